@@ -1,0 +1,46 @@
+# `make` lists what there is. Everything needs python3 (3.11 or newer), venv and make, and nothing else.
+PYTHON ?= python3
+BIN    := .venv/bin
+DEMO   := demo
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test lint check all-pythons wheel bench clean
+
+help:  ## list the targets
+	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+setup: .venv/ready  ## make the environment in .venv
+
+.venv/ready: pyproject.toml constraints.txt
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "levilab needs Python 3.11 or newer, this is " + sys.version.split()[0] + ": make PYTHON=python3.12 …")'
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+	@touch $@
+
+demo: setup  ## the main job on the virtual bench: acquire, analyze, report
+	@rm -rf $(DEMO)
+	$(BIN)/levilab acquire spin --mock --out $(DEMO)
+	$(BIN)/levilab analyze spindown $(DEMO)
+	$(BIN)/levilab report $(DEMO) --output $(DEMO)/report.html
+
+test: setup lint  ## everything that must pass: style, types, imports, tests
+	$(BIN)/python -m pytest
+
+lint: setup  ## style, types and import rules
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports --no-cache
+
+all-pythons: setup  ## the tests on every Python from 3.11 on that is installed
+	$(BIN)/nox --session tests
+
+wheel: setup  ## build the wheel and try it in a clean environment, beside a decoy
+	$(BIN)/nox --session wheel
+
+bench: setup  ## speed, as ratios within one run; the kept results are in docs/speed.md
+	$(BIN)/python benchmarks/spindown.py
+	$(BIN)/python benchmarks/startup.py
+
+clean:  ## remove what can be made again
+	rm -rf .venv build dist $(DEMO) .nox .pytest_cache .mypy_cache .ruff_cache .hypothesis

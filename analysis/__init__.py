@@ -1,0 +1,1 @@
+"""Analyses: pure functions, arrays in, frozen results out."""

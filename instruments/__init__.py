@@ -1,0 +1,1 @@
+"""Drivers for the instruments of the bench. Knows nothing of levilab."""

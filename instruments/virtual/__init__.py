@@ -1,0 +1,1 @@
+"""Wire-level models of the instruments: bytes in, bytes out."""

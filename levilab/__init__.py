@@ -1,0 +1,1 @@
+"""The lab application for experiments on the Levitron."""

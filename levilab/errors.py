@@ -1,0 +1,13 @@
+"""What goes wrong in ways that a person can mend: told in one line, never as a traceback."""
+
+from typing import ClassVar
+
+
+class LevilabError(Exception):
+    """A known failure. The text says what was seen, what was expected and what to do."""
+
+    exit_code: ClassVar[int] = 1
+
+
+class DataError(LevilabError):
+    """A data file or run folder that cannot be used as it is."""

@@ -1,0 +1,1 @@
+"""The virtual world: what the simulated bench measures."""
