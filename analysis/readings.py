@@ -1,0 +1,122 @@
+"""Readings of a spin-down, checked, and in the dimensionless numbers that fits work with."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analysis.errors import NoSpinDown, NotFinite, NotPositive, ShapesDiffer, TimesNotIncreasing, TooFewReadings
+
+Array = NDArray[np.float64]
+
+FEWEST = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """Spin frequency against time.
+
+    Attributes:
+        time: shape (n,), increasing [s].
+        frequency: shape (n,), above 0 [Hz].
+        u: standard uncertainties of the frequencies, shape (n,) [Hz]; None: unknown.
+        start_time: of the run [s].
+        reference_hz: unit of spin frequency [Hz].
+        duration: unit of time [s].
+        tau: time since the start in units of `duration`.
+        x: frequency in units of `reference_hz`.
+        weight: 1/u in the same units, one and the same where u is unknown.
+    """
+
+    time: Array
+    frequency: Array
+    u: Array | None
+    start_time: float
+    reference_hz: float
+    duration: float
+    tau: Array
+    x: Array
+    weight: Array | float
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def sigma_known(self) -> bool:
+        """Whether the uncertainties were given."""
+        return self.u is not None
+
+    def without(self, left_out: NDArray[np.intp]) -> "Readings":
+        """The same readings, some left out; start and units stay."""
+        keep = np.ones(len(self), dtype=bool)
+        keep[left_out] = False
+        return Readings(
+            time=self.time[keep],
+            frequency=self.frequency[keep],
+            u=None if self.u is None else self.u[keep],
+            start_time=self.start_time,
+            reference_hz=self.reference_hz,
+            duration=self.duration,
+            tau=self.tau[keep],
+            x=self.x[keep],
+            weight=self.weight[keep] if isinstance(self.weight, np.ndarray) else self.weight,
+        )
+
+
+def checked(time: ArrayLike, frequency: ArrayLike, u: ArrayLike | None) -> Readings:
+    """Readings that a spin-down can be fitted to.
+
+    Raises:
+        ShapesDiffer, TooFewReadings, NotFinite, TimesNotIncreasing, NotPositive: as they say.
+        NoSpinDown: the spin does not fall.
+    """
+    t = _column("time", time, None)
+    if len(t) < FEWEST:
+        raise TooFewReadings(seen=len(t), needed=FEWEST)
+    f = _column("spin frequency", frequency, len(t))
+    sigma = None if u is None else _column("standard uncertainty", _spread(u, len(t)), len(t))
+    for quantity, column in (("time", t), ("spin frequency", f), ("standard uncertainty", sigma)):
+        _all_finite(quantity, column)
+    still = np.flatnonzero(np.diff(t) <= 0)
+    if still.size:
+        i = int(still[0])
+        raise TimesNotIncreasing(index=i + 1, before=float(t[i]), after=float(t[i + 1]))
+    _all_positive("spin frequency", f)
+    _all_positive("standard uncertainty", sigma)
+    _falls(f)
+    reference_hz, duration = float(np.exp(np.log(f).mean())), float(t[-1] - t[0])
+    weight = 1.0 if sigma is None else reference_hz / sigma
+    return Readings(t, f, sigma, float(t[0]), reference_hz, duration, (t - t[0]) / duration, f / reference_hz, weight)
+
+
+def _spread(u: ArrayLike, n: int) -> Array:
+    values = np.asarray(u, dtype=float)
+    return np.full(n, values) if values.ndim == 0 else values
+
+
+def _column(quantity: str, values: ArrayLike, n: int | None) -> Array:
+    column = np.array(values, dtype=float)  # a copy: results must not change with the caller's array
+    if column.ndim != 1 or (n is not None and len(column) != n):
+        raise ShapesDiffer(quantity=quantity, seen=column.shape, expected=(n if n is not None else column.size,))
+    column.flags.writeable = False
+    return column
+
+
+def _all_finite(quantity: str, column: Array | None) -> None:
+    bad = np.flatnonzero(~np.isfinite(column)) if column is not None else ()
+    if len(bad) and column is not None:
+        raise NotFinite(quantity=quantity, index=int(bad[0]), value=float(column[bad[0]]))
+
+
+def _all_positive(quantity: str, column: Array | None) -> None:
+    bad = np.flatnonzero(column <= 0) if column is not None else ()
+    if len(bad) and column is not None:
+        raise NotPositive(quantity=quantity, unit="Hz", index=int(bad[0]), value=float(column[bad[0]]))
+
+
+def _falls(frequency: Array) -> None:
+    """The medians of the first and last third decide, so that one miscounted reading does not."""
+    third = -(-len(frequency) // 3)
+    first, last = float(np.median(frequency[:third])), float(np.median(frequency[-third:]))
+    if last >= first * (1 - 1e-12):
+        raise NoSpinDown(first=first, last=last)

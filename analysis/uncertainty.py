@@ -1,0 +1,104 @@
+"""Standard uncertainties: from curvature, from resampled residuals, and what an estimate is.
+
+Source: JCGM 100:2008 (GUM) for the words; Bates & Watts, Nonlinear Regression Analysis (1988), §2; Davison & Hinkley,
+Bootstrap Methods and their Application (1997), §6.2.3 and §7.2.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A quantity as estimated.
+
+    Attributes:
+        value: None where no float can hold it.
+        u: standard uncertainty; None where the readings leave it undefined.
+        unit: of both.
+        interval: the two ends of a 68 % interval, where one was asked for and found.
+    """
+
+    value: float | None
+    u: float | None
+    unit: str
+    interval: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Curvature:
+    """What the slopes at a solution say.
+
+    Attributes:
+        covariance: (JᵀJ)⁻¹, shape (p, p); None where the parameters cannot be separated.
+        leverage: how far each fitted value follows its own reading, 0 to 1, shape (n,).
+    """
+
+    covariance: Array | None
+    leverage: Array
+
+
+def curvature(gradient: Array) -> Curvature:
+    """Covariance for residuals of unit variance, and leverages, from slopes of shape (p, n).
+
+    By QR of the scaled slopes, never by their squares: a normal matrix loses half the digits.
+    """
+    scale = np.linalg.norm(gradient, axis=1)
+    if not (np.isfinite(scale).all() and (scale > 0).all()):
+        return Curvature(None, np.zeros(gradient.shape[1]))
+    rows = gradient / scale[:, None]
+    triangle = np.linalg.qr(rows.T, mode="r")
+    diagonal = np.abs(np.diagonal(triangle))
+    if diagonal.min() < 1e-12 * diagonal.max():  # 1e-12: the parameters differ by less than rounding tells
+        return Curvature(None, np.zeros(gradient.shape[1]))
+    inverse = np.linalg.inv(triangle)
+    orthonormal = inverse.T @ rows
+    with np.errstate(over="ignore"):
+        covariance = inverse @ inverse.T / np.outer(scale, scale)
+    return Curvature(covariance, np.minimum(np.einsum("pn,pn->n", orthonormal, orthonormal), 1.0))
+
+
+def propagate(covariance: Array, slopes: Array) -> tuple[Array | None, Array]:
+    """Covariance of functions of parameters, and their standard uncertainties, to first order.
+
+    Args:
+        covariance: of the parameters, shape (p, p).
+        slopes: of the functions with respect to them, shape (q, p).
+
+    Returns:
+        Covariance, shape (q, q), None where it overflows though the uncertainties, shape (q,), do not.
+    """
+    scale = np.abs(slopes).max(axis=1)
+    rows = slopes / np.where(scale > 0, scale, 1.0)[:, None]
+    unit = rows @ covariance @ rows.T
+    with np.errstate(over="ignore", invalid="ignore"):
+        full = unit * np.outer(scale, scale)
+    return (full if np.isfinite(full).all() else None), scale * np.sqrt(np.maximum(np.diagonal(unit), 0.0))
+
+
+def bootstrap(
+    refit: Callable[[Array], Array], residuals: Array, leverage: Array, *, samples: int, seed: int
+) -> list[tuple[float, float] | None]:
+    """Percentile intervals of 68.27 % from a fit repeated with its own residuals, drawn anew.
+
+    A residual is smaller than the error it stems from, by √(1 − leverage): that is put right first, and the mean
+    taken off.
+
+    Args:
+        refit: added errors, shape (n,), → parameters, shape (p,).
+        residuals: of equal variance, shape (n,).
+        leverage: shape (n,).
+        samples: how often.
+        seed: of the random numbers.
+    """
+    errors = residuals / np.sqrt(np.maximum(1 - leverage, 1e-12))
+    errors -= errors.mean()
+    random = np.random.default_rng(seed)
+    fits = np.array([refit(random.choice(errors, len(errors))) for _ in range(samples)])
+    low, high = np.percentile(fits, [15.865525, 84.134475], axis=0)
+    return [(float(a), float(b)) if np.isfinite([a, b]).all() else None for a, b in zip(low, high, strict=True)]

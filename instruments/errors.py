@@ -1,0 +1,59 @@
+"""What can go wrong between a driver and its instrument: one small tree.
+
+Each error says what was seen, what was expected and what to do, and carries the values as attributes.
+"""
+
+
+class InstrumentError(Exception):
+    """Anything that an instrument, or the way to it, did wrong.  address: the resource name."""
+
+    def __init__(self, address: str, message: str) -> None:
+        self.address = address
+        super().__init__(f"{address}: {message}")
+
+
+class NotConnected(InstrumentError):
+    """No instrument could be reached at this address."""
+
+
+class NoAnswer(InstrumentError):
+    """The instrument stayed silent.  question: what was asked; timeout: how long was waited [s]."""
+
+    def __init__(self, address: str, question: str, timeout: float) -> None:
+        self.question, self.timeout = question, timeout
+        super().__init__(
+            address,
+            f"no answer to {question!r} within {timeout:g} s: is it switched on, and free of other programs?",
+        )
+
+
+class BadAnswer(InstrumentError):
+    """The instrument answered something else than was expected."""
+
+    def __init__(self, address: str, question: str, answer: str, expected: str) -> None:
+        self.question, self.answer, self.expected = question, answer, expected
+        super().__init__(address, f"{question!r} was answered with {answer!r}, expected {expected}")
+
+
+class CommandRefused(InstrumentError):
+    """The instrument's error queue was not empty after a command.  entries: its texts, oldest first."""
+
+    def __init__(self, address: str, command: str, entries: tuple[str, ...]) -> None:
+        self.command, self.entries = command, entries
+        super().__init__(address, f"after {command!r} the instrument reports {'; '.join(entries)}")
+
+
+class WrongInstrument(InstrumentError):
+    """Another model than expected answered.  identity: its answer to ``*IDN?``."""
+
+    def __init__(self, address: str, identity: str, expected: str) -> None:
+        self.identity, self.expected = identity, expected
+        super().__init__(address, f"{identity!r} answered, expected {expected}: check the address")
+
+
+class OutOfRange(InstrumentError, ValueError):
+    """A setting that the instrument, or the bench, does not allow; nothing was sent."""
+
+    def __init__(self, address: str, name: str, value: object, allowed: str) -> None:
+        self.name, self.value, self.allowed = name, value, allowed
+        super().__init__(address, f"{name} = {value} is refused, allowed is {allowed}")

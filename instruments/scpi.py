@@ -1,0 +1,160 @@
+"""IEEE 488.2 and SCPI: what the drivers have in common, and how they declare a quantity in one line.
+
+Source: IEEE 488.2-1992; SCPI-1999 volumes 1 and 2.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar, cast, overload
+
+from instruments.errors import BadAnswer, CommandRefused, OutOfRange, WrongInstrument
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from instruments.transport import Transport
+
+T = TypeVar("T", bound=bool | float | str)
+
+#: What SCPI instruments send when there is no reading, and for infinity (SCPI-1999, vol. 1, 7.2.1).
+NOT_A_NUMBER, INFINITY = 9.91e37, 9.9e37
+
+#: Error queues hold 20 to 32 entries; more questions than that mean that the instrument never says "none".
+_LONGEST_ERROR_QUEUE = 64
+
+
+#: An answer's text as a value.  Instruments quote some words, and print switches as 0 or 1.
+_FROM_WIRE: dict[type, Callable[[str], Any]] = {
+    float: float,
+    bool: lambda answer: bool(int(answer)),
+    str: lambda answer: answer.strip('"'),
+}
+
+
+class ScpiInstrument:
+    """An instrument that speaks SCPI over a transport.
+
+    MODELS: what the model field of ``*IDN?`` must match, whole (regular expression).
+    """
+
+    MODELS: ClassVar[str] = ".*"
+
+    def __init__(self, transport: Transport) -> None:
+        self.transport = transport
+
+    def identity(self) -> str:
+        """The answer to ``*IDN?``.  Raises WrongInstrument when another model answers."""
+        answer = self.transport.query("*IDN?")
+        model = answer.split(",")[1].strip() if answer.count(",") >= 2 else answer
+        if not re.fullmatch(self.MODELS, model, re.IGNORECASE):
+            raise WrongInstrument(self.transport.address, answer, f"a model like {self.MODELS}")
+        return answer
+
+    def command(self, message: str) -> None:
+        """Send a command and read the error queue.  Raises CommandRefused with the queue's texts."""
+        self.transport.write(message)
+        self.raise_errors(message)
+
+    def raise_errors(self, after: str) -> None:
+        """Empty the error queue; raise CommandRefused if there was anything in it.
+
+        Entries look like ``+0,"No error"`` or, from some makers, ``0,"No error"``.
+        """
+        entries: list[str] = []
+        for _ in range(_LONGEST_ERROR_QUEUE):
+            answer = self.transport.query("SYST:ERR?")
+            number, _, text = answer.partition(",")
+            if not re.fullmatch(r"[+-]?\d+", number.strip()):
+                raise BadAnswer(self.transport.address, "SYST:ERR?", answer, 'a number and a text, as +0,"No error"')
+            if int(number) == 0:
+                break
+            entries.append(f"{number} {text}")
+        if entries:
+            raise CommandRefused(self.transport.address, after, tuple(entries))
+
+    def settings(self) -> dict[str, bool | float | str]:
+        """Every declared setting as it stands in the instrument, unit at the end of the name."""
+        return {
+            f"{name}_{setting.suffix}" if setting.suffix else name: getattr(self, name)
+            for name, setting in vars(type(self)).items()
+            if isinstance(setting, Setting)
+        }
+
+    def close(self) -> None:
+        """Give the instrument back."""
+        self.transport.close()
+
+
+@dataclass(eq=False)
+class Setting(Generic[T]):
+    """A quantity of an instrument that can be set and asked for, declared in one line.
+
+    header: the SCPI header; kind: float, bool or str; unit: of the number on the wire;
+    low, high: what the instrument takes; choices: the words it takes, in their short form;
+    suffix: the unit as it stands in names that leave the program (``hz``).
+    """
+
+    header: str
+    kind: type[T]
+    unit: str = ""
+    low: float = -math.inf
+    high: float = math.inf
+    choices: tuple[str, ...] = ()
+    name: str = ""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    @property
+    def suffix(self) -> str:
+        """The unit for the end of a name: Hz → hz."""
+        return self.unit.lower()
+
+    @overload
+    def __get__(self, instrument: None, owner: type) -> Setting[T]: ...
+    @overload
+    def __get__(self, instrument: ScpiInstrument, owner: type) -> T: ...
+    def __get__(self, instrument: ScpiInstrument | None, owner: type) -> Setting[T] | T:
+        """Ask the instrument."""
+        if instrument is None:
+            return self
+        question = f"{self.header}?"
+        return self._parse(instrument.transport.address, question, instrument.transport.query(question))
+
+    def __set__(self, instrument: ScpiInstrument, value: T) -> None:
+        """Check, send, and read the error queue."""
+        self._check(instrument.transport.address, value)
+        instrument.command(f"{self.header} {self._spell(value)}")
+
+    def _parse(self, address: str, question: str, answer: str) -> T:
+        convert: Callable[[str], Any] = _FROM_WIRE[self.kind]
+        try:
+            return cast("T", convert(answer))
+        except ValueError:
+            raise BadAnswer(address, question, answer, "a number") from None
+
+    def _check(self, address: str, value: T) -> None:
+        if self.choices and str(value).upper() not in self.choices:
+            raise OutOfRange(address, self.name, value, "one of " + ", ".join(self.choices))
+        if self.kind is float and not self.low <= float(value) <= self.high:
+            raise OutOfRange(address, self.name, value, f"{self.low:g} to {self.high:g} {self.unit}")
+
+    def _spell(self, value: T) -> str:
+        if self.kind is bool:
+            return "ON" if value else "OFF"
+        return repr(float(value)) if self.kind is float else str(value).upper()
+
+
+def parse_reading(address: str, question: str, answer: str) -> float | None:
+    """A measured number, or None where the instrument says that there was nothing to measure.
+
+    Raises BadAnswer if it is no number at all.
+    """
+    try:
+        number = float(answer)
+    except ValueError:
+        raise BadAnswer(address, question, answer, "a number") from None
+    return None if not math.isfinite(number) or abs(number) >= INFINITY else number

@@ -1,0 +1,148 @@
+"""The way to an instrument: PyVISA behind one small protocol.
+
+The only module that imports PyVISA.  A driver sees a :class:`Transport` and cannot tell a real instrument
+from a virtual one.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Protocol
+
+from instruments.errors import BadAnswer, NoAnswer, NotConnected
+
+if TYPE_CHECKING:
+    from pyvisa.highlevel import VisaLibraryBase
+    from pyvisa.resources import MessageBasedResource
+
+#: Called with the address, ">" or "<", and the bytes that were sent or received.
+TrafficLog = Callable[[str, str, bytes], None]
+
+#: PyVISA's own reading of a resource name that is a bare TCP connection: only reopening empties its pipe.
+_BARE_SOCKET = "::SOCKET"
+
+
+class Transport(Protocol):
+    """Messages to and from one instrument.  timeout: how long an answer is waited for [s]."""
+
+    address: str
+    timeout: float
+
+    def write(self, message: str) -> None:
+        """Send one message."""
+
+    def query(self, message: str, *, patience: float = 0.0) -> str:
+        """Send a question and return the answer without its line end.
+
+        patience: how long the instrument works on this answer before it can send it [s]; added to the
+        timeout.  Raises NoAnswer when nothing came in time.
+        """
+
+    def clear(self) -> None:
+        """Drop whatever is under way in either direction."""
+
+    def close(self) -> None:
+        """Give the instrument back."""
+
+
+class VisaTransport:
+    """A message-based VISA resource: GPIB, USB, TCP socket, VXI-11, HiSLIP, serial, or a virtual one."""
+
+    def __init__(
+        self,
+        address: str,
+        *,
+        library: str | VisaLibraryBase = "@py",
+        timeout: float = 2.0,
+        log: TrafficLog | None = None,
+    ) -> None:
+        """Open the resource.
+
+        library: a PyVISA library, ``"@py"`` needs nothing installed, ``""`` is the vendor's.
+        timeout: of one answer [s].  Raises NotConnected.
+        """
+        self.address, self.timeout = address, timeout
+        self._library, self._log = library, log
+        self._out_of_step = False
+        self._resource = self._open()
+
+    def _open(self) -> MessageBasedResource:
+        import pyvisa
+
+        try:
+            # pyvisa annotates neither a library instance here nor the message-based result
+            manager = pyvisa.ResourceManager(self._library)  # type: ignore[arg-type, unused-ignore]
+            resource: Any = manager.open_resource(self.address)
+        except (pyvisa.Error, OSError, ValueError) as error:
+            raise NotConnected(
+                self.address,
+                f"cannot be opened ({_one_line(error)}): check the address, the cable and that it is on",
+            ) from error
+        resource.write_termination = resource.read_termination = "\n"
+        return resource  # type: ignore[no-any-return]
+
+    def write(self, message: str) -> None:
+        """Send one message; see :class:`Transport`."""
+        if self._out_of_step:
+            self.clear()
+        self._record(">", message)
+        with self._told_as_ours(message, self.timeout):
+            self._resource.write(message)
+
+    def query(self, message: str, *, patience: float = 0.0) -> str:
+        """Ask; see :class:`Transport`."""
+        self.write(message)
+        within = self.timeout + patience
+        with self._told_as_ours(message, within):
+            self._resource.timeout = 1000 * within
+            answer = self._resource.read()
+        self._record("<", answer)
+        return answer.strip()
+
+    def clear(self) -> None:
+        """Resynchronise: a late answer to an old question never reaches the driver."""
+        import pyvisa
+
+        self._out_of_step = False
+        if self.address.upper().endswith(_BARE_SOCKET):
+            self._resource.close()
+            self._resource = self._open()
+            return
+        with contextlib.suppress(pyvisa.Error, NotImplementedError):
+            self._resource.clear()
+
+    def close(self) -> None:
+        """Close the resource; closing twice does no harm."""
+        self._resource.close()
+
+    def _record(self, direction: str, message: str) -> None:
+        if self._log:
+            self._log(self.address, direction, message.encode(errors="replace") + b"\n")
+
+    @contextlib.contextmanager
+    def _told_as_ours(self, question: str, within: float) -> Any:
+        """PyVISA's errors as ours; afterwards the next exchange starts from a clean pipe."""
+        import pyvisa
+
+        try:
+            yield
+        except pyvisa.VisaIOError as error:
+            self._out_of_step = True
+            if error.error_code == pyvisa.constants.StatusCode.error_timeout:
+                raise NoAnswer(self.address, question, within) from error
+            raise NotConnected(self.address, f"the link broke at {question!r} ({_one_line(error)})") from error
+        except UnicodeDecodeError as error:
+            self._out_of_step = True
+            raise BadAnswer(self.address, question, repr(error.object[:40]), "plain text") from error
+        except (pyvisa.Error, OSError) as error:
+            self._out_of_step = True
+            raise NotConnected(self.address, f"the link broke at {question!r} ({_one_line(error)})") from error
+        except BaseException:
+            # an interruption between question and answer leaves the answer in the pipe
+            self._out_of_step = True
+            raise
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(str(error).split())

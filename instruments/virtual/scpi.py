@@ -1,0 +1,251 @@
+"""The SCPI parser of the virtual instruments: one parser, a table of commands per instrument.
+
+Source: SCPI-1999, volume 1: short and long forms in any case (6.2), optional nodes and numeric suffixes,
+compound messages with path memory (6.2.4), unit suffixes (7.1), MINimum, MAXimum and DEFault (7.2.1);
+volume 2, chapter 21: the error numbers.  A message that is not understood gets no reply, only an entry in
+the error queue: that is what makes the other side time out, as on the bench.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import deque
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+ERRORS = {
+    -102: "Syntax error",
+    -104: "Data type error",
+    -108: "Parameter not allowed",
+    -109: "Missing parameter",
+    -113: "Undefined header",
+    -131: "Invalid suffix",
+    -222: "Data out of range",
+    -224: "Illegal parameter value",
+    -230: "Data corrupt or stale",
+    -350: "Error queue overflow",
+    -363: "Input buffer overrun",
+    -410: "Query INTERRUPTED",
+}
+
+_MULTIPLIERS = {"": 1.0, "N": 1e-9, "U": 1e-6, "M": 1e-3, "K": 1e3, "MA": 1e6, "G": 1e9}
+_NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*([a-zA-Z]*)")
+_CHANNEL_LIST = re.compile(r"\(@[\d,: ]*\)")
+
+
+class ScpiError(Exception):
+    """An entry for the error queue.  number: as in the table above."""
+
+    def __init__(self, number: int, detail: str = "") -> None:
+        self.number = number
+        text = ERRORS[number] + (f";{detail}" if detail else "")
+        self.entry = f'{number:+d},"{text}"'
+        super().__init__(self.entry)
+
+
+@dataclass(frozen=True)
+class Command:
+    """One row of an instrument's table.
+
+    pattern: the header as the manual prints it, ``[SOURce[1]:]FREQuency[:CW|:FIXed]``;
+    set, get: what a command or a query with this header does, given its parameters; None where there is none.
+    """
+
+    pattern: str
+    set: Callable[[list[str]], None] | None = None
+    get: Callable[[list[str]], str] | None = None
+
+    @cached_property
+    def header(self) -> re.Pattern[str]:
+        """The pattern as a regular expression for a header without its question mark."""
+        return re.compile(_expression(self.pattern), re.IGNORECASE)
+
+
+def _expression(pattern: str) -> str:
+    """A printed header as a regular expression: FREQuency → (?:FREQUENCY|FREQ), [x] → (?:x)?.
+
+    >>> _expression("[SOURce[1]:]FREQuency")
+    '(?:(?:SOURCE|SOUR)(?:1)?:)?(?:FREQUENCY|FREQ)'
+    """
+
+    def mnemonic(match: re.Match[str]) -> str:
+        long = match[0].upper()
+        short = re.sub("[a-z]", "", match[0])
+        return long if long == short else f"(?:{long}|{short})"
+
+    words = re.sub(r"[A-Z]+[a-z]*", mnemonic, pattern.replace("*", r"\*").replace("[", "\0"))
+    return words.replace("\0", "(?:").replace("]", ")?")
+
+
+@dataclass
+class Parser:
+    """Takes messages apart and runs them on a table of commands.
+
+    commands: the table; queue_size: entries of the error queue before it overflows.
+    """
+
+    commands: tuple[Command, ...]
+    queue_size: int = 20
+    errors: deque[str] = field(default_factory=deque)
+    _known: dict[str, Command] = field(default_factory=dict)
+
+    def run(self, message: str) -> str | None:
+        """Execute one message (a line without its end); the answers of its queries joined with ``;``, or None."""
+        answers: list[str] = []
+        path = ""
+        for unit in split_units(message):
+            header, _, rest = unit.partition(" ")
+            full, path = _resolve(header, path)
+            try:
+                answer = self._execute(full, split_parameters(rest))
+            except ScpiError as error:
+                self.report(error)
+                break
+            if answer is not None:
+                answers.append(answer)
+        return ";".join(answers) if answers else None
+
+    def _execute(self, header: str, parameters: list[str]) -> str | None:
+        name = header.removesuffix("?")
+        command = self._find(name)
+        if header.endswith("?"):
+            if command.get is None:
+                raise ScpiError(-113, header)
+            return command.get(parameters)
+        if command.set is None:
+            raise ScpiError(-113, header)
+        command.set(parameters)
+        return None
+
+    def _find(self, name: str) -> Command:
+        if name not in self._known:
+            found = next((command for command in self.commands if command.header.fullmatch(name)), None)
+            if found is None:  # unknown headers are not remembered: they could be any number
+                raise ScpiError(-113, name[:40])
+            self._known[name] = found
+        return self._known[name]
+
+    def report(self, error: ScpiError) -> None:
+        """Put an entry into the error queue; when it is full its last entry says so."""
+        if len(self.errors) < self.queue_size:
+            self.errors.append(error.entry)
+        else:
+            self.errors[-1] = ScpiError(-350).entry
+
+    def next_error(self) -> str:
+        """The oldest entry, removed, or ``+0,"No error"``."""
+        return self.errors.popleft() if self.errors else '+0,"No error"'
+
+
+def _resolve(header: str, path: str) -> tuple[str, str]:
+    """The full header of a program message unit, and the path that the next one starts from."""
+    if header.startswith("*"):
+        return header, path
+    full = header[1:] if header.startswith(":") else path + header
+    return full, full.rpartition(":")[0] + ":" if ":" in full else ""
+
+
+def split_units(message: str) -> Iterator[str]:
+    """The units of a compound message: split at semicolons outside of quotes.
+
+    >>> list(split_units('FREQ 40; DISP:TEXT "a;b"'))
+    ['FREQ 40', 'DISP:TEXT "a;b"']
+    """
+    return (unit.strip() for unit in _split(message, ";") if unit.strip())
+
+
+def split_parameters(text: str) -> list[str]:
+    """The parameters of a unit: split at commas outside of quotes and parentheses.
+
+    >>> split_parameters("25, MAX, (@1,2)")
+    ['25', 'MAX', '(@1,2)']
+    """
+    return [parameter.strip() for parameter in _split(text, ",")] if text.strip() else []
+
+
+def _split(text: str, separator: str) -> Iterator[str]:
+    start, quote, depth = 0, "", 0
+    for position, character in enumerate(text):
+        if quote:
+            quote = "" if character == quote else quote
+        elif character in "\"'":
+            quote = character
+        elif character in "()":
+            depth += 1 if character == "(" else -1
+        elif character == separator and depth <= 0:
+            yield text[start:position]
+            start = position + 1
+    yield text[start:]
+
+
+def one(parameters: list[str]) -> str:
+    """The only parameter, a channel list beside it aside.  Raises ScpiError if there is none or another."""
+    plain = [parameter for parameter in parameters if not _CHANNEL_LIST.fullmatch(parameter)]
+    if not plain:
+        raise ScpiError(-109)
+    if len(plain) > 1:
+        raise ScpiError(-108)
+    return plain[0]
+
+
+def number(text: str, *, low: float, high: float, default: float, unit: str = "") -> float:
+    """A numeric parameter: ``25``, ``1 kHz``, ``MIN``, ``MAX``, ``DEF``, ``INF``.  Raises ScpiError.
+
+    >>> number("1.5 kHz", low=0, high=1e6, default=0, unit="HZ")
+    1500.0
+    """
+    words = {"MIN": low, "MINIMUM": low, "MAX": high, "MAXIMUM": high, "DEF": default, "DEFAULT": default}
+    words |= {"INF": 9.9e37, "INFINITY": 9.9e37} if high >= 9.9e37 else {}
+    if text.upper() in words:
+        return words[text.upper()]
+    match = _NUMBER.fullmatch(text)
+    if not match:
+        raise ScpiError(-104, text[:20])
+    value = float(match[1]) * _multiplier(match[2].upper(), unit)
+    if not low <= value <= high:
+        raise ScpiError(-222)
+    return value
+
+
+def _multiplier(suffix: str, unit: str) -> float:
+    prefix = suffix.removesuffix(unit) if unit else suffix
+    # SCPI 7.1: with Hz and ohm a leading M means mega, elsewhere milli
+    if prefix == "M" and unit in {"HZ", "OHM"}:
+        return 1e6
+    if prefix not in _MULTIPLIERS or (suffix and not suffix.endswith(unit)) or (suffix and not unit):
+        raise ScpiError(-131, suffix[:20])
+    return _MULTIPLIERS[prefix]
+
+
+def choice(text: str, words: tuple[str, ...]) -> str:
+    """One of the words, given in short or long form; the short form of it.  Raises ScpiError.
+
+    >>> choice("square", ("SINusoid", "SQUare"))
+    'SQU'
+    """
+    for word in words:
+        short = re.sub("[a-z]", "", word)
+        if text.upper() in {short, word.upper()}:
+            return short
+    raise ScpiError(-224, text[:20])
+
+
+def boolean(text: str) -> bool:
+    """ON, OFF, 1 or 0.  Raises ScpiError."""
+    words = {"ON": True, "1": True, "OFF": False, "0": False}
+    if text.upper() not in words:
+        raise ScpiError(-224, text[:20])
+    return words[text.upper()]
+
+
+def nr3(value: float) -> str:
+    """A number as these instruments print it.
+
+    >>> nr3(23.456789)
+    '+2.345678900000000E+01'
+    """
+    return f"{value:+.15E}"

@@ -1,0 +1,192 @@
+"""The commands: translate, call, print.  Heavy imports happen inside the commands that need them."""
+
+from __future__ import annotations
+
+import sys
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, NoReturn
+
+import typer
+
+app = typer.Typer(
+    name="levilab",
+    help="The lab application for experiments on the Levitron: acquire, analyze, report.",
+    epilog="Try: levilab acquire spin --mock",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+acquire_app = typer.Typer(no_args_is_help=True, help="Run an experiment on the bench and write a run folder.")
+analyze_app = typer.Typer(no_args_is_help=True, help="Analyze runs or data files.")
+app.add_typer(acquire_app, name="acquire")
+app.add_typer(analyze_app, name="analyze")
+
+EXIT_FAILED, EXIT_INSTRUMENT, EXIT_INTERRUPTED = 1, 3, 130
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else on standard output.")]
+Paths = Annotated[list[Path], typer.Argument(metavar="PATH…", help="Run folders, data files, or folders to search.")]
+
+
+class Uncertainty(StrEnum):
+    """How the uncertainties of the fitted constants are found."""
+
+    COVARIANCE = "covariance"
+    PROFILE = "profile"
+    BOOTSTRAP = "bootstrap"
+
+
+@app.callback()
+def levilab(
+    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.", is_eager=True)] = False,
+) -> None:
+    """The lab application for experiments on the Levitron: acquire, analyze, report."""
+    if version:
+        from importlib.metadata import version as installed
+
+        typer.echo(f"levilab {installed('levilab')}")
+        raise typer.Exit
+
+
+@acquire_app.command("spin", epilog="Example: levilab acquire spin --mock --note 'first try'")
+def acquire_spin(
+    mock: Annotated[bool, typer.Option("--mock", help="Use the virtual bench; needs no hardware.")] = False,
+    bench: Annotated[Path, typer.Option(metavar="FILE", help="Describes the real bench.")] = Path("bench.toml"),
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where the run folder is made.")] = Path("runs"),
+    seed: Annotated[int | None, typer.Option(min=0, help="Makes a virtual run repeatable.")] = None,
+    note: Annotated[str, typer.Option(help="Kept with the run.")] = "",
+    realtime: Annotated[bool, typer.Option("--realtime", help="Keep the virtual bench to the wall clock.")] = False,
+    resume: Annotated[Path | None, typer.Option(metavar="RUN", help="Go on with an interrupted run.")] = None,
+    wire_log: Annotated[bool, typer.Option("--wire-log", help="Keep all bytes sent and received.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Spin-down: drive the top up, switch the drive off, count its spin until it falls.
+
+    Ctrl-C ends the run after the reading under way; outputs go off and the run is kept.
+    """
+    from levilab.order import spin_order
+    from levilab.progress import to_stderr
+    from levilab.record import acquire
+
+    order = spin_order(
+        mock=mock,
+        bench=bench,
+        out=out,
+        seed=seed,
+        note=note,
+        realtime=realtime,
+        resume=resume,
+        wire_log=wire_log,
+    )
+    run = acquire(order, to_stderr())
+    readings = len(run.readings().frame)
+    if as_json:
+        import json
+
+        typer.echo(json.dumps({"run": str(run.folder), "status": run.status, "readings": readings}))
+    else:
+        typer.echo(f"{run.status}: {readings} readings in {run.folder}")
+    if run.status == "interrupted":
+        raise typer.Exit(EXIT_INTERRUPTED)
+
+
+@analyze_app.command("spindown", epilog="Example: levilab analyze spindown sample_data/")
+def analyze_spindown(
+    paths: Paths,
+    columns: Annotated[
+        str,
+        typer.Option(metavar="NAME=COLUMN,…", help="Columns of your file, as time_s=Zeit,spin_frequency_hz=f."),
+    ] = "",
+    reading_u: Annotated[
+        float | None,
+        typer.Option(metavar="HZ", min=0, help="Standard uncertainty of a reading, if not in the data."),
+    ] = None,
+    uncertainty: Annotated[
+        Uncertainty, typer.Option(help="profile and bootstrap add intervals, and take longer.")
+    ] = Uncertainty.COVARIANCE,
+    keep_outliers: Annotated[
+        bool, typer.Option("--keep-outliers", help="Fit readings that look like miscounts, too.")
+    ] = False,
+    save: Annotated[bool, typer.Option(help="Write result.json and figures beside the run.")] = True,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write them there instead.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude."""
+    from levilab.formats import parse_columns
+    from levilab.pipeline import Options, analyze_spindowns
+    from levilab.result import as_document, save_result
+    from levilab.tables import print_spindown
+
+    options = Options(parse_columns(columns), reading_u, uncertainty.value, keep_outliers)
+    analysis = analyze_spindowns(paths, options)
+    folder = out or analysis.home
+    if as_json:
+        import json
+
+        typer.echo(json.dumps(as_document(analysis, folder), indent=2, sort_keys=True, allow_nan=False))
+    else:
+        print_spindown(analysis)
+    if save:
+        for path in save_result(analysis, folder):
+            typer.echo(f"wrote {path}", err=True)
+
+
+@app.command(epilog="Example: levilab report sample_data/ -o report.html")
+def report(
+    paths: Paths,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE.html", help="The file to write.")] = Path(
+        "report.html"
+    ),
+) -> None:
+    """Report runs in one self-contained file: what was measured, with what, figures, numbers, warnings."""
+    from levilab.report.page import write_report
+
+    typer.echo(f"the report is in {write_report(paths, output)}")
+
+
+@app.command(epilog="Example: levilab runs runs/")
+def runs(
+    folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="The folder to search.")] = Path("runs"),
+    as_json: Json = False,
+) -> None:
+    """List runs: when, what, status, length."""
+    from levilab.listing import list_runs
+    from levilab.tables import print_runs
+
+    found = list_runs(folder)
+    if as_json:
+        import json
+
+        typer.echo(json.dumps([vars(run) for run in found], indent=2))
+    else:
+        print_runs(found, folder)
+
+
+def main() -> None:
+    """The console script: known failures become one line and an exit status, everything else stays loud."""
+    _speak_utf8()
+    try:
+        app()
+    except Exception as error:  # noqa: BLE001 - sorted by kind below
+        _tell(error)
+
+
+def _tell(error: Exception) -> NoReturn:
+    from analysis.errors import AnalysisError
+    from instruments.errors import InstrumentError
+    from levilab.errors import LevilabError
+
+    codes = ((InstrumentError, EXIT_INSTRUMENT), (LevilabError, EXIT_FAILED), (AnalysisError, EXIT_FAILED))
+    for kind, code in (*codes, (OSError, EXIT_FAILED)):
+        if isinstance(error, kind):
+            typer.echo("levilab: " + " ".join(str(error).split()), err=True)
+            sys.exit(code)
+    raise error
+
+
+def _speak_utf8() -> None:
+    """Windows consoles and pipes default to code pages without ν and ω."""
+    for stream in (sys.stdout, sys.stderr):
+        reconfigure = getattr(stream, "reconfigure", None)
+        if reconfigure:
+            reconfigure(errors="replace")

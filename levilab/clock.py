@@ -1,0 +1,55 @@
+"""Time on the bench: the wall's, or a virtual one that jumps."""
+
+from __future__ import annotations
+
+import time
+from typing import Protocol
+
+
+class Clock(Protocol):
+    """Seconds since the bench was switched on."""
+
+    def now(self) -> float:
+        """The time [s]."""
+
+    def sleep(self, duration: float) -> None:
+        """Let time pass [s]."""
+
+
+class WallClock:
+    """The time of a real bench."""
+
+    def __init__(self) -> None:
+        self._start = time.monotonic()
+
+    def now(self) -> float:
+        """The time [s]."""
+        return time.monotonic() - self._start
+
+    def sleep(self, duration: float) -> None:
+        """Wait [s]."""
+        time.sleep(max(0.0, duration))
+
+
+class VirtualClock:
+    """The time of a virtual bench: waiting takes no time, or with realtime as long as it says.
+
+    >>> clock = VirtualClock()
+    >>> clock.sleep(190.0)
+    >>> clock.now()
+    190.0
+    """
+
+    def __init__(self, *, realtime: bool = False) -> None:
+        self._now = 0.0
+        self._wall = WallClock() if realtime else None
+
+    def now(self) -> float:
+        """The time [s]."""
+        return self._now
+
+    def sleep(self, duration: float) -> None:
+        """Jump ahead [s]; with realtime wait until the wall clock is there too."""
+        self._now += max(0.0, duration)
+        if self._wall:
+            self._wall.sleep(self._now - self._wall.now())

@@ -1,0 +1,91 @@
+"""bench.toml → frozen, validated settings.  Keys end in their unit; a wrong key or value is named with its path."""
+
+from __future__ import annotations
+
+import tomllib
+from typing import TYPE_CHECKING, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, ValidationError
+
+from levilab.errors import LevilabError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+class ConfigError(LevilabError):
+    """A configuration that cannot be used."""
+
+
+class Settings(BaseModel):
+    """A table of a configuration: frozen, and no key beside the ones named."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class InstrumentSettings(Settings):
+    """Where an instrument is, and what it is.  timeout_s: of one answer."""
+
+    model: str
+    address: str
+    timeout_s: PositiveFloat = 2.0
+
+
+class Limits(Settings):
+    """What this bench stands; more is refused, never clipped."""
+
+    drive_amplitude_vpp: PositiveFloat = 10.0
+    drive_frequency_hz: PositiveFloat = 100.0
+
+
+class SpinSettings(Settings):
+    """The spin-down: drive up to a frequency, switch off, read until the top falls.
+
+    reading_u_hz: standard uncertainty of one reading, where it is known; ramp_hz_per_s: no faster than the
+    drive can pull the top (about 0.25 Hz/s at 0.4 mT); longest_s: an end if the top never falls.
+    """
+
+    drive_frequency_hz: PositiveFloat = 40.0
+    drive_amplitude_vpp: PositiveFloat = 10.0
+    drive_waveform: Literal["SIN", "SQU", "TRI"] = "SIN"
+    ramp_hz_per_s: PositiveFloat = 0.2
+    interval_s: PositiveFloat = 10.0
+    gate_s: PositiveFloat = 1.0
+    trigger_level_v: float = 0.6
+    reading_u_hz: PositiveFloat | None = None
+    longest_s: PositiveFloat = 1800.0
+
+
+class BenchConfig(Settings):
+    """The bench: its instruments by kind, its limits, and how the experiments are run on it."""
+
+    visa_library: str = "@py"
+    counter: InstrumentSettings | None = None
+    generator: InstrumentSettings | None = None
+    limits: Limits = Field(default_factory=Limits)
+    spin: SpinSettings = Field(default_factory=SpinSettings)
+
+
+def read_bench(path: Path) -> BenchConfig:
+    """The bench described in a TOML file.  Raises ConfigError."""
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except FileNotFoundError:
+        raise ConfigError(
+            f"{path}: there is no such file: describe your bench in it (docs/bench.md), or try --mock"
+        ) from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: not readable as TOML: {error}") from error
+    try:
+        return BenchConfig.model_validate(table)
+    except ValidationError as error:
+        raise ConfigError(f"{path}: {in_one_line(error)}") from error
+
+
+def in_one_line(error: ValidationError) -> str:
+    """The first thing that is wrong, with its path and what is allowed, and how many more there are."""
+    first = error.errors()[0]
+    where = ".".join(str(part) for part in first["loc"]) or "the whole"
+    seen = "" if first["type"] == "missing" else f" = {str(first['input'])[:60]!r}"
+    more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
+    return f"{where}{seen}: {first['msg']}{more}"

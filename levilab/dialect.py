@@ -1,0 +1,149 @@
+"""How a line of a table is written: separator, decimal mark, comments, missed readings.
+
+The dialect is found by trying each row of a table on the file's lines and counting what comes out as numbers.
+"""
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+from levilab.columns import known_titles
+
+COMMENTS = ("#", "%", "//")
+COMMENTS_UNLESS_SEMICOLON = (*COMMENTS, ";", "'")
+MISSING = frozenset(
+    ("", "-", "--", "---", "n/a", "na", "n.a.", "nan", "#n/a", "#nv", "#num!", "#wert!", "#value!", "null", "none")
+)
+Kind = Literal["number", "missing", "text"]
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """Separator of the fields (None: any blanks) and decimal mark of the numbers."""
+
+    separator: str | None
+    decimal: str
+
+    @property
+    def comments(self) -> tuple[str, ...]:
+        """What a comment begins with; a semicolon that separates begins an empty field instead."""
+        return COMMENTS if self.separator == ";" else COMMENTS_UNLESS_SEMICOLON
+
+    def skips(self, line: str) -> bool:
+        """Whether a line is blank or a comment; tabs that separate are empty fields, not blanks."""
+        plain = line.strip(" \n") if self.separator == "\t" else line.strip()
+        return not plain or plain.lstrip().startswith(self.comments)
+
+    def split(self, line: str) -> list[str]:
+        """The fields of a line, stripped, without their quotation marks."""
+        if self.separator is None:
+            return _split_at_blanks(line)
+        if '"' not in line:
+            return [field.strip() for field in line.split(self.separator)]
+        try:
+            fields = next(csv.reader([line.strip(" \n")], delimiter=self.separator, skipinitialspace=True))
+        except (csv.Error, StopIteration):  # a field beyond 128 KiB, or nothing but blanks
+            fields = line.split(self.separator)
+        return [field.strip() for field in fields]
+
+    def number(self, text: str) -> float:
+        """The number in a field; infinite where it says so or overflows.
+
+        Raises:
+            ValueError: it is none, or it has the other decimal mark.
+        """
+        if "_" in text or (self.decimal == "," and "." in text):
+            raise ValueError(text)
+        return float(text.replace(",", ".") if self.decimal == "," else text)
+
+    def kind(self, text: str) -> Kind:
+        """Whether a field holds a number, a missed reading, or text."""
+        if text.casefold() in MISSING:
+            return "missing"
+        try:
+            self.number(text)
+        except ValueError:
+            return "text"
+        return "number"
+
+
+# Of two that do equally well the first is taken. Comma with decimal comma needs quoted fields.
+SEPARATORS = ("\t", ";", ",", None)
+DIALECTS = tuple(Dialect(separator, decimal) for separator in SEPARATORS for decimal in (".", ","))
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line that is neither blank nor a comment: its 1-based number, its fields, and what each of them is."""
+
+    number: int
+    fields: tuple[str, ...]
+    kinds: tuple[Kind, ...]
+
+    @cached_property
+    def filled(self) -> int:
+        """Number of fields without the empty ones at the end."""
+        return filled(self.fields)
+
+    @property
+    def is_row(self) -> bool:
+        """Whether it could be a row of readings: two numbers, of which one may be missed."""
+        return "number" in self.kinds and len(self.kinds) - self.kinds.count("text") > 1
+
+    @property
+    def is_text(self) -> bool:
+        """Whether it could be a header: several fields, text and no number."""
+        return len(self.kinds) > 1 and "text" in self.kinds and "number" not in self.kinds
+
+
+def filled(fields: Sequence[str]) -> int:
+    """Number of fields without the empty ones at the end."""
+    return next((i for i in range(len(fields), 0, -1) if fields[i - 1]), 0)
+
+
+def usual(counts: Iterable[int]) -> int:
+    """The most frequent of some counts, 0 of none."""
+    found = Counter(counts).most_common(1)
+    return found[0][0] if found else 0
+
+
+def content(lines: Sequence[str], dialect: Dialect, first: int = 1) -> list[Line]:
+    """The lines that are neither blank nor comments; `first` is the number of the first line."""
+    split = ((n, tuple(dialect.split(line))) for n, line in enumerate(lines, first) if not dialect.skips(line))
+    return [Line(n, fields, tuple(map(dialect.kind, fields))) for n, fields in split]
+
+
+def find_dialect(lines: Sequence[str]) -> Dialect | None:
+    """The dialect in which the most lines are rows of equal width; None if nothing looks like a table.
+
+    Rows without text count first: "1,5 2,5" is three fields with commas, one of them text, but two numbers
+    with blanks. Where there are no rows, known titles decide, so that a mere header is seen as one.
+    """
+    scores = {d: _score(content(lines, d), SEPARATORS.index(d.separator)) for d in DIALECTS}
+    best = max(DIALECTS, key=scores.__getitem__)
+    if scores[best][1]:
+        return best
+    titles = {d: max((known_titles(x.fields) for x in content(lines, d) if x.is_text), default=0) for d in DIALECTS}
+    best = max(DIALECTS, key=titles.__getitem__)
+    return best if titles[best] else None
+
+
+def _score(lines: list[Line], rank: int) -> tuple[int, int, int, int]:
+    """Rows of equal width without text, such rows at all, the separator's rank, numbers in those rows."""
+    rows = [line for line in lines if line.is_row]
+    width = usual(line.filled for line in rows)
+    alike = [line for line in rows if line.filled == width]
+    clean = sum("text" not in line.kinds for line in alike)
+    return clean, len(alike), -rank, sum(line.kinds.count("number") for line in alike)
+
+
+def _split_at_blanks(line: str) -> list[str]:
+    if '"' in line:
+        return [field.strip('"') for field in re.findall(r'"[^"]*"|\S+', line)]
+    if any(mark in line for mark in "[(/"):  # "f [Hz]" and "f / Hz" are one title each
+        line = re.sub(r"\s+(?=[\[(/])|(?<=/)\s+", "", line)
+    return line.split()

@@ -1,0 +1,67 @@
+"""Ctrl-C and SIGTERM, asked for politely: a reading is finished, the outputs go off, the run is kept."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import threading
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from types import FrameType
+
+#: What asks a program to end: Ctrl-C, kill, a closed terminal, and on Windows Ctrl-Break.
+_SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
+
+
+class Interrupted(Exception):
+    """The run was asked to end.  by: the signal's name."""
+
+    def __init__(self, by: str) -> None:
+        self.by = by
+        super().__init__(f"interrupted by {by}")
+
+
+class Stop:
+    """Whether somebody asked for the end.
+
+    The first signal is only noted, so that no exchange with an instrument is torn; `check()` raises it
+    where the program can end well.  The second one breaks through, in case an exchange hangs; from then on
+    signals are ignored, so that nothing can keep the outputs from going off.
+    """
+
+    def __init__(self) -> None:
+        self.by: str | None = None
+        self._shielded = False
+
+    def check(self) -> None:
+        """Raise Interrupted if somebody asked."""
+        if self.by:
+            raise Interrupted(self.by)
+
+    def shield(self) -> None:
+        """From here on nothing breaks through: the outputs are going off."""
+        self._shielded = True
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        """The signal handler."""
+        second, self.by = self.by is not None, signal.Signals(number).name
+        if second and not self._shielded:
+            self._shielded = True
+            raise Interrupted(self.by)
+
+
+@contextlib.contextmanager
+def watching_for_interruption() -> Iterator[Stop]:
+    """Signals go to the Stop given here, for as long as this lasts (main thread only)."""
+    stop = Stop()
+    if threading.current_thread() is not threading.main_thread():
+        yield stop
+        return
+    before = {number: signal.signal(number, stop) for number in _SIGNALS}
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,151 @@
+"""Where a text file keeps its table: encoding, header, row of units, first row; guessed from the first 64 KiB."""
+
+import codecs
+import io
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from levilab.columns import TableError, is_unit, known_titles, shown
+from levilab.dialect import Dialect, Line, content, filled, find_dialect, usual
+
+HEAD = 65536  # bytes that the guess rests upon
+SAMPLE = 200  # lines, the last of the head: those are rows even below a long preamble
+
+# UTF-32's mark begins with UTF-16's, so it goes first.
+BYTE_ORDER_MARKS = (
+    (codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"), (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"), (codecs.BOM_UTF8, "utf-8-sig"),
+)  # fmt: skip
+BINARY_FILES = (
+    (b"\x89PNG", "a PNG picture"), (b"PK\x03\x04", "a ZIP or Excel file"), (b"\xd0\xcf\x11\xe0", "an old Excel file"),
+    (b"%PDF", "a PDF document"), (b"\x1f\x8b", "a gzip archive"), (b"RIFF", "a WAV recording"),
+    (b"\x93NUMPY", "a NumPy array"), (b"\x89HDF", "an HDF5 file"), (b"\xff\xd8\xff", "a JPEG picture"),
+)  # fmt: skip
+CONTROL = re.compile("[\x00-\x08\x0e-\x19]")  # DOS may end a text with 0x1a
+EXPORT = "a table of text is expected: export it as CSV"
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How one file's table is written.
+
+    `header` is empty if the file has none, `untitled` is then the number of a line of text that could not be it
+    (0: there is none either). Rows may begin in line `first_line` (1-based), which lies `start` bytes into the file.
+    `width` is the number of fields a row must have, `row_fields` what rows usually have, empty ones included.
+    """
+
+    encoding: str
+    dialect: Dialect
+    header: tuple[str, ...]
+    units: tuple[str, ...]
+    untitled: int
+    first_line: int
+    start: int
+    width: int
+    row_fields: int
+
+
+def sniff(path: Path) -> Layout:
+    """Guess how a file writes its table.
+
+    Raises:
+        TableError: the file is empty or binary, or nothing in it looks like a table.
+        OSError: the file cannot be read.
+    """
+    with path.open("rb") as stream:
+        head = stream.read(HEAD)
+        whole = not stream.read(1)
+    for mark, what in BINARY_FILES:
+        if head.startswith(mark):
+            raise TableError(path, f"is {what}; {EXPORT}")
+    encoding = _encoding(head)
+    text = codecs.getincrementaldecoder(encoding)(errors="replace").decode(head, final=whole)
+    if CONTROL.search(text):
+        raise TableError(path, f"is a binary file; {EXPORT}")
+    lines = list(io.StringIO(text, newline=None))
+    if not whole and lines and not lines[-1].endswith("\n"):
+        lines.pop()
+    if not any(line.strip() for line in lines):
+        raise TableError(path, f"is {'empty' if whole else 'one line without end'}; {EXPORT}")
+    dialect = find_dialect(lines[-SAMPLE:])
+    if dialect is None:
+        at, line = next((n, line) for n, line in enumerate(lines, 1) if line.strip())
+        raise TableError(path, f"'{shown(line.strip())}' begins no table of at least two columns; {EXPORT}", line=at)
+    return _layout(lines, encoding, dialect, head)
+
+
+def _encoding(head: bytes) -> str:
+    for mark, encoding in BYTE_ORDER_MARKS:
+        if head.startswith(mark):
+            return encoding
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(head)
+    except UnicodeDecodeError:
+        return "latin-1"
+    return "utf-8"
+
+
+def _layout(lines: list[str], encoding: str, dialect: Dialect, head: bytes) -> Layout:
+    found = content(lines, dialect)
+    rows = [line for line in found[-SAMPLE:] if line.is_row]
+    width, row_fields = usual(row.filled for row in rows), usual(len(row.fields) for row in rows)
+    begin = _first_row(found, rows, width)
+    above, row_line = found[:begin], found[begin].number if begin < len(found) else len(lines) + 1
+    place = _header(above, width)
+    if place is None:
+        header = _header_in_comment(lines[: row_line - 1], dialect, width)
+        units: tuple[str, ...] = ()
+        first_line, untitled = row_line, above[-1].number if above and not header else 0
+    else:
+        header, units, untitled = above[place].fields, _units(above[place + 1 : place + 2]), 0
+        first_line = above[place + bool(units)].number + 1
+    header = header[: filled(header)]
+    return Layout(
+        encoding, dialect, header, units, untitled, first_line, _offset(head, first_line),
+        width=len(header) or width, row_fields=row_fields or len(header),
+    )  # fmt: skip
+
+
+def _first_row(found: list[Line], rows: list[Line], width: int) -> int:
+    """Index of the first line that has numbers where the later rows mostly have them."""
+    numeric = [i for i in range(width) if 2 * sum(r.kinds[i : i + 1] == ("text",) for r in rows) < len(rows)]
+    for index, line in enumerate(found):
+        if line.is_row and len(line.fields) >= width and not any(line.kinds[i] == "text" for i in numeric):
+            return index
+    return len(found)
+
+
+def _header(above: list[Line], width: int) -> int | None:
+    """Index of the header among the lines above the rows: known titles count, then the width, then nearness.
+
+    A row of units is not it, unless there is nothing else.
+    """
+    texts = [i for i, line in enumerate(above) if line.is_text]
+    titles = [i for i in texts if not all(is_unit(field) for field in above[i].fields if field)] or texts
+    known = {i: known_titles(above[i].fields) for i in titles}
+    likely = [i for i in titles if known[i] or above[i].filled >= width]
+    return max(likely, key=lambda i: (known[i] > 1, above[i].filled >= width, known[i], i), default=None)
+
+
+def _units(below: Sequence[Line]) -> tuple[str, ...]:
+    """The fields of the line below the header, if it is a row of units."""
+    if below and below[0].is_text and any(is_unit(field) for field in below[0].fields):
+        return below[0].fields
+    return ()
+
+
+def _header_in_comment(above: list[str], dialect: Dialect, width: int) -> tuple[str, ...]:
+    """The last comment above the rows, as numpy.savetxt writes its header, if it names the columns."""
+    for line in reversed(above):
+        if line.lstrip().startswith(dialect.comments):
+            fields = tuple(dialect.split(line.lstrip(" \t#%/;'")))
+            return fields if known_titles(fields) and filled(fields) >= width else ()
+    return ()
+
+
+def _offset(head: bytes, line: int) -> int:
+    """Where a line begins [bytes]; right for encodings that write a line end as one byte."""
+    ends = [end.end() for end in re.finditer(rb"\r\n|\r|\n", head)]
+    return ends[line - 2] if 1 < line <= len(ends) + 1 else 0 if line == 1 else len(head)

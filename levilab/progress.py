@@ -1,0 +1,83 @@
+"""What an acquisition shows while it runs, on standard error: a bar on a terminal, lines elsewhere."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+
+
+class Show(Protocol):
+    """What the acquisition tells."""
+
+    def preparing(self, text: str, fraction: float) -> None:
+        """The bench is being brought to where reading begins."""
+
+    def reading(self, text: str, elapsed: float, remaining: float) -> None:
+        """A reading that is on the disk; bench time since the start and expected until the end [s]."""
+
+    def message(self, text: str) -> None:
+        """Something worth a line of its own."""
+
+    def close(self) -> None:
+        """The end."""
+
+
+class Lines:
+    """One line a reading, for logs, pipes and tests."""
+
+    def preparing(self, text: str, fraction: float) -> None:
+        """Nothing: the events say it."""
+
+    def reading(self, text: str, elapsed: float, remaining: float) -> None:
+        """A line."""
+        self.message(f"{text}   about {remaining:.0f} s left")
+
+    def message(self, text: str) -> None:
+        """A line."""
+        print(text, file=sys.stderr, flush=True)  # noqa: T201 - this is where it is shown
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+class Bar:
+    """A progress bar with the time left and the last reading."""
+
+    def __init__(self) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn
+
+        self._progress: Progress = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=30),
+            TextColumn("{task.fields[left]}"),
+            console=Console(stderr=True),
+        )
+        self._progress.start()
+        self._task: TaskID = self._progress.add_task("connecting", total=1.0, left="")
+
+    def preparing(self, text: str, fraction: float) -> None:
+        """Fill the bar once for the preparation."""
+        self._progress.update(self._task, description=text, completed=fraction)
+
+    def reading(self, text: str, elapsed: float, remaining: float) -> None:
+        """The bar's share is bench time elapsed over elapsed and expected."""
+        share = elapsed / (elapsed + remaining) if elapsed + remaining > 0 else 0.0
+        self._progress.update(self._task, description=text, completed=share, left=f"about {remaining:.0f} s left")
+
+    def message(self, text: str) -> None:
+        """A line above the bar."""
+        self._progress.console.print(text, markup=False, highlight=False)
+
+    def close(self) -> None:
+        """Leave the bar as it is."""
+        self._progress.update(self._task, left="")
+        self._progress.stop()
+
+
+def to_stderr() -> Show:
+    """A bar on a terminal, lines elsewhere."""
+    return Bar() if sys.stderr.isatty() else Lines()

@@ -1,0 +1,67 @@
+"""The spin alone, in closed form, for every law of drag.
+
+Where only the spin is observed nothing has to be integrated: with an aligned dipole the axial spin obeys
+ω̇ = −g(ω) and nothing else.  Everything follows from two integrals over the spin itself,
+
+    time to fall from ω₀ to ω     ∫ dω/g(ω)
+    angle turned meanwhile        ∫ ω dω/g(ω)
+
+so a law is a row of three functions, and the laws share no algebra with the ones that are fitted in
+`analysis.drag`.  Spins in rad/s, angles in rad, times in s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SpinDecay:
+    """One law of drag in closed form.
+
+    after: (ω₀, t, *constants) → ω;  elapsed: (ω₀, ω, *constants) → t;  turned: (ω₀, ω, *constants) → angle.
+    """
+
+    after: Callable[..., Array]
+    elapsed: Callable[..., float]
+    turned: Callable[..., Array]
+
+
+def _mixed_after(spin: float, t: ArrayLike, c1: float, c2: float) -> Array:
+    # Bernoulli: 1/ω obeys the linear equation d(1/ω)/dt = C₁/ω + C₂
+    x = c1 * np.asarray(t, dtype=np.float64)
+    return np.asarray(1 / (np.exp(x) / spin + c2 * np.expm1(x) / c1))
+
+
+#: Stokes −C₁ω, Newton −C₂ω², laminar disc −Cω^(3/2), mixed −C₁ω − C₂ω² (both > 0).
+DECAYS: dict[str, SpinDecay] = {
+    "stokes": SpinDecay(
+        after=lambda spin, t, c: spin * np.exp(-c * np.asarray(t)),
+        elapsed=lambda spin, end, c: np.log(spin / end) / c,
+        turned=lambda spin, end, c: (spin - end) / c,
+    ),
+    "newton": SpinDecay(
+        after=lambda spin, t, c: 1 / (1 / spin + c * np.asarray(t)),
+        elapsed=lambda spin, end, c: (1 / end - 1 / spin) / c,
+        turned=lambda spin, end, c: np.log(spin / end) / c,
+    ),
+    "disc": SpinDecay(
+        after=lambda spin, t, c: (spin**-0.5 + 0.5 * c * np.asarray(t)) ** -2,
+        elapsed=lambda spin, end, c: 2 * (end**-0.5 - spin**-0.5) / c,
+        turned=lambda spin, end, c: 2 * (spin**0.5 - end**0.5) / c,
+    ),
+    "mixed": SpinDecay(
+        after=_mixed_after,
+        elapsed=lambda spin, end, c1, c2: np.log((c1 / end + c2) / (c1 / spin + c2)) / c1,
+        turned=lambda spin, end, c1, c2: np.log((c1 + c2 * spin) / (c1 + c2 * end)) / c2,
+    ),
+}

@@ -1,0 +1,143 @@
+"""PyVISA finds the virtual bench here: ``pyvisa.ResourceManager("@levilab")``.
+
+The backend is the few lines between PyVISA's library calls and :class:`instruments.virtual.bus.Bus`.
+Time-outs cost virtual time only.
+"""
+
+from __future__ import annotations
+
+import fnmatch
+import itertools
+from typing import TYPE_CHECKING, Any, cast
+
+from pyvisa import constants, rname
+from pyvisa.constants import EventAttribute, ResourceAttribute, StatusCode
+from pyvisa.highlevel import VisaLibraryBase
+from pyvisa.util import LibraryPath
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from pyvisa.typing import VISARMSession, VISASession
+
+    from instruments.virtual.bus import Bus, Session
+
+_numbers = itertools.count(1)
+
+#: What a VISA session says of itself before anything was set (VPP-4.3, 3.2 and 5.1).
+_DEFAULT_ATTRIBUTES: dict[int, Any] = {
+    ResourceAttribute.timeout_value: 2000,
+    ResourceAttribute.termchar: ord("\n"),
+    ResourceAttribute.termchar_enabled: False,
+    ResourceAttribute.send_end_enabled: True,
+    ResourceAttribute.resource_lock_state: constants.AccessModes.no_lock,
+}
+
+
+class LevilabVisaLibrary(VisaLibraryBase):
+    """A PyVISA library whose only resources are the instruments of one virtual bench."""
+
+    bus: Bus | None
+    _sessions: dict[int, tuple[Session, dict[int, Any]]]
+
+    @staticmethod
+    def get_library_paths() -> Iterable[LibraryPath]:
+        """One name: there is nothing to look for on disk."""
+        return (LibraryPath("levilab"),)
+
+    def _init(self) -> None:
+        self.bus = None
+        self._sessions = {}
+
+    def _bench(self) -> Bus:
+        """The bench given, or a fresh one with its own top when a program just asked for "@levilab"."""
+        if self.bus is None:
+            from levilab.bench import virtual_bus
+
+            self.bus = virtual_bus()
+        return self.bus
+
+    def open_default_resource_manager(self) -> tuple[VISARMSession, StatusCode]:
+        """ViOpenDefaultRM."""
+        return cast("VISARMSession", next(_numbers)), self.handle_return_value(None, StatusCode.success)
+
+    def list_resources(self, session: VISARMSession, query: str = "?*::INSTR") -> tuple[str, ...]:
+        """ViFindRsrc; the query's ``?*`` is ``*`` here."""
+        pattern = query.upper().replace("?*", "*")
+        return tuple(name for name in self._bench().instruments if fnmatch.fnmatch(name.upper(), pattern))
+
+    def open(
+        self,
+        session: VISARMSession,
+        resource_name: str,
+        access_mode: constants.AccessModes = constants.AccessModes.no_lock,
+        open_timeout: int | None = constants.VI_TMO_IMMEDIATE,
+    ) -> tuple[VISASession, StatusCode]:
+        """ViOpen."""
+        link = self._bench().open(resource_name)
+        if link is None:
+            return cast("VISASession", 0), self.handle_return_value(None, StatusCode.error_resource_not_found)
+        parsed = rname.parse_resource_name(resource_name)
+        attributes = _DEFAULT_ATTRIBUTES | {
+            ResourceAttribute.resource_name: resource_name,
+            ResourceAttribute.resource_class: parsed.resource_class,
+            ResourceAttribute.interface_type: parsed.interface_type_const,
+        }
+        number = cast("VISASession", next(_numbers))
+        self._sessions[number] = (link, attributes)
+        return number, self.handle_return_value(number, StatusCode.success)
+
+    def close(self, session: Any) -> StatusCode:
+        """ViClose."""
+        self._sessions.pop(session, None)
+        return self.handle_return_value(session, StatusCode.success)
+
+    def write(self, session: VISASession, data: bytes) -> tuple[int, StatusCode]:
+        """ViWrite."""
+        self._sessions[session][0].write(bytes(data))
+        return len(data), self.handle_return_value(session, StatusCode.success)
+
+    def read(self, session: VISASession, count: int) -> tuple[bytes, StatusCode]:
+        """ViRead."""
+        link, attributes = self._sessions[session]
+        got = link.read(count, attributes[ResourceAttribute.timeout_value] / 1000)
+        if got is None:
+            return b"", self.handle_return_value(session, StatusCode.error_timeout)
+        data, complete = got
+        status = StatusCode.success if complete else StatusCode.success_max_count_read
+        return data, self.handle_return_value(session, status)
+
+    def clear(self, session: VISASession) -> StatusCode:
+        """ViClear."""
+        self._sessions[session][0].clear()
+        return self.handle_return_value(session, StatusCode.success)
+
+    def get_attribute(self, session: Any, attribute: ResourceAttribute | EventAttribute) -> tuple[Any, StatusCode]:
+        """ViGetAttribute."""
+        _, attributes = self._sessions[session]
+        if attribute not in attributes:
+            return None, self.handle_return_value(session, StatusCode.error_nonsupported_attribute)
+        return attributes[attribute], self.handle_return_value(session, StatusCode.success)
+
+    def set_attribute(self, session: VISASession, attribute: ResourceAttribute, attribute_state: Any) -> StatusCode:
+        """ViSetAttribute."""
+        self._sessions[session][1][attribute] = attribute_state
+        return self.handle_return_value(session, StatusCode.success)
+
+    def disable_event(self, session: VISASession, event_type: Any, mechanism: Any) -> StatusCode:
+        """ViDisableEvent: there are no events."""
+        return self.handle_return_value(session, StatusCode.success)
+
+    def discard_events(self, session: VISASession, event_type: Any, mechanism: Any) -> StatusCode:
+        """ViDiscardEvents: there are no events."""
+        return self.handle_return_value(session, StatusCode.success)
+
+
+def library_for(bus: Bus) -> LevilabVisaLibrary:
+    """A library of its own for this bench, to hand to ``pyvisa.ResourceManager``."""
+    library = LevilabVisaLibrary(f"levilab-{next(_numbers)}")
+    library.bus = bus
+    return library
+
+
+WRAPPER_CLASS = LevilabVisaLibrary

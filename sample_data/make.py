@@ -1,0 +1,138 @@
+"""Make the sample data: four synthetic spin-downs and the ten published lower limits, as run folders.
+
+The thesis prints the constants of four spin-downs, C₁ and C₂ of unweighted straight lines, but none of their
+readings.  These readings are made up so that they give those constants: the law of a laminar disc from about
+40 Hz, a reading each 10 s, noise N(0, 0.03 Hz), start and constant solved for so that the straight lines
+return the published C₁ and C₂, rounded to 0.01 Hz.  They are not the author's data.
+
+Run it from anywhere: ``python sample_data/make.py``.  It writes the same bytes each time.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import root
+
+HERE = Path(__file__).parent
+NOISE_HZ, STEP_S, DIGIT_HZ = 0.03, 10.0, 0.01
+#: (C₁ [1/s], |C₂| [1/rad], readings): the thesis's four runs, C₁ printed to six decimals, C₂ to eight.
+PUBLISHED = (
+    (0.003199, 1.760e-5, 20),
+    (0.003134, 1.707e-5, 20),
+    (0.003133, 1.669e-5, 19),
+    (0.003261, 1.772e-5, 19),
+)
+LOWER_LIMITS_HZ = (21.7, 21.4, 21.7, 21.9, 21.8, 22.3, 21.8, 22.0, 22.1, 21.9)
+
+Array = NDArray[np.float64]
+
+CHANNELS = [
+    {"name": "time_s", "unit": "s", "source": "made up, from the moment the drive is off"},
+    {"name": "spin_frequency_hz", "unit": "Hz", "source": "made up, law of a laminar disc and noise"},
+    {"name": "spin_frequency_u_hz", "unit": "Hz", "source": "standard deviation of the noise"},
+]
+HOW = (
+    "SYNTHETIC, not the author's data: disc law from {start:.4f} Hz with C32 = {c32:.4e} (rad/s)^-1/2/s, noise "
+    "N(0, 0.03 Hz) of seed {seed}, both solved for so that unweighted straight lines return the published "
+    "C1 = {c1} 1/s and C2 = {c2} 1/rad; rounded to 0.01 Hz; made by sample_data/make.py"
+)
+
+
+def disc(t: Array, start_hz: float, c32: float) -> Array:
+    """Spin of a laminar disc [Hz]."""
+    return start_hz * (1 + c32 * np.sqrt(2 * np.pi * start_hz) * t / 2) ** -2.0
+
+
+def straight_lines(t: Array, nu: Array) -> tuple[float, float]:
+    """C₁ [1/s] and C₂ [1/rad] of unweighted straight lines through ln ω and 1/ω."""
+    omega = 2 * np.pi * nu
+    return -float(np.polyfit(t, np.log(omega), 1)[0]), float(np.polyfit(t, 1 / omega, 1)[0])
+
+
+def as_printed(c1: float, c2: float) -> tuple[str, str]:
+    """The two constants with the digits of the thesis."""
+    return f"{c1:.6f}", f"{c2:.3e}"
+
+
+def solve(c1: float, c2: float, n: int) -> tuple[Array, Array, dict[str, float]]:
+    """Readings that give the published constants to every printed digit, after rounding, and how they were made.
+
+    The first seed is taken for which rounding does not move a digit and the start lies within 0.25 Hz of 40.
+    """
+    t = STEP_S * np.arange(n)
+    for seed in range(1000):
+        noise = np.random.default_rng((n, round(c1 * 1e6), seed)).normal(0, NOISE_HZ, n)
+
+        def miss(x: Array, noise: Array = noise) -> list[float]:
+            got = straight_lines(t, disc(t, 40 * x[0], 2.3e-4 * x[1]) + noise)
+            return [got[0] / c1 - 1, got[1] / c2 - 1]
+
+        found = root(miss, [1.0, 1.0], tol=1e-12)
+        start, c32 = 40 * found.x[0], 2.3e-4 * found.x[1]
+        nu = np.round(disc(t, start, c32) + noise, 2)
+        kept = as_printed(*straight_lines(t, nu)) == as_printed(c1, c2)
+        if found.success and kept and abs(start - 40) < 0.25:
+            return t, nu, {"start": start, "c32": c32, "seed": seed}
+    raise RuntimeError(f"no seed gives C1 = {c1}, C2 = {c2}")
+
+
+def write(folder: Path, header: str, rows: list[str], record: dict[str, Any]) -> None:
+    """A run folder."""
+    folder.mkdir(exist_ok=True)
+    common = {
+        "schema": "levilab-run/1",
+        "status": "finished",
+        "ended_utc": None,
+        "time_zero_utc": None,
+        "command_line": ["python", "sample_data/make.py"],
+        "configuration": {},
+        "instruments": {},
+        "software": {},
+        "seed": None,
+    }
+    text = json.dumps(common | record, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
+    (folder / "run.json").write_text(text, encoding="utf-8", newline="\n")
+    (folder / "readings.csv").write_text("\n".join([header, *rows, ""]), encoding="utf-8", newline="\n")
+
+
+def main() -> None:
+    """Write the five run folders."""
+    for number, (c1, c2, n) in enumerate(PUBLISHED, start=1):
+        t, nu, how = solve(c1, c2, n)
+        write(
+            HERE / f"spin-down-{number}",
+            ",".join(channel["name"] for channel in CHANNELS),
+            [f"{x:g},{y:.2f},{NOISE_HZ}" for x, y in zip(t, nu, strict=True)],
+            {
+                "experiment": "spin",
+                "started_utc": None,
+                "channels": CHANNELS,
+                "note": f"run {number} of four; a stand-in for the thesis's run {number}",
+                "synthetic": True,
+                "synthetic_how": HOW.format(c1=c1, c2=c2, **how),
+                "published": {"c1_per_s": c1, "c2_per_rad": c2},
+            },
+        )
+        print(f"spin-down-{number}: {how}")
+    write(
+        HERE / "lower-limits",
+        "spin_frequency_hz",
+        [f"{limit:.1f}" for limit in LOWER_LIMITS_HZ],
+        {
+            "experiment": "limit",
+            "started_utc": None,
+            "channels": [
+                {"name": "spin_frequency_hz", "unit": "Hz", "source": "spin at which the top fell, as published"}
+            ],
+            "note": "the ten lower limits as published in the thesis: mean 21.86, s 0.25, s.e. 0.08 Hz",
+            "synthetic": False,
+            "synthetic_how": None,
+        },
+    )
+
+
+if __name__ == "__main__":
+    main()
