@@ -33,6 +33,9 @@ lint: setup  ## style, types and import rules
 	$(BIN)/lint-imports --no-cache
 
 all-pythons: setup  ## the tests on every Python from 3.11 on that is installed
+	@# pyenv shows only the versions that it is told to
+	@if command -v pyenv >/dev/null; then \
+	  PYENV_VERSION="$$(pyenv version-name):$$(pyenv versions --bare | tr '\n' ':')"; export PYENV_VERSION; fi; \
 	$(BIN)/nox --session tests
 
 wheel: setup  ## build the wheel and try it in a clean environment, beside a decoy

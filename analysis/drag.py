@@ -81,7 +81,7 @@ def _power_gradient(tau: Array, q: Array, m: float | None = None) -> Array:
 
 
 def _mixture(tau: Array, x0: float, alpha: float, beta: float) -> tuple[Array, Array, Array, Array]:
-    """y = ατ, e⁻ʸ, E = (1 − e⁻ʸ)/y and 1 + β x₀ τ E, for x = x₀ e⁻ʸ/(1 + β x₀ τ E)."""
+    """For x = x₀ e⁻ʸ/(1 + β x₀ τ E): y = ατ, e⁻ʸ, E = (1 − e⁻ʸ)/y, and the denominator."""
     y = _clip(alpha * tau, LARGEST_LOG)
     fall = np.exp(-y)
     mean = _or_one(-np.expm1(-y), y)
@@ -152,8 +152,8 @@ class DragLaw:
         orders = q[2:] if free else np.array(self.orders)
         with np.errstate(over="ignore"):
             units = [reference_hz, *np.exp(-orders * log_omega) / duration]
-        slopes = np.diag([*units, 1.0] if free else units)
-        values = np.diagonal(slopes) * q
+            slopes = np.diag([*units, 1.0] if free else units)
+            values = np.diagonal(slopes) * q
         if free:
             slopes[1, 2] = -log_omega * values[1]
             values[2] += 1

@@ -105,7 +105,7 @@ def fit_law(found: Solution, uncertainty: Uncertainty, samples: int, seed: int) 
     stats = _statistics(found)
     variance = _variance(found, stats)
     covariance, u = None, np.full(len(values), np.nan)
-    if variance is not None and found.curvature.covariance is not None and np.isfinite(values).all():
+    if variance is not None and found.curvature.covariance is not None:
         covariance, u = propagate(found.curvature.covariance * variance, slopes)
     intervals = _INTERVALS[uncertainty](found, values, u, samples, seed)
     # c = κ/(T ω_refᵐ) can leave the range of floats, to infinity or to zero
@@ -121,7 +121,7 @@ def fit_law(found: Solution, uncertainty: Uncertainty, samples: int, seed: int) 
     return LawFit(
         name=law.name,
         parameters=parameters,
-        covariance=covariance,
+        covariance=covariance if representable.all() else None,
         statistics=stats,
         residuals=readings.reference_hz * (readings.x - law.spin(readings.tau, found.q)),
         linearised=linearised(law, readings) if len(law.orders) == 1 else None,
@@ -275,7 +275,9 @@ def _without_interval(parameters: dict[str, Estimate]) -> str:
 def _constant_warnings(law: str, constant: str, estimate: Estimate) -> list[str]:
     value, u = estimate.value, estimate.u
     if value is None:
-        return [f"{law}: {constant} is too large or too small for a number, as it depends exponentially on the exponent"]
+        return [
+            f"{law}: {constant} is too large or too small for a number, as it depends exponentially on the exponent"
+        ]
     if u is None:
         return []
     said = []

@@ -11,9 +11,9 @@ Array = NDArray[np.float64]
 Residual = Callable[[Array], Array]  # q of shape (p,) → (model − data)/u of shape (n,)
 Gradient = Callable[[Array], Array]  # q of shape (p,) → slopes of that, shape (p, n)
 
-# A step that changes χ² or q by less than this ends the search: then q is within 1e-6 standard uncertainties of the
+# A step that changes χ² or q by less than this ends the search: then q is within 1e-5 standard uncertainties of the
 # minimum, and exact to about 1e-12 where the data are free of noise.
-TOLERANCE = 1e-13
+TOLERANCE = 1e-12
 MOST_EVALUATIONS = 500  # a sound fit needs 5 to 30
 
 
@@ -72,7 +72,7 @@ def profile(
     Returns:
         For each parameter the two ends, None where an end does not exist or was not found.
     """
-    from lmfit import conf_interval
+    from lmfit import MinimizerException, conf_interval
     from scipy.special import erf
 
     # In units of u, and away from zero, lmfit's first step and its relative tolerance suit every parameter.
@@ -84,25 +84,20 @@ def profile(
     def grown(old: Any, new: Any) -> float:
         return float(erf(np.sqrt(max(new.chisqr - old.chisqr, 0.0) / (variance or 1.0) / 2)))
 
-    probability = None if variance is None else grown
     minimizer = _minimizer(
         lambda z: residual(unscaled(z)), lambda z: gradient(unscaled(z)) * u[:, None], np.full(len(best), offset)
     )
+    probability = None if variance is None else grown
+
+    def ends(name: str, value: float, sigma: float) -> tuple[float, float] | None:
+        try:
+            found = conf_interval(minimizer, result, p_names=[name], sigmas=[1], prob_func=probability)[name]
+        except (MinimizerException, ArithmeticError, RuntimeError, ValueError):  # no such end
+            return None
+        low, high = (float(value + (end - result.params[name].value) * sigma) for _, end in (found[0], found[-1]))
+        return (low, high) if np.isfinite([low, high]).all() and low < value < high else None
+
     with warnings.catch_warnings(), np.errstate():  # lmfit warns of ends it does not find and alters numpy's state
         warnings.simplefilter("ignore")
         result = minimizer.leastsq()
-        return [
-            _ends(conf_interval, minimizer, result, name, probability, best[i], u[i])
-            for i, name in enumerate(result.params)
-        ]
-
-
-def _ends(search: Any, minimizer: Any, result: Any, name: str, probability: Any, best: float, u: float) -> Any:
-    from lmfit import MinimizerException
-
-    try:
-        found = search(minimizer, result, p_names=[name], sigmas=[1], prob_func=probability)[name]
-    except (MinimizerException, ValueError, ArithmeticError, RuntimeError):
-        return None
-    low, high = (float(best + (end - result.params[name].value) * u) for _, end in (found[0], found[-1]))
-    return (low, high) if len(found) == 3 and np.isfinite([low, high]).all() else None  # noqa: PLR2004 (two ends, centre)
+        return [ends(*each) for each in zip(result.params, best, u, strict=True)]

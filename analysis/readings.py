@@ -74,43 +74,50 @@ def checked(time: ArrayLike, frequency: ArrayLike, u: ArrayLike | None) -> Readi
     if len(t) < FEWEST:
         raise TooFewReadings(seen=len(t), needed=FEWEST)
     f = _column("spin frequency", frequency, len(t))
-    sigma = None if u is None else _column("standard uncertainty", _spread(u, len(t)), len(t))
+    sigma = _column("standard uncertainty", 1.0 if u is None else u, len(t), spread=True)
     for quantity, column in (("time", t), ("spin frequency", f), ("standard uncertainty", sigma)):
         _all_finite(quantity, column)
     still = np.flatnonzero(np.diff(t) <= 0)
     if still.size:
         i = int(still[0])
         raise TimesNotIncreasing(index=i + 1, before=float(t[i]), after=float(t[i + 1]))
-    _all_positive("spin frequency", f)
-    _all_positive("standard uncertainty", sigma)
+    for quantity, column in (("spin frequency", f), ("standard uncertainty", sigma)):
+        _all_positive(quantity, column)
     _falls(f)
     reference_hz, duration = float(np.exp(np.log(f).mean())), float(t[-1] - t[0])
-    weight = 1.0 if sigma is None else reference_hz / sigma
-    return Readings(t, f, sigma, float(t[0]), reference_hz, duration, (t - t[0]) / duration, f / reference_hz, weight)
+    return Readings(
+        time=t,
+        frequency=f,
+        u=None if u is None else sigma,
+        start_time=float(t[0]),
+        reference_hz=reference_hz,
+        duration=duration,
+        tau=(t - t[0]) / duration,
+        x=f / reference_hz,
+        weight=1.0 if u is None else reference_hz / sigma,
+    )
 
 
-def _spread(u: ArrayLike, n: int) -> Array:
-    values = np.asarray(u, dtype=float)
-    return np.full(n, values) if values.ndim == 0 else values
-
-
-def _column(quantity: str, values: ArrayLike, n: int | None) -> Array:
-    column = np.array(values, dtype=float)  # a copy: results must not change with the caller's array
+def _column(quantity: str, values: ArrayLike, n: int | None, *, spread: bool = False) -> Array:
+    """A column of its own, which cannot be changed: results must not change with the caller's array."""
+    column = np.array(values, dtype=float)
+    if spread and column.ndim == 0 and n is not None:
+        column = np.full(n, column)
     if column.ndim != 1 or (n is not None and len(column) != n):
-        raise ShapesDiffer(quantity=quantity, seen=column.shape, expected=(n if n is not None else column.size,))
+        raise ShapesDiffer(quantity=quantity, seen=column.shape, expected=(column.size if n is None else n,))
     column.flags.writeable = False
     return column
 
 
-def _all_finite(quantity: str, column: Array | None) -> None:
-    bad = np.flatnonzero(~np.isfinite(column)) if column is not None else ()
-    if len(bad) and column is not None:
+def _all_finite(quantity: str, column: Array) -> None:
+    bad = np.flatnonzero(~np.isfinite(column))
+    if bad.size:
         raise NotFinite(quantity=quantity, index=int(bad[0]), value=float(column[bad[0]]))
 
 
-def _all_positive(quantity: str, column: Array | None) -> None:
-    bad = np.flatnonzero(column <= 0) if column is not None else ()
-    if len(bad) and column is not None:
+def _all_positive(quantity: str, column: Array) -> None:
+    bad = np.flatnonzero(column <= 0)
+    if bad.size:
         raise NotPositive(quantity=quantity, unit="Hz", index=int(bad[0]), value=float(column[bad[0]]))
 
 

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-EXACT_SIGNS = 50  # the rarer sign up to here: exact distribution; beyond, the normal one errs by less than 0.005
+# Up to so many of the rarer sign the distribution is exact. Beyond, the normal one errs by less than 0.001 where
+# neither sign is much rarer, as with residuals of a fit.
+EXACT_SIGNS = 200
 
 
 @lru_cache(maxsize=256)

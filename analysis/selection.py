@@ -84,6 +84,7 @@ class Verdict:
 
 
 SPECIAL_CASES = {"mixed": ("stokes", "newton"), "power": ("stokes", "newton", "disc")}
+_SIMPLE = ("stokes", "newton", "disc")
 
 
 def statistics(
@@ -183,11 +184,14 @@ def verdict(fits: Mapping[str, Statistics], *, fall: float, exponent_u: float | 
         sentences.append(f"They exclude {_list([f'{name} ({reason})' for name, reason in excluded])}.")
     if weak:
         described = [f"{name} (Δ{_LABEL[criterion]} {differences[name]:.1f})" for name in weak]
-        sentences.append(f"They speak against {_list(described)}, but do not exclude it.")
-    if (exponent_u is not None and exponent_u > 0.5) or not (excluded or len(fits) == 1):  # noqa: PLR2004 (laws differ by ½)
         sentences.append(
-            f"The spin falls by only {100 * fall:.2g} %, and over so little the laws are nearly the same curve for "
-            "readings of this precision: let it fall further or measure it better."
+            f"They speak against {_list(described)}, but do not exclude {'it' if len(weak) == 1 else 'them'}."
+        )
+    doubtful = exponent_u is not None and exponent_u > 0.5 and not excluded  # the simple laws' exponents differ by ½
+    if doubtful or sum(name in _SIMPLE for name in (*tied, *weak)) > 1:
+        sentences.append(
+            f"For readings of this precision a fall of the spin by {100 * fall:.2g} % is too little to tell by: let it "
+            "fall further, or measure it better."
         )
     return Verdict(best, excluded, tied, weak, " ".join(sentences))
 
@@ -200,19 +204,25 @@ def _list(words: Sequence[str]) -> str:
 
 
 def _about_best(tied: Sequence[str]) -> str:
-    if len(tied) == 1:
-        return f"The readings favour the {tied[0]} law."
-    text = f"The readings cannot tell {_list(tied)} apart; {tied[0]} comes first"
+    best, *others = tied
+    if not others:
+        return f"The {best} law describes the readings best."
+    text = f"The {best} law describes the readings best, but they do not tell {_list(others)} from it"
     general = [name for name in tied if any(special in tied for special in SPECIAL_CASES.get(name, ()))]
     if not general:
         return f"{text}."
     special = [name for name in tied if any(name in SPECIAL_CASES[g] for g in general)]
-    contains = "contain" if len(general) > 1 else "contains"
-    return f"{text} ({_list(general)} {contains} {_list(special)} as special cases, so that tie is to be expected)."
+    contain = f"{_list(general)} {'contain' if len(general) > 1 else 'contains'} {_list(special)}"
+    cases = "special cases" if len(special) > 1 else "a special case"
+    return f"{text} ({contain} as {cases}, so that tie is to be expected)."
 
 
 def _reason(fit: Statistics, best: Statistics, difference: float, criterion: str) -> str:
-    reason = f"Δ{_LABEL[criterion]} {difference:.3g}, rms residual {fit.rms_residual:.2g} Hz against {best.rms_residual:.2g} Hz"
-    if fit.runs_test_p is not None and fit.runs_test_p < 0.01:  # noqa: PLR2004 (one per cent)
-        reason += f", residuals not in random order: p = {fit.runs_test_p:.1g}"
+    reason = (
+        f"Δ{_LABEL[criterion]} {difference:.3g}, rms residual {fit.rms_residual:.3g} Hz "
+        f"against {best.rms_residual:.3g} Hz"
+    )
+    if fit.runs_test_p is not None and fit.runs_test_p < 0.01:
+        p = f"p = {fit.runs_test_p:.1g}" if fit.runs_test_p > 1e-9 else "p < 1e-9"
+        reason += f", residuals not in random order: {p}"
     return reason

@@ -71,14 +71,17 @@ def propagate(covariance: Array, slopes: Array) -> tuple[Array | None, Array]:
         slopes: of the functions with respect to them, shape (q, p).
 
     Returns:
-        Covariance, shape (q, q), None where it overflows though the uncertainties, shape (q,), do not.
+        Covariance, shape (q, q), None where it overflows; and the uncertainties, shape (q,), which may be finite even
+        so, and are NaN for functions with infinite slopes.
     """
     scale = np.abs(slopes).max(axis=1)
-    rows = slopes / np.where(scale > 0, scale, 1.0)[:, None]
+    finite = np.isfinite(scale)
+    rows = np.where(finite[:, None], slopes, 0.0) / np.where(finite & (scale > 0), scale, 1.0)[:, None]
     unit = rows @ covariance @ rows.T
     with np.errstate(over="ignore", invalid="ignore"):
         full = unit * np.outer(scale, scale)
-    return (full if np.isfinite(full).all() else None), scale * np.sqrt(np.maximum(np.diagonal(unit), 0.0))
+        u = scale * np.sqrt(np.maximum(np.diagonal(unit), 0.0))
+    return (full if np.isfinite(full).all() else None), np.where(finite, u, np.nan)
 
 
 def bootstrap(
@@ -100,5 +103,6 @@ def bootstrap(
     errors -= errors.mean()
     random = np.random.default_rng(seed)
     fits = np.array([refit(random.choice(errors, len(errors))) for _ in range(samples)])
-    low, high = np.percentile(fits, [15.865525, 84.134475], axis=0)
+    with np.errstate(invalid="ignore"):  # a constant that overflows in some samples has no interval
+        low, high = np.percentile(fits, [15.865525, 84.134475], axis=0)
     return [(float(a), float(b)) if np.isfinite([a, b]).all() else None for a, b in zip(low, high, strict=True)]

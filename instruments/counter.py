@@ -64,9 +64,9 @@ class Keysight53230A(ScpiInstrument):
         self.automatic_level = False
         self.trigger_level = trigger_level_v
         self.slope = "POS"
-        # Without a signal the answer, "no reading", comes after this time.
-        self.measurement_timeout = 2 * gate_s + 1.0
-        self._patience = 2 * gate_s + 1.0
+        # Without a signal the answer, "no reading", comes after this time (2000 s is the longest there is).
+        self._patience = min(2 * gate_s + 1.0, 2000.0)
+        self.measurement_timeout = self._patience
 
     #: How long the counter may work on one answer [s].
     _patience = 3.0

@@ -40,7 +40,8 @@ class CommandRefused(InstrumentError):
 
     def __init__(self, address: str, command: str, entries: tuple[str, ...]) -> None:
         self.command, self.entries = command, entries
-        super().__init__(address, f"after {command!r} the instrument reports {'; '.join(entries)}")
+        more = f" and {len(entries) - 4} more" if len(entries) > 4 else ""
+        super().__init__(address, f"after {command!r} the instrument reports {'; '.join(entries[:4])}{more}")
 
 
 class WrongInstrument(InstrumentError):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Protocol
 
+from instruments.errors import CommandRefused
 from instruments.scpi import ScpiInstrument, Setting
 
 
@@ -56,5 +57,7 @@ class Keysight33500B(ScpiInstrument):
         self.offset = 0.0
 
     def off(self) -> None:
-        """Switch the output off, and see that it is."""
+        """Switch the output off, and see that it is.  Raises CommandRefused if it is not."""
         self.output = False
+        if self.output:
+            raise CommandRefused(self.transport.address, "OUTP1 OFF", ("the output is still on",))

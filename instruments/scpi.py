@@ -79,7 +79,8 @@ class ScpiInstrument:
         """Every declared setting as it stands in the instrument, unit at the end of the name."""
         return {
             f"{name}_{setting.suffix}" if setting.suffix else name: getattr(self, name)
-            for name, setting in vars(type(self)).items()
+            for owner in reversed(type(self).__mro__)
+            for name, setting in vars(owner).items()
             if isinstance(setting, Setting)
         }
 

@@ -74,7 +74,7 @@ class VisaTransport:
             # pyvisa annotates neither a library instance here nor the message-based result
             manager = pyvisa.ResourceManager(self._library)  # type: ignore[arg-type, unused-ignore]
             resource: Any = manager.open_resource(self.address)
-        except (pyvisa.Error, OSError, ValueError) as error:
+        except Exception as error:  # pyvisa-py raises plain Exception when a host is unknown or unreachable
             raise NotConnected(
                 self.address,
                 f"cannot be opened ({_one_line(error)}): check the address, the cable and that it is on",
@@ -104,13 +104,13 @@ class VisaTransport:
         """Resynchronise: a late answer to an old question never reaches the driver."""
         import pyvisa
 
-        self._out_of_step = False
         if self.address.upper().endswith(_BARE_SOCKET):
             self._resource.close()
             self._resource = self._open()
-            return
-        with contextlib.suppress(pyvisa.Error, NotImplementedError):
-            self._resource.clear()
+        else:
+            with contextlib.suppress(pyvisa.Error, NotImplementedError):
+                self._resource.clear()
+        self._out_of_step = False
 
     def close(self) -> None:
         """Close the resource; closing twice does no harm."""

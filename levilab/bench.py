@@ -76,7 +76,7 @@ class Bench:
             ("drive_amplitude_vpp", amplitude_vpp, self.limits.drive_amplitude_vpp),
             ("drive_frequency_hz", frequency_hz, self.limits.drive_frequency_hz),
         ):
-            if value > limit:
+            if not value <= limit:  # nan is more than any bench stands
                 raise OutOfRange("bench", name, value, f"up to {limit:g} (limits.{name} in bench.toml)")
 
     def outputs_off(self) -> None:
@@ -100,15 +100,18 @@ def open_bench(
 
         library = library_for(virtual_bus(world))
     bench = Bench(world.clock if world else WallClock(), config.limits)
-    try:
-        for kind in kinds:
-            settings = VIRTUAL[kind] if world else _described(config, kind)
-            transport = VisaTransport(settings.address, library=library, timeout=settings.timeout_s, log=log)
-            bench.instruments[kind] = DRIVERS[kind][settings.model](transport)
-            bench.instruments[kind].identity()
-        yield bench
-    finally:
-        _leave(bench)
+    with contextlib.ExitStack() as links:
+        try:
+            for kind in kinds:
+                settings = VIRTUAL[kind] if world else _described(config, kind)
+                transport = VisaTransport(settings.address, library=library, timeout=settings.timeout_s, log=log)
+                links.callback(transport.close)
+                instrument = DRIVERS[kind][settings.model](transport)
+                instrument.identity()
+                bench.instruments[kind] = instrument  # only what is what it should be is ever switched
+            yield bench
+        finally:
+            _switch_off(bench)
 
 
 def _described(config: BenchConfig, kind: str) -> InstrumentSettings:
@@ -121,7 +124,7 @@ def _described(config: BenchConfig, kind: str) -> InstrumentSettings:
     return settings
 
 
-def _leave(bench: Bench) -> None:
+def _switch_off(bench: Bench) -> None:
     """Outputs off, tried twice: an interruption or a late answer may cut the first try short."""
     try:
         try:
@@ -130,9 +133,6 @@ def _leave(bench: Bench) -> None:
             bench.outputs_off()
     except InstrumentError as error:
         raise OutputMayBeOn(error) from error
-    finally:
-        for instrument in bench.instruments.values():
-            instrument.close()
 
 
 def virtual_bus(world: World | None = None) -> Bus:

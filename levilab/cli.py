@@ -176,8 +176,8 @@ def _tell(error: Exception) -> NoReturn:
     from instruments.errors import InstrumentError
     from levilab.errors import LevilabError
 
-    codes = ((InstrumentError, EXIT_INSTRUMENT), (LevilabError, EXIT_FAILED), (AnalysisError, EXIT_FAILED))
-    for kind, code in (*codes, (OSError, EXIT_FAILED)):
+    codes = ((LevilabError, getattr(error, "exit_code", EXIT_FAILED)), (InstrumentError, EXIT_INSTRUMENT))
+    for kind, code in (*codes, (AnalysisError, EXIT_FAILED), (OSError, EXIT_FAILED)):
         if isinstance(error, kind):
             typer.echo("levilab: " + " ".join(str(error).split()), err=True)
             sys.exit(code)

@@ -6,12 +6,12 @@ The dialect is found by trying each row of a table on the file's lines and count
 import csv
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-from levilab.columns import known_titles
+from levilab.titles import known_titles
 
 COMMENTS = ("#", "%", "//")
 COMMENTS_UNLESS_SEMICOLON = (*COMMENTS, ";", "'")
@@ -111,10 +111,12 @@ def usual(counts: Iterable[int]) -> int:
     return found[0][0] if found else 0
 
 
-def content(lines: Sequence[str], dialect: Dialect, first: int = 1) -> list[Line]:
+def content(lines: Sequence[str], dialect: Dialect, first: int = 1) -> Iterator[Line]:
     """The lines that are neither blank nor comments; `first` is the number of the first line."""
-    split = ((n, tuple(dialect.split(line))) for n, line in enumerate(lines, first) if not dialect.skips(line))
-    return [Line(n, fields, tuple(map(dialect.kind, fields))) for n, fields in split]
+    for number, line in enumerate(lines, first):
+        if not dialect.skips(line):
+            fields = tuple(dialect.split(line))
+            yield Line(number, fields, tuple(map(dialect.kind, fields)))
 
 
 def find_dialect(lines: Sequence[str]) -> Dialect | None:
@@ -132,7 +134,7 @@ def find_dialect(lines: Sequence[str]) -> Dialect | None:
     return best if titles[best] else None
 
 
-def _score(lines: list[Line], rank: int) -> tuple[int, int, int, int]:
+def _score(lines: Iterable[Line], rank: int) -> tuple[int, int, int, int]:
     """Rows of equal width without text, such rows at all, the separator's rank, numbers in those rows."""
     rows = [line for line in lines if line.is_row]
     width = usual(line.filled for line in rows)

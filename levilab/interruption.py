@@ -52,6 +52,11 @@ class Stop:
             raise Interrupted(self.by)
 
 
+def _ignored_by_nohup(number: int) -> bool:
+    """Whether the run was started to outlive its terminal."""
+    return signal.Signals(number).name == "SIGHUP" and signal.getsignal(number) is signal.SIG_IGN
+
+
 @contextlib.contextmanager
 def watching_for_interruption() -> Iterator[Stop]:
     """Signals go to the Stop given here, for as long as this lasts (main thread only)."""
@@ -59,7 +64,7 @@ def watching_for_interruption() -> Iterator[Stop]:
     if threading.current_thread() is not threading.main_thread():
         yield stop
         return
-    before = {number: signal.signal(number, stop) for number in _SIGNALS}
+    before = {number: signal.signal(number, stop) for number in _SIGNALS if not _ignored_by_nohup(number)}
     try:
         yield stop
     finally:

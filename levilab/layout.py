@@ -3,15 +3,16 @@
 import codecs
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from levilab.columns import TableError, is_unit, known_titles, shown
+from levilab.columns import TableError, shown
 from levilab.dialect import Dialect, Line, content, filled, find_dialect, usual
+from levilab.titles import is_unit, known_titles
 
 HEAD = 65536  # bytes that the guess rests upon
-SAMPLE = 200  # lines, the last of the head: those are rows even below a long preamble
+SAMPLE = 100  # lines, the last of the head: those are rows even below a long preamble
 
 # UTF-32's mark begins with UTF-16's, so it goes first.
 BYTE_ORDER_MARKS = (
@@ -31,20 +32,19 @@ EXPORT = "a table of text is expected: export it as CSV"
 class Layout:
     """How one file's table is written.
 
-    `header` is empty if the file has none, `untitled` is then the number of a line of text that could not be it
-    (0: there is none either). Rows may begin in line `first_line` (1-based), which lies `start` bytes into the file.
-    `width` is the number of fields a row must have, `row_fields` what rows usually have, empty ones included.
+    `header`, in line `header_line`, is empty if the file has none; `header_line` is then that of a text above the
+    rows which could not be it, or 0. Rows may begin in line `first_line`, which lies `start` bytes into the file;
+    lines count from 1. `width` is the number of fields a row must have.
     """
 
     encoding: str
     dialect: Dialect
     header: tuple[str, ...]
+    header_line: int
     units: tuple[str, ...]
-    untitled: int
     first_line: int
     start: int
     width: int
-    row_fields: int
 
 
 def sniff(path: Path) -> Layout:
@@ -88,33 +88,34 @@ def _encoding(head: bytes) -> str:
 
 
 def _layout(lines: list[str], encoding: str, dialect: Dialect, head: bytes) -> Layout:
-    found = content(lines, dialect)
-    rows = [line for line in found[-SAMPLE:] if line.is_row]
-    width, row_fields = usual(row.filled for row in rows), usual(len(row.fields) for row in rows)
-    begin = _first_row(found, rows, width)
-    above, row_line = found[:begin], found[begin].number if begin < len(found) else len(lines) + 1
+    sample = content(lines[-SAMPLE:], dialect, 1 + max(0, len(lines) - SAMPLE))
+    rows = [line for line in sample if line.is_row]
+    width = usual(row.filled for row in rows)
+    numeric = [i for i in range(width) if 2 * sum(r.kinds[i : i + 1] == ("text",) for r in rows) < len(rows)]
+    above, first_line = _above_rows(content(lines, dialect), width, numeric)
     place = _header(above, width)
+    units: tuple[str, ...] = ()
     if place is None:
-        header = _header_in_comment(lines[: row_line - 1], dialect, width)
-        units: tuple[str, ...] = ()
-        first_line, untitled = row_line, above[-1].number if above and not header else 0
+        header, header_line = _header_in_comment(lines[: first_line - 1], dialect, width)
+        header_line = header_line or (above[-1].number if above else 0)
     else:
-        header, units, untitled = above[place].fields, _units(above[place + 1 : place + 2]), 0
+        header, header_line = above[place].fields, above[place].number
+        units = _units(above[place + 1 : place + 2])
         first_line = above[place + bool(units)].number + 1
     header = header[: filled(header)]
     return Layout(
-        encoding, dialect, header, units, untitled, first_line, _offset(head, first_line),
-        width=len(header) or width, row_fields=row_fields or len(header),
-    )  # fmt: skip
+        encoding, dialect, header, header_line, units, first_line, _offset(head, first_line), len(header) or width
+    )
 
 
-def _first_row(found: list[Line], rows: list[Line], width: int) -> int:
-    """Index of the first line that has numbers where the later rows mostly have them."""
-    numeric = [i for i in range(width) if 2 * sum(r.kinds[i : i + 1] == ("text",) for r in rows) < len(rows)]
-    for index, line in enumerate(found):
+def _above_rows(lines: Iterator[Line], width: int, numeric: Sequence[int]) -> tuple[list[Line], int]:
+    """The lines above the first that has numbers where later rows mostly have them, and that line's number."""
+    above: list[Line] = []
+    for line in lines:
         if line.is_row and len(line.fields) >= width and not any(line.kinds[i] == "text" for i in numeric):
-            return index
-    return len(found)
+            return above, line.number
+        above.append(line)
+    return above, above[-1].number + 1 if above else 1
 
 
 def _header(above: list[Line], width: int) -> int | None:
@@ -136,13 +137,13 @@ def _units(below: Sequence[Line]) -> tuple[str, ...]:
     return ()
 
 
-def _header_in_comment(above: list[str], dialect: Dialect, width: int) -> tuple[str, ...]:
-    """The last comment above the rows, as numpy.savetxt writes its header, if it names the columns."""
-    for line in reversed(above):
-        if line.lstrip().startswith(dialect.comments):
-            fields = tuple(dialect.split(line.lstrip(" \t#%/;'")))
-            return fields if known_titles(fields) and filled(fields) >= width else ()
-    return ()
+def _header_in_comment(above: list[str], dialect: Dialect, width: int) -> tuple[tuple[str, ...], int]:
+    """The last comment above the rows and its line, as numpy.savetxt writes its header, if it names the columns."""
+    for number in range(len(above), 0, -1):
+        if above[number - 1].lstrip().startswith(dialect.comments):
+            fields = tuple(dialect.split(above[number - 1].lstrip(" \t#%/;'")))
+            return (fields, number) if known_titles(fields) and filled(fields) >= width else ((), 0)
+    return (), 0
 
 
 def _offset(head: bytes, line: int) -> int:

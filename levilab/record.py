@@ -133,7 +133,8 @@ def _run(experiment: Experiment, session: Session, order: Order) -> None:
     finally:
         session.stop.shield()
         session.bench.outputs_off()
-        _note_instruments(session, "end")
+        with contextlib.suppress(CannotWrite):  # if the disk is full, what failed first is told
+            _note_instruments(session, "end")
 
 
 def _start_time(session: Session, zero: float) -> None:
@@ -146,12 +147,14 @@ def _read_until_the_end(experiment: Experiment, session: Session) -> None:
     first = int(session.now() // settings.interval_s) + 1 if session.rows else 0
     for k in itertools.count(first):
         session.wait(k * settings.interval_s - session.now())
+        asked = session.now()
         row = experiment.read(session)
         if row is None:
-            session.event("reading missed", "no reading; asking once more")
+            session.event("reading missed", f"no reading at {asked:.1f} s, asking once more")
             row = experiment.read(session)
         if row is None:
-            session.event("fell", f"no light pulses any more: the top fell before {session.now():.0f} s")
+            last = session.rows[-1]["time_s"] if session.rows else 0.0
+            session.event("fell", f"no light pulses any more: the top fell between {last:.1f} s and {asked:.1f} s")
             return
         session.keep(row, experiment.remaining([*session.rows, row]))
         if session.now() > settings.longest_s:
@@ -201,7 +204,7 @@ def _record(order: Order) -> RunRecord:
         status="running",
         started_utc=utc_now(),
         command_line=sys.argv,
-        channels=[vars(channel) for channel in experiment.channels],
+        channels=_channels(experiment, order.config.spin),
         configuration=_configuration(order),
         software=software_versions(),
         seed=order.seed,
@@ -209,6 +212,12 @@ def _record(order: Order) -> RunRecord:
         synthetic=order.world is not None,
         synthetic_how=order.how,
     )
+
+
+def _channels(experiment: Experiment, settings: SpinSettings) -> list[dict[str, str]]:
+    """The columns; there is none for an uncertainty that nobody knows."""
+    known = settings.reading_u_hz is not None
+    return [vars(channel) for channel in experiment.channels if known or "_u_" not in channel.name]
 
 
 def _configuration(order: Order) -> dict[str, Any]:

@@ -181,9 +181,18 @@ class RunWriter:
             self._append(EVENTS, json.dumps(event, ensure_ascii=False, allow_nan=False))
 
     def wire(self, address: str, direction: str, data: bytes) -> None:
-        """Append bytes that went over the wire to wire.log."""
-        with _told("write wire.log", self.folder):
+        """Append bytes that went over the wire to wire.log.
+
+        Never raises: the log is no measurement, and the exchange under way may be the one that switches the
+        output off.  If the log cannot be written it ends there, and run.json says why.
+        """
+        if "wire_log_ended" in (self.record.model_extra or {}):
+            return
+        try:
             self._append(WIRE, f"{utc_now()} {address} {direction} {data!r}", sync=False)
+        except OSError as error:
+            ended = {"wire_log_ended": error.strerror or str(error)}
+            self.record = RunRecord.model_validate(self.record.model_dump() | ended)
 
     def finish(self, status: Status, **changes: Any) -> None:
         """The run has ended: run.json says how, datapackage.json describes the files."""

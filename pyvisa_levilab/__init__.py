@@ -18,6 +18,7 @@ from pyvisa.util import LibraryPath
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from pyvisa.highlevel import ResourceInfo
     from pyvisa.typing import VISARMSession, VISASession
 
     from instruments.virtual.bus import Bus, Session
@@ -66,6 +67,10 @@ class LevilabVisaLibrary(VisaLibraryBase):
         pattern = query.upper().replace("?*", "*")
         return tuple(name for name in self._bench().instruments if fnmatch.fnmatch(name.upper(), pattern))
 
+    def parse_resource_extended(self, session: VISARMSession, resource_name: str) -> tuple[ResourceInfo, StatusCode]:
+        """ViParseRsrcEx; resource names know no case (VPP-4.3, 4.3.1), pyvisa's parser knows INSTR only."""
+        return super().parse_resource_extended(session, resource_name.upper())
+
     def open(
         self,
         session: VISARMSession,
@@ -77,7 +82,7 @@ class LevilabVisaLibrary(VisaLibraryBase):
         link = self._bench().open(resource_name)
         if link is None:
             return cast("VISASession", 0), self.handle_return_value(None, StatusCode.error_resource_not_found)
-        parsed = rname.parse_resource_name(resource_name)
+        parsed = rname.parse_resource_name(resource_name.upper())
         attributes = _DEFAULT_ATTRIBUTES | {
             ResourceAttribute.resource_name: resource_name,
             ResourceAttribute.resource_class: parsed.resource_class,

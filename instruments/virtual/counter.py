@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from instruments.scpi import NOT_A_NUMBER
-from instruments.virtual.device import Clock, VirtualInstrument
+from instruments.virtual.device import Clock, VirtualInstrument, answers, does
 from instruments.virtual.scpi import Command, nr3
 
 #: The voltage at the input: (start [s], step [s], n) → shape (n,) [V].
@@ -46,8 +46,8 @@ class Virtual53230A(VirtualInstrument):
             self.numeric("INPut[1]:LEVel[1][:ABSolute]", "level", low=-5.125, high=5.125, default=0, unit="V"),
             self.word("INPut[1]:SLOPe[1]", "slope", ("POSitive", "NEGative"), "POS"),
             self.numeric("SYSTem:TIMeout", "timeout", low=0.01, high=9.9e37, default=1.0, unit="S"),
-            Command("ABORt", set=lambda _: self.clear()),
-            Command("READ", get=lambda _: self._read()),
+            Command("ABORt", set=does(self.abandon)),
+            Command("READ", get=answers(self._read)),
         )
 
     def _configure(self) -> None:
@@ -56,7 +56,7 @@ class Virtual53230A(VirtualInstrument):
 
     def _read(self) -> str:
         """READ?: opens the gate; the answer comes when it has closed, or when the time-out is over."""
-        start = self.clock.now()
+        start = self._ready  # when what was asked before has been answered
         gate = float(self.settings["gate"])
         # programmer's reference: a time-out below the gate counts as twice the gate
         timeout = float(self.settings["timeout"])

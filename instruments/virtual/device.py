@@ -5,7 +5,19 @@ from __future__ import annotations
 from collections import deque
 from typing import TYPE_CHECKING, Protocol
 
-from instruments.virtual.scpi import Command, Parser, ScpiError, boolean, choice, nr3, number, one
+from instruments.virtual.scpi import (
+    Command,
+    Parser,
+    ScpiError,
+    at_most_one,
+    boolean,
+    choice,
+    limit,
+    none,
+    nr3,
+    number,
+    one,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,22 +52,23 @@ class VirtualInstrument:
         self.clock, self.pace = clock, pace
         self.settings: dict[str, Value] = {}
         self._defaults: dict[str, Value] = {}
-        self._input = bytearray()
+        self._input = b""
         self._output: deque[tuple[float, bytes]] = deque()
         self._ready = 0.0
-        self.parser = Parser((*self._common(), *self.table()))
+        self.parser = Parser()
+        self.parser.commands = (*self._common(), *self.table())
         self.settings |= self._defaults
 
     # --- the wire ---
 
     def receive(self, data: bytes) -> None:
         """Bytes from the controller; every complete line is executed."""
-        self._input += data
-        if len(self._input) > _INPUT_BUFFER and b"\n" not in self._input:
-            self._input.clear()
+        *lines, rest = (self._input + data).split(b"\n")
+        if len(rest) > _INPUT_BUFFER:
+            rest = b""
             self.parser.report(ScpiError(-363))
-        while b"\n" in self._input:
-            line, _, self._input = self._input.partition(b"\n")
+        self._input = rest
+        for line in lines:
             self._execute(line.decode("latin-1").strip())
 
     def _execute(self, message: str) -> None:
@@ -76,7 +89,11 @@ class VirtualInstrument:
 
     def clear(self) -> None:
         """Device clear: what is under way in either direction is dropped, settings stay."""
-        self._input.clear()
+        self._input = b""
+        self.abandon()
+
+    def abandon(self) -> None:
+        """What is under way is given up, and what has not been read yet is lost."""
         self._output.clear()
         self._ready = self.clock.now()
 
@@ -101,12 +118,12 @@ class VirtualInstrument:
 
     def _common(self) -> tuple[Command, ...]:
         return (
-            Command("*IDN", get=lambda _: self.identity),
-            Command("*RST", set=lambda _: self.reset()),
-            Command("*CLS", set=lambda _: self.parser.errors.clear()),
-            Command("*OPC", set=lambda _: None, get=lambda _: "1"),
-            Command("*WAI", set=lambda _: None),
-            Command("SYSTem:ERRor[:NEXT]", get=lambda _: self.parser.next_error()),
+            Command("*IDN", get=answers(lambda: self.identity)),
+            Command("*RST", set=does(self.reset)),
+            Command("*CLS", set=does(self.parser.errors.clear)),
+            Command("*OPC", set=none, get=answers(lambda: "1")),
+            Command("*WAI", set=none),
+            Command("SYSTem:ERRor[:NEXT]", get=answers(self.parser.next_error)),
         )
 
     def numeric(self, pattern: str, name: str, *, low: float, high: float, default: float, unit: str = "") -> Command:
@@ -117,19 +134,21 @@ class VirtualInstrument:
             return number(text, low=low, high=high, default=default, unit=unit)
 
         def ask(parameters: list[str]) -> str:
-            return nr3(read(one(parameters)) if parameters else float(self.settings[name]))
+            asked = at_most_one(parameters)
+            return nr3(limit(asked, low=low, high=high, default=default) if asked else float(self.settings[name]))
 
         return Command(pattern, self._setter(name, read), ask)
 
     def word(self, pattern: str, name: str, words: tuple[str, ...], default: str) -> Command:
         """A row for one word of several; the answer is the short form."""
         self._defaults[name] = default
-        return Command(pattern, self._setter(name, lambda text: choice(text, words)), self._getter(name))
+        set_ = self._setter(name, lambda text: choice(text, words))
+        return Command(pattern, set_, answers(lambda: str(self.settings[name])))
 
     def switch(self, pattern: str, name: str, *, default: bool = False) -> Command:
         """A row for ON or OFF; the answer is 1 or 0."""
         self._defaults[name] = default
-        return Command(pattern, self._setter(name, boolean), lambda _: str(int(self.settings[name])))
+        return Command(pattern, self._setter(name, boolean), answers(lambda: str(int(self.settings[name]))))
 
     def _setter(self, name: str, read: Callable[[str], Value]) -> Callable[[list[str]], None]:
         def set_(parameters: list[str]) -> None:
@@ -138,5 +157,22 @@ class VirtualInstrument:
 
         return set_
 
-    def _getter(self, name: str) -> Callable[[list[str]], str]:
-        return lambda _: str(self.settings[name])
+
+def does(act: Callable[[], None]) -> Callable[[list[str]], None]:
+    """What a command without parameters does, for a row of a table."""
+
+    def set_(parameters: list[str]) -> None:
+        none(parameters)
+        act()
+
+    return set_
+
+
+def answers(tell: Callable[[], str]) -> Callable[[list[str]], str]:
+    """What a query without parameters is answered with, for a row of a table."""
+
+    def get(parameters: list[str]) -> str:
+        none(parameters)
+        return tell()
+
+    return get

@@ -42,7 +42,9 @@ class ScpiError(Exception):
 
     def __init__(self, number: int, detail: str = "") -> None:
         self.number = number
-        text = ERRORS[number] + (f";{detail}" if detail else "")
+        # what the other side sent goes back as a string of IEEE 488.2 (8.7.8): ASCII, quotes doubled
+        shown = "".join(c if " " <= c <= "~" else "?" for c in detail).replace('"', '""')
+        text = ERRORS[number] + (f";{shown}" if detail else "")
         self.entry = f'{number:+d},"{text}"'
         super().__init__(self.entry)
 
@@ -88,7 +90,7 @@ class Parser:
     commands: the table; queue_size: entries of the error queue before it overflows.
     """
 
-    commands: tuple[Command, ...]
+    commands: tuple[Command, ...] = ()
     queue_size: int = 20
     errors: deque[str] = field(default_factory=deque)
     _known: dict[str, Command] = field(default_factory=dict)
@@ -98,10 +100,10 @@ class Parser:
         answers: list[str] = []
         path = ""
         for unit in split_units(message):
-            header, _, rest = unit.partition(" ")
+            header, *rest = unit.split(maxsplit=1)
             full, path = _resolve(header, path)
             try:
-                answer = self._execute(full, split_parameters(rest))
+                answer = self._execute(full, split_parameters("".join(rest)))
             except ScpiError as error:
                 self.report(error)
                 break
@@ -110,7 +112,7 @@ class Parser:
         return ";".join(answers) if answers else None
 
     def _execute(self, header: str, parameters: list[str]) -> str | None:
-        name = header.removesuffix("?")
+        name = header.removesuffix("?").upper()
         command = self._find(name)
         if header.endswith("?"):
             if command.get is None:
@@ -175,21 +177,49 @@ def _split(text: str, separator: str) -> Iterator[str]:
         elif character in "\"'":
             quote = character
         elif character in "()":
-            depth += 1 if character == "(" else -1
-        elif character == separator and depth <= 0:
+            depth = depth + 1 if character == "(" else max(0, depth - 1)
+        elif character == separator and not depth:
             yield text[start:position]
             start = position + 1
     yield text[start:]
 
 
-def one(parameters: list[str]) -> str:
-    """The only parameter, a channel list beside it aside.  Raises ScpiError if there is none or another."""
+def at_most_one(parameters: list[str]) -> str:
+    """The only parameter or "", a channel list aside.  Raises ScpiError if there are more."""
     plain = [parameter for parameter in parameters if not _CHANNEL_LIST.fullmatch(parameter)]
-    if not plain:
-        raise ScpiError(-109)
     if len(plain) > 1:
         raise ScpiError(-108)
-    return plain[0]
+    return plain[0] if plain else ""
+
+
+def one(parameters: list[str]) -> str:
+    """The only parameter, a channel list aside.  Raises ScpiError if there is none or another."""
+    only = at_most_one(parameters)
+    if not only:
+        raise ScpiError(-109)
+    return only
+
+
+def none(parameters: list[str]) -> None:
+    """Nothing but a channel list.  Raises ScpiError."""
+    if at_most_one(parameters):
+        raise ScpiError(-108)
+
+
+def _limits(low: float, high: float, default: float) -> dict[str, float]:
+    return {"MIN": low, "MINIMUM": low, "MAX": high, "MAXIMUM": high, "DEF": default, "DEFAULT": default}
+
+
+def limit(text: str, *, low: float, high: float, default: float) -> float:
+    """What a query may ask beside the setting itself: ``MIN``, ``MAX`` or ``DEF``.  Raises ScpiError.
+
+    >>> limit("max", low=0, high=1e6, default=0)
+    1000000.0
+    """
+    words = _limits(low, high, default)
+    if text.upper() not in words:
+        raise ScpiError(-224, text[:20])
+    return words[text.upper()]
 
 
 def number(text: str, *, low: float, high: float, default: float, unit: str = "") -> float:
@@ -198,8 +228,7 @@ def number(text: str, *, low: float, high: float, default: float, unit: str = ""
     >>> number("1.5 kHz", low=0, high=1e6, default=0, unit="HZ")
     1500.0
     """
-    words = {"MIN": low, "MINIMUM": low, "MAX": high, "MAXIMUM": high, "DEF": default, "DEFAULT": default}
-    words |= {"INF": 9.9e37, "INFINITY": 9.9e37} if high >= 9.9e37 else {}
+    words = _limits(low, high, default) | ({"INF": 9.9e37, "INFINITY": 9.9e37} if high >= 9.9e37 else {})
     if text.upper() in words:
         return words[text.upper()]
     match = _NUMBER.fullmatch(text)
@@ -212,13 +241,13 @@ def number(text: str, *, low: float, high: float, default: float, unit: str = ""
 
 
 def _multiplier(suffix: str, unit: str) -> float:
-    prefix = suffix.removesuffix(unit) if unit else suffix
-    # SCPI 7.1: with Hz and ohm a leading M means mega, elsewhere milli
-    if prefix == "M" and unit in {"HZ", "OHM"}:
-        return 1e6
-    if prefix not in _MULTIPLIERS or (suffix and not suffix.endswith(unit)) or (suffix and not unit):
+    if not suffix:
+        return 1.0
+    prefix = suffix.removesuffix(unit)
+    if not unit or not suffix.endswith(unit) or prefix not in _MULTIPLIERS:
         raise ScpiError(-131, suffix[:20])
-    return _MULTIPLIERS[prefix]
+    # SCPI 7.1: with Hz and ohm a leading M means mega, elsewhere milli
+    return 1e6 if prefix == "M" and unit in {"HZ", "OHM"} else _MULTIPLIERS[prefix]
 
 
 def choice(text: str, words: tuple[str, ...]) -> str:
@@ -243,9 +272,9 @@ def boolean(text: str) -> bool:
 
 
 def nr3(value: float) -> str:
-    """A number as these instruments print it.
+    """A number as these instruments print it: fifteen digits, and room for one more.
 
-    >>> nr3(23.456789)
-    '+2.345678900000000E+01'
+    >>> nr3(23.456789), nr3(9.9e37)  # a sixteenth digit would make 9.899999999999999 of it
+    ('+2.345678900000000E+01', '+9.900000000000000E+37')
     """
-    return f"{value:+.15E}"
+    return f"{value:+.14E}".replace("E", "0E")

@@ -61,7 +61,8 @@ DECAYS: dict[str, SpinDecay] = {
     ),
     "mixed": SpinDecay(
         after=_mixed_after,
-        elapsed=lambda spin, end, c1, c2: np.log((c1 / end + c2) / (c1 / spin + c2)) / c1,
-        turned=lambda spin, end, c1, c2: np.log((c1 + c2 * spin) / (c1 + c2 * end)) / c2,
+        # log1p: where one of the constants is small the logarithm is that of nearly one
+        elapsed=lambda spin, end, c1, c2: np.log1p(c1 * (1 / end - 1 / spin) / (c1 / spin + c2)) / c1,
+        turned=lambda spin, end, c1, c2: np.log1p(c2 * (spin - end) / (c1 + c2 * end)) / c2,
     ),
 }

@@ -116,10 +116,10 @@ class SpinWorld:
         self._go_on(self._state(time), drive_spin=2 * math.pi * frequency, hold=hold)
 
     def _state(self, time: float) -> _Stretch:
-        """The stretch that would begin now if nothing but the rule changed."""
+        """The stretch that would begin now, before a rule is chosen for it."""
         here: _Stretch = self._stretches[int(self._index(np.array([time]))[0])]
         spin, angle = self._motion(here, np.array([time]))
-        return replace(here, start=time, spin=float(spin[0]), angle=float(angle[0]))
+        return replace(here, start=time, spin=float(spin[0]), angle=float(angle[0]), acceleration=0.0)
 
     def _go_on(self, now: _Stretch, *, drive_spin: float, hold: float) -> None:
         """Lay down the future from this state on, as it is without a further change."""

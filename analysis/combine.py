@@ -1,0 +1,187 @@
+"""Several spin-downs of one top: the drag law is common, each run has a start and a constant of its own.
+
+The constants of one top differ from run to run by much more than one run's readings tell (the thesis's by 2 %, each
+good to 0.1 %; PHYSICS.md §5). So a mean over runs has its uncertainty from their scatter, and is not weighted.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.drag import LAWS
+from analysis.errors import NothingToCombine
+from analysis.lawfit import ROUNDING, LawFit
+from analysis.residuals import durbin_watson, runs_test_p
+from analysis.selection import NO_FIT, Statistics, Verdict, statistics, verdict, weigh
+from analysis.spindown import SpinDown, comparison_warnings
+from analysis.uncertainty import Estimate
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Mean(Estimate):
+    """The mean of a constant over the runs; u is its standard error.
+
+    Attributes:
+        scatter: standard deviation of one run's constant from another's; None with one run.
+        degrees_of_freedom: of scatter and u.
+    """
+
+    scatter: float | None = None
+    degrees_of_freedom: int = 0
+
+
+@dataclass(frozen=True)
+class CombinedLaw:
+    """One drag law over all runs.
+
+    Attributes:
+        name: of the law.
+        constants: mean of each constant over the runs.
+        linearised: the same for the straight-line constant, where the law has one.
+        statistics: over all readings of all runs.
+        warnings: what to know before using the numbers.
+    """
+
+    name: str
+    constants: dict[str, Mean]
+    linearised: dict[str, Mean] | None
+    statistics: Statistics
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Combined:
+    """All drag laws over all runs.
+
+    Attributes:
+        fits: in the order of the laws.
+        best: name of the law the runs favour together.
+        verdict: what they say about each law.
+        runs: how many there are.
+        warnings: what to know before using the numbers.
+    """
+
+    fits: tuple[CombinedLaw, ...]
+    best: str
+    verdict: Verdict
+    runs: int
+    warnings: tuple[str, ...]
+
+    def fit(self, name: str) -> CombinedLaw:
+        """One law."""
+        return next(fit for fit in self.fits if fit.name == name)
+
+
+def combine(runs: Sequence[SpinDown]) -> Combined:
+    """Means of the constants over several runs, and the law the runs favour together.
+
+    The criteria treat all runs as one experiment with p parameters for each run: with known uncertainties χ² is
+    added up, otherwise all readings share one unknown uncertainty.
+
+    Args:
+        runs: fitted to the same laws; laws that a run lacks are left out.
+
+    Raises:
+        NothingToCombine: no run, or no law common to all.
+    """
+    names = [name for name in LAWS if runs and all(name in _names(run) for run in runs)]
+    if not names:
+        raise NothingToCombine(runs=len(runs))
+    weighed = weigh({name: _statistics(runs, name) for name in names})
+    fits = tuple(_combined(name, [run.fit(name) for run in runs], weighed[name]) for name in names)
+    exponent = next((fit.constants["exponent"].u for fit in fits if fit.name == "power"), None)
+    fall = max(float(1 - run.frequency[-1] / run.frequency[0]) for run in runs)
+    decision = verdict(weighed, fall=fall, exponent_u=exponent)
+    said = comparison_warnings(weighed, decision.best)
+    if len(runs) == 1:
+        said.append("this is one run: its uncertainties contain nothing of the scatter between runs, so record several")
+    return Combined(fits, decision.best, decision, len(runs), tuple(said))
+
+
+def _names(run: SpinDown) -> set[str]:
+    return {fit.name for fit in run.fits}
+
+
+def _statistics(runs: Sequence[SpinDown], name: str) -> Statistics:
+    fits = [run.fit(name) for run in runs]
+    known = [fit.statistics.chi_square for fit in fits if fit.statistics.chi_square is not None]
+    all_known = len(known) == len(fits)
+    series = [
+        fit.residuals / run.u if all_known and run.u is not None else fit.residuals
+        for run, fit in zip(runs, fits, strict=True)
+    ]
+    return statistics(
+        n=sum(fit.statistics.n for fit in fits),
+        n_parameters=sum(fit.statistics.n_parameters for fit in fits),
+        rss=sum(fit.statistics.rss for fit in fits),
+        least_rss=sum(fit.statistics.n * (ROUNDING * fit.reference[0]) ** 2 for fit in fits),
+        chi_square=sum(known) if all_known else None,
+        durbin_watson=durbin_watson(*series),
+        runs_test_p=runs_test_p(*series),
+    )
+
+
+def _combined(name: str, fits: Sequence[LawFit], stats: Statistics) -> CombinedLaw:
+    constants = _means([fit.parameters for fit in fits], LAWS[name].constants)
+    lines = [fit.linearised for fit in fits if fit.linearised is not None]
+    said = [
+        warning
+        for constant in LAWS[name].constants
+        for warning in _warnings(name, constant, [fit.parameters[constant] for fit in fits], constants[constant])
+    ]
+    return CombinedLaw(name, constants, _means(lines, tuple(lines[0])) if lines else None, stats, tuple(said))
+
+
+def _means(runs: Sequence[Mapping[str, Estimate]], names: Sequence[str]) -> dict[str, Mean]:
+    return {name: mean([run[name] for run in runs]) for name in names}
+
+
+def mean(estimates: Sequence[Estimate]) -> Mean:
+    """The mean of one constant over the runs that have it, with u = s/√N from their scatter s (GUM 4.2).
+
+    Of one run: its own value and u.
+
+    >>> mean([Estimate(value, 0.01, "Hz") for value in (1.0, 2.0, 3.0)])
+    Mean(value=2.0, u=0.577..., unit='Hz', interval=None, scatter=1.0, degrees_of_freedom=2)
+    """
+    unit = estimates[0].unit
+    values = np.array([estimate.value for estimate in estimates if estimate.value is not None])
+    if not len(values):
+        return Mean(None, None, unit)
+    if len(values) == 1:
+        only = next(estimate for estimate in estimates if estimate.value is not None)
+        return Mean(only.value, only.u, unit, only.interval)
+    with np.errstate(over="ignore", invalid="ignore"):
+        average, scatter = float(values.mean()), float(values.std(ddof=1))
+    if not np.isfinite([average, scatter]).all():
+        return Mean(None, None, unit)
+    u = scatter / float(np.sqrt(len(values)))
+    return Mean(average, u, unit, scatter=scatter, degrees_of_freedom=len(values) - 1)
+
+
+def _warnings(law: str, constant: str, estimates: Sequence[Estimate], average: Mean) -> list[str]:
+    said = []
+    missing = sum(estimate.value is None for estimate in estimates)
+    if missing:
+        said.append(f"{law}: {missing} of {len(estimates)} runs have no {constant} and are not in its mean")
+    values = np.array([estimate.value for estimate in estimates if estimate.value is not None])
+    u = np.array([estimate.u for estimate in estimates if estimate.value is not None and estimate.u])
+    if average.scatter is None or len(u) != len(values):
+        return said
+    from scipy.special import gammaincc
+
+    weights = (u.min() / u) ** 2
+    q = float(
+        (((values - weights @ values / weights.sum()) / u) ** 2).sum()
+    )  # W. G. Cochran, Biometrics 10, 101 (1954)
+    if gammaincc((len(u) - 1) / 2, q / 2) < NO_FIT:
+        ratio = average.scatter / float(np.sqrt((u**2).mean()))
+        said.append(
+            f"{law}: {constant} scatters between the runs {ratio:.2g} times as much as each fit's own uncertainty "
+            "explains: the runs differ, so trust the scatter, not the fit of one run"
+        )
+    return said

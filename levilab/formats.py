@@ -1,0 +1,220 @@
+"""Other people's files, and our own readings.csv, as one table in SI.
+
+A file is sniffed (`levilab.layout`), its titles are understood (`levilab.columns`), its rows read (`levilab.rows`).
+"""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from levilab.columns import SHORTHANDS, Column, TableError, choose_columns, listed, shown
+from levilab.dialect import Dialect
+from levilab.errors import LevilabError
+from levilab.layout import Layout, sniff
+from levilab.rows import Rows, read_rows
+from levilab.titles import CANONICAL, COMPANIONS
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from numpy.typing import NDArray
+
+FEWEST = 3  # readings below which no analysis has anything to say
+NO_READING = 9.9e37  # SCPI-1999, 7.2.1.4: infinity is 9.9E37, "not a number" 9.91E37
+LONGEST_HEADER = 1 << 16  # bytes
+TITLES_WITHOUT_HEADER = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A table of readings.
+
+    `frame` has canonical columns (`time_s`, `spin_frequency_hz`, …) in SI, float64, all finite; `lines`, shape
+    (rows,), is the 1-based line of `path` that each row stands in; `header` are the titles in the file.
+    """
+
+    path: Path
+    frame: "pd.DataFrame"
+    warnings: tuple[str, ...]
+    header: tuple[str, ...]
+    lines: "NDArray[np.int64]"
+
+    def column(self, name: str) -> "NDArray[np.float64]":
+        """A canonical column in SI, shape (rows,).
+
+        Raises:
+            TableError: the file has no such column.
+        """
+        if name not in self.frame.columns:
+            key = next((short for short, long in SHORTHANDS.items() if long == name), name)
+            raise TableError(
+                self.path, f"no column is known to be {name}; it has {listed(self.header)}: say --columns {key}=NAME"
+            )
+        values: NDArray[np.float64] = self.frame[name].to_numpy(dtype=np.float64)
+        return values
+
+
+def read_table(path: Path, *, columns: Mapping[str, str] | None = None) -> Table:
+    """Read a table of text: CSV of any kind, tabs or blanks, decimal point or comma, with or without units.
+
+    Args:
+        path: the file.
+        columns: {canonical column, or t, f, u: title in the file or 1-based number}, where titles are not known.
+
+    Returns:
+        At least three rows. Rows with a missed reading (empty, nan, inf, 9.91E37) are left out, with a warning.
+
+    Raises:
+        TableError: there is no such table, or it cannot be understood without doubt.
+    """
+    with _file_errors(path):
+        layout = sniff(path)
+        header, wanted, warnings = _titles(path, layout, columns or {})
+        chosen, doubts = choose_columns(path, header, layout.units, wanted)
+        if not chosen:
+            known = "time_s, spin_frequency_hz, t, f [Hz], rpm …"
+            raise TableError(
+                path,
+                f"no title is known ({known}) among {listed(header)}: say --columns t=NAME,f=NAME",
+                line=layout.header_line or layout.first_line,
+            )
+        rows = read_rows(path, layout, chosen)
+    table = _table(path, header, chosen, rows, (*warnings, *doubts))
+    if len(table.frame) >= FEWEST:
+        return table
+    what = f"{len(table.frame)} readings" if rows.lines.size else "only a header"
+    missed = f" and {rows.lines.size - len(table.frame)} missed ones" if rows.lines.size > len(table.frame) else ""
+    raise TableError(
+        path,
+        f"holds {what}{missed}, at least {FEWEST} readings are needed: record longer",
+        line=layout.header_line or layout.first_line,
+    )
+
+
+def read_run_readings(path: Path) -> Table:
+    """Read the readings.csv of a run folder, which may still be being written.
+
+    A last line without its line end is torn and left out, with a warning. No rows, or no header yet, are no error.
+
+    Raises:
+        TableError: it cannot be read, its header is not ours, or a line is damaged.
+    """
+    with _file_errors(path):
+        with path.open("rb") as stream:
+            first = stream.readline(LONGEST_HEADER)
+        title = first.decode("utf-8-sig", errors="replace")
+        header = tuple(title.removesuffix("\n").removesuffix("\r").split(",")) if title.endswith("\n") else ()
+        chosen = tuple(Column(n, header.index(n), n, 1) for n in CANONICAL if n in header)
+        if header and not (chosen and "".join(header).isprintable()):
+            raise TableError(path, f"'{shown(title.strip())}' is no header of a run, as time_s,… is", line=1)
+        layout = Layout("utf-8-sig", Dialect(",", "."), header, 1, (), 2, len(first), len(header))
+        nothing = Rows((), np.zeros(0, np.int64), f"line 1: '{shown(title)}' was cut off" if title else None)
+        rows = read_rows(path, layout, chosen, drop_unended=True) if header else nothing
+    return _table(path, header, chosen, rows, ())
+
+
+class ColumnsError(LevilabError):
+    """`--columns` cannot be understood; wrong usage."""
+
+    exit_code = 2
+
+
+def parse_columns(text: str) -> dict[str, str]:
+    """What `--columns` says, as `read_table` takes it; titles may hold commas and equals signs.
+
+    >>> parse_columns("t=Zeit, s,f=3")
+    {'t': 'Zeit, s', 'f': '3'}
+
+    Raises:
+        ColumnsError: it is not NAME=COLUMN,NAME=COLUMN.
+    """
+    parts = [part.partition("=") for part in re.split(r",(?=\s*[a-z_]+\s*=)", text) if text.strip()]
+    found = {name.strip(): title.strip() for name, _, title in parts}
+    if len(found) < len(parts) or not all(name and title for name, title in found.items()):
+        raise ColumnsError(
+            f"--columns '{shown(text)}': NAME=COLUMN,NAME=COLUMN is expected, each NAME once, as t=Zeit,f=3"
+        )
+    return found
+
+
+def _must_be_file(path: Path) -> None:
+    if path.is_dir():
+        raise TableError(path, "is a folder; a data file is expected: name the file in it")
+    if not path.exists():  # also for a name that no file can have
+        raise FileNotFoundError
+    if not path.is_file():
+        raise TableError(path, "is a device or a pipe; a data file is expected: save it to a file first")
+
+
+@contextmanager
+def _file_errors(path: Path) -> Iterator[None]:
+    """Tell in one line what keeps a file from being opened."""
+    try:
+        _must_be_file(path)
+        yield
+    except FileNotFoundError as error:
+        raise TableError(path, "no such file; check the name and the folder") from error
+    except PermissionError as error:
+        raise TableError(path, "may not be read by you; change its permissions or copy it") from error
+    except OSError as error:
+        raise TableError(
+            path, f"cannot be read ({error.strerror or type(error).__name__}); check the name and the disk"
+        ) from error
+
+
+def _titles(
+    path: Path, layout: Layout, wanted: Mapping[str, str]
+) -> tuple[tuple[str, ...], Mapping[str, str], list[str]]:
+    """The file's titles, or numbers in their place; what to take for what; a warning where that is a guess."""
+    if layout.header:
+        return layout.header, wanted, []
+    numbers = tuple(str(n + 1) for n in range(layout.width))
+    if wanted:
+        return numbers, wanted, []
+    if layout.header_line:
+        raise TableError(
+            path,
+            f"is no header for the {layout.width} columns below: correct it, or say --columns t=1,f=2",
+            line=layout.header_line,
+        )
+    if layout.width > len(TITLES_WITHOUT_HEADER):
+        raise TableError(
+            path, f"{layout.width} columns and no header; add one, or say --columns t=1,f=2", line=layout.first_line
+        )
+    guess = dict(zip(TITLES_WITHOUT_HEADER, numbers, strict=False))
+    return numbers, guess, [f"{shown(str(path), 200)}: no header; the columns are taken as {', '.join(guess)}"]
+
+
+def _table(
+    path: Path, header: tuple[str, ...], chosen: Sequence[Column], rows: Rows, warnings: tuple[str, ...]
+) -> Table:
+    """Leave out missed readings, and uncertainties that nobody wrote; then to SI."""
+    import pandas as pd
+
+    name = shown(str(path), 200)
+    told = [*warnings, *([f"{name}, {rows.torn} and is left out"] if rows.torn else [])]
+    numbers = dict(zip(chosen, rows.values, strict=False))
+    # The comparison is false for NaN, too.
+    present = {column: np.abs(values) < NO_READING for column, values in numbers.items()}
+    for column in [c for c, p in present.items() if c.name in COMPANIONS and p.size and not p.any()]:
+        del present[column]
+        told.append(f"{name}: column '{shown(column.label)}' is empty and is not used")
+    good = np.logical_and.reduce(list(present.values())) if present else np.ones(rows.lines.size, bool)
+    lines, kept = rows.lines, {column: numbers[column] for column in present}
+    if not good.all():
+        told.append(_missed(name, lines[~good], good.size))
+        lines, kept = lines[good], {column: values[good] for column, values in kept.items()}
+    frame = {c.name: values if c.factor == 1 else values * c.factor for c, values in kept.items()}
+    return Table(path, pd.DataFrame(frame, dtype=np.float64), tuple(told), header, lines)
+
+
+def _missed(name: str, lines: "NDArray[np.int64]", rows: int) -> str:
+    places = ", ".join(str(line) for line in lines[:5]) + (", …" if lines.size > 5 else "")
+    return (
+        f"{name}: {lines.size} of {rows} rows {'is' if lines.size == 1 else 'are'} left out as missed "
+        f"(empty, nan, inf or 9.91E37): line{'s' * (lines.size > 1)} {places}"
+    )

@@ -1,0 +1,194 @@
+"""The numbers in the rows of a table of text, read at once where every line is plain, else line by line.
+
+Plain is a file in which the number of line ends and separators is that of full rows and every field that is used is
+a number or a missed reading; pandas then reads it at its full speed. All else (comments among the rows, quotation
+marks, blanks as separators, a damaged line) is read again line by line, so that an error can name its line.
+"""
+
+import csv
+import warnings
+from array import array
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from levilab.columns import Column, TableError, shown
+from levilab.dialect import MISSING
+from levilab.layout import Layout
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+BLOCK = 1 << 17  # bytes counted at once: small enough for the cache
+ONE_BYTE_ENCODINGS = ("utf-8", "utf-8-sig", "latin-1")  # those in which a line end is one byte, whatever precedes it
+SPELLINGS = sorted({form for text in MISSING for form in (text, text.upper(), text.title(), "NaN")})
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Numbers as they stand in the file.
+
+    `values` has one array, shape (rows,), for each column that is used, NaN where a reading is missed; `lines`,
+    shape (rows,), holds their 1-based lines; `torn` tells of a last line that was cut off and is left out.
+    """
+
+    values: "tuple[NDArray[np.float64], ...]"
+    lines: "NDArray[np.int64]"
+    torn: str | None = None
+
+
+def read_rows(path: Path, layout: Layout, chosen: Sequence[Column], *, drop_unended: bool = False) -> Rows:
+    """All rows of the chosen columns.
+
+    A last line without line end is left out if it is no full row, or in any case if `drop_unended`.
+
+    Raises:
+        TableError: a line is damaged.
+        OSError: the file cannot be read.
+    """
+    rows = _read_at_once(path, layout, chosen, drop_unended=drop_unended)
+    return rows or _read_lines(path, layout, chosen, drop_unended=drop_unended)
+
+
+def _read_at_once(path: Path, layout: Layout, chosen: Sequence[Column], *, drop_unended: bool) -> Rows | None:
+    """All rows by pandas, or None if any line is not plain, or the file grows meanwhile."""
+    import pandas as pd
+
+    dialect, fields, used = layout.dialect, layout.width, [column.index for column in chosen]
+    count, rest = _plain_lines(path, layout) if _may_be_plain(layout, used) else (0, b"")
+    if count == 0:
+        return None
+    try:
+        with warnings.catch_warnings(action="ignore"):
+            frame = pd.read_csv(
+                path.absolute(), sep=dialect.separator, decimal=dialect.decimal, header=None, names=list(range(fields)),
+                usecols=None if len(used) == fields else sorted(used), skiprows=layout.first_line - 1, dtype="float64",
+                index_col=False, quoting=csv.QUOTE_NONE, na_values=SPELLINGS, keep_default_na=False, compression=None,
+                encoding_errors="replace",
+            )  # fmt: skip
+    except ValueError:  # text in a number column or too many fields: _read_lines tells where, or reads it
+        return None
+    if len(frame) != count + bool(rest.strip()):
+        return None
+    values = tuple(frame[index].to_numpy()[:count] for index in used)
+    # If all fields hold a number, the right sum of separators means the right number in each line. If not, one too
+    # many in one line may hide one missing in another.
+    certain = len(used) == fields and not any(np.isnan(column).any() for column in values)
+    if not certain and not _every_line_is_full(path, layout):
+        return None
+    rows = Rows(values, np.arange(layout.first_line, layout.first_line + count))
+    return _with_last(path, layout, chosen, rows, rest.decode(layout.encoding, "replace"), drop_unended=drop_unended)
+
+
+def _may_be_plain(layout: Layout, used: Sequence[int]) -> bool:
+    """Whether the fast way is safe; without the first field a comment with separators would pass for a row."""
+    separator, decimal = layout.dialect.separator, layout.dialect.decimal
+    return layout.encoding in ONE_BYTE_ENCODINGS and separator not in (None, decimal) and 0 in used
+
+
+def _plain_lines(path: Path, layout: Layout) -> tuple[int, bytes]:
+    """Number of lines with rows, and what follows the last line end; none if the separators do not add up."""
+    separator = ord(layout.dialect.separator or " ")
+    lines = separators = 0
+    rest = b""
+    with path.open("rb") as stream:
+        stream.seek(layout.start)
+        while not rest and (block := stream.read(BLOCK) + stream.readline()):
+            end = block.rfind(b"\n") + 1
+            codes, rest = np.frombuffer(block, np.uint8, count=end), block[end:]
+            lines += int(np.count_nonzero(codes == ord("\n")))
+            separators += int(np.count_nonzero(codes == separator))
+            if b"\0" in block or b"\r" in rest:  # pandas ends a field at the one, a line at the other
+                return 0, b""
+    return (lines, rest) if separators == lines * (layout.width - 1) else (0, b"")
+
+
+def _every_line_is_full(path: Path, layout: Layout) -> bool:
+    """Whether each line, without all other characters, is the separators of one row."""
+    line = (layout.dialect.separator or " ").encode() * (layout.width - 1) + b"\n"
+    others = bytes(set(range(256)) - set(line))
+    with path.open("rb") as stream:
+        stream.seek(layout.start)
+        while block := stream.read(BLOCK) + stream.readline():
+            marks = block[: block.rfind(b"\n") + 1].translate(None, others)
+            if marks != line * (len(marks) // len(line)):
+                return False
+    return True
+
+
+def _with_last(
+    path: Path, layout: Layout, chosen: Sequence[Column], rows: Rows, rest: str, *, drop_unended: bool
+) -> Rows:
+    """Rows with what follows the last line end, if that is one."""
+    if layout.dialect.skips(rest):
+        return rows
+    line = layout.first_line + rows.lines.size
+    last = None if drop_unended else _row_or_none(path, layout, chosen, line, rest)
+    if last is None:
+        return replace(rows, torn=_torn(line, rest))
+    values = tuple(np.append(column, number) for column, number in zip(rows.values, last, strict=True))
+    return Rows(values, np.append(rows.lines, line))
+
+
+def _read_lines(path: Path, layout: Layout, chosen: Sequence[Column], *, drop_unended: bool) -> Rows:
+    """All rows line by line; some 2 µs a number."""
+    lines, values, torn = array("q"), [array("d") for _ in chosen], None
+    with path.open(encoding=layout.encoding, errors="replace", newline=None) as stream:
+        for number, line in enumerate(stream, 1):
+            if number < layout.first_line or layout.dialect.skips(line):
+                continue
+            row: list[float] | None
+            if line.endswith("\n"):
+                row = _row(path, layout, chosen, number, line)
+            else:
+                row = None if drop_unended else _row_or_none(path, layout, chosen, number, line)
+            if row is None:
+                torn = _torn(number, line)
+                break
+            lines.append(number)
+            for column, value in zip(values, row, strict=True):
+                column.append(value)
+    return Rows(tuple(np.array(column, np.float64) for column in values), np.array(lines, np.int64), torn)
+
+
+def _row(path: Path, layout: Layout, chosen: Sequence[Column], line: int, text: str) -> list[float]:
+    """The numbers of one row, NaN where a reading is missed."""
+    fields = layout.dialect.split(text)
+    if len(fields) < layout.width or any(fields[layout.width :]):
+        hint = "; if the comma is a decimal mark, separate by ; or tab" if layout.dialect.separator == "," else ""
+        raise TableError(
+            path,
+            f"'{shown(text.strip())}' has {len(fields)} field{'s' * (len(fields) != 1)}, {layout.width} are expected: "
+            f"complete or remove the line{hint}",
+            line=line,
+        )
+    return [_number(path, layout, column, line, fields[column.index]) for column in chosen]
+
+
+def _row_or_none(path: Path, layout: Layout, chosen: Sequence[Column], line: int, text: str) -> list[float] | None:
+    try:
+        return _row(path, layout, chosen, line, text)
+    except TableError:
+        return None
+
+
+def _number(path: Path, layout: Layout, column: Column, line: int, text: str) -> float:
+    try:
+        return layout.dialect.number(text)
+    except ValueError:
+        if text.casefold() in MISSING:
+            return float("nan")
+    mark = "comma" if layout.dialect.decimal == "," else "point"
+    raise TableError(
+        path,
+        f"'{shown(text)}' stands in column '{shown(column.label)}', a number with decimal {mark} is expected: correct "
+        "it, or leave it empty if the reading was missed",
+        line=line,
+    )
+
+
+def _torn(line: int, text: str) -> str:
+    return f"line {line}: '{shown(text.strip())}' was cut off"

@@ -1,0 +1,410 @@
+"""Spin-down fits: exact on exact data, unbiased on noise, honest where the readings say little."""
+
+import dataclasses
+
+import lmfit
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import linregress
+from scipy.stats import t as student
+
+from analysis.drag import LAWS, spin
+from analysis.errors import (
+    AnalysisError,
+    NoSpinDown,
+    NotFinite,
+    NotPositive,
+    ShapesDiffer,
+    TimesNotIncreasing,
+    TooFewReadings,
+    UnknownName,
+)
+from analysis.spindown import fit_spin_down
+
+T = np.arange(0, 200, 10.0)
+SIGMA = 0.03  # [Hz], the noise of PHYSICS.md §5
+CONSTANTS = {
+    "stokes": (3.18e-3,),
+    "newton": (1.73e-5,),
+    "disc": (2.34e-4,),
+    "mixed": (1.5e-3, 8e-6),
+    "power": (2.34e-4, 1.5),
+}
+
+
+def readings(law="disc", sigma=SIGMA, seed=0, time=T):
+    noise = np.random.default_rng(seed).normal(0, sigma, len(time)) if sigma else 0
+    return spin(law, time, 40.0, *CONSTANTS[law]) + noise
+
+
+def values(fit):
+    return np.array([estimate.value for estimate in fit.parameters.values()])
+
+
+def uncertainties(fit):
+    return np.array([estimate.u for estimate in fit.parameters.values()])
+
+
+def assert_finite(thing):
+    """Nowhere in a result is there a NaN or an infinity."""
+    if dataclasses.is_dataclass(thing):
+        assert_finite([getattr(thing, field.name) for field in dataclasses.fields(thing)])
+    elif isinstance(thing, dict):
+        assert_finite(list(thing.values()))
+    elif isinstance(thing, (list, tuple)):
+        for part in thing:
+            assert_finite(part)
+    elif isinstance(thing, (float, np.ndarray)):
+        assert np.isfinite(thing).all()
+
+
+# ---------------------------------------------------------------------------------------------- the numbers are right
+
+
+@pytest.mark.parametrize("u", [SIGMA, None])
+@pytest.mark.parametrize("law", LAWS)
+def test_readings_without_noise_give_their_constants_back(law, u):
+    fit = fit_spin_down(T, readings(law, sigma=0), u).fit(law)
+    assert values(fit) == pytest.approx([40.0, *CONSTANTS[law]], rel=1e-9)
+    assert fit.statistics.rms_residual < 1e-12
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_constants_are_unbiased_and_their_uncertainties_true(law):
+    truth, n = np.array([40.0, *CONSTANTS[law]]), 1000
+    fits = [fit_spin_down(T, readings(law, seed=i), SIGMA, laws=[law]).fits[0] for i in range(n)]
+    found, u = np.array([values(fit) for fit in fits]), np.array([uncertainties(fit) for fit in fits])
+    # 0.1: the Monte Carlo error of a mean of 1000 is 0.032; c of the power law is skew, by half of u(ln c) = 0.08
+    assert np.abs((found.mean(axis=0) - truth) / found.std(axis=0)).max() < 0.1
+    # 0.6827 ± 0.04: the Monte Carlo error is 0.015
+    assert (np.abs(found - truth) < u).mean(axis=0) == pytest.approx(0.6827, abs=0.04)
+    assert ((found - truth) / u).std(axis=0) == pytest.approx(1, abs=0.08)  # 3.5 standard errors of 1/√(2n)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_without_stated_uncertainties_the_intervals_cover_as_students_t(law):
+    truth, n = np.array([40.0, *CONSTANTS[law]]), 400
+    fits = [fit_spin_down(T, readings(law, seed=i), laws=[law]).fits[0] for i in range(n)]
+    covered = np.array([np.abs(values(fit) - truth) < uncertainties(fit) for fit in fits]).mean(axis=0)
+    expected = 1 - 2 * student.sf(1, len(T) - len(truth))
+    assert covered == pytest.approx(expected, abs=0.07)  # 3 standard errors of √(0.67·0.33/400)
+
+
+def test_the_covariance_in_textbook_constants_is_that_of_the_textbook_fit():
+    fit = fit_spin_down(T, readings("power"), SIGMA).fit("power")
+
+    def misfit(p):
+        return (spin("power", T, *(v.value for v in p.values())) - readings("power")) / SIGMA
+
+    start = lmfit.create_params(nu=40.0, c=2.34e-4, n=1.5)
+    peer = lmfit.minimize(misfit, start, scale_covar=False, epsfcn=1e-10)
+    # 1e-3 and 1e-2: lmfit's numerical slopes in strongly correlated parameters are the worse ones
+    assert values(fit) == pytest.approx([v.value for v in peer.params.values()], rel=1e-3)
+    assert np.sqrt(np.diagonal(fit.covariance)) == pytest.approx(np.sqrt(np.diagonal(peer.covar)), rel=1e-2)
+    assert np.sqrt(np.diagonal(fit.covariance)) == pytest.approx(uncertainties(fit), rel=1e-12)
+
+
+def test_one_uncertainty_each_weighs_the_readings():
+    y, u = readings(), np.full(T.size, SIGMA)
+    assert values(fit_spin_down(T, y, u).fit("disc")) == pytest.approx(values(fit_spin_down(T, y, SIGMA).fit("disc")))
+    y[3] += 0.5
+    u[3] = 1e6  # such a reading says nothing: the fit is that of the others
+    others = fit_spin_down(np.delete(T, 3), np.delete(y, 3), SIGMA).fit("disc")
+    assert values(fit_spin_down(T, y, u).fit("disc")) == pytest.approx(values(others), rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("law", "straighten", "factor"),
+    [
+        ("stokes", np.log, -1.0),
+        ("newton", lambda w: 1 / w, 1.0),
+        ("disc", lambda w: w**-0.5, 2.0),
+    ],
+)
+def test_linearised_constants_are_slopes_of_unweighted_straight_lines(law, straighten, factor):
+    y = readings()
+    (estimate,) = fit_spin_down(T, y, SIGMA).fit(law).linearised.values()
+    line = linregress(T, straighten(2 * np.pi * y))
+    assert estimate.value == pytest.approx(factor * line.slope, rel=1e-12)
+    assert estimate.u == pytest.approx(abs(factor) * line.stderr, rel=1e-9)
+
+
+def test_the_fitted_curve_goes_through_the_readings_on_their_own_clock():
+    y = readings()
+    run = fit_spin_down(T + 1000, y, SIGMA)
+    for fit in run.fits:
+        assert y - fit.spin_frequency(T + 1000) == pytest.approx(fit.residuals, abs=1e-12)
+        assert fit.spin_frequency(1000.0) == pytest.approx(fit.parameters["start_frequency"].value, rel=1e-12)
+
+
+# -------------------------------------------------------------------------------------------------- statistics, verdict
+
+
+def test_criteria_are_the_textbooks():
+    y = readings()
+    known, unknown = fit_spin_down(T, y, SIGMA).fit("power"), fit_spin_down(T, y).fit("power")
+    n, p, rss = 20, 3, (known.residuals**2).sum()
+    chi2 = rss / SIGMA**2
+    assert known.statistics.reduced_chi_square == pytest.approx(chi2 / (n - p))
+    assert known.statistics.aicc == pytest.approx(chi2 + 2 * p + 2 * p * (p + 1) / (n - p - 1))
+    assert known.statistics.bic == pytest.approx(chi2 + p * np.log(n))
+    k = p + 1
+    assert unknown.statistics.aicc == pytest.approx(n * np.log(rss / n) + 2 * k + 2 * k * (k + 1) / (n - k - 1))
+    assert unknown.statistics.bic == pytest.approx(n * np.log(rss / n) + k * np.log(n))
+    assert unknown.statistics.reduced_chi_square is None
+
+
+def test_weights_are_akaikes():
+    fits = fit_spin_down(T, readings(sigma=0.3), 0.3).fits
+    aicc = np.array([fit.statistics.aicc for fit in fits])
+    expected = np.exp(-(aicc - aicc.min()) / 2)
+    assert [fit.statistics.weight for fit in fits] == pytest.approx(expected / expected.sum())
+
+
+@pytest.mark.parametrize("u", [SIGMA, None])
+def test_precise_readings_of_a_disc_exclude_stokes_and_newton(u):
+    verdict = fit_spin_down(T, readings(), u).verdict
+    assert {name for name, _ in verdict.excluded} == {"stokes", "newton"}
+    assert "disc" in verdict.indistinguishable
+    assert all("ΔAICc" in reason and "rms residual" in reason for _, reason in verdict.excluded)
+    assert "power contains disc as a special case" in verdict.text
+
+
+def test_rough_readings_cannot_tell_and_say_why():
+    verdict = fit_spin_down(T, readings(sigma=3.0), 3.0).verdict
+    assert verdict.excluded == ()
+    assert {"stokes", "newton", "disc"} <= {*verdict.indistinguishable, *verdict.weak}
+    assert "too little to tell" in verdict.text
+
+
+def test_a_fall_by_one_per_cent_cannot_tell_the_laws_apart():
+    time = np.linspace(0, 3, 20)
+    run = fit_spin_down(time, readings(time=time), SIGMA)
+    assert run.verdict.excluded == ()
+    assert "% is too little to tell" in run.verdict.text
+    assert run.fit("power").parameters["exponent"].u > 10
+    assert_finite(run)
+
+
+def test_understated_uncertainties_are_enlarged_by_the_birge_ratio_and_exclude_nothing_falsely():
+    y = readings(sigma=0.3)
+    run, honest = fit_spin_down(T, y, 0.003), fit_spin_down(T, y)
+    assert uncertainties(run.fit("disc")) == pytest.approx(uncertainties(honest.fit("disc")), rel=1e-6)
+    assert "misses the readings by" in run.warnings[-1]
+    assert "newton" not in {name for name, _ in run.verdict.excluded}  # ΔAICc would be 1e4 if 0.003 Hz were believed
+
+
+def test_readings_without_uncertainty_are_warned_of():
+    (warning,) = fit_spin_down(T, readings()).warnings
+    assert "no uncertainties of the readings were given" in warning
+    assert fit_spin_down(T, readings(), SIGMA).warnings == ()
+
+
+def test_a_constant_well_below_zero_is_called_unphysical():
+    falls_evenly = 40 - T / 10  # exponent 0: c2 must undo c1's curvature
+    assert "c2 is negative by" in fit_spin_down(T, falls_evenly, SIGMA).fit("mixed").warnings[0]
+    for seed in range(20):  # and not on account of noise
+        fit = fit_spin_down(T, readings("newton", seed=seed), SIGMA).fit("mixed")
+        c1 = fit.parameters["c1"]
+        assert (fit.warnings != ()) == (c1.value < -2 * c1.u)
+
+
+# ---------------------------------------------------------------------------------------------------------- intervals
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("u", [SIGMA, None])
+def test_profile_intervals_agree_with_the_covariance_on_good_readings(law, u):
+    fit = fit_spin_down(T, readings(law), u, laws=[law], uncertainty="profile").fits[0]
+    # with u unknown the interval is Student's: 1.03 u for 17 or 18 degrees of freedom; c of the power law is skew
+    widening = 1.0 if u else student.ppf(0.841345, fit.statistics.degrees_of_freedom)
+    for estimate in fit.parameters.values():
+        low, high = estimate.interval
+        assert (high - low) / 2 / estimate.u == pytest.approx(widening, abs=0.02)
+        assert low < estimate.value < high
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_bootstrap_intervals_agree_with_the_covariance_on_good_readings(law):
+    time = np.linspace(0, 190, 200)  # many readings, so that their own scatter is known to 5 %
+    fit = fit_spin_down(
+        time, readings(law, time=time), laws=[law], uncertainty="bootstrap", bootstrap_samples=600
+    ).fits[0]
+    for estimate in fit.parameters.values():
+        low, high = estimate.interval
+        assert (high - low) / 2 / estimate.u == pytest.approx(1, abs=0.2)  # 3 errors of percentiles of 600: 0.06
+
+
+def test_the_bootstrap_repeats_with_its_seed():
+    def interval(seed):
+        run = fit_spin_down(T, readings(), laws=["disc"], uncertainty="bootstrap", bootstrap_samples=20, seed=seed)
+        return run.fits[0].parameters["c32"].interval
+
+    assert interval(1) == interval(1) != interval(2)
+
+
+# ----------------------------------------------------------------------------------------------------------- outliers
+
+
+@pytest.mark.parametrize("u", [SIGMA, None])
+@pytest.mark.parametrize("index", [0, 1, 7, 18, 19])
+@pytest.mark.parametrize("factor", [2.0, 0.5])
+def test_a_miscounted_reading_is_found_named_and_left_out(index, factor, u):
+    y = readings()
+    y[index] *= factor
+    run = fit_spin_down(T, y, u)
+    clean = fit_spin_down(np.delete(T, index), np.delete(y, index), u)
+    assert run.outliers == (index,)
+    assert f"{y[index]:.6g} Hz at {T[index]:.6g} s" in run.warnings[0]
+    assert run.time.size == run.fit("disc").residuals.size == 19
+    constant = [fitted.fit("disc").parameters["c32"].value for fitted in (run, clean)]
+    assert constant[0] == pytest.approx(constant[1], rel=1e-9)
+
+
+def test_outliers_are_kept_on_request_and_still_named():
+    y = readings()
+    y[7] *= 2
+    run = fit_spin_down(T, y, SIGMA, keep_outliers=True)
+    assert (run.outliers, run.time.size) == ((7,), 20)
+    assert "kept" in run.warnings[0]
+
+
+def test_at_most_a_tenth_is_left_out():
+    y = readings()
+    y[[3, 8, 14]] *= [2, 0.5, 1.5]
+    assert len(fit_spin_down(T, y, SIGMA).outliers) <= 2
+
+
+def test_honest_noise_loses_no_reading():
+    lost = sum(len(fit_spin_down(T, readings(seed=i), laws=["disc"]).outliers) for i in range(300))
+    assert lost <= 3  # 1e-3 a run
+
+
+# ------------------------------------------------------------------------------------------- little, much and odd data
+
+
+def test_three_readings_of_unknown_uncertainty_leave_three_parameters_without_one():
+    run = fit_spin_down([0, 100, 190], [40.0, 29.4, 21.9])
+    power = run.fit("power")
+    assert all(estimate.u is None for estimate in power.parameters.values())
+    assert "pass through 3 readings" in power.warnings[0]
+    assert run.fit("disc").parameters["c32"].u > 0
+    assert run.best in {"stokes", "newton", "disc"}
+    assert run.verdict.excluded == ()
+    assert "too few to compare" in run.warnings[-1]
+    assert_finite(run)
+
+
+def test_one_decade_of_time_and_spin():
+    time = np.linspace(0, 5000, 50)
+    run = fit_spin_down(time, readings(time=time), SIGMA)
+    exponent = run.fit("power").parameters["exponent"]
+    assert abs(exponent.value - 1.5) < 3 * exponent.u < 0.01
+    assert {"stokes", "newton", "mixed"} <= {name for name, _ in run.verdict.excluded}
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1e12])
+def test_the_unit_of_time_does_not_matter(scale):
+    y = readings()
+    fast, usual = fit_spin_down(T * scale, y, SIGMA), fit_spin_down(T, y, SIGMA)
+    for name in LAWS:
+        start = [run.fit(name).parameters["start_frequency"].value for run in (fast, usual)]
+        assert start[0] == pytest.approx(start[1], rel=1e-9)
+    assert fast.fit("disc").parameters["c32"].value * scale == pytest.approx(
+        usual.fit("disc").parameters["c32"].value, rel=1e-9
+    )
+
+
+def test_a_c_that_is_known_only_to_a_factor_is_called_so():
+    time = np.linspace(0, 60, 12)
+    fit = fit_spin_down(time, readings(time=time), SIGMA, laws=["power"]).fits[0]
+    c = fit.parameters["c"]
+    assert c.u > 0.5 * c.value
+    assert "known only to a factor" in fit.warnings[0]
+
+
+def test_a_c_beyond_all_floats_is_none_with_a_warning():
+    fit = fit_spin_down([0, 100, 190], [40.0, 21.91, 21.9], SIGMA, laws=["power"]).fits[0]
+    assert fit.parameters["c"].value is None
+    assert any("too large or too small for a number" in warning for warning in fit.warnings)
+    assert_finite(fit)
+
+
+def test_a_hundred_thousand_readings_are_as_easy_as_twenty():
+    time = np.linspace(0, 190, 100_000)
+    y = readings(time=time)
+    y[5000] *= 2
+    run = fit_spin_down(time, y, SIGMA)
+    assert run.outliers == (5000,)
+    c32 = run.fit("disc").parameters["c32"]
+    assert abs(c32.value - 2.34e-4) < 4 * c32.u < 2e-8
+
+
+@settings(deadline=None, max_examples=80)
+@given(
+    law=st.sampled_from(sorted(LAWS)),
+    n=st.integers(3, 40),
+    start=st.floats(1e-2, 1e4),
+    loss=st.floats(1e-3, 20.0),
+    noise=st.floats(0.0, 0.1),
+    seed=st.integers(0, 2**32 - 1),
+    known=st.booleans(),
+)
+def test_no_falling_spin_gives_a_nan_an_infinity_or_a_warning_of_numpys(*, law, n, start, loss, noise, seed, known):
+    rng = np.random.default_rng(seed)
+    time = np.cumsum(rng.uniform(0.1, 10, n))
+    rates = {"mixed": [loss / 2, loss / 2], "power": [loss, rng.uniform(-0.5, 2)]}.get(law, [loss])
+    x = LAWS[law].spin((time - time[0]) / np.ptp(time), np.array([1.0, *rates]))
+    y = start * np.abs(x + rng.normal(0, noise, n) + 1e-9)
+    try:
+        run = fit_spin_down(time, y, start * (noise + 1e-3) if known else None)
+    except NoSpinDown:
+        return
+    assert_finite(run)
+    assert run.best in {fit.name for fit in run.fits}
+
+
+# -------------------------------------------------------------------------------------------------- errors that teach
+
+Y = readings()
+
+
+@pytest.mark.parametrize(
+    ("error", "text", "arguments"),
+    [
+        (TooFewReadings, "2 usable readings", (T[:2], Y[:2])),
+        (ShapesDiffer, "spin frequency has shape", (T, Y[:5])),
+        (ShapesDiffer, "time has shape", (T.reshape(4, 5), Y)),
+        (ShapesDiffer, "standard uncertainty has shape", (T, Y, [0.1, 0.2])),
+        (NotFinite, "spin frequency number 3 is nan", (T[:4], [4, 3, np.nan, 1])),
+        (NotFinite, "standard uncertainty number 1 is inf", (T, Y, np.inf)),
+        (TimesNotIncreasing, "time number 3 is 10 s and follows 10 s", ([0, 10, 10, 20], Y[:4])),
+        (NotPositive, "spin frequency number 4 is 0 Hz", (T[:4], [4, 3, 2, 0])),
+        (NotPositive, "standard uncertainty number 1 is -0.1 Hz", (T, Y, -0.1)),
+        (NoSpinDown, "is the drive still on", (T, np.full(20, 30.0))),
+        (NoSpinDown, "is the drive still on", (T, Y[::-1])),
+    ],
+)
+def test_readings_that_cannot_be_used_are_refused_in_one_sentence(error, text, arguments):
+    with pytest.raises(error, match=text) as caught:
+        fit_spin_down(*arguments)
+    assert isinstance(caught.value, AnalysisError)
+    assert "\n" not in str(caught.value)
+
+
+def test_unknown_names_are_refused_with_the_known_ones():
+    with pytest.raises(UnknownName, match="stokes, newton, disc, mixed, power"):
+        fit_spin_down(T, Y, laws=["storks"])
+    with pytest.raises(UnknownName, match="covariance, profile, bootstrap"):
+        fit_spin_down(T, Y, uncertainty="guess")
+
+
+def test_results_do_not_change_with_the_callers_arrays():
+    time, y = T.copy(), Y.copy()
+    run = fit_spin_down(time, y)
+    time[:] = y[:] = 0
+    assert run.frequency == pytest.approx(Y)
+    with pytest.raises(ValueError, match="read-only"):
+        run.frequency[0] = 0

@@ -1,0 +1,136 @@
+"""The virtual bench as a PyVISA library: what any program that speaks PyVISA sees of it."""
+
+import subprocess
+import sys
+
+import pytest
+import pyvisa
+from pyvisa.constants import StatusCode
+
+from instruments.virtual.bus import Bus
+from instruments.virtual.device import VirtualInstrument, answers
+from instruments.virtual.scpi import Command
+from levilab.clock import VirtualClock
+from pyvisa_levilab import LevilabVisaLibrary, library_for
+
+COUNTER = "TCPIP0::counter.levilab::inst0::INSTR"
+GENERATOR = "TCPIP0::generator.levilab::inst0::INSTR"
+BLOCKS = "TCPIP0::blocks.levilab::inst0::INSTR"
+
+#: Every byte there is, line feeds and the end of a chunk of PyVISA's included.
+ANY_BYTES = bytes(range(256)) * 100
+
+
+class Blocks(VirtualInstrument):
+    """Answers ``DATA?`` with a definite-length block (IEEE 488.2, 8.7.9)."""
+
+    def table(self):
+        header = f"#5{len(ANY_BYTES):05d}"
+        return (Command("DATA", get=answers(lambda: header + ANY_BYTES.decode("latin-1"))),)
+
+
+@pytest.fixture
+def manager():
+    manager = pyvisa.ResourceManager("@levilab")
+    yield manager
+    manager.close()
+
+
+@pytest.fixture
+def blocks():
+    clock = VirtualClock()
+    manager = pyvisa.ResourceManager(library_for(Bus({BLOCKS: Blocks(clock)})))
+    resource = manager.open_resource(BLOCKS)
+    resource.clock = clock
+    yield resource
+    manager.close()
+
+
+def test_the_instruments_of_the_bench_are_listed(manager):
+    assert manager.list_resources() == (COUNTER, GENERATOR)
+    assert manager.list_resources("?*generator?*") == (GENERATOR,)
+    assert manager.list_resources("GPIB?*::INSTR") == ()
+
+
+@pytest.mark.parametrize("address", [GENERATOR, GENERATOR.lower(), GENERATOR.upper()])
+def test_a_resource_opens_in_any_case(manager, address):
+    with manager.open_resource(address, read_termination="\n") as generator:
+        assert generator.query("*IDN?").split(",")[1] == "33522B"
+
+
+def test_a_resource_that_is_not_there_is_not_found(manager):
+    with pytest.raises(pyvisa.VisaIOError) as missing:
+        manager.open_resource("TCPIP0::nobody::inst0::INSTR")
+    assert missing.value.error_code == StatusCode.error_resource_not_found
+
+
+@pytest.mark.parametrize("chunk", [1, 7, 1024, 20 * 1024, 1 << 20])
+def test_a_block_of_any_bytes_is_read_whole_in_chunks_of_any_size(blocks, chunk):
+    blocks.write("DATA?")
+    answer = blocks.read_raw(chunk)
+    assert answer == b"#525600" + ANY_BYTES + b"\n"
+
+
+def test_pyvisas_own_reader_of_blocks_gets_the_bytes(blocks):
+    assert bytes(blocks.query_binary_values("DATA?", datatype="B")) == ANY_BYTES
+
+
+def test_a_chunk_says_whether_more_is_to_come(blocks):
+    blocks.write("*OPC?")
+    with blocks.ignore_warning(StatusCode.success_max_count_read):
+        assert blocks.visalib.read(blocks.session, 1) == (b"1", StatusCode.success_max_count_read)
+    assert blocks.visalib.read(blocks.session, 1) == (b"\n", StatusCode.success)
+
+
+def test_a_time_out_is_visas_and_as_long_as_it_was_set(blocks):
+    blocks.timeout = 1_500_000
+    before = blocks.clock.now()
+    with pytest.raises(pyvisa.VisaIOError) as silence:
+        blocks.query("FOO?")
+    assert silence.value.error_code == StatusCode.error_timeout
+    assert blocks.clock.now() - before == pytest.approx(1500.0, abs=1e-9)
+
+
+def test_a_fresh_resource_waits_as_long_as_visa_prescribes(blocks):
+    assert blocks.timeout == 2000  # ms; VPP-4.3, attribute VI_ATTR_TMO_VALUE
+
+
+def test_clear_drops_an_answer_that_was_half_read(blocks):
+    blocks.write("DATA?")
+    assert blocks.read_bytes(3) == b"#52"
+    blocks.clear()
+    assert blocks.query("*OPC?").strip() == "1"
+
+
+def test_a_line_end_that_is_sent_twice_or_not_at_all_makes_no_difference(manager):
+    with manager.open_resource(GENERATOR, read_termination="\n") as generator:
+        for end in ("", "\n", "\r\n"):
+            generator.write_termination = ""
+            assert generator.query("OUTP?" + end) == "0"
+
+
+def test_benches_of_their_own_know_nothing_of_each_other():
+    first, second = (library_for(Bus({BLOCKS: Blocks(VirtualClock())})) for _ in range(2))
+    assert first is not second
+    assert isinstance(first, LevilabVisaLibrary)
+    resources = [pyvisa.ResourceManager(library).open_resource(BLOCKS) for library in (first, second)]
+    resources[0].write("FOO")
+    assert [resource.query("SYST:ERR?").strip() for resource in resources] == [
+        '-113,"Undefined header;FOO"',
+        '+0,"No error"',
+    ]
+
+
+def test_a_bare_program_sets_a_frequency_and_reads_it_back():
+    program = """
+import pyvisa
+manager = pyvisa.ResourceManager("@levilab")
+generator = manager.open_resource("TCPIP0::generator.levilab::inst0::INSTR")
+generator.write("FREQ 38.5")
+print(float(generator.query("FREQ?")))
+"""
+    # as a process: no import of ours before it, and nothing left to warn of at its end
+    ended = subprocess.run(
+        [sys.executable, "-W", "error", "-c", program], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (ended.stdout.strip(), ended.stderr) == ("38.5", "")

@@ -1,0 +1,221 @@
+"""What the drivers have in common: settings, the error queue, identity."""
+
+import math
+
+import pytest
+from conversation import NO_ERROR, accepted, conversation
+
+from instruments.counter import Keysight53230A
+from instruments.errors import BadAnswer, CommandRefused, InstrumentError, OutOfRange, WrongInstrument
+from instruments.generator import Keysight33500B
+from instruments.scpi import ScpiInstrument, Setting, parse_reading
+
+#: Headers as in the programmer's references, numbers as the instruments print them (INSTRUMENTS: 15 digits, NR3).
+WIRE = [
+    (Keysight53230A, "gate", 0.1, "SENS:FREQ:GATE:TIME 0.1", "+1.000000000000000E-01"),
+    (Keysight53230A, "coupling", "DC", "INP1:COUP DC", "DC"),
+    (Keysight53230A, "impedance", 1e6, "INP1:IMP 1000000.0", "+1.000000000000000E+06"),
+    (Keysight53230A, "trigger_level", -0.25, "INP1:LEV1 -0.25", "-2.500000000000000E-01"),
+    (Keysight53230A, "automatic_level", False, "INP1:LEV:AUTO OFF", "0"),
+    (Keysight53230A, "slope", "NEG", "INP1:SLOP1 NEG", "NEG"),
+    (Keysight53230A, "measurement_timeout", 3.0, "SYST:TIM 3.0", "+3.000000000000000E+00"),
+    (Keysight33500B, "waveform", "SQU", "FUNC SQU", "SQU"),
+    (Keysight33500B, "frequency", 38.25, "FREQ 38.25", "+3.825000000000000E+01"),
+    (Keysight33500B, "amplitude", 10.0, "VOLT 10.0", "+1.000000000000000E+01"),
+    (Keysight33500B, "offset", 0.5, "VOLT:OFFS 0.5", "+5.000000000000000E-01"),
+    (Keysight33500B, "load", 50.0, "OUTP1:LOAD 50.0", "+5.000000000000000E+01"),
+    (Keysight33500B, "output", True, "OUTP1 ON", "1"),
+]
+
+SETTINGS = [
+    (driver, setting)
+    for driver in (Keysight53230A, Keysight33500B)
+    for setting in vars(driver).values()
+    if isinstance(setting, Setting)
+]
+
+
+def test_the_wire_table_names_every_setting():
+    assert {(driver, setting.name) for driver, setting in SETTINGS} == {row[:2] for row in WIRE}
+
+
+@pytest.mark.parametrize(("driver", "name", "value", "sent", "answer"), WIRE)
+def test_a_setting_is_sent_and_the_error_queue_read(driver, name, value, sent, answer):
+    with conversation(driver, *accepted(sent)) as instrument:
+        setattr(instrument, name, value)
+
+
+@pytest.mark.parametrize(("driver", "name", "value", "sent", "answer"), WIRE)
+def test_a_setting_is_asked_for_with_the_same_header(driver, name, value, sent, answer):
+    with conversation(driver, (sent.split()[0] + "?", answer)) as instrument:
+        got = getattr(instrument, name)
+    assert got == value
+    assert type(got) is type(value)
+
+
+REFUSED = [
+    pytest.param(driver, setting, value, id=f"{driver.__name__}-{setting.name}-{value}")
+    for driver, setting in SETTINGS
+    if setting.kind is not bool
+    for value in (["FOO", ""] if setting.choices else [setting.low - 1, setting.high * 1.01, math.nan, -math.inf])
+]
+
+
+@pytest.mark.parametrize(("driver", "setting", "value"), REFUSED)
+def test_a_value_out_of_range_is_refused_before_a_byte_is_sent(driver, setting, value):
+    with (
+        conversation(driver) as instrument,  # an empty script: anything sent would fail
+        pytest.raises(OutOfRange) as refusal,
+    ):
+        setattr(instrument, setting.name, value)
+    assert refusal.value.name == setting.name
+    assert setting.name in str(refusal.value)
+    assert (setting.choices[0] if setting.choices else f"{setting.high:g}") in refusal.value.allowed
+
+
+def test_choices_are_taken_in_any_case_and_sent_in_capitals():
+    with conversation(Keysight33500B, *accepted("FUNC SIN")) as generator:
+        generator.waveform = "sin"
+
+
+@pytest.mark.parametrize("answer", ["", "twelve", "1,2"])
+def test_an_answer_that_is_no_number_is_told_with_its_question(answer):
+    with conversation(Keysight33500B, ("FREQ?", answer)) as generator, pytest.raises(BadAnswer) as bad:
+        _ = generator.frequency
+    assert (bad.value.question, bad.value.answer) == ("FREQ?", answer)
+
+
+def test_a_quoted_word_is_read_without_its_quotes():
+    with conversation(Keysight33500B, ("FUNC?", '"SIN"')) as generator:
+        assert generator.waveform == "SIN"
+
+
+def test_the_text_of_the_error_queue_ends_up_in_the_error():
+    refused = [("FREQ 20.0", None), ("SYST:ERR?", '-221,"Settings conflict;frequency reduced"'), NO_ERROR]
+    with conversation(Keysight33500B, *refused) as generator, pytest.raises(CommandRefused) as refusal:
+        generator.frequency = 20.0
+    assert refusal.value.command == "FREQ 20.0"
+    assert "Settings conflict;frequency reduced" in str(refusal.value)
+    assert "-221" in str(refusal.value)
+
+
+def test_the_whole_queue_is_read_oldest_first():
+    queue = [("SYST:ERR?", '-113,"Undefined header"'), ("SYST:ERR?", '-222,"Data out of range"'), NO_ERROR]
+    with conversation(ScpiInstrument, ("FOO", None), *queue) as instrument, pytest.raises(CommandRefused) as refusal:
+        instrument.command("FOO")
+    assert refusal.value.entries == ('-113 "Undefined header"', '-222 "Data out of range"')
+
+
+def test_a_queue_that_never_ends_is_given_up_and_told_in_a_short_line():
+    endless = [("SYST:ERR?", '-310,"System error"')] * 64
+    with conversation(ScpiInstrument, ("FOO", None), *endless) as instrument, pytest.raises(CommandRefused) as refusal:
+        instrument.command("FOO")
+    assert len(refusal.value.entries) == 64
+    assert "and 60 more" in str(refusal.value)
+    assert len(str(refusal.value)) < 250  # a line or two of a terminal
+
+
+def test_a_maker_who_prints_no_plus_is_understood():
+    with conversation(ScpiInstrument, ("FOO", None), ("SYST:ERR?", '0,"No error"')) as instrument:
+        instrument.command("FOO")
+
+
+@pytest.mark.parametrize("answer", ["", "+2.5E+01", "No error", "DC"])
+def test_an_answer_that_is_no_queue_entry_is_not_taken_for_one(answer):
+    with (
+        conversation(ScpiInstrument, ("FOO", None), ("SYST:ERR?", answer)) as instrument,
+        pytest.raises(BadAnswer, match="SYST:ERR"),
+    ):
+        instrument.command("FOO")
+
+
+@pytest.mark.parametrize(
+    ("driver", "identity"),
+    [
+        (Keysight53230A, "Agilent Technologies,53230A,MY50000484,02.05-1519.666-1.19-4.15-127-155-35"),
+        (Keysight53230A, "Keysight Technologies,53220A,MY12345678,03.09-2037.776-1.28-4.15-127-156-36"),
+        (Keysight33500B, "Agilent Technologies,33522B,MY52812345,3.05-1.19-2.00-52-00"),
+        (Keysight33500B, "Keysight Technologies, 33509B ,MY59000123,5.03-3.15-2.00-58-00"),
+        (ScpiInstrument, "anything"),
+    ],
+)
+def test_the_expected_instrument_is_welcome(driver, identity):
+    with conversation(driver, ("*IDN?", identity)) as instrument:
+        assert instrument.identity() == identity
+
+
+@pytest.mark.parametrize(
+    ("driver", "identity"),
+    [
+        (Keysight53230A, "Agilent Technologies,33522B,MY52812345,3.05-1.19-2.00-52-00"),
+        (Keysight53230A, "Agilent Technologies,53131A,0,3944"),  # the counter before it, another language
+        (Keysight53230A, "Keysight Technologies,53230AX,MY12345678,1"),
+        (Keysight33500B, "Agilent Technologies,33220A,MY44000001,2.02-2.02-22-2"),
+        (Keysight33500B, ""),
+    ],
+)
+def test_another_instrument_is_told_with_what_it_says(driver, identity):
+    with conversation(driver, ("*IDN?", identity)) as instrument, pytest.raises(WrongInstrument) as wrong:
+        instrument.identity()
+    assert wrong.value.identity == identity
+    assert "check the address" in str(wrong.value)
+
+
+def test_the_snapshot_names_settings_with_their_units():
+    questions = [(sent.split()[0] + "?", answer) for driver, *_, sent, answer in WIRE if driver is Keysight53230A]
+    with conversation(Keysight53230A, *questions) as counter:
+        snapshot = counter.settings()
+    assert snapshot == {
+        "gate_s": 0.1,
+        "coupling": "DC",
+        "impedance_ohm": 1e6,
+        "trigger_level_v": -0.25,
+        "automatic_level": False,
+        "slope": "NEG",
+        "measurement_timeout_s": 3.0,
+    }
+
+
+def test_a_variant_of_a_driver_keeps_the_settings_of_its_model():
+    class Variant(Keysight33500B):
+        MODELS = "33220A"
+        phase = Setting("PHAS", float, unit="deg")
+
+    questions = [(sent.split()[0] + "?", answer) for driver, *_, sent, answer in WIRE if driver is Keysight33500B]
+    with conversation(Variant, *questions, ("PHAS?", "0")) as generator:
+        assert list(generator.settings()) == [
+            *("waveform", "frequency_hz", "amplitude_vpp", "offset_v", "load_ohm", "output", "phase_deg")
+        ]
+
+
+@pytest.mark.parametrize(
+    ("answer", "reading"),
+    [
+        ("+2.345678900000000E+01", 23.4567890),
+        ("0", 0.0),
+        ("+9.91000000000000E+037", None),  # not a number
+        ("+9.9E+37", None),  # and infinity (SCPI-1999, vol. 1, 7.2.1)
+        ("-9.9E+37", None),
+        ("NAN", None),
+    ],
+)
+def test_what_stands_for_no_reading_is_none(answer, reading):
+    assert parse_reading("A", "READ?", answer) == reading
+
+
+def test_closing_the_driver_closes_its_transport():
+    with conversation(ScpiInstrument) as instrument:
+        instrument.close()
+    assert instrument.transport.closed
+
+
+def test_every_error_is_an_instrument_error_that_carries_its_address():
+    for error in (
+        BadAnswer("GPIB0::1", "FREQ?", "?", "a number"),
+        CommandRefused("GPIB0::1", "FOO", ("-113",)),
+        OutOfRange("GPIB0::1", "gate", 2, "1"),
+        WrongInstrument("GPIB0::1", "x", "y"),
+    ):
+        assert isinstance(error, InstrumentError)
+        assert error.address == "GPIB0::1"
+        assert str(error).startswith("GPIB0::1: ")

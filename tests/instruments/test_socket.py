@@ -1,0 +1,110 @@
+"""The transport over a real TCP connection on loopback, with pyvisa-py: what a bare socket does after a time-out."""
+
+import contextlib
+import socketserver
+import threading
+
+import pytest
+
+from instruments.errors import NoAnswer, NotConnected
+from instruments.transport import VisaTransport
+
+#: How long a test waits for its own server before it fails [s]; reached by a failure only.
+AT_MOST = 5.0
+#: A time-out that is meant to be reached [s].
+SHORT = 0.05
+
+
+class Connection(socketserver.StreamRequestHandler):
+    """Answers ``*IDN?``, and ``LATE?`` when the test says so; ``BYE`` ends the connection."""
+
+    def handle(self):
+        with contextlib.suppress(OSError):  # the other side may have gone
+            for line in self.rfile:
+                if line == b"BYE\n":
+                    return
+                self.answer(line)
+
+    def answer(self, line):
+        if line == b"*IDN?\n":
+            self.wfile.write(b"levilab,loopback,0,0\n")
+        elif line == b"LATE?\n":
+            self.server.release.wait(AT_MOST)
+            with contextlib.suppress(OSError):
+                self.wfile.write(b"late\n")
+            self.server.said.set()
+
+
+class Server(socketserver.ThreadingTCPServer):
+    """One instrument; its threads are joined when it is closed."""
+
+    allow_reuse_address = True
+
+    def __init__(self, port=0):
+        self.release, self.said = threading.Event(), threading.Event()
+        super().__init__(("127.0.0.1", port), Connection)
+
+    @property
+    def address(self):
+        return f"TCPIP0::127.0.0.1::{self.server_address[1]}::SOCKET"
+
+
+@contextlib.contextmanager
+def serving(port=0):
+    with Server(port) as server:
+        # looks for the end so often [s]: what stopping it costs
+        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
+        thread.start()
+        try:
+            yield server
+        finally:
+            server.release.set()
+            server.shutdown()
+            thread.join(AT_MOST)
+
+
+def test_question_and_answer_over_a_bare_socket():
+    with serving() as server, contextlib.closing(VisaTransport(server.address)) as transport:
+        assert transport.query("*IDN?") == "levilab,loopback,0,0"
+        assert transport.query("*IDN?") == "levilab,loopback,0,0"
+
+
+def test_a_late_answer_is_lost_and_the_next_question_gets_its_own():
+    with serving() as server, contextlib.closing(VisaTransport(server.address, timeout=SHORT)) as transport:
+        with pytest.raises(NoAnswer) as silence:
+            transport.query("LATE?")
+        assert silence.value.timeout == SHORT
+        server.release.set()
+        assert server.said.wait(AT_MOST)  # it is in the pipe now
+        transport.timeout = AT_MOST
+        assert transport.query("*IDN?") == "levilab,loopback,0,0"
+
+
+def test_patience_lets_a_slow_answer_come():
+    with serving() as server, contextlib.closing(VisaTransport(server.address, timeout=SHORT)) as transport:
+        threading.Timer(2 * SHORT, server.release.set).start()
+        assert transport.query("LATE?", patience=AT_MOST) == "late"
+
+
+def test_a_server_that_is_gone_is_told_and_found_again_when_it_is_back():
+    with serving() as server:
+        port = server.server_address[1]
+        transport = VisaTransport(server.address, timeout=SHORT)
+        with pytest.raises(NoAnswer):  # the other side hung up: no answer will come
+            transport.query("BYE")
+    with contextlib.closing(transport):
+        for _ in range(2):
+            with pytest.raises(NotConnected) as gone:
+                transport.query("*IDN?")
+            assert "\n" not in str(gone.value)
+        with serving(port):
+            transport.timeout = AT_MOST
+            assert transport.query("*IDN?") == "levilab,loopback,0,0"
+            transport.close()
+
+
+def test_a_port_where_nobody_listens_is_told():
+    with serving() as server:
+        address = server.address
+    with pytest.raises(NotConnected), contextlib.closing(VisaTransport(address)) as transport:
+        transport.query("*IDN?")

@@ -1,0 +1,177 @@
+"""The transport over PyVISA, with the virtual bench in the same process at the far end."""
+
+import itertools
+
+import pytest
+from pyvisa.constants import StatusCode
+
+from instruments.errors import BadAnswer, NoAnswer, NotConnected
+from instruments.transport import VisaTransport
+from instruments.virtual.bus import Bus
+from instruments.virtual.device import VirtualInstrument, answers
+from instruments.virtual.scpi import Command
+from levilab.clock import VirtualClock
+from pyvisa_levilab import LevilabVisaLibrary, library_for
+
+ADDRESS = "TCPIP0::slow.levilab::inst0::INSTR"
+SOCKET = "TCPIP0::slow.levilab::5025::SOCKET"
+IDENTITY = "levilab,slow,0,0"
+
+_unique = itertools.count()
+
+
+class Slow(VirtualInstrument):
+    """Answers ``SLOW?`` after five seconds, and ``BINary?`` with what is no text."""
+
+    identity = IDENTITY
+
+    def table(self):
+        return (Command("SLOW", get=answers(self._slow)), Command("BINary", get=answers(lambda: "\xff\xfe")))
+
+    def _slow(self):
+        self.busy_until(self.clock.now() + 5.0)
+        return "slow"
+
+
+@pytest.fixture
+def clock():
+    return VirtualClock()
+
+
+@pytest.fixture
+def bus(clock):
+    return Bus({ADDRESS: Slow(clock), SOCKET: Slow(clock)})
+
+
+def library_with(bus, **methods):
+    """A library for this bench with some of its functions replaced."""
+    library = type("Broken", (LevilabVisaLibrary,), methods)(f"broken-{next(_unique)}")
+    library.bus = bus
+    return library
+
+
+def test_a_question_is_answered_without_its_line_end(bus):
+    assert VisaTransport(ADDRESS, library=library_for(bus)).query("*IDN?") == IDENTITY
+
+
+def test_silence_is_told_with_question_and_timeout_and_costs_virtual_time_only(bus, clock):
+    transport = VisaTransport(ADDRESS, library=library_for(bus), timeout=3600.0)
+    with pytest.raises(NoAnswer) as silence:
+        transport.query("FOO?")
+    assert (silence.value.question, silence.value.timeout) == ("FOO?", 3600.0)
+    assert "no answer to 'FOO?' within 3600 s" in str(silence.value)
+    # an hour, to a nanosecond, in a test that takes none
+    assert clock.now() == pytest.approx(3600.0, abs=1e-9)
+
+
+def test_an_answer_that_takes_its_time_needs_patience(bus, clock):
+    transport = VisaTransport(ADDRESS, library=library_for(bus), timeout=2.0)
+    assert transport.query("SLOW?", patience=4.0) == "slow"
+    assert clock.now() == pytest.approx(5.0, abs=1e-9)  # not the six seconds that it might have taken
+    with pytest.raises(NoAnswer) as silence:
+        transport.query("SLOW?", patience=2.5)
+    assert silence.value.timeout == 4.5
+
+
+def test_patience_is_for_one_answer_only(bus):
+    transport = VisaTransport(ADDRESS, library=library_for(bus), timeout=2.0)
+    transport.query("SLOW?", patience=4.0)
+    with pytest.raises(NoAnswer):
+        transport.query("SLOW?")
+
+
+def test_a_late_answer_never_reaches_the_next_question(bus, clock):
+    transport = VisaTransport(ADDRESS, library=library_for(bus), timeout=2.0)
+    with pytest.raises(NoAnswer):
+        transport.query("SLOW?")
+    clock.sleep(10.0)
+    assert transport.query("*IDN?") == IDENTITY
+
+
+def test_an_interrupted_wait_leaves_no_answer_for_the_next_question(bus, clock, monkeypatch):
+    transport = VisaTransport(ADDRESS, library=library_for(bus), timeout=2.0)
+
+    def interrupted(duration):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(clock, "sleep", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            transport.query("SLOW?")
+    clock.sleep(10.0)
+    assert transport.query("*IDN?") == IDENTITY
+
+
+def test_an_answer_that_is_no_text_is_told_and_forgotten(bus):
+    transport = VisaTransport(ADDRESS, library=library_for(bus))
+    with pytest.raises(BadAnswer, match="expected plain text") as bad:
+        transport.query("BIN?")
+    assert bad.value.question == "BIN?"
+    assert transport.query("*IDN?") == IDENTITY
+
+
+@pytest.mark.parametrize("address", ["TCPIP0::nobody.levilab::inst0::INSTR", "no resource name at all", ""])
+def test_an_address_where_nothing_is_is_told_in_one_line(bus, address):
+    with pytest.raises(NotConnected) as missing:
+        VisaTransport(address, library=library_for(bus))
+    assert missing.value.address == address
+    assert "\n" not in str(missing.value)
+    assert "check the address" in str(missing.value)
+
+
+def test_an_unknown_library_is_told_as_ours():
+    with pytest.raises(NotConnected, match="nolibrary"):
+        VisaTransport(ADDRESS, library="@nolibrary")
+
+
+def test_whatever_a_library_raises_on_opening_is_told_as_ours(bus):
+    # pyvisa-py raises plain Exception for a host that cannot be reached
+    def unreachable(*_, **__):
+        raise Exception("could not connect:\nno route")  # noqa: TRY002
+
+    with pytest.raises(NotConnected, match="could not connect: no route"):
+        VisaTransport(ADDRESS, library=library_with(bus, open=unreachable))
+
+
+def test_a_link_that_breaks_is_told_with_the_question(bus):
+    def broken(self, session, data):
+        return 0, self.handle_return_value(session, StatusCode.error_connection_lost)
+
+    transport = VisaTransport(ADDRESS, library=library_with(bus, write=broken))
+    with pytest.raises(NotConnected, match=r"the link broke at '\*IDN\?'"):
+        transport.query("*IDN?")
+
+
+def test_a_bare_connection_is_opened_anew_until_the_instrument_is_back(bus):
+    transport = VisaTransport(SOCKET, library=library_for(bus), timeout=2.0)
+    with pytest.raises(NoAnswer):
+        transport.query("FOO?")
+    instruments, bus.instruments = bus.instruments, {}
+    for _ in range(3):
+        with pytest.raises(NotConnected, match="cannot be opened"):
+            transport.query("*IDN?")
+    bus.instruments = instruments
+    assert transport.query("*IDN?") == IDENTITY
+
+
+def test_the_log_gets_the_bytes_of_both_directions(bus):
+    traffic = []
+    transport = VisaTransport(ADDRESS, library=library_for(bus), log=lambda *line: traffic.append(line))
+    transport.write("*CLS")
+    transport.query("*IDN?")
+    with pytest.raises(NoAnswer):
+        transport.query("FOO?")
+    assert traffic == [
+        (ADDRESS, ">", b"*CLS\n"),
+        (ADDRESS, ">", b"*IDN?\n"),
+        (ADDRESS, "<", IDENTITY.encode() + b"\n"),
+        (ADDRESS, ">", b"FOO?\n"),
+    ]
+
+
+def test_closing_twice_does_no_harm_and_nothing_is_sent_after_it(bus):
+    transport = VisaTransport(ADDRESS, library=library_for(bus))
+    transport.close()
+    transport.close()
+    with pytest.raises(NotConnected, match="session"):
+        transport.query("*IDN?")

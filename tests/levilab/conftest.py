@@ -1,0 +1,36 @@
+"""What the tests of the application share."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def sample_data() -> Path:
+    return ROOT / "sample_data"
+
+
+@pytest.fixture
+def levilab(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Runs the command as a user does: a process of its own, in an empty folder."""
+
+    def run(*words: str | Path, cwd: Path = tmp_path, check: int | None = 0) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "levilab", *map(str, words)]
+        done = subprocess.run(
+            command, cwd=cwd, capture_output=True, text=True, encoding="utf-8", timeout=120, check=False
+        )
+        assert check is None or done.returncode == check, done.stderr
+        assert "Traceback" not in done.stderr
+        return done
+
+    return run

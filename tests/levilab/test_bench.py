@@ -1,0 +1,353 @@
+"""The bench, opened and left: whatever happens, the drive is off and everything is closed."""
+
+import pytest
+
+from instruments.errors import InstrumentError, NotConnected, OutOfRange, WrongInstrument
+from instruments.virtual.generator import Virtual33500B
+from levilab.bench import VIRTUAL, OutputMayBeOn, open_bench
+from levilab.clock import VirtualClock, WallClock
+from levilab.config import BenchConfig, ConfigError, InstrumentSettings, Limits, SpinSettings, read_bench
+from levilab.errors import LevilabError
+from levilab.interruption import Interrupted
+from levilab.simulator.world import SpinScene, SpinWorld
+
+KINDS = ("counter", "generator")
+
+
+class World(SpinWorld):
+    """A world that remembers what the coil did."""
+
+    def __init__(self):
+        self.coil = []
+        super().__init__(SpinScene(), VirtualClock())
+
+    def drive(self, time, waveform, frequency, amplitude):
+        self.coil.append((waveform, frequency, amplitude))
+        super().drive(time, waveform, frequency, amplitude)
+
+    @property
+    def field(self):
+        return self.coil[-1][2]
+
+
+class Faulty(Virtual33500B):
+    """A generator that stays silent for its next answers, or takes no notice of being switched off."""
+
+    silent, stuck = 0, False
+
+    def read(self, timeout):
+        if Faulty.silent:
+            Faulty.silent -= 1
+            self.clock.sleep(timeout)
+            self.clear()  # what it would have said is lost
+            return None
+        return super().read(timeout)
+
+    def receive(self, data):
+        super().receive(data.replace(b"OUTP1 OFF", b"*WAI") if Faulty.stuck else data)
+
+
+@pytest.fixture
+def world():
+    return World()
+
+
+@pytest.fixture
+def faulty(monkeypatch):
+    """The virtual bench with a generator whose faults a test can switch on."""
+    monkeypatch.setattr(Faulty, "silent", 0)
+    monkeypatch.setattr(Faulty, "stuck", False)
+    monkeypatch.setattr("instruments.virtual.generator.Virtual33500B", Faulty)
+    return Faulty
+
+
+def drive(bench):
+    bench.drive(waveform="SIN", frequency_hz=30.0, amplitude_vpp=10.0)
+
+
+def drive_and(world, end):
+    """The bench, opened, driving, and left by what `end` does; the world keeps it to look at."""
+    with open_bench(BenchConfig(), KINDS, world=world) as bench:
+        world.bench = bench
+        drive(bench)
+        end()
+
+
+def assert_closed(bench):
+    assert set(bench.instruments) == set(KINDS)
+    for instrument in bench.instruments.values():
+        with pytest.raises(NotConnected):
+            instrument.identity()
+
+
+# --- on every way out ---
+
+
+def test_drive_and_light_are_joined_by_one_world(world):
+    with open_bench(BenchConfig(), KINDS, world=world) as bench:
+        bench.counter.prepare(gate_s=1.0, trigger_level_v=0.6)
+        drive(bench)
+        assert bench.clock is world.clock
+        # 10 Vpp make 0.4 mT, which holds the top at 30 Hz; a reading scatters by 0.03 Hz
+        assert world.coil[-1] == ("SIN", 30.0, pytest.approx(0.4e-3))
+        bench.clock.sleep(20.0)
+        assert bench.counter.frequency() == pytest.approx(30.0, abs=0.15)
+
+
+def test_after_a_normal_end_the_drive_is_off_and_all_is_closed(world):
+    drive_and(world, lambda: None)
+    assert max(field for *_, field in world.coil) > 0
+    assert world.field == 0
+    assert_closed(world.bench)
+
+
+@pytest.mark.parametrize(
+    "error", [ZeroDivisionError("physics"), Interrupted("SIGINT"), KeyboardInterrupt(), SystemExit()], ids=repr
+)
+def test_after_any_error_the_drive_is_off_and_the_error_is_told(world, error):
+    def end():
+        raise error
+
+    with pytest.raises(type(error)) as told:
+        drive_and(world, end)
+    assert told.value is error
+    assert world.field == 0
+    assert_closed(world.bench)
+
+
+def test_switching_off_is_tried_a_second_time(world, faulty):
+    drive_and(world, lambda: setattr(faulty, "silent", 1))
+    assert faulty.silent == 0
+    assert world.field == 0
+    assert_closed(world.bench)
+
+
+def test_an_interruption_of_the_first_try_does_not_keep_the_drive_on(world, monkeypatch):
+    with open_bench(BenchConfig(), KINDS, world=world) as bench:
+        drive(bench)
+        switch_off, tries = bench.generator.off, []
+
+        def interrupted_once():
+            tries.append(1)
+            if len(tries) == 1:
+                raise Interrupted("SIGINT")
+            switch_off()
+
+        monkeypatch.setattr(bench.generator, "off", interrupted_once)
+    assert len(tries) == 2
+    assert world.field == 0
+
+
+def test_a_generator_that_stays_silent_is_told_by_name_and_all_is_closed(world, faulty):
+    with pytest.raises(OutputMayBeOn) as alarm:
+        drive_and(world, lambda: setattr(faulty, "silent", 1000))
+    assert alarm.value.address == VIRTUAL["generator"].address
+    assert "THE DRIVE MAY STILL BE ON" in str(alarm.value)
+    assert "generator.levilab" in str(alarm.value)
+    assert isinstance(alarm.value, InstrumentError)
+    assert_closed(world.bench)
+
+
+def test_the_alarm_keeps_what_went_wrong_before_it(world, faulty):
+    def end():
+        faulty.silent = 1000
+        raise ZeroDivisionError
+
+    with pytest.raises(OutputMayBeOn) as alarm:
+        drive_and(world, end)
+    chain = [alarm.value]
+    while chain[-1].__context__:
+        chain.append(chain[-1].__context__)
+    assert any(isinstance(error, ZeroDivisionError) for error in chain)
+
+
+def test_an_output_that_does_not_go_off_is_told(world, faulty):
+    with pytest.raises(OutputMayBeOn, match="still on"):
+        drive_and(world, lambda: setattr(faulty, "stuck", True))
+    assert world.field > 0  # it was no false alarm
+
+
+def test_a_generator_that_never_answered_is_silent_rather_than_perhaps_on(world, faulty):
+    faulty.silent = 1000
+    with pytest.raises(InstrumentError, match="no answer") as silence, open_bench(BenchConfig(), KINDS, world=world):
+        pass
+    assert not isinstance(silence.value, OutputMayBeOn)
+
+
+def test_a_bench_without_a_drive_needs_nothing_switched_off(world):
+    with open_bench(BenchConfig(), ("counter",), world=world) as bench:
+        assert set(bench.instruments) == {"counter"}
+        bench.outputs_off()
+    assert world.coil == []
+
+
+def test_the_wire_log_reaches_every_instrument(world):
+    traffic = []
+    with open_bench(BenchConfig(), KINDS, world=world, log=lambda *line: traffic.append(line)):
+        pass
+    assert {address for address, *_ in traffic} == {settings.address for settings in VIRTUAL.values()}
+    assert (VIRTUAL["generator"].address, ">", b"OUTP1 OFF\n") in traffic
+
+
+# --- limits ---
+
+
+@pytest.mark.parametrize(
+    ("drive", "name"),
+    [
+        ({"frequency_hz": 30.0, "amplitude_vpp": 4.01}, "drive_amplitude_vpp"),
+        ({"frequency_hz": 50.1, "amplitude_vpp": 4.0}, "drive_frequency_hz"),
+        ({"frequency_hz": float("nan"), "amplitude_vpp": 4.0}, "drive_frequency_hz"),
+    ],
+)
+def test_a_drive_beyond_the_limits_is_refused_by_name_and_nothing_is_sent(world, drive, name):
+    config = BenchConfig(limits=Limits(drive_amplitude_vpp=4.0, drive_frequency_hz=50.0))
+    with open_bench(config, KINDS, world=world) as bench:
+        with pytest.raises(OutOfRange) as refusal:
+            bench.drive(waveform="SIN", **drive)
+        assert world.coil == []
+    assert refusal.value.name == name
+    assert f"limits.{name} in bench.toml" in str(refusal.value)
+
+
+def test_a_drive_at_the_limits_is_allowed(world):
+    config = BenchConfig(limits=Limits(drive_amplitude_vpp=4.0, drive_frequency_hz=50.0))
+    with open_bench(config, KINDS, world=world) as bench:
+        bench.drive(waveform="SIN", frequency_hz=50.0, amplitude_vpp=4.0)
+        assert world.coil[-1] == ("SIN", 50.0, pytest.approx(4.0 / 2 * 0.08e-3))  # 0.08 mT/V
+
+
+# --- the bench that is described ---
+
+
+def described(**instruments):
+    """A bench as bench.toml describes it, its addresses leading to the virtual one."""
+    return BenchConfig(visa_library="@levilab", **instruments)
+
+
+def test_a_described_bench_is_opened_at_its_addresses():
+    with open_bench(described(**VIRTUAL), KINDS) as bench:
+        assert "53230A" in bench.counter.identity()
+        assert "33522B" in bench.generator.identity()
+        assert isinstance(bench.clock, WallClock)
+
+
+def test_an_instrument_that_is_not_described_is_asked_for_by_name():
+    with (
+        pytest.raises(ConfigError, match=r"add a table \[generator\]"),
+        open_bench(described(counter=VIRTUAL["counter"]), KINDS),
+    ):
+        pass
+
+
+def test_an_unknown_model_is_told_with_its_key_and_the_known_ones():
+    config = described(counter=InstrumentSettings(model="CNT-91", address="GPIB0::10::INSTR"))
+    with (
+        pytest.raises(ConfigError, match=r"counter\.model = 'CNT-91' is unknown, known are 53220A, 53230A"),
+        open_bench(config, ("counter",)),
+    ):
+        pass
+
+
+def test_an_address_that_leads_to_another_instrument_is_told_and_that_one_left_alone():
+    swapped = InstrumentSettings(model="33500B", address=VIRTUAL["counter"].address)
+    with (
+        pytest.raises(WrongInstrument, match="check the address"),
+        open_bench(described(counter=VIRTUAL["counter"], generator=swapped), KINDS),
+    ):
+        pass
+
+
+def test_an_address_where_nothing_is_is_told_after_the_drive_was_switched_off():
+    traffic = []
+    nowhere = InstrumentSettings(model="53230A", address="TCPIP0::nobody::inst0::INSTR")
+    with (
+        pytest.raises(NotConnected, match="nobody"),
+        open_bench(
+            described(counter=nowhere, generator=VIRTUAL["generator"]),
+            ("generator", "counter"),
+            log=lambda *line: traffic.append(line[1:]),
+        ),
+    ):
+        pass
+    assert (">", b"OUTP1 OFF\n") in traffic
+
+
+# --- bench.toml ---
+
+
+def written(folder, text, encoding="utf-8"):
+    path = folder / "bench.toml"
+    path.write_bytes(text.encode(encoding))
+    return path
+
+
+BENCH = """
+[counter]
+model = "53230A"
+address = "TCPIP0::192.0.2.7::5025::SOCKET"
+
+[limits]
+drive_amplitude_vpp = 5.0
+
+[spin]
+gate_s = 2
+"""
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
+def test_a_bench_is_read_with_or_without_a_byte_order_mark(tmp_path, encoding):
+    config = read_bench(written(tmp_path, BENCH.lstrip(), encoding))
+    assert config.counter == InstrumentSettings(model="53230A", address="TCPIP0::192.0.2.7::5025::SOCKET")
+    assert config.generator is None
+    assert config.limits == Limits(drive_amplitude_vpp=5.0)
+    assert config.spin == SpinSettings(gate_s=2.0)
+
+
+def test_an_empty_description_is_a_bench_without_instruments(tmp_path):
+    assert read_bench(written(tmp_path, "")) == BenchConfig()
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("[spin]\ngate = 1.0", "spin.gate = '1.0'"),
+        ("[conter]\nmodel = '53230A'", "conter"),
+        ("[spin]\ngate_s = 'long'", "spin.gate_s = 'long'"),
+        ("[spin]\ngate_s = -1", "spin.gate_s = '-1'"),
+        ("[spin]\ngate_s = inf", "spin.gate_s = 'inf'"),
+        ("[spin]\ndrive_waveform = 'SAW'", "'SIN', 'SQU' or 'TRI'"),
+        ("[limits]\ndrive_amplitude_vpp = nan", "limits.drive_amplitude_vpp"),
+        ("[counter]\nmodel = '53230A'", "counter.address: Field required"),
+        ("counter = 3", "counter = '3'"),
+        ("[spin]\ngate = 1\nlevel = 2", "(and 1 more)"),
+        ("[spin\n", "not readable as TOML"),
+        ("[spin]\ngate_s = 1,0", "not readable as TOML"),
+    ],
+)
+def test_what_is_wrong_with_a_description_is_told_in_one_line_with_its_path(tmp_path, text, says):
+    path = written(tmp_path, text)
+    with pytest.raises(ConfigError) as wrong:
+        read_bench(path)
+    message = str(wrong.value)
+    assert message.startswith(f"{path}: ")
+    assert says in message
+    assert "\n" not in message
+    assert isinstance(wrong.value, LevilabError)
+
+
+def test_a_description_that_is_no_text_is_told(tmp_path):
+    path = tmp_path / "bench.toml"
+    path.write_bytes(b"\xff\xfe[\x00s\x00")  # UTF-16, as an editor may save it
+    with pytest.raises(ConfigError, match="not readable as TOML"):
+        read_bench(path)
+
+
+def test_a_description_that_is_missing_is_told_with_what_to_do(tmp_path):
+    with pytest.raises(ConfigError, match=r"no such file.*--mock"):
+        read_bench(tmp_path / "bench.toml")
+
+
+def test_a_description_does_not_change_once_it_is_read():
+    with pytest.raises(ValueError, match="frozen"):
+        BenchConfig().limits.drive_amplitude_vpp = 20.0

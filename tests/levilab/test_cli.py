@@ -1,0 +1,251 @@
+"""The commands as a user runs them: what they print, what they refuse, and with which exit status."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+import pytest
+from tests_of_levilab import spin_down_csv
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    Command = Callable[..., subprocess.CompletedProcess[str]]
+
+COMMANDS = ["", "acquire", "acquire spin", "analyze", "analyze spindown", "report", "runs"]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help_and_the_ones_that_do_something_an_example(levilab: Command, command: str) -> None:
+    text = levilab(*command.split(), "--help").stdout
+    assert "Usage:" in text
+    if command not in {"", "acquire", "analyze"}:
+        assert f"Example: levilab {command}" in text
+
+
+def test_acquire_analyze_report_and_list_from_an_empty_folder(levilab: Command, tmp_path: Path) -> None:
+    acquired = levilab("acquire", "spin", "--mock", "--note", "one")
+    assert acquired.stdout.startswith("finished: ")
+    assert "s left" in acquired.stderr
+    analyzed = levilab("analyze", "spindown", "runs")
+    assert "What the data say" in analyzed.stdout
+    (run,) = (tmp_path / "runs").iterdir()
+    assert {"result.json", "spindown.png"} <= {path.name for path in run.iterdir()}
+    assert "report.html" in levilab("report", "runs").stdout
+    assert (tmp_path / "report.html").stat().st_size > 10_000
+    listed = levilab("runs").stdout
+    assert "finished" in listed
+    assert "one" in listed
+
+
+def test_json_is_one_document_and_nothing_else(levilab: Command) -> None:
+    acquired = json.loads(levilab("acquire", "spin", "--mock", "--seed", "2", "--json").stdout)
+    assert acquired["status"] == "finished"
+    result = json.loads(levilab("analyze", "spindown", acquired["run"], "--json").stdout)
+    assert result["best_model"] == "disc"
+    (listed,) = json.loads(levilab("runs", "--json").stdout)
+    assert listed["readings"] == acquired["readings"]
+
+
+def test_no_save_writes_nothing_and_out_writes_there(levilab: Command, tmp_path: Path) -> None:
+    path = spin_down_csv(tmp_path / "my.csv")
+    levilab("analyze", "spindown", path, "--no-save")
+    assert list(tmp_path.iterdir()) == [path]
+    levilab("analyze", "spindown", path, "--out", "there")
+    assert sorted(p.name for p in (tmp_path / "there").iterdir()) == ["result.json", "spindown.png"]
+
+
+def test_columns_of_another_name_are_mapped(levilab: Command, tmp_path: Path) -> None:
+    path = spin_down_csv(tmp_path / "my.csv", u=False)
+    path.write_text(path.read_text().replace("time_s,spin_frequency_hz", "Uhr,Kanal 2").replace(",", ";"), "utf-8")
+    refused = levilab("analyze", "spindown", path, check=1)
+    assert "Kanal 2" in refused.stderr
+    assert "--columns" in refused.stderr
+    mapped = levilab("analyze", "spindown", path, "--json", "--columns", "t=Uhr,f=Kanal 2")
+    assert json.loads(mapped.stdout)["best_model"] == "disc"
+
+
+ROWS = [f"{10 * k},{40 - k},0.03" for k in range(8)]
+HEADER = "time_s,spin_frequency_hz,spin_frequency_u_hz"
+
+
+def table(*rows: str) -> str:
+    return "\n".join([HEADER, *rows, ""])
+
+
+def with_row(k: int, row: str) -> str:
+    return table(*ROWS[:k], row, *ROWS[k + 1 :])
+
+
+#: name → (the file's text, what the one line must say)
+REFUSED = {
+    "empty": ("", "empty"),
+    "header only": (table(), "3 readings"),
+    "two rows": (table(*ROWS[:2]), "3 readings"),
+    "text in a number column": (with_row(3, "30,fast,0.03"), "line 5"),
+    "a time that repeats": (with_row(3, "20,37,0.03"), "line 5"),
+    "a time that goes back": (with_row(3, "5,37,0.03"), "line 5"),
+    "a frequency of zero": (with_row(3, "30,0,0.03"), "line 5"),
+    "a negative frequency": (with_row(3, "30,-37,0.03"), "line 5"),
+    "a negative uncertainty": (with_row(3, "30,37,-0.03"), "line 5"),
+    "constant data": (table(*(f"{10 * k},40,0.03" for k in range(8))), "fall"),
+    "a spin that rises": (table(*(f"{10 * k},{30 + k},0.03" for k in range(8))), "fall"),
+    "no such column": ("a,b\n1,2\n2,3\n3,4\n", "--columns"),
+    "a picture": ("\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "CSV"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_bad_data_get_one_clear_line_and_status_1(levilab: Command, tmp_path: Path, name: str) -> None:
+    text, says = REFUSED[name]
+    path = tmp_path / "my.csv"
+    path.write_bytes(text.encode("latin-1"))
+    refused = levilab("analyze", "spindown", path, check=1)
+    assert refused.stdout == ""
+    (line,) = refused.stderr.splitlines()
+    assert line.startswith("levilab: ")
+    assert "my.csv" in line
+    assert says in line
+    assert list(tmp_path.iterdir()) == [path]
+
+
+#: name → (the file's text, what the warning must say, readings used)
+TAKEN = {
+    "a NaN": (with_row(3, "30,nan,0.03"), "left out", 7),
+    "a gap": (table(*ROWS[:2], *ROWS[5:]), "", 5),
+    "an empty cell": (with_row(3, "30,,0.03"), "left out", 7),
+    "infinity": (with_row(3, "30,inf,0.03"), "left out", 7),
+    "no reading": (with_row(3, "30,9.91E37,0.03"), "left out", 7),
+    "an outlier": (with_row(3, "30,74,0.03"), "30 s", 7),
+    "a torn last line": (table(*ROWS) + "80,3", "line 10", 8),
+}
+
+
+@pytest.mark.parametrize("name", TAKEN)
+def test_imperfect_data_are_analyzed_with_a_warning_and_without_nan(
+    levilab: Command, tmp_path: Path, name: str
+) -> None:
+    text, says, used = TAKEN[name]
+    path = tmp_path / "my.csv"
+    path.write_text(text, encoding="utf-8")
+    done = levilab("analyze", "spindown", path, "--json")
+    result = json.loads(done.stdout, parse_constant=pytest.fail)
+    assert result["models"][0]["statistics"]["n"] == used
+    assert any(says in warning for warning in [*result["warnings"], *result["runs"][0]["warnings"]])
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["analyze", "spindown", "nowhere"], "no such file"),
+        (["analyze", "spindown", "."], "no spin run"),
+        (["report", "nowhere"], "no such file"),
+        (["runs", "nowhere"], "no such folder"),
+        (["acquire", "spin"], "bench.toml"),
+        (["acquire", "spin", "--bench", "other.toml"], "other.toml"),
+        (["acquire", "spin", "--mock", "--resume", "nowhere"], "run.json"),
+    ],
+)
+def test_what_is_not_there_is_named(levilab: Command, words: list[str], says: str) -> None:
+    refused = levilab(*words, check=1)
+    (line,) = refused.stderr.splitlines()
+    assert says in line
+
+
+def test_a_pdf_is_refused_before_anything_is_read(levilab: Command, sample_data: Path) -> None:
+    assert "HTML" in levilab("report", sample_data, "-o", "report.pdf", check=1).stderr
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["analyze"],
+        ["analyze", "spindown"],
+        ["analyze", "spindown", "x", "--reading-u", "much"],
+        ["analyze", "spindown", "x", "--columns", "t"],
+        ["acquire", "spin", "--mok"],
+        ["fly"],
+    ],
+)
+def test_wrong_usage_is_status_2(levilab: Command, words: list[str]) -> None:
+    assert levilab(*words, check=2).stdout.strip() == "" or words == ["analyze"]
+
+
+def test_an_instrument_that_does_not_answer_is_status_3(levilab: Command, tmp_path: Path) -> None:
+    """Nothing listens on port 9 of this machine; the link is refused at once."""
+    (tmp_path / "bench.toml").write_text(
+        '[counter]\nmodel = "53230A"\naddress = "TCPIP0::127.0.0.1::9::SOCKET"\n'
+        '[generator]\nmodel = "33500B"\naddress = "TCPIP0::127.0.0.1::9::SOCKET"\n',
+        encoding="utf-8",
+    )
+    refused = levilab("acquire", "spin", check=3)
+    assert refused.stderr.splitlines()[-1].startswith("levilab: TCPIP0::127.0.0.1::9::SOCKET: ")
+    assert '"failed"' in next((tmp_path / "runs").glob("*/run.json")).read_text(encoding="utf-8")
+
+
+def test_a_finished_run_is_not_resumed(levilab: Command) -> None:
+    run = json.loads(levilab("acquire", "spin", "--mock", "--json").stdout)["run"]
+    assert "is finished" in levilab("acquire", "spin", "--resume", run, check=1).stderr
+
+
+def test_a_result_that_cannot_be_written_is_shown_all_the_same(levilab: Command, tmp_path: Path) -> None:
+    path = spin_down_csv(tmp_path / "my.csv")
+    done = levilab("analyze", "spindown", path, "--out", path / "below", check=1)
+    assert "What the data say" in done.stdout
+    assert "--no-save" in done.stderr.splitlines()[-1]
+
+
+def test_a_pipe_of_an_old_code_page_gets_what_it_can_show(tmp_path: Path) -> None:
+    path = spin_down_csv(tmp_path / "my.csv")
+    done = subprocess.run(
+        [sys.executable, "-m", "levilab", "analyze", "spindown", str(path), "--no-save"],
+        capture_output=True,
+        env=os.environ | {"PYTHONIOENCODING": "cp1252"},
+        check=True,
+        timeout=60,
+    )
+    assert b"disc" in done.stdout
+
+
+def test_a_decoy_in_the_present_folder_is_not_imported(levilab: Command, tmp_path: Path) -> None:
+    for name in ("analysis.py", "instruments.py", "pyvisa_levilab.py"):
+        (tmp_path / name).write_text("raise SystemExit('the decoy was imported')", encoding="utf-8")
+    assert levilab("acquire", "spin", "--mock").stdout.startswith("finished")
+
+
+#: What takes long to import, and has no business where it is not used.
+HEAVY = {"numpy", "scipy", "pandas", "matplotlib", "lmfit", "pyvisa", "jinja2", "rich.progress"}
+
+
+@pytest.mark.parametrize(
+    ("words", "allowed"),
+    [
+        (["--help"], set[str]()),
+        (["acquire", "spin", "--help"], set[str]()),
+        (["--version"], set[str]()),
+        (["acquire", "spin", "--mock"], {"numpy", "pandas", "pyvisa"}),
+        (["runs", "."], {"numpy", "pandas"}),
+    ],
+)
+def test_nothing_heavy_is_imported_where_it_is_not_used(tmp_path: Path, words: list[str], allowed: set[str]) -> None:
+    program = (
+        f"import sys\nsys.argv = ['levilab', *{words!r}]\nfrom levilab.cli import main\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass\n"
+        f"print('HEAVY', *sorted({HEAVY!r} & set(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        cwd=tmp_path,
+        check=True,
+        timeout=60,
+    )
+    heavy = set(done.stdout.splitlines()[-1].split()[1:])
+    assert heavy <= allowed

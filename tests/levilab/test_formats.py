@@ -1,0 +1,416 @@
+"""Foreign tables: what people's programs write, what is refused and how, and properties over all dialects."""
+
+import codecs
+import os
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from levilab.columns import Column, TableError
+from levilab.dialect import Dialect
+from levilab.errors import DataError
+from levilab.formats import ColumnsError, parse_columns, read_run_readings, read_table
+from levilab.layout import Layout
+from levilab.rows import _read_at_once, _read_lines
+from levilab.titles import read_title, unit_factor
+
+T, F, U = "time_s", "spin_frequency_hz", "spin_frequency_u_hz"
+PLAIN = {T: [0, 0.5, 1], F: [61.5, 61.25, 61]}
+WITH_U = PLAIN | {U: [0.25, 0.5, 0.125]}
+SLOW = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+@pytest.fixture
+def table_file(tmp_path):
+    def write(content, name="data.csv"):
+        path = tmp_path / name
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return path
+
+    return write
+
+
+TABLES = {
+    "canonical": (f"{T},{F},{U}\n0,61.5,.25\n0.5,61.25,.5\n1,61,.125\n", WITH_U),
+    "canonical in another order": (f"{U},{F},{T}\n.25,61.5,0\n.5,61.25,.5\n.125,61,1e0\n", WITH_U),
+    "short names": ("t,f,u\n0,61.5,.25\n0.5,61.25,.5\n1,61,.125\n", WITH_U),
+    "canonical goes before an alias": (f"t,f,{F}\n0,1,61.5\n0.5,1,61.25\n1,1,61\n", PLAIN),
+    "German Excel": ('\ufeff"Zeit [s]";"Frequenz [Hz]"\r\n0;61,5\r\n0,5;61,25\r\n1;61\r\n', PLAIN),
+    "German Excel, trailing separators": ("Zeit (s);Frequenz (Hz);;\r\n0;61,5;;\r\n0,5;61,25;;\r\n1;61;;\r\n", PLAIN),
+    "quoted decimal commas": ('Zeit,f\n"0","61,5"\n"0,5","61,25"\n"1","61,0"\n', PLAIN),
+    "units row": ("t;f\ns;Hz\n0;61.5\n0.5;61.25\n1;61\n", PLAIN),
+    "units row in brackets, milli and kilo": ("t,f\n[ms],[kHz]\n0,.0615\n500,.06125\n1000,.061\n", PLAIN),
+    "rpm": ("t,rpm\n0,3690\n0.5,3675\n1,3660\n", PLAIN),
+    "rpm, u without a unit of its own": ("t,rpm,u\n0,3690,15\n0.5,3675,30\n1,3660,7.5\n", WITH_U),
+    "1/min with a superscript": ("t,Drehfrequenz / min⁻¹\n0,3690\n0.5,3675\n1,3660\n", PLAIN),
+    "Excel's own first line": ("sep=;\r\nZeit;Drehzahl [1/min]\r\n0;3690\r\n0,5;3675\r\n1;3660\r\n", PLAIN),
+    "milliseconds": ("t [ms]\tf/Hz\n0\t61.5\n500\t61.25\n1000\t61\n", PLAIN),
+    "microseconds, two letters mu": ("t/µs,f,u_f/μHz\n0,61.5,250000\n500000,61.25,5e5\n1e6,61,125e3\n", WITH_U),
+    "minutes": (f"t_min,f_hz\n0,61.5\n{0.5 / 60!r},61.25\n{1 / 60!r},61\n", PLAIN),
+    "kHz as a suffix": ("elapsed,f_khz\n0,.0615\n.5,.06125\n1,.061\n", PLAIN),
+    "in words": ("Time in ms, Spin frequency in Hz\n0, 61.5\n500, 61.25\n1000, 61\n", PLAIN),
+    "nu with a subscript": ("t,ν₃\n0,61.5\n0.5,61.25\n1,61\n", PLAIN),
+    "blanks": ("  t [s]    f / Hz\n   0     61.5\n   0.5   61.25\n   1     61   \n", PLAIN),
+    "blanks and decimal commas": ("t f\n0,0 61,5\n0,5 61,25\n1,0 61,0\n", PLAIN),
+    "thousands of blanks": (f"t,f\n0,{' ' * 3000}61.5\n0.5,61.25{' ' * 3000}\n1,61\n", PLAIN),
+    "numpy.savetxt": ("# t f\n0.0e+00 6.15e+01\n5e-01 6.125e+01\n1e+00 6.1e+01\n", PLAIN),
+    "comments everywhere": ("# made\n% by\nt,f\n// hand\n0,61.5\n#\n0.5,61.25\n; x\n1,61\n' end\n", PLAIN),
+    "preamble": ("Counter,CNT-91\nGate time,0.1,s\n\nnote: a, b\n\nt,f\n0,61.5\n0.5,61.25\n1,61\n", PLAIN),
+    "preamble with blanks, table with tabs": ("Run 5 of 12\nt\tf\n0\t61.5\n0.5\t61.25\n1\t61\n", PLAIN),
+    "preamble that begins like a title": ("Time: noon, lab\nZeit;Frequenz\n0;61,5\n0,5;61,25\n1;61\n", PLAIN),
+    "unbalanced quotation mark above": ('5" disk\nt,f\n0,61.5\n0.5,61.25\n1,61\n', PLAIN),
+    "carriage returns": ("t,f\r0,61.5\r0.5,61.25\r1,61\r", PLAIN),
+    "blank lines": ("\n\nt,f\n\n0,61.5\n  \n0.5,61.25\n\n1,61\n\n\n", PLAIN),
+    "no last line end": ("t,f\n0,61.5\n0.5,61.25\n1,61", PLAIN),
+    "text and clock beside": ("when,t,f,ok\n9:00 am,0,61.5,yes\n9:01,0.5,61.25,no\n9:02,1,61,\n", PLAIN),
+    "notes with commas among semicolons": ("t;f;note\n0;61,5;a, 7, 8\n0,5;61,25;b, 1, 2\n1;61;c, 3\n", PLAIN),
+    "Latin-1": ("t/µs;f;Gerät\n0;61,5;ä\n500000;61,25;ö\n1000000;61;ü\n".encode("latin-1"), PLAIN),
+    "UTF-16 little": (codecs.BOM_UTF16_LE + "Zeit;f\r\n0;61,5\r\n0,5;61,25\r\n1;61\r\n".encode("utf-16-le"), PLAIN),
+    "UTF-16 big": (codecs.BOM_UTF16_BE + "t\tf\r\n0\t61.5\r\n.5\t61.25\r\n1\t61\r\n".encode("utf-16-be"), PLAIN),
+    "angle": ("t,omega\n" + "".join(f"{t},{2 * np.pi * f!r}\n" for t, f in zip(*PLAIN.values(), strict=True)), PLAIN),
+    "field scan": (
+        "z/mm;u_z/mm;B [mT]\n10;0,5;20\n20;0,5;10\n30;0,5;5\n",
+        {"height_m": [0.01, 0.02, 0.03], "height_u_m": [5e-4] * 3, "flux_density_t": [0.02, 0.01, 0.005]},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_a_table_reads_the_same_whoever_wrote_it(name, table_file):
+    text, expected = TABLES[name]
+    table = read_table(table_file(text))
+    assert set(table.frame.columns) == set(expected)
+    for column, values in expected.items():
+        np.testing.assert_allclose(table.column(column), values, rtol=4e-16, atol=0)
+    assert table.warnings == ()
+    assert (table.frame.dtypes == np.float64).all()
+
+
+@pytest.mark.parametrize(
+    "missed", ["", "-", "--", "n/a", "nan", "NaN", "inf", "-Infinity", "9.91E37", "9.9e+37", "1e999"]
+)
+def test_a_missed_reading_is_left_out_and_told(missed, table_file):
+    table = read_table(table_file(f"t,f\n0,61.5\n0.2,{missed}\n0.5,61.25\n1,61\n"))
+    assert table.column(T).tolist() == PLAIN[T]
+    assert table.lines.tolist() == [2, 4, 5]
+    assert len(table.warnings) == 1
+    assert "1 of 4 rows" in table.warnings[0]
+    assert table.warnings[0].endswith("line 3")
+
+
+def test_many_missed_readings_make_one_warning(table_file):
+    table = read_table(table_file("t;f\n" + "".join(f"{i};{'' if i % 2 else '61,5'}\n" for i in range(30))))
+    assert [w.partition(": ")[2] for w in table.warnings] == [
+        "15 of 30 rows are left out as missed (empty, nan, inf or 9.91E37): lines 3, 5, 7, 9, 11, …"
+    ]
+
+
+def test_an_empty_column_of_uncertainties_costs_no_readings(table_file):
+    table = read_table(table_file("t,f,u\n0,61.5,\n0.5,61.25,\n1,61,\n"))
+    assert list(table.frame.columns) == [T, F]
+    assert "'u' is empty" in table.warnings[0]
+
+
+@pytest.mark.parametrize("last", ["1.5", "1.5,6x", "1.5,60.5,7", "1.5,-e"])
+def test_a_torn_last_line_is_left_out_and_told(last, table_file):
+    table = read_table(table_file("t,f\n0,61.5\n0.5,61.25\n1,61\n" + last))
+    assert table.column(T).tolist() == PLAIN[T]
+    assert f"line 5: '{last}' was cut off" in table.warnings[0]
+
+
+def test_a_last_line_without_end_that_is_a_full_row_counts(table_file):
+    assert read_table(table_file("t,f\n0,61.5\n0.5,61.25\n1,61\n1.5,60")).column(F)[-1] == 60
+
+
+def test_numbers_without_header_are_time_frequency_and_uncertainty_with_a_warning(table_file):
+    table = read_table(table_file("0,61.5,.25\n0.5,61.25,.5\n1,61,.125\n"))
+    assert {name: table.column(name).tolist() for name in table.frame} == WITH_U
+    assert f"no header; the columns are taken as {T}, {F}, {U}" in table.warnings[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "columns", "expected"),
+    [
+        ("A;B;C\n7;0;61,5\n7;0,5;61,25\n7;1;61\n", {"t": "B", "f": "C"}, PLAIN),
+        ("A;B;C\n7;0;61,5\n7;0,5;61,25\n7;1;61\n", {"t": "2", F: "3"}, PLAIN),
+        ("7,0,61.5,x\n7,0.5,61.25,x\n7,1,61,x\n", {"t": "2", "f": "3"}, PLAIN),
+        ("Scope 7\n0,61.5\n0.5,61.25\n1,61\n", {"t": "1", "f": "2"}, PLAIN),
+        ("t,f,freq\n0,1,61.5\n0.5,1,61.25\n1,1,61\n", {"f": "FREQ"}, PLAIN),
+        ("t,CH1 [kHz]\n0,.0615\n0.5,.06125\n1,.061\n", {"f": "CH1"}, PLAIN),
+        ("t,CH1 (top)\n0,61.5\n0.5,61.25\n1,61\n", {"f": "CH1 (top)"}, PLAIN),
+        ("t,rpm\n0,3690\n0.5,3675\n1,3660\n", {"f": "rpm"}, PLAIN),
+    ],
+)
+def test_columns_can_be_named(text, columns, expected, table_file):
+    table = read_table(table_file(text), columns=columns)
+    assert set(table.frame) == set(expected)
+    for name, values in expected.items():
+        np.testing.assert_allclose(table.column(name), values, rtol=4e-16)
+
+
+def test_a_known_quantity_in_an_unknown_unit_is_not_used_and_told(table_file):
+    table = read_table(table_file("t,f,u [ppm]\n0,61.5,1\n0.5,61.25,1\n1,61,1\n"))
+    assert list(table.frame) == [T, F]
+    assert "'ppm' is no unit of frequency" in table.warnings[0]
+
+
+GOOD = "t,f\n0,61.5\n0.5,61.25\n1,61\n"
+# content, columns, words that the message must have
+ERRORS = {
+    "empty": ("", None, ["is empty"]),
+    "blank": ("\n \n\t\n", None, ["is empty"]),
+    "only a header": ("t,f\n", None, ["line 1", "only a header", "at least 3"]),
+    "only a header, no line end": ("t,f", None, ["line 1", "only a header"]),
+    "two readings": ("t,f\n0,61.5\n1,61\n", None, ["2 readings", "at least 3"]),
+    "all missed": ("t,f\n0,nan\n1,nan\n2,nan\n3,nan\n", None, ["0 readings and 4 missed"]),
+    "text in a number column": ("t,f\n0,61.5\n0.5,abc\n1,61\n", None, ["line 3", "'abc'", "'f'", "decimal point"]),
+    "text in the first row": ("t,f\n0,abc\n0.5,61.25\n1,61\n2,60\n", None, ["line 2", "'abc'"]),
+    "text in all rows": ("t,f\nabc,def\n", None, ["line 2", "'abc'"]),
+    "decimal comma among points": ("t;f\n0;61.5\n0.5;61,25\n1;61.1\n", None, ["line 3", "'61,25'", "decimal point"]),
+    "decimal commas between commas": ("t,f\n0,61,5\n1,61,25\n2,60,75\n", None, ["line 2", "3 fields", "; or tab"]),
+    "too few fields": ("t,f\n0,61.5\n0.5\n1,61\n", None, ["line 3", "'0.5'", "1 field,", "2 are expected"]),
+    "too many fields": ("t,f\n0,61.5\n0.5,61,7\n1,61\n2,60\n", None, ["line 3", "3 fields"]),
+    "second header": (GOOD + GOOD, None, ["line 5", "'t'"]),
+    "thousands separator": ("t;f\n0;1.061,5\n1;1.061,2\n2;1.061,1\n", None, ["line 2", "'1.061,5'"]),
+    "underscore": ("t,f\n0,61\n1,6_1\n2,60\n", None, ["line 3", "'6_1'"]),
+    "two frequencies": ("t,f,rpm\n0,1,60\n1,1,60\n2,1,60\n", None, ["'f', 'rpm'", "--columns f=2 or f=3"]),
+    "wrong name": (GOOD, {"f": "nu"}, ["no column 'nu'", "'t', 'f'"]),
+    "wrong number": (GOOD, {"f": "3"}, ["no column '3'"]),
+    "wrong quantity": (GOOD, {"speed": "f"}, ["cannot set 'speed'", "spin_frequency_hz"]),
+    "one column twice": (GOOD, {"t": "t", "f": "1"}, ["'1' twice"]),
+    "unknown titles": ("# x\na,c\ns,V\n\n0,1\n1,2\n2,3\n", None, ["line 2", "'a', 'c'", "--columns"]),
+    "speed without a unit": ("a,speed\n0,1\n1,2\n2,3\n", None, ["'speed'", "--columns"]),
+    "mHz or MHz": ("a,f_mhz\n0,1\n1,2\n2,3\n", None, ["'f_mhz'"]),
+    "no header, many columns": ("0,1,2,3\n1,1,2,3\n2,1,2,3\n", None, ["line 1", "4 columns and no header"]),
+    "text but no header": ("Scope 7\n0,61\n1,61\n2,60\n", None, ["line 1", "no header", "t=1,f=2"]),
+    "prose": ("Dear all,\nsee you.\n", None, ["line 1", "Dear all"]),
+    "contradicting units": ("t/s,f\nms,Hz\n0,61\n1,61\n2,60\n", None, ["'t/s'", "'ms'"]),
+    "PNG": (b"\x89PNG\r\n\x1a\n\0\0", None, ["PNG", "export it as CSV"]),
+    "xlsx": (b"PK\x03\x04\x14\0", None, ["Excel", "export it as CSV"]),
+    "zeros": (b"\0" * 100, None, ["binary", "export it as CSV"]),
+    "one endless line": (b"1," * 50000, None, ["without end"]),
+    "control characters in a field": (GOOD + "1.5,\x1b[31m6\n", None, ["line 5", "\N{REPLACEMENT CHARACTER}[31m6"]),
+    "long text": (f"t,f\n0,61\n1,{'x' * 500}\n2,60\n", None, ["line 3", "xxx…"]),
+}
+
+
+@pytest.mark.parametrize("name", ERRORS)
+def test_an_error_is_one_line_that_names_file_and_place(name, table_file):
+    content, columns, words = ERRORS[name]
+    path = table_file(content)
+    with pytest.raises(DataError) as caught:
+        read_table(path, columns=columns)
+    message = str(caught.value)
+    assert message.startswith(str(path))
+    assert message.isprintable()
+    assert len(message) < len(str(path)) + 320
+    assert all(word in message for word in words), message
+    assert caught.value.exit_code == 1
+    if any(word.startswith("line ") for word in words):
+        assert f"line {caught.value.line}" in words
+
+
+def test_what_is_no_file_is_told(tmp_path):
+    for path, words in ((tmp_path / "none.csv", "no such file"), (tmp_path, "is a folder")):
+        with pytest.raises(TableError, match=words):
+            read_table(path)
+    with pytest.raises(TableError, match="no such file"):
+        read_table(tmp_path / "a\0b")
+
+
+def test_a_pipe_is_refused_at_once(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(TableError, match="device or a pipe"):
+        read_table(tmp_path / "pipe")
+
+
+@pytest.mark.parametrize(
+    ("error", "words"), [(PermissionError(13, "denied"), "may not be read"), (OSError(5, "I/O error"), "I/O error")]
+)
+def test_an_unreadable_file_is_told(error, words, table_file, monkeypatch):
+    path = table_file(GOOD)
+
+    def refuse(*_, **__):
+        raise error
+
+    monkeypatch.setattr(Path, "open", refuse)
+    for read in (read_table, read_run_readings):
+        with pytest.raises(TableError, match=words):
+            read(path)
+
+
+def test_a_missing_column_is_told_with_those_there_are(table_file):
+    with pytest.raises(TableError, match=r"height_m; it has 't', 'f': say --columns height_m=NAME"):
+        read_table(table_file(GOOD)).column("height_m")
+
+
+def test_the_columns_option_is_read_and_its_mistakes_are_wrong_usage():
+    assert parse_columns("") == {}
+    assert parse_columns("t=1,spin_frequency_hz=f = 2, s") == {"t": "1", F: "f = 2, s"}
+    for text in ("t", "t=", "=1", "t=1,t=2", "t:1,f:2"):
+        with pytest.raises(ColumnsError, match="NAME=COLUMN"):
+            parse_columns(text)
+    assert ColumnsError.exit_code == 2
+
+
+def test_units_are_those_of_the_quantity_and_case_counts_where_it_must():
+    assert unit_factor("mHz", "frequency") == 1e-3
+    assert unit_factor("MHZ", "frequency") is None
+    assert unit_factor("khz", "frequency") == 1e3
+    assert unit_factor("rad s⁻¹", "frequency") == pytest.approx(0.15915494309189535, rel=1e-15)
+    assert unit_factor("ms", "frequency") is None
+    assert read_title("f(t)").unit == "t"
+    assert read_title("u(f) / Hz").column == U
+
+
+# --- our own run folders -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("text", ["", f"{T},{F}\n", f"{T},{F}"])
+def test_a_run_without_readings_is_an_empty_table(text, table_file):
+    table = read_run_readings(table_file(text))
+    assert len(table.frame) == 0
+    assert len(table.lines) == 0
+    assert list(table.frame) == ([T, F] if text.endswith("\n") else [])
+    assert len(table.warnings) == (text != "" and not text.endswith("\n"))
+
+
+@pytest.mark.parametrize("last", ["1.5,60.5", "1.5,60.", "1.5", "1", "\0\0\0"])
+def test_a_runs_last_line_without_end_is_torn_even_if_it_parses(last, table_file):
+    table = read_run_readings(table_file(f"{T},{F}\n0,61.5\n0.5,61.25\n1,61\n{last}"))
+    assert table.column(F).tolist() == PLAIN[F]
+    assert "line 5" in table.warnings[0]
+
+
+def test_a_run_being_written_grows_reading_by_reading(tmp_path):
+    path, text = tmp_path / "readings.csv", f"{T},{F}\n0.1,61.5\n0.2,61.25\n"
+    seen = []
+    for end in range(len(text) + 1):
+        path.write_text(text[:end])
+        seen.append(len(read_run_readings(path).frame))
+    assert sorted(seen) == seen
+    assert seen[-1] == 2
+
+
+def test_a_damaged_line_within_a_run_is_an_error(table_file):
+    with pytest.raises(TableError, match="line 3"):
+        read_run_readings(table_file(f"{T},{F}\n0,61.5\n0.\n1,61\n"))
+    for header in ("a,b", f"{T},{F}\r"):
+        with pytest.raises(TableError, match="is no header of a run"):
+            read_run_readings(table_file(f"{header}\r\n0,61.5\n"))
+
+
+# --- properties --------------------------------------------------------------------------------------------------
+
+numbers = st.floats(min_value=-1e37, max_value=1e37, allow_subnormal=False)
+tables = st.integers(2, 3).flatmap(lambda n: st.lists(st.tuples(*[numbers] * n), min_size=3, max_size=12))
+
+
+@st.composite
+def written_tables(draw):
+    rows = draw(tables)
+    separator, decimal = draw(st.sampled_from([",.", ";.", ";,", "\t.", "\t,", " .", " ,"]))
+    newline = draw(st.sampled_from(["\n", "\r\n", "\r"]))
+    encoding = draw(st.sampled_from(["utf-8", "utf-8-sig", "utf-16", "latin-1"]))
+    form = draw(st.sampled_from([repr, "{:.17g}".format, "{:+.16e}".format]))
+    lines = [separator.join([T, F, U][: len(rows[0])])]
+    if draw(st.booleans()):
+        lines.append(separator.join(["s", "Hz", "Hz"][: len(rows[0])]))
+    lines += [separator.join(form(x).replace(".", decimal) for x in row) for row in rows]
+    for _ in range(draw(st.integers(0, 3))):
+        lines.insert(draw(st.integers(0, len(lines))), draw(st.sampled_from(["# é, 1; 2\t3", "% 1,2,3", "//", ""])))
+    end = draw(st.sampled_from([newline, "", separator + newline if separator != " " else newline]))
+    return rows, (newline.join(lines) + end).encode(encoding)
+
+
+@SLOW
+@given(written_tables())
+def test_any_table_in_any_dialect_reads_back_equal(tmp_path, written):
+    rows, data = written
+    path = tmp_path / "written.csv"
+    path.write_bytes(data)
+    frame = read_table(path).frame
+    assert list(frame) == [T, F, U][: len(rows[0])]
+    np.testing.assert_allclose(frame.to_numpy(), np.array(rows), rtol=1e-15, atol=0)
+
+
+def reads_or_refuses(path):
+    for read in (read_table, read_run_readings):
+        try:
+            table = read(path)
+        except DataError as error:
+            assert str(error).isprintable()  # noqa: PT017
+        else:
+            assert np.isfinite(table.frame.to_numpy()).all()
+            assert len(table.lines) == len(table.frame)
+            assert all(w.isprintable() for w in table.warnings)
+
+
+words = [T, F, "Hz", "61.5", "7,5", "nan", "inf", "1e999", "9.91E37", "\n", "\n", "\r\n", "\u2028"]
+pieces = st.sampled_from([*words, *'tfus012-éµ٣_(]/#%,,;\t \r"\0\x1a\x0b\x85'])
+bodies = st.lists(pieces, max_size=40).map("".join)
+
+
+@SLOW
+@given(st.binary(max_size=300))
+@example(codecs.BOM_UTF16_LE + b"t")
+@example(codecs.BOM_UTF32_BE + b"t,f\n")
+@example(b"\xef\xbb\xbf")
+def test_any_bytes_are_read_or_refused(tmp_path, data):
+    (tmp_path / "fuzz.csv").write_bytes(data)
+    reads_or_refuses(tmp_path / "fuzz.csv")
+
+
+@settings(SLOW, max_examples=600)
+@given(st.sampled_from(["", "t,f\n", "t;f;u\n", f"{T},{F}\n0,61\n1,61\n2,61\n", "t\tf\n0\t1\n1\t1\n2\t1\n"]), bodies)
+def test_any_text_is_read_or_refused(tmp_path, head, body):
+    (tmp_path / "fuzz.csv").write_bytes((head + body).encode())
+    reads_or_refuses(tmp_path / "fuzz.csv")
+
+
+@settings(SLOW, max_examples=400)
+@given(st.lists(st.text(alphabet='0123456789.,;eE+-_ "xna\t\r\0#', max_size=12), min_size=1, max_size=6))
+def test_reading_at_once_and_line_by_line_agree(tmp_path, lines):
+    """Whatever pandas takes for a number, the careful way must take for the same one."""
+    path = tmp_path / "both.csv"
+    text = "t,f\n" + "".join(f"1,{line}\n" for line in lines)
+    path.write_text(text, newline="")
+    layout = Layout("utf-8", Dialect(",", "."), ("t", "f"), 1, (), 2, 4, 2)
+    columns = (Column(T, 0, "t", 1), Column(F, 1, "f", 1))
+    fast = _read_at_once(path, layout, columns, drop_unended=False)
+    if fast is not None:
+        slow = _read_lines(path, layout, columns, drop_unended=False)
+        assert fast.lines.tolist() == slow.lines.tolist()
+        for a, b in zip(fast.values, slow.values, strict=True):
+            np.testing.assert_allclose(a, b, rtol=1e-15)
+
+
+def test_a_plain_file_is_read_at_once_as_pandas_would(table_file):
+    rng = np.random.default_rng(3)
+    frame = pd.DataFrame({T: np.arange(40000) * 0.1, F: 61 + rng.normal(0, 1e-3, 40000), U: rng.uniform(1, 2, 40000)})
+    path = table_file(frame.to_csv(index=False))
+    table = read_table(path)
+    pd.testing.assert_frame_equal(table.frame, pd.read_csv(path), check_exact=True)
+    assert table.lines[[0, -1]].tolist() == [2, 40001]
+    assert table.warnings == ()
+
+
+def test_one_field_too_many_does_not_hide_one_that_is_missing(table_file):
+    for rows, line in (("0,61\n1,60,5\n2\n3,59\n", 3), ("0,61\n1\n2,60,5\n3,59\n", 3)):
+        with pytest.raises(TableError, match=f"line {line}: .* 2 are expected"):
+            read_table(table_file("t,f\n" + rows))
+
+
+def test_a_comment_with_as_many_separators_as_a_row_stays_a_comment(table_file):
+    table = read_table(table_file("n,t,f\n1,0,61.5\n#2,.2,7\n3,0.5,61.25\n4,1,61\n"))
+    assert table.column(T).tolist() == PLAIN[T]
+
+
+def test_a_line_far_down_is_named(table_file):
+    rows = "".join(f"{i},61.5\n" for i in range(30000))
+    with pytest.raises(TableError, match="line 30003: 'x' stands in column 'f'"):
+        read_table(table_file(f"t,f\n{rows}# pause\n30001,x\n30002,61\n"))

@@ -1,0 +1,162 @@
+"""From paths to results: what is found, what is refused, and that the numbers are the published ones."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests_of_levilab import spin_down_csv
+
+from levilab.errors import DataError, LevilabError
+from levilab.pipeline import Options, analyze_spindowns
+from levilab.result import as_document, save_result
+from levilab.run import CannotWrite
+
+#: The thesis's constants, as printed: C₁ [1/s], |C₂| [1/rad].
+PUBLISHED = (
+    ("0.003199", "1.760e-05"),
+    ("0.003134", "1.707e-05"),
+    ("0.003133", "1.669e-05"),
+    ("0.003261", "1.772e-05"),
+)
+
+
+def test_the_straight_lines_give_the_published_constants_to_every_printed_digit(sample_data: Path) -> None:
+    analysis = analyze_spindowns([sample_data], Options())
+    constants = [
+        (run.fit("stokes").linearised["c1"].value, run.fit("newton").linearised["c2"].value)  # type: ignore[index]
+        for run in analysis.runs
+    ]
+    assert tuple((f"{c1:.6f}", f"{c2:.3e}") for c1, c2 in constants) == PUBLISHED
+    assert f"{np.mean([c1 for c1, _ in constants]):.8f}" in {"0.00318175", "0.00318176", "0.00318174"}
+
+
+def test_the_sample_data_are_what_their_script_makes(
+    sample_data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import runpy
+
+    script = tmp_path / "make.py"
+    script.write_text((sample_data / "make.py").read_text(encoding="utf-8"), encoding="utf-8")
+    runpy.run_path(str(script), run_name="__main__")
+    for made in sorted(tmp_path.glob("*/*")):
+        shipped = sample_data / made.relative_to(tmp_path)
+        assert made.read_text(encoding="utf-8") == shipped.read_text(encoding="utf-8"), made
+
+
+def test_the_four_runs_exclude_stokes_and_newton_and_favour_the_disc(sample_data: Path) -> None:
+    combined = analyze_spindowns([sample_data], Options()).combined
+    assert combined.best == "disc"
+    assert {name for name, _ in combined.verdict.excluded} == {"stokes", "newton"}
+    disc = combined.fit("disc").constants["c32"]
+    # refit of the published pairs (PHYSICS.md §5): 2.365, 2.309, 2.289, 2.397e-4
+    assert disc.value == pytest.approx(np.mean([2.365e-4, 2.309e-4, 2.289e-4, 2.397e-4]), rel=3e-3)
+    assert disc.scatter == pytest.approx(np.std([2.365, 2.309, 2.289, 2.397], ddof=1) * 1e-4, rel=0.15)
+    assert disc.u == pytest.approx(disc.scatter / 2)
+
+
+def test_the_result_is_written_as_the_interface_says(sample_data: Path, tmp_path: Path) -> None:
+    save_result(analyze_spindowns([sample_data], Options()), tmp_path)
+    text = (tmp_path / "result.json").read_text(encoding="utf-8")
+    result = json.loads(text, parse_constant=pytest.fail)
+    assert list(result) == sorted(result)
+    assert result["synthetic"] is True
+    assert len(result["inputs"]) == len(result["runs"]) == 4
+    assert (tmp_path / result["inputs"][0]["path"]).is_file()
+    assert [model["name"] for model in result["models"]] == ["stokes", "newton", "disc", "mixed", "power"]
+    run = result["runs"][0]
+    assert set(run) >= {"path", "values", "models", "best_model", "warnings"}
+    for model in run["models"]:
+        assert set(model["parameters"]) >= {"start_frequency"}
+        assert set(model["statistics"]) == {
+            "n", "rms_residual", "reduced_chi_square", "aicc", "bic", "weight", "durbin_watson", "runs_test_p",
+        }  # fmt: skip
+    assert run["models"][0]["linearised"]["c1"]["unit"] == "1/s"
+    assert set(result["models"][2]["parameters"]) == {"c32"}
+    assert (tmp_path / "spindown.png").stat().st_size > 10_000
+
+
+def test_one_run_has_its_start_and_covariance_at_the_top(sample_data: Path) -> None:
+    analysis = analyze_spindowns([sample_data / "spin-down-1"], Options())
+    result = as_document(analysis, analysis.home)
+    disc = next(model for model in result["models"] if model["name"] == "disc")
+    assert set(disc["parameters"]) == {"start_frequency", "c32"}
+    assert np.array(disc["covariance"]).shape == (2, 2)
+    assert disc["covariance"][1][1] == pytest.approx(disc["parameters"]["c32"]["u"] ** 2)
+    assert result["inputs"][0]["path"] == "readings.csv"
+
+
+def test_a_plain_csv_is_analyzed_and_knows_nothing_of_synthetic(tmp_path: Path) -> None:
+    analysis = analyze_spindowns([spin_down_csv(tmp_path / "my.csv")], Options())
+    result = as_document(analysis, analysis.home)
+    assert analysis.home == tmp_path
+    assert (result["synthetic"], result["best_model"]) == (False, "disc")
+    assert result["values"]["c32"]["value"] == pytest.approx(2.34e-4, abs=4 * result["values"]["c32"]["u"])
+
+
+def test_the_same_run_given_twice_counts_once(sample_data: Path) -> None:
+    analysis = analyze_spindowns([sample_data, sample_data / "spin-down-1"], Options())
+    assert len(analysis.sources) == 4
+
+
+def test_a_stated_reading_uncertainty_takes_the_place_of_the_scatter(tmp_path: Path) -> None:
+    path = spin_down_csv(tmp_path / "my.csv", u=False)
+    without = analyze_spindowns([path], Options()).runs[0].fit("disc")
+    with_u = analyze_spindowns([path], Options(reading_u=0.03)).runs[0].fit("disc")
+    assert without.statistics.reduced_chi_square is None
+    assert with_u.statistics.reduced_chi_square == pytest.approx(1, abs=1)
+    ratio = without.parameters["c32"].u / with_u.parameters["c32"].u  # type: ignore[operator]
+    assert ratio**2 == pytest.approx(with_u.statistics.reduced_chi_square)
+
+
+@pytest.mark.parametrize("how", ["profile", "bootstrap"])
+def test_intervals_are_there_when_asked_for(tmp_path: Path, how: str) -> None:
+    path = spin_down_csv(tmp_path / "my.csv", u=False)
+    analysis = analyze_spindowns([path], Options(uncertainty=how))  # type: ignore[arg-type]
+    c = as_document(analysis, tmp_path)["runs"][0]["values"]["c32"]
+    low, high = c["interval_68"]
+    assert low < c["value"] < high
+    # no u was stated: both stand on the residuals' own scatter; 1000 samples tell a quantile to some 5 %
+    assert (high - low) / 2 == pytest.approx(c["u"], rel=0.15)
+
+
+def test_in_a_searched_folder_what_is_broken_is_passed_over_and_told(sample_data: Path, tmp_path: Path) -> None:
+    import shutil
+
+    for name in ("spin-down-1", "spin-down-2", "lower-limits"):
+        shutil.copytree(sample_data / name, tmp_path / name)
+    (tmp_path / "spin-down-2" / "run.json").write_text("{", encoding="utf-8")
+    analysis = analyze_spindowns([tmp_path], Options())
+    assert [source.name for source in analysis.sources] == ["spin-down-1"]
+    assert any("spin-down-2" in warning for warning in analysis.warnings)
+
+
+def test_a_run_of_another_experiment_is_refused_by_name(sample_data: Path) -> None:
+    with pytest.raises(DataError, match="holds a limit run, spindown needs a spin run"):
+        analyze_spindowns([sample_data / "lower-limits"], Options())
+
+
+def test_a_folder_without_runs_says_what_it_found(sample_data: Path, tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="found no run at all"):
+        analyze_spindowns([tmp_path], Options())
+    import shutil
+
+    shutil.copytree(sample_data / "lower-limits", tmp_path / "limits")
+    with pytest.raises(DataError, match="found only 1 limit"):
+        analyze_spindowns([tmp_path], Options())
+
+
+def test_a_folder_that_cannot_be_written_is_told_in_one_line(sample_data: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way", encoding="utf-8")
+    analysis = analyze_spindowns([sample_data], Options())
+    with pytest.raises(CannotWrite, match="--out") as caught:
+        save_result(analysis, tmp_path / "file" / "below")
+    assert isinstance(caught.value, LevilabError)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("n", [3, 4, 5, 7])
+def test_few_readings_give_a_result_without_nan_that_says_what_it_cannot_tell(tmp_path: Path, n: int) -> None:
+    analysis = analyze_spindowns([spin_down_csv(tmp_path / "my.csv", n=n)], Options())
+    text = json.dumps(as_document(analysis, tmp_path), allow_nan=False)
+    assert json.loads(text)["warnings"]

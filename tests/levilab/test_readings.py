@@ -1,0 +1,60 @@
+"""What a spin-down's table must fulfil, and how it is told if it does not."""
+
+import numpy as np
+import pytest
+
+from levilab.columns import TableError
+from levilab.formats import read_run_readings, read_table
+from levilab.readings import spin_readings
+
+HEADER = "time_s,spin_frequency_hz,spin_frequency_u_hz\n"
+
+
+def table_of(tmp_path, text):
+    path = tmp_path / "data.csv"
+    path.write_text(text)
+    return read_table(path)
+
+
+def test_readings_are_arrays_with_the_tables_warnings(tmp_path):
+    readings = spin_readings(table_of(tmp_path, HEADER + "0,61,.1\n1,60,.1\n2,nan,.1\n3,59,.2\n"))
+    np.testing.assert_array_equal(readings.time, [0, 1, 3])
+    np.testing.assert_array_equal(readings.frequency, [61, 60, 59])
+    np.testing.assert_array_equal(readings.u, [0.1, 0.1, 0.2])
+    assert "line 4" in readings.warnings[0]
+
+
+def test_uncertainties_may_be_absent(tmp_path):
+    assert spin_readings(table_of(tmp_path, "t,f\n0,61\n1,60\n2,59\n")).u is None
+
+
+@pytest.mark.parametrize(
+    ("rows", "line", "words"),
+    [
+        ("0,61,.1\n1,60,.1\n\n1,59,.1\n", 5, ["the time 1 s is repeated", "in line 3"]),
+        ("0,61,.1\n2,60,.1\n# x\n1,59,.1\n", 5, ["the time 1 s comes after 2 s in line 3"]),
+        ("0,61,.1\n1,0,.1\n2,59,.1\n", 3, ["the frequency is 0 Hz"]),
+        ("0,61,.1\n1,60,.1\n2,-59,.1\n", 4, ["the frequency is -59 Hz"]),
+        ("0,61,.1\n1,60,0\n2,59,.1\n", 3, ["the uncertainty is 0 Hz"]),
+        ("0,61,.1\n1,60,.1\n2,59,-.1\n", 4, ["the uncertainty is -0.1 Hz"]),
+    ],
+)
+def test_what_cannot_be_a_spin_down_is_told_with_its_line(rows, line, words, tmp_path):
+    with pytest.raises(TableError) as caught:
+        spin_readings(table_of(tmp_path, HEADER + rows))
+    assert caught.value.line == line
+    assert f"data.csv, line {line}: " in str(caught.value)
+    assert str(caught.value).isprintable()
+    assert all(word in str(caught.value) for word in words), str(caught.value)
+
+
+def test_a_missing_column_is_told_with_those_there_are(tmp_path):
+    with pytest.raises(TableError, match=r"spin_frequency_hz; it has 't', 'z': say --columns f=NAME"):
+        spin_readings(table_of(tmp_path, "t,z\n0,1\n1,2\n2,3\n"))
+
+
+def test_a_run_with_too_few_readings_is_told(tmp_path):
+    path = tmp_path / "readings.csv"
+    path.write_text(HEADER + "0,61,.1\n")
+    with pytest.raises(TableError, match="holds 1 readings, at least 3"):
+        spin_readings(read_run_readings(path))

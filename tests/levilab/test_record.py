@@ -1,0 +1,287 @@
+"""The acquisition: from the virtual bench into a run folder, and every way out of it."""
+
+import itertools
+import json
+import signal
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from instruments.counter import Keysight53230A
+from instruments.errors import InstrumentError, NoAnswer
+from instruments.generator import Keysight33500B
+from levilab.clock import VirtualClock
+from levilab.config import BenchConfig, SpinSettings
+from levilab.experiment import ExperimentFailed
+from levilab.order import spin_order
+from levilab.record import Order, acquire
+from levilab.run import CannotWrite, Run, RunWriter
+from levilab.simulator.world import SpinScene, SpinWorld, drawn
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+
+class Silent:
+    """Shows nothing, remembers what it was to show."""
+
+    def __init__(self) -> None:
+        self.readings: list[str] = []
+        self.messages: list[str] = []
+
+    def preparing(self, text: str, fraction: float) -> None: ...
+
+    def reading(self, text: str, elapsed: float, remaining: float) -> None:
+        self.readings.append(text)
+
+    def message(self, text: str) -> None:
+        self.messages.append(text)
+
+    def close(self) -> None: ...
+
+
+def mock(out: Path, seed: int = 1, **changes: Any) -> Order:
+    words: dict[str, Any] = {"bench": Path("none"), "note": "", "realtime": False, "resume": None, "wire_log": False}
+    return spin_order(mock=True, out=out, seed=seed, **(words | changes))
+
+
+def in_world(out: Path, scene: SpinScene, settings: SpinSettings | None = None) -> Order:
+    config = BenchConfig(spin=settings or SpinSettings())
+    return Order("spin", config, out=out, world=lambda: SpinWorld(scene, VirtualClock()), how="a test")
+
+
+@pytest.fixture
+def outputs(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
+    """What the generator's output was set to, in order."""
+    seen: list[bool] = []
+    listener = "instruments.virtual.generator.Virtual33500B.changed"
+    from instruments.virtual.generator import Virtual33500B
+
+    changed = Virtual33500B.changed
+
+    def watched(self: Virtual33500B, name: str) -> None:
+        if name == "output":
+            seen.append(bool(self.settings["output"]))
+        changed(self, name)
+
+    monkeypatch.setattr(listener, watched)
+    return seen
+
+
+def test_a_spin_down_is_read_every_ten_seconds_until_the_top_falls(tmp_path: Path, outputs: list[bool]) -> None:
+    run = acquire(mock(tmp_path), Silent())
+    frame = run.readings().frame
+    assert run.status == "finished"
+    assert 17 <= len(frame) <= 22  # about 190 s; the fall scatters by 0.25 Hz, which is 3 s, the drag by 2 %, 4 s
+    assert np.allclose(np.diff(frame["time_s"]), 10, atol=0.06)  # the gate waits for an edge, 1/22 s at the most
+    assert frame["spin_frequency_hz"].iloc[0] == pytest.approx(40, abs=0.2)  # 0.5 s after the drive, 0.1 Hz/s
+    assert 21 < frame["spin_frequency_hz"].iloc[-1] < 24
+    assert (frame["spin_frequency_u_hz"] == 0.03).all()
+    assert outputs[-1] is False
+    assert [event["kind"] for event in run.events()] == ["drive on", "locked", "drive off", "reading missed", "fell"]
+
+
+def test_the_readings_follow_the_law_of_the_world_within_their_uncertainty(tmp_path: Path) -> None:
+    """χ² over 40 runs about the true curve: only the gate's finite length (2e-5 Hz) and the start come between."""
+    chi_square, n = 0.0, 0
+    for seed in range(40):
+        frame = acquire(mock(tmp_path, seed), Silent()).readings().frame
+        scene = drawn(seed)
+        c = scene.constants[0]
+        # free of the start: ν^(−1/2) of the law is a straight line of known slope
+        y, t = frame["spin_frequency_hz"].to_numpy() ** -0.5, frame["time_s"].to_numpy()
+        slope = c * np.sqrt(2 * np.pi) / 2
+        u = 0.5 * frame["spin_frequency_hz"].to_numpy() ** -1.5 * 0.03
+        offset = np.average(y - slope * t, weights=u**-2)
+        chi_square += float(np.sum(((y - slope * t - offset) / u) ** 2))
+        n += len(y) - 1
+    assert chi_square / n == pytest.approx(1, abs=4 * np.sqrt(2 / n))  # 4 standard deviations of χ²/n
+
+
+def test_what_was_done_stands_in_run_json(tmp_path: Path) -> None:
+    run = acquire(mock(tmp_path, note="first try"), Silent())
+    record = json.loads((run.folder / "run.json").read_text(encoding="utf-8"))
+    assert record["schema"] == "levilab-run/1"
+    assert record["synthetic"] is True
+    assert "no real top" in record["synthetic_how"]
+    assert (record["seed"], record["note"]) == (1, "first try")
+    assert record["instruments"]["counter"]["identity"].startswith("Keysight Technologies,53230A")
+    assert record["instruments"]["generator"]["settings_end"]["output"] is False
+    assert record["instruments"]["counter"]["settings_end"]["gate_s"] == 1.0
+    assert [channel["unit"] for channel in record["channels"]] == ["s", "Hz", "Hz"]
+    assert record["software"]["levilab"]
+
+
+def test_the_same_seed_gives_the_same_readings_and_another_one_others(tmp_path: Path) -> None:
+    first, again, other = (
+        (acquire(mock(tmp_path, seed), Silent()).folder / "readings.csv").read_bytes() for seed in (5, 5, 6)
+    )
+    assert first == again != other
+
+
+def test_what_was_shown_is_what_stands_in_the_folder(tmp_path: Path) -> None:
+    show = Silent()
+    frame = acquire(mock(tmp_path), show).readings().frame
+    assert [float(text.split()[0]) for text in show.readings] == [round(t, 2) for t in frame["time_s"]]
+
+
+def test_the_wire_log_holds_every_byte(tmp_path: Path) -> None:
+    run = acquire(mock(tmp_path, wire_log=True), Silent())
+    log = (run.folder / "wire.log").read_text(encoding="utf-8")
+    assert log.count("> b'READ?\\n'") == len(run.readings().frame) + 2 + 2  # two before, two at the fall
+    assert "> b'OUTP1 OFF\\n'" in log
+
+
+def test_a_top_that_is_not_there_is_an_error_that_says_what_to_look_at(tmp_path: Path, outputs: list[bool]) -> None:
+    with pytest.raises(ExperimentFailed, match="trigger level"):
+        acquire(in_world(tmp_path, SpinScene(start_hz=5.0)), Silent())
+    (run,) = [Run.load(path) for path in tmp_path.iterdir()]
+    assert run.status == "failed"
+    assert not outputs or outputs[-1] is False
+
+
+def test_a_top_that_does_not_follow_the_drive_is_an_error(tmp_path: Path, outputs: list[bool]) -> None:
+    weak = SpinSettings(drive_amplitude_vpp=0.5)
+    with pytest.raises(ExperimentFailed, match="did not follow"):
+        acquire(in_world(tmp_path, SpinScene(), weak), Silent())
+    assert outputs == [True, False, *outputs[2:]]
+    assert outputs[-1] is False
+
+
+def test_a_drive_beyond_the_limits_is_refused_before_anything_is_set(tmp_path: Path, outputs: list[bool]) -> None:
+    with pytest.raises(InstrumentError, match=r"drive_amplitude_vpp = 15.*limits"):
+        acquire(in_world(tmp_path, SpinScene(), SpinSettings(drive_amplitude_vpp=15.0)), Silent())
+    assert True not in outputs
+
+
+def test_a_top_that_never_falls_ends_at_the_longest_time(tmp_path: Path) -> None:
+    scene = SpinScene(fall_hz=1.0, constants=(1e-6,))
+    run = acquire(in_world(tmp_path, scene, SpinSettings(longest_s=100.0)), Silent())
+    assert run.status == "finished"
+    assert len(run.readings().frame) == 11
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_run_with_outputs_off_and_all_readings(
+    tmp_path: Path, outputs: list[bool], number: signal.Signals
+) -> None:
+    class Impatient(Silent):
+        def reading(self, text: str, elapsed: float, remaining: float) -> None:
+            super().reading(text, elapsed, remaining)
+            if len(self.readings) == 5:
+                signal.raise_signal(number)
+
+    run = acquire(mock(tmp_path), Impatient())
+    assert run.status == "interrupted"
+    assert len(run.readings().frame) == 5
+    assert outputs[-1] is False
+    assert run.events()[-1]["text"] == f"interrupted by {number.name}, outputs are off"
+
+
+def test_ctrl_c_twice_breaks_through_an_exchange_and_outputs_are_off_all_the_same(
+    tmp_path: Path, outputs: list[bool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    count = itertools.count()
+
+    def hangs(self: Keysight53230A) -> float | None:
+        if next(count) == 4:
+            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
+            pytest.fail("the second signal did not break through")
+        return read(self)
+
+    read: Callable[[Keysight53230A], float | None] = Keysight53230A.frequency
+    monkeypatch.setattr(Keysight53230A, "frequency", hangs)
+    run = acquire(mock(tmp_path), Silent())
+    assert run.status == "interrupted"
+    assert outputs[-1] is False
+
+
+@pytest.mark.parametrize("when", range(0, 22, 3))
+def test_an_exception_at_any_moment_leaves_outputs_off_and_the_readings_so_far(
+    tmp_path: Path, outputs: list[bool], monkeypatch: pytest.MonkeyPatch, when: int
+) -> None:
+    count = itertools.count()
+
+    def fails(self: Keysight53230A) -> float | None:
+        if next(count) == when:
+            raise NoAnswer("counter", "READ?", 2.0)
+        return read(self)
+
+    read = Keysight53230A.frequency
+    monkeypatch.setattr(Keysight53230A, "frequency", fails)
+    with pytest.raises(NoAnswer):
+        acquire(mock(tmp_path), Silent())
+    (run,) = [Run.load(path) for path in tmp_path.iterdir()]
+    assert run.status == "failed"
+    assert len(run.readings().frame) == max(0, when - 2)
+    assert not outputs or outputs[-1] is False
+    assert "READ?" in run.events()[-1]["text"]
+
+
+def test_a_generator_that_no_longer_answers_is_told_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def mute(self: Keysight33500B) -> None:
+        raise NoAnswer("generator", "OUTP1 OFF", 2.0)
+
+    monkeypatch.setattr(Keysight33500B, "off", mute)
+    with pytest.raises(InstrumentError, match="MAY STILL BE ON"):
+        acquire(mock(tmp_path), Silent())
+
+
+def test_a_full_disk_in_the_middle_leaves_outputs_off_and_the_shown_readings(
+    tmp_path: Path, outputs: list[bool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Filling(Silent):
+        def reading(self, text: str, elapsed: float, remaining: float) -> None:
+            super().reading(text, elapsed, remaining)
+            if len(self.readings) == 7:
+                monkeypatch.setattr("levilab.run.os.fsync", full)
+
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    show = Filling()
+    with pytest.raises(CannotWrite, match=r"write the reading .*No space left"):
+        acquire(mock(tmp_path), show)
+    (run,) = [Run.load(path) for path in tmp_path.iterdir()]
+    assert run.status == "interrupted"
+    assert outputs[-1] is False
+    shown = [float(text.split()[0]) for text in show.readings]
+    assert [round(t, 2) for t in run.readings().frame["time_s"]][:7] == shown
+
+
+def test_an_interrupted_run_is_resumed_where_it_was_left(tmp_path: Path) -> None:
+    class Impatient(Silent):
+        def reading(self, text: str, elapsed: float, remaining: float) -> None:
+            super().reading(text, elapsed, remaining)
+            if len(self.readings) == 8:
+                signal.raise_signal(signal.SIGINT)
+
+    half = acquire(mock(tmp_path, 3), Impatient())
+    run = acquire(mock(tmp_path, 3, resume=half.folder), Silent())
+    whole = acquire(mock(tmp_path, 3), Silent()).readings().frame
+    frame = run.readings().frame
+    assert run.folder == half.folder
+    assert run.status == "finished"
+    assert len(frame) == len(whole)
+    # gates open a little earlier or later, at 0.1 Hz/s, and each sees noise of its own
+    assert np.allclose(frame["spin_frequency_hz"], whole["spin_frequency_hz"], atol=0.2)
+
+
+def test_a_wire_log_that_cannot_be_written_does_not_keep_the_output_on(
+    tmp_path: Path, outputs: list[bool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    append = RunWriter._append
+
+    def full(self: RunWriter, name: str, line: str, *, sync: bool = True) -> None:
+        if name == "wire.log" and "OUTP1 ON" in line:
+            raise OSError(28, "No space left on device")
+        append(self, name, line, sync=sync)
+
+    monkeypatch.setattr(RunWriter, "_append", full)
+    run = acquire(mock(tmp_path, wire_log=True), Silent())
+    assert run.status == "finished"
+    assert outputs[-1] is False
+    assert (run.record.model_extra or {})["wire_log_ended"] == "No space left on device"

@@ -1,0 +1,171 @@
+"""The run folder: nothing that was written is lost, and what is broken says so."""
+
+import hashlib
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from levilab.errors import DataError
+from levilab.listing import list_runs
+from levilab.run import CannotWrite, Run, RunRecord, RunWriter, find_runs, replace_atomically
+
+CHANNELS = [
+    {"name": "time_s", "unit": "s", "source": "clock"},
+    {"name": "spin_frequency_hz", "unit": "Hz", "source": "counter"},
+    {"name": "spin_frequency_u_hz", "unit": "Hz", "source": "given"},
+]
+
+
+def record(**changes: object) -> RunRecord:
+    return RunRecord(
+        experiment="spin", status="running", started_utc="2026-11-20T10:15:00.000000Z", channels=CHANNELS
+    ).model_copy(update=changes)
+
+
+def row(k: int) -> dict[str, float | None]:
+    return {"time_s": 10.0 * k, "spin_frequency_hz": 40.0 - k / 3, "spin_frequency_u_hz": None if k == 1 else 0.03}
+
+
+def written(out: Path, rows: int = 4) -> Path:
+    with RunWriter.create(out, record()) as writer:
+        for k in range(rows):
+            writer.reading(row(k))
+        writer.event(0.0, "drive off", "drive off")
+        writer.finish("finished")
+    return writer.folder
+
+
+def test_a_run_that_was_written_loads_as_it_was(tmp_path: Path) -> None:
+    run = Run.load(written(tmp_path))
+    assert (run.status, run.record.experiment) == ("finished", "spin")
+    frame = run.readings().frame
+    assert frame["time_s"].tolist() == [0, 20, 30]  # a row without u is no whole reading
+    assert frame["spin_frequency_hz"].tolist() == [40.0, 40 - 2 / 3, 39.0]
+    assert [event["kind"] for event in run.events()] == ["drive off"]
+
+
+def test_the_folder_can_be_read_with_numpy_alone(tmp_path: Path) -> None:
+    table = np.genfromtxt(written(tmp_path) / "readings.csv", delimiter=",", names=True)
+    assert table.dtype.names == ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
+    assert table["spin_frequency_hz"][3] == 39.0
+
+
+def test_the_name_says_when_and_what(tmp_path: Path) -> None:
+    assert re.fullmatch(r"\d{8}T\d{6}Z-spin-[0-9a-f]{4}", written(tmp_path).name)
+
+
+def test_the_datapackage_holds_units_and_hashes(tmp_path: Path) -> None:
+    folder = written(tmp_path)
+    package = json.loads((folder / "datapackage.json").read_text(encoding="utf-8"))
+    readings = next(r for r in package["resources"] if r["path"] == "readings.csv")
+    assert readings["hash"] == "sha256:" + hashlib.sha256((folder / "readings.csv").read_bytes()).hexdigest()
+    assert [field["unit"] for field in readings["schema"]["fields"]] == ["s", "Hz", "Hz"]
+
+
+def test_a_torn_last_line_is_left_out_with_a_warning(tmp_path: Path) -> None:
+    folder = written(tmp_path)
+    whole = (folder / "readings.csv").read_bytes()
+    (folder / "readings.csv").write_bytes(whole + b"40.0,38.")
+    table = Run.load(folder).readings()
+    assert len(table.frame) == 3
+    assert any("cut off" in warning or "torn" in warning for warning in table.warnings)
+
+
+def test_a_run_whose_process_is_gone_is_interrupted_and_one_that_lives_is_running(tmp_path: Path) -> None:
+    with RunWriter.create(tmp_path, record()) as writer:
+        writer.reading(row(0))
+        assert Run.load(writer.folder).status == "running"
+    assert Run.load(writer.folder).status == "interrupted"
+
+
+def test_reopening_cuts_a_torn_line_and_goes_on(tmp_path: Path) -> None:
+    with RunWriter.create(tmp_path, record()) as writer:
+        writer.reading(row(0))
+    with (writer.folder / "readings.csv").open("ab") as file:
+        file.write(b"10.0,39")
+    with RunWriter.reopen(Run.load(writer.folder)) as again:
+        again.reading(row(2))
+        again.finish("finished")
+    assert Run.load(writer.folder).readings().frame["time_s"].tolist() == [0, 20]
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("{", "cut off or not JSON"),
+        ("", "cut off or not JSON"),
+        ("[]", "schema"),
+        ('{"schema": "levilab-run/7"}', "levilab-run/7"),
+        ('{"schema": "levilab-run/1", "status": "finished", "started_utc": null}', "experiment"),
+        ('{"schema": "levilab-run/1", "experiment": "spin", "status": "lost", "started_utc": null}', "status"),
+    ],
+)
+def test_a_broken_run_json_says_what_is_wrong_and_how_to_save_the_readings(
+    tmp_path: Path, text: str, says: str
+) -> None:
+    folder = written(tmp_path)
+    (folder / "run.json").write_text(text, encoding="utf-8")
+    with pytest.raises(DataError, match=says) as caught:
+        Run.load(folder)
+    assert "levilab analyze spindown" in str(caught.value)
+    listed = list_runs(tmp_path)
+    assert [run.status for run in listed] == ["unreadable"]
+
+
+def test_replacing_a_file_leaves_the_old_one_whole_when_writing_fails(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "run.json"
+    replace_atomically(path, "old")
+
+    def no_space(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("levilab.run.os.fsync", no_space)
+    with pytest.raises(OSError, match="No space"):
+        replace_atomically(path, "new")
+    assert path.read_text(encoding="utf-8") == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("rows_until_full", range(6))
+def test_when_the_disk_is_full_every_earlier_reading_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rows_until_full: int
+) -> None:
+    with RunWriter.create(tmp_path, record()) as writer:
+        for k in range(rows_until_full):
+            writer.reading({"time_s": k, "spin_frequency_hz": 40 - k, "spin_frequency_u_hz": 0.03})
+
+        def no_space(_: int) -> None:
+            raise OSError(28, "No space left on device")
+
+        monkeypatch.setattr("levilab.run.os.fsync", no_space)
+        with pytest.raises(CannotWrite, match=r"77\.5,21\.5.*No space left on device.*earlier readings are kept"):
+            writer.reading({"time_s": 77.5, "spin_frequency_hz": 21.5, "spin_frequency_u_hz": 0.03})
+    run = Run.load(writer.folder)
+    assert run.status == "interrupted"
+    assert run.readings().frame["time_s"].tolist()[:rows_until_full] == list(range(rows_until_full))
+
+
+def test_a_folder_that_cannot_be_made_is_told_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "runs").write_text("a file in the way", encoding="utf-8")
+    with pytest.raises(CannotWrite, match="--out"):
+        RunWriter.create(tmp_path / "runs", record())
+
+
+def test_runs_are_found_below_a_folder_and_listed_oldest_first(tmp_path: Path) -> None:
+    late = RunWriter.create(tmp_path / "b", record(started_utc="2026-11-21T00:00:00Z", note="late"))
+    early = RunWriter.create(tmp_path / "a" / "deep", record(started_utc="2026-11-20T00:00:00Z", note="early"))
+    for writer in (late, early):
+        with writer:
+            writer.reading(row(0))
+            writer.reading(row(2))
+            writer.finish("finished")
+    assert find_runs(tmp_path) == sorted([late.folder, early.folder])
+    assert [(run.note, run.readings, run.length_s) for run in list_runs(tmp_path)] == [
+        ("early", 2, 20.0),
+        ("late", 2, 20.0),
+    ]
