@@ -219,10 +219,10 @@ def _about_best(tied: Sequence[str]) -> str:
 
 def _reason(fit: Statistics, best: Statistics, difference: float, criterion: str) -> str:
     reason = (
-        f"Δ{_LABEL[criterion]} {difference:.3g}, rms residual {fit.rms_residual:.3g} Hz "
-        f"against {best.rms_residual:.3g} Hz"
+        f"Δ{_LABEL[criterion]} {difference:.0f}, rms residual {fit.rms_residual:.2g} Hz "
+        f"against {best.rms_residual:.2g} Hz"
     )
     if fit.runs_test_p is not None and fit.runs_test_p < 0.01:
         p = f"p = {fit.runs_test_p:.1g}" if fit.runs_test_p > 1e-9 else "p < 1e-9"
-        reason += f", residuals not in random order: {p}"
+        reason += f", residuals in no random order: {p}"
     return reason

@@ -87,6 +87,7 @@ def acquire_spin(
     else:
         typer.echo(f"{run.status}: {readings} readings in {run.folder}")
     if run.status == "interrupted":
+        typer.echo(f"go on with it: levilab acquire spin --resume {run.folder}", err=True)
         raise typer.Exit(EXIT_INTERRUPTED)
 
 

@@ -1,7 +1,8 @@
-"""Numbers as people read them: value(u), rounded by the rule of the Particle Data Group."""
+"""Numbers and names as people read them: value(u), rounded by the rule of the Particle Data Group."""
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -22,9 +23,12 @@ UNITS = {
     "1": "",
     "1/s": "s⁻¹",
     "1/rad": "rad⁻¹",
-    "(rad/s)^-1/2/s": "(rad/s)^(−½) s⁻¹",
-    "(rad/s)^(1-exponent)/s": "(rad/s)^(1−n) s⁻¹",
+    "(rad/s)^-1/2/s": "(rad/s)^−½/s",
+    "(rad/s)^(1-exponent)/s": "(rad/s)^(1−n)/s",
 }
+
+#: What is drawn against time to make a law a straight line.
+AXES = {"stokes": "ln ω", "newton": "1/ω", "disc": "ω^−½"}
 
 
 def with_uncertainty(estimate: Estimate) -> str:
@@ -36,9 +40,17 @@ def with_uncertainty(estimate: Estimate) -> str:
     >>> with_uncertainty(Estimate(40.0123, None, "Hz"))
     '40.0123 Hz'
     """
-    if estimate.value is None:
-        return "—"
-    return f"{_number(estimate.value, estimate.u)} {UNITS.get(estimate.unit, estimate.unit)}".strip()
+    return f"{without_unit(estimate)} {in_words(estimate.unit)}".strip()
+
+
+def without_unit(estimate: Estimate) -> str:
+    """Value and standard uncertainty alone, for a column whose head has the unit; a dash where there is none."""
+    return "—" if estimate.value is None else _number(estimate.value, estimate.u)
+
+
+def in_words(unit: str) -> str:
+    """A unit as people write it."""
+    return UNITS.get(unit, unit)
 
 
 def _number(value: float, u: float | None) -> str:
@@ -49,6 +61,15 @@ def _number(value: float, u: float | None) -> str:
         return f"{value:.6g}"
     ordinary = 1e-2 <= abs(value) < 1e5 or abs(value) < u < 1e5
     return f"{ufloat(value, u):SP}" if ordinary else f"{ufloat(value, u):eSP}"
+
+
+def short_name(name: str) -> str:
+    """A run's name without the time that it begins with.
+
+    >>> short_name("20261120T101500Z-spin-7f3a")
+    'spin-7f3a'
+    """
+    return re.sub(r"^\d{8}T\d{6}Z-", "", name)
 
 
 def plain(value: float | None, digits: int = 3) -> str:

@@ -107,7 +107,9 @@ def acquire(order: Order, show: Show) -> Run:
                 _run(experiment, Session(bench, settings, writer, show, stop), order)
             status: Status = "finished"
         except Interrupted as interruption:
-            writer.event(None, "interrupted", f"interrupted by {interruption.by}, outputs are off")
+            text = f"interrupted by {interruption.by}, outputs are off"
+            writer.event(None, "interrupted", text)
+            show.message(text)
             status = "interrupted"
         except Exception as error:
             # the disk may be full: what is told is the first thing that went wrong

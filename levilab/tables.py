@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sys
+from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 from rich import box
@@ -11,7 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from levilab.numbers import SYMBOLS, plain, share, with_uncertainty
+from levilab.numbers import AXES, SYMBOLS, in_words, plain, share, short_name, with_uncertainty, without_unit
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -23,29 +24,38 @@ if TYPE_CHECKING:
     from levilab.pipeline import SpinDownAnalysis
 
 
+#: Columns of a terminal from which on the list of runs shows notes.
+ROOM_FOR_NOTES = 110
+
+
 def _console() -> Console:
     """As wide as the terminal; into a pipe or file as wide as the tables need."""
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 160
     return Console(width=max(width, 80), highlight=False)
 
 
-def _table(*columns: str, numbers: Sequence[str] = ()) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+def _table(title: str | None, *columns: str, numbers: Sequence[str] = ()) -> Table:
+    table = Table(
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+        pad_edge=False,
+        title=title,
+        title_justify="left",
+        title_style="bold",
+    )
     for column in columns:
         table.add_column(column, justify="right" if column in numbers else "left", overflow="fold")
     return table
 
 
 def print_spindown(analysis: SpinDownAnalysis) -> None:
-    """The runs, the laws, the straight lines, what the data say, and the warnings."""
+    """The runs, the laws, how well they fit, the straight lines, what the data say, and the warnings.
+
+    Each table fits a terminal of 80 columns.
+    """
     console = _console()
-    synthetic = sum(source.synthetic for source in analysis.sources)
-    total = len(analysis.runs)
-    made_up = "" if not synthetic else ", SYNTHETIC" if synthetic == total else f", {synthetic} of them SYNTHETIC"
-    console.print(f"[bold]Spin-down of {total} run{'s' * (total > 1)}{made_up}[/bold]\n")
-    console.print(_runs_table(analysis))
-    console.print(_laws_table(analysis))
-    console.print(_lines_table(analysis))
+    for table in (_runs_table, _laws_table, _fits_table, _lines_table):
+        console.print(table(analysis))
     console.print(f"[bold]What the data say.[/bold] {escape(analysis.combined.verdict.text)}")
     for warning in all_warnings(analysis):
         console.print(f"[yellow]note:[/yellow] {escape(warning)}")
@@ -64,7 +74,10 @@ def all_warnings(analysis: SpinDownAnalysis) -> list[str]:
 
 
 def _runs_table(analysis: SpinDownAnalysis) -> Table:
-    table = _table("run", "readings", "time [s]", "spin [Hz]", "best law", "its constants", numbers=["readings"])
+    total, synthetic = len(analysis.runs), sum(source.synthetic for source in analysis.sources)
+    made_up = "" if not synthetic else ", SYNTHETIC" if synthetic == total else f", {synthetic} of them SYNTHETIC"
+    title = f"Spin-down, {total} run{'s' * (total > 1)}{made_up}"
+    table = _table(title, "run", "readings", "time [s]", "spin [Hz]", "best law", numbers=["readings"])
     for source, run in zip(analysis.sources, analysis.runs, strict=True):
         table.add_row(
             escape(source.name),
@@ -72,23 +85,31 @@ def _runs_table(analysis: SpinDownAnalysis) -> Table:
             f"{run.time[0]:.1f} … {run.time[-1]:.1f}",
             f"{run.frequency[0]:.2f} → {run.frequency[-1]:.2f}",
             run.best,
-            _constants(run.fit(run.best).parameters),
         )
     return table
 
 
 def _laws_table(analysis: SpinDownAnalysis) -> Table:
-    several = len(analysis.runs) > 1
-    constants = "mean over the runs, u from their scatter" if several else "constants"
+    of = (
+        "Drag laws"
+        if len(analysis.runs) == 1
+        else f"Drag laws, means over {len(analysis.runs)} runs, u from their scatter"
+    )
+    table = _table(of, "law", "", "constants")
+    for fit in analysis.combined.fits:
+        constants = law_constants(analysis, fit.name)
+        best = "best" if fit.name == analysis.combined.best else ""
+        table.add_row(fit.name, best, "\n".join(_equations(constants)))
+    return table
+
+
+def _fits_table(analysis: SpinDownAnalysis) -> Table:
     numbers = ("rms [Hz]", "χ²/dof", "ΔAICc", "weight", "runs test p", "DW")
-    table = _table("law", constants, *numbers, numbers=numbers)
-    models = analysis.combined.fits
-    least = min((m.statistics.aicc for m in models if m.statistics.aicc is not None), default=0.0)
-    for model in models:
-        best = "*" if model.name == analysis.combined.best else " "
-        table.add_row(
-            f"{best} {model.name}", _constants(law_constants(analysis, model.name)), *_columns(model.statistics, least)
-        )
+    table = _table("How well they fit", "law", *numbers, numbers=numbers)
+    fits = analysis.combined.fits
+    least = min((fit.statistics.aicc for fit in fits if fit.statistics.aicc is not None), default=0.0)
+    for fit in fits:
+        table.add_row(fit.name, *_columns(fit.statistics, least))
     return table
 
 
@@ -112,35 +133,56 @@ def _columns(statistics: Statistics, least: float) -> list[str]:
 
 
 def _lines_table(analysis: SpinDownAnalysis) -> Table:
-    models = [model for model in analysis.combined.fits if model.linearised]
-    titles = {"stokes": "ln ω against t", "newton": "1/ω against t", "disc": "ω^(−1/2) against t"}
-    table = _table("straight lines, unweighted", *(titles[model.name] for model in models))
+    """The thesis's straight lines, run by run, beside the fit of the favoured law."""
+    best = analysis.combined.fit(analysis.combined.best)
+    lines = [fit for fit in analysis.combined.fits if fit.linearised]
+    headers = [f"{AXES[fit.name]}\n{_header(fit.linearised or {})}" for fit in lines]
+    favoured = f"{best.name} fit\n{_header(best.constants)}"
+    table = _table("Run by run: unweighted straight lines, and the fit of the best law", "run", *headers, favoured)
     for source, run in zip(analysis.sources, analysis.runs, strict=True):
-        table.add_row(escape(source.name), *(_constants(run.fit(m.name).linearised or {}) for m in models))
+        cells = [_first(run.fit(fit.name).linearised or {}) for fit in lines]
+        fitted = run.fit(best.name).parameters
+        table.add_row(escape(short_name(source.name)), *cells, _first({name: fitted[name] for name in best.constants}))
     if len(analysis.runs) > 1:
         table.add_section()
-        table.add_row("mean, u from the scatter", *(_constants(m.linearised or {}) for m in models))
+        table.add_row("mean", *(_first(fit.linearised or {}) for fit in lines), _first(best.constants))
     return table
 
 
-def _constants(estimates: Mapping[str, Estimate]) -> str:
-    return ", ".join(f"{SYMBOLS[name]} = {with_uncertainty(estimate)}" for name, estimate in estimates.items())
+def _equations(estimates: Mapping[str, Estimate]) -> list[str]:
+    return [f"{SYMBOLS[name]} = {with_uncertainty(estimate)}" for name, estimate in estimates.items()]
+
+
+def _header(estimates: Mapping[str, Estimate]) -> str:
+    name, estimate = next(iter(estimates.items()))
+    return f"{SYMBOLS[name]} \\[{in_words(estimate.unit)}]"
+
+
+def _first(estimates: Mapping[str, Estimate]) -> str:
+    return without_unit(next(iter(estimates.values())))
 
 
 def print_runs(runs: Sequence[Listed], root: Path) -> None:
-    """The list of runs."""
+    """The list of runs, and below it what is wrong with the broken ones."""
     console = _console()
     if not runs:
         console.print(f"no runs in {escape(str(root))}")
         return
-    table = _table(
-        "started (UTC)", "run", "what", "status", "readings", "length [s]", "note", numbers=["readings", "length [s]"]
-    )
+    table = _table(None, "when (UTC)", "run", "what", "status", "readings", "length", numbers=["readings", "length"])
+    if with_notes := console.width >= ROOM_FOR_NOTES:
+        table.add_column("note", no_wrap=True, overflow="ellipsis", max_width=console.width - 80)
     for run in runs:
-        started = (run.started_utc or "—")[:19].replace("T", " ")
+        when = (run.started_utc or "—")[:16].replace("T", " ")
         what = run.experiment + (", synthetic" if run.synthetic else "")
-        note = run.problem or run.note
-        table.add_row(
-            started, escape(run.path), what, run.status, str(run.readings), f"{run.length_s:.0f}", escape(note)
-        )
+        cells = [when, escape(_below(run.path, root)), what, run.status, str(run.readings), f"{run.length_s:.0f} s"]
+        table.add_row(*cells, *([escape(run.note)] if with_notes else []))
     console.print(table)
+    for run in runs:
+        if run.problem:
+            console.print(f"[yellow]note:[/yellow] {escape(run.problem)}")
+
+
+def _below(path: str, root: Path) -> str:
+    """A run's path as seen from the folder that was searched."""
+    below = PurePath(path).relative_to(root)
+    return (below.parent / short_name(PurePath(path).name)).as_posix()

@@ -126,6 +126,13 @@ def test_alternating_coupling_and_level_nought_find_nothing_or_count_noise_at_25
     assert sum(map(right, readings_at_all_places(messages))) <= 4  # by chance
 
 
+@pytest.mark.parametrize(("coupling", "seen"), [("DC", True), ("AC", False)])
+def test_alternating_coupling_takes_the_mean_away(coupling, seen):
+    # dark 0.1 V and a mean of 1.1 V·0.03·1.064 on it: without them the pulses reach 1.065 V
+    device = counter(pulses(40.0), f"INP1:COUP {coupling};LEV:AUTO OFF;:INP1:LEV1 1.1", "SYST:TIM 2")
+    assert (reading(device)[0] != NO_READING) is seen
+
+
 def test_the_state_after_power_on_is_the_one_that_fails():
     device = counter(pulses(25.0))
     device.receive(b"INP:COUP?;LEV:AUTO?\n")
@@ -173,7 +180,8 @@ def test_without_a_time_out_the_counter_waits_until_it_is_aborted():
 
 def test_what_follows_an_abort_in_the_same_bytes_is_not_lost():
     device = counter(pulses(40.0), FIXED_LEVEL)
-    device.receive(b"ABOR\nINP1:LEV1 0.5\nINP1:LEV1?\n")
+    device.receive(b"ABOR\nINP1:LEV1 0.5\nINP1:LE")
+    device.receive(b"V1?\n")
     assert float(device.read(1.0)) == 0.5
 
 

@@ -99,6 +99,17 @@ def test_a_waveform_holds_with_its_first_harmonic(waveform, fundamental):
         assert (abs(spin_hz(top, 10.0) - 30.0 - step * reach) < 1e-9) is followed
 
 
+def test_a_top_let_go_while_it_is_pulled_spins_down_from_there():
+    top = world()
+    top.drive(0.0, "SIN", 30.0, FIELD)
+    top.drive(1.0, "SIN", 30.4, FIELD)
+    off(top, 1.5)
+    let_go = spin_hz(top, 1.5)
+    assert 30.05 < let_go < 30.35
+    expected = float(DECAYS["disc"].after(TURN * let_go, 10.0, 2.34e-4)) / TURN
+    assert spin_hz(top, 11.5) == pytest.approx(expected, rel=1e-14)
+
+
 def test_after_the_drive_is_off_the_top_follows_its_law_of_drag():
     top = world()
     top.drive(0.0, "SIN", 30.0, FIELD)
@@ -122,7 +133,7 @@ def test_after_the_drive_is_off_the_top_follows_its_law_of_drag():
 #: Seconds since the last change, waveform, how far from 30 Hz, amplitude as a part of the usual one.
 CHANGES = st.lists(
     st.tuples(
-        st.one_of(st.just(0.0), st.floats(1e-3, 20.0)),
+        st.one_of(st.just(0.0), st.floats(1e-3, 1.0), st.floats(1.0, 20.0)),
         st.sampled_from(["SIN", "SQU", "TRI", "RAMP"]),
         st.one_of(st.floats(-0.6, 0.6), st.floats(-12.0, 12.0)),
         st.sampled_from([0.0, 0.2, 1.0, 1.0, 2.0]),
@@ -152,6 +163,8 @@ def test_angle_and_spin_are_continuous_whatever_the_drive_does(changes, drag):
     by_trapezoids = (spin[1:] + spin[:-1]) / 2 * step
     error = np.abs(np.diff(turned) - by_trapezoids)[: max(0, spinning.sum() - 1)]
     assert np.all(error <= 8.0 * step**2 + 1e-10)
+    # a fall between two samples included, where the spin may also be a little more than at both of them
+    assert np.all((np.diff(turned) >= 0) & (np.diff(turned) <= (np.max(spin) + 8.0 * step) * step + 1e-10))
     assert np.all(turned[~spinning] == turned[~spinning][:1])
 
 
@@ -160,9 +173,13 @@ def test_angle_and_spin_are_continuous_whatever_the_drive_does(changes, drag):
 
 def test_the_top_falls_at_its_lower_limit_and_stays_dark():
     top = world()
-    time = float(DECAYS["disc"].elapsed(TURN * 30.0, TURN * QUIET.fall_hz, 2.34e-4))
+    top.drive(0.0, "SIN", 30.0, FIELD)
+    off(top, 5.0)
+    time = 5.0 + float(DECAYS["disc"].elapsed(TURN * 30.0, TURN * QUIET.fall_hz, 2.34e-4))
     assert spin_hz(top, time - 1e-6) == pytest.approx(QUIET.fall_hz, abs=1e-6)
     assert spin_hz(top, time + 1e-6) == 0.0
+    # 137 rad/s for two microseconds, and the rounding of an angle of 2e4 rad
+    assert angle(top, time + 1e-6) == pytest.approx(angle(top, time - 1e-6), abs=3e-4)
     before, after = top.light(time - 1.0, 1e-4, 9_000), top.light(time + 1e-6, 1e-4, 100_000)
     assert before.max() == pytest.approx(QUIET.bright, abs=0.01)
     assert np.all(after == QUIET.dark)
