@@ -36,16 +36,22 @@ class Uncertainty(StrEnum):
     BOOTSTRAP = "bootstrap"
 
 
+def _print_version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        typer.echo(f"levilab {version('levilab')}")
+        raise typer.Exit
+
+
 @app.callback()
 def levilab(
-    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.", is_eager=True)] = False,
+    version: Annotated[
+        bool,
+        typer.Option("--version", help="Print the version and exit.", callback=_print_version, is_eager=True),
+    ] = False,
 ) -> None:
     """The lab application for experiments on the Levitron: acquire, analyze, report."""
-    if version:
-        from importlib.metadata import version as installed
-
-        typer.echo(f"levilab {installed('levilab')}")
-        raise typer.Exit
 
 
 @acquire_app.command("spin", epilog="Example: levilab acquire spin --mock --note 'first try'")

@@ -28,6 +28,12 @@ def test_every_command_has_help_and_the_ones_that_do_something_an_example(levila
         assert f"Example: levilab {command}" in text
 
 
+def test_the_version_is_printed(levilab: Command) -> None:
+    from importlib.metadata import version
+
+    assert levilab("--version").stdout == f"levilab {version('levilab')}\n"
+
+
 def test_acquire_analyze_report_and_list_from_an_empty_folder(levilab: Command, tmp_path: Path) -> None:
     acquired = levilab("acquire", "spin", "--mock", "--note", "one")
     assert acquired.stdout.startswith("finished: ")
