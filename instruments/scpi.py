@@ -53,6 +53,10 @@ class ScpiInstrument:
             raise WrongInstrument(self.transport.address, answer, f"a model like {self.MODELS}")
         return answer
 
+    def forget_errors(self) -> None:
+        """Empty the error queue: what an earlier program left there is not ours."""
+        self.transport.write("*CLS")
+
     def command(self, message: str) -> None:
         """Send a command and read the error queue.  Raises CommandRefused with the queue's texts."""
         self.transport.write(message)

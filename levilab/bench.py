@@ -108,6 +108,7 @@ def open_bench(
                 links.callback(transport.close)
                 instrument = DRIVERS[kind][settings.model](transport)
                 instrument.identity()
+                instrument.forget_errors()
                 bench.instruments[kind] = instrument  # only what is what it should be is ever switched
             yield bench
         finally:

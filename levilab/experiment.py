@@ -56,6 +56,8 @@ class Experiment:
 _RAMP_STEP_S = 1.0
 #: A locked top spins at the drive's frequency; the reading scatters by 0.03 Hz [Hz].
 _LOCKED_WITHIN_HZ = 0.3
+#: A free top does not speed up (5 % leave room for noise), nor lose half its spin between readings so close.
+_HIGHEST_SHARE, _LOWEST_SHARE, _RECENT_INTERVALS = 1.05, 0.5, 3.0
 #: Spin at which a top falls (mean of the ten published limits) [Hz], and how long that takes from 40 Hz [s].
 _FALL_HZ, _USUAL_S = 21.86, 190.0
 
@@ -108,13 +110,31 @@ def _read_spin(session: Session) -> Row | None:
     """One counter reading; its time is the middle of the exchange, which is the gate's."""
     before = session.now()
     spin = session.bench.counter.frequency()
-    if spin is None:
+    time = (before + session.now()) / 2
+    if spin is None or not _plausible(session, time, spin):
         return None
     return {
-        "time_s": (before + session.now()) / 2,
+        "time_s": time,
         "spin_frequency_hz": spin,
         "spin_frequency_u_hz": session.settings.reading_u_hz,
     }
+
+
+def _plausible(session: Session, time: float, spin: float) -> bool:
+    """Whether a free top can have this spin after the one before; a fallen one rattles, and makes light of any kind.
+
+    What is not taken for a reading is kept as an event.
+    """
+    if not session.rows:
+        return True
+    last = session.rows[-1]
+    share = spin / float(last["spin_frequency_hz"] or spin)
+    recent = time - float(last["time_s"] or 0.0) < _RECENT_INTERVALS * session.settings.interval_s
+    if share < _HIGHEST_SHARE and (share > _LOWEST_SHARE or not recent):
+        return True
+    text = f"{spin:.4g} Hz at {time:.1f} s does not follow from {last['spin_frequency_hz']:.4g} Hz, not taken"
+    session.event("implausible", text, spin_frequency_hz=spin)
+    return False
 
 
 def _until_the_fall(rows: Sequence[Row]) -> float:

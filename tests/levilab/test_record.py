@@ -221,6 +221,31 @@ def test_an_exception_at_any_moment_leaves_outputs_off_and_the_readings_so_far(
     assert "READ?" in run.events()[-1]["text"]
 
 
+def test_a_fallen_top_that_rattles_is_not_taken_for_a_spinning_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rattle = iter([180.0, 3.0])
+    read = Keysight53230A.frequency
+    monkeypatch.setattr(Keysight53230A, "frequency", lambda self: read(self) or next(rattle))
+    run = acquire(mock(tmp_path), Silent())
+    assert run.readings().frame["spin_frequency_hz"].between(20, 41).all()
+    assert [event["spin_frequency_hz"] for event in run.events() if event["kind"] == "implausible"] == [180.0, 3.0]
+    assert run.events()[-1]["kind"] == "fell"
+
+
+def test_errors_that_an_earlier_program_left_are_not_ours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from instruments.virtual.generator import Virtual33500B
+
+    init = Virtual33500B.__init__
+
+    def soiled(self: Virtual33500B, *args: Any, **named: Any) -> None:
+        init(self, *args, **named)
+        self.receive(b"NONSENSE\n")
+
+    monkeypatch.setattr(Virtual33500B, "__init__", soiled)
+    assert acquire(mock(tmp_path), Silent()).status == "finished"
+
+
 def test_a_generator_that_no_longer_answers_is_told_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def mute(self: Keysight33500B) -> None:
         raise NoAnswer("generator", "OUTP1 OFF", 2.0)
