@@ -46,6 +46,8 @@ class Keysight53230A(ScpiInstrument):
     gate = Setting("SENS:FREQ:GATE:TIME", float, unit="s", low=100e-6, high=1000.0)
     coupling = Setting("INP1:COUP", str, choices=("AC", "DC"))
     impedance = Setting("INP1:IMP", float, unit="ohm", low=50.0, high=1e6)
+    probe_factor = Setting("INP1:PROB", float, low=1.0, high=10.0)
+    input_range = Setting("INP1:RANG", float, unit="V", low=5.0, high=50.0)
     trigger_level = Setting("INP1:LEV1", float, unit="V", low=-5.125, high=5.125)
     automatic_level = Setting("INP1:LEV:AUTO", bool)
     slope = Setting("INP1:SLOP1", str, choices=("POS", "NEG"))
@@ -61,6 +63,8 @@ class Keysight53230A(ScpiInstrument):
         self.gate = gate_s
         self.coupling = "DC"
         self.impedance = 1e6
+        self.probe_factor = 1.0
+        self.input_range = 5.0
         self.automatic_level = False
         self.trigger_level = trigger_level_v
         self.slope = "POS"
@@ -78,6 +82,7 @@ class Keysight53230A(ScpiInstrument):
         except NoAnswer:
             # the front-panel time-out may be off: stop waiting, and let the link tell if it is dead
             self.transport.clear()
+            self.forget_errors()  # a query cut off leaves −410 behind
             self.command("ABOR")
             return None
         return parse_reading(self.transport.address, "READ?", answer)

@@ -22,7 +22,7 @@ class Generator(Protocol):
         """Its settings as they stand."""
 
     def prepare(self, *, waveform: str, frequency_hz: float, amplitude_vpp: float) -> None:
-        """Set the signal; the output stays as it is."""
+        """Set the signal; the output is off afterwards."""
 
     def off(self) -> None:
         """Switch the output off."""
@@ -48,16 +48,24 @@ class Keysight33500B(ScpiInstrument):
     output = Setting("OUTP1", bool)
 
     def prepare(self, *, waveform: str, frequency_hz: float, amplitude_vpp: float) -> None:
-        """Set the signal; see :class:`Generator`."""
+        """Set the signal, and nothing else: what was left on, burst, sweep or modulation, is reset first.
+
+        See :class:`Generator`.  The reset switches the output off.
+        """
+        self.command("*RST")
         self.command("OUTP1:LOAD INF")
         self.command("VOLT:UNIT VPP")
         self.waveform = waveform
         self.frequency = frequency_hz
-        self.amplitude = amplitude_vpp
         self.offset = 0.0
+        self.amplitude = amplitude_vpp
 
     def off(self) -> None:
-        """Switch the output off, and see that it is.  Raises CommandRefused if it is not."""
-        self.output = False
+        """Switch the output off, and see that it is.  Raises CommandRefused if it is not.
+
+        What stands in the error queue, of an exchange cut off perhaps, is no reason to doubt it: the answer is.
+        """
+        self.forget_errors()
+        self.transport.write("OUTP1 OFF")
         if self.output:
             raise CommandRefused(self.transport.address, "OUTP1 OFF", ("the output is still on",))

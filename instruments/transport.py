@@ -131,17 +131,21 @@ class VisaTransport:
             self._out_of_step = True
             if error.error_code == pyvisa.constants.StatusCode.error_timeout:
                 raise NoAnswer(self.address, question, within) from error
-            raise NotConnected(self.address, f"the link broke at {question!r} ({_one_line(error)})") from error
+            raise NotConnected(self.address, _broken(question, error)) from error
         except UnicodeDecodeError as error:
             self._out_of_step = True
             raise BadAnswer(self.address, question, repr(error.object[:40]), "plain text") from error
-        except (pyvisa.Error, OSError) as error:
+        except Exception as error:  # OSError, and whatever else pyvisa-py's protocols raise (EOFError, RPCError)
             self._out_of_step = True
-            raise NotConnected(self.address, f"the link broke at {question!r} ({_one_line(error)})") from error
+            raise NotConnected(self.address, _broken(question, error)) from error
         except BaseException:
             # an interruption between question and answer leaves the answer in the pipe
             self._out_of_step = True
             raise
+
+
+def _broken(question: str, error: BaseException) -> str:
+    return f"no link at {question!r} ({_one_line(error)}): check the address and the cable, and that it is on"
 
 
 def _one_line(error: BaseException) -> str:

@@ -17,7 +17,7 @@ from levilab.clock import Clock, VirtualClock, WallClock
 from levilab.config import BenchConfig, ConfigError, InstrumentSettings, Limits
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from instruments.scpi import ScpiInstrument
     from instruments.virtual.bus import Bus
@@ -42,8 +42,8 @@ COIL_T_PER_V = 0.4e-3 / 5.0
 class OutputMayBeOn(InstrumentError):
     """The drive could not be switched off."""
 
-    def __init__(self, cause: InstrumentError) -> None:
-        super().__init__(cause.address, f"THE DRIVE MAY STILL BE ON, switch it off by hand ({cause})")
+    def __init__(self, address: str, cause: Exception) -> None:
+        super().__init__(address, f"THE DRIVE MAY STILL BE ON, switch it off by hand ({cause})")
 
 
 @dataclass
@@ -80,19 +80,35 @@ class Bench:
                 raise OutOfRange("bench", name, value, f"up to {limit:g} (limits.{name} in bench.toml)")
 
     def outputs_off(self) -> None:
-        """Switch off whatever drives something."""
-        if "generator" in self.instruments:
+        """Switch off whatever drives something, and see that it is off.
+
+        Tried twice: an interruption or a late answer may cut the first try short.  Raises OutputMayBeOn.
+        """
+        if "generator" not in self.instruments:
+            return
+        try:
             self.generator.off()
+        except Exception:  # noqa: BLE001 - whatever it was, the second try decides
+            try:
+                self.generator.off()
+            except Exception as error:
+                raise OutputMayBeOn(self.instruments["generator"].transport.address, error) from error
 
 
 @contextlib.contextmanager
 def open_bench(
-    config: BenchConfig, kinds: tuple[str, ...], *, world: World | None = None, log: TrafficLog | None = None
+    config: BenchConfig,
+    kinds: tuple[str, ...],
+    *,
+    world: World | None = None,
+    log: TrafficLog | None = None,
+    check: Callable[[], None] = lambda: None,
 ) -> Iterator[Bench]:
-    """The bench with the instruments of these kinds; on the way out outputs are off and all is closed.
+    """The bench with the instruments of these kinds, outputs off; on the way out they are off again and all is closed.
 
-    world: what the virtual instruments see, None for the real ones.  Raises ConfigError for an instrument
-    that is not described or of an unknown model, InstrumentError when one does not answer as it should.
+    world: what the virtual instruments see, None for the real ones; check: called between the instruments, may raise
+    to give up.  Raises ConfigError for an instrument that is not described or of an unknown model, InstrumentError
+    when one does not answer as it should.
     """
     library: Any = config.visa_library
     if world:
@@ -110,9 +126,17 @@ def open_bench(
                 instrument.identity()
                 instrument.forget_errors()
                 bench.instruments[kind] = instrument  # only what is what it should be is ever switched
+                check()
+            bench.outputs_off()  # a program that was killed may have left them on
             yield bench
         finally:
-            _switch_off(bench)
+            bench.outputs_off()
+
+
+def check_described(config: BenchConfig, kinds: tuple[str, ...]) -> None:
+    """Raise ConfigError unless all instruments of these kinds are described."""
+    for kind in kinds:
+        _described(config, kind)
 
 
 def _described(config: BenchConfig, kind: str) -> InstrumentSettings:
@@ -123,17 +147,6 @@ def _described(config: BenchConfig, kind: str) -> InstrumentSettings:
         known = ", ".join(DRIVERS[kind])
         raise ConfigError(f"bench.toml: {kind}.model = {settings.model!r} is unknown, known are {known}")
     return settings
-
-
-def _switch_off(bench: Bench) -> None:
-    """Outputs off, tried twice: an interruption or a late answer may cut the first try short."""
-    try:
-        try:
-            bench.outputs_off()
-        except Exception:  # noqa: BLE001 - whatever it was, the second try decides
-            bench.outputs_off()
-    except InstrumentError as error:
-        raise OutputMayBeOn(error) from error
 
 
 def virtual_bus(world: World | None = None) -> Bus:

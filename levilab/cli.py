@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import sys
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated, NoReturn, cast
 
 import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from analysis.lawfit import Uncertainty as Kind
+    from levilab.errors import LevilabError
+    from levilab.pipeline import Options
 
 app = typer.Typer(
     name="levilab",
@@ -24,6 +33,18 @@ app.add_typer(analyze_app, name="analyze")
 
 EXIT_FAILED, EXIT_INSTRUMENT, EXIT_INTERRUPTED = 1, 3, 130
 
+Columns = Annotated[
+    str,
+    typer.Option(
+        metavar="NAME=COLUMN,…",
+        help="Columns of your file: t=Zeit,f=Kanal2 or t=1,f=3; with a unit in brackets: 'f=Drehzahl [rpm]'.",
+    ),
+]
+ReadingU = Annotated[
+    float | None,
+    typer.Option(metavar="HZ", help="Standard uncertainty of every reading; goes before what the data say."),
+]
+KeepOutliers = Annotated[bool, typer.Option("--keep-outliers", help="Fit readings that look like miscounts, too.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else on standard output.")]
 Paths = Annotated[list[Path], typer.Argument(metavar="PATH…", help="Run folders, data files, or folders to search.")]
 
@@ -57,12 +78,19 @@ def levilab(
 @acquire_app.command("spin", epilog="Example: levilab acquire spin --mock --note 'first try'")
 def acquire_spin(
     mock: Annotated[bool, typer.Option("--mock", help="Use the virtual bench; needs no hardware.")] = False,
-    bench: Annotated[Path, typer.Option(metavar="FILE", help="Describes the real bench.")] = Path("bench.toml"),
+    bench: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Describes the bench; with --mock only its settings count.", show_default="bench.toml"
+        ),
+    ] = None,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where the run folder is made.")] = Path("runs"),
     seed: Annotated[int | None, typer.Option(min=0, help="Makes a virtual run repeatable.")] = None,
     note: Annotated[str, typer.Option(help="Kept with the run.")] = "",
     realtime: Annotated[bool, typer.Option("--realtime", help="Keep the virtual bench to the wall clock.")] = False,
-    resume: Annotated[Path | None, typer.Option(metavar="RUN", help="Go on with an interrupted run.")] = None,
+    resume: Annotated[
+        Path | None, typer.Option(metavar="RUN", help="Go on with an interrupted run: read on, without driving again.")
+    ] = None,
     wire_log: Annotated[bool, typer.Option("--wire-log", help="Keep all bytes sent and received.")] = False,
     as_json: Json = False,
 ) -> None:
@@ -85,57 +113,74 @@ def acquire_spin(
         wire_log=wire_log,
     )
     run = acquire(order, to_stderr())
-    readings = len(run.readings().frame)
+    readings = run.count()
     if as_json:
         import json
 
         typer.echo(json.dumps({"run": str(run.folder), "status": run.status, "readings": readings}))
     else:
-        typer.echo(f"{run.status}: {readings} readings in {run.folder}")
+        typer.echo(f"{run.status}: {readings} reading{'s' * (readings != 1)} in {run.folder}")
     if run.status == "interrupted":
-        typer.echo(f"go on with it: levilab acquire spin --resume {run.folder}", err=True)
+        if readings:
+            typer.echo(f"go on with it: levilab acquire spin --resume {run.folder}", err=True)
         raise typer.Exit(EXIT_INTERRUPTED)
 
 
 @analyze_app.command("spindown", epilog="Example: levilab analyze spindown sample_data/")
 def analyze_spindown(
     paths: Paths,
-    columns: Annotated[
-        str,
-        typer.Option(metavar="NAME=COLUMN,…", help="Columns of your file, as time_s=Zeit,spin_frequency_hz=f."),
-    ] = "",
-    reading_u: Annotated[
-        float | None,
-        typer.Option(metavar="HZ", min=0, help="Standard uncertainty of a reading, if not in the data."),
-    ] = None,
+    columns: Columns = "",
+    reading_u: ReadingU = None,
     uncertainty: Annotated[
-        Uncertainty, typer.Option(help="profile and bootstrap add intervals, and take longer.")
+        Uncertainty, typer.Option(help="profile and bootstrap add 68 % intervals, and take longer.")
     ] = Uncertainty.COVARIANCE,
-    keep_outliers: Annotated[
-        bool, typer.Option("--keep-outliers", help="Fit readings that look like miscounts, too.")
-    ] = False,
+    keep_outliers: KeepOutliers = False,
     save: Annotated[bool, typer.Option(help="Write result.json and figures beside the run.")] = True,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write them there instead.")] = None,
     as_json: Json = False,
 ) -> None:
     """Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude."""
-    from levilab.formats import parse_columns
-    from levilab.pipeline import Options, analyze_spindowns
+    from levilab.pipeline import analyze_spindowns
     from levilab.result import as_document, save_result
     from levilab.tables import print_spindown
 
-    options = Options(parse_columns(columns), reading_u, uncertainty.value, keep_outliers)
-    analysis = analyze_spindowns(paths, options)
-    folder = out or analysis.home
+    analysis = analyze_spindowns(paths, _options(columns, reading_u, uncertainty.value, keep_outliers))
+    failure: LevilabError | None = None
+    written: list[Path] = []
+    if save:  # first: a reader that goes away must not cost the result
+        failure, written = _tried(lambda: save_result(analysis, out or analysis.home))
     if as_json:
         import json
 
-        typer.echo(json.dumps(as_document(analysis, folder), indent=2, sort_keys=True, allow_nan=False))
+        document = as_document(analysis, out or analysis.home)
+        typer.echo(json.dumps(document, indent=2, sort_keys=True, allow_nan=False))
     else:
         print_spindown(analysis)
-    if save:
-        for path in save_result(analysis, folder):
-            typer.echo(f"wrote {path}", err=True)
+    for path in written:
+        typer.echo(f"wrote {path}", err=True)
+    if failure:
+        raise failure
+
+
+def _options(columns: str, reading_u: float | None, uncertainty: str, keep_outliers: bool) -> Options:
+    from levilab.formats import parse_columns
+    from levilab.pipeline import Options
+
+    if reading_u is not None and not 0 < reading_u < float("inf"):
+        raise typer.BadParameter(
+            f"{reading_u:g} Hz; a standard uncertainty above 0 is expected", param_hint="--reading-u"
+        )
+    return Options(parse_columns(columns), reading_u, cast("Kind", uncertainty), keep_outliers)
+
+
+def _tried(save: Callable[[], list[Path]]) -> tuple[LevilabError | None, list[Path]]:
+    """What kept the result from being written, or the files; what was found is shown either way."""
+    from levilab.errors import LevilabError
+
+    try:
+        return None, save()
+    except LevilabError as error:
+        return error, []
 
 
 @app.command(epilog="Example: levilab report sample_data/ -o report.html")
@@ -144,11 +189,15 @@ def report(
     output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE.html", help="The file to write.")] = Path(
         "report.html"
     ),
+    columns: Columns = "",
+    reading_u: ReadingU = None,
+    keep_outliers: KeepOutliers = False,
 ) -> None:
     """Report runs in one self-contained file: what was measured, with what, figures, numbers, warnings."""
     from levilab.report.page import write_report
 
-    typer.echo(f"the report is in {write_report(paths, output)}")
+    options = _options(columns, reading_u, "covariance", keep_outliers)
+    typer.echo(f"the report is in {write_report(paths, output, options)}")
 
 
 @app.command(epilog="Example: levilab runs runs/")
@@ -174,6 +223,9 @@ def main() -> None:
     _speak_utf8()
     try:
         app()
+    except BrokenPipeError:  # whoever read our output went away: nothing is left to say, and nobody to say it to
+        _mute()
+        sys.exit(EXIT_FAILED)
     except Exception as error:  # noqa: BLE001 - sorted by kind below
         _tell(error)
 
@@ -186,9 +238,18 @@ def _tell(error: Exception) -> NoReturn:
     codes = ((LevilabError, getattr(error, "exit_code", EXIT_FAILED)), (InstrumentError, EXIT_INSTRUMENT))
     for kind, code in (*codes, (AnalysisError, EXIT_FAILED), (OSError, EXIT_FAILED)):
         if isinstance(error, kind):
-            typer.echo("levilab: " + " ".join(str(error).split()), err=True)
+            with contextlib.suppress(OSError):
+                typer.echo("levilab: " + " ".join(str(error).split()), err=True)
             sys.exit(code)
     raise error
+
+
+def _mute() -> None:
+    """Python flushes its streams when it ends; into a broken pipe it would complain."""
+    with open(os.devnull, "w", encoding="utf-8") as nowhere:  # noqa: PTH123 - a descriptor is needed
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError, ValueError):
+                os.dup2(nowhere.fileno(), stream.fileno())
 
 
 def _speak_utf8() -> None:

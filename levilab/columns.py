@@ -1,7 +1,7 @@
 """The columns of a file that hold something we know, by their titles, their units and what the user says."""
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -43,7 +43,11 @@ def listed(names: Iterable[str]) -> str:
 
 
 def choose_columns(
-    path: Path, header: Sequence[str], units: Sequence[str], wanted: Mapping[str, str]
+    path: Path,
+    header: Sequence[str],
+    units: Sequence[str],
+    wanted: Mapping[str, str],
+    quantities: Collection[str] = CANONICAL,
 ) -> tuple[tuple[Column, ...], tuple[str, ...]]:
     """The columns of a file that hold something we know, and warnings about those that nearly do.
 
@@ -51,24 +55,29 @@ def choose_columns(
         path: the file, for messages.
         header: the column titles, stripped.
         units: the row of units beneath, or nothing.
-        wanted: {canonical name, or t, f, u: title or 1-based number}; goes before what the titles say.
+        wanted: {canonical name, or t, f, u: title or 1-based number}; goes before what the titles say.  A unit may
+            follow in brackets where the file gives none: ``Drehzahl [rpm]``.
+
+        quantities: canonical names looked for.
 
     Raises:
         TableError: a wanted column does not exist, a quantity has two columns, or units contradict each other.
     """
     titles = [read_title(text) for text in header]
-    chosen = _wanted_columns(path, header, wanted)
+    chosen, stated = _wanted_columns(path, header, wanted)
     offered: dict[str, list[int]] = {}
     warnings = []
     for index, title in enumerate(titles):
-        if title.column is None or title.column in chosen or index in chosen.values():
+        if title.column is None or title.column not in quantities:
+            continue
+        if title.column in chosen or index in chosen.values():
             continue
         if title.unit is not None and unit_factor(title.unit, dimension(title.column)) is None:
             warnings.append(_unknown_unit(path, header[index], title))
         else:
             offered.setdefault(title.column, []).append(index)
     chosen |= {name: _only_one(path, header, name, indices) for name, indices in offered.items()}
-    written = {name: _written_unit(path, name, index, header, units) for name, index in chosen.items()}
+    written = {name: _written_unit(path, name, index, header, units) for name, index in chosen.items()} | stated
     columns = []
     for name, index in chosen.items():
         # An uncertainty without a unit has that of its quantity: "rpm,u" gives both in 1/min.
@@ -78,13 +87,20 @@ def choose_columns(
     return tuple(sorted(columns, key=lambda c: CANONICAL.index(c.name))), tuple(warnings)
 
 
-def _wanted_columns(path: Path, header: Sequence[str], wanted: Mapping[str, str]) -> dict[str, int]:
+def _wanted_columns(
+    path: Path, header: Sequence[str], wanted: Mapping[str, str]
+) -> tuple[dict[str, int], dict[str, str]]:
+    """Index and, where the user states it, unit of each wanted column."""
     chosen: dict[str, int] = {}
+    stated: dict[str, str] = {}
     for key, title in wanted.items():
         name = SHORTHANDS.get(key, key)
         if name not in CANONICAL:
             raise TableError(path, f"--columns cannot set '{shown(key)}'; it sets t, f, u or {', '.join(CANONICAL)}")
         index = _find(header, title.strip())
+        if index is None and (with_unit := re.fullmatch(r"(.+?)\s*\[([^\[\]]+)\]\s*", title)):
+            index = _find(header, with_unit[1].strip())
+            stated[name] = _stated_unit(path, name, with_unit[2].strip())
         if index is None:
             raise TableError(
                 path,
@@ -93,7 +109,14 @@ def _wanted_columns(path: Path, header: Sequence[str], wanted: Mapping[str, str]
         if index in chosen.values():
             raise TableError(path, f"--columns names column '{shown(title)}' twice; each column holds one quantity")
         chosen[name] = index
-    return chosen
+    return chosen, stated
+
+
+def _stated_unit(path: Path, name: str, unit: str) -> str:
+    kind = dimension(name)
+    if unit_factor(unit, kind) is None:
+        raise TableError(path, f"--columns: '{shown(unit)}' is no unit of {kind}; known are {', '.join(UNITS[kind])}")
+    return unit
 
 
 def _find(header: Sequence[str], title: str) -> int | None:

@@ -38,22 +38,27 @@ class Limits(Settings):
     drive_frequency_hz: PositiveFloat = 100.0
 
 
-class SpinSettings(Settings):
+class ExperimentSettings(Settings):
+    """What every experiment that reads again and again needs.  longest_s: an end if nothing else ends it."""
+
+    interval_s: PositiveFloat = 10.0
+    longest_s: PositiveFloat = 1800.0
+
+
+class SpinSettings(ExperimentSettings):
     """The spin-down: drive up to a frequency, switch off, read until the top falls.
 
     reading_u_hz: standard uncertainty of one reading, where it is known; ramp_hz_per_s: no faster than the
-    drive can pull the top (about 0.25 Hz/s at 0.4 mT); longest_s: an end if the top never falls.
+    drive can pull the top (about 0.25 Hz/s at 0.4 mT).
     """
 
     drive_frequency_hz: PositiveFloat = 40.0
     drive_amplitude_vpp: PositiveFloat = 10.0
     drive_waveform: Literal["SIN", "SQU", "TRI"] = "SIN"
     ramp_hz_per_s: PositiveFloat = 0.2
-    interval_s: PositiveFloat = 10.0
     gate_s: PositiveFloat = 1.0
     trigger_level_v: float = 0.6
     reading_u_hz: PositiveFloat | None = None
-    longest_s: PositiveFloat = 1800.0
 
 
 class BenchConfig(Settings):
@@ -74,6 +79,8 @@ def read_bench(path: Path) -> BenchConfig:
         raise ConfigError(
             f"{path}: there is no such file: describe your bench in it (docs/bench.md), or try --mock"
         ) from None
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror}): a TOML file is expected") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: not readable as TOML: {error}") from error
     try:
@@ -82,10 +89,21 @@ def read_bench(path: Path) -> BenchConfig:
         raise ConfigError(f"{path}: {in_one_line(error)}") from error
 
 
+def within_limits(config: BenchConfig) -> BenchConfig:
+    """The configuration, if what its spin-down wants is allowed on its bench.  Raises ConfigError."""
+    for name in ("drive_amplitude_vpp", "drive_frequency_hz"):
+        wanted, limit = getattr(config.spin, name), getattr(config.limits, name)
+        if wanted > limit:
+            raise ConfigError(f"spin.{name} = {wanted:g} is more than this bench stands, limits.{name} = {limit:g}")
+    return config
+
+
 def in_one_line(error: ValidationError) -> str:
     """The first thing that is wrong, with its path and what is allowed, and how many more there are."""
     first = error.errors()[0]
     where = ".".join(str(part) for part in first["loc"]) or "the whole"
-    seen = "" if first["type"] == "missing" else f" = {str(first['input'])[:60]!r}"
     more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
+    if first["type"] == "extra_forbidden":
+        return f"{where} is no key known here{more}"
+    seen = "" if first["type"] == "missing" else f" = {str(first['input'])[:60]!r}"
     return f"{where}{seen}: {first['msg']}{more}"

@@ -7,7 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.font_manager import findfont, get_font
+
+from levilab.numbers import short_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -16,32 +20,35 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from analysis.spindown import SpinDown
     from levilab.pipeline import SpinDownAnalysis
 
     Array = NDArray[np.float64]
 
 #: Okabe and Ito's colours, told apart by everyone; one a law, whatever the figure.
 COLOURS = {"stokes": "#0072B2", "newton": "#D55E00", "disc": "#009E73", "mixed": "#CC79A7", "power": "#E69F00"}
-NAMES = {
-    "stokes": "Stokes  ω̇ = −C₁ω",
-    "newton": "Newton  ω̇ = −C₂ω²",
-    "disc": "laminar disc  ω̇ = −Cω$^{3/2}$",
-    "mixed": "mixed  ω̇ = −C₁ω − C₂ω²",
-    "power": "power  ω̇ = −cωⁿ",
+EQUATIONS = {
+    "stokes": "ω̇ = −C₁ω",
+    "newton": "ω̇ = −C₂ω²",
+    "disc": "ω̇ = −Cω$^{3/2}$",
+    "mixed": "ω̇ = −C₁ω − C₂ω²",
+    "power": "ω̇ = −cωⁿ",
 }
+#: One a run, as long as there are so few.
 MARKERS = "osD^vP*X"
-#: (title, what is drawn of ν, the law that makes it straight)
+#: (axis, what is drawn of ω, the law that makes it straight)
 STRAIGHT_LINES: tuple[tuple[str, Callable[[Array], Array], str], ...] = (
-    ("ln ν", np.log, "stokes"),
-    ("1/ν  [s]", lambda nu: 1 / nu, "newton"),
-    ("ν$^{−1/2}$  [s$^{1/2}$]", lambda nu: nu**-0.5, "disc"),
+    ("ln ω   (ω in rad/s)", np.log, "stokes"),
+    ("1/ω  [s/rad]", lambda omega: 1 / omega, "newton"),
+    ("ω$^{−1/2}$  [(s/rad)$^{1/2}$]", lambda omega: omega**-0.5, "disc"),
 )
-#: More points than a figure can show are thinned out evenly.
-MOST_POINTS = 2000
+#: More points than a panel can show are thinned out evenly; up to so many have bars each; so many means of more.
+MOST_POINTS, MOST_BARS, MEANS = 600, 200, 40
+#: A bar longer than the marker's radius, as part of the panel's height, is seen; outliers with their value written.
+_SEEN, _MOST_NAMED = 1 / 120, 6
 
 _STYLE: Any = {
     "font.size": 9,
+    "axes.titlesize": 9,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
@@ -54,20 +61,17 @@ _STYLE: Any = {
 
 
 def spindown_figure(analysis: SpinDownAnalysis) -> Figure:
-    """Data and laws; residuals of every law; the thesis's straight-line panels."""
+    """Readings and laws; residuals of every law; the straight lines one draws on paper, and what departs from them."""
     with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(10, 10.5), layout="constrained")
-        rows = figure.add_gridspec(3, 1, height_ratios=[1.5, 1.0, 1.0])
-        _draw_spin(figure.add_subplot(rows[0]), analysis)
-        columns = rows[1].subgridspec(1, len(COLOURS), wspace=0.02)
-        shared: Axes | None = None
-        for k, name in enumerate(COLOURS):
-            axes = figure.add_subplot(columns[k], sharey=shared)
-            _draw_residuals(axes, analysis, name, labelled=shared is None)
-            shared = shared or axes
-        columns = rows[2].subgridspec(1, len(STRAIGHT_LINES), wspace=0.02)
-        for k, (title, transform, law) in enumerate(STRAIGHT_LINES):
-            _draw_straight(figure.add_subplot(columns[k]), analysis, title, transform, law)
+        figure = Figure(figsize=(10, 12.5))
+        _draw_spin(_row(figure, 0.665, 0.31)[0], analysis)
+        _draw_residuals(figure, _row(figure, 0.425, 0.15, len(COLOURS), gap=0.055), analysis)
+        _draw_straight_lines(
+            figure,
+            _row(figure, 0.16, 0.185, len(STRAIGHT_LINES), gap=0.095),
+            _row(figure, 0.04, 0.105, len(STRAIGHT_LINES), gap=0.095),
+            analysis,
+        )
     return figure
 
 
@@ -79,83 +83,221 @@ def save_png(figure: Figure, path: Path) -> None:
 
 
 def as_svg(figure: Figure) -> str:
-    """A figure as SVG text, the same bytes for the same figure."""
+    """A figure as SVG text, the same bytes for the same results."""
     buffer = io.StringIO()
     with mpl.rc_context(_STYLE):
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     return buffer.getvalue()
 
 
-def _thin(n: int) -> NDArray[np.intp]:
-    return np.unique(np.linspace(0, n - 1, min(n, MOST_POINTS)).astype(np.intp))
+def _row(figure: Figure, bottom: float, height: float, n: int = 1, gap: float = 0.0) -> list[Axes]:
+    """Panels side by side.  Placed by hand: automatic layouts differ in the last bit from one drawing to the next."""
+    left, right = 0.085, 0.985
+    width = (right - left - (n - 1) * gap) / n
+    return [figure.add_axes((left + k * (width + gap), bottom, width, height)) for k in range(n)]
 
 
-def _marks(run: SpinDown, k: int) -> dict[str, Any]:
-    few = len(run.time) <= MOST_POINTS // 10
-    return {"linestyle": "none", "marker": MARKERS[k % len(MARKERS)], "markersize": 4 if few else 1.5, "alpha": 0.8}
+# --- readings and laws ---------------------------------------------------------------------------------
 
 
 def _draw_spin(axes: Axes, analysis: SpinDownAnalysis) -> None:
-    """The readings of all runs and, through each, every law."""
-    for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True)):
-        t = np.linspace(run.time[0], run.time[-1], 300)
-        for fit in run.fits:
-            label = NAMES[fit.name] if k == 0 else None
-            width = 1.6 if fit.name == run.best else 0.8
-            axes.plot(t, fit.spin_frequency(t), color=COLOURS[fit.name], linewidth=width, label=label)
-        points = _thin(len(run.time))
-        label = source.name if len(analysis.runs) <= len(MARKERS) else None
-        axes.plot(
-            run.time[points],
-            run.frequency[points],
-            color="black",
-            markerfacecolor="white",
-            label=label,
-            **_marks(run, k),
-        )
+    """The readings of all runs, every law through the first, the best one through each."""
+    span = _set_range(axes, analysis)
+    for name in COLOURS:
+        _draw_law(axes, analysis, name)
+    for k in range(len(analysis.runs)):
+        _draw_readings(axes, analysis, k, analysis.runs[k].frequency, span, label=_run_label(analysis, k))
         _draw_outliers(axes, analysis, k)
     axes.set(xlabel="time  [s]", ylabel="spin frequency ν  [Hz]")
     together = "" if len(analysis.runs) == 1 else f" of {len(analysis.runs)} runs"
-    axes.set_title(f"Spin-down{together}: readings and drag laws{_synthetic(analysis)}", loc="left")
-    axes.legend(ncols=2)
+    axes.set_title(f"Spin-down{together}: readings and drag laws{_synthetic(analysis)}", loc="left", fontsize=11)
+    axes.legend(loc="upper right", ncols=2 if len(axes.get_lines()) > 9 else 1)
 
 
-def _draw_outliers(axes: Axes, analysis: SpinDownAnalysis, k: int) -> None:
-    readings, outliers = analysis.sources[k].readings, list(analysis.runs[k].outliers)
-    if outliers:
+def _set_range(axes: Axes, analysis: SpinDownAnalysis) -> float:
+    """What the readings used need, and no more: an outlier squeezes nothing."""
+    low = min(float(run.frequency.min()) for run in analysis.runs)
+    high = max(float(run.frequency.max()) for run in analysis.runs)
+    margin = 0.06 * (high - low) or 0.06 * high
+    axes.set_ylim(low - margin, high + margin)
+    return high - low + 2 * margin
+
+
+def _draw_law(axes: Axes, analysis: SpinDownAnalysis, name: str) -> None:
+    """One law; with several runs through the first one alone, unless it is the best."""
+    verdict, best = analysis.combined.verdict, name == analysis.combined.best
+    excluded = name in dict(verdict.excluded)
+    note = "excluded" if excluded else "best" if best and verdict.decided else ""
+    label = f"{name}   {EQUATIONS[name]}" + (f"   ({note})" if note else "")
+    thick = 1.2 if len(analysis.runs) > 1 or _many(analysis) else 2.4
+    for k, run in enumerate(analysis.runs if best else analysis.runs[:1]):
+        t = np.linspace(run.time[0], run.time[-1], 200)
         axes.plot(
-            readings.time[outliers], readings.frequency[outliers], "x", color="red", markersize=9, label="outlier"
+            t,
+            run.fit(name).spin_frequency(t),
+            color=COLOURS[name],
+            linestyle="dashed" if excluded else "solid",
+            linewidth=thick if best else 1.0,
+            zorder=2.5 if best else 2.2,
+            label=label if k == 0 else None,
         )
 
 
+def _run_label(analysis: SpinDownAnalysis, k: int) -> str | None:
+    """A name for each of a few runs, a number for many."""
+    if len(analysis.runs) <= len(MARKERS):
+        return _drawable(short_name(analysis.sources[k].name))
+    return f"{len(analysis.runs)} runs" if k == 0 else None
+
+
+def _drawable(name: str) -> str:
+    """A name as a legend shows it: no formula, no hidden label, and no character that the font lacks."""
+    font = get_font(findfont("DejaVu Sans"))
+    text = "".join(c if c.isprintable() and font.get_char_index(ord(c)) else "□" for c in name)
+    text = text if len(text) <= 40 else text[:39] + "…"
+    return (" " if text.startswith("_") else "") + text.replace("\\", "\\\\").replace("$", r"\$")
+
+
+def _draw_outliers(axes: Axes, analysis: SpinDownAnalysis, k: int) -> None:
+    """A cross where it lies; an arrow at the edge, with its value, where it lies beyond."""
+    readings, outliers = analysis.sources[k].readings, np.array(analysis.runs[k].outliers, dtype=np.intp)
+    t, nu = readings.time[outliers], readings.frequency[outliers]
+    low, high = axes.get_ylim()
+    style: Any = {"color": "red", "linestyle": "none", "zorder": 5}
+    edges = (("x", (low <= nu) & (nu <= high), None), ("^", nu > high, 0.97), ("v", nu < low, 0.03))
+    first = "outlier" not in axes.get_legend_handles_labels()[1]
+    for marker, chosen, share in edges:
+        if not chosen.any():
+            continue
+        shown = np.flatnonzero(chosen)[_thin(int(chosen.sum()), MOST_POINTS)]
+        y = nu[shown] if share is None else np.full(len(shown), low + share * (high - low))
+        axes.plot(t[shown], y, marker=marker, markersize=8, label="outlier" if first else None, **style)
+        first = False
+        for i in range(min(len(shown), _MOST_NAMED) if share else 0):
+            text = f"{nu[shown[i]]:.4g} Hz"
+            axes.annotate(text, (t[shown[i]], y[i]), (7, -3), textcoords="offset points", color="red", fontsize=8)
+
+
 def _synthetic(analysis: SpinDownAnalysis) -> str:
-    return "  (SYNTHETIC)" if any(source.synthetic for source in analysis.sources) else ""
+    made_up = sum(source.synthetic for source in analysis.sources)
+    if not made_up:
+        return ""
+    return "  (SYNTHETIC)" if made_up == len(analysis.sources) else f"  ({made_up} of them SYNTHETIC)"
 
 
-def _draw_residuals(axes: Axes, analysis: SpinDownAnalysis, name: str, *, labelled: bool) -> None:
-    """What one law leaves over: it should be noise about zero, without a shape."""
-    for k, run in enumerate(analysis.runs):
-        points = _thin(len(run.time))
-        axes.plot(run.time[points], run.fit(name).residuals[points], color=COLOURS[name], **_marks(run, k))
-    axes.axhline(0, color="black", linewidth=0.8)
-    axes.set_title(NAMES[name].split("  ")[0], loc="left", color=COLOURS[name])
-    axes.set_xlabel("time  [s]")
-    if labelled:
-        axes.set_ylabel("residual  [Hz]")
-    else:
-        axes.tick_params(labelleft=False)
+# --- residuals -----------------------------------------------------------------------------------------
+
+
+def _draw_residuals(figure: Figure, panels: list[Axes], analysis: SpinDownAnalysis) -> None:
+    """What each law leaves over, each on its own scale: it should be noise about zero, without a shape."""
+    u = _usual_u(analysis)
+    band = "" if u is None else f"; grey: ±u of one reading, {u:.2g} Hz"
+    means = "; black: means" if _many(analysis) else ""
+    _head(figure, 0.605, f"Residuals, reading − law, each law on its own scale{band}{means}")
+    for axes, name in zip(panels, COLOURS, strict=True):
+        residuals = [run.fit(name).residuals for run in analysis.runs]
+        most = max(float(np.abs(r).max()) for r in residuals)
+        limit = max(1.1 * (most + (u or 0.0)), 1e-12 * float(analysis.runs[0].frequency[0]))
+        if u is not None:
+            axes.axhspan(-u, u, color="black", alpha=0.12, linewidth=0)
+        axes.axhline(0, color="black", linewidth=0.8)
+        for k, values in enumerate(residuals):
+            _draw_readings(axes, analysis, k, values, 2 * limit, colour=COLOURS[name])
+            _draw_means(axes, analysis, values)
+        axes.set(ylim=(-limit, limit), xlabel="time  [s]")
+        axes.tick_params(labelsize=7)
+        axes.set_title(name, loc="left", color=COLOURS[name], fontweight="bold", pad=9)
+        axes.set_title(f"to ±{most:.2g} Hz", loc="right", color="dimgrey", fontsize=8, pad=9)
+    panels[0].set_ylabel("residual  [Hz]")
+
+
+def _usual_u(analysis: SpinDownAnalysis) -> float | None:
+    known = [run.u for run in analysis.runs if run.u is not None]
+    return float(np.median(np.concatenate(known))) if known else None
+
+
+# --- straight lines ------------------------------------------------------------------------------------
+
+
+def _draw_straight_lines(figure: Figure, above: list[Axes], below: list[Axes], analysis: SpinDownAnalysis) -> None:
+    """Where a law holds, its points lie on the line, and the strip below shows noise about zero."""
+    _head(figure, 0.375, "Straight lines as one draws them on paper; below each, how far the points lie from the line")
+    for panel, strip, (quantity, transform, law) in zip(above, below, STRAIGHT_LINES, strict=True):
+        _draw_straight(panel, strip, analysis, transform, law)
+        panel.set_ylabel(quantity)
+        panel.set_title(f"straight if {law} holds", loc="left", color=COLOURS[law], fontweight="bold", pad=9)
+        panel.tick_params(labelbottom=False)
+        strip.set(xlabel="time  [s]", xlim=panel.get_xlim())
+    most = max(abs(limit) for strip in below for limit in strip.get_ylim())
+    for strip in below:
+        strip.set_ylim(-most, most)  # in parts of the range, so that one sees which line is the straightest
+    below[0].set_ylabel("off the line\n[% of the range]")
 
 
 def _draw_straight(
-    axes: Axes, analysis: SpinDownAnalysis, title: str, transform: Callable[[Array], Array], law: str
+    panel: Axes, strip: Axes, analysis: SpinDownAnalysis, transform: Callable[[Array], Array], law: str
 ) -> None:
-    """The thesis's panels: where this law holds, the points lie on the line."""
+    strip.axhline(0, color=COLOURS[law], linewidth=1)
     for k, run in enumerate(analysis.runs):
-        y = transform(run.frequency)
-        slope, intercept = np.polyfit(run.time - run.time[0], y, 1)
-        ends = run.time[[0, -1]]
-        axes.plot(ends, intercept + slope * (ends - run.time[0]), color=COLOURS[law], linewidth=1)
-        points = _thin(len(run.time))
-        axes.plot(run.time[points], y[points], color="black", markerfacecolor="white", **_marks(run, k))
-    axes.set(xlabel="time  [s]")
-    axes.set_title(f"{title}: straight for {NAMES[law].split('  ')[0]}", loc="left", color=COLOURS[law])
+        y = transform(2 * np.pi * run.frequency)
+        line = np.polynomial.Polynomial.fit(run.time, y, 1)(run.time)
+        panel.plot(run.time[[0, -1]], line[[0, -1]], color=COLOURS[law], linewidth=1)
+        _draw_readings(panel, analysis, k, y)
+        off = 100 * (y - line) / (np.ptp(y) or 1.0)
+        _draw_readings(strip, analysis, k, off)
+        _draw_means(strip, analysis, off)
+
+
+# --- what the panels share -----------------------------------------------------------------------------
+
+
+def _head(figure: Figure, y: float, text: str) -> None:
+    figure.text(0.01, y, text, fontsize=10)
+
+
+def _many(analysis: SpinDownAnalysis) -> bool:
+    """Whether only means show what shape the noise hides."""
+    return len(analysis.runs) == 1 and len(analysis.runs[0].time) > MOST_BARS
+
+
+def _draw_means(axes: Axes, analysis: SpinDownAnalysis, y: Array) -> None:
+    if _many(analysis):
+        time = analysis.runs[0].time
+        parts = np.array_split(np.arange(len(y)), MEANS)
+        axes.plot([time[p].mean() for p in parts], [y[p].mean() for p in parts], color="black", linewidth=1.2, zorder=4)
+
+
+def _thin(n: int, most: int) -> NDArray[np.intp]:
+    return np.unique(np.linspace(0, n - 1, min(n, most)).astype(np.intp))
+
+
+def _draw_readings(
+    axes: Axes,
+    analysis: SpinDownAnalysis,
+    k: int,
+    y: Array,
+    span: float | None = None,
+    *,
+    colour: str | None = None,
+    label: str | None = None,
+) -> None:
+    """One number for each reading of run k: points, with bars of u where they are seen in a `span`."""
+    run, runs = analysis.runs[k], len(analysis.runs)
+    total = sum(len(each.time) for each in analysis.runs)
+    if runs > len(MARKERS):
+        colour = to_hex(mpl.colormaps["viridis"](0.9 * k / (runs - 1)))
+    points = _thin(len(y), max(MOST_POINTS // runs, 20))
+    few = total <= MOST_BARS
+    style: Any = {"color": colour or "black", "linestyle": "none", "alpha": 0.8 if few else 0.4}
+    style["zorder"] = 3.0 if few else 2.1  # many points would hide the laws
+    if span and run.u is not None and few and np.median(run.u) > _SEEN * span:
+        axes.errorbar(run.time, y, run.u, elinewidth=0.8, **style)
+    axes.plot(
+        run.time[points],
+        y[points],
+        marker=MARKERS[k] if runs <= len(MARKERS) else "o",
+        markersize=4 if few else 2.5 if len(y) <= MOST_BARS else 1.5,
+        markerfacecolor=style["color"] if colour else "white",
+        label=label,
+        **style,
+    )

@@ -4,7 +4,7 @@ A file is sniffed (`levilab.layout`), its titles are understood (`levilab.column
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -58,12 +58,15 @@ class Table:
         return values
 
 
-def read_table(path: Path, *, columns: Mapping[str, str] | None = None) -> Table:
+def read_table(
+    path: Path, *, columns: Mapping[str, str] | None = None, quantities: Collection[str] = CANONICAL
+) -> Table:
     """Read a table of text: CSV of any kind, tabs or blanks, decimal point or comma, with or without units.
 
     Args:
         path: the file.
         columns: {canonical column, or t, f, u: title in the file or 1-based number}, where titles are not known.
+        quantities: canonical columns that are wanted; what stands in others is nobody's concern.
 
     Returns:
         At least three rows. Rows with a missed reading (empty, nan, inf, 9.91E37) are left out, with a warning.
@@ -74,7 +77,7 @@ def read_table(path: Path, *, columns: Mapping[str, str] | None = None) -> Table
     with _file_errors(path):
         layout = sniff(path)
         header, wanted, warnings = _titles(path, layout, columns or {})
-        chosen, doubts = choose_columns(path, header, layout.units, wanted)
+        chosen, doubts = choose_columns(path, header, layout.units, wanted, quantities)
         if not chosen:
             known = "time_s, spin_frequency_hz, t, f [Hz], rpm …"
             raise TableError(
@@ -200,9 +203,15 @@ def _table(
     numbers = dict(zip(chosen, rows.values, strict=False))
     # The comparison is false for NaN, too.
     present = {column: np.abs(values) < NO_READING for column, values in numbers.items()}
-    for column in [c for c, p in present.items() if c.name in COMPANIONS and p.size and not p.any()]:
-        del present[column]
-        told.append(f"{name}: column '{shown(column.label)}' is empty and is not used")
+    quantity = [p for c, p in present.items() if c.name not in COMPANIONS]
+    read = np.logical_and.reduce(quantity) if quantity else np.ones(rows.lines.size, bool)
+    for column, missing in [(c, read & ~p) for c, p in present.items() if c.name in COMPANIONS]:
+        if missing.any():  # better no uncertainties than readings lost for want of them
+            del present[column]
+            told.append(
+                f"{name}: column '{shown(column.label)}' is empty in {missing.sum()} of {read.sum()} rows and "
+                "is not used"
+            )
     good = np.logical_and.reduce(list(present.values())) if present else np.ones(rows.lines.size, bool)
     lines, kept = rows.lines, {column: numbers[column] for column in present}
     if not good.all():

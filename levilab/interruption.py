@@ -15,8 +15,11 @@ if TYPE_CHECKING:
 _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
 
 
-class Interrupted(Exception):
-    """The run was asked to end.  by: the signal's name."""
+class Interrupted(BaseException):
+    """The run was asked to end.  by: the signal's name.
+
+    No Exception, so that no library on the way takes it for a failure of its own.
+    """
 
     def __init__(self, by: str) -> None:
         self.by = by

@@ -19,9 +19,10 @@ BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"), (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"), (codecs.BOM_UTF8, "utf-8-sig"),
 )  # fmt: skip
-BINARY_FILES = (
+NO_TABLES = (
     (b"\x89PNG", "a PNG picture"), (b"PK\x03\x04", "a ZIP or Excel file"), (b"\xd0\xcf\x11\xe0", "an old Excel file"),
     (b"%PDF", "a PDF document"), (b"\x1f\x8b", "a gzip archive"), (b"RIFF", "a WAV recording"),
+    (b"{", "a JSON file (of a run, name the folder instead)"), (b"<", "an HTML or XML page"),
     (b"\x93NUMPY", "a NumPy array"), (b"\x89HDF", "an HDF5 file"), (b"\xff\xd8\xff", "a JPEG picture"),
 )  # fmt: skip
 CONTROL = re.compile("[\x00-\x08\x0e-\x19]")  # DOS may end a text with 0x1a
@@ -57,7 +58,7 @@ def sniff(path: Path) -> Layout:
     with path.open("rb") as stream:
         head = stream.read(HEAD)
         whole = not stream.read(1)
-    for mark, what in BINARY_FILES:
+    for mark, what in NO_TABLES:
         if head.startswith(mark):
             raise TableError(path, f"is {what}; {EXPORT}")
     encoding = _encoding(head)

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import secrets
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pydantic import ValidationError
+
 from levilab.clock import VirtualClock
-from levilab.config import BenchConfig, SpinSettings, read_bench
+from levilab.config import BenchConfig, ConfigError, in_one_line, read_bench, within_limits
 from levilab.errors import LevilabError
 from levilab.record import Order
-from levilab.run import Run
+from levilab.run import Run, find_run
 from levilab.simulator.world import SpinScene, SpinWorld, drawn
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from levilab.config import SpinSettings
 
 HOW = (
     "acquired on the virtual bench: the drivers are the real ones, the instruments wire-level models, the top a "
-    "spin that decays as a laminar disc's, {law}, with scatter drawn by the seed; no real top was measured"
+    "spin that decays by the {law}; drag and fall were drawn by the seed, and no real top was measured"
 )
 
 
@@ -25,10 +28,16 @@ class CannotResume(LevilabError):
     """This run cannot be gone on with."""
 
 
+class ContradictoryOptions(LevilabError):
+    """Options that do not go together; wrong usage."""
+
+    exit_code = 2
+
+
 def spin_order(
     *,
     mock: bool,
-    bench: Path,
+    bench: Path | None,
     out: Path,
     seed: int | None,
     note: str,
@@ -36,19 +45,29 @@ def spin_order(
     resume: Path | None,
     wire_log: bool,
 ) -> Order:
-    """What `levilab acquire spin` is to do.  Raises ConfigError, CannotResume, DataError."""
-    run = _resumable(resume) if resume else None
-    if run and run.record.synthetic:
-        mock, seed = True, run.record.seed
-    if not mock:
-        return Order("spin", read_bench(bench), out=out, note=note, wire_log=wire_log, resume=run)
-    seed = secrets.randbelow(1 << 31) if seed is None else seed
-    scene = drawn(seed)
-    # the scene's jitter is what one pulse scatters by: a reading over a gate T scatters by √2 jitter/T
-    settings = SpinSettings(reading_u_hz=round(2**0.5 * scene.jitter / SpinSettings().gate_s, 6))
+    """What `levilab acquire spin` is to do.  Raises ConfigError, CannotResume, ContradictoryOptions, DataError."""
+    run = _resumable(find_run(resume, out)) if resume else None
+    virtual = mock or bool(run and run.record.seed is not None)
+    if seed is not None and (run or not mock):
+        raise ContradictoryOptions("--seed goes with --mock, and not with --resume: a run keeps its seed")
+    if realtime and not virtual:
+        raise ContradictoryOptions("--realtime goes with --mock: a real bench always keeps to the wall clock")
+    config = _as_it_was(run) if run else BenchConfig()
+    if bench or not virtual:
+        described = read_bench(bench or Path("bench.toml"))
+        # a run is gone on with as it was begun; only where the instruments are may have changed
+        addresses = {kind: getattr(described, kind) for kind in ("visa_library", "counter", "generator", "limits")}
+        config = config.model_copy(update=addresses) if run else described
+    within_limits(config)
+    if not virtual:
+        if run:
+            run.elapsed()  # before the bench is touched
+        return Order("spin", config, out=out, note=note, wire_log=wire_log, resume=run)
+    seed = run.record.seed if run else secrets.randbelow(1 << 31) if seed is None else seed
+    scene = drawn(seed or 0)
     return Order(
         "spin",
-        BenchConfig(visa_library="@levilab", spin=settings),
+        config.model_copy(update={"visa_library": "@levilab", "spin": _with_uncertainty(config.spin, scene)}),
         out=out,
         world=lambda: SpinWorld(scene, VirtualClock(realtime=realtime)),
         how=HOW.format(law=_law_in_words(scene)),
@@ -59,9 +78,23 @@ def spin_order(
     )
 
 
+def _with_uncertainty(settings: SpinSettings, scene: SpinScene) -> SpinSettings:
+    """The scene's jitter is what one pulse scatters by: a reading over a gate T scatters by √2 jitter/T."""
+    u = settings.reading_u_hz or round(2**0.5 * scene.jitter / settings.gate_s, 6)
+    return settings.model_copy(update={"reading_u_hz": u})
+
+
 def _law_in_words(scene: SpinScene) -> str:
     constants = ", ".join(f"{c:.4e}" for c in scene.constants)
     return f"{scene.drag} law with {constants} (SI), falling at {scene.fall_hz:.2f} Hz"
+
+
+def _as_it_was(run: Run) -> BenchConfig:
+    """The configuration that a run was begun with."""
+    try:
+        return BenchConfig.model_validate(run.record.configuration)
+    except ValidationError as error:
+        raise ConfigError(f"{run.folder}/run.json: configuration: {in_one_line(error)}") from error
 
 
 def _resumable(folder: Path) -> Run:
@@ -70,4 +103,6 @@ def _resumable(folder: Path) -> Run:
         raise CannotResume(f"{folder}: holds a {run.record.experiment} run, levilab acquire spin resumes spin runs")
     if run.status in {"running", "finished"}:
         raise CannotResume(f"{folder}: is {run.status}, only an interrupted or failed run can be resumed")
+    if run.record.time_zero_utc is None or not run.count():
+        raise CannotResume(f"{folder}: ended before its first reading, there is nothing to go on with: start anew")
     return run

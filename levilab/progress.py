@@ -28,16 +28,28 @@ class Show(Protocol):
 class Lines:
     """One line a reading, for logs, pipes and tests."""
 
+    def __init__(self) -> None:
+        self._gone = False
+        self._fifths = 0
+
     def preparing(self, text: str, fraction: float) -> None:
-        """Nothing: the events say it."""
+        """A line each fifth of the way."""
+        if int(5 * fraction) > self._fifths:
+            self._fifths = int(5 * fraction)
+            self.message(text)
 
     def reading(self, text: str, elapsed: float, remaining: float) -> None:
         """A line."""
         self.message(f"{text}   about {remaining:.0f} s left")
 
     def message(self, text: str) -> None:
-        """A line."""
-        print(text, file=sys.stderr, flush=True)  # noqa: T201 - this is where it is shown
+        """A line.  A display that went away does not end a measurement."""
+        if self._gone:
+            return
+        try:
+            print(text, file=sys.stderr, flush=True)  # noqa: T201 - this is where it is shown
+        except OSError:
+            self._gone = True
 
     def close(self) -> None:
         """Nothing is open."""
@@ -55,6 +67,7 @@ class Bar:
             BarColumn(bar_width=30),
             TextColumn("{task.fields[left]}"),
             console=Console(stderr=True),
+            transient=True,
         )
         self._progress.start()
         self._task: TaskID = self._progress.add_task("connecting", total=1.0, left="")
@@ -64,7 +77,8 @@ class Bar:
         self._progress.update(self._task, description=text, completed=fraction)
 
     def reading(self, text: str, elapsed: float, remaining: float) -> None:
-        """The bar's share is bench time elapsed over elapsed and expected."""
+        """A line above the bar; the bar's share is bench time elapsed over elapsed and expected."""
+        self.message(text)
         share = elapsed / (elapsed + remaining) if elapsed + remaining > 0 else 0.0
         self._progress.update(self._task, description=text, completed=share, left=f"about {remaining:.0f} s left")
 
@@ -73,8 +87,7 @@ class Bar:
         self._progress.console.print(text, markup=False, highlight=False)
 
     def close(self) -> None:
-        """Leave the bar as it is."""
-        self._progress.update(self._task, left="")
+        """Take the bar away; the lines stay."""
         self._progress.stop()
 
 

@@ -38,11 +38,46 @@ def spin_readings(table: Table, *, fewest: int = FEWEST) -> Readings:
     u = table.column("spin_frequency_u_hz") if has_u else None
     if time.size < fewest:
         raise TableError(table.path, f"holds {time.size} readings, at least {fewest} are needed: record longer")
+    _must_be_ordinary(table, time, frequency)
     _must_increase(table, time)
     _must_be_positive(table, frequency, "the frequency", "Hz, but a spinning top is above 0: remove the reading")
     if u is not None:
         _must_be_positive(table, u, "the uncertainty", "Hz, but must be above 0: correct it or remove the column")
-    return Readings(time, frequency, u, table.warnings)
+        _must_be_possible(table, u, frequency)
+    return Readings(time, frequency, u, (*table.warnings, *_doubts(table, frequency)))
+
+
+#: A Levitron spins at 20 to 60 Hz, driven to about 60 Hz; far above that the unit is in doubt [Hz].
+FASTEST_HZ = 200.0
+
+
+def _doubts(table: Table, frequency: "NDArray[np.float64]") -> list[str]:
+    """A spin that no such top has: most likely turns per minute."""
+    middle = float(np.median(frequency))
+    if middle <= FASTEST_HZ:
+        return []
+    doubt = f"{table.path.name}: the spin is about {middle:.4g} Hz, a Levitron spins at 20 to 60 Hz"
+    return [f"{doubt}; if these are turns per minute, say so: --columns 'f=NAME [rpm]'"]
+
+
+#: Beyond these a number is no measurement, and its powers would leave the range of floating point.
+EARLIEST_S, SLOWEST_HZ, HIGHEST_HZ = 1e15, 1e-9, 1e12
+
+
+def _must_be_ordinary(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> None:
+    size = np.abs(frequency)
+    for wrong, values, what, allowed in (
+        (np.abs(time) > EARLIEST_S, time, "time", f"up to {EARLIEST_S:g} s"),
+        (size > HIGHEST_HZ, frequency, "frequency", f"up to {HIGHEST_HZ:g} Hz"),
+        ((size > 0) & (size < SLOWEST_HZ), frequency, "frequency", f"from {SLOWEST_HZ:g} Hz"),
+    ):
+        if wrong.any():
+            i = int(np.flatnonzero(wrong)[0])
+            raise TableError(
+                table.path,
+                f"a {what} of {values[i]:.9g} is no measurement, {allowed}: check the unit",
+                line=int(table.lines[i]),
+            )
 
 
 def _must_increase(table: Table, time: "NDArray[np.float64]") -> None:
@@ -53,7 +88,7 @@ def _must_increase(table: Table, time: "NDArray[np.float64]") -> None:
         what = "is repeated" if time[i] == time[i + 1] else "comes"
         raise TableError(
             table.path,
-            f"the time {time[i + 1]:.9g} s {what} after {time[i]:.9g} s in line {before}, times must increase: sort "
+            f"the time {time[i + 1]:.16g} s {what} after {time[i]:.16g} s in line {before}, times must increase: sort "
             "the readings, or correct one",
             line=after,
         )
@@ -64,3 +99,15 @@ def _must_be_positive(table: Table, values: "NDArray[np.float64]", what: str, ad
     if wrong.size:
         i = int(wrong[0])
         raise TableError(table.path, f"{what} is {values[i]:.9g} {advice}", line=int(table.lines[i]))
+
+
+def _must_be_possible(table: Table, u: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> None:
+    """An uncertainty below the rounding of the number itself is a mistake."""
+    wrong = np.flatnonzero((u < 1e-15 * frequency) | (u > 1e15 * frequency))
+    if wrong.size:
+        i = int(wrong[0])
+        raise TableError(
+            table.path,
+            f"an uncertainty of {u[i]:.3g} Hz for {frequency[i]:.9g} Hz cannot be meant: correct it or drop the column",
+            line=int(table.lines[i]),
+        )

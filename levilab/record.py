@@ -9,22 +9,23 @@ import contextlib
 import itertools
 import sys
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from instruments.errors import InstrumentError
-from levilab.bench import VIRTUAL, Bench, open_bench
-from levilab.errors import DataError
-from levilab.experiment import EXPERIMENTS, Experiment, Row
+from levilab.bench import VIRTUAL, Bench, check_described, open_bench
+from levilab.experiment import EXPERIMENTS, Experiment, ExperimentFailed, Missed, Row
 from levilab.interruption import Interrupted, Stop, watching_for_interruption
-from levilab.run import CannotWrite, Run, RunRecord, RunWriter, Status, utc_now
+from levilab.run import Run, RunRecord, utc_now
+from levilab.software import software_versions
+from levilab.writing import CannotWrite, RunWriter
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from levilab.config import BenchConfig, SpinSettings
+    from levilab.config import BenchConfig, ExperimentSettings
     from levilab.progress import Show
+    from levilab.run import Status
     from levilab.simulator.world import World
 
 #: So long is slept at a stretch before looking whether somebody asked for the end [s].
@@ -35,16 +36,22 @@ _NAP_S = 0.2
 class Session:
     """An acquisition under way: what the steps of an experiment act on.
 
-    zero: bench time of time_s = 0 [s], None before it is reached.
+    zero: bench time of time_s = 0 [s], None before it is reached;
+    replaying: while a virtual top is brought to where a resumed run left it; that is no event of the run;
+    asked: when the last reading was asked for [s];
+    rows: the readings so far; missed: why there was none at the last times asked, empty after a reading.
     """
 
     bench: Bench
-    settings: SpinSettings
+    settings: ExperimentSettings
     writer: RunWriter
     show: Show
     stop: Stop
     zero: float | None = None
+    replaying: bool = False
+    asked: float = 0.0
     rows: list[Row] = field(default_factory=list)
+    missed: list[Missed] = field(default_factory=list)
 
     def now(self) -> float:
         """Seconds since time zero."""
@@ -62,13 +69,21 @@ class Session:
 
     def event(self, kind: str, text: str, **data: Any) -> None:
         """Write down and show what happened."""
+        if self.replaying:
+            return
         self.writer.event(None if self.zero is None else self.now(), kind, text, **data)
         self.show.message(text)
 
     def keep(self, row: Row, remaining: float) -> None:
-        """Write a reading down, then show it: what was shown is on the disk."""
+        """Write a reading down, then show it: what was shown is on the disk.
+
+        Raises ExperimentFailed if its time does not come after the last one's.
+        """
+        if self.rows and not float(row["time_s"] or 0.0) > float(self.rows[-1]["time_s"] or 0.0):
+            raise ExperimentFailed(f"the clock went back: {row['time_s']} s after {self.rows[-1]['time_s']} s")
         self.writer.reading(row)
         self.rows.append(row)
+        self.missed.clear()
         self.show.reading(_in_words(row), float(row["time_s"] or 0.0), remaining)
 
 
@@ -95,16 +110,16 @@ class Order:
 
 
 def acquire(order: Order, show: Show) -> Run:
-    """Run an experiment.  Returns the run, finished or interrupted; other ends raise, the run kept all the same."""
+    """Run an experiment.  Returns the run, finished or interrupted; other ends raise, the run kept all the same.
+
+    A bench that could not be opened leaves no run, unless it was to be logged.
+    """
     experiment = EXPERIMENTS[order.experiment]
-    settings = order.config.spin
-    writer = RunWriter.reopen(order.resume) if order.resume else RunWriter.create(order.out, _record(order))
-    with watching_for_interruption() as stop, writer, contextlib.closing(show):
+    if order.world is None:
+        check_described(order.config, experiment.kinds)
+    with watching_for_interruption() as stop, _writer(order) as writer, contextlib.closing(show):
         try:
-            world = order.world() if order.world else None
-            log = writer.wire if order.wire_log else None
-            with open_bench(order.config, experiment.kinds, world=world, log=log) as bench:
-                _run(experiment, Session(bench, settings, writer, show, stop), order)
+            _at_the_bench(experiment, order, writer, show, stop)
             status: Status = "finished"
         except Interrupted as interruption:
             text = f"interrupted by {interruption.by}, outputs are off"
@@ -116,32 +131,60 @@ def acquire(order: Order, show: Show) -> Run:
             with contextlib.suppress(CannotWrite):
                 writer.event(None, "failed", f"{type(error).__name__}: {error}")
                 writer.finish("failed")
+            if not writer.record.instruments and not order.wire_log:
+                writer.discard()
             raise
         writer.finish(status)
     return Run.load(writer.folder)
 
 
-def _run(experiment: Experiment, session: Session, order: Order) -> None:
-    """The steps of the experiment; the bench is open."""
-    try:
-        _note_instruments(session, "start")
-        experiment.connect(session)
-        if order.resume:
-            _catch_up(experiment, session, order)
-        else:
-            experiment.start(session)
-            _start_time(session, session.bench.clock.now())
-        _read_until_the_end(experiment, session)
-    finally:
-        session.stop.shield()
-        session.bench.outputs_off()
-        with contextlib.suppress(CannotWrite):  # if the disk is full, what failed first is told
-            _note_instruments(session, "end")
+def _writer(order: Order) -> RunWriter:
+    if order.resume is None:
+        return RunWriter.create(order.out, _record(order))
+    return RunWriter.reopen(order.resume, note=order.note)
 
 
-def _start_time(session: Session, zero: float) -> None:
-    session.zero = zero
-    session.writer.update(time_zero_utc=utc_now())
+def _at_the_bench(experiment: Experiment, order: Order, writer: RunWriter, show: Show, stop: Stop) -> None:
+    """The steps of the experiment, between opening the bench and leaving it."""
+    world = order.world() if order.world else None
+    log = writer.wire if order.wire_log else None
+    with open_bench(order.config, experiment.kinds, world=world, log=log, check=stop.check) as bench:
+        session = Session(bench, experiment.settings(order.config), writer, show, stop)
+        try:
+            _note_instruments(session, "start")
+            experiment.connect(session)
+            _begin(experiment, session, order)
+            _read_until_the_end(experiment, session)
+        finally:
+            stop.shield()
+            bench.outputs_off()
+            with contextlib.suppress(CannotWrite):  # if the disk is full, what failed first is told
+                _note_instruments(session, "end")
+
+
+def _begin(experiment: Experiment, session: Session, order: Order) -> None:
+    """Bring the top to where reading begins, or take up a run where it was left."""
+    if order.resume:
+        _catch_up(experiment, session, order, order.resume)
+    else:
+        experiment.start(session)
+        session.zero = session.bench.clock.now()
+        session.writer.update(time_zero_utc=utc_now())
+
+
+def _catch_up(experiment: Experiment, session: Session, order: Order, run: Run) -> None:
+    """A real top has gone on meanwhile, a virtual one is brought there again."""
+    frame = run.readings().frame
+    session.rows = [{str(k): float(v) for k, v in row.items()} for row in frame.to_dict("records")]
+    if order.world:
+        session.replaying = True
+        experiment.start(session)
+        session.replaying = False
+        session.zero = session.bench.clock.now()
+        session.wait(float(frame["time_s"].iloc[-1]))
+    else:
+        session.zero = session.bench.clock.now() - run.elapsed()
+    session.event("resumed", f"resumed after {len(frame)} reading{'s' * (len(frame) != 1)}, without driving again")
 
 
 def _read_until_the_end(experiment: Experiment, session: Session) -> None:
@@ -149,43 +192,22 @@ def _read_until_the_end(experiment: Experiment, session: Session) -> None:
     first = int(session.now() // settings.interval_s) + 1 if session.rows else 0
     for k in itertools.count(first):
         session.wait(k * settings.interval_s - session.now())
-        asked = session.now()
-        row = experiment.read(session)
-        if row is None:
-            session.event("reading missed", f"no reading at {asked:.1f} s, asking once more")
-            row = experiment.read(session)
-        if row is None:
-            last = session.rows[-1]["time_s"] if session.rows else 0.0
-            session.event("fell", f"no light pulses any more: the top fell between {last:.1f} s and {asked:.1f} s")
-            return
-        session.keep(row, experiment.remaining([*session.rows, row]))
+        session.asked = session.now()
+        got = experiment.read(session)
+        if isinstance(got, Missed):
+            session.missed.append(got)
+            if end := experiment.over(session):
+                session.event(*end)
+                return
+        else:
+            session.keep(got, experiment.remaining([*session.rows, got]))
         if session.now() > settings.longest_s:
-            session.event("longest", f"{settings.longest_s:g} s are over (spin.longest_s)")
+            session.event("longest", f"{settings.longest_s:g} s are over ({experiment.name}.longest_s)")
             return
-
-
-def _catch_up(experiment: Experiment, session: Session, order: Order) -> None:
-    """Take up a run where it was left: the real top has gone on meanwhile, a virtual one is brought there again."""
-    assert order.resume
-    frame = order.resume.readings().frame
-    session.rows = [{str(k): float(v) for k, v in row.items()} for row in frame.to_dict("records")]
-    zero_utc = order.resume.record.time_zero_utc
-    if zero_utc is None:
-        raise DataError(
-            f"{order.resume.folder}: ended before its first reading, there is nothing to resume: start anew"
-        )
-    if order.world:
-        experiment.start(session)
-        session.zero = session.bench.clock.now()
-        session.wait(float(frame["time_s"].iloc[-1]) if len(frame) else 0.0)
-    else:
-        elapsed = (datetime.now(UTC) - datetime.fromisoformat(zero_utc)).total_seconds()
-        session.zero = session.bench.clock.now() - elapsed
-    session.event("resumed", f"resumed after {len(frame)} readings")
 
 
 def _note_instruments(session: Session, moment: str) -> None:
-    """Identity and settings of each instrument go into run.json."""
+    """Identity and settings of each instrument go into run.json; a virtual one makes the run synthetic."""
     noted = {kind: dict(about) for kind, about in session.writer.record.instruments.items()}
     for kind, instrument in session.bench.instruments.items():
         about = noted.setdefault(kind, {})
@@ -196,46 +218,26 @@ def _note_instruments(session: Session, moment: str) -> None:
             about[f"settings_{moment}"] = instrument.settings()
         except InstrumentError as error:
             about[f"settings_{moment}"] = {"unknown": str(error)}
-    session.writer.update(instruments=noted)
+    changes: dict[str, Any] = {"instruments": noted}
+    virtual = [kind for kind, about in noted.items() if "VIRTUAL" in str(about.get("identity"))]
+    if virtual and not session.writer.record.synthetic:
+        changes |= {"synthetic": True, "synthetic_how": f"virtual instruments answered: {', '.join(virtual)}"}
+    session.writer.update(**changes)
 
 
 def _record(order: Order) -> RunRecord:
     experiment = EXPERIMENTS[order.experiment]
+    config = order.config if order.world is None else order.config.model_copy(update=dict(VIRTUAL))
     return RunRecord(
         experiment=order.experiment,
         status="running",
         started_utc=utc_now(),
         command_line=sys.argv,
-        channels=_channels(experiment, order.config.spin),
-        configuration=_configuration(order),
+        channels=[vars(channel) for channel in experiment.channels(experiment.settings(order.config))],
+        configuration=config.model_dump(mode="json"),
         software=software_versions(),
         seed=order.seed,
         note=order.note,
         synthetic=order.world is not None,
         synthetic_how=order.how,
     )
-
-
-def _channels(experiment: Experiment, settings: SpinSettings) -> list[dict[str, str]]:
-    """The columns; there is none for an uncertainty that nobody knows."""
-    known = settings.reading_u_hz is not None
-    return [vars(channel) for channel in experiment.channels if known or "_u_" not in channel.name]
-
-
-def _configuration(order: Order) -> dict[str, Any]:
-    config = order.config if order.world is None else replace_instruments(order.config)
-    return config.model_dump(mode="json")
-
-
-def replace_instruments(config: BenchConfig) -> BenchConfig:
-    """The configuration with the virtual instruments in the place of the real ones."""
-    return config.model_copy(update=dict(VIRTUAL))
-
-
-def software_versions() -> dict[str, str]:
-    """Versions of what a result may depend on."""
-    import platform
-    from importlib.metadata import version
-
-    names = ("levilab", "numpy", "scipy", "pandas", "lmfit", "pyvisa", "pyvisa-py")
-    return {"python": platform.python_version(), "platform": platform.platform()} | {n: version(n) for n in names}

@@ -9,8 +9,8 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from levilab.record import software_versions
-from levilab.run import CannotWrite, replace_atomically
+from levilab.software import software_versions
+from levilab.writing import CannotWrite, replace_atomically
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

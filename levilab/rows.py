@@ -101,7 +101,8 @@ def _plain_lines(path: Path, layout: Layout) -> tuple[int, bytes]:
             codes, rest = np.frombuffer(block, np.uint8, count=end), block[end:]
             lines += int(np.count_nonzero(codes == ord("\n")))
             separators += int(np.count_nonzero(codes == separator))
-            if b"\0" in block or b"\r" in rest:  # pandas ends a field at the one, a line at the other
+            # pandas ends a field at the one, and a line at the other, wherever it stands
+            if b"\0" in block or block.count(b"\r") != block.count(b"\r\n"):
                 return 0, b""
     return (lines, rest) if separators == lines * (layout.width - 1) else (0, b"")
 

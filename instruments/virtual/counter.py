@@ -41,6 +41,7 @@ class Virtual53230A(VirtualInstrument):
             self.numeric("[SENSe[1]:]FREQuency:GATE:TIME", "gate", low=1e-4, high=1e3, default=0.1, unit="S"),
             self.word("INPut[1]:COUPling", "coupling", ("AC", "DC"), "AC"),
             self.numeric("INPut[1]:IMPedance", "impedance", low=50, high=1e6, default=1e6, unit="OHM"),
+            self.numeric("INPut[1]:PROBe", "probe_factor", low=1, high=10, default=1),
             self.numeric("INPut[1]:RANGe", "range", low=5, high=50, default=5, unit="V"),
             self.switch("INPut[1]:LEVel[1]:AUTO", "automatic_level", default=True),
             self.numeric("INPut[1]:LEVel[1][:ABSolute]", "level", low=-5.125, high=5.125, default=0, unit="V"),

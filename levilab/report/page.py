@@ -6,35 +6,39 @@ Nothing is fetched when it is opened, and everything that a person typed is esca
 from __future__ import annotations
 
 import base64
-from typing import TYPE_CHECKING, Any
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
+from analysis.uncertainty import Estimate
 from levilab.errors import LevilabError
 from levilab.figures import as_svg, spindown_figure
-from levilab.numbers import SYMBOLS, plain, share, with_uncertainty
-from levilab.pipeline import Options, Source, SpinDownAnalysis, analyze_spindowns
-from levilab.record import software_versions
-from levilab.run import CannotWrite, replace_atomically, utc_now
+from levilab.numbers import AXES, SYMBOLS, in_words, plain, share, with_uncertainty, without_unit
+from levilab.pipeline import Options, SpinDownAnalysis, analyze_spindowns
+from levilab.report.inputs import describe
+from levilab.run import utc_now
+from levilab.software import software_versions
 from levilab.tables import all_warnings, law_constants
+from levilab.writing import CannotWrite, replace_atomically
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-#: Readings printed in the page; more stay in the data file.
-MOST_READINGS = 200
+    from analysis.combine import Mean
 
 
 class UnknownFormat(LevilabError):
     """A report in a format that is not written."""
 
 
-def write_report(paths: Sequence[Path], output: Path) -> Path:
+def write_report(paths: Sequence[Path], output: Path, options: Options | None = None) -> Path:
     """Analyze what lies at the paths and report it.  Raises DataError, UnknownFormat, CannotWrite."""
     if output.suffix.lower() not in {".html", ".htm"}:
         raise UnknownFormat(
             f"{output}: reports are written as HTML, name the file report.html; a browser prints it to PDF"
         )
-    page = render(analyze_spindowns(paths, Options()))
+    page = render(analyze_spindowns(paths, options or Options()))
     try:
         output.parent.mkdir(parents=True, exist_ok=True)
         replace_atomically(output, page)
@@ -50,17 +54,26 @@ def render(analysis: SpinDownAnalysis) -> str:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
-        loader=PackageLoader("levilab.report", "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+        loader=PackageLoader("levilab.report", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
-    environment.filters |= {"estimate": with_uncertainty, "plain": plain, "share": share}
-    environment.globals["law_constants"] = law_constants
-    models = analysis.combined.fits
+    environment.filters |= {"estimate": with_uncertainty, "number": without_unit, "plain": plain, "share": share}
+    fits = analysis.combined.fits
+    best = analysis.combined.best
     return environment.get_template("page.html.j2").render(
-        analysis=analysis,
+        options=analysis.options,
         combined=analysis.combined,
-        synthetic=[source for source in analysis.sources if source.synthetic],
-        sources=[_about(source, analysis, k) for k, source in enumerate(analysis.sources)],
-        least_aicc=min((m.statistics.aicc for m in models if m.statistics.aicc is not None), default=0.0),
+        verdict=analysis.combined.verdict,
+        n=analysis.combined.fit(best).statistics.n,
+        constants={fit.name: law_constants(analysis, fit.name) for fit in fits},
+        scatters={fit.name: {name: scatter(mean) for name, mean in fit.constants.items()} for fit in fits},
+        least_aicc=min((fit.statistics.aicc for fit in fits if fit.statistics.aicc is not None), default=0.0),
+        banner=_banner(analysis),
+        inputs=[describe(*pair, analysis.options) for pair in zip(analysis.sources, analysis.runs, strict=True)],
+        columns=_columns(analysis),
         symbols=SYMBOLS,
         figure=_as_image(as_svg(spindown_figure(analysis))),
         warnings=all_warnings(analysis),
@@ -69,24 +82,60 @@ def render(analysis: SpinDownAnalysis) -> str:
     )
 
 
-def _about(source: Source, analysis: SpinDownAnalysis, k: int) -> dict[str, Any]:
-    """What the page says of one input."""
-    readings = source.readings
-    count = len(readings.time)
-    rows = [
-        (float(readings.time[i]), float(readings.frequency[i]), None if readings.u is None else float(readings.u[i]))
-        for i in range(min(count, MOST_READINGS))
+def _banner(analysis: SpinDownAnalysis) -> tuple[str, str] | None:
+    """Which inputs are synthetic, and what that does to the result."""
+    total, made_up = len(analysis.sources), [source.name for source in analysis.sources if source.synthetic]
+    if not made_up:
+        return None
+    below = "How it was made stands below, under its name."
+    if total == 1:
+        return "SYNTHETIC.", f"This run did not come from a real top. {below}"
+    below = "How each was made stands below, under its name."
+    if len(made_up) == total:
+        return "SYNTHETIC.", f"None of these {total} runs came from a real top. {below}"
+    said = f"{len(made_up)} of {total} runs did not come from a real top ({', '.join(made_up)})"
+    mixed = "Means, comparison of the laws and figure are of both together and so no measurement: report the real runs "
+    return "REAL AND SYNTHETIC RUNS MIXED.", f"{said}. {mixed}by themselves. {below}"
+
+
+@dataclass(frozen=True)
+class Column:
+    """A constant, run by run.  of: where it comes from; estimates: one a run."""
+
+    of: str
+    symbol: str
+    unit: str
+    estimates: tuple[Estimate, ...]
+    mean: Mean | None
+    scatter: Estimate | None
+
+
+def _columns(analysis: SpinDownAnalysis) -> list[Column]:
+    """The straight lines' constants and those of the best law's fit."""
+    combined, columns = analysis.combined, []
+    for law in combined.fits:
+        if law.linearised:
+            lines = [run.fit(law.name).linearised or {} for run in analysis.runs]
+            columns += _of_law(f"{AXES[law.name]} against t", law.linearised, lines)
+    best = combined.fit(combined.best)
+    fits = [run.fit(best.name).parameters for run in analysis.runs]
+    starts = tuple(fit["start_frequency"] for fit in fits)
+    columns.append(Column(f"{best.name} fit", SYMBOLS["start_frequency"], in_words(starts[0].unit), starts, None, None))
+    return columns + _of_law(f"{best.name} fit", best.constants, fits)
+
+
+def _of_law(of: str, means: Mapping[str, Mean], runs: Sequence[Mapping[str, Estimate]]) -> list[Column]:
+    return [
+        Column(of, SYMBOLS[name], in_words(mean.unit), tuple(run[name] for run in runs), mean, scatter(mean))
+        for name, mean in means.items()
     ]
-    return {
-        "source": source,
-        "fit": analysis.runs[k],
-        "record": source.run.record if source.run else None,
-        "status": source.run.status if source.run else "data file",
-        "events": source.run.events() if source.run else [],
-        "count": count,
-        "rows": rows,
-        "outliers": set(analysis.runs[k].outliers),
-    }
+
+
+def scatter(mean: Mean) -> Estimate | None:
+    """Standard deviation between the runs; its own u is s/√(2·dof) (GUM E.4.3)."""
+    if mean.scatter is None:
+        return None
+    return Estimate(mean.scatter, mean.scatter / math.sqrt(2 * mean.degrees_of_freedom), mean.unit)
 
 
 def _as_image(svg: str) -> str:

@@ -17,6 +17,8 @@ def preparation(gate, level, timeout):
         f"SENS:FREQ:GATE:TIME {gate}",
         "INP1:COUP DC",
         "INP1:IMP 1000000.0",
+        "INP1:PROB 1.0",
+        "INP1:RANG 5.0",
         "INP1:LEV:AUTO OFF",
         f"INP1:LEV1 {level}",
         "INP1:SLOP1 POS",
@@ -63,13 +65,13 @@ def test_the_counters_own_time_out_is_no_reading():
 
 
 def test_a_counter_that_waits_for_ever_is_cleared_and_aborted_and_gives_no_reading():
-    lines = [("READ?", SILENCE), (CLEAR, None), ("ABOR", None), NO_ERROR]
+    lines = [("READ?", SILENCE), (CLEAR, None), ("*CLS", None), ("ABOR", None), NO_ERROR]
     with conversation(Keysight53230A, *lines) as counter:
         assert counter.frequency() is None
 
 
 def test_a_link_that_is_dead_is_not_taken_for_a_missing_signal():
-    lines = [("READ?", SILENCE), (CLEAR, None), ("ABOR", None), ("SYST:ERR?", SILENCE)]
+    lines = [("READ?", SILENCE), (CLEAR, None), ("*CLS", None), ("ABOR", None), ("SYST:ERR?", SILENCE)]
     with conversation(Keysight53230A, *lines) as counter, pytest.raises(NoAnswer) as silence:
         counter.frequency()
     assert silence.value.question == "SYST:ERR?"

@@ -10,20 +10,20 @@ from instruments.errors import CommandRefused, NoAnswer, OutOfRange
 from instruments.generator import Keysight33500B
 
 
-def test_the_signal_is_set_for_a_coil_and_the_output_left_alone():
-    lines = accepted("OUTP1:LOAD INF", "VOLT:UNIT VPP", "FUNC SIN", "FREQ 30.5", "VOLT 10.0", "VOLT:OFFS 0.0")
+def test_the_signal_is_set_for_a_coil_from_a_clean_state_with_the_offset_gone_before_the_amplitude_comes():
+    lines = accepted("*RST", "OUTP1:LOAD INF", "VOLT:UNIT VPP", "FUNC SIN", "FREQ 30.5", "VOLT:OFFS 0.0", "VOLT 10.0")
     with conversation(Keysight33500B, *lines) as generator:
         generator.prepare(waveform="SIN", frequency_hz=30.5, amplitude_vpp=10.0)
 
 
 def test_off_is_sent_and_seen():
-    with conversation(Keysight33500B, *accepted("OUTP1 OFF"), ("OUTP1?", "0")) as generator:
+    with conversation(Keysight33500B, ("*CLS", None), ("OUTP1 OFF", None), ("OUTP1?", "0")) as generator:
         generator.off()
 
 
 def test_an_output_that_stays_on_is_an_error():
     with (
-        conversation(Keysight33500B, *accepted("OUTP1 OFF"), ("OUTP1?", "1")) as generator,
+        conversation(Keysight33500B, ("*CLS", None), ("OUTP1 OFF", None), ("OUTP1?", "1")) as generator,
         pytest.raises(CommandRefused, match="still on"),
     ):
         generator.off()
@@ -31,14 +31,14 @@ def test_an_output_that_stays_on_is_an_error():
 
 def test_a_silent_generator_is_not_taken_for_one_that_is_off():
     with (
-        conversation(Keysight33500B, ("OUTP1 OFF", None), ("SYST:ERR?", SILENCE)) as generator,
+        conversation(Keysight33500B, ("*CLS", None), ("OUTP1 OFF", None), ("OUTP1?", SILENCE)) as generator,
         pytest.raises(NoAnswer),
     ):
         generator.off()
 
 
 def test_an_amplitude_beyond_the_generator_stops_the_preparation_before_it_is_sent():
-    lines = accepted("OUTP1:LOAD INF", "VOLT:UNIT VPP", "FUNC SIN", "FREQ 30.5")
+    lines = accepted("*RST", "OUTP1:LOAD INF", "VOLT:UNIT VPP", "FUNC SIN", "FREQ 30.5", "VOLT:OFFS 0.0")
     with conversation(Keysight33500B, *lines) as generator, pytest.raises(OutOfRange, match=r"0\.002 to 20 Vpp"):
         generator.prepare(waveform="SIN", frequency_hz=30.5, amplitude_vpp=20.5)
 

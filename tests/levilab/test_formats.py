@@ -414,3 +414,34 @@ def test_a_line_far_down_is_named(table_file):
     rows = "".join(f"{i},61.5\n" for i in range(30000))
     with pytest.raises(TableError, match="line 30003: 'x' stands in column 'f'"):
         read_table(table_file(f"t,f\n{rows}# pause\n30001,x\n30002,61\n"))
+
+
+def test_columns_that_nobody_asked_for_cost_no_reading(table_file):
+    rows = "".join(f"{t},{60 - t},{'' if t % 5 else 0.07},ok\n" for t in range(20))
+    path = table_file("time_s,spin_frequency_hz,height_m,drive\n" + rows)
+    table = read_table(path, quantities=(T, F, U))
+    assert list(table.frame) == [T, F]
+    assert len(table.frame) == 20
+    assert table.warnings == ()
+
+
+def test_uncertainties_with_gaps_are_not_used_rather_than_readings_lost(table_file):
+    rows = "".join(f"{t},{60 - t},{'' if t % 2 else 0.03}\n" for t in range(20))
+    table = read_table(table_file("t,f,u\n" + rows))
+    assert list(table.frame) == [T, F]
+    assert len(table.frame) == 20
+    assert "empty in 10 of 20 rows" in table.warnings[0]
+
+
+def test_a_unit_can_be_stated_with_the_column(table_file):
+    path = table_file("Zeit;Drehzahl\n" + "".join(f"{t};{1800 - t}\n" for t in range(5)))
+    table = read_table(path, columns={"t": "Zeit", "f": "Drehzahl [rpm]"})
+    assert table.frame[F].iloc[0] == pytest.approx(30.0)
+    with pytest.raises(TableError, match="no unit of frequency"):
+        read_table(path, columns={"t": "Zeit", "f": "Drehzahl [ells]"})
+
+
+@pytest.mark.parametrize(("text", "says"), [('{"schema": 1}\n', "JSON"), ("<!DOCTYPE html>\n<p>", "HTML")])
+def test_what_is_another_kind_of_text_is_named(table_file, text, says):
+    with pytest.raises(TableError, match=says):
+        read_table(table_file(text))

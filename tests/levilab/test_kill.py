@@ -149,7 +149,7 @@ def limiting(fd):
     global count
     sync(fd)
     count += 1
-    if count == 8:
+    if count == 12:
         resource.setrlimit(resource.RLIMIT_FSIZE, ({room}, {room}))
 os.fsync = limiting
 """

@@ -10,7 +10,7 @@ from tests_of_levilab import spin_down_csv
 from levilab.errors import DataError, LevilabError
 from levilab.pipeline import Options, analyze_spindowns
 from levilab.result import as_document, save_result
-from levilab.run import CannotWrite
+from levilab.writing import CannotWrite
 
 #: The thesis's constants, as printed: C₁ [1/s], |C₂| [1/rad].
 PUBLISHED = (

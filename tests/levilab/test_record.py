@@ -1,9 +1,11 @@
 """The acquisition: from the virtual bench into a run folder, and every way out of it."""
 
+from __future__ import annotations
+
+import dataclasses
 import itertools
 import json
 import signal
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,11 +19,13 @@ from levilab.config import BenchConfig, SpinSettings
 from levilab.experiment import ExperimentFailed
 from levilab.order import spin_order
 from levilab.record import Order, acquire
-from levilab.run import CannotWrite, Run, RunWriter
+from levilab.run import Run
 from levilab.simulator.world import SpinScene, SpinWorld, drawn
+from levilab.writing import CannotWrite, RunWriter
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
 
 class Silent:
@@ -42,8 +46,8 @@ class Silent:
     def close(self) -> None: ...
 
 
-def mock(out: Path, seed: int = 1, **changes: Any) -> Order:
-    words: dict[str, Any] = {"bench": Path("none"), "note": "", "realtime": False, "resume": None, "wire_log": False}
+def mock(out: Path, seed: int | None = 1, **changes: Any) -> Order:
+    words: dict[str, Any] = {"bench": None, "note": "", "realtime": False, "resume": None, "wire_log": False}
     return spin_order(mock=True, out=out, seed=seed, **(words | changes))
 
 
@@ -80,7 +84,7 @@ def test_a_spin_down_is_read_every_ten_seconds_until_the_top_falls(tmp_path: Pat
     assert 21 < frame["spin_frequency_hz"].iloc[-1] < 24
     assert (frame["spin_frequency_u_hz"] == 0.03).all()
     assert outputs[-1] is False
-    assert [event["kind"] for event in run.events()] == ["drive on", "locked", "drive off", "reading missed", "fell"]
+    assert [event["kind"] for event in run.events()] == ["drive on", "locked", "drive off", "asked again", "fell"]
 
 
 def test_the_readings_follow_the_law_of_the_world_within_their_uncertainty(tmp_path: Path) -> None:
@@ -146,14 +150,8 @@ def test_a_top_that_does_not_follow_the_drive_is_an_error(tmp_path: Path, output
     weak = SpinSettings(drive_amplitude_vpp=0.5)
     with pytest.raises(ExperimentFailed, match="did not follow"):
         acquire(in_world(tmp_path, SpinScene(), weak), Silent())
-    assert outputs == [True, False, *outputs[2:]]
+    assert True in outputs
     assert outputs[-1] is False
-
-
-def test_a_drive_beyond_the_limits_is_refused_before_anything_is_set(tmp_path: Path, outputs: list[bool]) -> None:
-    with pytest.raises(InstrumentError, match=r"drive_amplitude_vpp = 15.*limits"):
-        acquire(in_world(tmp_path, SpinScene(), SpinSettings(drive_amplitude_vpp=15.0)), Silent())
-    assert True not in outputs
 
 
 def test_a_top_that_never_falls_ends_at_the_longest_time(tmp_path: Path) -> None:
@@ -221,16 +219,77 @@ def test_an_exception_at_any_moment_leaves_outputs_off_and_the_readings_so_far(
     assert "READ?" in run.events()[-1]["text"]
 
 
+def counting(monkeypatch: pytest.MonkeyPatch, wrong: Callable[[int, float | None], float | None]) -> None:
+    """Let the counter miscount: `wrong` gets the number of the count, the first after the drive is 2, and its value."""
+    count = itertools.count()
+    read = Keysight53230A.frequency
+    monkeypatch.setattr(Keysight53230A, "frequency", lambda self: wrong(next(count), read(self)))
+
+
 def test_a_fallen_top_that_rattles_is_not_taken_for_a_spinning_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    rattle = iter([180.0, 3.0])
-    read = Keysight53230A.frequency
-    monkeypatch.setattr(Keysight53230A, "frequency", lambda self: read(self) or next(rattle))
+    rattle = itertools.cycle([180.0, 3.0, 95.0])
+    counting(monkeypatch, lambda _, spin: spin or next(rattle))
     run = acquire(mock(tmp_path), Silent())
     assert run.readings().frame["spin_frequency_hz"].between(20, 41).all()
-    assert [event["spin_frequency_hz"] for event in run.events() if event["kind"] == "implausible"] == [180.0, 3.0]
     assert run.events()[-1]["kind"] == "fell"
+    assert "3 times in a row" in run.events()[-1]["text"]
+    assert {180.0, 3.0, 95.0} <= {event.get("spin_frequency_hz") for event in run.events()}
+
+
+@pytest.mark.parametrize(("number", "factor"), [(2, 2.0), (7, 2.0), (7, 0.5), (7, 0.8), (12, 1.3)])
+def test_one_miscount_does_not_end_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, factor: float
+) -> None:
+    whole = acquire(mock(tmp_path / "whole"), Silent()).readings().frame
+    counting(monkeypatch, lambda k, spin: spin * factor if spin and k == number else spin)
+    run = acquire(mock(tmp_path / "one"), Silent())
+    frame = run.readings().frame
+    assert run.status == "finished"
+    assert len(frame) == len(whole)
+    off = np.abs(frame["spin_frequency_hz"].to_numpy() / whole["spin_frequency_hz"].to_numpy() - 1) > 0.1
+    assert off.sum() <= 1  # a miscount that could be true stands; the analysis finds it
+
+
+@pytest.mark.parametrize("moment", range(3))
+def test_a_signal_while_connecting_never_lets_the_drive_on(
+    tmp_path: Path, outputs: list[bool], monkeypatch: pytest.MonkeyPatch, moment: int
+) -> None:
+    asked = itertools.count()
+    identity = Keysight33500B.identity
+
+    def interrupted(self: Keysight33500B) -> str:
+        if next(asked) == moment // 2:
+            signal.raise_signal(signal.SIGINT)
+        return identity(self)
+
+    monkeypatch.setattr(Keysight53230A if moment % 2 else Keysight33500B, "identity", interrupted)
+    run = acquire(mock(tmp_path), Silent())
+    assert run.status == "interrupted"
+    assert True not in outputs
+
+
+def test_the_time_of_a_reading_is_the_middle_of_its_gate(tmp_path: Path) -> None:
+    """At 40 Hz and 0.1 Hz/s a time stamp that is half a gate off would be 0.05 Hz off; the mean of 40 runs tells."""
+    off = []
+    for seed in range(40):
+        worlds: list[SpinWorld] = []
+        order = mock(tmp_path, seed)
+        make = order.world
+        assert make
+
+        def keep(make: Callable[[], Any] = make, worlds: list[SpinWorld] = worlds) -> SpinWorld:
+            worlds.append(make())
+            return worlds[0]
+
+        frame = acquire(dataclasses.replace(order, world=keep), Silent()).readings().frame
+        released = [stretch for stretch in worlds[0]._stretches if stretch.rule == "coasts"][-1].start
+        spin, _ = worlds[0].motion(released + frame["time_s"].to_numpy()[:8])
+        off += list(frame["spin_frequency_hz"].to_numpy()[:8] - spin / (2 * np.pi))
+    # 320 readings of 0.03 Hz: 0.0017 Hz; 5 ms between the drive's end and time zero: 0.0005 Hz; the reciprocal
+    # counter's own bias near whole numbers of periods: a few mHz
+    assert abs(np.mean(off)) < 0.008
 
 
 def test_errors_that_an_earlier_program_left_are_not_ours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -262,7 +321,7 @@ def test_a_full_disk_in_the_middle_leaves_outputs_off_and_the_shown_readings(
         def reading(self, text: str, elapsed: float, remaining: float) -> None:
             super().reading(text, elapsed, remaining)
             if len(self.readings) == 7:
-                monkeypatch.setattr("levilab.run.os.fsync", full)
+                monkeypatch.setattr("levilab.writing.os.fsync", full)
 
     def full(_: int) -> None:
         raise OSError(28, "No space left on device")
@@ -285,7 +344,7 @@ def test_an_interrupted_run_is_resumed_where_it_was_left(tmp_path: Path) -> None
                 signal.raise_signal(signal.SIGINT)
 
     half = acquire(mock(tmp_path, 3), Impatient())
-    run = acquire(mock(tmp_path, 3, resume=half.folder), Silent())
+    run = acquire(mock(tmp_path, None, resume=half.folder, note="second half"), Silent())
     whole = acquire(mock(tmp_path, 3), Silent()).readings().frame
     frame = run.readings().frame
     assert run.folder == half.folder

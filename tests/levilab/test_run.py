@@ -10,7 +10,8 @@ import pytest
 
 from levilab.errors import DataError
 from levilab.listing import list_runs
-from levilab.run import CannotWrite, Run, RunRecord, RunWriter, find_runs, replace_atomically
+from levilab.run import Run, RunRecord, find_runs
+from levilab.writing import CannotWrite, RunWriter, replace_atomically
 
 CHANNELS = [
     {"name": "time_s", "unit": "s", "source": "clock"},
@@ -42,8 +43,8 @@ def test_a_run_that_was_written_loads_as_it_was(tmp_path: Path) -> None:
     run = Run.load(written(tmp_path))
     assert (run.status, run.record.experiment) == ("finished", "spin")
     frame = run.readings().frame
-    assert frame["time_s"].tolist() == [0, 20, 30]  # a row without u is no whole reading
-    assert frame["spin_frequency_hz"].tolist() == [40.0, 40 - 2 / 3, 39.0]
+    assert frame["time_s"].tolist() == [0, 10, 20, 30]
+    assert frame["spin_frequency_hz"].tolist() == [40.0, 40 - 1 / 3, 40 - 2 / 3, 39.0]
     assert [event["kind"] for event in run.events()] == ["drive off"]
 
 
@@ -70,7 +71,7 @@ def test_a_torn_last_line_is_left_out_with_a_warning(tmp_path: Path) -> None:
     whole = (folder / "readings.csv").read_bytes()
     (folder / "readings.csv").write_bytes(whole + b"40.0,38.")
     table = Run.load(folder).readings()
-    assert len(table.frame) == 3
+    assert len(table.frame) == 4
     assert any("cut off" in warning or "torn" in warning for warning in table.warnings)
 
 
@@ -124,7 +125,7 @@ def test_replacing_a_file_leaves_the_old_one_whole_when_writing_fails(
     def no_space(_: int) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("levilab.run.os.fsync", no_space)
+    monkeypatch.setattr("levilab.writing.os.fsync", no_space)
     with pytest.raises(OSError, match="No space"):
         replace_atomically(path, "new")
     assert path.read_text(encoding="utf-8") == "old"
@@ -142,7 +143,7 @@ def test_when_the_disk_is_full_every_earlier_reading_is_kept(
         def no_space(_: int) -> None:
             raise OSError(28, "No space left on device")
 
-        monkeypatch.setattr("levilab.run.os.fsync", no_space)
+        monkeypatch.setattr("levilab.writing.os.fsync", no_space)
         with pytest.raises(CannotWrite, match=r"77\.5,21\.5.*No space left on device.*earlier readings are kept"):
             writer.reading({"time_s": 77.5, "spin_frequency_hz": 21.5, "spin_frequency_u_hz": 0.03})
     run = Run.load(writer.folder)

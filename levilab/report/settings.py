@@ -1,0 +1,65 @@
+"""An instrument's settings, as they stand in run.json, in the words of a lab book."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+#: How the last word of a key is written as a unit.
+UNITS = {
+    "s": "s", "hz": "Hz", "v": "V", "vpp": "Vpp", "ohm": "Ω", "t": "T", "m": "m", "a": "A", "k": "K", "db": "dB",
+}  # fmt: skip
+#: Instruments say infinite as 9.9e37 (SCPI-99 volume 1, §7.2.1.4).
+INFINITE = 9e37
+#: What makes up a generator's drive; the other settings are named one by one.
+_DRIVE = ("frequency_hz", "amplitude_vpp", "waveform")
+_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+
+
+def settings_in_words(settings: Mapping[str, Any]) -> str:
+    """All settings in one line; a generator's drive first.
+
+    >>> settings_in_words({"automatic_level": False, "gate_s": 1.0, "impedance_ohm": 1e6})
+    'automatic level off, gate 1 s, impedance 1 MΩ'
+    >>> settings_in_words({"output": False, "frequency_hz": 40.0, "amplitude_vpp": 10.0, "waveform": "SIN"})
+    'output off; last drive 40 Hz, 10 Vpp, SIN'
+    """
+    drive = [value_in_words(key, settings[key]) for key in _DRIVE if key in settings]
+    if "output" not in settings or not drive:
+        return ", ".join(setting_in_words(key, value) for key, value in settings.items())
+    others = [setting_in_words(key, value) for key, value in settings.items() if key not in {"output", *_DRIVE}]
+    named = "drive" if settings["output"] else "last drive"
+    parts = [setting_in_words("output", settings["output"]), f"{named} {', '.join(drive)}", ", ".join(others)]
+    return "; ".join(filter(None, parts))
+
+
+def setting_in_words(key: str, value: Any) -> str:
+    """A setting and its value.
+
+    >>> setting_in_words("load_ohm", 9.9e37)
+    'load high impedance'
+    """
+    name, _, unit = key.rpartition("_")
+    return f"{(name if unit in UNITS and name else key).replace('_', ' ')} {value_in_words(key, value)}"
+
+
+def value_in_words(key: str, value: Any) -> str:
+    """A setting's value with the unit that its key ends in; other units stand as they are typed.
+
+    >>> value_in_words("trigger_level_v", 0.6), value_in_words("slope", "POS"), value_in_words("interval_s", 0.005)
+    ('0.6 V', 'POS', '5 ms')
+    """
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    if not isinstance(value, int | float):
+        return "not known" if value is None else str(value)
+    name, _, last = key.rpartition("_")
+    unit = UNITS.get(last, "") if name else ""
+    if abs(value) >= INFINITE:
+        return "high impedance" if unit == "Ω" else "infinite"
+    if not unit or 0.01 <= abs(value) < 1000 or value == 0:
+        return f"{value:g} {unit}".strip()
+    factor, prefix = next(((f, p) for f, p in _PREFIXES if abs(value) >= f), _PREFIXES[-1])
+    return f"{value / factor:g} {prefix}{unit}"

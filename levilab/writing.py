@@ -1,0 +1,248 @@
+"""Writing a run folder while measuring, so that nothing is lost.
+
+``run.json`` is replaced atomically, ``readings.csv`` and ``events.jsonl`` are flushed to the disk row by row:
+a process that is killed between two rows loses nothing that it has shown.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import math
+import os
+import secrets
+import shutil
+import time
+from datetime import UTC, datetime
+from typing import IO, TYPE_CHECKING, Any, Self
+
+from levilab.errors import LevilabError
+from levilab.run import EVENTS, PACKAGE, READINGS, RECORD, WIRE, RunRecord, lock_of, utc_now
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+    from pathlib import Path
+
+    from levilab.run import Run, Status
+
+
+class CannotWrite(LevilabError):
+    """A file cannot be written (any more)."""
+
+
+def replace_atomically(path: Path, text: str) -> None:
+    """Write a file so that a reader sees the old one or the new one, whole, whatever happens meanwhile.
+
+    Raises OSError.
+    """
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with part.open("w", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        _replace(part, path)
+        _sync_folder(path.parent)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
+        raise
+
+
+def _sync_folder(folder: Path) -> None:
+    """A new name is on the disk only with its folder; Windows keeps names without being asked."""
+    if os.name != "posix":
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _replace(part: Path, path: Path) -> None:
+    """os.replace; Windows refuses for as long as another program reads the old file."""
+    for attempt in range(10):
+        try:
+            part.replace(path)
+        except PermissionError:
+            if os.name != "nt" or attempt == 9:
+                raise
+            time.sleep(0.02)
+        else:
+            return
+
+
+class RunWriter:
+    """A run folder that is being written.  One row is one `write` of a whole line, on the disk before it is shown.
+
+    Use it as a context manager: it holds the folder's lock, by which others see that the run is alive.
+    """
+
+    def __init__(self, folder: Path, record: RunRecord) -> None:
+        self.folder, self.record = folder, record
+        self._files: dict[str, IO[str]] = {}
+        self._lock = lock_of(folder)
+
+    @classmethod
+    def create(cls, out: Path, record: RunRecord) -> Self:
+        """A new folder ``<UTC>-<experiment>-<four hex digits>`` below `out`.  Raises CannotWrite."""
+        with _told("create the run folder", out, safe=""):
+            out.mkdir(parents=True, exist_ok=True)
+            writer = cls(_new_folder(out, record.experiment), record)
+            writer._lock.acquire(blocking=False)
+            writer._append(READINGS, writer._header())
+            replace_atomically(writer.folder / RECORD, record.as_json())
+            _sync_folder(out)
+        return writer
+
+    @classmethod
+    def reopen(cls, run: Run, *, note: str = "") -> Self:
+        """Go on writing an ended run; torn last lines are cut off first, a note is added.  Raises CannotWrite."""
+        writer = cls(run.folder, run.record)
+        with _told("reopen the run", run.folder):
+            try:
+                writer._lock.acquire(timeout=2)
+            except TimeoutError:
+                raise CannotWrite(f"{run.folder}: another process is writing this run") from None
+            for name in (READINGS, EVENTS):
+                _cut_torn_line(run.folder / name)
+            writer._check_header()
+            notes = "; ".join(filter(None, (run.record.note, note)))
+            writer.update(status="running", ended_utc=None, note=notes)
+        return writer
+
+    def _header(self) -> str:
+        return ",".join(channel["name"] for channel in self.record.channels)
+
+    def _check_header(self) -> None:
+        """New rows must stand below the header that they are of; an empty file gets one."""
+        path = self.folder / READINGS
+        first = path.read_text(encoding="utf-8").partition("\n")[0] if path.exists() else ""
+        if not first:
+            self._append(READINGS, self._header())
+        elif first != self._header():
+            raise CannotWrite(f"{path}: its header is {first!r}, run.json says {self._header()!r}: not gone on with")
+
+    def discard(self) -> None:
+        """Take a run away that never began.  Only for one without a reading."""
+        for file in self._files.values():
+            file.close()
+        self._files.clear()
+        self._lock.release()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for file in self._files.values():
+            with contextlib.suppress(OSError):
+                file.close()
+        self._lock.release()
+
+    def update(self, **changes: Any) -> None:
+        """Change entries of run.json."""
+        record = self.record.model_copy(update=changes)
+        with _told("write run.json", self.folder):
+            replace_atomically(self.folder / RECORD, record.as_json())
+        self.record = record
+
+    def reading(self, row: Mapping[str, float | None]) -> None:
+        """Append a row to readings.csv.  None becomes an empty cell.  Raises CannotWrite with the row in it."""
+        line = ",".join(_cell(row.get(channel["name"])) for channel in self.record.channels)
+        with _told(f"write the reading {line}", self.folder):
+            self._append(READINGS, line)
+
+    def event(self, time_s: float | None, kind: str, text: str, **data: Any) -> None:
+        """Append a line to events.jsonl."""
+        event = {"utc": utc_now(), "time_s": time_s, "kind": kind, "text": text} | data
+        with _told(f"write the event {text!r}", self.folder):
+            self._append(EVENTS, json.dumps(event, ensure_ascii=False, allow_nan=False))
+
+    def wire(self, address: str, direction: str, data: bytes) -> None:
+        """Append bytes that went over the wire to wire.log.
+
+        Never raises: the log is no measurement, and the exchange under way may be the one that switches the
+        output off.  If the log cannot be written it ends there, and run.json says why.
+        """
+        if "wire_log_ended" in (self.record.model_extra or {}):
+            return
+        try:
+            self._append(WIRE, f"{utc_now()} {address} {direction} {data!r}", sync=False)
+        except OSError as error:
+            ended = {"wire_log_ended": error.strerror or str(error)}
+            self.record = RunRecord.model_validate(self.record.model_dump() | ended)
+
+    def finish(self, status: Status, **changes: Any) -> None:
+        """The run has ended: run.json says how, datapackage.json describes the files."""
+        self.update(status=status, ended_utc=utc_now(), **changes)
+        with _told("write datapackage.json", self.folder):
+            replace_atomically(self.folder / PACKAGE, _datapackage(self.folder, self.record))
+
+    def _append(self, name: str, line: str, *, sync: bool = True) -> None:
+        if name not in self._files:
+            self._files[name] = (self.folder / name).open("a", encoding="utf-8", newline="\n")
+        file = self._files[name]
+        file.write(line + "\n")
+        file.flush()
+        if sync:
+            os.fsync(file.fileno())
+
+
+def _new_folder(out: Path, experiment: str) -> Path:
+    """``<UTC>-<experiment>-<four hex digits>``, one that is not there yet."""
+    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
+    while True:
+        folder = out / f"{stamp}-{experiment}-{secrets.token_hex(2)}"
+        with contextlib.suppress(FileExistsError):
+            folder.mkdir()
+            return folder
+
+
+def _cell(value: float | None) -> str:
+    return "" if value is None or not math.isfinite(value) else repr(float(value))
+
+
+def _cut_torn_line(path: Path) -> None:
+    if not path.exists():
+        return
+    with path.open("rb+") as file:
+        data = file.read()
+        file.truncate(data.rfind(b"\n") + 1)
+
+
+@contextlib.contextmanager
+def _told(what: str, where: Path, safe: str = "all earlier readings are kept: ") -> Iterator[None]:
+    """An OSError as one sentence that says what is safe and what to do."""
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise CannotWrite(
+            f"could not {what} in {where} ({reason}); {safe}free space, or choose another place with --out"
+        ) from error
+
+
+def _datapackage(folder: Path, record: RunRecord) -> str:
+    """The Frictionless description of the folder: fields with units, and the hash of each file."""
+    fields = [
+        {"name": channel["name"], "type": "number", "unit": channel["unit"], "description": channel["source"]}
+        for channel in record.channels
+    ]
+    resources: list[dict[str, Any]] = []
+    for name in (READINGS, EVENTS, WIRE):
+        path = folder / name
+        if path.exists():
+            data = path.read_bytes()
+            about = {"path": name, "name": name.replace(".", "-"), "bytes": len(data)}
+            about["hash"] = "sha256:" + hashlib.sha256(data).hexdigest()
+            resources.append(about | ({"schema": {"fields": fields}} if name == READINGS else {}))
+    package = {
+        "name": folder.name.lower(),
+        "title": f"levilab {record.experiment} run",
+        "created": record.started_utc,
+        "resources": resources,
+    }
+    return json.dumps(package, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
