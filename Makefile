@@ -12,12 +12,13 @@ help:  ## list the targets
 setup: .venv/ready  ## make the environment in .venv
 
 .venv/ready: pyproject.toml constraints.txt
-	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "levilab needs Python 3.11 or newer, this is " + sys.version.split()[0] + ": make PYTHON=python3.12 …")'
-	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "levilab needs Python 3.11 or newer, this is " + sys.version.split()[0] + ": make PYTHON=python3.12 …")'
+	@echo 'making an environment in .venv and installing into it: about a minute'
+	@$(PYTHON) -m venv .venv
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
 	@touch $@
 
-demo: setup  ## the main job on the virtual bench: acquire, analyze, report
+demo: setup  ## the main job on the virtual bench: acquire, analyze, report (into demo/, made anew)
 	@rm -rf $(DEMO)
 	$(BIN)/levilab acquire spin --mock --out $(DEMO)
 	$(BIN)/levilab analyze spindown $(DEMO)
@@ -38,7 +39,7 @@ all-pythons: setup  ## the tests on every Python from 3.11 on that is installed
 	  PYENV_VERSION="$$(pyenv version-name):$$(pyenv versions --bare | tr '\n' ':')"; export PYENV_VERSION; fi; \
 	$(BIN)/nox --session tests
 
-wheel: setup  ## build the wheel and try it in a clean environment, beside a decoy
+wheel: setup  ## build the wheel into dist/ and try it in a clean environment, beside a decoy
 	$(BIN)/nox --session wheel
 
 bench: setup  ## speed, as ratios within one run; the kept results are in docs/speed.md

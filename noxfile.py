@@ -11,16 +11,16 @@ nox.options.error_on_missing_interpreters = False
 
 PYTHONS = ["3.11", "3.12", "3.13", "3.14"]
 CONSTRAINTS = Path("constraints.txt").resolve()
+DIST = Path("dist").resolve()
 
 
 def install_wheel(session: nox.Session, *extras: str) -> None:
-    """Build the wheel and install it, with the versions that the tests have passed with."""
-    folder = Path(session.create_tmp())
+    """Build the wheel into dist/ and install it, with the versions that the tests have passed with."""
     session.install("build", "--constraint", str(CONSTRAINTS))
-    session.run("python", "-m", "build", "--wheel", "--outdir", str(folder), silent=True)
-    (wheel,) = folder.glob("levilab-*.whl")
-    session.install(f"{wheel}{''.join(extras)}", "--constraint", str(CONSTRAINTS))
-    wheel.unlink()
+    session.run("python", "-m", "build", "--wheel", "--outdir", str(DIST), silent=True)
+    newest = max(DIST.glob("levilab-*.whl"), key=lambda wheel: wheel.stat().st_mtime)
+    session.install(f"{newest}{''.join(extras)}", "--force-reinstall", "--no-deps")
+    session.install(f"{newest}{''.join(extras)}", "--constraint", str(CONSTRAINTS))
 
 
 @nox.session(python=PYTHONS)
@@ -34,7 +34,7 @@ def tests(session: nox.Session) -> None:
 def wheel(session: nox.Session) -> None:
     """The wheel in a clean environment runs from a folder that holds a decoy analysis.py."""
     install_wheel(session)
-    folder = Path(session.create_tmp()) / "elsewhere"
+    folder = Path(session.create_tmp()).resolve() / "elsewhere"
     folder.mkdir(exist_ok=True)
     for decoy in ("analysis.py", "instruments.py", "levilab.py"):
         (folder / decoy).write_text("raise SystemExit('the decoy was imported')\n", encoding="utf-8")
@@ -42,7 +42,7 @@ def wheel(session: nox.Session) -> None:
     session.run("levilab", "acquire", "spin", "--mock", "--out", "runs")
     session.run("levilab", "analyze", "spindown", "runs")
     session.run("levilab", "report", "runs", "-o", "report.html")
-    # the console script does not look here; -m would, so levilab must be found elsewhere first
+    # the console script does not look here, -m does: a levilab.py here is what the user asks for, the others are not
     (folder / "levilab.py").unlink()
     session.run("python", "-m", "levilab", "acquire", "spin", "--mock", "--out", "runs")
     session.log(f"the wheel works on {sys.platform}")

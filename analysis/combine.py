@@ -14,9 +14,10 @@ from analysis.drag import LAWS
 from analysis.errors import NothingToCombine
 from analysis.lawfit import ROUNDING, LawFit
 from analysis.residuals import durbin_watson, runs_test_p
-from analysis.selection import NO_FIT, Statistics, Verdict, statistics, verdict, weigh
+from analysis.selection import NO_FIT, Statistics, statistics, weigh
 from analysis.spindown import SpinDown, comparison_warnings
 from analysis.uncertainty import Estimate
+from analysis.verdict import Verdict, verdict
 
 Array = NDArray[np.float64]
 
@@ -91,15 +92,38 @@ def combine(runs: Sequence[SpinDown]) -> Combined:
     names = [name for name in LAWS if runs and all(name in _names(run) for run in runs)]
     if not names:
         raise NothingToCombine(runs=len(runs))
-    weighed = weigh({name: _statistics(runs, name) for name in names})
+    weighed, criterion = weigh({name: _statistics(runs, name) for name in names})
     fits = tuple(_combined(name, [run.fit(name) for run in runs], weighed[name]) for name in names)
-    exponent = next((fit.constants["exponent"].u for fit in fits if fit.name == "power"), None)
+    exponent = next((fit.constants["exponent"] for fit in fits if fit.name == "power"), None)
     fall = max(float(1 - run.frequency[-1] / run.frequency[0]) for run in runs)
-    decision = verdict(weighed, fall=fall, exponent_u=exponent)
-    said = comparison_warnings(weighed, decision.best)
-    if len(runs) == 1:
-        said.append("this is one run: its uncertainties contain nothing of the scatter between runs, so record several")
+    decision = verdict(weighed, criterion, fall=fall, exponent=exponent)
+    said = [*comparison_warnings(weighed, decision.best), *_about_number(runs)]
     return Combined(fits, decision.best, decision, len(runs), tuple(said))
+
+
+def _about_number(runs: Sequence[SpinDown]) -> list[str]:
+    """What so few runs, or runs of two kinds, leave open."""
+    n, said = len(runs), []
+    without_u = sum(run.u is None for run in runs)
+    if 0 < without_u < n:
+        said.append(
+            f"{without_u} of {n} runs give no uncertainties of their readings: the laws are compared by the scatter "
+            "alone"
+        )
+    if n == 1:
+        said.append("this is one run: its uncertainties contain nothing of the scatter between runs, so record several")
+    elif n < FEW_RUNS:
+        from scipy.special import stdtrit
+
+        width = float(stdtrit(n - 1, 0.5 + 0.5 * 0.6827))
+        said.append(
+            f"{n} runs tell their own scatter, and so u of the means, to {100 / np.sqrt(2 * (n - 1)):.0f} % only: a "
+            f"68 % interval is {width:.2g} u to each side (Student's t)"
+        )
+    return said
+
+
+FEW_RUNS = 5
 
 
 def _names(run: SpinDown) -> set[str]:
@@ -114,15 +138,44 @@ def _statistics(runs: Sequence[SpinDown], name: str) -> Statistics:
         fit.residuals / run.u if all_known and run.u is not None else fit.residuals
         for run, fit in zip(runs, fits, strict=True)
     ]
+    spared, chi_square_more, rss_more = _common_exponent(fits)
     return statistics(
         n=sum(fit.statistics.n for fit in fits),
-        n_parameters=sum(fit.statistics.n_parameters for fit in fits),
-        rss=sum(fit.statistics.rss for fit in fits),
+        n_parameters=sum(fit.statistics.n_parameters for fit in fits) - spared,
+        rss=sum(fit.statistics.rss for fit in fits) + rss_more,
         least_rss=sum(fit.statistics.n * (ROUNDING * fit.reference[0]) ** 2 for fit in fits),
-        chi_square=sum(known) if all_known else None,
+        chi_square=sum(known) + chi_square_more if all_known else None,
         durbin_watson=durbin_watson(*series),
         runs_test_p=runs_test_p(*series),
     )
+
+
+def _common_exponent(fits: Sequence[LawFit]) -> tuple[int, float, float]:
+    """The law is common to the runs, so a free exponent is one parameter, not one a run: what that spares and costs.
+
+    Near their minima χ² and RSS are parabolas in the exponent. With one exponent for all, their mean weighted by 1/u²,
+    they grow by Cochran's Q: parameters spared, growth of χ², growth of RSS [Hz²].
+    """
+    exponents = [fit.parameters.get("exponent") for fit in fits]
+    if len(fits) < 2 or not all(
+        e and e.value is not None and e.u and fit.statistics.degrees_of_freedom > 0
+        for e, fit in zip(exponents, fits, strict=True)
+    ):
+        return 0, 0.0, 0.0
+    values = np.array([e.value for e in exponents if e])
+    u = np.array([e.u for e in exponents if e])
+    stated = np.array([fit.statistics.inflation for fit in fits])  # u was enlarged by its root
+    noise = np.array([fit.statistics.rss / fit.statistics.degrees_of_freedom for fit in fits])
+    # RSS of a run grows by its noise for each (u by the scatter)²; where u was stated that is not its own scatter's
+    own = np.array(
+        [
+            1.0 if fit.statistics.reduced_chi_square is None else stated_ / fit.statistics.reduced_chi_square
+            for fit, stated_ in zip(fits, stated, strict=True)
+        ]
+    )
+    weights = stated / u**2
+    away = (values - weights @ values / weights.sum()) ** 2 / u**2
+    return len(fits) - 1, float(stated @ away), float((noise * own) @ away)
 
 
 def _combined(name: str, fits: Sequence[LawFit], stats: Statistics) -> CombinedLaw:
@@ -143,6 +196,7 @@ def _means(runs: Sequence[Mapping[str, Estimate]], names: Sequence[str]) -> dict
 def mean(estimates: Sequence[Estimate]) -> Mean:
     """The mean of one constant over the runs that have it, with u = s/√N from their scatter s (GUM 4.2).
 
+    Few runs may agree by chance: u is no smaller than the runs' own uncertainties leave to their mean, √Σu²/N.
     Of one run: its own value and u.
 
     >>> mean([Estimate(value, 0.01, "Hz") for value in (1.0, 2.0, 3.0)])
@@ -159,7 +213,9 @@ def mean(estimates: Sequence[Estimate]) -> Mean:
         average, scatter = float(values.mean()), float(values.std(ddof=1))
     if not np.isfinite([average, scatter]).all():
         return Mean(None, None, unit)
-    u = scatter / float(np.sqrt(len(values)))
+    own = [estimate.u for estimate in estimates if estimate.value is not None and estimate.u is not None]
+    least = float(np.sqrt(np.sum(np.square(own)))) / len(values) if len(own) == len(values) else 0.0
+    u = max(scatter / float(np.sqrt(len(values))), least)
     return Mean(average, u, unit, scatter=scatter, degrees_of_freedom=len(values) - 1)
 
 

@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 Uncertainty = Literal["covariance", "profile", "bootstrap"]
 Intervals = Sequence[tuple[float, float] | None]
 
+FACTOR_TOLD = 3.0  # u(ln c) above which "known to a factor" says nothing
 ROUNDING = 64 * float(np.finfo(float).eps)  # relative: residuals below it are the computer's, not the top's
 
 
@@ -283,9 +284,11 @@ def _constant_warnings(law: str, constant: str, estimate: Estimate) -> list[str]
     said = []
     if value < -2 * u and constant != "exponent":
         said.append(f"{law}: {constant} is negative by {-value / u:.1f} standard uncertainties, which no drag can be")
-    if constant == "c" and u > 0.5 * abs(value):
+    if constant == "c" and u > FACTOR_TOLD * abs(value):
+        said.append(f"{law}: c is not determined, as it depends exponentially on the exponent")
+    elif constant == "c" and u > 0.5 * abs(value):
         said.append(
-            f"{law}: c is known only to a factor of about {np.exp(min(u / abs(value), 700.0)):.2g}, as it depends "
+            f"{law}: c is known only to a factor of about {np.exp(u / abs(value)):.2g}, as it depends "
             "exponentially on the exponent"
         )
     return said

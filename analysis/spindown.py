@@ -11,8 +11,9 @@ from analysis.errors import UnknownName
 from analysis.lawfit import ROUNDING, UNCERTAINTIES, LawFit, Solution, Uncertainty, fit_law, solution
 from analysis.readings import Readings, checked
 from analysis.residuals import gross_errors, studentised
-from analysis.selection import Statistics, Verdict, verdict, weigh
+from analysis.selection import NO_FIT, Statistics, weigh
 from analysis.uncertainty import Estimate
+from analysis.verdict import Verdict, verdict
 
 __all__ = ["Estimate", "LawFit", "SpinDown", "Statistics", "Verdict", "fit_spin_down"]
 
@@ -100,10 +101,10 @@ def fit_spin_down(
         fit_law(solved.get(name) or solution(LAWS[name], readings), uncertainty, bootstrap_samples, seed)
         for name in chosen
     ]
-    weighed = weigh({fit.name: fit.statistics for fit in fits})
-    exponent = next((fit.parameters["exponent"].u for fit in fits if fit.name == "power"), None)
+    weighed, criterion = weigh({fit.name: fit.statistics for fit in fits})
+    exponent = next((fit.parameters["exponent"] for fit in fits if fit.name == "power"), None)
     fall = float(1 - readings.x[-1] / readings.x[0])
-    decision = verdict(weighed, fall=fall, exponent_u=exponent)
+    decision = verdict(weighed, criterion, fall=fall, exponent=exponent)
     return SpinDown(
         fits=tuple(replace(fit, statistics=weighed[fit.name]) for fit in fits),
         best=decision.best,
@@ -138,18 +139,19 @@ class _Search:
 
 
 def _search_outliers(readings: Readings) -> _Search:
-    """Readings that lie too far from a power law fitted to the others, at most a tenth of them.
+    """Readings that lie too far from a power law fitted to the others, at most a tenth of them beside the miscounts.
 
     The worst goes first, then all is fitted anew: one at a time, or a hundredth of very many.
     """
     n = len(readings)
-    left_out, deviations = np.empty(0, dtype=np.intp), np.empty(0)
     if n < FEWEST_FOR_OUTLIERS:
-        return _Search(left_out, deviations, None)
+        return _Search(np.empty(0, dtype=np.intp), np.empty(0), None)
+    left_out, deviations = _miscounts(readings)
+    allowed = len(left_out) + max(1, n // 10)
     while True:
         kept = np.delete(np.arange(n), left_out)
         found = solution(LAWS["power"], readings.without(left_out) if len(left_out) else readings)
-        most = min(max(1, n // 10) - len(left_out), max(1, n // 100))
+        most = min(allowed - len(left_out), max(1, n // 100))
         floor = 1.0 if readings.sigma_known else ROUNDING  # a stated uncertainty is a scatter to be expected
         t = studentised(found.residuals, found.curvature.leverage, len(found.q), floor)
         worst = gross_errors(t, len(found.q))[:most]
@@ -160,10 +162,41 @@ def _search_outliers(readings: Readings) -> _Search:
         deviations = np.append(deviations, np.abs(t[worst]))
 
 
+MISCOUNT, FAR, WINDOW = 0.25, 8.0, 5  # relative; robust standard deviations; readings that a median is taken over
+
+
+def _miscounts(readings: Readings) -> tuple[NDArray[np.intp], Array]:
+    """Readings off by a good part of themselves, as twice or half, and by how many standard deviations.
+
+    Several of them hide one another from a search one at a time. So the power law is fitted to running medians, which
+    none of them moves, and then to what lies near it, until that stays the same. If more than a quarter of the
+    readings lie far away no law fits, and none is left out.
+    """
+    from scipy.ndimage import median_filter
+
+    n = len(readings)
+    smooth = median_filter(readings.x, size=WINDOW, mode="nearest")
+    far = np.abs(readings.x / smooth - 1) > MISCOUNT / 2
+    if not far.any():
+        return np.flatnonzero(far), np.empty(0)
+    found = solution(LAWS["power"], replace(readings, x=smooth))
+    for _ in range(10):
+        off = np.abs(readings.x / LAWS["power"].spin(readings.tau, found.q) - 1)
+        scatter = max(1.4826 * float(np.median(off)), ROUNDING)  # of normal noise by its median
+        now = off > max(MISCOUNT, FAR * scatter)
+        if now.sum() > n // 4:
+            return np.empty(0, dtype=np.intp), np.empty(0)
+        if (now == far).all():
+            break
+        far = now
+        found = solution(LAWS["power"], readings.without(np.flatnonzero(far)))
+    return np.flatnonzero(far), off[far] / scatter
+
+
 def _outlier_warnings(readings: Readings, search: _Search, *, kept: bool) -> list[str]:
     done = "was kept as asked" if kept else "was left out"
     return [
-        f"the reading of {readings.frequency[i]:.6g} Hz at {readings.time[i]:.6g} s lies {deviation:.1f} standard "
+        f"the reading of {readings.frequency[i]:.6g} Hz at {readings.time[i]:.12g} s lies {deviation:.3g} standard "
         f"deviations from the others and {done}"
         for i, deviation in zip(search.indices, search.deviations, strict=True)
     ]
@@ -183,11 +216,27 @@ def comparison_warnings(fits: Mapping[str, Statistics], best: str) -> list[str]:
             f"even the best law, {best}, misses the readings by {birge:.2g} times their stated uncertainties, more "
             "than chance explains: all uncertainties are enlarged by that ratio; check the readings' uncertainties"
         )
+    known, probability = fits[best].sigma_known, _less_than_chance(fits[best])
+    if known and probability < NO_FIT:
+        ratio = float(np.sqrt(fits[best].reduced_chi_square or 0.0))
+        said.append(
+            f"the readings scatter only {ratio:.2g} times as much about the best law as their stated uncertainties "
+            "say: are these too large?"
+        )
     undefined = [name for name, fit in fits.items() if fit.aicc is None]
     if undefined:
         n = fits[best].n
         said.append(f"{n} readings are too few to compare {_listed(undefined)} by AICc: record more readings")
     return said
+
+
+def _less_than_chance(fit: Statistics) -> float:
+    """Probability of a χ² as small as this."""
+    if fit.chi_square is None or fit.degrees_of_freedom < 1:
+        return 1.0
+    from scipy.special import gammainc
+
+    return float(gammainc(fit.degrees_of_freedom / 2, fit.chi_square / 2))
 
 
 def _listed(names: Sequence[str]) -> str:

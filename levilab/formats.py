@@ -141,6 +141,9 @@ def parse_columns(text: str) -> dict[str, str]:
         raise ColumnsError(
             f"--columns '{shown(text)}': NAME=COLUMN,NAME=COLUMN is expected, each NAME once, as t=Zeit,f=3"
         )
+    unknown = [name for name in found if name not in {*SHORTHANDS, *CANONICAL}]
+    if unknown:
+        raise ColumnsError(f"--columns: '{shown(unknown[0])}' is no quantity known here; t, f and u are, as t=Zeit,f=3")
     return found
 
 

@@ -38,9 +38,10 @@ def with_uncertainty(estimate: Estimate) -> str:
     >>> with_uncertainty(Estimate(0.00318175, 3.06e-5, "1/s"))
     '3.182(31)×10⁻³ s⁻¹'
     >>> with_uncertainty(Estimate(40.0123, None, "Hz"))
-    '40.0123 Hz'
+    '40.01 Hz, u not determined'
     """
-    return f"{without_unit(estimate)} {in_words(estimate.unit)}".strip()
+    text = f"{without_unit(estimate)} {in_words(estimate.unit)}".strip()
+    return text if estimate.u is not None or estimate.value is None else f"{text}, u not determined"
 
 
 def without_unit(estimate: Estimate) -> str:
@@ -58,7 +59,7 @@ def _number(value: float, u: float | None) -> str:
     from uncertainties import ufloat
 
     if not u:
-        return f"{value:.6g}"
+        return f"{value:.4g}"
     ordinary = 1e-2 <= abs(value) < 1e5 or abs(value) < u < 1e5
     return f"{ufloat(value, u):SP}" if ordinary else f"{ufloat(value, u):eSP}"
 

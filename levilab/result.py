@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import os
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from levilab.software import software_versions
+from levilab.tables import all_warnings
 from levilab.writing import CannotWrite, replace_atomically
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ RESULT, FIGURE = "result.json", "spindown.png"
 #: What of the statistics is written, in INTERFACE's names.
 _STATISTICS = (
     "n", "rms_residual", "reduced_chi_square", "aicc", "bic", "weight", "durbin_watson", "runs_test_p",
+    "difference",
 )  # fmt: skip
 
 
@@ -54,8 +55,7 @@ def as_document(analysis: SpinDownAnalysis, folder: Path) -> dict[str, Any]:
             "schema": SCHEMA,
             "analysis": "spindown",
             "inputs": [
-                {"path": _relative(source.data, folder), "sha256": hashlib.sha256(source.data.read_bytes()).hexdigest()}
-                for source in analysis.sources
+                {"path": _relative(source.data, folder), "sha256": source.sha256} for source in analysis.sources
             ],
             "synthetic": any(source.synthetic for source in analysis.sources),
             "software": software_versions(),
@@ -64,8 +64,9 @@ def as_document(analysis: SpinDownAnalysis, folder: Path) -> dict[str, Any]:
             "models": _combined_models(analysis),
             "best_model": combined.best,
             "verdict": combined.verdict.text,
+            "decided": combined.verdict.decided,
             "runs": [_run(source, analysis, k, folder) for k, source in enumerate(analysis.sources)],
-            "warnings": [*analysis.warnings, *combined.warnings],
+            "warnings": all_warnings(analysis),
         }
     )
     return document
@@ -75,7 +76,7 @@ def _combined_values(analysis: SpinDownAnalysis) -> dict[str, Any]:
     """The favoured law's constants, and by how much they differ from run to run."""
     best = analysis.combined.fit(analysis.combined.best)
     scatter = {
-        f"{name}_scatter": {"value": mean.scatter, "u": None, "unit": mean.unit}
+        f"{name}_scatter": {"value": mean.scatter, "u": None, "unit": mean.unit, "runs": mean.degrees_of_freedom + 1}
         for name, mean in best.constants.items()
         if mean.scatter is not None
     }
@@ -118,6 +119,9 @@ def _settings(analysis: SpinDownAnalysis) -> dict[str, Any]:
         "reading_u_hz": options.reading_u,
         "uncertainty": options.uncertainty,
         "keep_outliers": options.keep_outliers,
+        "bootstrap": {"samples": options.bootstrap_samples, "seed": options.seed}
+        if options.uncertainty == "bootstrap"
+        else None,
     }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import PurePath
 from typing import TYPE_CHECKING
 
@@ -65,9 +66,10 @@ def all_warnings(analysis: SpinDownAnalysis) -> list[str]:
     """Every warning once, a run's with its name where there are several runs."""
     several = len(analysis.runs) > 1
     texts = [*analysis.warnings, *analysis.combined.warnings]
-    texts += [text for fit in analysis.combined.fits for text in fit.warnings]
+    excluded = {name for name, _ in analysis.combined.verdict.excluded}  # what they lack is of no interest any more
+    texts += [text for fit in analysis.combined.fits if fit.name not in excluded for text in fit.warnings]
     for source, run in zip(analysis.sources, analysis.runs, strict=True):
-        of_laws = [f"{fit.name}: {warning}" for fit in run.fits for warning in fit.warnings]
+        of_laws = [warning for fit in run.fits if fit.name not in excluded for warning in fit.warnings]
         prefix = f"{source.name}: " if several else ""
         texts += [prefix + text for text in (*source.readings.warnings, *run.warnings, *of_laws)]
     return list(dict.fromkeys(texts))
@@ -84,7 +86,7 @@ def _runs_table(analysis: SpinDownAnalysis) -> Table:
             str(len(run.time)),
             f"{run.time[0]:.1f} … {run.time[-1]:.1f}",
             f"{run.frequency[0]:.2f} → {run.frequency[-1]:.2f}",
-            run.best,
+            run.best if run.verdict.decided else "undecided",
         )
     return table
 
@@ -98,18 +100,18 @@ def _laws_table(analysis: SpinDownAnalysis) -> Table:
     table = _table(of, "law", "", "constants")
     for fit in analysis.combined.fits:
         constants = law_constants(analysis, fit.name)
-        best = "best" if fit.name == analysis.combined.best else ""
+        verdict = analysis.combined.verdict
+        best = "best" if verdict.decided and fit.name == verdict.best else ""
         table.add_row(fit.name, best, "\n".join(_equations(constants)))
     return table
 
 
 def _fits_table(analysis: SpinDownAnalysis) -> Table:
-    numbers = ("rms [Hz]", "χ²/dof", "ΔAICc", "weight", "runs test p", "DW")
+    numbers = ("rms [Hz]", "χ²/dof", "ΔAICc", "weight", "order p", "DW")
     table = _table("How well they fit", "law", *numbers, numbers=numbers)
     fits = analysis.combined.fits
-    least = min((fit.statistics.aicc for fit in fits if fit.statistics.aicc is not None), default=0.0)
     for fit in fits:
-        table.add_row(fit.name, *_columns(fit.statistics, least))
+        table.add_row(fit.name, *_columns(fit.statistics))
     return table
 
 
@@ -120,8 +122,8 @@ def law_constants(analysis: SpinDownAnalysis, name: str) -> Mapping[str, Estimat
     return analysis.combined.fit(name).constants
 
 
-def _columns(statistics: Statistics, least: float) -> list[str]:
-    difference = None if statistics.aicc is None else statistics.aicc - least
+def _columns(statistics: Statistics) -> list[str]:
+    difference = statistics.difference
     return [
         plain(statistics.rms_residual),
         plain(statistics.reduced_chi_square),
@@ -150,7 +152,21 @@ def _lines_table(analysis: SpinDownAnalysis) -> Table:
 
 
 def _equations(estimates: Mapping[str, Estimate]) -> list[str]:
-    return [f"{SYMBOLS[name]} = {with_uncertainty(estimate)}" for name, estimate in estimates.items()]
+    return [
+        f"{SYMBOLS[name]} = {with_uncertainty(estimate)}{_interval(estimate)}" for name, estimate in estimates.items()
+    ]
+
+
+def _interval(estimate: Estimate) -> str:
+    """The 68 % interval where one was asked for, in the digits that u gives."""
+    if not estimate.interval or not estimate.u:
+        return ""
+    low, high = (without_unit(replace(estimate, value=end)) for end in estimate.interval)
+    return f", 68 %: {low.split('(')[0]}{_power(low)} … {high.split('(')[0]}{_power(high)}"
+
+
+def _power(text: str) -> str:
+    return text.partition(")")[2]
 
 
 def _header(estimates: Mapping[str, Estimate]) -> str:

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from levilab.numbers import short_name
 from levilab.report.settings import setting_in_words, settings_in_words, value_in_words
 
@@ -72,7 +70,7 @@ def describe(source: Source, fit: SpinDown, options: Options) -> Input:
         events=tuple((_moment(event, zero), event["text"]) for event in events[:MOST_EVENTS]),
         events_left_out=max(0, len(events) - MOST_EVENTS),
         fell=_fell(events, fit),
-        blocks=_blocks(source),
+        blocks=_blocks(source, options.reading_u),
     )
 
 
@@ -120,21 +118,19 @@ def _uncertainty(source: Source, fit: SpinDown, options: Options) -> str:
         return "u of a reading: not known, taken from the scatter about each law"
     low, high = float(fit.u.min()), float(fit.u.max())
     size = f"{low:.2g} Hz" if low == high else f"{low:.2g} Hz to {high:.2g} Hz"
-    if options.reading_u is not None and bool(np.all(fit.u == options.reading_u)):
+    if options.reading_u is not None:
         return f"u of a reading: {size}, as given to the analysis"
     channels = source.run.record.channels if source.run else []
     origin = next((c.get("source") for c in channels if c.get("name") == "spin_frequency_u_hz"), None)
     return f"u of a reading: {size}, {origin or 'from a column of the data'}"
 
 
-def _blocks(source: Source) -> tuple[Block, ...]:
+def _blocks(source: Source, given_u: float | None) -> tuple[Block, ...]:
     readings = source.readings
     shown = min(len(readings.time), MOST_READINGS)
-    rows = [
-        (i, float(readings.time[i]), float(readings.frequency[i]), None if readings.u is None else float(readings.u[i]))
-        for i in range(shown)
-    ]
-    return tuple(Block(tuple(rows[k : k + BLOCK])) for k in range(0, shown, BLOCK))
+    u = [given_u] * shown if readings.u is None or given_u is not None else readings.u[:shown].tolist()
+    rows = tuple(zip(range(shown), readings.time[:shown].tolist(), readings.frequency[:shown].tolist(), u, strict=True))
+    return tuple(Block(rows[k : k + BLOCK]) for k in range(0, shown, BLOCK))
 
 
 # --- when, and what happened ---------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from analysis.combine import combine, mean
 from analysis.drag import LAWS, spin
@@ -34,7 +35,9 @@ def test_each_constant_is_the_mean_of_the_runs():
         for constant, average in together.fit(name).constants.items():
             values = [run.fit(name).parameters[constant].value for run in fitted]
             assert average.value == pytest.approx(np.mean(values))
-            assert average.u == pytest.approx(np.std(values, ddof=1) / 2)
+            own = np.array([run.fit(name).parameters[constant].u for run in fitted])
+            assert average.scatter == pytest.approx(np.std(values, ddof=1))
+            assert average.u == pytest.approx(max(average.scatter / 2, np.sqrt(own @ own) / 4))
     lines = [run.fit("disc").linearised["c32"].value for run in fitted]
     assert together.fit("disc").linearised["c32"].value == pytest.approx(np.mean(lines))
 
@@ -93,3 +96,45 @@ def test_runs_without_a_common_law_cannot_be_combined():
 def test_laws_that_a_run_lacks_are_left_out():
     together = combine([*runs(constants=THESIS[:1]), *runs(laws=["disc", "stokes"], constants=THESIS[1:2])])
     assert [fit.name for fit in together.fits] == ["stokes", "disc"]
+
+
+@pytest.mark.parametrize("u", [0.03, None])
+def test_one_exponent_for_all_runs_costs_what_a_common_fit_finds(u):
+    """Against a fit of all runs at once with one exponent: the parabola is exact to a few per cent of the growth."""
+    fitted = runs(u)
+    stats = combine(fitted).fit("power").statistics
+
+    def residuals(parameters):
+        exponent, rest = parameters[0], parameters[1:].reshape(len(fitted), 2)
+        return np.concatenate([
+            (run.frequency - spin("power", run.time - run.start_time, start, np.exp(log_c), exponent)) / 0.03
+            for run, (start, log_c) in zip(fitted, rest, strict=True)
+        ])  # fmt: skip
+
+    own = [
+        [fit.parameters[key].value for key in ("start_frequency", "c", "exponent")]
+        for fit in (r.fit("power") for r in fitted)
+    ]
+    exponent = np.mean([each[2] for each in own])
+    shift = [np.log(c) + (n - exponent) * np.log(2 * np.pi * 30) for _, c, n in own]
+    start = [exponent, *np.ravel([(each[0], log_c) for each, log_c in zip(own, shift, strict=True)])]
+    joint = least_squares(residuals, start, x_scale=np.abs(start), xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    assert stats.n_parameters == 2 * len(fitted) + 1
+    separate = sum(fit.fit("power").statistics.rss for fit in fitted)
+    growth = 2 * joint.cost * 0.03**2 - separate
+    assert growth > 0
+    assert stats.rss - separate == pytest.approx(growth, rel=0.05)
+
+
+def test_more_runs_make_no_law_more_excluded_for_its_constants():
+    """Eight runs of a disc: power, which contains it, is never excluded, and its exponent is 3/2."""
+    together = combine(runs(constants=[2.34e-4 * (1 + 0.02 * k) for k in range(-4, 4)]))
+    assert {name for name, _ in together.verdict.excluded} >= {"stokes", "newton"}
+    assert "power" in {*together.verdict.indistinguishable, *together.verdict.needless}
+    exponent = together.fit("power").constants["exponent"]
+    assert exponent.value == pytest.approx(1.5, abs=3 * exponent.u)
+
+
+def test_few_runs_say_how_little_they_tell():
+    assert "Student's t" in combine(runs()[:2]).warnings[-1]
+    assert "1.8 u" in combine(runs()[:2]).warnings[-1]  # t of one degree of freedom at 84.1 %: 1.84

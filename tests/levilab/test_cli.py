@@ -149,7 +149,7 @@ def test_imperfect_data_are_analyzed_with_a_warning_and_without_nan(
     ("words", "says"),
     [
         (["analyze", "spindown", "nowhere"], "no such file"),
-        (["analyze", "spindown", "."], "no spin run"),
+        (["analyze", "spindown", "."], "found nothing"),
         (["report", "nowhere"], "no such file"),
         (["runs", "nowhere"], "no such folder"),
         (["acquire", "spin"], "bench.toml"),
@@ -191,7 +191,64 @@ def test_an_instrument_that_does_not_answer_is_status_3(levilab: Command, tmp_pa
     )
     refused = levilab("acquire", "spin", check=3)
     assert refused.stderr.splitlines()[-1].startswith("levilab: TCPIP0::127.0.0.1::9::SOCKET: ")
-    assert '"failed"' in next((tmp_path / "runs").glob("*/run.json")).read_text(encoding="utf-8")
+    assert list((tmp_path / "runs").iterdir()) == []  # there is nothing to keep
+
+
+def test_a_run_is_meant_by_its_short_name(levilab: Command) -> None:
+    run = json.loads(levilab("acquire", "spin", "--mock", "--json").stdout)["run"]
+    short = run.split("Z-")[1]
+    assert short in levilab("runs").stdout
+    assert json.loads(levilab("analyze", "spindown", short, "--json").stdout)["inputs"]
+    assert "is finished" in levilab("acquire", "spin", "--resume", short, check=1).stderr
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["acquire", "spin", "--seed", "1"],
+        ["acquire", "spin", "--realtime"],
+        ["analyze", "spindown", "x", "--reading-u", "0"],
+        ["analyze", "spindown", "x", "--columns", "speed=f"],
+    ],
+)
+def test_options_that_make_no_sense_are_wrong_usage(levilab: Command, words: list[str]) -> None:
+    assert levilab(*words, check=2).stderr
+
+
+def test_a_reader_that_goes_away_costs_neither_the_run_nor_the_result(tmp_path: Path) -> None:
+    """As in `levilab … | head -1`: the first line is read, then the pipe is closed."""
+    for words in (["acquire", "spin", "--mock"], ["analyze", "spindown", "runs"]):
+        process = subprocess.Popen(
+            [sys.executable, "-m", "levilab", *words],
+            cwd=tmp_path,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+        )
+        assert process.stdout
+        process.stdout.readline()
+        process.stdout.close()
+        process.wait(timeout=60)
+    (run,) = (tmp_path / "runs").iterdir()
+    assert '"finished"' in (run / "run.json").read_text(encoding="utf-8")
+    assert (run / "result.json").exists()
+
+
+def test_the_bench_file_sets_the_experiment_of_the_virtual_bench_too(levilab: Command, tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text("[spin]\ninterval_s = 20.0\n", encoding="utf-8")
+    readings = json.loads(levilab("acquire", "spin", "--mock", "--bench", "mine.toml", "--json").stdout)["readings"]
+    assert 8 <= readings <= 11
+
+
+def test_a_drive_beyond_the_limits_is_refused_before_anything_is_touched(levilab: Command, tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text("[limits]\ndrive_amplitude_vpp = 4.0\n", encoding="utf-8")
+    refused = levilab("acquire", "spin", "--mock", "--bench", "mine.toml", check=1)
+    assert "spin.drive_amplitude_vpp = 10 is more than this bench stands" in refused.stderr
+    assert not (tmp_path / "runs").exists()
+
+
+def test_intervals_are_shown_when_asked_for(levilab: Command, tmp_path: Path) -> None:
+    path = spin_down_csv(tmp_path / "my.csv")
+    assert "68 %: " in levilab("analyze", "spindown", path, "--uncertainty", "profile", "--no-save").stdout
 
 
 def test_a_finished_run_is_not_resumed(levilab: Command) -> None:

@@ -1,6 +1,9 @@
 """From paths to results: what is found, what is refused, and that the numbers are the published ones."""
 
+import hashlib
 import json
+import os
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -70,6 +73,7 @@ def test_the_result_is_written_as_the_interface_says(sample_data: Path, tmp_path
         assert set(model["parameters"]) >= {"start_frequency"}
         assert set(model["statistics"]) == {
             "n", "rms_residual", "reduced_chi_square", "aicc", "bic", "weight", "durbin_watson", "runs_test_p",
+            "difference",
         }  # fmt: skip
     assert run["models"][0]["linearised"]["c1"]["unit"] == "1/s"
     assert set(result["models"][2]["parameters"]) == {"c32"}
@@ -94,9 +98,54 @@ def test_a_plain_csv_is_analyzed_and_knows_nothing_of_synthetic(tmp_path: Path) 
     assert result["values"]["c32"]["value"] == pytest.approx(2.34e-4, abs=4 * result["values"]["c32"]["u"])
 
 
-def test_the_same_run_given_twice_counts_once(sample_data: Path) -> None:
+def test_the_same_run_given_twice_counts_once(sample_data: Path, tmp_path: Path) -> None:
     analysis = analyze_spindowns([sample_data, sample_data / "spin-down-1"], Options())
     assert len(analysis.sources) == 4
+    shutil.copytree(sample_data / "spin-down-1", tmp_path / "copy")
+    analysis = analyze_spindowns([sample_data / "spin-down-1", tmp_path / "copy"], Options())
+    assert len(analysis.sources) == 1
+    assert "counted once" in analysis.warnings[0]
+
+
+def test_the_readings_of_a_run_are_that_run_and_as_synthetic(sample_data: Path, tmp_path: Path) -> None:
+    (source,) = analyze_spindowns([sample_data / "spin-down-1" / "readings.csv"], Options()).sources
+    assert source.synthetic
+    shutil.copytree(sample_data / "spin-down-1", tmp_path / "broken")
+    (tmp_path / "broken" / "run.json").write_text("{", encoding="utf-8")
+    (source,) = analyze_spindowns([tmp_path / "broken" / "readings.csv"], Options()).sources
+    assert any("whether it is SYNTHETIC is not known" in warning for warning in source.readings.warnings)
+
+
+def test_real_and_synthetic_inputs_together_are_warned_of(sample_data: Path, tmp_path: Path) -> None:
+    path = spin_down_csv(tmp_path / "my.csv")
+    analysis = analyze_spindowns([path, sample_data / "spin-down-1"], Options())
+    assert "1 of 2 inputs are SYNTHETIC" in analysis.warnings[0]
+    assert analysis.home == Path()
+
+
+def test_inputs_of_the_same_name_are_told_apart(tmp_path: Path) -> None:
+    for k, folder in enumerate(("monday", "tuesday")):
+        (tmp_path / folder).mkdir()
+        spin_down_csv(tmp_path / folder / "run.csv", seed=k)
+    paths = [tmp_path / "monday" / "run.csv", Path(os.path.relpath(tmp_path / "tuesday" / "run.csv"))]
+    analysis = analyze_spindowns(paths, Options())
+    assert [source.name for source in analysis.sources] == ["monday/run.csv", "tuesday/run.csv"]
+
+
+def test_the_hash_in_the_result_is_that_of_the_file(sample_data: Path, tmp_path: Path) -> None:
+    result = as_document(analyze_spindowns([sample_data], Options()), tmp_path)
+    for given in result["inputs"]:
+        assert hashlib.sha256((tmp_path / given["path"]).read_bytes()).hexdigest() == given["sha256"]
+
+
+def test_turns_per_minute_taken_for_hertz_are_doubted(tmp_path: Path) -> None:
+    path = spin_down_csv(tmp_path / "my.csv", u=False)
+    t, nu = np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)
+    np.savetxt(path, np.c_[t, 60 * nu], delimiter=",", header="t,f", comments="")
+    (source,) = analyze_spindowns([path], Options()).sources
+    assert "[rpm]" in source.readings.warnings[0]
+    stated = analyze_spindowns([path], Options(columns={"t": "t", "f": "f [rpm]"}))
+    assert stated.runs[0].frequency[0] == pytest.approx(40, abs=0.1)
 
 
 def test_a_stated_reading_uncertainty_takes_the_place_of_the_scatter(tmp_path: Path) -> None:
@@ -121,8 +170,6 @@ def test_intervals_are_there_when_asked_for(tmp_path: Path, how: str) -> None:
 
 
 def test_in_a_searched_folder_what_is_broken_is_passed_over_and_told(sample_data: Path, tmp_path: Path) -> None:
-    import shutil
-
     for name in ("spin-down-1", "spin-down-2", "lower-limits"):
         shutil.copytree(sample_data / name, tmp_path / name)
     (tmp_path / "spin-down-2" / "run.json").write_text("{", encoding="utf-8")
@@ -137,10 +184,8 @@ def test_a_run_of_another_experiment_is_refused_by_name(sample_data: Path) -> No
 
 
 def test_a_folder_without_runs_says_what_it_found(sample_data: Path, tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="found no run at all"):
+    with pytest.raises(DataError, match="found nothing"):
         analyze_spindowns([tmp_path], Options())
-    import shutil
-
     shutil.copytree(sample_data / "lower-limits", tmp_path / "limits")
     with pytest.raises(DataError, match="found only 1 limit"):
         analyze_spindowns([tmp_path], Options())

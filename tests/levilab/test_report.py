@@ -6,7 +6,7 @@ import json
 import re
 import shutil
 from html.parser import HTMLParser
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 from tests_of_levilab import spin_down_csv
@@ -14,9 +14,6 @@ from tests_of_levilab import spin_down_csv
 from levilab.errors import LevilabError
 from levilab.pipeline import Options, analyze_spindowns
 from levilab.report.page import render, write_report
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 class Page(HTMLParser):
@@ -37,8 +34,6 @@ class Page(HTMLParser):
 
 @pytest.fixture(scope="module")
 def page() -> Page:
-    from pathlib import Path
-
     return Page(render(analyze_spindowns([Path(__file__).parents[2] / "sample_data"], Options())))
 
 
@@ -59,24 +54,144 @@ def test_numbers_have_uncertainties_and_the_published_constants_are_there(page: 
     assert "scatters between the runs" in text
 
 
-def test_what_a_user_typed_is_escaped_wherever_it_stands(tmp_path: Path, sample_data: Path) -> None:
+def changed(run: Path, **entries: object) -> Path:
+    """The run with other entries in run.json."""
+    record = json.loads((run / "run.json").read_text(encoding="utf-8"))
+    (run / "run.json").write_text(json.dumps(record | entries), encoding="utf-8")
+    return run
+
+
+def text_of(*paths: Path, options: Options | None = None) -> str:
+    return " ".join(Page(render(analyze_spindowns(paths, options or Options()))).text.split())
+
+
+@pytest.fixture
+def run(tmp_path: Path, sample_data: Path) -> Path:
+    return Path(shutil.copytree(sample_data / "spin-down-1", tmp_path / "20261121T005200Z-spin-c893"))
+
+
+INSTRUMENTS = {
+    "counter": {
+        "identity": "Keysight Technologies,53230A,1,3.09",
+        "address": "TCPIP0::10.0.0.5::INSTR",
+        "driver": "Keysight53230A",
+        "settings_start": {"gate_s": 0.1, "coupling": "AC"},
+        "settings_end": {"automatic_level": False, "gate_s": 1.0, "impedance_ohm": 1e6, "coupling": "DC"},
+    },
+    "generator": {
+        "address": "TCPIP0::10.0.0.6::INSTR",
+        "settings_end": {
+            "output": False, "frequency_hz": 40.0, "amplitude_vpp": 10.0, "waveform": "SIN", "load_ohm": 9.9e37,
+        },
+    },
+}  # fmt: skip
+
+
+def test_what_a_user_typed_is_escaped_wherever_it_stands(tmp_path: Path, run: Path) -> None:
     evil = '<script>alert("x")</script>&<img src=x onerror=alert(1)>'
-    run = tmp_path / "run <b>bold"
-    shutil.copytree(sample_data / "spin-down-1", run)
-    record = (run / "run.json").read_text(encoding="utf-8")
-    record = re.sub(r'"note": "[^"]*"', lambda _: '"note": ' + json.dumps(evil), record)
-    (run / "run.json").write_text(record, encoding="utf-8")
-    (run / "events.jsonl").write_text(json.dumps({"time_s": 1.0, "kind": "x", "text": evil}) + "\n", encoding="utf-8")
-    parsed = Page(render(analyze_spindowns([run], Options())))
-    assert parsed.text.count(evil) == 2
+    settings = {evil: evil, "waveform": evil, "output": evil}
+    changed(
+        run.rename(tmp_path / "run <b>bold"),
+        note=evil,
+        synthetic_how=evil,
+        command_line=[evil],
+        started_utc=evil,
+        configuration={"spin": {"drive_waveform": evil, "ramp_hz_per_s": evil}, "limits": {evil: evil}},
+        channels=[{"name": "spin_frequency_u_hz", "source": evil}],
+        instruments={evil: {"identity": evil, "address": evil, "settings_end": settings}},
+    )
+    event = json.dumps({"time_s": 1.0, "kind": "fell", "text": evil}) + "\n"
+    (tmp_path / "run <b>bold" / "events.jsonl").write_text(event, encoding="utf-8")
+    file = spin_down_csv(tmp_path / "<i>my.csv")
+    parsed = Page(render(analyze_spindowns([tmp_path / "run <b>bold", file], Options())))
+    assert parsed.text.count(evil) >= 14
     assert "run <b>bold" in parsed.text
-    assert "script" not in {tag for tag, _ in parsed.tags}
+    assert "<i>my.csv" in parsed.text
+    assert not {"script", "b", "i"} & {tag for tag, _ in parsed.tags}
     assert all("onerror" not in attributes for _, attributes in parsed.tags)
 
 
-def test_a_report_of_a_data_file_knows_no_instrument_and_says_so_by_silence(tmp_path: Path) -> None:
+def test_settings_read_like_a_lab_book_and_are_those_of_the_measurement(run: Path) -> None:
+    text = text_of(changed(run, instruments=INSTRUMENTS))
+    assert "automatic level off, gate 1 s, impedance 1 MΩ, coupling DC" in text
+    assert "output off; last drive 40 Hz, 10 Vpp, SIN; load high impedance" in text
+    assert "0.1 s" not in text  # the state before the measurement
+    assert "did not answer at TCPIP0::10.0.0.6::INSTR" in text
+
+
+def test_the_drive_its_limits_and_the_origin_of_u_are_told(run: Path) -> None:
+    spin = {"drive_waveform": "SIN", "drive_frequency_hz": 40.0, "drive_amplitude_vpp": 10.0, "ramp_hz_per_s": 0.2}
+    text = text_of(changed(run, configuration={"spin": spin, "limits": {"drive_amplitude_vpp": 12.0}}))
+    assert "SIN, 40 Hz, 10 Vpp, raised by 0.2 Hz/s" in text
+    assert "limits of the bench: drive amplitude 12 Vpp" in text
+    assert "u of a reading: 0.03 Hz, standard deviation of the noise" in text
+
+
+def test_times_are_to_the_second_and_what_is_not_known_is_left_out(run: Path) -> None:
+    assert "not known" not in text_of(run)
+    started, ended = "2026-11-21T00:52:00.123456Z", "2026-11-21T00:55:10.5Z"
+    text = text_of(changed(run, started_utc=started, ended_utc=ended))
+    assert "2026-11-21 00:52:00 UTC to 2026-11-21 00:55:10 UTC" in text
+
+
+def test_what_happened_tells_the_fall_and_leaves_out_what_was_replayed(run: Path) -> None:
+    events = [
+        {"utc": "2026-11-21T00:51:00Z", "time_s": None, "kind": "drive on", "text": "drive on at 30 Hz"},
+        {"utc": "2026-11-21T00:53:00Z", "time_s": None, "kind": "replayed", "text": "drive on again"},
+        {"utc": "2026-11-21T00:55:00Z", "time_s": 200.0, "kind": "fell", "text": "fell between 190.0 s and 200.0 s"},
+    ]
+    (run / "events.jsonl").write_text("".join(json.dumps(event) + "\n" for event in events), encoding="utf-8")
+    text = text_of(changed(run, time_zero_utc="2026-11-21T00:52:00Z"))
+    assert "before drive on at 30 Hz" in text
+    assert "again" not in text
+    assert "The fall. fell between 190.0 s and 200.0 s; last reading 21.75 Hz at 190.0 s." in text
+
+
+def test_one_synthetic_run_says_once_how_it_was_made(run: Path) -> None:
+    text = text_of(run)
+    assert text.count("39.9366 Hz") == 1
+    assert "SYNTHETIC. This run did not come from a real top." in text
+
+
+def test_a_mixture_of_real_and_synthetic_runs_is_no_measurement_and_says_so(tmp_path: Path, sample_data: Path) -> None:
+    text = text_of(sample_data / "spin-down-1", spin_down_csv(tmp_path / "real.csv"))
+    assert "REAL AND SYNTHETIC RUNS MIXED. 1 of 2 runs did not come from a real top (spin-down-1)." in text
+
+
+def test_each_run_has_its_own_constants_and_the_scatter_stands_beside_the_mean(page: Page) -> None:
+    text = " ".join(page.text.split())
+    for own in ("2.3687(30)×10⁻⁴", "2.3077(29)×10⁻⁴", "2.2828(31)×10⁻⁴", "2.3971(32)×10⁻⁴"):
+        assert own in text
+    assert re.search(r"mean 3\.182\(31\)×10⁻³", text)
+    assert re.search(r"scatter s 6\.1\(2\.5\)×10⁻⁵", text)  # s/√4 is the mean's u, s/√6 its own
+    assert "ν₀ is the spin at the first reading" in text
+    assert "1.55 to 2.45" in text  # 2 ± 4/√78
+
+
+def test_intervals_are_shown_where_they_were_asked_for(run: Path) -> None:
+    assert "68 % interval" not in text_of(run)
+    text = text_of(run, options=Options(uncertainty="profile"))
+    assert "68 % interval (profile)" in text
+    assert re.search(r"\[0\.0002365\d*, 0\.0002371\d*\]|\[0\.0002366\d*, 0\.0002372\d*\]", text)
+
+
+@pytest.mark.parametrize("readings", [3, 20])
+def test_a_law_is_marked_best_only_where_the_readings_decide(tmp_path: Path, readings: int) -> None:
+    analysis = analyze_spindowns([spin_down_csv(tmp_path / "a.csv", n=readings)], Options())
+    parsed = Page(render(analysis))
+    marked = [attributes for tag, attributes in parsed.tags if tag == "tr" and attributes.get("class") == "best"]
+    assert bool(marked) == analysis.combined.verdict.decided
+    assert ("(best)" in parsed.text) == analysis.combined.verdict.decided
+
+
+def test_nothing_is_folded_away_so_that_all_is_printed(page: Page) -> None:
+    assert "details" not in {tag for tag, _ in page.tags}
+
+
+def test_a_report_of_a_data_file_knows_no_instrument_and_says_so(tmp_path: Path) -> None:
     parsed = Page(render(analyze_spindowns([spin_down_csv(tmp_path / "my.csv")], Options())))
     assert "my.csv" in parsed.text
+    assert "no instruments recorded" in parsed.text
     assert "SYNTHETIC" not in parsed.text
 
 
@@ -89,7 +204,7 @@ def test_many_readings_are_cut_in_the_page_and_the_figure_stays_small(tmp_path: 
     np.savetxt(path, np.c_[t, nu], delimiter=",", header="time_s,spin_frequency_hz", comments="")
     html = render(analyze_spindowns([path], Options(reading_u=0.03)))
     assert "the first 200 of 20000" in " ".join(Page(html).text.split())
-    assert len(html) < 5e6
+    assert len(html) < 3e6
 
 
 def test_a_report_that_cannot_be_written_is_told_in_one_line(tmp_path: Path, sample_data: Path) -> None:

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import re
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from levilab.errors import DataError
 from levilab.listing import list_runs
-from levilab.run import Run, RunRecord, find_runs
+from levilab.run import Run, RunRecord, find_run, find_runs
 from levilab.writing import CannotWrite, RunWriter, replace_atomically
 
 CHANNELS = [
@@ -170,3 +171,59 @@ def test_runs_are_found_below_a_folder_and_listed_oldest_first(tmp_path: Path) -
         ("early", 2, 20.0),
         ("late", 2, 20.0),
     ]
+
+
+def test_a_run_is_found_by_its_name_below_a_folder(tmp_path: Path) -> None:
+    folder = written(tmp_path)
+    short = folder.name.split("Z-")[1]
+    assert find_run(Path(short), tmp_path) == folder
+    assert find_run(Path(folder.name), tmp_path) == folder
+    assert find_run(Path("spin-none"), tmp_path) == Path("spin-none")
+
+
+def test_going_on_with_an_empty_file_writes_its_header_first(tmp_path: Path) -> None:
+    folder = written(tmp_path)
+    (folder / "readings.csv").write_text("", encoding="utf-8")
+    with RunWriter.reopen(Run.load(folder)) as writer:
+        writer.reading({"time_s": 1.0, "spin_frequency_hz": 39.0, "spin_frequency_u_hz": 0.03})
+    assert Run.load(folder).count() == 1
+
+
+def test_rows_are_not_written_below_another_header(tmp_path: Path) -> None:
+    folder = written(tmp_path)
+    (folder / "readings.csv").write_text("time_s,height_m\n", encoding="utf-8")
+    with pytest.raises(CannotWrite, match="its header is"):
+        RunWriter.reopen(Run.load(folder))
+
+
+def test_damaged_events_are_left_out(tmp_path: Path) -> None:
+    folder = written(tmp_path)
+    with (folder / "events.jsonl").open("ab") as file:
+        file.write(b'{"kind": 1\n[]\n{"text": 3}\n\xff\xfe\n{"text": "fine", "time_s": "soon"}\n')
+    events = Run.load(folder).events()
+    assert [(event["text"], event["time_s"]) for event in events] == [("drive off", 0.0), ("fine", None)]
+
+
+def test_a_clock_that_was_set_back_is_found_before_a_run_is_gone_on_with(tmp_path: Path) -> None:
+    ahead = (datetime.now(UTC) + timedelta(hours=1)).isoformat()
+    run = Run.load(written(tmp_path))
+    changed = run.record.model_copy(update={"time_zero_utc": ahead})
+    with pytest.raises(DataError, match="set back"):
+        Run(run.folder, changed, "interrupted").elapsed()
+    past = (datetime.now(UTC) - timedelta(seconds=100)).isoformat()
+    changed = run.record.model_copy(update={"time_zero_utc": past})
+    assert Run(run.folder, changed, "interrupted").elapsed() == pytest.approx(100, abs=5)
+
+
+def test_a_link_that_leads_nowhere_is_no_place_for_runs(tmp_path: Path) -> None:
+    (tmp_path / "runs").symlink_to(tmp_path / "gone" / "away")
+    with pytest.raises(CannotWrite):
+        RunWriter.create(tmp_path / "runs", record())
+
+
+def test_a_linked_run_is_found_once(tmp_path: Path) -> None:
+    folder = written(tmp_path / "real")
+    (tmp_path / "look").mkdir()
+    (tmp_path / "look" / "link").symlink_to(folder, target_is_directory=True)
+    (tmp_path / "look" / "loop").symlink_to(tmp_path / "look", target_is_directory=True)
+    assert find_runs(tmp_path / "look") == [tmp_path / "look" / "link"]

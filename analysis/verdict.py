@@ -1,0 +1,137 @@
+"""What the readings say about the laws, in words.
+
+A law is excluded by a fit that is worse, never by the number of its constants: a law that fits as well with more of
+them is only more than is needed.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import floor, log10
+
+from analysis.selection import Statistics, deviance, variance_factor
+from analysis.uncertainty import Estimate
+
+EXCLUDED, TIED = 10.0, 4.0  # differences of AICc, Burnham & Anderson (2002) §2.6
+SPECIAL_CASES = {"mixed": ("stokes", "newton"), "power": ("stokes", "newton", "disc")}
+_SIMPLE = ("stokes", "newton", "disc")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the readings say; every law stands in one of the four lists.
+
+    Attributes:
+        best: name of the law with the smallest criterion.
+        decided: whether the readings single out one of the simple laws, or a general one before all of them.
+        indistinguishable: names of the laws that fit as well as the best one, which comes first.
+        needless: names of laws that fit as well, but with more constants than it takes.
+        weak: names of laws disfavoured but not excluded.
+        excluded: names of laws the readings exclude, each with the reason.
+        text: the same in a few sentences.
+    """
+
+    best: str
+    decided: bool
+    indistinguishable: tuple[str, ...]
+    needless: tuple[str, ...]
+    weak: tuple[str, ...]
+    excluded: tuple[tuple[str, str], ...]
+    text: str
+
+
+def verdict(fits: Mapping[str, Statistics], criterion: str, *, fall: float, exponent: Estimate | None) -> Verdict:
+    """What the readings say about the laws.
+
+    Args:
+        fits: statistics by the law's name, weighed, best law first.
+        criterion: by which.
+        fall: part of the spin lost between the first and the last reading, 0 to 1.
+        exponent: of the power law, where it was fitted.
+    """
+    best = next(iter(fits))
+    telling = criterion == "aicc" or (criterion == "bic" and fits[best].sigma_known)
+    kinds = {name: _kind(fits, name, best) if telling else "tied" for name in fits}
+    listed = {kind: tuple(name for name in fits if kinds[name] == kind) for kind in ("tied", "needless", "weak")}
+    excluded = tuple((name, _reason(name, best, fits)) for name in fits if kinds[name] == "excluded")
+    open_ = [name for name in (*listed["tied"], *listed["weak"]) if name in _SIMPLE]
+    decided = telling and len(open_) <= 1
+    sentences = [
+        _about_best(listed["tied"], exponent) if decided else _undecided(fits[best].n, fall, open_),
+        _sentence("The readings exclude", [f"{name} ({reason})" for name, reason in excluded], ""),
+        _sentence(
+            "They speak against",
+            [f"{n} (ΔAICc {fits[n].difference:.1f})" for n in listed["weak"]],
+            ", without excluding it",
+        ),
+        _about_needless(listed["needless"], best, exponent) if decided else "",
+    ]
+    text = " ".join(filter(None, sentences))
+    return Verdict(best, decided, listed["tied"], listed["needless"], listed["weak"], excluded, text)
+
+
+def _kind(fits: Mapping[str, Statistics], name: str, best: str) -> str:
+    """tied, needless, weak or excluded."""
+    fit, factor = fits[name], variance_factor(fits)
+    if fit.difference is None:  # more constants than the readings can bear
+        return "needless"
+    if fit.difference <= TIED:
+        return "tied"
+    general = best in SPECIAL_CASES.get(name, ())
+    more = fit.n_parameters > fits[best].n_parameters
+    if general or (more and deviance(fit, factor) - deviance(fits[best], factor) <= TIED):
+        return "needless"
+    return "weak" if fit.difference <= EXCLUDED else "excluded"
+
+
+def _reason(name: str, best: str, fits: Mapping[str, Statistics]) -> str:
+    fit = fits[name]
+    shape = ", and its residuals have a shape" if fit.has_shape else ""
+    left = f"it leaves {fit.rms_residual:.2g} Hz rms, {best} {fits[best].rms_residual:.2g} Hz"
+    return f"ΔAICc {fit.difference:.0f}: {left}{shape}"
+
+
+def _about_best(tied: Sequence[str], exponent: Estimate | None) -> str:
+    best, *others = tied
+    if best == "power":
+        best = f"power law, {_in_words(exponent)},"
+        return (
+            f"The {best} fits best." if not others else f"The {best} fits best; {_list(others)} cannot be told from it."
+        )
+    if not others:
+        return f"The {best} law fits best."
+    named = [f"power, {_in_words(exponent)}," if name == "power" else name for name in others]
+    contains = [name for name in others if best in SPECIAL_CASES.get(name, ())]
+    expected = " which contains it," if contains == others == ["power"] else ""
+    return f"The {best} law fits best; {_list(named)}{expected} cannot be told from it.".replace(",,", ",")
+
+
+def _undecided(n: int, fall: float, names: Sequence[str]) -> str:
+    laws = _list(names) if len(names) > 1 else "the laws"
+    return (
+        f"These {n} readings cannot tell {laws} apart: over a fall of the spin by {100 * fall:.2g} % they differ too "
+        "little for readings of this number and precision. Let the top fall further, or read it more often."
+    )
+
+
+def _about_needless(needless: Sequence[str], best: str, exponent: Estimate | None) -> str:
+    if not needless:
+        return ""
+    named = [f"power, {_in_words(exponent)}," if name == "power" else name for name in needless]
+    fits = "fit" if len(named) > 1 else "fits"
+    return f"{_list(named)} {fits} as well as {best}, with more constants than it takes.".replace(", ,", ",")
+
+
+def _in_words(exponent: Estimate | None) -> str:
+    """As n = 1.507 ± 0.006."""
+    if exponent is None or exponent.value is None or not exponent.u:
+        return "of whatever exponent"
+    digits = min(max(0, -floor(log10(exponent.u)) + (exponent.u < 3 * 10 ** floor(log10(exponent.u)))), 9)
+    return f"n = {exponent.value:.{digits}f} ± {exponent.u:.{digits}f}"
+
+
+def _sentence(start: str, names: Sequence[str], end: str) -> str:
+    return f"{start} {_list(names)}{end}." if names else ""
+
+
+def _list(words: Sequence[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
