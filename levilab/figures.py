@@ -127,7 +127,8 @@ def _draw_law(axes: Axes, analysis: SpinDownAnalysis, name: str) -> None:
     """One law; with several runs through the first one alone, unless it is the best."""
     verdict, best = analysis.combined.verdict, name == analysis.combined.best
     excluded = name in dict(verdict.excluded)
-    note = "excluded" if excluded else "best" if best and verdict.decided else ""
+    as_good = name in verdict.needless or (name in verdict.indistinguishable and not best)
+    note = "excluded" if excluded else "fits as well" if as_good else "best" if best and verdict.decided else ""
     label = f"{name}   {EQUATIONS[name]}" + (f"   ({note})" if note else "")
     thick = 1.2 if len(analysis.runs) > 1 or _many(analysis) else 2.4
     for k, run in enumerate(analysis.runs if best else analysis.runs[:1]):

@@ -70,7 +70,6 @@ def render(analysis: SpinDownAnalysis) -> str:
         n=analysis.combined.fit(best).statistics.n,
         constants={fit.name: law_constants(analysis, fit.name) for fit in fits},
         scatters={fit.name: {name: scatter(mean) for name, mean in fit.constants.items()} for fit in fits},
-        least_aicc=min((fit.statistics.aicc for fit in fits if fit.statistics.aicc is not None), default=0.0),
         banner=_banner(analysis),
         inputs=[describe(*pair, analysis.options) for pair in zip(analysis.sources, analysis.runs, strict=True)],
         columns=_columns(analysis),
