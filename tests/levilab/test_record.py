@@ -369,3 +369,33 @@ def test_a_wire_log_that_cannot_be_written_does_not_keep_the_output_on(
     assert run.status == "finished"
     assert outputs[-1] is False
     assert (run.record.model_extra or {})["wire_log_ended"] == "No space left on device"
+
+
+def test_a_real_run_is_gone_on_with_by_the_time_on_the_wall(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The way without a world: instruments from the configuration, and a top that has gone on since its time zero."""
+    from datetime import UTC, datetime, timedelta
+
+    import levilab.bench as benches
+
+    class Impatient(Silent):
+        def reading(self, text: str, elapsed: float, remaining: float) -> None:
+            super().reading(text, elapsed, remaining)
+            if len(self.readings) == 4:
+                signal.raise_signal(signal.SIGINT)
+
+    clock = VirtualClock()
+    world = SpinWorld(SpinScene(), clock)
+    join = benches.virtual_bus
+    monkeypatch.setattr(benches, "virtual_bus", lambda _=None: join(world))
+    monkeypatch.setattr(benches, "WallClock", lambda: clock)
+    config = BenchConfig(visa_library=f"{tmp_path.name}@levilab", **benches.VIRTUAL)
+    half = acquire(Order("spin", config, out=tmp_path), Impatient())
+    assert half.record.synthetic  # the instruments say so themselves
+    zero = datetime.now(UTC) - timedelta(seconds=72.5)
+    left = dataclasses.replace(half, record=half.record.model_copy(update={"time_zero_utc": zero.isoformat()}))
+    run = acquire(Order("spin", config, out=tmp_path, resume=left), Silent())
+    times = run.readings().frame["time_s"].to_numpy()
+    assert len(times) > 6
+    # the next whole ten seconds, and half a gate; a slow machine may take some seconds from zero to there
+    assert 80 <= times[4] < 92
+    assert (np.diff(times) > 0).all()
