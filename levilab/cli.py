@@ -220,7 +220,7 @@ def runs(
 
 def main() -> None:
     """The console script: known failures become one line and an exit status, everything else stays loud."""
-    _speak_utf8()
+    _never_fail_to_print()
     try:
         app()
     except BrokenPipeError:  # whoever read our output went away: nothing is left to say, and nobody to say it to
@@ -252,8 +252,8 @@ def _mute() -> None:
                 os.dup2(nowhere.fileno(), stream.fileno())
 
 
-def _speak_utf8() -> None:
-    """Windows consoles and pipes default to code pages without ν and ω."""
+def _never_fail_to_print() -> None:
+    """Consoles and pipes of Windows may use code pages without ν and ω: those are shown as question marks there."""
     for stream in (sys.stdout, sys.stderr):
         reconfigure = getattr(stream, "reconfigure", None)
         if reconfigure:

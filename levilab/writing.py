@@ -127,9 +127,7 @@ class RunWriter:
 
     def discard(self) -> None:
         """Take a run away that never began.  Only for one without a reading."""
-        for file in self._files.values():
-            file.close()
-        self._files.clear()
+        self._close()
         self._lock.release()
         shutil.rmtree(self.folder, ignore_errors=True)
 
@@ -137,10 +135,15 @@ class RunWriter:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._close()
+        self._lock.release()
+
+    def _close(self) -> None:
+        """What is still in a buffer could not be written before and has been told: closing need not tell it again."""
         for file in self._files.values():
             with contextlib.suppress(OSError):
                 file.close()
-        self._lock.release()
+        self._files.clear()
 
     def update(self, **changes: Any) -> None:
         """Change entries of run.json."""
