@@ -4,7 +4,7 @@ BIN    := .venv/bin
 DEMO   := demo
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint check all-pythons wheel bench clean
+.PHONY: help setup demo test explore lint all-pythons wheel bench clean
 
 help:  ## list the targets
 	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -26,6 +26,9 @@ demo: setup  ## the main job on the virtual bench: acquire, analyze, report (int
 
 test: setup lint  ## everything that must pass: style, types, imports, tests
 	$(BIN)/python -m pytest
+
+explore: setup  ## the property tests with new random examples
+	HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest tests/levilab/test_formats.py tests/analysis tests/instruments
 
 lint: setup  ## style, types and import rules
 	$(BIN)/ruff check .

@@ -120,11 +120,19 @@ def _every_line_is_full(path: Path, layout: Layout) -> bool:
     return True
 
 
+def _skips(layout: Layout, line: str) -> bool:
+    """Whether a line is no row: blank, a comment, or some separators that a spreadsheet left behind."""
+    separator = layout.dialect.separator
+    if layout.dialect.skips(line):
+        return True
+    return separator is not None and not line.strip(separator + " \n") and line.count(separator) < layout.width - 1
+
+
 def _with_last(
     path: Path, layout: Layout, chosen: Sequence[Column], rows: Rows, rest: str, *, drop_unended: bool
 ) -> Rows:
     """Rows with what follows the last line end, if that is one."""
-    if layout.dialect.skips(rest):
+    if _skips(layout, rest):
         return rows
     line = layout.first_line + rows.lines.size
     last = None if drop_unended else _row_or_none(path, layout, chosen, line, rest)
@@ -139,7 +147,7 @@ def _read_lines(path: Path, layout: Layout, chosen: Sequence[Column], *, drop_un
     lines, values, torn = array("q"), [array("d") for _ in chosen], None
     with path.open(encoding=layout.encoding, errors="replace", newline=None) as stream:
         for number, line in enumerate(stream, 1):
-            if number < layout.first_line or layout.dialect.skips(line):
+            if number < layout.first_line or _skips(layout, line):
                 continue
             row: list[float] | None
             if line.endswith("\n"):

@@ -1,8 +1,15 @@
 """What all tests share."""
 
+import os
 import signal
 
 import pytest
+from hypothesis import settings
+
+# What is green stays green: the same examples each time. `make explore` looks for others.
+settings.register_profile("repeat", derandomize=True)
+settings.register_profile("explore", max_examples=1000)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeat"))
 
 
 @pytest.fixture(autouse=True, scope="session")

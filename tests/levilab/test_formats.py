@@ -327,7 +327,11 @@ def written_tables(draw):
     return rows, (newline.join(lines) + end).encode(encoding)
 
 
+FIVE = [(0.0, 0.0, 0.0)] * 5
+
+
 @SLOW
+@example((FIVE, b"time_s,spin_frequency_hz,spin_frequency_u_hz\ns,Hz,Hz\n" + b"0.0,0.0,0.0\n" * 5 + b",\n"))
 @given(written_tables())
 def test_any_table_in_any_dialect_reads_back_equal(tmp_path, written):
     rows, data = written
