@@ -181,7 +181,8 @@ def _miscounts(readings: Readings) -> tuple[NDArray[np.intp], Array]:
         return np.flatnonzero(far), np.empty(0)
     found = solution(LAWS["power"], replace(readings, x=smooth))
     for _ in range(10):
-        off = np.abs(readings.x / LAWS["power"].spin(readings.tau, found.q) - 1)
+        # of an exponent below 1 the fitted top may have stopped: what is read then is far off, not infinitely so
+        off = np.abs(readings.x / np.maximum(LAWS["power"].spin(readings.tau, found.q), ROUNDING) - 1)
         scatter = max(1.4826 * float(np.median(off)), ROUNDING)  # of normal noise by its median
         now = off > max(MISCOUNT, FAR * scatter)
         if now.sum() > n // 4:
