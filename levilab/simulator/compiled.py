@@ -1,0 +1,76 @@
+"""How the simulator's kernels are compiled, and where the machine code is kept.
+
+Numba keeps compiled code on disk and looks at one source file to see whether it is still good.  Ours are put
+together from several files, so they are kept in a folder that is named by the source of all of them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numba
+import numba.core
+from numba.extending import overload
+from platformdirs import user_cache_path
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+F = TypeVar("F", bound="Callable[..., Any]")
+
+# numpy: 1/0 is inf and no exception, whose test would keep loops from becoming SIMD;
+# contract: a·b + c in one rounding.  Nothing that reorders sums.
+PART_OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract"}, "forceinline": True}
+
+
+@cache
+def _folder() -> Path:
+    digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:2]}".encode())
+    for source in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(source.read_bytes())
+    return user_cache_path("levilab", appauthor=False) / "kernels" / digest.hexdigest()[:16]
+
+
+def part(function: F) -> F:
+    """A small function that kernels are made of; it is compiled into them."""
+    compiled: F = numba.njit(function, **PART_OPTIONS)
+    return compiled
+
+
+def kernel(function: F) -> F:
+    """An entry point: compiled once for each kind of scene, kept on disk, run without the interpreter's lock."""
+    config: Any = numba.core.config
+    before = config.CACHE_DIR
+    config.CACHE_DIR = before or str(_folder())  # read by numba here, when the function is decorated
+    try:
+        compiled: F = numba.njit(
+            function, error_model="numpy", fastmath={"contract"}, cache=True, nogil=True, boundscheck=False
+        )
+    finally:
+        config.CACHE_DIR = before
+    return compiled
+
+
+def kind(numba_type: Any) -> type:
+    """The class of a tuple with names, or NoneType, from its type at compile time."""
+    found: type = getattr(numba_type, "instance_class", type(None))
+    return found
+
+
+def by_type(choices: Mapping[type, Callable[..., Any]]) -> Callable[..., Any]:
+    """A function inside kernels that is another one for every class of its first argument.
+
+    choices: class → implementation, all with the same parameters; NoneType stands for None.  The choice is made
+    when a kernel is compiled: nothing is left of it in the machine code.
+    """
+
+    def chosen(*arguments: Any) -> Any:
+        raise NotImplementedError("it exists inside of kernels only")
+
+    plain = {which: getattr(function, "py_func", function) for which, function in choices.items()}
+    overload(chosen, jit_options=PART_OPTIONS, strict=False)(lambda *arguments: plain[kind(arguments[0])])
+    return chosen

@@ -1,0 +1,270 @@
+"""Many tops at once: different starts and parameters, in SIMD lanes and over the cores."""
+
+from __future__ import annotations
+
+import math
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from levilab.simulator import top
+from levilab.simulator.estimate import estimate
+from levilab.simulator.keys import SceneError
+from levilab.simulator.lanes import LANES, advance_many, numbers_of
+from levilab.simulator.motion import STATE_SIZE
+from levilab.simulator.problem import NOWHERE, Problem, scheme_for, travelled
+from levilab.simulator.schemes import SCHEMES
+from levilab.simulator.simulate import simulate
+from levilab.simulator.steps import longest_step
+from levilab.simulator.stops import kinks, stops_between
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+    from levilab.simulator.scene import Scene
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+#: Tops whose step is found one by one, to choose that of all: the corners of a map and some inside.
+PILOTS = 8
+#: Motion [s] that a step is chosen on; errors grow with the time, and the tolerance is shared out accordingly.
+PILOT_DURATION = 3.0
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """The ends of many motions.  All arrays have the shape of the values that were varied, states one axis more.
+
+    scene: what they have in common; values: what differs, by dotted keys; survived: still up after `duration` [s];
+    time [s]: of the end, or of the escape; states: at the end, shape (…, 18); position_error [m], axis_error [rad]:
+    estimated, NaN where they were not asked for.  Where an error is larger than the tolerance, the motion was
+    chaotic, and whether it survived is chance.
+    """
+
+    scene: Scene
+    values: dict[str, NDArray[Any]]
+    duration: float
+    survived: NDArray[np.bool_]
+    time: Array
+    states: Array
+    position_error: Array
+    axis_error: Array
+
+    @property
+    def position(self) -> Array:
+        """Places at the end, shape (…, 3) [m]."""
+        return self.states[..., top.R]
+
+    @property
+    def axis(self) -> Array:
+        """Axes at the end, shape (…, 3)."""
+        return self.states[..., top.N]
+
+    @property
+    def spin_hz(self) -> Array:
+        """Spins ω₃/2π at the end [Hz]."""
+        along = np.sum(self.states[..., top.L] * self.states[..., top.N], axis=-1)
+        washers = self.scene.washers.inertia_kg_m2
+        inertia = self.values.get("top.inertia_axial_kg_m2", np.array(self.scene.top.inertia_axial_kg_m2))
+        return np.asarray((along - self.states[..., top.LOOSE] * (washers > 0)) / (inertia - washers) / (2 * np.pi))
+
+
+def simulate_many(
+    scene: Scene,
+    over: Mapping[str, ArrayLike],
+    duration: float = 30.0,
+    *,
+    tolerance: float = 1e-9,
+    step: float | None = None,
+    cores: int | None = None,
+    errors: bool = True,
+    progress: Callable[[float], None] | None = None,
+) -> Ensemble:
+    """Simulate a scene for many values at once.
+
+    over: dotted keys of the scene with their values, broadcast against each other; duration [s]; tolerance: wanted
+    error of place [m] and axis [rad] at the end, from which one step is chosen on a few of the tops; step [s]:
+    fixes it instead; cores: threads, as many as there are where None; errors: estimate every top's error by a
+    second, coarser run, which takes half as long again; progress: is told the share of the work done.
+
+    Raises SceneError for keys and values that a scene does not allow, SimulationError for senseless numbers.
+
+    >>> import numpy as np
+    >>> from levilab.simulator import preset, simulate_many
+    >>> spins = np.array([18.0, 25.0, 30.0])
+    >>> simulate_many(preset("undriven"), {"start.spin_hz": spins}, 5.0).survived
+    array([False,  True,  True])
+    """
+    if scene.observed == "spin":
+        raise SceneError("observed = spin: the spin alone has a closed form; many at once need observed = motion")
+    keys = list(over)
+    values = np.broadcast_arrays(*(np.asarray(over[key]) for key in keys)) if keys else [np.zeros(1)]
+    shape = values[0].shape
+    tops = [
+        _Top.of(scene.changed({key: _plain(v.flat[i]) for key, v in zip(keys, values, strict=False)}), duration)
+        for i in range(values[0].size)
+    ]
+    share = step / tops[0].longest if step else _step_share(tops, duration, tolerance)
+    ends = _Ends.empty(len(tops))
+    threads = cores or os.cpu_count() or 1
+    work = [part for group in _groups(tops) for part in _parts(group, threads)]
+    with ThreadPoolExecutor(threads) as pool:
+        for done, _ in enumerate(
+            pool.map(lambda part: _advance(tops, part, duration, share, ends, errors=errors), work), 1
+        ):
+            if progress is not None:
+                progress(done / len(work))
+    return Ensemble(
+        scene,
+        {key: np.array(v) for key, v in zip(keys, values, strict=False)},
+        duration,
+        ends.survived.reshape(shape),
+        ends.states[:, top.TIME].reshape(shape),
+        ends.states.reshape(*shape, STATE_SIZE),
+        ends.position_error.reshape(shape),
+        ends.axis_error.reshape(shape),
+    )
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value
+
+
+@dataclass(frozen=True)
+class _Top:
+    """One top, made ready.  longest: the longest step it allows [s]; kinked: its drive jumps or bends on the way."""
+
+    problem: Problem
+    longest: float
+    kinked: bool
+
+    @classmethod
+    def of(cls, scene: Scene, duration: float) -> _Top:
+        model, start = top.model_of(scene), top.start_of(scene)
+        problem = Problem(scene, model, start, scheme_for(None, model))
+        kinked = model.drive is not None and kinks(scene.drive, 0.0, duration).size > 0
+        return cls(problem, longest_step(scene, model, start, problem.scheme), kinked)
+
+
+@dataclass(frozen=True)
+class _Ends:
+    states: Array
+    survived: NDArray[np.bool_]
+    position_error: Array
+    axis_error: Array
+
+    @classmethod
+    def empty(cls, n: int) -> _Ends:
+        return cls(np.empty((n, STATE_SIZE)), np.zeros(n, dtype=np.bool_), np.full(n, np.nan), np.full(n, np.nan))
+
+
+def _step_share(tops: list[_Top], duration: float, tolerance: float) -> float:
+    """The part of a top's longest step that keeps the errors within the tolerance, from a few of them."""
+    some = {round(i) for i in np.linspace(0, len(tops) - 1, PILOTS)}
+    time = min(duration, PILOT_DURATION)
+    shares = []
+    for i in some:
+        motion = simulate(tops[i].problem.scene, time, tolerance=tolerance * time / duration, rate=None)
+        if motion.accuracy.reached:
+            shares.append(motion.accuracy.step / tops[i].longest)
+    return min(shares, default=0.25)
+
+
+def _groups(tops: list[_Top]) -> Iterable[list[int]]:
+    """Tops whose models are of the same kind, and so go through the same kernel."""
+    groups: dict[Any, list[int]] = {}
+    for i, one in enumerate(tops):
+        kind = (_kind(one.problem.model), one.problem.scheme.name, one.kinked, one.problem.escape)
+        groups.setdefault(kind, []).append(i)
+    return groups.values()
+
+
+def _kind(model: Any) -> Any:
+    if isinstance(model, np.ndarray):
+        return model.tobytes()
+    if isinstance(model, tuple):
+        return (type(model).__name__, *(_kind(inner) for inner in model))
+    return type(model).__name__
+
+
+def _parts(group: list[int], threads: int) -> list[list[int]]:
+    """Pieces of the work: enough of them to keep the threads evenly busy, large enough to keep the lanes full."""
+    size = max(8 * LANES, math.ceil(len(group) / (8 * threads)))
+    return [group[i : i + size] for i in range(0, len(group), size)]
+
+
+def _advance(tops: list[_Top], part: list[int], duration: float, share: float, ends: _Ends, *, errors: bool) -> None:
+    some = [tops[i] for i in part]
+    steps = np.array([share * one.longest for one in some])
+    counts = np.maximum(np.ceil(duration / steps), 1).astype(np.int64)
+    problem = some[0].problem
+    if some[0].kinked:
+        states, survived = _one_by_one(some, np.full(len(some), duration), steps, escape=True)
+    else:
+        states, taken = _together(some, duration / counts, counts, problem.escape)
+        survived = (taken == counts) & _inside(states, problem.escape)
+    ends.states[part], ends.survived[part] = states, survived
+    if errors:
+        twice, four = (_coarse(some, states[:, top.TIME], times * steps) for times in (2, 4))
+        for error, columns in ((ends.position_error, top.R), (ends.axis_error, top.N)):
+            error[part] = estimate(states[:, columns], twice[:, columns], four[:, columns], problem.scheme.order)
+    late = ~survived
+    states[late] = _at_the_limit(states[late], steps[late], problem.escape)
+    ends.states[part] = states
+
+
+def _coarse(some: list[_Top], times: Array, steps: Array) -> Array:
+    """The states at these times with steps of these lengths and no escape."""
+    if some[0].kinked:
+        return _one_by_one(some, times, steps, escape=False)[0]
+    counts = np.maximum(np.ceil(times / steps), 1).astype(np.int64)
+    return _together(some, times / counts, counts, NOWHERE)[0]
+
+
+def _together(some: list[_Top], steps: Array, counts: Counts, escape: tuple[float, float]) -> tuple[Array, Counts]:
+    """States at the ends and steps taken, by the kernel with lanes."""
+    scheme = SCHEMES[some[0].problem.scheme.name]
+    starts = np.array([one.problem.start for one in some])
+    numbers = np.array([numbers_of(one.problem.model) for one in some])
+    states, taken = np.empty_like(starts), np.zeros(len(some), dtype=np.int64)
+    model, a, b = some[0].problem.model, np.array(scheme.drifts), np.array(scheme.kicks)
+    advance_many(model, starts, numbers, steps, counts, a, b, escape, states, taken)
+    states[:, top.TIME] = starts[:, top.TIME] + steps * taken
+    return states, taken
+
+
+def _one_by_one(some: list[_Top], times: Array, steps: Array, *, escape: bool) -> tuple[Array, NDArray[np.bool_]]:
+    """States at the ends, and whether they were reached: for drives with kinks, whose steps differ from top to top."""
+    states, lasted = np.empty((len(some), STATE_SIZE)), np.ones(len(some), dtype=np.bool_)
+    for i, one in enumerate(some):
+        stops = stops_between(0.0, times[i], steps[i], one.problem.scene.drive)
+        if escape:
+            through, fell, _ = travelled(one.problem, stops)
+            states[i], lasted[i] = through[-1] if fell is None else fell.state, fell is None
+        else:
+            states[i] = one.problem.advanced(one.problem.start, stops, NOWHERE)[0][-1]
+    return states, lasted
+
+
+def _inside(states: Array, escape: tuple[float, float]) -> NDArray[np.bool_]:
+    x, y, z = states[:, top.R].T
+    return np.asarray((z > escape[1]) & (np.hypot(x, y) < escape[0]))
+
+
+def _at_the_limit(states: Array, steps: Array, escape: tuple[float, float]) -> Array:
+    """States that are a part of a step outside, taken back to the limit along their velocity."""
+    x, y, z = states[:, top.R].T
+    vx, vy, vz = states[:, top.V].T
+    r = np.hypot(x, y)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        back = np.fmax(np.where(z <= escape[1], (z - escape[1]) / vz, 0), (r - escape[0]) * r / (x * vx + y * vy))
+    back = np.clip(np.nan_to_num(back), 0, steps)
+    taken_back = states.copy()
+    taken_back[:, top.R] -= back[:, None] * states[:, top.V]
+    taken_back[:, top.TIME] -= back
+    return taken_back

@@ -1,0 +1,135 @@
+"""Dotted keys: nested tables, changed and checked by paths such as top.mass_kg or start.position_m.0."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import tomllib
+from typing import TYPE_CHECKING, Any
+
+from levilab.errors import LevilabError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+Table = dict[str, Any]
+
+
+class SceneError(LevilabError):
+    """A scene that cannot be simulated as it is described."""
+
+
+def parsed(setting: str) -> tuple[str, Any]:
+    """KEY=VALUE as a dotted key and a value of TOML; a word without quotes is a string.  Raises SceneError.
+
+    >>> parsed("drag.law=stokes"), parsed("start.position_m = [0, 0, 0.072]")
+    (('drag.law', 'stokes'), ('start.position_m', [0, 0, 0.072]))
+    """
+    key, equals, text = setting.partition("=")
+    key, text = key.strip(), text.strip()
+    if not (key and equals):
+        raise SceneError(f"{setting!r}: KEY=VALUE is expected, such as top.mass_kg=0.025 or drag.law=stokes")
+    return key, _value(text)
+
+
+def _value(text: str) -> Any:
+    try:
+        table = tomllib.loads(f"value = {text}")
+        if table.keys() == {"value"}:  # a line break in the text would begin another key
+            return table["value"]
+    except tomllib.TOMLDecodeError:
+        pass
+    try:
+        return float(text)  # .5 and 5. are numbers to everybody but TOML
+    except ValueError:
+        return text
+
+
+def set_key(table: Table, key: str, value: Any) -> None:
+    """Put a value at a dotted key of a table of tables and lists; all keys must be there.  Raises SceneError.
+
+    A table as value changes the keys that it holds and leaves the others.
+    """
+    given = f"{key} = {shown(value)}"
+    *way, last = key.split(".")
+    at: Any = table
+    for depth, part in enumerate(way):
+        at = at[_step(table, at, [*way[:depth], part], given)]
+    step = _step(table, at, [*way, last], given)
+    if not isinstance(at[step], dict):
+        at[step] = plain(value)
+    elif isinstance(value, dict):
+        for inner, item in value.items():
+            set_key(table, f"{key}.{inner}", item)
+    else:
+        raise SceneError(f"{given}: a table is expected, with the keys {', '.join(at[step])}")
+
+
+def _step(table: Table, at: Any, way: list[str], given: str) -> str | int:
+    """The last step of a way into a table, which has led to `at`; or what is wrong with it."""
+    *before, part = way
+    if isinstance(at, dict) and part in at:
+        return part
+    if isinstance(at, dict):
+        raise SceneError(f"{given}: {_unknown(table, at, way)}")
+    if not isinstance(at, list):
+        raise SceneError(f"{given}: {'.'.join(before)} = {shown(at)} has no parts, give it as a whole")
+    if not (part.isdecimal() and int(part) < len(at)):
+        raise SceneError(f"{given}: {'.'.join(before)} has {len(at)} numbers, counted from 0 to {len(at) - 1}")
+    return int(part)
+
+
+def _unknown(table: Table, at: Table, way: list[str]) -> str:
+    """What to say about a key that nobody knows: what was meant, perhaps, and what there is."""
+    *before, part = way
+    elsewhere = [f"{name}.{part}" for name, inner in table.items() if isinstance(inner, dict) and part in inner]
+    near = nearest(part, at)
+    meant = elsewhere or ([".".join([*before, near])] if near else [])
+    asked = f"; did you mean {' or '.join(meant)}?" if meant else ";"
+    where = f" in {'.'.join(before)}" if before else ""
+    return f"there is no key {'.'.join(way)}{asked} Known{where} are {', '.join(at)}"
+
+
+def nearest(word: str, known: Iterable[str]) -> str | None:
+    """The known word that was most likely meant, if any is near."""
+    found = difflib.get_close_matches(word.lower(), list(known), n=1, cutoff=0.5)
+    return found[0] if found else None
+
+
+def plain(value: Any) -> Any:
+    """Numbers and arrays of numpy as Python's own; a list of one's own."""
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def shown(value: Any) -> str:
+    """A value as one would write it, cut where it is long."""
+    text = str(plain(value))
+    return text if len(text) <= 60 else f"{text[:59]}…"
+
+
+def as_toml(table: Mapping[str, Any]) -> str:
+    """A table of strings, numbers, lists and tables of these as TOML text; what is None is left out.
+
+    >>> print(as_toml({"a": 1.5, "b": {"c": [1e-06, "x"], "d": None}}))
+    a = 1.5
+    <BLANKLINE>
+    [b]
+    c = [1e-06, "x"]
+    """
+    return "\n".join(_lines(table))
+
+
+def _lines(table: Mapping[str, Any]) -> Iterator[str]:
+    yield from _assignments(table)
+    for name, inner in table.items():
+        if isinstance(inner, dict):
+            yield from ("", f"[{name}]", *_assignments(inner))
+
+
+def _assignments(table: Mapping[str, Any]) -> Iterator[str]:
+    for key, value in table.items():
+        if value is not None and not isinstance(value, dict):
+            # JSON's strings, floats and lists are TOML's, but for DEL, which TOML wants escaped
+            yield f"{key} = {json.dumps(value, ensure_ascii=False, allow_nan=False)}".replace("\x7f", "\\u007f")

@@ -1,0 +1,147 @@
+"""The two exact flows that the motion is put together from, and the numbers they need.
+
+The kinetic energy alone moves the top freely: the *drift*.  The field, gravity and the drive change its
+momenta at a fixed place and attitude: the *kick*.  Both are exact, whatever the step:
+
+    drift   r ← r + d v;  n (and the attitude) turns about L by the angle |L| d/I₁
+    kick    v ← v + k F/m,  L ← L + k T     with F = ∇(M·B) + m g,  T = M×B
+
+What a scene does not have is no code in its kernels: a model is a tuple of small tuples, one type for each
+kind, and the functions are chosen by type when a kernel is compiled (numba's `overload`).
+Source: Simon, Heflinger & Ridgway, Am. J. Phys. 65, 286 (1997); Landau & Lifshitz, Mechanics, § 33, 36.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from levilab.simulator.braking import braked, ticked
+from levilab.simulator.compiled import by_type, part
+from levilab.simulator.loads import applied_field, load
+from levilab.simulator.vectors import Vector, dot, plus, rotation, turned
+
+
+class State(NamedTuple):
+    """All that any scene moves; what a scene does not need stays as it is and costs nothing.
+
+    r [m], v [m/s]: place and velocity; n: the top's axis; L [kg m²/s]: angular momentum; arm: the body's
+    x axis (tilted dipole, magnetised disc); clock [rad/s]: the spin that drag alone prescribes (aligned
+    dipole); loose [kg m²/s]: axial angular momentum of loose washers; t [s].
+    """
+
+    r: Vector
+    v: Vector
+    n: Vector
+    L: Vector
+    arm: Vector
+    clock: float
+    loose: float
+    t: float
+
+
+#: Numbers in a State, in the order of its fields.
+STATE_SIZE = 18
+
+
+class Body(NamedTuple):
+    """A rigid symmetric top: 1/m [1/kg], 1/I₁, I₃ [kg m²]; gravity [m/s²] as seen from the base's frame."""
+
+    inverse_mass: float
+    inverse_transverse: float
+    axial: float
+    gravity: Vector
+
+
+class Rigid(NamedTuple):
+    """Everything turns as one.  twist: 1/I₃ − 1/I₁ [1/(kg m²)]."""
+
+    twist: float
+
+
+class Loose(NamedTuple):
+    """Washers that slide on the body: its own turn goes with the core's spin alone.  inverse_core: 1/I_core."""
+
+    inverse_core: float
+
+
+class Model(NamedTuple):
+    """A scene as its kernels see it: one tuple for each thing modelled, None for what is not."""
+
+    field: Any
+    body: Body
+    magnet: Any
+    turning: Any
+    drag: Any
+    drive: Any
+
+
+# --- drift ---
+
+
+def _no_twist(turning: Any, n: Any, arm: Any, along: Any, loose: Any, inverse_i1: Any, d: Any) -> Any:
+    return arm
+
+
+def _rigid_twist(turning: Any, n: Any, arm: Any, along: Any, loose: Any, inverse_i1: Any, d: Any) -> Any:
+    angle = turning.twist * along * d
+    sinc, cosc = rotation(angle * angle)
+    return turned(arm, n, angle * sinc, angle * angle * cosc)
+
+
+def _loose_twist(turning: Any, n: Any, arm: Any, along: Any, loose: Any, inverse_i1: Any, d: Any) -> Any:
+    spin = (along - loose) * turning.inverse_core
+    angle = (spin - along * inverse_i1) * d
+    sinc, cosc = rotation(angle * angle)
+    return turned(arm, n, angle * sinc, angle * angle * cosc)
+
+
+#: The arm after its turn about the axis itself: (turning, axis, arm, L·n, washers' part of it, 1/I₁, d).
+twisted = by_type({type(None): _no_twist, Rigid: _rigid_twist, Loose: _loose_twist})
+
+
+def _not_swung(turning: Any, arm: Any, axis: Any, sine: Any, cosine: Any) -> Any:
+    return arm
+
+
+def _swung(turning: Any, arm: Any, axis: Any, sine: Any, cosine: Any) -> Any:
+    return turned(arm, axis, sine, cosine)
+
+
+#: The arm after its turn about the angular momentum: (turning, arm, L, sine, cosine).
+swung = by_type({type(None): _not_swung, Rigid: _swung, Loose: _swung})
+
+
+@part
+def drift(model: Model, s: State, d: float) -> State:
+    """Free motion for the time d [s], exact."""
+    body = model.body
+    w = d * body.inverse_transverse
+    sinc, cosc = rotation(dot(s.L, s.L) * (w * w))
+    sine, cosine = w * sinc, w * w * cosc
+    arm = twisted(model.turning, s.n, s.arm, dot(s.L, s.n), s.loose, body.inverse_transverse, d)
+    return State(
+        plus(s.r, d, s.v),
+        s.v,
+        turned(s.n, s.L, sine, cosine),
+        s.L,
+        swung(model.turning, arm, s.L, sine, cosine),
+        ticked(model.drag, s.clock, d),
+        s.loose,
+        s.t + d,
+    )
+
+
+# --- kick ---
+
+
+@part
+def kick(model: Model, s: State, k: float, level: float, slope: float) -> State:
+    """Forces and torques for the time k [s] at a fixed place and attitude, exact.
+
+    level, slope: of the drive, whose field is (level + slope·t) × amplitude × its carrier.
+    """
+    body = model.body
+    force, torque = load(model.magnet, model.field, s, applied_field(model.drive, s.t, level, slope))
+    v = plus(plus(s.v, k * body.inverse_mass, force), k, body.gravity)
+    momentum, loose = braked(model.drag, body, s, torque, k)
+    return State(s.r, v, s.n, momentum, s.arm, s.clock, loose, s.t)

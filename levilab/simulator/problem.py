@@ -1,0 +1,131 @@
+"""A scene made ready for its kernels, and its motion at one step from stop to stop."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from levilab.errors import LevilabError
+from levilab.simulator import escapes, top
+from levilab.simulator.braking import Flowing, LooseFlowing
+from levilab.simulator.motion import STATE_SIZE
+from levilab.simulator.schemes import SCHEMES, Scheme
+from levilab.simulator.splitting import advance
+from levilab.simulator.stops import every_step
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from levilab.simulator.scene import Scene
+    from levilab.simulator.stops import Stops
+    from levilab.simulator.trajectory import Event
+
+Array = NDArray[np.float64]
+
+#: No escape: for coarse runs, which a fine one is compared with.
+NOWHERE = (math.inf, -math.inf)
+
+#: Steps in one call of a kernel; between calls progress is told and Ctrl-C is heard (about 50 ms).
+STEPS_IN_A_CALL = 100_000
+
+
+class SimulationError(LevilabError):
+    """A simulation that cannot be carried out."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A scene made ready for its kernels."""
+
+    scene: Scene
+    model: Any
+    start: Array
+    scheme: Scheme
+
+    @property
+    def escape(self) -> tuple[float, float]:
+        """Radius and height [m] outside of which the top counts as fallen."""
+        return self.scene.escape.radius_m, self.scene.escape.height_m
+
+    def advanced(self, start: Array, stops: Stops, escape: tuple[float, float]) -> tuple[Array, bool]:
+        """The states at the stops that were reached, shape (n, 18), and whether that is all of them."""
+        states = np.empty((stops.times.size, STATE_SIZE))
+        a, b = np.array(self.scheme.drifts), np.array(self.scheme.kicks)
+        reached = advance(
+            self.model, start, stops.times, stops.counts, stops.levels, stops.slopes, a, b, escape, states
+        )
+        return states[: reached + 1], reached == stops.counts.size
+
+
+def scheme_for(name: str | None, model: Any) -> Scheme:
+    """The scheme of that name, or the best one for the model: drag that flows allows no Nyström composition."""
+    flows = isinstance(model.drag, Flowing | LooseFlowing)
+    if name is None:
+        return SCHEMES["kahan-li-8" if flows else "blanes-moan-6"]
+    if name not in SCHEMES:
+        raise SimulationError(f"scheme {name!r}: expected one of {', '.join(SCHEMES)}")
+    if flows and not SCHEMES[name].any_split:
+        fitting = ", ".join(scheme.name for scheme in SCHEMES.values() if scheme.any_split)
+        raise SimulationError(
+            f"scheme {name}: with drag on a top whose spin the field changes it loses its order: take one of {fitting}"
+        )
+    return SCHEMES[name]
+
+
+def travelled(
+    problem: Problem, stops: Stops, progress: Callable[[float], None] | None = None
+) -> tuple[Array, Event | None, int]:
+    """All states at the stops, until an escape; in calls short enough to be interrupted."""
+    done = np.cumsum(stops.counts)
+    pieces, state, at = [problem.start[None]], problem.start, 0
+    while at < stops.counts.size:
+        to = max(int(np.searchsorted(done, done[at] + STEPS_IN_A_CALL)), at + 1)
+        states, through = problem.advanced(state, stops.part(at, to), problem.escape)
+        pieces.append(states[1:])
+        state, at = states[-1], at + len(states) - 1
+        if not through:
+            passed, fell = _escape(problem, state, stops.part(at, at + 1))
+            if fell is not None:
+                return np.concatenate(pieces), fell, int(done[at])
+            pieces.append(passed[None])
+            state, at = passed, at + 1
+        if progress is not None:
+            progress(float(done[at - 1] / done[-1]))
+    return np.concatenate(pieces), None, int(done[-1])
+
+
+def _escape(problem: Problem, state: Array, interval: Stops) -> tuple[Array, Event | None]:
+    """The escape within an interval, step by step.
+
+    The kernel looks a little ahead, where the drifts of two steps have become one; a top that only grazes the limit
+    there has not escaped, and the state at the interval's end is returned.
+    """
+    single = every_step(interval)
+    states, through = problem.advanced(state, single, problem.escape)
+    if through:
+        return states[-1], None
+    at = len(states) - 1
+    after = problem.advanced(states[-1], single.part(at, at + 1), NOWHERE)[0][-1]
+    if not np.all(np.isfinite(after)):
+        raise SimulationError(
+            f"the motion cannot be followed beyond {states[-1][top.TIME]:.6g} s, where its numbers leave their range; "
+            f"the last place was ({', '.join(f'{x:.4g}' for x in states[-1][top.R])}) m: "
+            "start farther from the base's edges, or end at a greater escape.height_m"
+        )
+    moved = mover(problem, single.part(at, at + 1))
+    length = float(single.times[at + 1] - single.times[at])
+    return after, escapes.escaped(states[-1], length, moved, problem.escape)
+
+
+def mover(problem: Problem, interval: Stops) -> Callable[[Array, float], Array]:
+    """(state, time) → the state that much later, in one step, with the drive as it is in the interval."""
+
+    def moved(state: Array, length: float) -> Array:
+        times = np.array([state[top.TIME], state[top.TIME] + length])
+        return np.asarray(problem.advanced(state, replace(interval, times=times), NOWHERE)[0][-1])
+
+    return moved

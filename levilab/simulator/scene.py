@@ -1,0 +1,264 @@
+"""A scene: what is simulated, from the magnets to the start, with the thesis's device as default.
+
+The frame is the base's: origin at its centre, z up its axis; a base that leans has a gravity that leans.
+A scene is a preset, a TOML file, or either of them with some keys changed; what does not go together is told
+with the key, its value and what is allowed.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from importlib import resources
+from operator import attrgetter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+from pydantic import NonNegativeFloat, ValidationError, model_validator
+
+from levilab.config import in_one_line
+from levilab.simulator.keys import SceneError, Table, as_toml, nearest, parsed, set_key, shown
+from levilab.simulator.scene_parts import Base, Drag, Drive, Escape, Part, Start, Top, Washers
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+    from importlib.resources.abc import Traversable
+
+__all__ = [
+    "Base", "Drag", "Drive", "Escape", "Scene", "SceneError", "Start", "Top", "Washers",
+    "preset", "presets", "read_scene", "remarks", "scene_of", "with_settings",
+]  # fmt: skip
+
+
+class Scene(Part):
+    """All that is simulated.  observed "spin": the spin alone, which needs no integration.
+
+    Raises pydantic's ValidationError for a value that its key does not allow, SceneError for values that do not
+    go together; `scene_of`, `read_scene`, `with_settings` and `changed` raise SceneError for both.
+    """
+
+    name: str = ""
+    description: str = ""
+    observed: Literal["motion", "spin"] = "motion"
+    gravity_m_s2: NonNegativeFloat = 9.82
+    base: Base = Base()
+    top: Top = Top()
+    washers: Washers = Washers()
+    drag: Drag = Drag()
+    drive: Drive = Drive()
+    start: Start = Start()
+    escape: Escape = Escape()
+
+    @model_validator(mode="after")
+    def _goes_together(self) -> Scene:
+        for rule in RULES:
+            if not rule.holds(self):
+                value = shown(attrgetter(rule.key)(self))
+                raise SceneError(f"{rule.key} = {value}: {rule.expected.format(s=self)}")
+        return self
+
+    def changed(self, values: Mapping[str, Any]) -> Scene:
+        """The scene with other values at dotted keys, checked anew.  Raises SceneError.
+
+        >>> Scene().changed({"top.mass_kg": 0.025, "start.position_m.2": 0.072}).start.position_m
+        (0.001, 0.0, 0.072)
+        """
+        table = self.as_table()
+        for key, value in values.items():
+            set_key(table, key, value)
+        # a constant belongs to its law: with another law goes that law's own, unless one is given with it
+        given = any(key.startswith("drag.coefficient") for key in values) or "coefficient" in values.get("drag", ())
+        if table["drag"]["law"] != self.drag.law and not given:
+            table["drag"]["coefficient"] = None
+        return scene_of(table)
+
+    def as_table(self) -> Table:
+        """All keys with their values, as TOML and JSON have them; None where nothing is given."""
+        return self.model_dump(mode="json")
+
+    def as_toml(self) -> str:
+        """The scene as the text of a TOML file."""
+        return as_toml(self.as_table()) + "\n"
+
+
+class Rule(NamedTuple):
+    """Values that must go together: the key that is named, the test, and what is allowed (with s, the scene)."""
+
+    key: str
+    holds: Callable[[Scene], bool]
+    expected: str
+
+
+def _given(s: Scene) -> bool:
+    return s.start.place == "given"
+
+
+def _coefficients(s: Scene) -> bool:
+    return s.drag.law == "none" or len(s.drag.constants) == (2 if s.drag.law == "mixed" else 1)
+
+
+RULES: tuple[Rule, ...] = (
+    Rule(
+        "base.outer_radius_m",
+        lambda s: s.base.outer_radius_m > s.base.inner_radius_m,
+        "more than base.inner_radius_m = {s.base.inner_radius_m} is expected",
+    ),
+    Rule(
+        "top.inertia_axial_kg_m2",
+        # a flat body has just twice; the margin is for sums that were rounded
+        lambda s: s.top.inertia_axial_kg_m2 <= 2 * s.top.inertia_transverse_kg_m2 * (1 + 1e-9),
+        "at most twice top.inertia_transverse_kg_m2 = {s.top.inertia_transverse_kg_m2} is expected; "
+        "no symmetric body has more",
+    ),
+    Rule("top.moment_a_m2", lambda s: s.top.moment_a_m2 != 0, "any number but 0 is expected, negative to float"),
+    Rule(
+        "top.moment_tilt",
+        lambda s: any(s.top.moment_tilt),
+        "[transverse, axial] parts are expected that are not both 0, such as [0.03, 0.97]",
+    ),
+    Rule(
+        "washers.inertia_kg_m2",
+        lambda s: s.washers.inertia_kg_m2 < s.top.inertia_axial_kg_m2,
+        "less than top.inertia_axial_kg_m2 = {s.top.inertia_axial_kg_m2} is expected, of which it is a part",
+    ),
+    Rule(
+        "drag.coefficient",
+        _coefficients,
+        "two numbers, [c1, c2], are expected with drag.law = mixed and one with every other law (here: {s.drag.law})",
+    ),
+    Rule(
+        "drive.direction",
+        lambda s: any(s.drive.direction),
+        "a direction is expected, such as [0, 1, 0]; for no drive set drive.waveform to off",
+    ),
+    Rule(
+        "start.position_m",
+        lambda s: not _given(s) or s.start.position_m[2] > max(0.0, s.escape.height_m),
+        "a height (the third number) above the base, 0, and above escape.height_m = {s.escape.height_m} is expected",
+    ),
+    Rule(
+        "start.position_m",
+        lambda s: not _given(s) or math.hypot(*s.start.position_m[:2]) <= s.escape.radius_m,
+        "a place within escape.radius_m = {s.escape.radius_m} of the base's axis is expected",
+    ),
+    Rule(
+        "start.precession",
+        lambda s: s.start.precession != "steady" or s.start.tilt_rad > 0,
+        "start.tilt_rad above 0 is expected with it; an upright top does not precess: take none",
+    ),
+    Rule(
+        "observed",
+        lambda s: s.observed != "spin" or s.top.aligned,
+        "motion is expected, since a moment with a transverse part (top.moment_tilt.0 = {s.top.moment_tilt[0]}) "
+        "couples the spin to it; spin goes with a transverse part of 0",
+    ),
+    Rule(
+        "observed",
+        lambda s: s.observed != "spin" or s.washers.inertia_kg_m2 == 0,
+        "motion is expected, since washers.inertia_kg_m2 = {s.washers.inertia_kg_m2} are loose; "
+        "spin goes with an inertia of 0",
+    ),
+)
+
+
+class Remark(NamedTuple):
+    """What is allowed but does nothing: the test, and what to say (with s, the scene)."""
+
+    applies: Callable[[Scene], bool]
+    text: str
+
+
+def _ignored_place(s: Scene) -> bool:
+    usual = (Start().position_m, Start().velocity_m_s)
+    return s.start.place == "equilibrium" and (s.start.position_m, s.start.velocity_m_s) != usual
+
+
+REMARKS: tuple[Remark, ...] = (
+    Remark(
+        lambda s: s.drive.waveform != "off" and s.top.aligned,
+        "the drive cannot change the spin: a uniform field does not turn a moment that lies along the axis "
+        "(top.moment_tilt.0 = 0; the thesis's driven top has top.moment_tilt = [0.03, 0.97])",
+    ),
+    Remark(
+        lambda s: s.drive.waveform != "off" and s.drive.amplitude_t == 0,
+        "the drive does nothing: drive.amplitude_t = 0",
+    ),
+    Remark(
+        lambda s: s.drag.law == "none" and s.drag.coefficient is not None,
+        "drag.coefficient = {s.drag.coefficient} does nothing: drag.law = none",
+    ),
+    Remark(_ignored_place, "start.position_m and start.velocity_m_s do nothing: start.place = equilibrium"),
+)
+
+
+def remarks(scene: Scene) -> list[str]:
+    """What is set in a scene but has no effect, a sentence each."""
+    return [remark.text.format(s=scene) for remark in REMARKS if remark.applies(scene)]
+
+
+def scene_of(table: Mapping[str, Any]) -> Scene:
+    """The scene that a table of keys describes; keys left out have their defaults.  Raises SceneError."""
+    whole = Scene().as_table()
+    whole["drag"] = {"law": "none", "coefficient": None}
+    for key, value in table.items():
+        set_key(whole, key, value)
+    try:
+        return Scene.model_validate(whole)
+    except ValidationError as error:
+        raise SceneError(in_one_line(error)) from error
+
+
+def with_settings(scene: Scene, settings: Iterable[str]) -> Scene:
+    """The scene with the changes of --set KEY=VALUE, all of them made before it is checked.  Raises SceneError.
+
+    >>> with_settings(preset("friction"), ["top.mass_kg=0.0255", "drag.law=newton"]).drag.constants
+    (1.727e-05,)
+    """
+    return scene.changed(dict(map(parsed, settings)))
+
+
+def presets() -> list[str]:
+    """The names of the scenes that ship."""
+    return sorted(file.name.removesuffix(".toml") for file in _shipped().iterdir() if file.name.endswith(".toml"))
+
+
+def preset(name: str) -> Scene:
+    """A scene that ships, by its name.  Raises SceneError."""
+    if name in presets():
+        return _described(_shipped() / f"{name}.toml", name)
+    near = nearest(name, presets())
+    meant = f"did you mean {near}? " if near else ""
+    raise SceneError(
+        f"there is no scene {name!r}: {meant}Known are {', '.join(presets())}; the path to a TOML file goes, too"
+    )
+
+
+def read_scene(name_or_path: str | Path) -> Scene:
+    """The scene of a preset's name, or of a TOML file.  Raises SceneError."""
+    name, path = str(name_or_path), Path(name_or_path)
+    if name in presets() or not (path.suffix == ".toml" or len(path.parts) > 1 or path.exists()):
+        return preset(name)
+    return _described(path, path.stem)
+
+
+def _shipped() -> Traversable:
+    return resources.files("levilab.simulator") / "scenes"
+
+
+def _described(file: Traversable | Path, name: str) -> Scene:
+    """The scene of a file, which has the file's name if it gives itself none."""
+    try:
+        table = tomllib.loads(file.read_bytes().decode("utf-8-sig"))
+    except FileNotFoundError:
+        raise SceneError(
+            f"{file}: there is no such file; scenes that ship are {', '.join(presets())}, "
+            "each a TOML file to copy and change"
+        ) from None
+    except OSError as error:
+        raise SceneError(f"{file}: cannot be read ({error.strerror}): a TOML file is expected") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise SceneError(f"{file}: not readable as TOML: {error}") from error
+    try:
+        return scene_of({"name": name} | table)
+    except SceneError as error:
+        raise SceneError(f"{file}: {error}") from error

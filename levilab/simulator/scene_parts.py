@@ -1,0 +1,184 @@
+"""The parts of a scene: the magnets, what acts on them, and how the motion begins.
+
+Lengths [m], angles [rad], spins and drives [Hz], moments [A m²], flux densities [T].  Keys end in their unit; the
+defaults are the thesis's device.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, ConfigDict, Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic_core import PydanticCustomError
+
+from levilab.config import Settings
+
+FieldKind = Literal[
+    "exact", "paraxial-2", "paraxial-4", "paraxial-6", "paraxial-8", "paraxial-10", "paraxial-12", "paraxial-14",
+    "paraxial-16", "paraxial-18", "paraxial-20",
+]  # fmt: skip
+Law = Literal["none", "stokes", "newton", "disc", "mixed"]
+
+#: Constants of the drag laws where a scene gives none, from the four spin-downs of the thesis (40 Hz to the fall
+#: near 22 Hz): the means of its C₁ [1/s] and C₂ [1/rad], and of the disc law's constant refitted to each run
+#: [(rad/s)^-1/2/s].  The thesis has no fit of C₁ and C₂ together: mixed is half of the first mean and half of the
+#: second, and thereby, each to 1.4 %, the tangent to the disc law at 30 Hz, √ω ≈ √ω₀/2 + ω/(2√ω₀).
+CONSTANTS: dict[str, float | tuple[float, float]] = {
+    "stokes": 0.00318175,
+    "newton": 1.7270e-5,
+    "disc": 2.340e-4,
+    "mixed": (0.5 * 0.00318175, 0.5 * 1.7270e-5),
+}
+
+
+def _numbers(count: int) -> BeforeValidator:
+    def check(value: Any) -> Any:
+        if isinstance(value, list | tuple) and len(value) == count:
+            return tuple(value)
+        raise PydanticCustomError("numbers", "{count} numbers in brackets are expected", {"count": count})
+
+    return BeforeValidator(check)
+
+
+def _one_or_two(value: Any) -> Any:
+    """A constant of drag is one number, or two; pydantic's own words for a union name its parts as keys."""
+    numbers = list(value) if isinstance(value, list | tuple) else [value]
+    if value is None or (1 <= len(numbers) <= 2 and all(map(_from_zero, numbers))):
+        return tuple(numbers) if len(numbers) == 2 else numbers[0]
+    raise PydanticCustomError("coefficient", "a number from 0 is expected, two of them ([c1, c2]) for the law mixed")
+
+
+def _from_zero(value: Any) -> bool:
+    # NaN is in no range, and True is an int to Python
+    return isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value <= sys.float_info.max
+
+
+Vector = Annotated[tuple[float, float, float], _numbers(3)]
+Pair = Annotated[tuple[float, float], _numbers(2)]
+Coefficient = Annotated[float | tuple[float, float] | None, BeforeValidator(_one_or_two)]
+Never = Annotated[NonNegativeFloat | None, BeforeValidator(lambda value: None if value == "never" else value)]
+
+
+class Part(Settings):
+    """A table of a scene.  Strict: a number in quotes is no number."""
+
+    model_config = ConfigDict(strict=True)
+
+
+class Base(Part):
+    """The ring magnet.  strength_t_m: dipole density integrated over the thickness [T m].
+
+    origin_m: height of the middle of its thickness; tilt: the base leans by tilt_rad towards tilt_azimuth_rad.
+    """
+
+    inner_radius_m: PositiveFloat = 0.030
+    outer_radius_m: PositiveFloat = 0.055
+    strength_t_m: float = 1.40e-3
+    field: FieldKind = "paraxial-2"
+    thickness_m: NonNegativeFloat = 0.0
+    origin_m: float = 0.0
+    tilt_rad: float = Field(default=0.0, gt=-math.pi / 2, lt=math.pi / 2)
+    tilt_azimuth_rad: float = 0.0
+
+
+class Top(Part):
+    """The symmetric top.  moment_a_m2: signed along its axis, negative when it floats over the thesis's base.
+
+    moment_tilt: transverse and axial part of the moment, as fractions of moment_a_m2.  magnet "disc": the moment
+    is spread evenly over a disc of magnet_radius_m and magnet_height_m.
+    """
+
+    mass_kg: PositiveFloat = 0.02526
+    inertia_transverse_kg_m2: PositiveFloat = 1.04e-6
+    inertia_axial_kg_m2: PositiveFloat = 1.731314e-6
+    moment_a_m2: float = -0.714
+    moment_tilt: Pair = (0.0, 1.0)
+    magnet: Literal["point", "disc"] = "point"
+    magnet_radius_m: PositiveFloat = 0.0144
+    magnet_height_m: PositiveFloat = 0.0033
+
+    @property
+    def aligned(self) -> bool:
+        """Whether the moment lies along the axis."""
+        return self.moment_tilt[0] == 0
+
+
+class Washers(Part):
+    """Washers that an O-ring holds.  inertia_kg_m2: the part of the axial inertia that is loose, 0 = none.
+
+    coupling_n_m_s: torque between washers and top per slip [N m s]; drag_share: part of the drag that they take.
+    """
+
+    inertia_kg_m2: NonNegativeFloat = 0.0
+    coupling_n_m_s: NonNegativeFloat = 1e-6
+    drag_share: float = Field(default=1.0, ge=0, le=1)
+
+
+class Drag(Part):
+    """Drag of the air on the spin, dω/dt = −C|ω|^(n−1) ω: n = 1 stokes, 2 newton, 3/2 disc; mixed: c1 and c2.
+
+    coefficient: where none is given, that of the thesis's spin-downs.
+    """
+
+    law: Law = "none"
+    coefficient: Coefficient = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _usual(cls, table: Any) -> Any:
+        if isinstance(table, dict) and table.get("coefficient") is None:
+            return table | {"coefficient": CONSTANTS.get(str(table.get("law")))}
+        return table
+
+    @property
+    def constants(self) -> tuple[float, ...]:
+        """What the law takes: nothing, one number or two."""
+        if self.law == "none" or self.coefficient is None:
+            return ()
+        return self.coefficient if isinstance(self.coefficient, tuple) else (self.coefficient,)
+
+
+class Drive(Part):
+    """A uniform field, amplitude_t · s(2π frequency_hz t + phase_rad) along direction, until off_s (None: always).
+
+    s is 0 at phase 0 and 1 at π/2 (sine, triangle), the sine's sign (square), or 1 and 0 in turn (unipolar).
+    """
+
+    waveform: Literal["off", "sine", "triangle", "square", "unipolar"] = "off"
+    amplitude_t: NonNegativeFloat = 4e-4
+    frequency_hz: PositiveFloat = 30.0
+    phase_rad: float = math.pi / 2
+    direction: Vector = (0.0, 1.0, 0.0)
+    off_s: Never = None
+
+    @property
+    def unit_direction(self) -> tuple[float, float, float]:
+        """The direction, of length 1."""
+        largest = max(map(abs, self.direction))  # first, so that no square over- or underflows
+        x, y, z = (part / largest for part in self.direction)
+        length = math.hypot(x, y, z)
+        return x / length, y / length, z / length
+
+
+class Start(Part):
+    """How the motion begins: IC1 of the thesis.  place "equilibrium": at rest where the top floats.
+
+    precession "thesis": φ̇ = ψ̇ = 2π spin_hz/(1 + cos tilt); "steady": the slow precession without nutation;
+    "none": the axis starts at rest.  spin_hz: turns about the axis per second, ω₃/2π.
+    """
+
+    place: Literal["given", "equilibrium"] = "given"
+    position_m: Vector = (0.001, 0.0, 0.071)
+    velocity_m_s: Vector = (-0.0007, 0.0, 0.002)
+    tilt_rad: float = Field(default=0.01, ge=0, lt=math.pi)
+    spin_hz: float = 30.0
+    precession: Literal["thesis", "steady", "none"] = "thesis"
+
+
+class Escape(Part):
+    """Where the top counts as fallen: farther than radius_m from the base's axis, or at height_m or below."""
+
+    radius_m: PositiveFloat = 0.02
+    height_m: float = 0.0

@@ -1,0 +1,199 @@
+"""One top from its start to the end: the step chosen from the tolerance, the error told with the result."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from levilab.simulator import escapes, top
+from levilab.simulator.estimate import estimate
+from levilab.simulator.problem import NOWHERE, Problem, SimulationError, mover, scheme_for, travelled
+from levilab.simulator.spin import DECAYS
+from levilab.simulator.steps import longest_step
+from levilab.simulator.stops import every_step, stops_between
+from levilab.simulator.trajectory import Accuracy, Event, Trajectory
+
+if TYPE_CHECKING:
+    from levilab.simulator.scene import Scene
+    from levilab.simulator.stops import Stops
+
+Array = NDArray[np.float64]
+
+#: A chaotic motion has no step that is small enough: below this part of the longest step it is told instead.
+SMALLEST = 1 / 256
+
+Watch = Mapping[str, Callable[[Trajectory], Array]]
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """What `simulate` was asked for, beside the accuracy."""
+
+    duration: float
+    rate: float | None
+    events: Watch | None
+    progress: Callable[[float], None] | None
+
+
+@dataclass(frozen=True)
+class Run:
+    """States at the samples, shape (n, 18), the fall that ended them, events on the way, and the steps taken."""
+
+    states: Array
+    fell: Event | None
+    events: tuple[Event, ...]
+    steps: int
+
+
+def simulate(
+    scene: Scene,
+    duration: float = 30.0,
+    *,
+    tolerance: float = 1e-9,
+    rate: float | None = 100.0,
+    events: Watch | None = None,
+    scheme: str | None = None,
+    step: float | None = None,
+    start: Array | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Trajectory:
+    """Simulate a scene, with an error at the end within the tolerance.
+
+    duration [s], negative to go back in time; tolerance: wanted error of the place [m] and the axis [rad] at the
+    end; rate: samples per second (the last sample is the end), None for the start and the end alone; events:
+    functions of a Trajectory, shape (n,), whose zeros are located; scheme: a name of SCHEMES, chosen where none is
+    given; step: fixes the step [s] instead of choosing it; start: a state to start from instead of the scene's,
+    shape (18,), whose time is kept; progress: is told the share of the work that is done.
+
+    Raises SimulationError for numbers that make no sense, and where the motion leaves the numbers' range.
+
+    >>> from levilab.simulator import preset, simulate
+    >>> motion = simulate(preset("undriven"), 5, tolerance=1e-10)
+    >>> motion.survived, motion.accuracy.reached
+    (True, True)
+    """
+    _check(duration=duration, tolerance=tolerance, rate=rate, step=step)
+    if scene.observed == "spin":
+        return spin_alone(scene, duration, tolerance, rate)
+    model = top.model_of(scene)
+    state = top.start_of(scene) if start is None else np.array(start, dtype=np.float64)
+    if not np.all(np.isfinite(state)):
+        raise SimulationError("the start has a value that is no number: 18 finite numbers are expected")
+    problem = Problem(scene, model, state, scheme_for(scheme, model))
+    wanted = _Wanted(duration, rate, events, progress)
+    run, accuracy = _to_tolerance(problem, wanted, tolerance, step)
+    return Trajectory(scene, run.states, top.energy(scene, model, run.states), accuracy, run.fell, run.events)
+
+
+def _check(*, duration: float, tolerance: float, rate: float | None, step: float | None) -> None:
+    if not (math.isfinite(duration) and duration != 0):
+        raise SimulationError(f"duration = {duration} s: a finite time other than 0 is expected")
+    for name, value in (("tolerance", tolerance), ("rate", rate), ("step", step)):
+        if value is not None and not (math.isfinite(value) and value > 0):
+            raise SimulationError(f"{name} = {value}: a number above 0 is expected")
+
+
+def _to_tolerance(problem: Problem, wanted: _Wanted, tolerance: float, step: float | None) -> tuple[Run, Accuracy]:
+    """The run whose estimated error is within the tolerance, or the best one where none is."""
+    longest = longest_step(problem.scene, problem.model, problem.start, problem.scheme)
+    h = step or min(longest / 2, abs(wanted.duration) / 2)
+    best: tuple[Run, Accuracy] | None = None
+    while True:
+        run = _run(problem, wanted, h)
+        position, axis = _errors(problem, run, h)
+        accuracy = Accuracy(position, axis, tolerance, problem.scheme.name, h, run.steps)
+        worst = max(position, axis)
+        stuck = best is not None and worst > 0.5 * max(best[1].position, best[1].axis)
+        if best is None or not stuck:
+            best = run, accuracy
+        if step or accuracy.reached or stuck or h < longest * SMALLEST:
+            return best
+        h *= min(max(0.9 * (tolerance / worst) ** (1 / problem.scheme.order), 0.1), 0.7)
+
+
+def _errors(problem: Problem, run: Run, step: float) -> tuple[float, float]:
+    """Estimated errors of the last state, place [m] and axis [rad]: from the same motion with longer steps."""
+    end = run.states[-1]
+    twice, four = (_coarse(problem, end[top.TIME], times * step) for times in (2, 4))
+    # rounding: a random walk of half a unit in the last place, twice for each stage
+    floor = 2.2e-16 * math.sqrt(2 * run.steps * problem.scheme.stages)
+    position = estimate(end[top.R], twice[top.R], four[top.R], problem.scheme.order)
+    position += floor * float(np.linalg.norm(end[top.R]))
+    axis = floor + estimate(end[top.N], twice[top.N], four[top.N], problem.scheme.order)
+    if run.fell is not None:  # the moment of the fall is uncertain, too: the motion across the limit turns it to time
+        late = position / escapes.speed(end, run.fell.name)
+        position += late * float(np.linalg.norm(end[top.V]))
+        axis += late * float(np.linalg.norm(np.cross(end[top.L], end[top.N]))) * problem.model.body.inverse_transverse
+    return (position, axis) if math.isfinite(position + axis) else (math.inf, math.inf)
+
+
+def _coarse(problem: Problem, until: float, step: float) -> Array:
+    """The state at a time, with steps of that length and no escape."""
+    stops = stops_between(problem.start[top.TIME], until, step, problem.scene.drive)
+    return np.asarray(problem.advanced(problem.start, stops, NOWHERE)[0][-1])
+
+
+# --- one run at one step ---
+
+
+def _run(problem: Problem, wanted: _Wanted, step: float) -> Run:
+    begin = float(problem.start[top.TIME])
+    samples = _samples(begin, wanted.duration, wanted.rate)
+    stops = stops_between(begin, begin + wanted.duration, step, problem.scene.drive, samples)
+    if wanted.events:
+        stops = every_step(stops)
+    states, fell, steps = travelled(problem, stops, wanted.progress)
+    found = _events(problem, states, stops, wanted.events) if wanted.events else ()
+    kept = states[np.isin(states[:, top.TIME], np.concatenate([samples, stops.times[[0, -1]]]))]
+    if fell is not None:
+        kept = np.concatenate([kept, fell.state[None]])
+    return Run(kept, fell, found, steps)
+
+
+def _samples(begin: float, duration: float, rate: float | None) -> Array:
+    if rate is None:
+        return np.array([])
+    inside = np.arange(1, math.ceil(abs(duration) * rate * (1 - 1e-12))) / rate
+    return np.asarray(begin + math.copysign(1.0, duration) * inside)
+
+
+def _events(problem: Problem, states: Array, stops: Stops, events: Watch) -> tuple[Event, ...]:
+    """All zeros of the events' functions, in the order of their time."""
+
+    def on(function: Callable[[Trajectory], Array], rows: Array) -> Array:
+        nothing = Accuracy(0, 0, 0, "", 0, 0)
+        energies = top.energy(problem.scene, problem.model, rows)
+        return np.asarray(function(Trajectory(problem.scene, rows, energies, nothing)), dtype=np.float64)
+
+    found = []
+    for name, function in events.items():
+        values = on(function, states)
+        for i in np.flatnonzero(np.signbit(values[1:]) != np.signbit(values[:-1])):
+            interval = stops.part(int(i), int(i) + 1)
+            length = float(interval.times[1] - interval.times[0])
+            value = lambda state, function=function: float(on(function, state[None])[0])  # noqa: E731
+            found.append(escapes.located(name, states[i], length, mover(problem, interval), value))
+    return tuple(sorted(found, key=lambda event: event.time))
+
+
+# --- the spin alone ---
+
+
+def spin_alone(scene: Scene, duration: float, tolerance: float, rate: float | None) -> Trajectory:
+    """The spin in closed form; the top stays where it starts, and nothing is integrated."""
+    start = top.start_of(scene)
+    times = np.concatenate([[0.0], _samples(0.0, duration, rate), [duration]])
+    states = np.tile(start, (times.size, 1))
+    states[:, top.TIME] = times
+    spin = abs(start[top.CLOCK])
+    if scene.drag.law != "none" and spin > 0 and any(scene.drag.constants):
+        now = DECAYS[scene.drag.law].after(spin, times, *scene.drag.constants)
+        states[:, top.L] = start[top.L] * (now / spin)[:, None]
+        states[:, top.CLOCK] = np.copysign(now, start[top.CLOCK])
+    energies = top.energy(scene, top.model_of(scene), states)
+    return Trajectory(scene, states, energies, Accuracy(0.0, 0.0, tolerance, "closed form", duration, 0))

@@ -1,0 +1,96 @@
+"""The integrator's loop for one top: steps of a composition from stop to stop."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from levilab.simulator.compiled import kernel, part
+from levilab.simulator.motion import Model, State, drift, kick
+
+Array = NDArray[np.float64]
+
+
+@part
+def taken(block: Array, stride: int, j: int) -> State:
+    """The state of lane j from a block of rows, flat, row after row."""
+    s = stride
+    return State(
+        (block[j], block[s + j], block[2 * s + j]),
+        (block[3 * s + j], block[4 * s + j], block[5 * s + j]),
+        (block[6 * s + j], block[7 * s + j], block[8 * s + j]),
+        (block[9 * s + j], block[10 * s + j], block[11 * s + j]),
+        (block[12 * s + j], block[13 * s + j], block[14 * s + j]),
+        block[15 * s + j],
+        block[16 * s + j],
+        block[17 * s + j],
+    )
+
+
+@part
+def put(block: Array, stride: int, j: int, state: State) -> None:
+    """Write the state of lane j into a block of rows."""
+    s = stride
+    block[j], block[s + j], block[2 * s + j] = state.r
+    block[3 * s + j], block[4 * s + j], block[5 * s + j] = state.v
+    block[6 * s + j], block[7 * s + j], block[8 * s + j] = state.n
+    block[9 * s + j], block[10 * s + j], block[11 * s + j] = state.L
+    block[12 * s + j], block[13 * s + j], block[14 * s + j] = state.arm
+    block[15 * s + j] = state.clock
+    block[16 * s + j] = state.loose
+    block[17 * s + j] = state.t
+
+
+@part
+def tidied(s: State, t: float) -> State:
+    """The axis at length 1 again, which rounding takes away by 1e-16 a step, and the time [s] as it should be.
+
+    A time added up from a million drifts is off by 1e-8 s, and with it the drive's phase.
+    """
+    n = s.n
+    excess = 1.5 - 0.5 * (n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
+    return State(s.r, s.v, (n[0] * excess, n[1] * excess, n[2] * excess), s.L, s.arm, s.clock, s.loose, t)
+
+
+@kernel
+def advance(
+    model: Model,
+    block: Array,
+    stops: Array,
+    counts: NDArray[np.int64],
+    levels: Array,
+    slopes: Array,
+    drifts: Array,
+    kicks: Array,
+    escape: tuple[float, float],
+    states: Array,
+) -> int:
+    """Integrate one top from stop to stop and write its state at each; returns the number of stops reached.
+
+    block: its state at stops[0], shape (18,); stops: times, shape (n + 1,) [s], forwards or backwards;
+    counts: steps to each next stop, shape (n,); levels, slopes: of the drive between stops, shape (n,);
+    drifts, kicks: the composition's coefficients; escape: the radius and the height [m] outside of which it
+    ends; states: shape (n + 1, 18), row 0 is the start.  A state that is no number counts as outside.
+    """
+    s = taken(block, 1, 0)
+    put(states[0], 1, 0, s)
+    stages = kicks.size
+    radius2, height = escape[0] * escape[0], escape[1]
+    for i in range(counts.size):
+        h = (stops[i + 1] - stops[i]) / counts[i]
+        level, slope = levels[i], slopes[i]
+        first, last = drifts[0] * h, drifts[stages] * h
+        s = drift(model, s, first)
+        for step in range(counts[i]):
+            for stage in range(stages - 1):
+                s = kick(model, s, kicks[stage] * h, level, slope)
+                s = drift(model, s, drifts[stage + 1] * h)
+            s = kick(model, s, kicks[stages - 1] * h, level, slope)
+            # the last drift of a step and the first of the next are one
+            ahead = first if step + 1 < counts[i] else 0.0
+            s = tidied(drift(model, s, last + ahead), stops[i] + (step + 1) * h + ahead)
+            if not (s.r[2] > height and s.r[0] * s.r[0] + s.r[1] * s.r[1] < radius2):
+                return i
+        s = tidied(s, stops[i + 1])
+        put(states[i + 1], 1, 0, s)
+    return counts.size

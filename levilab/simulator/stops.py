@@ -1,0 +1,109 @@
+"""Where the integration must stop: samples, kinks of the drive, and often enough to be watched."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from levilab.simulator.scene import Drive
+
+Array = NDArray[np.float64]
+
+#: Steps between stops at most: what has to be gone through again to find the moment of an escape.
+STEPS_BETWEEN_STOPS = 1000
+
+
+@dataclass(frozen=True)
+class Stops:
+    """times: shape (n + 1,) [s]; counts: steps to the next, shape (n,); levels, slopes: of the drive, shape (n,).
+
+    Within an interval the drive's field is (level + slope·t) × its carrier, which is smooth: no step crosses a kink,
+    so the order of the integrator is kept.
+    """
+
+    times: Array
+    counts: NDArray[np.int64]
+    levels: Array
+    slopes: Array
+
+    def part(self, first: int, last: int) -> Stops:
+        """The intervals from first to last, without the last."""
+        return Stops(
+            self.times[first : last + 1], self.counts[first:last], self.levels[first:last], self.slopes[first:last]
+        )
+
+
+def every_step(stops: Stops) -> Stops:
+    """The same steps, with a stop after each."""
+    lengths = np.diff(stops.times) / stops.counts
+    index = np.repeat(np.arange(stops.counts.size), stops.counts)
+    first = np.cumsum(stops.counts) - stops.counts
+    inside = np.arange(index.size) - first[index]
+    times = np.append(stops.times[:-1][index] + inside * lengths[index], stops.times[-1])
+    return Stops(times, np.ones(index.size, dtype=np.int64), stops.levels[index], stops.slopes[index])
+
+
+def stops_between(start: float, end: float, step: float, drive: Drive, samples: Array | None = None) -> Stops:
+    """The stops from start to end (either way in time) with steps no longer than `step` [s]."""
+    low, high = min(start, end), max(start, end)
+    wanted = [np.array([low, high]), kinks(drive, low, high)]
+    if samples is not None:
+        wanted.append(samples[(samples > low) & (samples < high)])
+    times = _distinct(np.concatenate(wanted), (high - low) * 1e-12)
+    pieces = np.ceil(np.diff(times) / (step * STEPS_BETWEEN_STOPS)).astype(np.int64)
+    times = np.concatenate(
+        [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(times, times[1:], pieces, strict=False)] + [times[-1:]]
+        if np.any(pieces > 1)
+        else [times]
+    )
+    if end < start:
+        times = times[::-1].copy()
+    counts = np.maximum(np.ceil(np.abs(np.diff(times)) / step * (1 - 1e-12)), 1).astype(np.int64)
+    levels, slopes = _shape(drive, (times[1:] + times[:-1]) / 2)
+    return Stops(times, counts, levels, slopes)
+
+
+def _distinct(times: Array, apart: float) -> Array:
+    """Sorted, without those that come closer than this after another; the last one stays."""
+    times = np.unique(times)
+    keep = np.concatenate([[True], np.diff(times) > apart])
+    kept = times[keep]
+    kept[-1] = times[-1]
+    return np.asarray(kept)
+
+
+def kinks(drive: Drive, low: float, high: float) -> Array:
+    """Times strictly between at which the drive's field jumps or bends [s]."""
+    found = []
+    if drive.off_s is not None and low < drive.off_s < high and drive.waveform != "off":
+        found.append(drive.off_s)
+    offset = {"square": 0.0, "unipolar": 0.0, "triangle": 0.25}.get(drive.waveform)
+    if offset is not None and drive.amplitude_t != 0:
+        f, turns = drive.frequency_hz, drive.phase_rad / (2 * math.pi)
+        first, last = math.ceil(2 * (f * low + turns - offset)), math.floor(2 * (f * high + turns - offset))
+        found.extend(((np.arange(first, last + 1) / 2 + offset - turns) / f).tolist())
+    times = np.array(found, dtype=np.float64)
+    return np.asarray(times[(times > low) & (times < high)])
+
+
+def _shape(drive: Drive, middles: Array) -> tuple[Array, Array]:
+    """Level and slope of each interval, from its middle."""
+    on = np.ones_like(middles) if drive.off_s is None else (middles < drive.off_s).astype(np.float64)
+    turns = drive.frequency_hz * middles + drive.phase_rad / (2 * math.pi)
+    first_half = turns - np.floor(turns) < 0.5
+    if drive.waveform == "square":
+        return on * np.where(first_half, 1.0, -1.0), np.zeros_like(on)
+    if drive.waveform == "unipolar":
+        return on * first_half, np.zeros_like(on)
+    if drive.waveform == "triangle":
+        rising = (turns + 0.25) - np.floor(turns + 0.25) < 0.5
+        slope = np.where(rising, 4.0, -4.0) * drive.frequency_hz
+        # the value at the middle: 0 at whole turns, ±1 at the quarters
+        value = 1 - 4 * np.abs((turns + 0.25) - np.floor(turns + 0.25) - 0.5)
+        return on * (value - slope * middles), on * slope
+    return on, np.zeros_like(on)

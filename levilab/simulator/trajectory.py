@@ -1,0 +1,109 @@
+"""What a simulation gives: the motion as arrays, how it ended, and how good it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from levilab.simulator import top
+
+if TYPE_CHECKING:
+    from levilab.simulator.scene import Scene
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened: its name, when [s], and the state then, shape (18,)."""
+
+    name: str
+    time: float
+    state: Array
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """How good the end of a trajectory is.
+
+    position [m], axis [rad]: estimated errors of the last state, made to bound the true ones; tolerance: what was
+    asked for; scheme, step [s], steps: how it was integrated.  A chaotic motion has errors as large as the motion
+    itself whatever the step: then `reached` is False and the estimate says so.
+    """
+
+    position: float
+    axis: float
+    tolerance: float
+    scheme: str
+    step: float
+    steps: int
+
+    @property
+    def reached(self) -> bool:
+        """Whether the estimated errors are within the tolerance."""
+        return bool(max(self.position, self.axis) <= self.tolerance)
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """The motion of one top, in the base's frame: origin at the base's centre, z up its axis.
+
+    scene: what was simulated; states: shape (n, 18), see `levilab.simulator.motion.State`; energies [J], shape (n,);
+    fell: the escape that ended it, None if it stayed to the end; events: found on the way, in their order.
+    """
+
+    scene: Scene
+    states: Array
+    energies: Array
+    accuracy: Accuracy
+    fell: Event | None = None
+    events: tuple[Event, ...] = ()
+
+    @property
+    def time(self) -> Array:
+        """Shape (n,) [s]; the last one is the end, or the moment of the fall."""
+        return self.states[:, top.TIME]
+
+    @property
+    def position(self) -> Array:
+        """Place of the centre of mass, shape (n, 3) [m]."""
+        return self.states[:, top.R]
+
+    @property
+    def velocity(self) -> Array:
+        """Shape (n, 3) [m/s]."""
+        return self.states[:, top.V]
+
+    @property
+    def axis(self) -> Array:
+        """The top's axis, a unit vector, shape (n, 3)."""
+        return self.states[:, top.N]
+
+    @property
+    def angular_momentum(self) -> Array:
+        """Shape (n, 3) [kg m²/s]."""
+        return self.states[:, top.L]
+
+    @property
+    def tilt(self) -> Array:
+        """Angle between the top's axis and the base's, shape (n,) [rad]; exact for small angles, too."""
+        return np.asarray(np.arctan2(np.hypot(self.axis[:, 0], self.axis[:, 1]), self.axis[:, 2]))
+
+    @property
+    def spin_hz(self) -> Array:
+        """ω₃/2π, shape (n,) [Hz]; with loose washers that of the core, which carries the magnet."""
+        return top.spin_of(self.scene, self.states) / (2 * np.pi)
+
+    @property
+    def washer_spin_hz(self) -> Array:
+        """Spin of the loose washers, shape (n,) [Hz]; that of the top where none are loose."""
+        inertia = self.scene.washers.inertia_kg_m2
+        return self.states[:, top.LOOSE] / (2 * np.pi * inertia) if inertia else self.spin_hz
+
+    @property
+    def survived(self) -> bool:
+        """Whether the top was still up at the end."""
+        return self.fell is None
