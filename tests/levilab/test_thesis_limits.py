@@ -63,9 +63,7 @@ def test_an_edge_of_survival_lies_where_the_thesis_has_its_upper_limit(start):
 
 @pytest.mark.parametrize("start", ["IC1", "IC2", "IC4"])
 def test_with_drag_the_top_comes_down_at_the_spin_of_the_thesis(start):
-    motion = simulate(
-        scene("friction", start).changed({"escape.height_m": 0.06}), 200.0, rate=None, tolerance=1e-6
-    )
+    motion = simulate(scene("friction", start).changed({"escape.height_m": 0.06}), 200.0, rate=None, tolerance=1e-6)
     assert motion.fell.name == "height"
     assert motion.spin_hz[-1] == pytest.approx(STARTS[start][5], abs=CLOSE)
 
