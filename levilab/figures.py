@@ -1,4 +1,4 @@
-"""Results → figures.  The only module that draws."""
+"""Results of analyses → figures, and what all figures look like."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ MOST_POINTS, MOST_BARS, MEANS = 600, 200, 40
 #: A bar longer than the marker's radius, as part of the panel's height, is seen; outliers with their value written.
 _SEEN, _MOST_NAMED = 1 / 120, 6
 
-_STYLE: Any = {
+STYLE: Any = {
     "font.size": 9,
     "axes.titlesize": 9,
     "axes.spines.top": False,
@@ -62,14 +62,14 @@ _STYLE: Any = {
 
 def spindown_figure(analysis: SpinDownAnalysis) -> Figure:
     """Readings and laws; residuals of every law; the straight lines one draws on paper, and what departs from them."""
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10, 12.5))
-        _draw_spin(_row(figure, 0.665, 0.31)[0], analysis)
-        _draw_residuals(figure, _row(figure, 0.425, 0.15, len(COLOURS), gap=0.055), analysis)
+        _draw_spin(row(figure, 0.665, 0.31)[0], analysis)
+        _draw_residuals(figure, row(figure, 0.425, 0.15, len(COLOURS), gap=0.055), analysis)
         _draw_straight_lines(
             figure,
-            _row(figure, 0.16, 0.185, len(STRAIGHT_LINES), gap=0.095),
-            _row(figure, 0.04, 0.105, len(STRAIGHT_LINES), gap=0.095),
+            row(figure, 0.16, 0.185, len(STRAIGHT_LINES), gap=0.095),
+            row(figure, 0.04, 0.105, len(STRAIGHT_LINES), gap=0.095),
             analysis,
         )
     return figure
@@ -85,12 +85,12 @@ def save_png(figure: Figure, path: Path) -> None:
 def as_svg(figure: Figure) -> str:
     """A figure as SVG text, the same bytes for the same results."""
     buffer = io.StringIO()
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     return buffer.getvalue()
 
 
-def _row(figure: Figure, bottom: float, height: float, n: int = 1, gap: float = 0.0) -> list[Axes]:
+def row(figure: Figure, bottom: float, height: float, n: int = 1, gap: float = 0.0) -> list[Axes]:
     """Panels side by side.  Placed by hand: automatic layouts differ in the last bit from one drawing to the next."""
     left, right = 0.085, 0.985
     width = (right - left - (n - 1) * gap) / n

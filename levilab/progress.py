@@ -1,8 +1,9 @@
-"""What an acquisition shows while it runs, on standard error: a bar on a terminal, lines elsewhere."""
+"""What is shown while something runs, on standard error: a bar on a terminal; of an acquisition lines elsewhere."""
 
 from __future__ import annotations
 
 import sys
+import time
 from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
@@ -94,3 +95,42 @@ class Bar:
 def to_stderr() -> Show:
     """A bar on a terminal, lines elsewhere."""
     return Bar() if sys.stderr.isatty() else Lines()
+
+
+class Share:
+    """A bar for work whose share is known, on a terminal, once it takes longer than a second.
+
+    A share that goes back is a new attempt: a simulation tries shorter steps until its error is small enough.
+    """
+
+    def __init__(self, description: str) -> None:
+        self._description = description
+        self._begin = time.monotonic()
+        self._bar: Progress | None = None
+        self._last, self._attempt = 0.0, 1
+
+    def __call__(self, share: float) -> None:
+        """Show the share that is done."""
+        if share < self._last:
+            self._attempt += 1
+        self._last = share
+        if self._bar is None and sys.stderr.isatty() and time.monotonic() - self._begin > 1:
+            self._bar = self._opened()
+        if self._bar is not None:
+            again = f", attempt {self._attempt} with shorter steps" if self._attempt > 1 else ""
+            self._bar.update(self._task, description=self._description + again, completed=share)
+
+    def _opened(self) -> Progress:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn
+
+        columns = TextColumn("{task.description}"), BarColumn(bar_width=30), TextColumn("{task.percentage:3.0f} %")
+        bar = Progress(*columns, console=Console(stderr=True), transient=True)
+        self._task = bar.add_task(self._description, total=1.0)
+        bar.start()
+        return bar
+
+    def close(self) -> None:
+        """Take the bar away."""
+        if self._bar is not None:
+            self._bar.stop()

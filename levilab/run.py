@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     from levilab.formats import Table
 
 SCHEMA: Literal["levilab-run/1"] = "levilab-run/1"
-READINGS, EVENTS, RECORD, LOCK, WIRE, PACKAGE = (
+READINGS, STATES, EVENTS, RECORD, LOCK, WIRE, PACKAGE = (
     "readings.csv",
+    "states.csv",
     "events.jsonl",
     "run.json",
     "run.lock",

@@ -6,5 +6,5 @@ def software_versions() -> dict[str, str]:
     import platform
     from importlib.metadata import version
 
-    names = ("levilab", "numpy", "scipy", "pandas", "lmfit", "pyvisa", "pyvisa-py")
+    names = ("levilab", "numpy", "numba", "scipy", "pandas", "lmfit", "pyvisa", "pyvisa-py")
     return {"python": platform.python_version(), "platform": platform.platform()} | {n: version(n) for n in names}

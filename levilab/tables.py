@@ -29,13 +29,14 @@ if TYPE_CHECKING:
 ROOM_FOR_NOTES = 110
 
 
-def _console() -> Console:
+def terminal() -> Console:
     """As wide as the terminal; into a pipe or file as wide as the tables need."""
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 160
     return Console(width=max(width, 80), highlight=False)
 
 
-def _table(title: str | None, *columns: str, numbers: Sequence[str] = ()) -> Table:
+def new_table(title: str | None, *columns: str, numbers: Sequence[str] = ()) -> Table:
+    """An empty table; numbers: the columns that are aligned to the right."""
     table = Table(
         box=box.SIMPLE_HEAD,
         padding=(0, 1, 0, 0),
@@ -54,7 +55,7 @@ def print_spindown(analysis: SpinDownAnalysis) -> None:
 
     Each table fits a terminal of 80 columns.
     """
-    console = _console()
+    console = terminal()
     for table in (_runs_table, _laws_table, _fits_table, _lines_table):
         console.print(table(analysis))
     console.print(f"[bold]What the data say.[/bold] {escape(analysis.combined.verdict.text)}")
@@ -79,7 +80,7 @@ def _runs_table(analysis: SpinDownAnalysis) -> Table:
     total, synthetic = len(analysis.runs), sum(source.synthetic for source in analysis.sources)
     made_up = "" if not synthetic else ", SYNTHETIC" if synthetic == total else f", {synthetic} of them SYNTHETIC"
     title = f"Spin-down, {total} run{'s' * (total > 1)}{made_up}"
-    table = _table(title, "run", "readings", "time [s]", "spin [Hz]", "best law", numbers=["readings"])
+    table = new_table(title, "run", "readings", "time [s]", "spin [Hz]", "best law", numbers=["readings"])
     for source, run in zip(analysis.sources, analysis.runs, strict=True):
         table.add_row(
             escape(source.name),
@@ -97,7 +98,7 @@ def _laws_table(analysis: SpinDownAnalysis) -> Table:
         if len(analysis.runs) == 1
         else f"Drag laws, means over {len(analysis.runs)} runs, u from their scatter"
     )
-    table = _table(of, "law", "", "constants")
+    table = new_table(of, "law", "", "constants")
     for fit in analysis.combined.fits:
         constants = law_constants(analysis, fit.name)
         verdict = analysis.combined.verdict
@@ -108,7 +109,7 @@ def _laws_table(analysis: SpinDownAnalysis) -> Table:
 
 def _fits_table(analysis: SpinDownAnalysis) -> Table:
     numbers = ("rms [Hz]", "χ²/dof", "ΔAICc", "weight", "order p", "DW")
-    table = _table("How well they fit", "law", *numbers, numbers=numbers)
+    table = new_table("How well they fit", "law", *numbers, numbers=numbers)
     fits = analysis.combined.fits
     for fit in fits:
         table.add_row(fit.name, *_columns(fit.statistics))
@@ -140,7 +141,7 @@ def _lines_table(analysis: SpinDownAnalysis) -> Table:
     lines = [fit for fit in analysis.combined.fits if fit.linearised]
     headers = [f"{AXES[fit.name]}\n{_header(fit.linearised or {})}" for fit in lines]
     favoured = f"{best.name} fit\n{_header(best.constants)}"
-    table = _table("Run by run: unweighted straight lines, and the fit of the best law", "run", *headers, favoured)
+    table = new_table("Run by run: unweighted straight lines, and the fit of the best law", "run", *headers, favoured)
     for source, run in zip(analysis.sources, analysis.runs, strict=True):
         cells = [_first(run.fit(fit.name).linearised or {}) for fit in lines]
         fitted = run.fit(best.name).parameters
@@ -180,17 +181,18 @@ def _first(estimates: Mapping[str, Estimate]) -> str:
 
 def print_runs(runs: Sequence[Listed], root: Path) -> None:
     """The list of runs, and below it what is wrong with the broken ones."""
-    console = _console()
+    console = terminal()
     if not runs:
         console.print(f"no runs in {escape(str(root))}")
         return
-    table = _table(None, "when (UTC)", "run", "what", "status", "readings", "length", numbers=["readings", "length"])
+    table = new_table(None, "when (UTC)", "run", "what", "status", "readings", "length", numbers=["readings", "length"])
     if with_notes := console.width >= ROOM_FOR_NOTES:
         table.add_column("note", no_wrap=True, overflow="ellipsis", max_width=console.width - 80)
     for run in runs:
         when = (run.started_utc or "—")[:16].replace("T", " ")
-        what = run.experiment + (", synthetic" if run.synthetic else "")
-        cells = [when, escape(_below(run.path, root)), what, run.status, str(run.readings), f"{run.length_s:.0f} s"]
+        what = run.experiment + (f" {run.scene}" if run.scene else "") + (", synthetic" if run.synthetic else "")
+        what = escape(what)
+        cells = [when, escape(_below(run.path, root)), what, run.status, run.size, f"{run.length_s:.0f} s"]
         table.add_row(*cells, *([escape(run.note)] if with_notes else []))
     console.print(table)
     for run in runs:

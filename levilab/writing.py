@@ -18,10 +18,10 @@ from datetime import UTC, datetime
 from typing import IO, TYPE_CHECKING, Any, Self
 
 from levilab.errors import LevilabError
-from levilab.run import EVENTS, PACKAGE, READINGS, RECORD, WIRE, RunRecord, lock_of, utc_now
+from levilab.run import EVENTS, PACKAGE, READINGS, RECORD, STATES, WIRE, RunRecord, lock_of, utc_now
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
     from pathlib import Path
 
     from levilab.run import Run, Status
@@ -86,13 +86,13 @@ class RunWriter:
         self._lock = lock_of(folder)
 
     @classmethod
-    def create(cls, out: Path, record: RunRecord) -> Self:
-        """A new folder ``<UTC>-<experiment>-<four hex digits>`` below `out`.  Raises CannotWrite."""
+    def create(cls, out: Path, record: RunRecord, table: str = READINGS) -> Self:
+        """A new folder ``<UTC>-<experiment>-<four hex digits>`` below `out`; table: its rows.  Raises CannotWrite."""
         with _told("create the run folder", out, safe=""):
             out.mkdir(parents=True, exist_ok=True)
             writer = cls(_new_folder(out, record.experiment), record)
             writer._lock.acquire(blocking=False)
-            writer._append(READINGS, writer._header())
+            writer._append(table, writer._header())
             replace_atomically(writer.folder / RECORD, record.as_json())
             _sync_folder(out)
         return writer
@@ -157,6 +157,13 @@ class RunWriter:
         line = ",".join(_cell(row.get(channel["name"])) for channel in self.record.channels)
         with _told(f"write the reading {line}", self.folder):
             self._append(READINGS, line)
+
+    def states(self, lines: Iterable[str]) -> None:
+        """Append many rows to states.csv, on the disk together.  Raises CannotWrite."""
+        with _told(f"write {STATES}", self.folder, safe=""):
+            for line in lines:
+                self._append(STATES, line, sync=False)
+            os.fsync(self._files[STATES].fileno())
 
     def event(self, time_s: float | None, kind: str, text: str, **data: Any) -> None:
         """Append a line to events.jsonl."""
@@ -235,13 +242,13 @@ def _datapackage(folder: Path, record: RunRecord) -> str:
         for channel in record.channels
     ]
     resources: list[dict[str, Any]] = []
-    for name in (READINGS, EVENTS, WIRE):
+    for name in (READINGS, STATES, EVENTS, WIRE):
         path = folder / name
         if path.exists():
             data = path.read_bytes()
             about = {"path": name, "name": name.replace(".", "-"), "bytes": len(data)}
             about["hash"] = "sha256:" + hashlib.sha256(data).hexdigest()
-            resources.append(about | ({"schema": {"fields": fields}} if name == READINGS else {}))
+            resources.append(about | ({"schema": {"fields": fields}} if name in {READINGS, STATES} else {}))
     package = {
         "name": folder.name.lower(),
         "title": f"levilab {record.experiment} run",

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from levilab.simulator.ensemble import Ensemble, simulate_many
     from levilab.simulator.problem import SimulationError
     from levilab.simulator.scene import Scene, SceneError, preset, presets, read_scene, with_settings
-    from levilab.simulator.simulate import simulate
+    from levilab.simulator.single import simulate
     from levilab.simulator.trajectory import Accuracy, Event, Trajectory
 
 _HOME = {
@@ -30,7 +30,7 @@ _HOME = {
     "read_scene": "scene",
     "with_settings": "scene",
     "SimulationError": "problem",
-    "simulate": "simulate",
+    "simulate": "single",
     "Accuracy": "trajectory",
     "Event": "trajectory",
     "Trajectory": "trajectory",

@@ -18,7 +18,7 @@ from levilab.simulator.lanes import LANES, advance_many, numbers_of
 from levilab.simulator.motion import STATE_SIZE
 from levilab.simulator.problem import NOWHERE, Problem, scheme_for, travelled
 from levilab.simulator.schemes import SCHEMES
-from levilab.simulator.simulate import simulate
+from levilab.simulator.single import simulate
 from levilab.simulator.steps import longest_step
 from levilab.simulator.stops import kinks, stops_between
 
@@ -79,7 +79,7 @@ def simulate_many(
     over: Mapping[str, ArrayLike],
     duration: float = 30.0,
     *,
-    tolerance: float = 1e-9,
+    tolerance: float = 1e-7,
     step: float | None = None,
     cores: int | None = None,
     errors: bool = True,

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     Command = Callable[..., subprocess.CompletedProcess[str]]
 
-COMMANDS = ["", "acquire", "acquire spin", "analyze", "analyze spindown", "report", "runs"]
+COMMANDS = ["", "acquire", "acquire spin", "analyze", "analyze spindown", "report", "simulate", "runs"]
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -282,7 +282,7 @@ def test_a_decoy_in_the_present_folder_is_not_imported(levilab: Command, tmp_pat
 
 
 #: What takes long to import, and has no business where it is not used.
-HEAVY = {"numpy", "scipy", "pandas", "matplotlib", "lmfit", "pyvisa", "jinja2", "rich.progress"}
+HEAVY = {"numpy", "scipy", "pandas", "matplotlib", "lmfit", "pyvisa", "jinja2", "numba", "rich.progress"}
 
 
 @pytest.mark.parametrize(
@@ -290,6 +290,8 @@ HEAVY = {"numpy", "scipy", "pandas", "matplotlib", "lmfit", "pyvisa", "jinja2", 
     [
         (["--help"], set[str]()),
         (["acquire", "spin", "--help"], set[str]()),
+        (["simulate", "--help"], set[str]()),
+        (["simulate", "nowhere"], set[str]()),
         (["--version"], set[str]()),
         (["acquire", "spin", "--mock"], {"numpy", "pandas", "pyvisa"}),
         (["runs", "."], {"numpy", "pandas"}),

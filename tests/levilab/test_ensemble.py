@@ -6,7 +6,7 @@ import pytest
 from levilab.simulator import SceneError
 from levilab.simulator.ensemble import simulate_many
 from levilab.simulator.scene import preset
-from levilab.simulator.simulate import simulate
+from levilab.simulator.single import simulate
 
 UNDRIVEN = preset("undriven")
 KINDS = {

@@ -5,7 +5,7 @@ import pytest
 
 from levilab.simulator.scene import Scene, preset
 from levilab.simulator.schemes import SCHEMES, Scheme
-from levilab.simulator.simulate import simulate
+from levilab.simulator.single import simulate
 
 UNDRIVEN, DRIVEN = preset("undriven"), preset("driven")
 

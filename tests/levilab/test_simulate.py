@@ -7,7 +7,7 @@ import pytest
 
 from levilab.simulator import SceneError, SimulationError
 from levilab.simulator.scene import preset
-from levilab.simulator.simulate import simulate
+from levilab.simulator.single import simulate
 
 UNDRIVEN, FRICTION, TILTED, DRIVEN = (preset(name) for name in ("undriven", "friction", "tilted", "driven"))
 EPS = np.finfo(float).eps

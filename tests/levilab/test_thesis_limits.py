@@ -10,7 +10,7 @@ import pytest
 from levilab.simulator import top
 from levilab.simulator.ensemble import simulate_many
 from levilab.simulator.scene import preset
-from levilab.simulator.simulate import simulate
+from levilab.simulator.single import simulate
 
 #: (position, velocity, tilt), and the published limits: lower, upper, spin at a height of 6 cm with drag [Hz].
 STARTS = {

@@ -54,7 +54,7 @@ def simulate(
     scene: Scene,
     duration: float = 30.0,
     *,
-    tolerance: float = 1e-9,
+    tolerance: float = 1e-7,
     rate: float | None = 100.0,
     events: Watch | None = None,
     scheme: str | None = None,

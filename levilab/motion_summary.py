@@ -1,0 +1,157 @@
+"""A simulated motion in a few numbers: how it ended, height, spin, lines, and how good it is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from levilab.motion_lines import LONGEST_S, AxisLines, lines_of
+from levilab.simulator.scene import remarks
+
+if TYPE_CHECKING:
+    from levilab.simulator.scene import Scene
+    from levilab.simulator.trajectory import Accuracy, Trajectory
+
+#: An error [m, rad] at the end that nobody sees.
+SMALL = 1e-5
+
+FALLS = {"radius": "drifted out to {cm:.3g} cm from the axis", "height": "came down to {cm:.3g} cm"}
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What is told of a motion.
+
+    rate: states kept per second [1/s]; computing: the time it took [s]; energy_change: greatest departure from the
+    start in parts of the energy then; notes: sentences of what to mind.
+    """
+
+    motion: Trajectory
+    duration: float
+    rate: float
+    computing: float
+    lines: AxisLines
+    energy_change: float
+    notes: tuple[str, ...]
+
+    @property
+    def end(self) -> float:
+        """When it ended [s]: as asked for, or with the fall."""
+        return float(self.motion.time[-1])
+
+    @property
+    def speed(self) -> float:
+        """How many times faster than the real top it was."""
+        return self.end / max(self.computing, 1e-9)
+
+    @property
+    def heights(self) -> str:
+        """The range of the heights, in words; a zero has no sign."""
+        height = 100 * self.motion.position[:, 2]
+        low, high, mean = (round(float(x), 3) + 0.0 for x in (height.min(), height.max(), height.mean()))
+        return f"{low:.3f} to {high:.3f} cm, mean {mean:.3f} cm"
+
+    @property
+    def fell(self) -> str:
+        """How it fell, in words; empty if it did not."""
+        if self.motion.fell is None:
+            return ""
+        escape = self.motion.scene.escape
+        limit = {"radius": escape.radius_m, "height": escape.height_m}[self.motion.fell.name]
+        return FALLS[self.motion.fell.name].format(cm=100 * limit)
+
+
+def summarise(motion: Trajectory, duration: float, rate: float, computing: float) -> Summary:
+    """Look at a motion; rate: states per second that are kept."""
+    energy = motion.energies
+    change = float(np.max(np.abs(energy - energy[0]))) / (abs(float(energy[0])) or 1.0)
+    lines = lines_of(motion)
+    return Summary(motion, duration, rate, computing, lines, change, tuple(_notes(motion, lines, rate)))
+
+
+def conserved(scene: Scene) -> bool:
+    """Whether the energy stays as it is: neither drag nor drive nor friction of loose washers."""
+    driven = scene.drive.waveform != "off" and scene.drive.amplitude_t > 0
+    dragged = scene.drag.law != "none" and any(scene.drag.constants)
+    return not (driven or dragged or scene.washers.inertia_kg_m2 > 0)
+
+
+def _notes(motion: Trajectory, lines: AxisLines, rate: float) -> list[str]:
+    accuracy, notes = motion.accuracy, remarks(motion.scene)
+    if not accuracy.reached:
+        notes.append(_not_reached(accuracy))
+    highest = max((abs(line.frequency) for line in lines.lines), default=0.0)
+    if highest > rate / 2:
+        notes.append(
+            f"{rate:g} states per second are less than twice the highest line, {highest:.3g} Hz: the lines here come "
+            f"from more of them, but states.csv would show it elsewhere; take --rate {math.ceil(3 * highest / 10) * 10}"
+        )
+    if lines.lines and lines.until < 0.99 * min(float(motion.time[-1]), LONGEST_S):
+        notes.append(
+            f"the lines are those of the first {lines.until:.3g} s: later the changing spin has moved them farther "
+            "than they can be told apart"
+        )
+    return notes
+
+
+def _not_reached(accuracy: Accuracy) -> str:
+    said = f"the tolerance of {accuracy.tolerance:g} was not reached, and shorter steps do not help"
+    worst = max(accuracy.position, accuracy.axis)
+    if worst < SMALL:
+        return f"{said}: what rounding leaves, magnified by the motion, is {worst:.1g}"
+    return (
+        f"{said}: this motion is chaotic.  How such a top moves is right; where exactly it is at a late moment, and "
+        "when exactly it falls, depends on the last digit of its start"
+    )
+
+
+def as_document(summary: Summary) -> dict[str, Any]:
+    """The summary for programs, units in the names; what no number can say is null."""
+    motion = summary.motion
+    height, accuracy, fell = motion.position[:, 2], motion.accuracy, motion.fell
+    document = {
+        "scene": motion.scene.name,
+        "survived": motion.survived,
+        "fell": None if fell is None else {"how": fell.name, "text": summary.fell, "time_s": fell.time},
+        "duration_s": summary.duration,
+        "end_s": summary.end,
+        "height_mean_m": float(height.mean()),
+        "height_min_m": float(height.min()),
+        "height_max_m": float(height.max()),
+        "distance_from_axis_max_m": float(np.hypot(*motion.position[:, :2].T).max()),
+        "tilt_max_rad": float(motion.tilt.max()),
+        "spin_start_hz": float(motion.spin_hz[0]),
+        "spin_end_hz": float(motion.spin_hz[-1]),
+        "washer_spin_end_hz": float(motion.washer_spin_hz[-1]),
+        "energy_conserved": conserved(motion.scene),
+        "energy_change_relative": summary.energy_change,
+        "lines": [
+            {"frequency_hz": line.frequency, "amplitude_rad": line.amplitude, "name": line.name}
+            for line in summary.lines.lines
+        ],
+        "line_resolution_hz": summary.lines.resolution,
+        "lines_until_s": summary.lines.until,
+        "position_error_m": float(accuracy.position),
+        "axis_error_rad": float(accuracy.axis),
+        "tolerance": accuracy.tolerance,
+        "tolerance_reached": accuracy.reached,
+        "scheme": accuracy.scheme,
+        "step_s": float(accuracy.step),
+        "steps": accuracy.steps,
+        "computing_time_s": summary.computing,
+        "times_real_time": summary.speed,
+        "notes": list(summary.notes),
+    }
+    return {key: finite(value) for key, value in document.items()}
+
+
+def finite(value: Any) -> Any:
+    """What no number can say as None, in tables and lists too."""
+    if isinstance(value, dict):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

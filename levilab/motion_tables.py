@@ -1,0 +1,95 @@
+"""A simulated motion → text on a terminal."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from rich.markup import escape
+
+from levilab.motion_summary import conserved
+from levilab.tables import new_table, terminal
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from levilab.motion_summary import Summary
+
+
+def print_motion(summary: Summary) -> None:
+    """How it ended, the motion in numbers, the lines of the axis, how good it is, and what to mind."""
+    out = terminal()
+    out.print(f"[bold]{escape(_headline(summary))}[/bold]")
+    facts = new_table(None, "", "")
+    facts.show_header = False
+    for what, text in (*_motion_facts(summary), *_quality_facts(summary)):
+        facts.add_row(what, text)
+    out.print(facts)
+    if summary.lines.lines:
+        out.print(_lines_table(summary))
+    for note in summary.notes:
+        out.print(f"[yellow]note:[/yellow] {escape(note)}")
+
+
+def _headline(summary: Summary) -> str:
+    name = summary.motion.scene.name or "the scene"
+    if summary.motion.scene.observed == "spin":
+        return f"{name}: the spin alone, for {summary.duration:g} s"
+    if summary.motion.survived:
+        return f"{name}: the top stayed up for all of {summary.duration:g} s"
+    return f"{name}: the top fell after {summary.end:.5g} s, it {summary.fell}"
+
+
+def _motion_facts(summary: Summary) -> list[tuple[str, str]]:
+    motion = summary.motion
+    spin = motion.spin_hz
+    facts = [("spin", f"{spin[0]:.3f} Hz at the start, {spin[-1]:.3f} Hz at the end")]
+    if motion.scene.observed == "spin":
+        return facts
+    facts.insert(0, ("height", summary.heights))
+    if motion.scene.washers.inertia_kg_m2 > 0:
+        washers = motion.washer_spin_hz
+        facts.append(("loose washers", f"{washers[0]:.3f} Hz at the start, {washers[-1]:.3f} Hz at the end"))
+    facts.append(("tilt", f"up to {1000 * motion.tilt.max():.3g} mrad, {math.degrees(motion.tilt.max()):.3g}°"))
+    return facts
+
+
+def _quality_facts(summary: Summary) -> list[tuple[str, str]]:
+    accuracy = summary.motion.accuracy
+    if accuracy.steps == 0:
+        return [("computed", "in closed form, nothing was integrated")]
+    verdict = "within" if accuracy.reached else "NOT within"
+    facts = [
+        (
+            "error at the end",
+            f"{accuracy.position:.1g} m of the place, {accuracy.axis:.1g} rad of the axis (estimated)",
+        ),
+        ("", f"{verdict} the tolerance of {accuracy.tolerance:g}"),
+    ]
+    if conserved(summary.motion.scene):
+        facts.append(("energy", f"constant to {summary.energy_change:.1g} of itself"))
+    steps = f"{accuracy.steps} steps of {1000 * accuracy.step:.3g} ms by {accuracy.scheme}"
+    speed = f", {_rounded(summary.speed)} times faster than the real top" if summary.end >= 1 else ""
+    facts.append(("computed", steps + speed))  # of less than a second nothing but the overhead would be seen
+    return facts
+
+
+def _rounded(speed: float) -> str:
+    """Two digits: more of a computer's speed is chance."""
+    return f"{float(f'{speed:.2g}'):,.0f}".replace(",", " ") if speed >= 10 else f"{speed:.2g}"
+
+
+def _lines_table(summary: Summary) -> Table:
+    resolution = summary.lines.resolution
+    digits = 2 if resolution > 0.05 else 3
+    shown = new_table(
+        "Lines of the axis, n_x + i n_y",
+        "frequency \\[Hz]", "amplitude \\[mrad]", "what it is",
+        numbers=("frequency \\[Hz]", "amplitude \\[mrad]"),
+    )  # fmt: skip
+    for line in summary.lines.lines:
+        shown.add_row(f"{line.frequency:.{digits}f}", f"{1000 * line.amplitude:.3g}", line.name)
+    of = f", of the first {summary.lines.until:.3g} s" if summary.lines.until < 0.99 * summary.end else ""
+    shown.caption = f"those {resolution:.2g} Hz apart are told apart{of}"
+    shown.caption_justify = "left"
+    return shown

@@ -1,0 +1,198 @@
+"""The one simulation of the command: an order → the motion, its summary, and a run folder."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import sys
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from levilab.motion_lines import rate_for
+from levilab.motion_summary import as_document, summarise
+from levilab.run import STATES, RunRecord, utc_now
+from levilab.simulator.problem import SimulationError
+from levilab.simulator.single import simulate
+from levilab.software import software_versions
+from levilab.writing import CannotWrite, RunWriter
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    from levilab.motion_summary import Summary
+    from levilab.simulator.scene import Scene
+    from levilab.simulator.trajectory import Trajectory
+
+FIGURE = "motion.png"
+
+#: States at most: 300 MB of them.
+MOST_STATES = 2_000_000
+#: So much is simulated to have the kernels compiled, or brought from the disk, before the clock starts [s].
+_FIRST_S = 1e-3
+#: Rows in one block of states.csv.
+_ROWS = 1000
+
+#: Columns of states.csv: name, unit, what it is, and its values for a motion.
+COLUMNS: tuple[tuple[str, str, str, Callable[[Trajectory], Any]], ...] = (
+    ("time_s", "s", "since the start; the last row is the end", lambda motion: motion.time),
+    ("x_m", "m", "centre of mass, from the base's centre", lambda motion: motion.position[:, 0]),
+    ("y_m", "m", "centre of mass, from the base's centre", lambda motion: motion.position[:, 1]),
+    ("z_m", "m", "centre of mass, above the base's centre", lambda motion: motion.position[:, 2]),
+    ("vx_m_s", "m/s", "velocity", lambda motion: motion.velocity[:, 0]),
+    ("vy_m_s", "m/s", "velocity", lambda motion: motion.velocity[:, 1]),
+    ("vz_m_s", "m/s", "velocity", lambda motion: motion.velocity[:, 2]),
+    ("axis_x", "1", "the top's axis, a unit vector", lambda motion: motion.axis[:, 0]),
+    ("axis_y", "1", "the top's axis, a unit vector", lambda motion: motion.axis[:, 1]),
+    ("axis_z", "1", "the top's axis, a unit vector", lambda motion: motion.axis[:, 2]),
+    ("spin_frequency_hz", "Hz", "turns about the axis per second, ω₃/2π", lambda motion: motion.spin_hz),
+    ("energy_j", "J", "without the part of the drive's field", lambda motion: motion.energies),
+)
+
+
+@dataclass(frozen=True)
+class SimulationOrder:
+    """What is to be simulated: scene, duration [s], tolerance [m and rad], rate [states per second].
+
+    out: where a run folder is made, None for none.
+    """
+
+    scene: Scene
+    duration: float = 30.0
+    tolerance: float = 1e-7
+    rate: float = 100.0
+    out: Path | None = None
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """What came of it, and the run folder if there is one."""
+
+    summary: Summary
+    folder: Path | None
+
+
+def carry_out(
+    order: SimulationOrder, message: Callable[[str], None], progress: Callable[[float], None] | None = None
+) -> Simulation:
+    """Simulate, look at the motion, and write it down; what does not come to its end leaves nothing behind.
+
+    message: is told what takes a moment; progress: the share that is done.  Raises SimulationError, CannotWrite.
+    """
+    factor = _samples_per_state(order)
+    if order.out is None:
+        return Simulation(_simulated(order, factor, message, progress), None)
+    with RunWriter.create(order.out, _record(order), STATES) as writer:
+        try:
+            summary = _simulated(order, factor, message, progress)
+            _write(summary, factor, writer)
+        except BaseException:
+            writer.discard()
+            raise
+    return Simulation(summary, writer.folder)
+
+
+def _samples_per_state(order: SimulationOrder) -> int:
+    """Samples for each state that is kept: the spectrum needs more of them than a file does.  Checks the numbers."""
+    for name, value in (("duration", order.duration), ("tolerance", order.tolerance), ("rate", order.rate)):
+        if not (math.isfinite(value) and value > 0):
+            raise SimulationError(f"--{name} {value:g}: a number above 0 is expected")
+    states = order.duration * order.rate
+    if states > MOST_STATES:
+        raise SimulationError(
+            f"--duration {order.duration:g} with --rate {order.rate:g} are {states:.2g} states, at most {MOST_STATES} "
+            f"are kept: take --rate {MOST_STATES / order.duration:.2g} or less"
+        )
+    wanted = math.ceil(rate_for(order.scene) / order.rate)
+    return max(min(wanted, int(MOST_STATES / max(states, 1.0))), 1)
+
+
+def _simulated(
+    order: SimulationOrder,
+    factor: int,
+    message: Callable[[str], None],
+    progress: Callable[[float], None] | None,
+) -> Summary:
+    with _telling_of_compilation(message):
+        simulate(order.scene, min(_FIRST_S, order.duration), rate=None)
+    begin = time.perf_counter()
+    motion = simulate(
+        order.scene, order.duration, tolerance=order.tolerance, rate=factor * order.rate, progress=progress
+    )
+    return summarise(motion, order.duration, order.rate, time.perf_counter() - begin)
+
+
+@contextlib.contextmanager
+def _telling_of_compilation(message: Callable[[str], None]) -> Iterator[None]:
+    """Say so when the kernel is compiled; one that lies on the disk is not."""
+    from numba.core.event import Event, Listener, install_listener
+
+    from levilab.simulator.splitting import advance
+
+    class Compilation(Listener):
+        def on_start(self, event: Event) -> None:
+            if event.data["dispatcher"] is advance:
+                message("compiling for this kind of scene: a few seconds, once")
+
+        def on_end(self, event: Event) -> None:
+            """Nothing to say."""
+
+    with install_listener("numba:compile", Compilation()):
+        yield
+
+
+# --- the run folder ---
+
+
+def _record(order: SimulationOrder) -> RunRecord:
+    return RunRecord(
+        experiment="simulate",
+        status="running",
+        started_utc=utc_now(),
+        command_line=sys.argv,
+        channels=[{"name": name, "unit": unit, "source": source} for name, unit, source, _ in COLUMNS],
+        configuration={
+            "scene": order.scene.as_table(),
+            "duration_s": order.duration,
+            "tolerance": order.tolerance,
+            "rate_hz": order.rate,
+        },
+        software=software_versions(),
+        note=order.scene.description,
+        synthetic=True,
+        synthetic_how=f"simulated: scene {order.scene.name or 'without a name'}",
+    )
+
+
+def _write(summary: Summary, factor: int, writer: RunWriter) -> None:
+    from levilab.figures import save_png
+    from levilab.motion_figures import motion_figure
+
+    rows = kept_rows(summary.motion, factor)
+    writer.states(state_rows(summary.motion, rows))
+    if summary.motion.fell is not None:
+        writer.event(summary.motion.fell.time, "fell", f"the top {summary.fell}")
+    try:
+        save_png(motion_figure(summary), writer.folder / FIGURE)
+    except OSError as error:
+        raise CannotWrite(
+            f"could not write {FIGURE} in {writer.folder} ({error.strerror or error}): "
+            "free space, or choose another place with --out"
+        ) from error
+    writer.finish("finished", simulation=as_document(summary) | {"states": len(rows)})
+
+
+def kept_rows(motion: Trajectory, factor: int) -> np.ndarray[Any, np.dtype[np.intp]]:
+    """Every so manieth sample, and the last one, which is the end."""
+    return np.unique(np.append(np.arange(0, len(motion.time) - 1, factor), len(motion.time) - 1))
+
+
+def state_rows(motion: Trajectory, rows: np.ndarray[Any, np.dtype[np.intp]]) -> Iterator[str]:
+    """Lines of states.csv, some at a time, in full precision."""
+    table = np.column_stack([values(motion) for _, _, _, values in COLUMNS])
+    for first in range(0, len(rows), _ROWS):
+        block = table[rows[first : first + _ROWS]].tolist()
+        yield "\n".join(",".join(map(repr, row)) for row in block)

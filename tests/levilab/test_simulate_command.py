@@ -1,0 +1,264 @@
+"""`levilab simulate` as a user runs it: what it tells, what it writes, what it refuses."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from levilab.motion_figures import motion_figure
+from levilab.motion_lines import lines_of, rate_for
+from levilab.motion_summary import as_document, summarise
+from levilab.progress import Share
+from levilab.run import Run
+from levilab.simulation import COLUMNS, SimulationOrder, carry_out, kept_rows
+from levilab.simulator.scene import preset
+from levilab.simulator.single import simulate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from levilab.motion_summary import Summary
+    from levilab.simulator.scene import Scene
+
+    Command = Callable[..., subprocess.CompletedProcess[str]]
+
+#: As INTERFACE.md has them.
+HEADER = "time_s,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,axis_x,axis_y,axis_z,spin_frequency_hz,energy_j"
+
+
+def summary(scene: Scene, duration: float, rate: float = 100.0) -> Summary:
+    motion = simulate(scene, duration, rate=rate * np.ceil(rate_for(scene) / rate))
+    return summarise(motion, duration, rate, 0.01)
+
+
+# --- the run folder ---
+
+
+def test_a_run_folder_holds_the_states_in_full_precision_the_scene_and_a_figure(tmp_path: Path) -> None:
+    scene = preset("undriven").changed({"start.spin_hz": 31.0})
+    done = carry_out(SimulationOrder(scene, 2.0, out=tmp_path), lambda _: None)
+    assert done.folder is not None
+    header, *lines = (done.folder / "states.csv").read_text(encoding="utf-8").splitlines()
+    assert header == HEADER == ",".join(column[0] for column in COLUMNS)
+    table = np.array([[float(cell) for cell in line.split(",")] for line in lines])
+    assert table[:, 0] == pytest.approx(np.arange(201) / 100)
+    motion = done.summary.motion
+    rows = kept_rows(motion, round((len(motion.time) - 1) / 200))
+    assert np.array_equal(table[:, 1:4], motion.position[rows])  # not one bit is lost
+    assert np.array_equal(table[:, 11], motion.energies[rows])
+    run = Run.load(done.folder)
+    assert (run.status, run.record.experiment, run.record.synthetic) == ("finished", "simulate", True)
+    assert "undriven" in (run.record.synthetic_how or "")
+    assert run.record.configuration["scene"]["start"]["spin_hz"] == 31.0
+    assert run.record.configuration["tolerance"] == 1e-7
+    assert (run.record.model_extra or {})["simulation"]["states"] == 201
+    package = json.loads((done.folder / "datapackage.json").read_text(encoding="utf-8"))
+    (resource,) = package["resources"]
+    assert resource["path"] == "states.csv"
+    assert [field["name"] for field in resource["schema"]["fields"]] == HEADER.split(",")
+    assert (done.folder / "motion.png").stat().st_size > 20_000
+
+
+def test_a_simulation_that_fails_leaves_no_folder(tmp_path: Path) -> None:
+    def broken(_: float) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        carry_out(SimulationOrder(preset("undriven"), 5.0, out=tmp_path), lambda _: None, broken)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_runs_lists_a_simulation_with_its_states_and_analyze_says_that_it_is_none_of_its_own(
+    levilab: Command,
+) -> None:
+    done = levilab("simulate", "friction", "--duration", "2", "--out", "runs")
+    assert "stayed up for all of 2 s" in done.stdout
+    assert "wrote runs" in done.stderr
+    listed = levilab("runs").stdout
+    assert "201 states" in listed
+    assert "simulate friction, synthetic" in listed
+    (run,) = json.loads(levilab("runs", "--json").stdout)
+    assert (run["readings"], run["states"], run["length_s"]) == (0, 201, 2.0)
+    refused = levilab("analyze", "spindown", "runs", check=1)
+    assert "1 simulate run" in refused.stderr
+
+
+# --- what is told ---
+
+
+def test_json_has_units_in_its_names_and_the_folder(levilab: Command, tmp_path: Path) -> None:
+    text = levilab("simulate", "undriven", "--duration", "3", "--json", "--out", "here").stdout
+    document = json.loads(text)
+    assert document["survived"] is True
+    assert document["fell"] is None
+    assert document["tolerance_reached"] is True
+    assert document["position_error_m"] < 1e-7
+    assert 0.07 < document["height_mean_m"] < 0.075
+    assert (tmp_path / document["run"] / "states.csv").exists()
+
+
+def test_a_top_too_slow_to_float_is_said_to_have_fallen_and_when(levilab: Command) -> None:
+    told = levilab("simulate", "undriven", "--set", "start.spin_hz=15").stdout
+    assert "the top fell after 0.18" in told
+    assert "came down to 0 cm" in told
+    drifted = json.loads(levilab("simulate", "undriven", "--set", "escape.radius_m=0.002", "--json", check=0).stdout)
+    assert drifted["fell"]["how"] == "radius"
+    assert drifted["fell"]["text"] == "drifted out to 0.2 cm from the axis"
+    assert drifted["fell"]["time_s"] == drifted["end_s"] < 30
+
+
+def test_a_chaotic_motion_is_told_to_be_one() -> None:
+    motion = simulate(preset("undriven"), 1.0)
+    chaotic = replace(motion, accuracy=replace(motion.accuracy, position=np.inf))
+    told = summarise(chaotic, 1.0, 100.0, 0.01)
+    assert any("chaotic" in note for note in told.notes)
+    assert as_document(told)["position_error_m"] is None
+    magnified = replace(motion, accuracy=replace(motion.accuracy, position=1e-5))
+    (note,) = summarise(magnified, 1.0, 100.0, 0.01).notes[:1]
+    assert "1e-07" in note
+    assert "chaotic" not in note
+
+
+def test_too_low_a_rate_for_the_lines_is_told(levilab: Command) -> None:
+    told = json.loads(levilab("simulate", "undriven", "--duration", "5", "--rate", "50", "--json").stdout)
+    assert any("take --rate 1" in note for note in told["notes"])  # three times the 42 to 43 Hz of the nutation
+
+
+# --- the lines ---
+
+
+def test_the_driven_top_has_a_line_at_the_drive_with_sidebands_and_its_four_modes() -> None:
+    found = summary(preset("driven"), 60.0).lines
+    place = {line.name: line.frequency for line in found.lines}
+    assert place["drive"] == pytest.approx(30.0, abs=found.resolution / 100)
+    # the roots for small motions are −0.589, 0.772, 7.53 and 42.2 Hz; the tilt of 7° moves them by some percent
+    assert place["precession"] == pytest.approx(7.3, abs=0.1)
+    assert place["nutation"] == pytest.approx(42.4, abs=0.3)
+    assert place["swing sideways"] == pytest.approx(0.77, abs=0.05)
+    assert place["swing sideways, backwards"] == pytest.approx(-0.589, abs=0.05)
+    sidebands = [line.frequency - 30 for line in found.lines if line.name.startswith("drive ")]
+    # the spin swings about the drive's frequency at 0.31 to 0.33 Hz, depending on how far
+    assert {round(abs(x), 2) for x in sidebands} >= {0.31}
+
+
+def test_a_spin_the_other_way_round_mirrors_the_lines() -> None:
+    mirrored = summary(preset("undriven").changed({"start.spin_hz": -30.0}), 10.0)
+    forth, back = summary(preset("undriven"), 10.0).lines.lines, mirrored.lines.lines
+    for name in ("precession", "nutation"):
+        (one,) = [line for line in forth if line.name == name]
+        (other,) = [line for line in back if line.name == name]
+        assert other.frequency == pytest.approx(-one.frequency, rel=0.01)
+        left, right = motion_figure(mirrored).axes[-1].get_xlim()
+        assert left < other.frequency < right
+
+
+def test_a_falling_spin_gives_the_lines_of_its_first_seconds() -> None:
+    told = summary(preset("friction"), 20.0)
+    assert told.lines.until < 5
+    assert any("first" in note for note in told.notes)
+    (precession,) = [line for line in told.lines.lines if line.name == "precession"]
+    assert precession.frequency == pytest.approx(7.5, abs=0.1)
+
+
+def test_an_unlocked_top_has_the_wobble_once_a_turn_beside_the_drive() -> None:
+    told = summary(preset("driven").changed({"drive.frequency_hz": 35.0}), 20.0)
+    place = {line.name: line.frequency for line in told.lines.lines}
+    assert place["drive"] == pytest.approx(35.0, abs=0.01)
+    assert place["wobble, once a turn"] == pytest.approx(30.0, abs=0.2)
+
+
+def test_what_does_not_last_or_does_not_move_has_no_lines() -> None:
+    assert lines_of(simulate(preset("undriven"), 0.5, rate=400.0)).lines == ()
+    assert lines_of(simulate(preset("friction").changed({"observed": "spin"}), 30.0)).lines == ()
+
+
+# --- the figure ---
+
+
+def texts(told: Summary) -> str:
+    figure = motion_figure(told)
+    titles = [panel.get_title(loc="left") for panel in figure.axes]
+    return "\n".join([*titles, *(text.get_text() for text in figure.texts)])
+
+
+def test_the_figure_calls_a_change_of_the_energy_an_error_only_where_nothing_changes_it() -> None:
+    assert "Error of the energy" in texts(summary(preset("undriven"), 2.0))
+    dragged = texts(summary(preset("friction"), 2.0))
+    assert "Error" not in dragged
+    assert "drag" in dragged
+
+
+def test_the_figure_shows_the_path_to_scale_and_that_it_is_synthetic() -> None:
+    told = summary(preset("undriven"), 2.0)
+    assert motion_figure(told).axes[0].get_aspect() == 1.0
+    assert "SYNTHETIC" in texts(told)
+
+
+def test_a_scene_without_motion_has_the_spin_drawn_alone() -> None:
+    told = summary(preset("friction").changed({"observed": "spin"}), 30.0)
+    assert len(motion_figure(told).axes) == 1
+
+
+# --- what is refused, and what ends it ---
+
+REFUSED = {
+    "an unknown scene": (["nowhere"], "driven"),
+    "a key that is not there": (["undriven", "--set", "top.mass=1"], "top.mass_kg"),
+    "a setting without a value": (["undriven", "--set", "top.mass_kg"], "KEY=VALUE"),
+    "a value that is not allowed": (["undriven", "--set", "top.mass_kg=-1"], "top.mass_kg"),
+    "no duration": (["undriven", "--duration", "0"], "--duration"),
+    "time that runs back": (["undriven", "--duration", "-3"], "--duration"),
+    "no end": (["undriven", "--duration", "inf"], "--duration"),
+    "no number": (["undriven", "--tolerance", "nan"], "--tolerance"),
+    "more states than memory": (["undriven", "--rate", "1e9"], "--rate 6.7e+04"),
+    "a file where a folder should be": (["undriven", "--out", "file"], "--out"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_makes_no_sense_is_refused_in_one_line(levilab: Command, tmp_path: Path, name: str) -> None:
+    words, says = REFUSED[name]
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    refused = levilab("simulate", *words, check=1)
+    assert refused.stdout == ""
+    (line,) = refused.stderr.splitlines()
+    assert says in line
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_number_that_is_none_is_wrong_usage(levilab: Command) -> None:
+    levilab("simulate", "undriven", "--duration", "long", check=2)
+    levilab("simulate", check=2)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Windows sends no such signal to one process")
+def test_interrupted_it_says_so_in_one_line_and_leaves_nothing(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "levilab", "simulate", "driven", "--duration", "6000", "--out", "runs"]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+        deadline = time.monotonic() + 60
+        while not list(tmp_path.glob("runs/*/run.json")) and time.monotonic() < deadline:
+            time.sleep(0.05)  # until it is under way
+        process.send_signal(signal.SIGINT)
+        _, told = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert told.splitlines()[-1] == "levilab: interrupted, nothing was written"
+    assert "Traceback" not in told
+    assert list((tmp_path / "runs").iterdir()) == []
+
+
+def test_no_bar_is_shown_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    share = Share("simulating")
+    for part in (0.1, 0.9, 0.1):
+        share(part)
+    share.close()
+    assert capsys.readouterr().err == ""
