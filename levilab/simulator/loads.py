@@ -9,9 +9,46 @@ from numpy.typing import NDArray
 
 from levilab.simulator.compiled import by_type, part
 from levilab.simulator.fields import axial
+from levilab.simulator.paraxial import Paraxial, Paraxial2, ParaxialThick
+from levilab.simulator.ring import Sheet, Thick
 from levilab.simulator.vectors import Vector, cross, plus, sine_of_turns
 
 Array = NDArray[np.float64]
+
+# --- the drive ---
+
+
+class Sine(NamedTuple):
+    """A uniform field: amplitude [T] along each axis; [Hz]; phase in turns."""
+
+    amplitude: Vector
+    frequency: float
+    phase: float
+
+
+class Kinked(NamedTuple):
+    """A uniform field that is linear in time between its kinks; level and slope come with each interval."""
+
+    amplitude: Vector
+
+
+def _no_drive(drive: Any, b: Any, strength: Any, at: Any) -> Any:
+    return b
+
+
+def _sine_drive(drive: Any, b: Any, strength: Any, at: Any) -> Any:
+    t, level, _ = at
+    return plus(b, strength * level * sine_of_turns(drive.frequency * t + drive.phase), drive.amplitude)
+
+
+def _kinked_drive(drive: Any, b: Any, strength: Any, at: Any) -> Any:
+    t, level, slope = at
+    return plus(b, strength * (level + slope * t), drive.amplitude)
+
+
+#: The field b with strength times the drive's added to it: (drive, b, strength, (time, level, slope)).
+driven = by_type({type(None): _no_drive, Sine: _sine_drive, Kinked: _kinked_drive})
+
 
 # --- magnets ---
 
@@ -40,20 +77,39 @@ class Disc(NamedTuple):
     nodes: Array
 
 
-@part
-def dipole_load(field: Any, r: Vector, moment: Vector, applied: Vector) -> tuple[Vector, Vector]:
-    """Force [N] and torque [N m] on a dipole in the base's field and a uniform one."""
-    x, y, z = r
-    p, q, bz, s, g = axial(field, z, x * x + y * y)
+def _force(field: Any, five: Any, x: Any, y: Any, moment: Any) -> Any:
+    p, q, _, s, g = five
     mr = x * moment[0] + y * moment[1]
     along = q * mr + s * moment[2]
-    force = (p * moment[0] + along * x, p * moment[1] + along * y, s * mr + g * moment[2])
-    return force, cross(moment, (p * x + applied[0], p * y + applied[1], bz + applied[2]))
+    return (p * moment[0] + along * x, p * moment[1] + along * y, s * mr + g * moment[2])
 
 
-def _aligned_load(magnet: Any, field: Any, s: Any, applied: Any) -> Any:
-    mu = magnet.moment
-    return dipole_load(field, s.r, (mu * s.n[0], mu * s.n[1], mu * s.n[2]), applied)
+def _force_without_q(field: Any, five: Any, x: Any, y: Any, moment: Any) -> Any:
+    p, _, _, s, g = five
+    along = s * moment[2]
+    across = x * moment[0] + y * moment[1]
+    return (p * moment[0] + along * x, p * moment[1] + along * y, s * across + g * moment[2])
+
+
+#: ∇(M·B): (field, its five functions, x, y, moment).
+force_on = by_type({Paraxial2: _force_without_q, Paraxial: _force, ParaxialThick: _force, Sheet: _force, Thick: _force})
+
+
+@part
+def dipole_load(model: Any, r: Vector, strength: float, moment: Vector, at: Any) -> tuple[Vector, Vector]:
+    """Force [N] and torque [N m] on the dipole strength × moment in the fields of base and drive.
+
+    The strength goes with the field, which is known before the moment: less to wait for.
+    """
+    x, y, z = r
+    p, q, bz, s, g = axial(model.field, z, x * x + y * y)
+    five = (strength * p, strength * q, strength * bz, strength * s, strength * g)
+    b = driven(model.drive, (five[0] * x, five[0] * y, five[2]), strength, at)
+    return force_on(model.field, five, x, y, moment), cross(moment, b)
+
+
+def _aligned_load(magnet: Any, model: Any, s: Any, at: Any) -> Any:
+    return dipole_load(model, s.r, magnet.moment, s.n, at)
 
 
 @part
@@ -63,56 +119,50 @@ def moment_of(magnet: Any, n: Vector, arm: Vector) -> Vector:
     return (a * n[0] + t * arm[0], a * n[1] + t * arm[1], a * n[2] + t * arm[2])
 
 
-def _tilted_load(magnet: Any, field: Any, s: Any, applied: Any) -> Any:
-    return dipole_load(field, s.r, moment_of(magnet, s.n, s.arm), applied)
+def _tilted_load(magnet: Any, model: Any, s: Any, at: Any) -> Any:
+    return dipole_load(model, s.r, 1.0, moment_of(magnet, s.n, s.arm), at)
 
 
-def _disc_load(magnet: Any, field: Any, s: Any, applied: Any) -> Any:
+def _disc_load(magnet: Any, model: Any, s: Any, at: Any) -> Any:
     moment = moment_of(magnet, s.n, s.arm)
     third = cross(s.n, s.arm)
     force, torque = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for i in range(magnet.nodes.shape[0]):
         node = magnet.nodes[i]
         offset = plus(plus((node[2] * s.n[0], node[2] * s.n[1], node[2] * s.n[2]), node[0], s.arm), node[1], third)
-        pull, twist = dipole_load(field, plus(s.r, 1.0, offset), moment, applied)
+        pull, twist = dipole_load(model, plus(s.r, 1.0, offset), 1.0, moment, at)
         force = plus(force, node[3], pull)
         torque = plus(plus(torque, node[3], twist), node[3], cross(offset, pull))
     return force, torque
 
 
-#: Force [N] and torque [N m] on a magnet: (magnet, field, state, applied field).
+#: Force [N] and torque [N m] on a magnet: (magnet, model, state, moment of the drive).
 load = by_type({Aligned: _aligned_load, Tilted: _tilted_load, Disc: _disc_load})
 
-# --- the drive ---
+# --- the weight ---
 
 
-class Sine(NamedTuple):
-    """A uniform field: amplitude [T] along each axis; [Hz]; phase in turns."""
+class Upright(NamedTuple):
+    """Gravity straight down [m/s²]."""
 
-    amplitude: Vector
-    frequency: float
-    phase: float
+    g: float
 
 
-class Kinked(NamedTuple):
-    """A uniform field that is linear in time between its kinks; level and slope come with each interval."""
+class Leaning(NamedTuple):
+    """Gravity as a leaning base sees it [m/s²]."""
 
-    amplitude: Vector
-
-
-def _no_drive(drive: Any, t: Any, level: Any, slope: Any) -> Any:
-    return (0.0, 0.0, 0.0)
+    x: float
+    y: float
+    z: float
 
 
-def _sine_drive(drive: Any, t: Any, level: Any, slope: Any) -> Any:
-    now = level * sine_of_turns(drive.frequency * t + drive.phase)
-    return (now * drive.amplitude[0], now * drive.amplitude[1], now * drive.amplitude[2])
+def _straight(gravity: Any, v: Any, k: Any) -> Any:
+    return (v[0], v[1], v[2] - k * gravity.g)
 
 
-def _kinked_drive(drive: Any, t: Any, level: Any, slope: Any) -> Any:
-    now = level + slope * t
-    return (now * drive.amplitude[0], now * drive.amplitude[1], now * drive.amplitude[2])
+def _aslant(gravity: Any, v: Any, k: Any) -> Any:
+    return (v[0] + k * gravity.x, v[1] + k * gravity.y, v[2] + k * gravity.z)
 
 
-#: The drive's field [T] at time t: (drive, t, level, slope).
-applied_field = by_type({type(None): _no_drive, Sine: _sine_drive, Kinked: _kinked_drive})
+#: The velocity after the time k of weight alone: (gravity, velocity, k).
+weighed = by_type({Upright: _straight, Leaning: _aslant})

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from levilab.simulator.braking import braked, ticked
 from levilab.simulator.compiled import by_type, part
-from levilab.simulator.loads import applied_field, load
+from levilab.simulator.loads import load, weighed
 from levilab.simulator.vectors import Vector, dot, plus, rotation, turned
 
 
@@ -44,12 +44,12 @@ STATE_SIZE = 18
 
 
 class Body(NamedTuple):
-    """A rigid symmetric top: 1/m [1/kg], 1/I₁, I₃ [kg m²]; gravity [m/s²] as seen from the base's frame."""
+    """A rigid symmetric top: 1/m [1/kg], 1/I₁, I₃ [kg m²]; gravity: Upright or Leaning, as the base sees it."""
 
     inverse_mass: float
     inverse_transverse: float
     axial: float
-    gravity: Vector
+    gravity: Any
 
 
 class Rigid(NamedTuple):
@@ -115,16 +115,16 @@ swung = by_type({type(None): _not_swung, Rigid: _swung, Loose: _swung})
 def drift(model: Model, s: State, d: float) -> State:
     """Free motion for the time d [s], exact."""
     body = model.body
-    w = d * body.inverse_transverse
-    sinc, cosc = rotation(dot(s.L, s.L) * (w * w))
-    sine, cosine = w * sinc, w * w * cosc
+    k = d * body.inverse_transverse
+    turn = (k * s.L[0], k * s.L[1], k * s.L[2])
+    sinc, cosc = rotation(dot(turn, turn))
     arm = twisted(model.turning, s.n, s.arm, dot(s.L, s.n), s.loose, body.inverse_transverse, d)
     return State(
         plus(s.r, d, s.v),
         s.v,
-        turned(s.n, s.L, sine, cosine),
+        turned(s.n, turn, sinc, cosc),
         s.L,
-        swung(model.turning, arm, s.L, sine, cosine),
+        swung(model.turning, arm, turn, sinc, cosc),
         ticked(model.drag, s.clock, d),
         s.loose,
         s.t + d,
@@ -141,7 +141,7 @@ def kick(model: Model, s: State, k: float, level: float, slope: float) -> State:
     level, slope: of the drive, whose field is (level + slope·t) × amplitude × its carrier.
     """
     body = model.body
-    force, torque = load(model.magnet, model.field, s, applied_field(model.drive, s.t, level, slope))
-    v = plus(plus(s.v, k * body.inverse_mass, force), k, body.gravity)
+    force, torque = load(model.magnet, model, s, (s.t, level, slope))
+    v = plus(weighed(body.gravity, s.v, k), k * body.inverse_mass, force)  # what is known first is added first
     momentum, loose = braked(model.drag, body, s, torque, k)
     return State(s.r, v, s.n, momentum, s.arm, s.clock, loose, s.t)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from levilab.simulator import braking
 from levilab.simulator.fields import field_of, flux_density
-from levilab.simulator.loads import Aligned, Disc, Kinked, Sine, Tilted
+from levilab.simulator.loads import Aligned, Disc, Kinked, Leaning, Sine, Tilted, Upright
 from levilab.simulator.motion import STATE_SIZE, Body, Loose, Model, Rigid
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def model_of(scene: Scene) -> Model:
             1 / top.mass_kg,
             1 / top.inertia_transverse_kg_m2,
             top.inertia_axial_kg_m2,
-            gravity(scene),
+            Upright(scene.gravity_m_s2) if scene.base.tilt_rad == 0 else Leaning(*gravity(scene)),
         ),
         magnet=_magnet(scene),
         turning=_turning(scene),
@@ -203,7 +203,7 @@ def energy(scene: Scene, model: Model, states: Array) -> Array:
     across = np.einsum("ij,ij->i", momentum, momentum) - along**2
     kinetic = np.einsum("ij,ij->i", s[:, V], s[:, V]) / (2 * model.body.inverse_mass)
     turning = across * model.body.inverse_transverse / 2 + _spinning(scene, along, s[:, LOOSE])
-    weight = -(s[:, R] @ np.array(model.body.gravity)) / model.body.inverse_mass
+    weight = -(s[:, R] @ np.array(gravity(scene))) * scene.top.mass_kg
     return np.asarray(kinetic + turning + weight + magnetic_energy(model, s))
 
 
