@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING, Annotated, NoReturn, cast
 
 import typer
 
+from levilab import cli_simulator
+from levilab.cli_simulator import EXIT_INTERRUPTED, Json
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from analysis.lawfit import Uncertainty as Kind
     from levilab.errors import LevilabError
     from levilab.pipeline import Options
-    from levilab.simulator.explain import Effect
-    from levilab.simulator.scene import Scene
 
 app = typer.Typer(
     name="levilab",
@@ -33,7 +34,7 @@ analyze_app = typer.Typer(no_args_is_help=True, help="Analyze runs or data files
 app.add_typer(acquire_app, name="acquire")
 app.add_typer(analyze_app, name="analyze")
 
-EXIT_FAILED, EXIT_INSTRUMENT, EXIT_INTERRUPTED = 1, 3, 130
+EXIT_FAILED, EXIT_INSTRUMENT = 1, 3
 
 Columns = Annotated[
     str,
@@ -47,7 +48,6 @@ ReadingU = Annotated[
     typer.Option(metavar="HZ", help="Standard uncertainty of every reading; goes before what the data say."),
 ]
 KeepOutliers = Annotated[bool, typer.Option("--keep-outliers", help="Fit readings that look like miscounts, too.")]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else on standard output.")]
 Paths = Annotated[list[Path], typer.Argument(metavar="PATH…", help="Run folders, data files, or folders to search.")]
 
 
@@ -202,86 +202,6 @@ def report(
     typer.echo(f"the report is in {write_report(paths, output, options)}")
 
 
-@app.command(epilog="Example: levilab simulate driven --duration 60 --set drive.frequency_hz=30.1 --out runs")
-def simulate(
-    scene: Annotated[
-        str, typer.Argument(metavar="SCENE", help="undriven, friction, tilted, driven, loose-washers, or a TOML file.")
-    ],
-    duration: Annotated[float, typer.Option(metavar="S", help="How many seconds are simulated.")] = 30.0,
-    tolerance: Annotated[
-        float, typer.Option(metavar="X", help="Wanted error at the end, of the place in m and of the axis in rad.")
-    ] = 1e-7,
-    rate: Annotated[float, typer.Option(metavar="HZ", help="States per second that are written.")] = 100.0,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Change a key of the scene, as top.mass_kg=0.025; repeatable."),
-    ] = None,
-    explain: Annotated[
-        bool, typer.Option("--explain", help="Tell what is left out, and how much each of it would change.")
-    ] = False,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Make a run folder there: states.csv, run.json, motion.png.")
-    ] = None,
-    as_json: Json = False,
-) -> None:
-    """Simulate the motion: does the top stay up, where and how fast does it turn, which frequencies are in it.
-
-    The first run for a kind of scene compiles for a few seconds.  Ctrl-C ends it, and nothing is written then.
-    """
-    try:
-        _simulate(scene, settings or [], duration, tolerance, rate, out, explain=explain, as_json=as_json)
-    except KeyboardInterrupt:
-        typer.echo("levilab: interrupted, nothing was written", err=True)
-        raise typer.Exit(EXIT_INTERRUPTED) from None
-
-
-def _simulate(
-    name: str,
-    settings: list[str],
-    duration: float,
-    tolerance: float,
-    rate: float,
-    out: Path | None,
-    *,
-    explain: bool,
-    as_json: bool,
-) -> None:
-    from levilab.simulator.scene import read_scene, with_settings
-
-    scene = with_settings(read_scene(name), settings)  # a wrong name is told before anything heavy is loaded
-    from levilab.motion_summary import as_document, finite
-    from levilab.progress import Share
-    from levilab.simulation import SimulationOrder, carry_out
-
-    order = SimulationOrder(scene, duration, tolerance, rate, out)
-    with contextlib.closing(Share("simulating")) as share:
-        done = carry_out(order, lambda text: typer.echo(text, err=True), share)
-    effects = _effects(scene, duration) if explain else []
-    if as_json:
-        import json
-        from dataclasses import asdict
-
-        document = as_document(done.summary) | {"run": str(done.folder) if done.folder else None}
-        document |= {"effects": [finite(asdict(effect)) for effect in effects]} if explain else {}
-        typer.echo(json.dumps(document, indent=2, allow_nan=False))
-        return
-    from levilab.motion_tables import print_motion
-
-    print_motion(done.summary)
-    if explain:
-        from levilab.explain_table import print_effects
-
-        print_effects(effects)
-    if done.folder:
-        typer.echo(f"wrote {done.folder}", err=True)
-
-
-def _effects(scene: Scene, duration: float) -> list[Effect]:
-    from levilab.simulator.explain import explain
-
-    return explain(scene, duration)
-
-
 @app.command(epilog="Example: levilab runs runs/")
 def runs(
     folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="The folder to search.")] = Path("runs"),
@@ -298,6 +218,9 @@ def runs(
         typer.echo(json.dumps([vars(run) for run in found], indent=2))
     else:
         print_runs(found, folder)
+
+
+cli_simulator.add_to(app)
 
 
 def main() -> None:

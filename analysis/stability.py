@@ -1,0 +1,215 @@
+"""Where and how fast a top floats: windows of height, mass and spin from the field on the base's axis.
+
+A field is a function of the height z [m], shape (n,), that gives B, B′, B″ on the axis, shape (3, n) or more rows
+[T, T/m, T/m²]; B counts along z.  μ is the moment along the top's axis, signed: an upright top of μ < 0 in B > 0
+stands against the field, as the Levitron does.
+
+Sources: Berry, Proc. R. Soc. A 452, 1207 (1996) (adiabatic); Simon, Heflinger & Ridgway, Am. J. Phys. 65, 286 (1997);
+Gans, Jones & Washizu, J. Phys. D 31, 671 (1998) (linear).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+Array = NDArray[np.float64]
+AxialField = Callable[[Array], Array]
+
+#: Steps of the scans: heights in which a window or an equilibrium is looked for, and spins.
+HEIGHTS = 4000
+SPINS = 2000
+
+
+@dataclass(frozen=True)
+class Symmetric:
+    """A symmetric top.  mass [kg]; transverse, axial: I₁, I₃ [kg m²]; moment [A m²], signed; gravity [m/s²]."""
+
+    mass: float
+    transverse: float
+    axial: float
+    moment: float
+    gravity: float = 9.82
+
+
+@dataclass(frozen=True)
+class Window:
+    """Heights at which a top whose moment follows the field is stable; masses that float there.
+
+    low, high [m]; light, heavy [kg]: of a top of the given moment, which stands against the field.
+    """
+
+    low: float
+    high: float
+    light: float
+    heavy: float
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A height at which field and weight balance for an upright top.
+
+    height [m]; axial, radial: stiffness over mass [1/s²] of a moment that follows the field, positive if stable;
+    spins: the windows of spin [Hz] in which small motions stay small, from the quartic.
+    """
+
+    height: float
+    axial: float
+    radial: float
+    spins: tuple[tuple[float, float], ...]
+
+    @property
+    def stable(self) -> bool:
+        """Stable up and down and sideways, if the top spins neither too slowly nor too fast."""
+        return self.axial > 0 and self.radial > 0
+
+
+# --- adiabatic: the moment follows the field ---
+
+
+def _conditions(field: AxialField, z: Array) -> Array:
+    """Three functions, positive where stable: lift away from the base, axial and radial stiffness; shape (3, n).
+
+    In φ₁ = −B: φ₁φ₂ < 0, φ₁φ₃ > 0, φ₂² − 2φ₃φ₁ > 0 for U = mgz + |μ||B|.
+    """
+    b, slope, bend = field(z)[:3]
+    return np.array([-b * slope, b * bend, slope**2 - 2 * b * bend])
+
+
+def windows(field: AxialField, top: Symmetric, low: float, high: float) -> tuple[Window, ...]:
+    """The stable heights between low and high [m], for a moment against the field, each with its masses.
+
+    Scanned in HEIGHTS steps, each edge then found to the last digits.
+    """
+    z = np.linspace(low, high, HEIGHTS)
+    inside = np.all(_conditions(field, z) > 0, axis=0)
+    edges = np.flatnonzero(inside[1:] != inside[:-1])
+    places = [low] * bool(inside[0]) + [_edge(field, z[i], z[i + 1]) for i in edges] + [high] * bool(inside[-1])
+    found = []
+    for a, b in zip(places[::2], places[1::2], strict=True):
+        masses = [floating_mass(field, top, h) for h in np.linspace(a, b, 200)]
+        found.append(Window(a, b, min(masses), max(masses)))
+    return tuple(found)
+
+
+def _edge(field: AxialField, inside: float, outside: float) -> float:
+    """The height at which one of the conditions passes zero."""
+    worst = lambda z: float(np.min(_conditions(field, np.array([z]))[:, 0] / _sizes(field, inside)))  # noqa: E731
+    return float(brentq(worst, inside, outside, xtol=1e-15, rtol=1e-14))
+
+
+def _sizes(field: AxialField, z: float) -> Array:
+    b, slope, bend = np.abs(field(np.array([z]))[:3, 0])
+    return np.array([b * slope, b * bend + slope**2, slope**2])
+
+
+def floating_mass(field: AxialField, top: Symmetric, height: float) -> float:
+    """The mass [kg] that floats at a height: |μ||B′|/g."""
+    return abs(top.moment * float(field(np.array([height]))[1, 0])) / top.gravity
+
+
+def reduced_mass(mass: float, top: Symmetric, radius: float, strength: float) -> float:
+    """M = m g a²/(2π|μ|ρ), without dimension."""
+    return mass * top.gravity * radius**2 / (2 * math.pi * abs(top.moment) * strength)
+
+
+# --- the equilibria of an upright top ---
+
+
+def equilibria(field: AxialField, top: Symmetric, low: float, high: float) -> tuple[Equilibrium, ...]:
+    """All heights between low and high [m] at which the force μB′ carries the weight."""
+    z = np.linspace(low, high, HEIGHTS)
+    weight = top.mass * top.gravity
+
+    def missing(height: float) -> float:
+        return float(top.moment * field(np.array([height]))[1, 0] - weight)
+
+    values = top.moment * field(z)[1] - weight
+    places = [float(brentq(missing, z[i], z[i + 1], xtol=1e-15)) for i in np.flatnonzero(values[1:] * values[:-1] < 0)]
+    return tuple(_described(field, top, place) for place in places)
+
+
+def _described(field: AxialField, top: Symmetric, height: float) -> Equilibrium:
+    b, slope, bend = (float(value) for value in field(np.array([height]))[:3, 0])
+    # U = −μB for the upright top; sideways |B| changes by B′²/4B − B″/2 (Berry), and −μ = |μ| against the field
+    axial = -top.moment * bend / top.mass
+    radial = -top.moment * (slope**2 / (4 * b) - bend / 2) / top.mass
+    return Equilibrium(height, axial, radial, spin_windows(field, top, height))
+
+
+# --- linear: small motions of the whole top ---
+
+
+def quartic(field: AxialField, top: Symmetric, height: float, spin: float) -> Array:
+    """Coefficients of (I₁α² − I₃ω₃α + P)(α² + Ω²/2) = (μB′)²/4m, highest power first, over I₁; spin ω₃ [rad/s].
+
+    For u = x + iy and N = n_x + i n_y ∝ e^{iαt}; P = −μB, Ω² = −μB″/m.  At the equilibrium μB′ = mg.
+    """
+    b, slope, bend = (float(value) for value in field(np.array([height]))[:3, 0])
+    p, omega2, turn = -top.moment * b, -top.moment * bend / top.mass, top.axial * spin
+    coupling = (top.moment * slope) ** 2 / (4 * top.mass)
+    i1 = top.transverse
+    return np.array([i1, -turn, p + i1 * omega2 / 2, -turn * omega2 / 2, p * omega2 / 2 - coupling]) / i1
+
+
+def modes(field: AxialField, top: Symmetric, height: float, spin_hz: float) -> NDArray[np.complex128]:
+    """The four frequencies α/2π [Hz] of the sideways motion; real if it is stable, negative if it turns backwards."""
+    roots = np.roots(quartic(field, top, height, 2 * math.pi * spin_hz)) / (2 * math.pi)
+    return np.asarray(roots[np.argsort(roots.real)], dtype=np.complex128)
+
+
+def vertical_mode(field: AxialField, top: Symmetric, height: float) -> float:
+    """The frequency [Hz] of the up-and-down motion; NaN where it is unstable."""
+    square = -top.moment * float(field(np.array([height]))[2, 0]) / top.mass
+    return math.sqrt(square) / (2 * math.pi) if square > 0 else math.nan
+
+
+def spin_windows(field: AxialField, top: Symmetric, height: float) -> tuple[tuple[float, float], ...]:
+    """The windows of spin [Hz] with four real roots, between 0 and 20 times the sleeping top's limit.
+
+    Four real roots: two conditions that the discriminant alone does not tell apart, so the scan (SPINS steps) looks
+    at the roots, and each edge is then the zero of the discriminant.
+    """
+    limit = sleeping_limit(field, top, height)
+    if not math.isfinite(limit):
+        return ()
+    spins = np.linspace(0, 20 * limit, SPINS)
+    stable = np.array([_all_real(quartic(field, top, height, 2 * math.pi * spin)) for spin in spins])
+    change = np.flatnonzero(stable[1:] != stable[:-1])
+
+    def discriminant(spin: float) -> float:
+        return _discriminant(quartic(field, top, height, 2 * math.pi * spin))
+
+    edges = [float(brentq(discriminant, spins[i], spins[i + 1], xtol=1e-13, rtol=1e-14)) for i in change]
+    edges = [0.0] * bool(stable[0]) + edges + [math.inf] * bool(stable[-1])
+    return tuple(zip(edges[::2], edges[1::2], strict=True))
+
+
+def _all_real(coefficients: Array) -> bool:
+    roots = np.roots(coefficients)
+    return bool(np.max(np.abs(roots.imag)) < 1e-6 * np.max(np.abs(roots)))
+
+
+def _discriminant(coefficients: Array) -> float:
+    """Of a x⁴ + b x³ + c x² + d x + e: 4(c² − 3bd + 12ae)³ − (2c³ − 9bcd + 27ad² + 27b²e − 72ace)², over 27."""
+    a, b, c, d, e = (float(x) for x in coefficients)
+    first = c * c - 3 * b * d + 12 * a * e
+    second = 2 * c**3 - 9 * b * c * d + 27 * a * d * d + 27 * b * b * e - 72 * a * c * e
+    return (4 * first**3 - second**2) / 27
+
+
+def sleeping_limit(field: AxialField, top: Symmetric, height: float) -> float:
+    """2√(I₁P)/I₃ in turns per second: below, a top on a fixed point would not sleep.  NaN where the field rights it."""
+    p = -top.moment * float(field(np.array([height]))[0, 0])
+    return 2 * math.sqrt(top.transverse * p) / top.axial / (2 * math.pi) if p > 0 else math.nan
+
+
+def thesis_limit(field: AxialField, top: Symmetric, height: float) -> float:
+    """The thesis's own estimate √(mg/I₃·|φ₁/φ₂|)/2π [Hz]; it lacks the factor 2√(I₁/I₃)."""
+    b, slope = (float(value) for value in field(np.array([height]))[:2, 0])
+    return math.sqrt(top.mass * top.gravity / top.axial * abs(b / slope)) / (2 * math.pi)

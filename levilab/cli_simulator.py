@@ -1,0 +1,177 @@
+"""The commands of the simulator: simulate, stability, benchmark.  Heavy imports happen where they are needed."""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from levilab.simulator.explain import Effect
+    from levilab.simulator.scene import Scene
+
+EXIT_INTERRUPTED = 130
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else on standard output.")]
+Presets = Annotated[
+    str, typer.Argument(metavar="SCENE", help="undriven, friction, tilted, driven, loose-washers, or a TOML file.")
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Change a key of the scene, as top.mass_kg=0.025; repeatable."),
+]
+benchmark_app = typer.Typer(no_args_is_help=True, help="Speed against error, with other programs beside.")
+
+
+def add_to(app: typer.Typer) -> None:
+    """Make the commands known to the application."""
+    app.command(epilog="Example: levilab simulate driven --duration 60 --set drive.frequency_hz=30.1 --out runs")(
+        simulate
+    )
+    app.command(epilog="Example: levilab stability undriven --set top.mass_kg=0.0255")(stability)
+    app.add_typer(benchmark_app, name="benchmark")
+
+
+def _scene(name: str, settings: list[str] | None) -> Scene:
+    """A wrong name or key is told before anything heavy is loaded."""
+    from levilab.simulator.scene import read_scene, with_settings
+
+    return with_settings(read_scene(name), settings or [])
+
+
+def simulate(
+    scene: Presets,
+    duration: Annotated[float, typer.Option(metavar="S", help="How many seconds are simulated.")] = 30.0,
+    tolerance: Annotated[
+        float, typer.Option(metavar="X", help="Wanted error at the end, of the place in m and of the axis in rad.")
+    ] = 1e-7,
+    rate: Annotated[float, typer.Option(metavar="HZ", help="States per second that are written.")] = 100.0,
+    settings: Settings = None,
+    explain: Annotated[
+        bool, typer.Option("--explain", help="Tell what is left out, and how much each of it would change.")
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Make a run folder there: states.csv, run.json, motion.png.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Simulate the motion: does the top stay up, where and how fast does it turn, which frequencies are in it.
+
+    The first run for a kind of scene compiles for a few seconds.  Ctrl-C ends it, and nothing is written then.
+    """
+    try:
+        _simulate(_scene(scene, settings), duration, tolerance, rate, out, explain=explain, as_json=as_json)
+    except KeyboardInterrupt:
+        typer.echo("levilab: interrupted, nothing was written", err=True)
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+
+
+def _simulate(
+    scene: Scene,
+    duration: float,
+    tolerance: float,
+    rate: float,
+    out: Path | None,
+    *,
+    explain: bool,
+    as_json: bool,
+) -> None:
+    from levilab.motion_summary import as_document, finite
+    from levilab.progress import Share
+    from levilab.simulation import SimulationOrder, carry_out
+
+    order = SimulationOrder(scene, duration, tolerance, rate, out)
+    with contextlib.closing(Share("simulating")) as share:
+        done = carry_out(order, lambda text: typer.echo(text, err=True), share)
+    effects = _explained(scene, duration) if explain else ()
+    if as_json:
+        import json
+        from dataclasses import asdict
+
+        document = as_document(done.summary) | {"run": str(done.folder) if done.folder else None}
+        document |= {"effects": [finite(asdict(effect)) for effect in effects]} if explain else {}
+        typer.echo(json.dumps(document, indent=2, allow_nan=False))
+        return
+    from levilab.motion_tables import print_motion
+
+    print_motion(done.summary)
+    if explain:
+        from levilab.explain_table import print_effects
+
+        print_effects(effects)
+    if done.folder:
+        typer.echo(f"wrote {done.folder}", err=True)
+
+
+def _explained(scene: Scene, duration: float) -> tuple[Effect, ...]:
+    from levilab.simulator.explain import explain
+
+    return explain(scene, duration)
+
+
+def stability(
+    scene: Presets,
+    settings: Settings = None,
+    survival: Annotated[
+        bool, typer.Option("--map", help="Simulate a map of survival over spin and mass, too; takes a while.")
+    ] = False,
+    duration: Annotated[float, typer.Option(metavar="S", help="How long a top of the map has to stay up.")] = 30.0,
+    out: Annotated[
+        Path, typer.Option(metavar="DIR", help="Where the map is written: survival.png and survival.csv.")
+    ] = Path(),
+    as_json: Json = False,
+) -> None:
+    """Where the top floats: heights, masses and spins, from the field and the theory of small motions."""
+    from levilab.simulator.floating import stability_of
+    from levilab.stability_table import as_document, print_stability
+
+    chosen = _scene(scene, settings)
+    found = stability_of(chosen)
+    document = as_document(found)
+    if not as_json:
+        print_stability(found)
+    if survival:
+        document["map"] = _mapped(chosen, duration, out)
+    if as_json:
+        import json
+
+        typer.echo(json.dumps(document, indent=2, allow_nan=False))
+
+
+def _mapped(scene: Scene, duration: float, out: Path) -> dict[str, object]:
+    from levilab.progress import Share
+    from levilab.stability_map import survival_map, write_map
+
+    try:
+        with contextlib.closing(Share("simulating the map")) as share:
+            found = survival_map(scene, duration=duration, progress=share)
+    except KeyboardInterrupt:
+        typer.echo("levilab: interrupted, no map was written", err=True)
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    for path in write_map(found, out):
+        typer.echo(f"wrote {path}", err=True)
+    return {
+        "spin_step_hz": found.spin_step,
+        "spins_hz": found.spins.tolist(),
+        "masses_kg": found.masses.tolist(),
+        "survived": found.survived.tolist(),
+    }
+
+
+@benchmark_app.command("simulator", epilog="Example: levilab benchmark simulator --out speed")
+def benchmark_simulator(
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer points and repetitions: a first look.")] = False,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write simulator.json and simulator.png there.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Speed against error of the simulator, with scipy's and heyoka's integrators on the same motion.
+
+    heyoka takes part if it is installed: pip install 'levilab[peers]'.  Leave the machine alone meanwhile.
+    """
+    from levilab.benchmark.command import run_and_tell
+
+    run_and_tell(quick=quick, out=out, as_json=as_json)

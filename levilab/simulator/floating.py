@@ -1,0 +1,163 @@
+"""Where the top of a scene floats, and how fast it may spin: the scene's own field in the theory of stability."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analysis import stability
+from levilab.simulator.fields import flux_density, flux_gradient, on_axis
+from levilab.simulator.keys import SceneError
+from levilab.simulator.top import base_field, disc_nodes
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from levilab.simulator.scene import Scene
+
+Array = NDArray[np.float64]
+
+#: Heights in which a top is looked for: from a tenth of the inner radius to four outer radii above the base.
+_LOW, _HIGH = 0.1, 4.0
+
+
+@dataclass(frozen=True)
+class Stability:
+    """What the theory says of a scene.
+
+    windows: heights and masses, adiabatic; equilibria: of the scene's own mass; floating: the one in which it
+    floats, None if there is none; modes [Hz]: sideways, at the scene's spin, complex where unstable; vertical,
+    sleeping [Hz]: the up-and-down mode and the sleeping top's limit there; nearest: the mass [kg] nearest to the
+    scene's that floats, None where no mass does.
+    """
+
+    scene: Scene
+    windows: tuple[stability.Window, ...]
+    equilibria: tuple[stability.Equilibrium, ...]
+    floating: stability.Equilibrium | None
+    modes: NDArray[np.complex128]
+    vertical: float
+    sleeping: float
+    thesis_estimate: float
+    nearest: float | None
+
+
+def symmetric(scene: Scene) -> stability.Symmetric:
+    """The scene's top, with the part of its moment that lies along the axis."""
+    top = scene.top
+    return stability.Symmetric(
+        top.mass_kg,
+        top.inertia_transverse_kg_m2,
+        top.inertia_axial_kg_m2,
+        top.moment_a_m2 * top.moment_tilt[1],
+        scene.gravity_m_s2,
+    )
+
+
+def axial_field(scene: Scene) -> Callable[[Array], Array]:
+    """B, B′ and B″ on the axis as an upright top feels them: at its centre, or averaged over its magnet.
+
+    The average's radial stiffness is that of a field with the averaged B, B′ and B″: exact, because the average over
+    an upright body of a field without sources has none either.
+    """
+    field = base_field(scene)
+    if scene.top.magnet == "point":
+        return lambda z: on_axis(field, z)
+    nodes = disc_nodes(scene.top.magnet_radius_m, scene.top.magnet_height_m)
+    step = 1e-4  # for B″: differences of the gradient, good to 1e-9 of it over a field's length of some cm
+
+    def averaged(z: Array) -> Array:
+        heights = np.atleast_1d(z)
+        places = nodes[None, :, :3] + heights[:, None, None] * np.array([0.0, 0.0, 1.0])
+
+        def mean(values: Array) -> Array:
+            return np.asarray(values @ nodes[:, 3])
+
+        up = np.array([0.0, 0.0, step])
+        slopes = [mean(flux_gradient(field, places + k * up)[..., 2, 2]) for k in (-1, 0, 1)]
+        return np.array([mean(flux_density(field, places)[..., 2]), slopes[1], (slopes[2] - slopes[0]) / (2 * step)])
+
+    return averaged
+
+
+def stability_of(scene: Scene) -> Stability:
+    """Windows, equilibria and modes of a scene's top, upright on the axis of its base (a lean of it is left out)."""
+    top, field = symmetric(scene), axial_field(scene)
+    low, high = _range(scene)
+    found = stability.windows(field, top, low, high)
+    balance = stability.equilibria(field, top, low, high)
+    floating = next((e for e in reversed(balance) if e.stable), None)
+    height = floating.height if floating else math.nan
+    spin = scene.start.spin_hz
+    return Stability(
+        scene,
+        found,
+        balance,
+        floating,
+        stability.modes(field, top, height, spin) if floating else np.empty(0, dtype=np.complex128),
+        stability.vertical_mode(field, top, height) if floating else math.nan,
+        stability.sleeping_limit(field, top, height) if floating else math.nan,
+        stability.thesis_limit(field, top, height) if floating else math.nan,
+        None if floating else nearest_mass(found, top, field),
+    )
+
+
+def _range(scene: Scene) -> tuple[float, float]:
+    top_face = scene.base.origin_m + scene.base.thickness_m / 2
+    return top_face + _LOW * scene.base.inner_radius_m, top_face + _HIGH * scene.base.outer_radius_m
+
+
+def lifting(
+    windows: tuple[stability.Window, ...], top: stability.Symmetric, field: Callable[[Array], Array]
+) -> list[stability.Window]:
+    """The windows in which the field lifts a moment of this sign: the force μB′ points up."""
+    return [w for w in windows if top.moment * float(field(np.array([(w.low + w.high) / 2]))[1, 0]) > 0]
+
+
+def nearest_mass(
+    windows: tuple[stability.Window, ...], top: stability.Symmetric, field: Callable[[Array], Array]
+) -> float | None:
+    """The mass [kg] nearest to the top's that floats; a thousandth inside of its window, whose edge holds nothing."""
+    candidates = []
+    for window in lifting(windows, top, field):
+        margin = (window.heavy - window.light) / 1000
+        candidates.append(min(max(top.mass, window.light + margin), window.heavy - margin))
+    return min(candidates, key=lambda mass: abs(mass - top.mass), default=None)
+
+
+def floating_height(scene: Scene) -> float:
+    """The height [m] at which the scene's top floats.  Raises SceneError, with the nearest mass that does."""
+    found = stability_of(scene)
+    if found.floating:
+        return found.floating.height
+    raise SceneError(f"top.mass_kg = {scene.top.mass_kg:g}: {advice(found)}")
+
+
+def advice(found: Stability) -> str:
+    """What to do about a top that does not float."""
+    if found.nearest is None:
+        return (
+            "no top with this moment floats over this base, whatever its mass: "
+            "the moment must point against the field (top.moment_a_m2 of the other sign)"
+        )
+    return f"a top of this mass does not float over this base; the nearest that does has {1000 * found.nearest:.2f} g"
+
+
+def survival(
+    scene: Scene,
+    spins: ArrayLike,
+    masses: ArrayLike,
+    duration: float = 30.0,
+    progress: Callable[[float], None] | None = None,
+) -> NDArray[np.bool_]:
+    """Whether the top is still up after so long [s], for spins [Hz] and masses [kg]; shape (masses, spins)."""
+    from levilab.simulator.ensemble import simulate_many
+
+    values = {"start.spin_hz": np.asarray(spins)[None, :], "top.mass_kg": np.asarray(masses)[:, None]}
+    # from the given place: some of the masses of a map float nowhere
+    given = scene.changed({"start.place": "given"})
+    return simulate_many(given, values, duration, errors=False, tolerance=1e-6, progress=progress).survived

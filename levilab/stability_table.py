@@ -1,0 +1,148 @@
+"""Where a top floats → text on a terminal, and one JSON document."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from rich.markup import escape
+
+from levilab.simulator.floating import advice, axial_field, lifting, symmetric
+from levilab.tables import new_table, terminal
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from levilab.simulator.floating import Stability
+
+#: The master's thesis on the Levitron: its simulated limits of four starts, and what it measured.
+THESIS = {
+    "lower": "14.005 by its own estimate; 21.78 – 23.02 simulated; 21.86 ± 0.08 measured",
+    "upper": "65.01 – 81.73 simulated; about 61 highest synchronised",
+    "height": "7.3 measured",
+    "mass": "25.5 printed, which its own field cannot lift",
+}
+
+
+def _is_thesis_device(found: Stability) -> bool:
+    base, top = found.scene.base, found.scene.top
+    ring = (base.inner_radius_m, base.outer_radius_m, base.strength_t_m, base.thickness_m)
+    body = (top.inertia_transverse_kg_m2, top.inertia_axial_kg_m2, abs(top.moment_a_m2))
+    return ring == (0.030, 0.055, 1.40e-3, 0.0) and body == (1.04e-6, 1.731314e-6, 0.714)
+
+
+def print_stability(found: Stability) -> None:
+    """The windows, the equilibria, the spins; with the thesis's figures beside where it is the thesis's device."""
+    out = terminal()
+    out.print(f"[bold]{escape(found.scene.name or 'the scene')}: {escape(_headline(found))}[/bold]")
+    out.print(_windows_table(found))
+    if found.equilibria:
+        out.print(_equilibria_table(found))
+    if found.floating:
+        out.print(_facts_table(found))
+    for remark in remarks(found):
+        out.print(f"[yellow]note:[/yellow] {escape(remark)}")
+
+
+def _headline(found: Stability) -> str:
+    if not found.floating:
+        return advice(found)
+    return f"a top of {1000 * found.scene.top.mass_kg:.2f} g floats at {100 * found.floating.height:.3f} cm"
+
+
+def _windows_table(found: Stability) -> Any:
+    table = new_table("Where tops float, if they spin", "region", "heights \\[cm]", "masses \\[g]", "this moment")
+    top, field = symmetric(found.scene), axial_field(found.scene)
+    lifted = lifting(found.windows, top, field)
+    for number, window in enumerate(found.windows):
+        name = "upper" if number and number == len(found.windows) - 1 else "lower"
+        table.add_row(
+            name,
+            f"{100 * window.low:.4f} – {100 * window.high:.4f}",
+            f"{1000 * window.light:.3f} – {1000 * window.heavy:.3f}",
+            "is lifted" if window in lifted else "is pulled down; one of the other sign is lifted",
+        )
+    return table
+
+
+def _equilibria_table(found: Stability) -> Any:
+    table = new_table("Where field and weight balance", "height \\[cm]", "up and down", "sideways", "spins \\[Hz]")
+    for place in found.equilibria:
+        table.add_row(
+            f"{100 * place.height:.3f}",
+            "stable" if place.axial > 0 else "falls or rises away",
+            "stable" if place.radial > 0 else "slips away",
+            _spins(place.spins) if place.axial > 0 else "none helps",
+        )
+    return table
+
+
+def _spins(windows: Sequence[tuple[float, float]]) -> str:
+    return ", ".join(f"{low:.2f} – {high:.2f}" for low, high in windows) or "none helps"
+
+
+def _facts_table(found: Stability) -> Any:
+    assert found.floating
+    beside = _is_thesis_device(found)
+    table = new_table("The floating top", "", "here", *(["in the thesis"] if beside else []))
+    lower, upper = found.floating.spins[0] if found.floating.spins else (math.nan, math.nan)
+    rows = [
+        ("height \\[cm]", f"{100 * found.floating.height:.3f}", THESIS["height"]),
+        ("mass \\[g]", f"{1000 * found.scene.top.mass_kg:.2f}", THESIS["mass"]),
+        ("slowest spin \\[Hz]", f"{lower:.2f} for small motions", THESIS["lower"]),
+        ("fastest spin \\[Hz]", f"{upper:.2f} for small motions", THESIS["upper"]),
+        ("sleeping top's limit \\[Hz]", f"{found.sleeping:.2f}", ""),
+        ("the thesis's estimate \\[Hz]", f"{found.thesis_estimate:.3f}", "14.005, which lacks a factor 2√(I₁/I₃)"),
+        (f"modes at {found.scene.start.spin_hz:g} Hz \\[Hz]", _modes(found), ""),
+        ("up-and-down mode \\[Hz]", f"{found.vertical:.3f}", ""),
+    ]
+    for what, here, there in rows:
+        table.add_row(what, here, *([there] if beside else []))
+    return table
+
+
+def _modes(found: Stability) -> str:
+    grows = [f" ({'grows' if mode.imag < 0 else 'decays'})" if abs(mode.imag) > 1e-6 else "" for mode in found.modes]
+    return ", ".join(f"{mode.real:.3f}{word}" for mode, word in zip(found.modes, grows, strict=True))
+
+
+def remarks(found: Stability) -> list[str]:
+    """What to mind."""
+    scene, said = found.scene, []
+    if scene.base.tilt_rad:
+        said.append("the base leans; this is of an upright one")
+    if scene.top.moment_tilt[0]:
+        said.append("the moment leans in the top; this is of its part along the axis")
+    if found.floating and found.floating.spins:
+        low, high = found.floating.spins[0]
+        if not low < abs(scene.start.spin_hz) < high:
+            said.append(f"the scene's spin of {scene.start.spin_hz:g} Hz lies outside: the top is lost")
+    return said
+
+
+def as_document(found: Stability) -> dict[str, Any]:
+    """All of it with units in the names; what does not exist is None."""
+    floating = found.floating
+    return {
+        "schema": "levilab-stability/1",
+        "scene": found.scene.as_table(),
+        "windows": [
+            {"low_m": w.low, "high_m": w.high, "light_kg": w.light, "heavy_kg": w.heavy} for w in found.windows
+        ],
+        "equilibria": [
+            {"height_m": e.height, "stable": e.stable, "spins_hz": [[_finite(a), _finite(b)] for a, b in e.spins]}
+            for e in found.equilibria
+        ],
+        "floats": floating is not None,
+        "height_m": floating.height if floating else None,
+        "nearest_mass_kg": found.nearest,
+        "modes_hz": [{"frequency": float(m.real), "growth_per_s": float(-2 * math.pi * m.imag)} for m in found.modes],
+        "vertical_mode_hz": _finite(found.vertical),
+        "sleeping_limit_hz": _finite(found.sleeping),
+        "thesis_estimate_hz": _finite(found.thesis_estimate),
+        "remarks": remarks(found),
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
