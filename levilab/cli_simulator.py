@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from levilab.simulator.explain import Effect
+    from levilab.explain import Effect
     from levilab.simulator.scene import Scene
 
 EXIT_INTERRUPTED = 130
@@ -106,7 +106,7 @@ def _simulate(
 
 
 def _explained(scene: Scene, duration: float) -> tuple[Effect, ...]:
-    from levilab.simulator.explain import explain
+    from levilab.explain import explain
 
     return explain(scene, duration)
 

@@ -138,24 +138,16 @@ def _expected(motion: Trajectory) -> dict[str, float]:
 
 
 def _modes(motion: Trajectory) -> dict[str, float]:
-    """Roots α/2π of (I₁α² − I₃ω₃α + P)(α² + Ω_z²/2) = m g²/4 with P = |μ|B, Ω_z² = |μ|B″/m.
-
-    Small motions about the place where the top floats: Gans, Jones & Washizu, J. Phys. D 31, 671 (1998).
-    """
-    from levilab.simulator.fields import on_axis
-    from levilab.simulator.top import base_field
+    """The modes of small motions about the mean height; none where they are not stable."""
+    from analysis import stability
+    from levilab.simulator.floating import axial_field, symmetric
 
     scene = motion.scene
-    height = float(np.mean(motion.position[:, 2]))
-    flux, _, curvature = (float(b[0]) for b in on_axis(base_field(scene), np.array([height]), 2))
-    moment = -scene.top.moment_a_m2 * scene.top.moment_tilt[1]
-    stiff, swing = moment * flux, moment * curvature / (2 * scene.top.mass_kg)
-    i1, l3 = scene.top.inertia_transverse_kg_m2, 2 * np.pi * scene.top.inertia_axial_kg_m2 * float(motion.spin_hz[0])
-    coupling = scene.top.mass_kg * scene.gravity_m_s2**2 / 4
-    roots = np.roots([i1, -l3, stiff + i1 * swing, -l3 * swing, stiff * swing - coupling]) / (2 * np.pi)
-    if not np.all(np.abs(roots.imag) < 1e-6 * np.abs(roots).max()):
-        return {}  # not stable: whatever lines there are, they are not these
-    slow1, slow2, precession, nutation = sorted(roots.real, key=abs)
+    height, spin = float(np.mean(motion.position[:, 2])), float(motion.spin_hz[0])
+    modes = stability.modes(axial_field(scene), symmetric(scene), height, spin)
+    if np.abs(modes.imag).max() > 1e-6 * np.abs(modes).max():
+        return {}  # whatever lines there are, they are not these
+    slow1, slow2, precession, nutation = sorted(modes.real, key=abs)
     return {
         "nutation": nutation,
         "precession": precession,

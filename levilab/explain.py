@@ -1,0 +1,203 @@
+"""What a scene models and what it leaves out, and what each of it amounts to in what can be observed.
+
+Nothing is taken from a list of sizes: each effect is switched the other way by itself, and both motions are simulated
+from the same start, for LONGEST seconds at most.  The simulator is fast enough that no formula for the size of an
+effect would be quicker to trust.  What is compared: the mean height, the frequency of the precession, and the spin.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from analysis import stability
+from analysis.lines import spectral_lines
+from levilab.motion_lines import rate_for
+from levilab.simulator.floating import advice, axial_field, stability_of, symmetric
+from levilab.simulator.keys import SceneError
+from levilab.simulator.single import simulate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from levilab.simulator.scene import Scene
+    from levilab.simulator.trajectory import Trajectory
+
+#: Seconds that are compared: some twenty up-and-downs, lines told apart by 0.1 Hz.
+LONGEST = 20.0
+#: Below these a change is nothing that could be seen: a micrometre, a tenth of a millihertz.
+LEAST_M, LEAST_HZ = 1e-7, 1e-5
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One effect: its name, whether the scene has it, and what it changes.
+
+    what: in words, with what is assumed where the scene has it not; height_m, precession_hz, spin_hz: what changes
+    when it is there, NaN where one of the two motions has none; remark: what else happens.
+    """
+
+    name: str
+    included: bool
+    what: str
+    height_m: float
+    precession_hz: float
+    spin_hz: float
+    remark: str
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """An effect of any scene: whether it is there, and the changes that make it so and take it away."""
+
+    name: str
+    what: str
+    included: Callable[[Scene], bool]
+    on: Callable[[Scene], dict[str, Any]]
+    off: dict[str, Any]
+
+
+def _leaning(scene: Scene) -> dict[str, Any]:
+    """A moment that leans by 1.77° as the thesis's does, with the same part along the axis."""
+    return {"top.moment_tilt": [0.03 / 0.97 * scene.top.moment_tilt[1], scene.top.moment_tilt[1]]}
+
+
+KINDS = (
+    _Kind(
+        "field beyond r²",
+        "terms r⁴ and higher of the field's potential, all of them: the exact ring",
+        lambda s: s.base.field != "paraxial-2",
+        lambda _: {"base.field": "exact"},
+        {"base.field": "paraxial-2"},
+    ),
+    _Kind(
+        "thickness of the base",
+        "1 cm instead of a sheet at the same height, equally strong in all",
+        lambda s: s.base.thickness_m > 0,
+        lambda _: {"base.thickness_m": 0.01},
+        {"base.thickness_m": 0.0},
+    ),
+    _Kind(
+        "size of the magnet",
+        "a disc, 2.88 cm wide and 3.3 mm thick unless the scene says otherwise, instead of a point",
+        lambda s: s.top.magnet == "disc",
+        lambda _: {"top.magnet": "disc"},
+        {"top.magnet": "point"},
+    ),
+    _Kind(
+        "drag of the air",
+        "on the spin, as on a laminar disc, with the constant of the thesis's spin-downs",
+        lambda s: s.drag.law != "none",
+        lambda _: {"drag.law": "disc"},
+        {"drag.law": "none"},
+    ),
+    _Kind(
+        "tilt of the moment",
+        "by 1.77° in the top, as in the thesis, with the same part along the axis",
+        lambda s: not s.top.aligned,
+        _leaning,
+        {},
+    ),
+    _Kind(
+        "drive",
+        "a field of 0.4 mT along y at the spin of the start",
+        lambda s: s.drive.waveform != "off" and s.drive.amplitude_t > 0,
+        lambda s: {"drive.waveform": "sine", "drive.frequency_hz": abs(s.start.spin_hz) or 30.0},
+        {"drive.waveform": "off"},
+    ),
+    _Kind(
+        "lean of the base",
+        "by 0.01 rad",
+        lambda s: s.base.tilt_rad != 0,
+        lambda _: {"base.tilt_rad": 0.01},
+        {"base.tilt_rad": 0.0},
+    ),
+    _Kind(
+        "loose washers",
+        "of 9 % of the axial inertia",
+        lambda s: s.washers.inertia_kg_m2 > 0,
+        lambda s: {"washers.inertia_kg_m2": 0.09 * s.top.inertia_axial_kg_m2},
+        {"washers.inertia_kg_m2": 0.0},
+    ),
+)
+
+
+def explain(scene: Scene, duration: float = 30.0) -> tuple[Effect, ...]:
+    """Every effect of a scene with what it amounts to, in the order of KINDS.  Raises as `simulate` does."""
+    if scene.observed == "spin":
+        scene = scene.changed({"observed": "motion"})
+    time = min(abs(duration), LONGEST)
+    as_it_is = simulate(scene, time, tolerance=1e-6, rate=rate_for(scene))
+    return tuple(_effect(kind, scene, as_it_is, time) for kind in KINDS)
+
+
+def _effect(kind: _Kind, scene: Scene, as_it_is: Trajectory, time: float) -> Effect:
+    included = kind.included(scene)
+    changes = _without(kind, scene) if included else kind.on(scene)
+    try:
+        changed = scene.changed(changes)
+        other = simulate(changed, time, tolerance=1e-6, rate=rate_for(changed))
+    except SceneError as error:
+        return Effect(kind.name, included, kind.what, math.nan, math.nan, math.nan, str(error))
+    with_it, without = (as_it_is, other) if included else (other, as_it_is)
+    height, precession, spin = (a - b for a, b in zip(_observed(with_it), _observed(without), strict=True))
+    return Effect(
+        kind.name,
+        included,
+        kind.what,
+        _seen(height, LEAST_M),
+        _seen(precession, LEAST_HZ),
+        _seen(spin, LEAST_HZ),
+        _remark(included, as_it_is, other),
+    )
+
+
+def _without(kind: _Kind, scene: Scene) -> dict[str, Any]:
+    return kind.off or {"top.moment_tilt": [0.0, scene.top.moment_tilt[1]]}
+
+
+def _seen(change: float, least: float) -> float:
+    return 0.0 if abs(change) < least else change
+
+
+def _observed(motion: Trajectory) -> tuple[float, float, float]:
+    """Mean height [m], frequency of the precession [Hz] and spin at the end [Hz]; NaN of a top that fell."""
+    if not motion.survived:
+        return math.nan, math.nan, math.nan
+    even = slice(None, -1)
+    # whole oscillations cannot be cut out of a motion of several frequencies: a window weighs the ends down
+    weight = np.hanning(motion.time.size - 1)
+    height = float(np.average(motion.position[even, 2], weights=weight))
+    return height, _precession(motion), float(motion.spin_hz[-1])
+
+
+def _precession(motion: Trajectory) -> float:
+    """The strongest line of n_x + i n_y near where theory has the precession; NaN if there is none."""
+    scene, n = motion.scene, motion.time.size - 1
+    height, spin = float(np.mean(motion.position[:, 2])), float(np.mean(motion.spin_hz))
+    modes = stability.modes(axial_field(scene), symmetric(scene), height, spin)
+    expected = modes[2].real if spin > 0 else modes[1].real
+    rate = (n - 1) / float(motion.time[n - 1] - motion.time[0])
+    found = spectral_lines((motion.axis[:, 0] + 1j * motion.axis[:, 1])[:n], rate, most=16, weakest=1e-4).lines
+    near = [line for line in found if abs(line.frequency - expected) < 0.25 * abs(expected)]
+    return near[0].frequency if near else math.nan
+
+
+def _remark(included: bool, as_it_is: Trajectory, other: Trajectory) -> str:  # noqa: FBT001
+    """What the change does to the outcome."""
+    if as_it_is.survived == other.survived:
+        return "" if as_it_is.survived else "lost either way"
+    assert other.fell or as_it_is.fell
+    lost = as_it_is if other.survived else other
+    word = "without it" if included else "with it"
+    if lost is as_it_is:
+        return f"{word} the top stays up"
+    return f"{word} the top is lost after {lost.time[-1]:.3g} s{_why(lost.scene)}"
+
+
+def _why(scene: Scene) -> str:
+    found = stability_of(scene)
+    return "" if found.floating else f": {advice(found)}"

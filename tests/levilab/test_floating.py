@@ -1,0 +1,100 @@
+"""Where the top of a scene floats: with any field, with a magnet of finite size, and by the command."""
+
+import json
+
+import numpy as np
+import pytest
+
+from levilab.simulator.floating import axial_field, floating_height, stability_of, survival
+from levilab.simulator.scene import SceneError, preset
+from levilab.simulator.single import simulate
+from levilab.stability_map import survival_map, write_map
+from levilab.stability_table import as_document, print_stability
+
+UNDRIVEN = preset("undriven")
+DISC = UNDRIVEN.changed({"base.field": "exact", "top.magnet": "disc"})
+
+
+def test_a_magnet_of_finite_size_moves_the_window_as_computed_elsewhere():
+    point, disc = (axial_field(scene)(np.array([0.073]))[:, 0] for scene in (UNDRIVEN, DISC))
+    assert disc[1] / point[1] == pytest.approx(1.037, abs=0.0005)
+    assert disc[2] / point[2] == pytest.approx(1.82, abs=0.005)
+    assert stability_of(UNDRIVEN).windows[-1].low == pytest.approx(0.07004, abs=5e-6)
+    assert stability_of(DISC).windows[-1].low == pytest.approx(0.06704, abs=5e-6)
+
+
+def test_every_field_gives_the_same_axis():
+    heights = [
+        floating_height(UNDRIVEN.changed({"base.field": field})) for field in ("paraxial-2", "paraxial-8", "exact")
+    ]
+    assert heights == pytest.approx([heights[0]] * 3, abs=1e-12)
+
+
+def test_a_top_started_at_rest_where_it_floats_stays_there():
+    scene = UNDRIVEN.changed({"start.place": "equilibrium", "start.tilt_rad": 0.0})
+    motion = simulate(scene, 10.0)
+    assert np.abs(motion.position - motion.position[0]).max() < 1e-12
+    assert motion.position[0, 2] == floating_height(scene)
+
+
+def test_a_steady_precession_keeps_its_tilt():
+    scene = UNDRIVEN.changed(
+        {"start.place": "equilibrium", "start.tilt_rad": 0.001, "start.precession": "steady", "start.spin_hz": 40.0}
+    )
+    # two nutations long: the sideways swing that the tilt sets off, of 0.8 Hz, has hardly begun
+    steady = simulate(scene, 0.04, rate=1000)
+    other = simulate(scene.changed({"start.precession": "thesis"}), 0.04, rate=1000)
+    assert np.ptp(other.tilt) > 4e-4
+    assert np.ptp(steady.tilt) < 1e-5
+
+
+def test_a_mass_that_cannot_float_is_told_the_nearest_that_can():
+    heavy = UNDRIVEN.changed({"top.mass_kg": 0.0255, "start.place": "equilibrium"})
+    with pytest.raises(SceneError, match=r"does not float over this base; the nearest that does has 25\.48 g"):
+        floating_height(heavy)
+    light = UNDRIVEN.changed({"top.mass_kg": 0.010})
+    assert stability_of(light).nearest == pytest.approx(0.02474, abs=1e-5)
+    nearest = UNDRIVEN.changed({"top.mass_kg": stability_of(heavy).nearest})
+    assert stability_of(nearest).floating is not None
+
+
+def test_the_linear_window_agrees_with_simulated_small_motions():
+    # at rest where it floats and tilted by 1e-4; above the upper edge the motion grows slowly at first
+    calm = UNDRIVEN.changed({"start.place": "equilibrium", "start.tilt_rad": 1e-4})
+    ((low, high),) = stability_of(calm).floating.spins
+    alive = [
+        simulate(calm.changed({"start.spin_hz": spin}), 30.0, rate=None, tolerance=1e-6).survived
+        for spin in (low - 0.1, low + 0.1, high - 0.5, high + 2.0)
+    ]
+    assert alive == [False, True, True, False]
+
+
+def test_the_table_has_the_figures_of_the_thesis_beside(capsys):
+    print_stability(stability_of(UNDRIVEN))
+    shown = capsys.readouterr().out
+    for figure in ("7.0035 – 7.5683", "24.742 – 25.485", "21.65", "80.60", "14.005", "21.86 ± 0.08"):
+        assert figure in shown
+    print_stability(stability_of(UNDRIVEN.changed({"top.moment_a_m2": -0.715})))
+    assert "thesis's estimate" in (other := capsys.readouterr().out)
+    assert "21.86" not in other
+
+
+def test_the_document_has_no_number_that_json_has_not():
+    for scene in (UNDRIVEN, UNDRIVEN.changed({"top.mass_kg": 0.03}), DISC):
+        json.dumps(as_document(stability_of(scene)), allow_nan=False)
+
+
+def test_survival_is_found_over_spin_and_mass():
+    alive = survival(UNDRIVEN, np.array([20.0, 30.0]), np.array([0.0252, 0.0253, 0.0260]), 5.0)
+    assert alive.tolist() == [[False, True], [False, True], [False, False]]
+
+
+def test_a_map_is_written_as_a_table_and_a_picture(tmp_path):
+    found = survival_map(UNDRIVEN, spins=(20.0, 32.0, 4), masses=(0.0252, 0.0256, 3), duration=2.0)
+    assert found.spin_step == 4.0
+    table, picture = write_map(found, tmp_path / "new")
+    lines = table.read_text(encoding="utf-8").splitlines()
+    assert lines[0] == "mass_kg,20,24,28,32"
+    assert lines[1] == "0.0252,0,1,1,1"
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert np.isnan(found.slowest[-1])  # nothing of 25.6 g floats
