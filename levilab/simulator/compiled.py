@@ -6,8 +6,11 @@ together from several files, so they are kept in a folder that is named by the s
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
+import shutil
 import sys
+import time
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -32,7 +35,18 @@ def _folder() -> Path:
     digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:2]}".encode())
     for source in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(source.read_bytes())
-    return user_cache_path("levilab", appauthor=False) / "kernels" / digest.hexdigest()[:16]
+    folder = user_cache_path("levilab", appauthor=False) / "kernels" / digest.hexdigest()[:16]
+    if not folder.exists():
+        _sweep(folder.parent)
+    return folder
+
+
+def _sweep(kernels: Path) -> None:
+    """Take away what other versions of the source have left, if nobody has used it for a month."""
+    with contextlib.suppress(OSError):
+        for old in kernels.iterdir():
+            if time.time() - old.stat().st_mtime > 30 * 86400:
+                shutil.rmtree(old, ignore_errors=True)
 
 
 def part(function: F) -> F:

@@ -16,7 +16,7 @@ from levilab.simulator.estimate import estimate
 from levilab.simulator.keys import SceneError
 from levilab.simulator.lanes import LANES, advance_many, numbers_of
 from levilab.simulator.motion import STATE_SIZE
-from levilab.simulator.problem import NOWHERE, Problem, scheme_for, travelled
+from levilab.simulator.problem import NOWHERE, Problem, end_at, scheme_for, travelled
 from levilab.simulator.schemes import SCHEMES
 from levilab.simulator.single import simulate
 from levilab.simulator.steps import longest_step
@@ -247,7 +247,7 @@ def _one_by_one(some: list[_Top], times: Array, steps: Array, *, escape: bool) -
             through, fell, _ = travelled(one.problem, stops)
             states[i], lasted[i] = through[-1] if fell is None else fell.state, fell is None
         else:
-            states[i] = one.problem.advanced(one.problem.start, stops, NOWHERE)[0][-1]
+            states[i] = end_at(one.problem, stops)
     return states, lasted
 
 

@@ -124,7 +124,7 @@ def flux_density(field: Field, positions: ArrayLike) -> Array:
 
     >>> base = field_of(0.030, 0.055, 1.40e-3, "exact")
     >>> flux_density(base, [0.0, 0.0, 0.073]).round(7)
-    array([ 0.       ,  0.       , -0.0187455])
+    array([0.       , 0.       , 0.0187455])
     """
     places, five = _five(field, positions)
     b = places * five[..., :1]

@@ -83,8 +83,8 @@ def travelled(
     done = np.cumsum(stops.counts)
     pieces, state, at = [problem.start[None]], problem.start, 0
     while at < stops.counts.size:
-        to = max(int(np.searchsorted(done, done[at] + STEPS_IN_A_CALL)), at + 1)
-        states, through = problem.advanced(state, stops.part(at, to), problem.escape)
+        first, last = next(stops.part(at, stops.counts.size).pieces(STEPS_IN_A_CALL))
+        states, through = problem.advanced(state, stops.part(at + first, at + last), problem.escape)
         pieces.append(states[1:])
         state, at = states[-1], at + len(states) - 1
         if not through:
@@ -96,6 +96,17 @@ def travelled(
         if progress is not None:
             progress(float(done[at - 1] / done[-1]))
     return np.concatenate(pieces), None, int(done[-1])
+
+
+def end_at(problem: Problem, stops: Stops) -> Array:
+    """The state at the last stop, with no escape; NaN where the numbers leave their range on the way."""
+    state = problem.start
+    for first, last in stops.pieces(STEPS_IN_A_CALL):
+        states, through = problem.advanced(state, stops.part(first, last), NOWHERE)
+        if not through:
+            return np.full_like(state, math.nan)
+        state = states[-1]
+    return state
 
 
 def _escape(problem: Problem, state: Array, interval: Stops) -> tuple[Array, Event | None]:

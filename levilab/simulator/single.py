@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from levilab.simulator import escapes, top
 from levilab.simulator.estimate import estimate
-from levilab.simulator.problem import NOWHERE, Problem, SimulationError, mover, scheme_for, travelled
+from levilab.simulator.problem import Problem, SimulationError, end_at, mover, scheme_for, travelled
 from levilab.simulator.spin import DECAYS
 from levilab.simulator.steps import longest_step
 from levilab.simulator.stops import every_step, stops_between
@@ -135,7 +135,7 @@ def _errors(problem: Problem, run: Run, step: float) -> tuple[float, float]:
 def _coarse(problem: Problem, until: float, step: float) -> Array:
     """The state at a time, with steps of that length and no escape."""
     stops = stops_between(problem.start[top.TIME], until, step, problem.scene.drive)
-    return np.asarray(problem.advanced(problem.start, stops, NOWHERE)[0][-1])
+    return end_at(problem, stops)
 
 
 # --- one run at one step ---

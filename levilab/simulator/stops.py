@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from levilab.simulator.scene import Drive
 
 Array = NDArray[np.float64]
@@ -30,6 +32,15 @@ class Stops:
     counts: NDArray[np.int64]
     levels: Array
     slopes: Array
+
+    def pieces(self, steps: int) -> Iterator[tuple[int, int]]:
+        """First and last of pieces that have about so many steps each; all intervals in their order."""
+        done = np.concatenate([[0], np.cumsum(self.counts)])
+        first = 0
+        while first < self.counts.size:
+            last = max(int(np.searchsorted(done, done[first] + steps)), first + 1)
+            yield first, min(last, self.counts.size)
+            first = min(last, self.counts.size)
 
     def part(self, first: int, last: int) -> Stops:
         """The intervals from first to last, without the last."""

@@ -141,7 +141,7 @@ def named() -> list[dict[str, Any]]:
         case("driven", 5.0, **driven),
         case("driven-stokes", 5.0, **driven, drag__law="stokes", drag__coefficient=0.00318175),
         case("paraxial-6", 5.0, base__field="paraxial-6"),
-        case("leaning base", 5.0, base__tilt_rad=0.01, base__tilt_azimuth_rad=0.7),
+        case("leaning base", 5.0, base__tilt_rad=0.001, base__tilt_azimuth_rad=0.7),
         case("upright", 5.0, start__tilt_rad=0.0),
         case("nearly upright", 5.0, start__tilt_rad=1e-12),
         case("no spin", 0.1, start__spin_hz=0.0),

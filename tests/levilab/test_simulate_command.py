@@ -123,7 +123,7 @@ def test_a_chaotic_motion_is_told_to_be_one() -> None:
     told = summarise(chaotic, 1.0, 100.0, 0.01)
     assert any("chaotic" in note for note in told.notes)
     assert as_document(told)["position_error_m"] is None
-    magnified = replace(motion, accuracy=replace(motion.accuracy, position=1e-5))
+    magnified = replace(motion, accuracy=replace(motion.accuracy, position=5e-7))
     (note,) = summarise(magnified, 1.0, 100.0, 0.01).notes[:1]
     assert "1e-07" in note
     assert "chaotic" not in note
@@ -250,7 +250,8 @@ def test_interrupted_it_says_so_in_one_line_and_leaves_nothing(tmp_path: Path) -
             time.sleep(0.05)  # until it is under way
         process.send_signal(signal.SIGINT)
         _, told = process.communicate(timeout=60)
-    assert process.returncode == 130
+    # a shell shows 130 for both: where it hits a compilation, Python ends itself by the signal
+    assert process.returncode in {130, -signal.SIGINT}
     assert told.splitlines()[-1] == "levilab: interrupted, nothing was written"
     assert "Traceback" not in told
     assert list((tmp_path / "runs").iterdir()) == []
