@@ -179,7 +179,7 @@ def spin_windows(field: AxialField, top: Symmetric, height: float) -> tuple[tupl
     if not math.isfinite(limit):
         return ()
     spins = np.linspace(0, 20 * limit, SPINS)
-    stable = np.array([_all_real(quartic(field, top, height, 2 * math.pi * spin)) for spin in spins])
+    stable = _all_real(np.array([quartic(field, top, height, 2 * math.pi * spin) for spin in (0.0, 1.0)]), spins)
     change = np.flatnonzero(stable[1:] != stable[:-1])
 
     def discriminant(spin: float) -> float:
@@ -190,9 +190,17 @@ def spin_windows(field: AxialField, top: Symmetric, height: float) -> tuple[tupl
     return tuple(zip(edges[::2], edges[1::2], strict=True))
 
 
-def _all_real(coefficients: Array) -> bool:
-    roots = np.roots(coefficients)
-    return bool(np.max(np.abs(roots.imag)) < 1e-6 * np.max(np.abs(roots)))
+def _all_real(at_zero_and_one: Array, spins: Array) -> NDArray[np.bool_]:
+    """Whether the quartic has four real roots at each of the spins; its coefficients are linear in the spin.
+
+    The roots are the eigenvalues of the companion matrices, all in one call.
+    """
+    at_zero, slope = at_zero_and_one[0], at_zero_and_one[1] - at_zero_and_one[0]
+    companion = np.zeros((spins.size, 4, 4))
+    companion[:, 0] = -(at_zero[1:] + spins[:, None] * slope[1:])
+    companion[:, [1, 2, 3], [0, 1, 2]] = 1
+    roots = np.linalg.eigvals(companion)
+    return np.asarray(np.abs(roots.imag).max(axis=1) < 1e-6 * np.abs(roots).max(axis=1))
 
 
 def _discriminant(coefficients: Array) -> float:

@@ -83,6 +83,8 @@ def _notes(motion: Trajectory, lines: AxisLines, rate: float) -> list[str]:
     accuracy, notes = motion.accuracy, remarks(motion.scene)
     if not accuracy.reached:
         notes.append(_not_reached(accuracy))
+    if motion.fell is not None:
+        notes.extend(_cannot_float(motion.scene))
     highest = max((abs(line.frequency) for line in lines.lines), default=0.0)
     if highest > rate / 2:
         notes.append(
@@ -95,6 +97,14 @@ def _notes(motion: Trajectory, lines: AxisLines, rate: float) -> list[str]:
             "than they can be told apart"
         )
     return notes
+
+
+def _cannot_float(scene: Scene) -> list[str]:
+    """Why a top was lost that had no chance."""
+    from levilab.simulator.floating import advice, stability_of
+
+    found = stability_of(scene)
+    return [] if found.floating else [advice(found)]
 
 
 def _not_reached(accuracy: Accuracy) -> str:
