@@ -16,9 +16,9 @@ from levilab.simulator.estimate import estimate
 from levilab.simulator.keys import SceneError
 from levilab.simulator.lanes import LANES, advance_many, numbers_of
 from levilab.simulator.motion import STATE_SIZE
-from levilab.simulator.problem import NOWHERE, Problem, end_at, scheme_for, travelled
+from levilab.simulator.problem import NOWHERE, Problem, SimulationError, end_at, scheme_for, travelled
 from levilab.simulator.schemes import SCHEMES
-from levilab.simulator.single import simulate
+from levilab.simulator.single import check, simulate
 from levilab.simulator.steps import longest_step
 from levilab.simulator.stops import kinks, stops_between
 
@@ -100,6 +100,9 @@ def simulate_many(
     >>> simulate_many(preset("undriven"), {"start.spin_hz": spins}, 5.0).survived
     array([False,  True,  True])
     """
+    check(duration=duration, tolerance=tolerance, rate=None, step=step)
+    if duration < 0:
+        raise SimulationError(f"duration = {duration} s: many at once go forwards only")
     if scene.observed == "spin":
         raise SceneError("observed = spin: the spin alone has a closed form; many at once need observed = motion")
     keys = list(over)

@@ -1,4 +1,8 @@
-"""What turns and pulls the top: its magnet in the base's field, and the uniform field of the drive."""
+"""What turns and pulls the top: its magnet in the base's field, and the uniform field of the drive.
+
+Fields come multiplied by the moment's size, so they are energies [J] and their gradients forces [N]; magnets are
+directions in the body.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 class Sine(NamedTuple):
-    """A uniform field: amplitude [T] along each axis; [Hz]; phase in turns."""
+    """A uniform field: amplitude [J] along each axis; [Hz]; phase in turns."""
 
     amplitude: Vector
     frequency: float
@@ -32,21 +36,21 @@ class Kinked(NamedTuple):
     amplitude: Vector
 
 
-def _no_drive(drive: Any, b: Any, strength: Any, at: Any) -> Any:
+def _no_drive(drive: Any, b: Any, at: Any) -> Any:
     return b
 
 
-def _sine_drive(drive: Any, b: Any, strength: Any, at: Any) -> Any:
+def _sine_drive(drive: Any, b: Any, at: Any) -> Any:
     t, level, _ = at
-    return plus(b, strength * level * sine_of_turns(drive.frequency * t + drive.phase), drive.amplitude)
+    return plus(b, level * sine_of_turns(drive.frequency * t + drive.phase), drive.amplitude)
 
 
-def _kinked_drive(drive: Any, b: Any, strength: Any, at: Any) -> Any:
+def _kinked_drive(drive: Any, b: Any, at: Any) -> Any:
     t, level, slope = at
-    return plus(b, strength * (level + slope * t), drive.amplitude)
+    return plus(b, level + slope * t, drive.amplitude)
 
 
-#: The field b with strength times the drive's added to it: (drive, b, strength, (time, level, slope)).
+#: The field b with the drive's added to it: (drive, b, (time, level, slope)).
 driven = by_type({type(None): _no_drive, Sine: _sine_drive, Kinked: _kinked_drive})
 
 
@@ -54,13 +58,11 @@ driven = by_type({type(None): _no_drive, Sine: _sine_drive, Kinked: _kinked_driv
 
 
 class Aligned(NamedTuple):
-    """A point dipole along the axis.  moment [A m²], signed along n."""
-
-    moment: float
+    """A point dipole along the axis."""
 
 
 class Tilted(NamedTuple):
-    """A point dipole M = transverse·e₁ + axial·n [A m²]."""
+    """A point dipole axial·n + transverse·e₁, as fractions of the moment."""
 
     axial: float
     transverse: float
@@ -69,7 +71,7 @@ class Tilted(NamedTuple):
 class Disc(NamedTuple):
     """A magnet of finite size: dipoles at the nodes of a quadrature over its volume, fixed in the body.
 
-    nodes: shape (n, 4), place along e₁, e₂, n [m] and weight (sum 1).
+    axial, transverse: as of Tilted; nodes: shape (n, 4), place along e₁, e₂, n [m] and weight (sum 1).
     """
 
     axial: float
@@ -96,31 +98,27 @@ force_on = by_type({Paraxial2: _force_without_q, Paraxial: _force, ParaxialThick
 
 
 @part
-def dipole_load(model: Any, r: Vector, strength: float, moment: Vector, at: Any) -> tuple[Vector, Vector]:
-    """Force [N] and torque [N m] on the dipole strength × moment in the fields of base and drive.
-
-    The strength goes with the field, which is known before the moment: less to wait for.
-    """
+def dipole_load(model: Any, r: Vector, moment: Vector, at: Any) -> tuple[Vector, Vector]:
+    """Force [N] and torque [N m] on a dipole in the fields of base and drive."""
     x, y, z = r
-    p, q, bz, s, g = axial(model.field, z, x * x + y * y)
-    five = (strength * p, strength * q, strength * bz, strength * s, strength * g)
-    b = driven(model.drive, (five[0] * x, five[0] * y, five[2]), strength, at)
+    five = axial(model.field, z, x * x + y * y)
+    b = driven(model.drive, (five[0] * x, five[0] * y, five[2]), at)
     return force_on(model.field, five, x, y, moment), cross(moment, b)
 
 
 def _aligned_load(magnet: Any, model: Any, s: Any, at: Any) -> Any:
-    return dipole_load(model, s.r, magnet.moment, s.n, at)
+    return dipole_load(model, s.r, s.n, at)
 
 
 @part
 def moment_of(magnet: Any, n: Vector, arm: Vector) -> Vector:
-    """The moment [A m²] of a tilted magnet."""
+    """The direction of a tilted moment; its length is that of the fractions."""
     a, t = magnet.axial, magnet.transverse
     return (a * n[0] + t * arm[0], a * n[1] + t * arm[1], a * n[2] + t * arm[2])
 
 
 def _tilted_load(magnet: Any, model: Any, s: Any, at: Any) -> Any:
-    return dipole_load(model, s.r, 1.0, moment_of(magnet, s.n, s.arm), at)
+    return dipole_load(model, s.r, moment_of(magnet, s.n, s.arm), at)
 
 
 def _disc_load(magnet: Any, model: Any, s: Any, at: Any) -> Any:
@@ -130,7 +128,7 @@ def _disc_load(magnet: Any, model: Any, s: Any, at: Any) -> Any:
     for i in range(magnet.nodes.shape[0]):
         node = magnet.nodes[i]
         offset = plus(plus((node[2] * s.n[0], node[2] * s.n[1], node[2] * s.n[2]), node[0], s.arm), node[1], third)
-        pull, twist = dipole_load(model, plus(s.r, 1.0, offset), 1.0, moment, at)
+        pull, twist = dipole_load(model, plus(s.r, 1.0, offset), moment, at)
         force = plus(force, node[3], pull)
         torque = plus(plus(torque, node[3], twist), node[3], cross(offset, pull))
     return force, torque

@@ -65,7 +65,10 @@ class Loose(NamedTuple):
 
 
 class Model(NamedTuple):
-    """A scene as its kernels see it: one tuple for each thing modelled, None for what is not."""
+    """A scene as its kernels see it: one tuple for each thing modelled, None for what is not.
+
+    field: of the base, times the moment [J].
+    """
 
     field: Any
     body: Body

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -46,6 +47,11 @@ class Problem:
     start: Array
     scheme: Scheme
 
+    @cached_property
+    def coefficients(self) -> tuple[Array, Array]:
+        """The scheme's drifts and kicks."""
+        return np.array(self.scheme.drifts), np.array(self.scheme.kicks)
+
     @property
     def escape(self) -> tuple[float, float]:
         """Radius and height [m] outside of which the top counts as fallen."""
@@ -54,7 +60,7 @@ class Problem:
     def advanced(self, start: Array, stops: Stops, escape: tuple[float, float]) -> tuple[Array, bool]:
         """The states at the stops that were reached, shape (n, 18), and whether that is all of them."""
         states = np.empty((stops.times.size, STATE_SIZE))
-        a, b = np.array(self.scheme.drifts), np.array(self.scheme.kicks)
+        a, b = self.coefficients
         reached = advance(
             self.model, start, stops.times, stops.counts, stops.levels, stops.slopes, a, b, escape, states
         )

@@ -77,7 +77,7 @@ def simulate(
     >>> motion.survived, motion.accuracy.reached
     (True, True)
     """
-    _check(duration=duration, tolerance=tolerance, rate=rate, step=step)
+    check(duration=duration, tolerance=tolerance, rate=rate, step=step)
     if scene.observed == "spin":
         return spin_alone(scene, duration, tolerance, rate)
     model = top.model_of(scene)
@@ -90,7 +90,7 @@ def simulate(
     return Trajectory(scene, run.states, top.energy(scene, model, run.states), accuracy, run.fell, run.events)
 
 
-def _check(*, duration: float, tolerance: float, rate: float | None, step: float | None) -> None:
+def check(*, duration: float, tolerance: float, rate: float | None, step: float | None) -> None:
     if not (math.isfinite(duration) and duration != 0):
         raise SimulationError(f"duration = {duration} s: a finite time other than 0 is expected")
     for name, value in (("tolerance", tolerance), ("rate", rate), ("step", step)):
@@ -148,11 +148,18 @@ def _run(problem: Problem, wanted: _Wanted, step: float) -> Run:
     if wanted.events:
         stops = every_step(stops)
     states, fell, steps = travelled(problem, stops, wanted.progress)
-    found = _events(problem, states, stops, wanted.events) if wanted.events else ()
-    kept = states[np.isin(states[:, top.TIME], np.concatenate([samples, stops.times[[0, -1]]]))]
     if fell is not None:
-        kept = np.concatenate([kept, fell.state[None]])
+        states = np.concatenate([states, fell.state[None]])
+    found = _events(problem, states, stops, wanted.events) if wanted.events else ()
+    kept = states[_at(states[:, top.TIME], samples, abs(wanted.duration) * 1e-11)]
     return Run(kept, fell, found, steps)
+
+
+def _at(times: Array, samples: Array, apart: float) -> NDArray[np.bool_]:
+    """Which of the times are samples, or the first or the last; a kink may stand for a sample a rounding away."""
+    wanted = np.sort(np.concatenate([samples, times[[0, -1]]]))
+    after = np.clip(np.searchsorted(wanted, times), 1, wanted.size - 1)
+    return np.asarray(np.minimum(np.abs(wanted[after] - times), np.abs(times - wanted[after - 1])) <= apart)
 
 
 def _samples(begin: float, duration: float, rate: float | None) -> Array:
@@ -175,7 +182,7 @@ def _events(problem: Problem, states: Array, stops: Stops, events: Watch) -> tup
         values = on(function, states)
         for i in np.flatnonzero(np.signbit(values[1:]) != np.signbit(values[:-1])):
             interval = stops.part(int(i), int(i) + 1)
-            length = float(interval.times[1] - interval.times[0])
+            length = float(states[i + 1, top.TIME] - states[i, top.TIME])
             value = lambda state, function=function: float(on(function, state[None])[0])  # noqa: E731
             found.append(escapes.located(name, states[i], length, mover(problem, interval), value))
     return tuple(sorted(found, key=lambda event: event.time))

@@ -76,16 +76,17 @@ def advance(
     put(states[0], 1, 0, s)
     stages = kicks.size
     radius2, height = escape[0] * escape[0], escape[1]
+    a, b = np.empty(stages + 1), np.empty(stages)
     for i in range(counts.size):
         h = (stops[i + 1] - stops[i]) / counts[i]
         level, slope = levels[i], slopes[i]
-        first, last = drifts[0] * h, drifts[stages] * h
+        a[:], b[:] = drifts * h, kicks * h
+        first, last = a[0], a[stages]
         s = drift(model, s, first)
         for step in range(counts[i]):
             for stage in range(stages - 1):
-                s = kick(model, s, kicks[stage] * h, level, slope)
-                s = drift(model, s, drifts[stage + 1] * h)
-            s = kick(model, s, kicks[stages - 1] * h, level, slope)
+                s = drift(model, kick(model, s, b[stage], level, slope), a[stage + 1])
+            s = kick(model, s, b[stages - 1], level, slope)
             # the last drift of a step and the first of the next are one
             ahead = first if step + 1 < counts[i] else 0.0
             s = tidied(drift(model, s, last + ahead), stops[i] + (step + 1) * h + ahead)

@@ -25,10 +25,9 @@ def longest_step(scene: Scene, model: Model, start: Array, scheme: Scheme) -> fl
     An angle of 1 rad in a drift, a slowing by 0.2 in a kick, half a period of the drive.  What a tumbling top can
     add to its angular momentum is allowed for: the field's torque turns it at about √(|μ|B/I₁).
     """
-    flux = float(np.linalg.norm(flux_density(model.field, start[None, top.R])))
-    moment = abs(scene.top.moment_a_m2) * math.hypot(*scene.top.moment_tilt)
+    stiffness = float(np.linalg.norm(flux_density(model.field, start[None, top.R])))  # |μ|B [J]
     turning = float(np.linalg.norm(start[top.L])) * model.body.inverse_transverse
-    turning += math.sqrt(moment * flux * model.body.inverse_transverse)
+    turning += math.sqrt(stiffness * model.body.inverse_transverse)
     drift, kick = (float(np.max(np.abs(c))) for c in (scheme.drifts, scheme.kicks))
     limits = [1 / (drift * turning + 1e-300), 0.2 / (max(drift, kick) * _slowing(model.drag, start) + 1e-300)]
     if model.drive is not None:

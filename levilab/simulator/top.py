@@ -30,7 +30,7 @@ def model_of(scene: Scene) -> Model:
     """The numbers of a scene, typed by what it models."""
     top = scene.top
     return Model(
-        field=base_field(scene),
+        field=base_field(scene, times=_moment(scene)),
         body=Body(
             1 / top.mass_kg,
             1 / top.inertia_transverse_kg_m2,
@@ -44,12 +44,17 @@ def model_of(scene: Scene) -> Model:
     )
 
 
-def base_field(scene: Scene) -> Any:
-    """The field of the scene's base, one of the kinds of `levilab.simulator.fields`."""
+def base_field(scene: Scene, times: float = 1.0) -> Any:
+    """The field of the scene's base, one of the kinds of `levilab.simulator.fields`, times a factor."""
     base = scene.base
-    return field_of(
-        base.inner_radius_m, base.outer_radius_m, base.strength_t_m, base.field, base.thickness_m, base.origin_m
-    )
+    strength = base.strength_t_m * times
+    return field_of(base.inner_radius_m, base.outer_radius_m, strength, base.field, base.thickness_m, base.origin_m)
+
+
+def _moment(scene: Scene) -> float:
+    """What the fields are multiplied by [A m²]: of an aligned dipole all of it, else the fractions stay apart."""
+    top = scene.top
+    return top.moment_a_m2 if has_attitude(scene) else top.moment_a_m2 * top.moment_tilt[1]
 
 
 def gravity(scene: Scene) -> tuple[float, float, float]:
@@ -66,10 +71,10 @@ def has_attitude(scene: Scene) -> bool:
 
 def _magnet(scene: Scene) -> Any:
     top = scene.top
-    transverse, axial = (fraction * top.moment_a_m2 for fraction in top.moment_tilt)
+    transverse, axial = top.moment_tilt
     if top.magnet == "disc":
         return Disc(axial, transverse, disc_nodes(top.magnet_radius_m, top.magnet_height_m))
-    return Tilted(axial, transverse) if has_attitude(scene) else Aligned(axial)
+    return Tilted(axial, transverse) if has_attitude(scene) else Aligned()
 
 
 def disc_nodes(radius: float, height: float) -> Array:
@@ -137,7 +142,7 @@ def _drive(scene: Scene) -> Any:
     drive = scene.drive
     if drive.waveform == "off" or drive.amplitude_t == 0:
         return None
-    x, y, z = (drive.amplitude_t * part for part in drive.unit_direction)
+    x, y, z = (_moment(scene) * drive.amplitude_t * part for part in drive.unit_direction)
     if drive.waveform == "sine":
         return Sine((x, y, z), drive.frequency_hz, drive.phase_rad / (2 * math.pi))
     return Kinked((x, y, z))
@@ -217,16 +222,14 @@ def _spinning(scene: Scene, along: Array, loose: Array) -> Array:
 def magnetic_energy(model: Model, states: Array) -> Array:
     """−M·B [J] in the base's field, shape (n,)."""
     magnet, axis, arm = model.magnet, states[:, N], states[:, ARM]
-    if isinstance(magnet, Aligned):
-        return np.asarray(-magnet.moment * np.einsum("ij,ij->i", axis, flux_density(model.field, states[:, R])))
-    moment = magnet.axial * axis + magnet.transverse * arm
-    if isinstance(magnet, Tilted):
-        return np.asarray(-np.einsum("ij,ij->i", moment, flux_density(model.field, states[:, R])))
+    direction = axis if isinstance(magnet, Aligned) else magnet.axial * axis + magnet.transverse * arm
+    if not isinstance(magnet, Disc):
+        return np.asarray(-np.einsum("ij,ij->i", direction, flux_density(model.field, states[:, R])))
     third = np.cross(axis, arm)
     total = np.zeros(len(states))
     for e1, e2, e3, weight in magnet.nodes:
         place = states[:, R] + e1 * arm + e2 * third + e3 * axis
-        total -= weight * np.einsum("ij,ij->i", moment, flux_density(model.field, place))
+        total -= weight * np.einsum("ij,ij->i", direction, flux_density(model.field, place))
     return total
 
 

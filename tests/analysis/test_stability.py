@@ -88,6 +88,12 @@ def test_the_linear_window_and_its_modes_are_those_published():
     )
 
 
+def test_the_synchronous_wobble_resonates_where_published():
+    # θ = δ P/((I₃ − I₁) ω² − P): the resonance of a driven top, just above the lower limit
+    p = 0.714 * float(BASE(np.array([0.073]))[0, 0])
+    assert math.sqrt(p / (THESIS.axial - THESIS.transverse)) / (2 * math.pi) == pytest.approx(22.1, abs=0.1)
+
+
 def test_the_estimate_of_the_thesis_is_reproduced_with_the_mass_it_must_have_used():
     top = Symmetric(0.0253, THESIS.transverse, 1.73e-6, THESIS.moment)
     assert thesis_limit(BASE, top, 0.073) == pytest.approx(14.005, abs=0.01)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from levilab.simulator import SceneError
+from levilab.simulator import SceneError, SimulationError
 from levilab.simulator.ensemble import simulate_many
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
@@ -73,6 +73,12 @@ def test_tops_of_different_kinds_go_together():
 def test_a_wrong_key_is_named():
     with pytest.raises(SceneError, match=r"top\.mass"):
         simulate_many(UNDRIVEN, {"top.mass": np.array([0.025])}, 1.0)
+
+
+@pytest.mark.parametrize(("name", "value"), [("duration", np.nan), ("duration", -1.0), ("tolerance", 0.0)])
+def test_numbers_that_make_no_sense_are_refused_by_name(name, value):
+    with pytest.raises(SimulationError, match=name):
+        simulate_many(UNDRIVEN, {"start.spin_hz": np.array([30.0])}, **({"duration": 1.0} | {name: value}))
 
 
 def test_progress_runs_to_the_whole():

@@ -161,6 +161,19 @@ def test_the_end_does_not_depend_on_the_samples(rate):
     assert motion.accuracy.reached
 
 
+def test_samples_and_kinks_of_the_drive_at_the_same_time_are_one():
+    square = DRIVEN.changed({"drive.waveform": "square", "drive.phase_rad": 0.3})
+    for scene in (square, square.changed({"drive.phase_rad": 0.0}), DRIVEN.changed({"drive.off_s": 0.5})):
+        motion = simulate(scene, 1.0, rate=60)
+        assert motion.time == pytest.approx(np.arange(61) / 60, abs=1e-12)
+
+
+def test_an_event_in_the_very_step_of_the_fall_is_found():
+    motion = simulate(at(spin_hz=0.0), 5.0, events={"nearly down": lambda m: m.position[:, 2] - 1e-5})
+    assert [event.name for event in motion.events] == ["nearly down"]
+    assert 0 < motion.fell.time - motion.events[0].time < 1e-4
+
+
 def test_progress_runs_to_the_whole():
     shares = []
     simulate(UNDRIVEN, 20.0, step=1e-4, progress=shares.append)
