@@ -91,6 +91,7 @@ def simulate(
 
 
 def check(*, duration: float, tolerance: float, rate: float | None, step: float | None) -> None:
+    """Refuse numbers that make no sense, by name.  Raises SimulationError."""
     if not (math.isfinite(duration) and duration != 0):
         raise SimulationError(f"duration = {duration} s: a finite time other than 0 is expected")
     for name, value in (("tolerance", tolerance), ("rate", rate), ("step", step)):
