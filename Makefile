@@ -45,9 +45,11 @@ all-pythons: setup  ## the tests on every Python from 3.11 on that is installed
 wheel: setup  ## build the wheel into dist/ and try it in a clean environment, beside a decoy
 	$(BIN)/nox --session wheel
 
-bench: setup  ## speed, as ratios within one run; the kept results are in docs/speed.md
+bench: setup  ## speed, as ratios within one run (a few minutes); the kept results are in docs/speed.md
 	$(BIN)/python benchmarks/spindown.py
 	$(BIN)/python benchmarks/startup.py
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[dev,peers]"
+	$(BIN)/levilab benchmark simulator
 
 clean:  ## remove what can be made again
 	rm -rf .venv build dist $(DEMO) .nox .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -97,7 +97,11 @@ def of_sheet(field: Any, z: Any, r2: Any) -> Any:
 
 
 def of_thick_ring(field: Any, z: Any, r2: Any) -> Any:
-    """The mean of sheets over the thickness."""
+    """The mean of sheets over the thickness.
+
+    It is right to 1e-10 from a quarter of the thickness off the edges on.  Nearer by, the sheets begin to be seen: with
+    20 mm the gradient is right to 2e-8 at 1 mm and to 2 % at 0.1 mm (against mpmath); a top does not come that near.
+    """
     p, q, bz, s, g = 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(field.nodes.shape[0]):
         place, weight = field.nodes[i, 0], field.nodes[i, 1]
