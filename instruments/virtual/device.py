@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections import deque
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 from instruments.virtual.scpi import (
     Command,
     Parser,
-    ScpiError,
     at_most_one,
     boolean,
     choice,
@@ -18,14 +17,12 @@ from instruments.virtual.scpi import (
     number,
     one,
 )
+from instruments.virtual.status import OPERATION_COMPLETE, Status
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
 Value = float | str | bool
-
-#: A message longer than this without a line end is dropped, so that no input makes the instrument grow.
-_INPUT_BUFFER = 1 << 20
 
 
 class Clock(Protocol):
@@ -38,8 +35,17 @@ class Clock(Protocol):
         """Let time pass."""
 
 
+@dataclass(frozen=True)
+class Answer:
+    """What an instrument says: the bytes, and when they are ready [s].  epoch: of the measurement they come from."""
+
+    data: bytes
+    ready: float
+    epoch: int
+
+
 class VirtualInstrument:
-    """A wire-level model: lines in, lines out, an error queue, and the time everything takes.
+    """A wire-level model: messages in, answers out, an error queue, and the time everything takes.
 
     A subclass gives its identity and extends `table()` and, where it reacts to settings, `changed()`.
 
@@ -47,59 +53,39 @@ class VirtualInstrument:
     """
 
     identity = "levilab,virtual,0,0"
+    #: What ``SYST:ERR?`` answers when there is nothing to tell, how many entries it keeps, and what ends an answer.
+    no_error, queue_size, line_end = '+0,"No error"', 20, "\n"
 
     def __init__(self, clock: Clock, *, pace: float = 2e-3) -> None:
         self.clock, self.pace = clock, pace
         self.settings: dict[str, Value] = {}
         self._defaults: dict[str, Value] = {}
-        self._input = b""
-        self._output: deque[tuple[float, bytes]] = deque()
+        self.status = Status()
+        self.epoch = 0
         self._ready = 0.0
-        self.parser = Parser()
+        self.parser = Parser(queue_size=self.queue_size, no_error=self.no_error, noted=self.status.note_error)
         self.parser.commands = (*self._common(), *self.table())
         self.settings |= self._defaults
 
-    # --- the wire ---
-
-    def receive(self, data: bytes) -> None:
-        """Bytes from the controller; every complete line is executed."""
-        *lines, rest = (self._input + data).split(b"\n")
-        if len(rest) > _INPUT_BUFFER:
-            rest = b""
-            self.parser.report(ScpiError(-363))
-        self._input = rest
-        for line in lines:
-            self._execute(line.decode("latin-1").strip())
-
-    def _execute(self, message: str) -> None:
+    def execute(self, message: str) -> Answer | None:
+        """Run one message, a line without its end; the answers of its queries, if it has any."""
         self._ready = max(self._ready, self.clock.now()) + self.pace
         answer = self.parser.run(message)
-        if answer is not None:
-            self._output.append((self._ready, answer.encode("latin-1") + b"\n"))
-
-    def read(self, timeout: float) -> bytes | None:
-        """The next answer, waited for at most this long [s]; None if there was none in time."""
-        deadline = self.clock.now() + timeout
-        if not self._output or self._output[0][0] > deadline:
-            self.clock.sleep(timeout)
+        if answer is None:
             return None
-        ready, answer = self._output.popleft()
-        self.clock.sleep(max(0.0, ready - self.clock.now()))
-        return answer
-
-    def clear(self) -> None:
-        """Device clear: what is under way in either direction is dropped, settings stay."""
-        self._input = b""
-        self.abandon()
+        return Answer((answer + self.line_end).encode("latin-1"), self._ready, self.epoch)
 
     def abandon(self) -> None:
         """What is under way is given up, and what has not been read yet is lost."""
-        self._output.clear()
+        self.epoch += 1
         self._ready = self.clock.now()
 
     def busy_until(self, instant: float) -> None:
         """The answer to the message under way is ready at this time [s] and not before."""
         self._ready = max(self._ready, instant)
+
+    def trigger(self) -> None:
+        """``*TRG``, or the interface's own trigger message."""
 
     # --- the tables ---
 
@@ -117,14 +103,40 @@ class VirtualInstrument:
             self.changed(name)
 
     def _common(self) -> tuple[Command, ...]:
+        status = self.status
         return (
             Command("*IDN", get=answers(lambda: self.identity)),
             Command("*RST", set=does(self.reset)),
-            Command("*CLS", set=does(self.parser.errors.clear)),
-            Command("*OPC", set=none, get=answers(lambda: "1")),
+            Command("*CLS", set=does(self._clear_status)),
+            Command("*OPC", set=does(self._note_completion), get=answers(lambda: "1")),
             Command("*WAI", set=none),
+            Command("*TRG", set=does(self.trigger)),
+            Command("*TST", get=answers(lambda: "+0")),
+            Command("*ESR", get=answers(lambda: f"{status.take_events():+d}")),
+            self._mask("*ESE", "event_enable"),
+            self._mask("*SRE", "request_enable"),
+            Command("*STB", get=answers(lambda: f"{self.status_byte():+d}")),
             Command("SYSTem:ERRor[:NEXT]", get=answers(self.parser.next_error)),
+            Command("SYSTem:VERSion", get=answers(lambda: "1999.0")),
+            *(Command(f"SYSTem:{word}", set=none) for word in ("BEEPer[:IMMediate]", "LOCal", "REMote", "RWLock")),
         )
+
+    def status_byte(self, *, message_available: bool = False) -> int:
+        """The status byte (IEEE 488.2, 11.2)."""
+        return self.status.byte(errors_waiting=bool(self.parser.errors), message_available=message_available)
+
+    def _clear_status(self) -> None:
+        self.parser.errors.clear()
+        self.status.events = 0
+
+    def _note_completion(self) -> None:
+        self.status.events |= OPERATION_COMPLETE
+
+    def _mask(self, pattern: str, name: str) -> Command:
+        def set_(parameters: list[str]) -> None:
+            setattr(self.status, name, int(number(one(parameters), low=0, high=255, default=0)))
+
+        return Command(pattern, set_, answers(lambda: f"{getattr(self.status, name):+d}"))
 
     def numeric(self, pattern: str, name: str, *, low: float, high: float, default: float, unit: str = "") -> Command:
         """A row for a number that can be set and asked for, ``MIN``, ``MAX`` and ``DEF`` included."""

@@ -27,14 +27,18 @@ ERRORS = {
     -222: "Data out of range",
     -224: "Illegal parameter value",
     -230: "Data corrupt or stale",
+    -213: "Init ignored",
+    -221: "Settings conflict",
     -350: "Error queue overflow",
     -363: "Input buffer overrun",
     -410: "Query INTERRUPTED",
+    -420: "Query UNTERMINATED",
 }
 
 _MULTIPLIERS = {"": 1.0, "N": 1e-9, "U": 1e-6, "M": 1e-3, "K": 1e3, "MA": 1e6, "G": 1e9}
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*([a-zA-Z]*)")
-_CHANNEL_LIST = re.compile(r"\(@[\d,: ]*\)")
+_CHANNEL_LIST = re.compile(r"\(@[\d,: !]*\)")
+_BLANK, _DIGITS = " \t\r\n", re.compile("[0-9]+")
 
 
 class ScpiError(Exception):
@@ -87,11 +91,14 @@ def _expression(pattern: str) -> str:
 class Parser:
     """Takes messages apart and runs them on a table of commands.
 
-    commands: the table; queue_size: entries of the error queue before it overflows.
+    commands: the table; queue_size: entries of the error queue before it overflows; no_error: what an empty one
+    answers; noted: called with the number of each error.
     """
 
     commands: tuple[Command, ...] = ()
     queue_size: int = 20
+    no_error: str = '+0,"No error"'
+    noted: Callable[[int], None] = lambda _: None
     errors: deque[str] = field(default_factory=deque)
     _known: dict[str, Command] = field(default_factory=dict)
 
@@ -133,14 +140,15 @@ class Parser:
 
     def report(self, error: ScpiError) -> None:
         """Put an entry into the error queue; when it is full its last entry says so."""
+        self.noted(error.number)
         if len(self.errors) < self.queue_size:
             self.errors.append(error.entry)
         else:
             self.errors[-1] = ScpiError(-350).entry
 
     def next_error(self) -> str:
-        """The oldest entry, removed, or ``+0,"No error"``."""
-        return self.errors.popleft() if self.errors else '+0,"No error"'
+        """The oldest entry, removed, or that there is none."""
+        return self.errors.popleft() if self.errors else self.no_error
 
 
 def _resolve(header: str, path: str) -> tuple[str, str]:
@@ -152,36 +160,56 @@ def _resolve(header: str, path: str) -> tuple[str, str]:
 
 
 def split_units(message: str) -> Iterator[str]:
-    """The units of a compound message: split at semicolons outside of quotes.
+    """The units of a compound message: split at semicolons outside of quotes and blocks.
 
     >>> list(split_units('FREQ 40; DISP:TEXT "a;b"'))
     ['FREQ 40', 'DISP:TEXT "a;b"']
     """
-    return (unit.strip() for unit in _split(message, ";") if unit.strip())
+    return (unit for unit in _split(message, ";") if unit)
 
 
 def split_parameters(text: str) -> list[str]:
-    """The parameters of a unit: split at commas outside of quotes and parentheses.
+    """The parameters of a unit: split at commas outside of quotes, parentheses and blocks.
 
     >>> split_parameters("25, MAX, (@1,2)")
     ['25', 'MAX', '(@1,2)']
+    >>> split_parameters("ARB1,#13,;,")
+    ['ARB1', '#13,;,']
     """
-    return [parameter.strip() for parameter in _split(text, ",")] if text.strip() else []
+    return list(_split(text, ",")) if text.strip() else []
+
+
+_SPECIAL = re.compile(r"[\"'();,]|(?<![^\s,])#[1-9]")
 
 
 def _split(text: str, separator: str) -> Iterator[str]:
-    start, quote, depth = 0, "", 0
-    for position, character in enumerate(text):
-        if quote:
-            quote = "" if character == quote else quote
-        elif character in "\"'":
-            quote = character
-        elif character in "()":
-            depth = depth + 1 if character == "(" else max(0, depth - 1)
-        elif character == separator and not depth:
-            yield text[start:position]
-            start = position + 1
-    yield text[start:]
+    """The pieces between separators, blanks taken away, but not those that are the bytes of a block."""
+    start = looked = block_end = depth = 0
+    while found := _SPECIAL.search(text, looked):
+        what, looked = found[0], found.end()
+        if what in {'"', "'"}:
+            closing = text.find(what, looked)
+            looked = closing + 1 if closing >= 0 else len(text)
+        elif what[0] == "#":
+            looked = block_end = _end_of_block(text, found.start())
+        elif what in "()":
+            depth = depth + 1 if what == "(" else max(0, depth - 1)
+        elif what == separator and not depth:
+            yield _piece(text, start, found.start(), block_end)
+            start = looked
+    yield _piece(text, start, len(text), block_end)
+
+
+def _piece(text: str, start: int, end: int, block_end: int) -> str:
+    kept = max(start, min(block_end, end))
+    return (text[start:kept] + text[kept:end].rstrip(_BLANK)).lstrip(_BLANK)
+
+
+def _end_of_block(text: str, head: int) -> int:
+    """Where a definite-length block ends whose # stands at head; just behind the # if it is none."""
+    data = head + 2 + int(text[head + 1])
+    length = text[head + 2 : data]
+    return min(len(text), data + int(length)) if _DIGITS.fullmatch(length) else head + 1
 
 
 def at_most_one(parameters: list[str]) -> str:

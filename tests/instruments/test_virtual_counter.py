@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from wire import received, send
 
 from instruments.virtual.counter import Virtual53230A, crossings
 from levilab.clock import VirtualClock
@@ -35,16 +36,16 @@ def counter(signal, *messages, start=0.0):
     clock.sleep(start)
     device = Virtual53230A(clock, signal=signal)
     for message in (*messages, "*OPC?"):
-        device.receive(message.encode() + b"\n")
-    assert device.read(1.0) == b"1\n"
+        send(device, message.encode() + b"\n")
+    assert received(device, 1.0) == b"1\n"
     return device
 
 
 def reading(device, timeout=100.0):
     """The answer to ``READ?``, None if none comes, and how long it took [s]."""
     before = device.clock.now()
-    device.receive(b"READ?\n")
-    answer = device.read(timeout)
+    send(device, b"READ?\n")
+    answer = received(device, timeout)
     return None if answer is None else float(answer), device.clock.now() - before
 
 
@@ -77,15 +78,15 @@ def test_falling_edges_give_the_same_frequency(slope):
 
 def test_configure_restores_the_gate():
     device = counter(pulses(40.0), FIXED_LEVEL, "SENS:FREQ:GATE:TIME 1", "CONF:FREQ (@1)")
-    device.receive(b"SENS:FREQ:GATE:TIME?\n")
-    assert float(device.read(1.0)) == 0.1
+    send(device, b"SENS:FREQ:GATE:TIME?\n")
+    assert float(received(device, 1.0)) == 0.1
 
 
 def test_two_readings_in_one_message_take_two_gates():
     device = counter(pulses(40.0), FIXED_LEVEL, "SENS:FREQ:GATE:TIME 1", "SYST:TIM 3")
     before = device.clock.now()
-    device.receive(b"READ?;READ?\n")
-    first, second = device.read(10.0).split(b";")
+    send(device, b"READ?;READ?\n")
+    first, second = received(device, 10.0).split(b";")
     assert float(first) == pytest.approx(40.0, rel=1e-4)
     assert float(second) == pytest.approx(40.0, rel=1e-4)
     assert device.clock.now() - before >= 2.0
@@ -135,8 +136,8 @@ def test_alternating_coupling_takes_the_mean_away(coupling, seen):
 
 def test_the_state_after_power_on_is_the_one_that_fails():
     device = counter(pulses(25.0))
-    device.receive(b"INP:COUP?;LEV:AUTO?\n")
-    assert device.read(1.0) == b"AC;1\n"
+    send(device, b"INP:COUP?;LEV:AUTO?\n")
+    assert received(device, 1.0) == b"AC;1\n"
 
 
 # --- time-outs ---
@@ -172,17 +173,17 @@ def test_a_time_out_that_just_holds_the_gate_is_too_short_for_whole_periods(time
 def test_without_a_time_out_the_counter_waits_until_it_is_aborted():
     device = counter(pulses(40.0), FIXED_LEVEL, "INP1:LEV1 2", "SYST:TIM INF")
     assert reading(device, timeout=1e6)[0] is None
-    device.receive(b"*OPC?\n")
-    assert device.read(1e6) is None  # busy with the reading still
-    device.receive(b"ABOR\n*OPC?\n")
-    assert device.read(1.0) == b"1\n"
+    send(device, b"*OPC?\n")
+    assert received(device, 1e6) is None  # busy with the reading still
+    send(device, b"ABOR\n*OPC?\n")
+    assert received(device, 1.0) == b"1\n"
 
 
 def test_what_follows_an_abort_in_the_same_bytes_is_not_lost():
     device = counter(pulses(40.0), FIXED_LEVEL)
-    device.receive(b"ABOR\nINP1:LEV1 0.5\nINP1:LE")
-    device.receive(b"V1?\n")
-    assert float(device.read(1.0)) == 0.5
+    send(device, b"ABOR\nINP1:LEV1 0.5\nINP1:LE")
+    send(device, b"V1?\n")
+    assert float(received(device, 1.0)) == 0.5
 
 
 # --- the Schmitt trigger ---

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from wire import ask, cable, errors, received, send
 
 from instruments.virtual.counter import Virtual53230A
 from instruments.virtual.device import VirtualInstrument, answers
@@ -46,18 +47,6 @@ def counter():
     return Virtual53230A(VirtualClock(), signal=no_light)
 
 
-def ask(device, message):
-    """What comes back within ten seconds, without its line end; None if nothing does."""
-    device.receive(message.encode("latin-1") + b"\n")
-    answer = device.read(10.0)
-    return answer if answer is None else answer.decode("ascii").removesuffix("\n")
-
-
-def errors(device):
-    """The numbers in the error queue, oldest first."""
-    return [int(entry.split(",")[0]) for entry in iter(lambda: ask(device, "SYST:ERR?"), NO_ERROR)]
-
-
 # --- headers ---
 
 
@@ -81,7 +70,7 @@ def errors(device):
     ],
 )
 def test_a_header_is_understood_in_every_form_that_the_manual_allows(generator, message):
-    generator.receive(message.encode() + b"\n")
+    send(generator, message.encode() + b"\n")
     assert float(ask(generator, "FREQ?")) == 40.0
     assert errors(generator) == []
 
@@ -128,7 +117,7 @@ def test_a_common_command_leaves_the_branch_as_it_is(generator):
 
 
 def test_every_line_starts_at_the_root(generator):
-    generator.receive(b"SOUR:FREQ 40\nOUTP ON\n")
+    send(generator, b"SOUR:FREQ 40\nOUTP ON\n")
     assert errors(generator) == []
 
 
@@ -140,22 +129,22 @@ def test_the_first_error_ends_a_compound(generator):
 
 def test_semicolons_and_commas_inside_quotes_separate_nothing():
     device = Display(VirtualClock())
-    device.receive(b'DISP:TEXT "a;b,c"; TEXT \'d";e\',"f"\n')
+    send(device, b'DISP:TEXT "a;b,c"; TEXT \'d";e\',"f"\n')
     assert device.texts == [['"a;b,c"'], ["'d\";e'", '"f"']]
     assert errors(device) == []
 
 
 def test_a_message_may_come_in_pieces_and_several_at_once(generator):
     for byte in b"FREQ 41\nVOLT 3;":
-        generator.receive(bytes([byte]))
-    generator.receive(b"VOLT?\nFREQ?\n")
-    assert generator.read(1.0) == b"+3.000000000000000E+00\n"
-    assert generator.read(1.0) == b"+4.100000000000000E+01\n"
+        send(generator, bytes([byte]))
+    send(generator, b"VOLT?\nFREQ?\n")
+    assert received(generator, 1.0) == b"+3.000000000000000E+00\n"
+    assert received(generator, 1.0) == b"+4.100000000000000E+01\n"
 
 
 def test_an_endless_line_is_dropped_and_the_next_one_understood(generator):
     for _ in range(3):
-        generator.receive(b"x" * (1 << 19))
+        send(generator, b"x" * (1 << 19))
     assert ask(generator, "") is None
     assert errors(generator) == [-363]
 
@@ -181,14 +170,14 @@ def test_an_endless_line_is_dropped_and_the_next_one_understood(generator):
     ],
 )
 def test_a_number_is_understood_with_its_unit(generator, message, hertz):
-    generator.receive(message.encode() + b"\n")
+    send(generator, message.encode() + b"\n")
     # products as 500 × 1e-6 are rounded once
     assert float(ask(generator, "FREQ?")) == pytest.approx(hertz, rel=1e-15)
     assert errors(generator) == []
 
 
 def test_elsewhere_an_m_means_milli(counter):
-    counter.receive(b"SENS:FREQ:GATE:TIME 100 ms\nINP:LEV 250mV\n")
+    send(counter, b"SENS:FREQ:GATE:TIME 100 ms\nINP:LEV 250mV\n")
     assert float(ask(counter, "SENS:FREQ:GATE:TIME?")) == pytest.approx(0.1, rel=1e-15)
     assert float(ask(counter, "INP:LEV?")) == pytest.approx(0.25, rel=1e-15)
 
@@ -245,7 +234,7 @@ def test_a_bad_parameter_in_a_query_gets_no_reply(generator, message, number):
 
 
 def test_a_query_can_ask_for_the_limits_and_the_default(generator):
-    generator.receive(b"FREQ 40\n")
+    send(generator, b"FREQ 40\n")
     assert [float(ask(generator, f"FREQ? {word}")) for word in ("MIN", "MAX", "DEF")] == [1e-6, 30e6, 1e3]
     assert float(ask(generator, "FREQ?")) == 40.0
 
@@ -269,7 +258,7 @@ def test_an_infinite_load_is_understood_and_printed_as_scpi_prints_infinity(gene
 
 def test_a_full_queue_says_so_in_its_last_entry(generator):
     for k in range(25):
-        generator.receive(b"FOO%d\n" % k)
+        send(generator, b"FOO%d\n" % k)
     queue = errors(generator)
     assert len(queue) == 20
     assert queue == [-113] * 19 + [-350]
@@ -281,13 +270,13 @@ def test_an_entry_is_a_string_in_ascii_whatever_was_sent(generator):
 
 
 def test_cls_empties_the_queue_and_keeps_the_settings(generator):
-    generator.receive(b"FREQ 40\nFOO\n*CLS\n")
+    send(generator, b"FREQ 40\nFOO\n*CLS\n")
     assert errors(generator) == []
     assert float(ask(generator, "FREQ?")) == 40.0
 
 
 def test_rst_restores_the_settings_and_keeps_the_queue(generator):
-    generator.receive(b"FREQ 40\nOUTP ON\nFUNC SQU\nFOO\n*RST\n")
+    send(generator, b"FREQ 40\nOUTP ON\nFUNC SQU\nFOO\n*RST\n")
     assert ask(generator, "FREQ?;OUTP?;FUNC?") == "+1.000000000000000E+03;0;SIN"
     assert errors(generator) == [-113]
 
@@ -298,8 +287,8 @@ def test_opc_answers_one_when_everything_before_it_is_done(generator):
 
 
 def test_clear_drops_a_half_sent_message_and_unread_answers(generator):
-    generator.receive(b"*IDN?\nFREQ 4")
-    generator.clear()
+    send(generator, b"*IDN?\nFREQ 4")
+    cable(generator).clear()
     assert ask(generator, "FREQ?") == "+1.000000000000000E+03"
     assert errors(generator) == []
 
@@ -335,10 +324,10 @@ def test_nothing_that_is_sent_breaks_an_instrument(messages):
     clock = VirtualClock()
     for device in (Virtual33500B(clock), Virtual53230A(clock, signal=no_light)):
         for message in messages:
-            device.receive(message)
+            send(device, message)
             queue = device.parser.errors
             assert len(queue) <= 20
             assert all(ENTRY.fullmatch(entry) for entry in queue)
-        device.receive(b"\n")
-        device.clear()
+        send(device, b"\n")
+        cable(device).clear()
         assert ask(device, "*CLS;*IDN?") == device.identity
