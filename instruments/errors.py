@@ -16,6 +16,13 @@ class NotConnected(InstrumentError):
     """No instrument could be reached at this address."""
 
 
+class Occupied(NotConnected):
+    """Another program holds the instrument."""
+
+    def __init__(self, address: str) -> None:
+        super().__init__(address, "another program has locked the instrument: close it there first")
+
+
 class NoAnswer(InstrumentError):
     """The instrument stayed silent.  question: what was asked; timeout: how long was waited [s]."""
 

@@ -7,10 +7,13 @@ from a virtual one.
 from __future__ import annotations
 
 import contextlib
+import select
+import socket
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol
 
-from instruments.errors import BadAnswer, NoAnswer, NotConnected
+from instruments.blocks import BrokenBlock, block_of, read_block
+from instruments.errors import BadAnswer, NoAnswer, NotConnected, Occupied
 
 if TYPE_CHECKING:
     from pyvisa.highlevel import VisaLibraryBase
@@ -21,6 +24,12 @@ TrafficLog = Callable[[str, str, bytes], None]
 
 #: PyVISA's own reading of a resource name that is a bare TCP connection: only reopening empties its pipe.
 _BARE_SOCKET = "::SOCKET"
+
+#: Bytes read at a stretch, and the longest answer that is text.
+_CHUNK, _LONGEST_ANSWER = 1 << 20, 1 << 22
+
+#: VISA's numbers for: locked, busy.
+_HELD_BY_ANOTHER = {-1073807345, -1073807246}
 
 
 class Transport(Protocol):
@@ -39,8 +48,20 @@ class Transport(Protocol):
         timeout.  Raises NoAnswer when nothing came in time.
         """
 
+    def query_block(self, message: str, *, patience: float = 0.0) -> bytes:
+        """Send a question and return the bytes of the definite-length block that answers it (IEEE 488.2, 8.7.9).
+
+        Raises NoAnswer as query does, BadAnswer when it is no block or one that breaks off.
+        """
+
     def clear(self) -> None:
         """Drop whatever is under way in either direction."""
+
+    def reopen(self) -> None:
+        """Give the link up and make it anew.  Raises NotConnected."""
+
+    def lock(self) -> None:
+        """Keep other programs from the instrument, where the interface can.  Raises Occupied if one has it."""
 
     def close(self) -> None:
         """Give the instrument back."""
@@ -65,6 +86,7 @@ class VisaTransport:
         self.address, self.timeout = address, timeout
         self._library, self._log = library, log
         self._out_of_step = False
+        self._stream = address.upper().endswith(_BARE_SOCKET) or address.upper().startswith("ASRL")
         self._resource = self._open()
 
     def _open(self) -> MessageBasedResource:
@@ -88,7 +110,27 @@ class VisaTransport:
             self.clear()
         self._record(">", message)
         with self._told_as_ours(message, self.timeout):
+            if self._stream:  # an answer that nobody waited for is no answer to this
+                self._discard_received()
             self._resource.write(message)
+
+    def _discard_received(self) -> None:
+        """Empty the pipe without waiting.
+
+        pyvisa-py's own way waits 0.1 s at a bare socket, and for ever if the other side is gone: so its socket is
+        looked at here.  Other libraries know how.
+        """
+        import pyvisa
+
+        link: Any = getattr(self._resource.visalib, "sessions", {}).get(self._resource.session)
+        interface = getattr(link, "interface", None)
+        if not isinstance(interface, socket.socket):
+            self._resource.flush(pyvisa.constants.BufferOperation.discard_read_buffer)
+            return
+        link._pending_buffer.clear()
+        while select.select([interface], [], [], 0)[0]:
+            if not interface.recv(_CHUNK):
+                raise ConnectionResetError("the other side has closed the connection")
 
     def query(self, message: str, *, patience: float = 0.0) -> str:
         """Ask; see :class:`Transport`."""
@@ -96,21 +138,61 @@ class VisaTransport:
         within = self.timeout + patience
         with self._told_as_ours(message, within):
             self._resource.timeout = 1000 * within
-            answer = self._resource.read()
-        self._record("<", answer)
-        return answer.strip()
+            # more than the longest answer without an end is noise: it is left for the next resynchronisation
+            answer = self._resource.read_bytes(_LONGEST_ANSWER, chunk_size=_CHUNK, break_on_termchar=True)
+            text = answer.decode("ascii")
+        self._record("<", text.rstrip("\r\n"))
+        return text.strip()
+
+    def query_block(self, message: str, *, patience: float = 0.0) -> bytes:
+        """Ask for a block; see :class:`Transport`."""
+        self.write(message)
+        within = self.timeout + patience
+        with self._told_as_ours(message, within):
+            self._resource.timeout = 1000 * within
+            block = self._block()
+        self._record("<", f"({len(block)} bytes)")
+        return block
+
+    def _block(self) -> bytes:
+        if not self._stream:
+            return block_of(self._resource.read_raw(_CHUNK))
+        self._resource.read_termination = None  # a line feed in the block is a byte like any other
+        try:
+            return read_block(lambda count: self._resource.read_bytes(count, chunk_size=_CHUNK) if count else b"")
+        finally:
+            self._resource.read_termination = "\n"
 
     def clear(self) -> None:
         """Resynchronise: a late answer to an old question never reaches the driver."""
         import pyvisa
 
         if self.address.upper().endswith(_BARE_SOCKET):
-            self._resource.close()
-            self._resource = self._open()
+            self.reopen()
         else:
             with contextlib.suppress(pyvisa.Error, NotImplementedError):
                 self._resource.clear()
         self._out_of_step = False
+
+    def reopen(self) -> None:
+        """Open the resource anew; see :class:`Transport`."""
+        with contextlib.suppress(Exception):  # it may be gone for good
+            self._resource.close()
+        self._resource = self._open()
+        self._out_of_step = False
+
+    def lock(self) -> None:
+        """Exclusive access until the link is closed; see :class:`Transport`."""
+        import pyvisa
+
+        try:
+            self._resource.lock_excl(timeout=1000 * self.timeout)
+        except pyvisa.VisaIOError as error:
+            if error.error_code in _HELD_BY_ANOTHER:
+                raise Occupied(self.address) from error
+            # interfaces without locks: bare sockets, serial lines, and what pyvisa-py does not lock
+        except NotImplementedError:
+            pass
 
     def close(self) -> None:
         """Close the resource; closing twice does no harm."""
@@ -132,6 +214,9 @@ class VisaTransport:
             if error.error_code == pyvisa.constants.StatusCode.error_timeout:
                 raise NoAnswer(self.address, question, within) from error
             raise NotConnected(self.address, _broken(question, error)) from error
+        except BrokenBlock as error:
+            self._out_of_step = True
+            raise BadAnswer(self.address, question, error.seen, "a definite-length block") from error
         except UnicodeDecodeError as error:
             self._out_of_step = True
             raise BadAnswer(self.address, question, repr(error.object[:40]), "plain text") from error

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import fnmatch
 import itertools
+import math
 from typing import TYPE_CHECKING, Any, cast
 
 from pyvisa import constants, rname
@@ -32,6 +33,17 @@ _DEFAULT_ATTRIBUTES: dict[int, Any] = {
     ResourceAttribute.termchar_enabled: False,
     ResourceAttribute.send_end_enabled: True,
     ResourceAttribute.resource_lock_state: constants.AccessModes.no_lock,
+}
+
+#: The same for a serial line (VPP-4.3, 5.1.2): 9600 baud, 8N1.
+_SERIAL_ATTRIBUTES: dict[int, Any] = {
+    ResourceAttribute.asrl_baud_rate: 9600,
+    ResourceAttribute.asrl_data_bits: 8,
+    ResourceAttribute.asrl_parity: constants.Parity.none,
+    ResourceAttribute.asrl_stop_bits: constants.StopBits.one,
+    ResourceAttribute.asrl_flow_control: constants.ControlFlow.none,
+    ResourceAttribute.asrl_end_in: constants.SerialTermination.termination_char,
+    ResourceAttribute.asrl_end_out: constants.SerialTermination.none,
 }
 
 
@@ -83,38 +95,89 @@ class LevilabVisaLibrary(VisaLibraryBase):
         if link is None:
             return cast("VISASession", 0), self.handle_return_value(None, StatusCode.error_resource_not_found)
         parsed = rname.parse_resource_name(resource_name.upper())
-        attributes = _DEFAULT_ATTRIBUTES | {
-            ResourceAttribute.resource_name: resource_name,
-            ResourceAttribute.resource_class: parsed.resource_class,
-            ResourceAttribute.interface_type: parsed.interface_type_const,
-        }
+        serial = parsed.interface_type_const == constants.InterfaceType.asrl
+        attributes = (
+            _DEFAULT_ATTRIBUTES
+            | (_SERIAL_ATTRIBUTES if serial else {})
+            | {
+                ResourceAttribute.resource_name: resource_name,
+                ResourceAttribute.resource_class: parsed.resource_class,
+                ResourceAttribute.interface_type: parsed.interface_type_const,
+            }
+        )
         number = cast("VISASession", next(_numbers))
         self._sessions[number] = (link, attributes)
         return number, self.handle_return_value(number, StatusCode.success)
 
     def close(self, session: Any) -> StatusCode:
         """ViClose."""
-        self._sessions.pop(session, None)
+        link, _ = self._sessions.pop(session, (None, {}))
+        if link:
+            link.close()
         return self.handle_return_value(session, StatusCode.success)
 
     def write(self, session: VISASession, data: bytes) -> tuple[int, StatusCode]:
         """ViWrite."""
-        self._sessions[session][0].write(bytes(data))
+        link, attributes = self._sessions[session]
+        if link.hold.keeps_out(link):
+            return 0, self.handle_return_value(session, StatusCode.error_resource_locked)
+        link.write(bytes(data), end=bool(attributes[ResourceAttribute.send_end_enabled]))
         return len(data), self.handle_return_value(session, StatusCode.success)
 
     def read(self, session: VISASession, count: int) -> tuple[bytes, StatusCode]:
-        """ViRead."""
+        """ViRead: up to the end of the answer, the termination character if that is on, or so many bytes."""
         link, attributes = self._sessions[session]
-        got = link.read(count, attributes[ResourceAttribute.timeout_value] / 1000)
+        if link.hold.keeps_out(link):
+            return b"", self.handle_return_value(session, StatusCode.error_resource_locked)
+        got = link.read(count, _seconds(attributes[ResourceAttribute.timeout_value]), until=_termchar(attributes))
         if got is None:
             return b"", self.handle_return_value(session, StatusCode.error_timeout)
         data, complete = got
         status = StatusCode.success if complete else StatusCode.success_max_count_read
+        if data[-1:] == _termchar(attributes):
+            status = StatusCode.success_termination_character_read
         return data, self.handle_return_value(session, status)
 
     def clear(self, session: VISASession) -> StatusCode:
         """ViClear."""
         self._sessions[session][0].clear()
+        return self.handle_return_value(session, StatusCode.success)
+
+    def flush(self, session: VISASession, mask: constants.BufferOperation) -> StatusCode:
+        """ViFlush: what was received and not read is dropped."""
+        self._sessions[session][0].discard()
+        return self.handle_return_value(session, StatusCode.success)
+
+    def read_stb(self, session: VISASession) -> tuple[int, StatusCode]:
+        """ViReadSTB."""
+        return self._sessions[session][0].status_byte(), self.handle_return_value(session, StatusCode.success)
+
+    def assert_trigger(self, session: VISASession, protocol: constants.TriggerProtocol) -> StatusCode:
+        """ViAssertTrigger."""
+        self._sessions[session][0].trigger()
+        return self.handle_return_value(session, StatusCode.success)
+
+    # --- locks ---
+
+    def lock(
+        self, session: VISASession, lock_type: constants.Lock, timeout: int, requested_key: str | None = None
+    ) -> tuple[str, StatusCode]:
+        """ViLock; a shared lock with the same key lets its holders through."""
+        link, attributes = self._sessions[session]
+        key = requested_key or f"levilab-{next(_numbers)}"
+        if not link.hold.take(link, key if lock_type == constants.Lock.shared else None):
+            return "", self.handle_return_value(session, StatusCode.error_resource_locked)
+        shared = lock_type == constants.Lock.shared
+        attributes[ResourceAttribute.resource_lock_state] = (
+            constants.AccessModes.shared_lock if shared else constants.AccessModes.exclusive_lock
+        )
+        return key if shared else "", self.handle_return_value(session, StatusCode.success)
+
+    def unlock(self, session: VISASession) -> StatusCode:
+        """ViUnlock."""
+        link, attributes = self._sessions[session]
+        link.hold.let_go(link)
+        attributes[ResourceAttribute.resource_lock_state] = constants.AccessModes.no_lock
         return self.handle_return_value(session, StatusCode.success)
 
     def get_attribute(self, session: Any, attribute: ResourceAttribute | EventAttribute) -> tuple[Any, StatusCode]:
@@ -136,6 +199,18 @@ class LevilabVisaLibrary(VisaLibraryBase):
     def discard_events(self, session: VISASession, event_type: Any, mechanism: Any) -> StatusCode:
         """ViDiscardEvents: there are no events."""
         return self.handle_return_value(session, StatusCode.success)
+
+
+def _seconds(timeout: int) -> float:
+    """VISA's milliseconds; its largest number stands for ever."""
+    return math.inf if timeout == constants.VI_TMO_INFINITE else timeout / 1000
+
+
+def _termchar(attributes: dict[int, Any]) -> bytes:
+    """What ends a read, or nothing.  A serial line ends one there by itself (VPP-4.3, VI_ATTR_ASRL_END_IN)."""
+    serial = attributes.get(ResourceAttribute.asrl_end_in) == constants.SerialTermination.termination_char
+    wanted = attributes[ResourceAttribute.termchar_enabled] or serial
+    return bytes([attributes[ResourceAttribute.termchar]]) if wanted else b""
 
 
 def library_for(bus: Bus) -> LevilabVisaLibrary:

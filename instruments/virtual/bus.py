@@ -17,6 +17,38 @@ if TYPE_CHECKING:
 
 
 @dataclass
+class Hold:
+    """Who keeps the others from an instrument: one, or all that know the key.
+
+    >>> hold = Hold()
+    >>> hold.take("me", None), hold.take("you", None)
+    (True, False)
+    >>> hold.let_go("me")
+    >>> hold.take("you", "key"), hold.take("me", "key")
+    (True, True)
+    """
+
+    holders: list[object] = field(default_factory=list)
+    key: str | None = None
+
+    def take(self, who: object, key: str | None) -> bool:
+        """Whether it is theirs now.  key: to share it with, None to share it with nobody."""
+        others = [holder for holder in self.holders if holder is not who]
+        if others and (key is None or key != self.key):
+            return False
+        self.holders, self.key = [*others, who], key
+        return True
+
+    def let_go(self, who: object) -> None:
+        """Give it up; it is no error not to have it."""
+        self.holders = [holder for holder in self.holders if holder is not who]
+
+    def keeps_out(self, who: object) -> bool:
+        """Whether somebody else has it."""
+        return bool(self.holders) and all(holder is not who for holder in self.holders)
+
+
+@dataclass
 class Bus:
     """The instruments of one virtual bench by resource name.
 
@@ -25,6 +57,7 @@ class Bus:
 
     instruments: Mapping[str, VirtualInstrument]
     lock: threading.RLock = field(default_factory=threading.RLock)
+    _holds: dict[int, Hold] = field(default_factory=dict)
 
     def open(self, address: str) -> Session | None:
         """A session with the instrument at this address (any case), or None if there is none."""
@@ -37,10 +70,10 @@ class Bus:
 
     def session(self, device: VirtualInstrument, *, stream: bool) -> Session:
         """A link to one of the instruments."""
-        return Session(device, stream=stream, lock=self.lock)
+        return Session(device, stream=stream, lock=self.lock, hold=self._holds.setdefault(id(device), Hold()))
 
 
-@dataclass
+@dataclass(eq=False)
 class Session:
     """One program's link to one instrument.
 
@@ -52,6 +85,7 @@ class Session:
     device: VirtualInstrument
     stream: bool = False
     lock: threading.RLock = field(default_factory=threading.RLock)
+    hold: Hold = field(default_factory=Hold)
     _framer: Framer = field(default_factory=Framer)
     _answers: deque[Answer] = field(default_factory=deque)
     _rest: bytes = b""
@@ -91,8 +125,11 @@ class Session:
                 return self.device.clock.now()
             return self._answers[0].ready if self._answers else None
 
-    def read(self, count: int, timeout: float) -> tuple[bytes, bool] | None:
-        """At most count bytes of the answer and whether that was its end; None after the timeout [s]."""
+    def read(self, count: int, timeout: float, *, until: bytes = b"") -> tuple[bytes, bool] | None:
+        """At most count bytes of the answer and whether that was its end; None after the timeout [s].
+
+        until: the byte after which to stop, if any.
+        """
         clock = self.device.clock
         ready = self.ready()
         if ready is None or ready > clock.now() + timeout:
@@ -100,16 +137,34 @@ class Session:
             clock.sleep(timeout)
             return None
         clock.sleep(max(0.0, ready - clock.now()))
-        return self.take(count)
+        return self.take(count, until=until)
 
-    def take(self, count: int) -> tuple[bytes, bool]:
+    def take(self, count: int, *, until: bytes = b"") -> tuple[bytes, bool]:
         """At most count bytes of what is ready, and whether the answer ends with them."""
         with self.lock:
             if not self._rest and self._answers:
                 self._rest = self._answers.popleft().data
             self._asked = False
-            chunk, self._rest = self._rest[:count], self._rest[count:]
+            stop = self._rest.find(until, 0, count) + 1 if until else 0
+            chunk, self._rest = self._rest[: stop or count], self._rest[stop or count :]
             return chunk, not self._rest
+
+    def discard(self) -> None:
+        """Drop what is ready and was not read."""
+        with self.lock:
+            self._rest = b""
+            self._drop_what_is_abandoned()
+            while self._answers and self._answers[0].ready <= self.device.clock.now():
+                self._answers.popleft()
+
+    def trigger(self) -> None:
+        """The interface's trigger message."""
+        with self.lock:
+            self.device.trigger()
+
+    def close(self) -> None:
+        """The program is gone."""
+        self.hold.let_go(self)
 
     def _note_silence(self, ready: float | None) -> None:
         """A reader who waits for what nobody asked: IEEE 488.2, 6.3.2.2."""

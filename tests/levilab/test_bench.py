@@ -35,16 +35,12 @@ class Faulty(Virtual33500B):
 
     silent, stuck = 0, False
 
-    def read(self, timeout):
-        if Faulty.silent:
+    def execute(self, message):
+        answer = super().execute(message.replace("OUTP1 OFF", "*WAI") if Faulty.stuck else message)
+        if answer and Faulty.silent:
             Faulty.silent -= 1
-            self.clock.sleep(timeout)
-            self.clear()  # what it would have said is lost
             return None
-        return super().read(timeout)
-
-    def receive(self, data):
-        super().receive(data.replace(b"OUTP1 OFF", b"*WAI") if Faulty.stuck else data)
+        return answer
 
 
 @pytest.fixture

@@ -299,7 +299,7 @@ def test_errors_that_an_earlier_program_left_are_not_ours(tmp_path: Path, monkey
 
     def soiled(self: Virtual33500B, *args: Any, **named: Any) -> None:
         init(self, *args, **named)
-        self.receive(b"NONSENSE\n")
+        self.execute("NONSENSE")
 
     monkeypatch.setattr(Virtual33500B, "__init__", soiled)
     assert acquire(mock(tmp_path), Silent()).status == "finished"
