@@ -28,13 +28,25 @@ SPINS = 2000
 
 @dataclass(frozen=True)
 class Symmetric:
-    """A symmetric top.  mass [kg]; transverse, axial: I₁, I₃ [kg m²]; moment [A m²], signed; gravity [m/s²]."""
+    """A symmetric top.  mass [kg]; transverse, axial: I₁, I₃ [kg m²]; moment [A m²], signed; gravity [m/s²].
+
+    stiffnesses: of an upright magnet that is no point, heights, shape (n,) → ∂²E/∂θ², ∂²E/∂x², ∂²E/∂x∂θ of its energy,
+    shape (3, n) [J, J/m², J/m]; None: those of a point, μB, μB″/2, μB′/2.
+    """
 
     mass: float
     transverse: float
     axial: float
     moment: float
     gravity: float = 9.82
+    stiffnesses: Callable[[Array], Array] | None = None
+
+    def stiffness(self, field: AxialField, z: Array) -> Array:
+        """Against tilting, moving sideways, and both: shape (3, n)."""
+        if self.stiffnesses is not None:
+            return self.stiffnesses(z)
+        b, slope, bend = field(z)[:3]
+        return self.moment * np.array([b, bend / 2, slope / 2])
 
 
 @dataclass(frozen=True)
@@ -72,13 +84,15 @@ class Equilibrium:
 # --- adiabatic: the moment follows the field ---
 
 
-def _conditions(field: AxialField, z: Array) -> Array:
+def _conditions(field: AxialField, top: Symmetric, z: Array) -> Array:
     """Three functions, positive where stable: lift away from the base, axial and radial stiffness; shape (3, n).
 
-    In φ₁ = −B: φ₁φ₂ < 0, φ₁φ₃ > 0, φ₂² − 2φ₃φ₁ > 0 for U = mgz + |μ||B|.
+    In φ₁ = −B: φ₁φ₂ < 0, φ₁φ₃ > 0, φ₂² − 2φ₃φ₁ > 0 for U = mgz + |μ||B|.  The last is the sideways stiffness of a
+    moment that follows the field, E_xx − E_xθ²/E_θθ, for a top that stands against it.
     """
     b, slope, bend = field(z)[:3]
-    return np.array([-b * slope, b * bend, slope**2 - 2 * b * bend])
+    tilt, sideways, both = top.stiffness(field, z) / top.moment
+    return np.array([-b * slope, b * bend, 4 * (both**2 - sideways * tilt)])
 
 
 def windows(field: AxialField, top: Symmetric, low: float, high: float) -> tuple[Window, ...]:
@@ -87,9 +101,9 @@ def windows(field: AxialField, top: Symmetric, low: float, high: float) -> tuple
     Scanned in HEIGHTS steps, each edge then found to the last digits.
     """
     z = np.linspace(low, high, HEIGHTS)
-    inside = np.all(_conditions(field, z) > 0, axis=0)
+    inside = np.all(_conditions(field, top, z) > 0, axis=0)
     edges = np.flatnonzero(inside[1:] != inside[:-1])
-    places = [low] * bool(inside[0]) + [_edge(field, z[i], z[i + 1]) for i in edges] + [high] * bool(inside[-1])
+    places = [low] * bool(inside[0]) + [_edge(field, top, z[i], z[i + 1]) for i in edges] + [high] * bool(inside[-1])
     found = []
     for a, b in zip(places[::2], places[1::2], strict=True):
         masses = [floating_mass(field, top, h) for h in np.linspace(a, b, 200)]
@@ -97,9 +111,10 @@ def windows(field: AxialField, top: Symmetric, low: float, high: float) -> tuple
     return tuple(found)
 
 
-def _edge(field: AxialField, inside: float, outside: float) -> float:
+def _edge(field: AxialField, top: Symmetric, inside: float, outside: float) -> float:
     """The height at which one of the conditions passes zero."""
-    worst = lambda z: float(np.min(_conditions(field, np.array([z]))[:, 0] / _sizes(field, inside)))  # noqa: E731
+    size = _sizes(field, inside)
+    worst = lambda z: float(np.min(_conditions(field, top, np.array([z]))[:, 0] / size))  # noqa: E731
     return float(brentq(worst, inside, outside, xtol=1e-15, rtol=1e-14))
 
 
@@ -109,7 +124,9 @@ def _sizes(field: AxialField, z: float) -> Array:
 
 
 def floating_mass(field: AxialField, top: Symmetric, height: float) -> float:
-    """The mass [kg] that floats at a height: |μ||B′|/g."""
+    """The mass [kg] that floats at a height: |μ||B′|/g; infinite where nothing weighs."""
+    if top.gravity == 0:
+        return math.inf
     return abs(top.moment * float(field(np.array([height]))[1, 0])) / top.gravity
 
 
@@ -135,10 +152,11 @@ def equilibria(field: AxialField, top: Symmetric, low: float, high: float) -> tu
 
 
 def _described(field: AxialField, top: Symmetric, height: float) -> Equilibrium:
-    b, slope, bend = (float(value) for value in field(np.array([height]))[:3, 0])
+    bend = float(field(np.array([height]))[2, 0])
+    tilt, sideways, both = top.stiffness(field, np.array([height]))[:, 0]
     # U = −μB for the upright top; sideways |B| changes by B′²/4B − B″/2 (Berry), and −μ = |μ| against the field
     axial = -top.moment * bend / top.mass
-    radial = -top.moment * (slope**2 / (4 * b) - bend / 2) / top.mass
+    radial = float(sideways - both**2 / tilt) / top.mass
     return Equilibrium(height, axial, radial, spin_windows(field, top, height))
 
 
@@ -148,13 +166,13 @@ def _described(field: AxialField, top: Symmetric, height: float) -> Equilibrium:
 def quartic(field: AxialField, top: Symmetric, height: float, spin: float) -> Array:
     """Coefficients of (I₁α² − I₃ω₃α + P)(α² + Ω²/2) = (μB′)²/4m, highest power first, over I₁; spin ω₃ [rad/s].
 
-    For u = x + iy and N = n_x + i n_y ∝ e^{iαt}; P = −μB, Ω² = −μB″/m.  At the equilibrium μB′ = mg.
+    For u = x + iy and N = n_x + i n_y ∝ e^{iαt}; P = −μB = −E_θθ, Ω²/2 = −μB″/2m = −E_xx/m, μB′/2 = E_xθ, which is
+    mg/2 at the equilibrium of a point.
     """
-    b, slope, bend = (float(value) for value in field(np.array([height]))[:3, 0])
-    p, omega2, turn = -top.moment * b, -top.moment * bend / top.mass, top.axial * spin
-    coupling = (top.moment * slope) ** 2 / (4 * top.mass)
+    tilt, sideways, both = (float(value) for value in top.stiffness(field, np.array([height]))[:, 0])
+    p, half, turn = -tilt, -sideways / top.mass, top.axial * spin
     i1 = top.transverse
-    return np.array([i1, -turn, p + i1 * omega2 / 2, -turn * omega2 / 2, p * omega2 / 2 - coupling]) / i1
+    return np.array([i1, -turn, p + i1 * half, -turn * half, p * half - both**2 / top.mass]) / i1
 
 
 def modes(field: AxialField, top: Symmetric, height: float, spin_hz: float) -> NDArray[np.complex128]:
@@ -213,7 +231,7 @@ def _discriminant(coefficients: Array) -> float:
 
 def sleeping_limit(field: AxialField, top: Symmetric, height: float) -> float:
     """2√(I₁P)/I₃ in turns per second: below, a top on a fixed point would not sleep.  NaN where the field rights it."""
-    p = -top.moment * float(field(np.array([height]))[0, 0])
+    p = -float(top.stiffness(field, np.array([height]))[0, 0])
     return 2 * math.sqrt(top.transverse * p) / top.axial / (2 * math.pi) if p > 0 else math.nan
 
 

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from levilab.explain import Effect
     from levilab.simulator.scene import Scene
 
@@ -61,10 +63,16 @@ def simulate(
 
     The first run for a kind of scene compiles for a few seconds.  Ctrl-C ends it, and nothing is written then.
     """
+    _simulate(_scene(scene, settings), duration, tolerance, rate, out, explain=explain, as_json=as_json)
+
+
+@contextlib.contextmanager
+def _interruptible(what_is_left: str) -> Iterator[None]:
+    """Ctrl-C ends the command with one line."""
     try:
-        _simulate(_scene(scene, settings), duration, tolerance, rate, out, explain=explain, as_json=as_json)
+        yield
     except KeyboardInterrupt:
-        typer.echo("levilab: interrupted, nothing was written", err=True)
+        typer.echo(f"levilab: interrupted, {what_is_left}", err=True)
         raise typer.Exit(EXIT_INTERRUPTED) from None
 
 
@@ -83,9 +91,16 @@ def _simulate(
     from levilab.simulation import SimulationOrder, carry_out
 
     order = SimulationOrder(scene, duration, tolerance, rate, out)
-    with contextlib.closing(Share("simulating")) as share:
+    with _interruptible("nothing was written"), contextlib.closing(Share("simulating")) as share:
         done = carry_out(order, lambda text: typer.echo(text, err=True), share)
-    effects = _explained(scene, duration) if explain else ()
+    if done.folder:
+        typer.echo(f"wrote {done.folder}", err=True)
+    if not as_json:  # at once: what explains it takes longer
+        from levilab.motion_tables import print_motion
+
+        print_motion(done.summary)
+    with _interruptible("the effects are not known"):
+        effects = _explained(scene, duration) if explain else ()
     if as_json:
         import json
         from dataclasses import asdict
@@ -93,21 +108,16 @@ def _simulate(
         document = as_document(done.summary) | {"run": str(done.folder) if done.folder else None}
         document |= {"effects": [finite(asdict(effect)) for effect in effects]} if explain else {}
         typer.echo(json.dumps(document, indent=2, allow_nan=False))
-        return
-    from levilab.motion_tables import print_motion
-
-    print_motion(done.summary)
-    if explain:
+    elif explain:
         from levilab.explain_table import print_effects
 
         print_effects(effects)
-    if done.folder:
-        typer.echo(f"wrote {done.folder}", err=True)
 
 
 def _explained(scene: Scene, duration: float) -> tuple[Effect, ...]:
     from levilab.explain import explain
 
+    typer.echo("switching each effect on or off: some seconds, more where code must be compiled first", err=True)
     return explain(scene, duration)
 
 
@@ -142,14 +152,11 @@ def stability(
 
 def _mapped(scene: Scene, duration: float, out: Path) -> dict[str, object]:
     from levilab.progress import Share
-    from levilab.stability_map import survival_map, write_map
+    from levilab.stability_map import place_for_map, survival_map, write_map
 
-    try:
-        with contextlib.closing(Share("simulating the map")) as share:
-            found = survival_map(scene, duration=duration, progress=share)
-    except KeyboardInterrupt:
-        typer.echo("levilab: interrupted, no map was written", err=True)
-        raise typer.Exit(EXIT_INTERRUPTED) from None
+    place_for_map(out)
+    with _interruptible("no map was written"), contextlib.closing(Share("simulating the map")) as share:
+        found = survival_map(scene, duration=duration, progress=share)
     for path in write_map(found, out):
         typer.echo(f"wrote {path}", err=True)
     return {

@@ -1,8 +1,9 @@
 """What a scene models and what it leaves out, and what each of it amounts to in what can be observed.
 
 Nothing is taken from a list of sizes: each effect is switched the other way by itself, and both motions are simulated
-from the same start, for LONGEST seconds at most.  The simulator is fast enough that no formula for the size of an
-effect would be quicker to trust.  What is compared: the mean height, the frequency of the precession, and the spin.
+from the start that the scene describes, for LONGEST seconds at most.  The simulator is fast enough that no formula for
+the size of an effect would be quicker to trust.  What is compared: the mean height, the frequency of the precession,
+and the spin.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 from analysis import stability
 from analysis.lines import spectral_lines
 from levilab.motion_lines import rate_for
+from levilab.simulator.errors import SimulationError
 from levilab.simulator.floating import advice, axial_field, stability_of, symmetric
 from levilab.simulator.keys import SceneError
 from levilab.simulator.single import simulate
@@ -65,14 +67,20 @@ def _leaning(scene: Scene) -> dict[str, Any]:
     return {"top.moment_tilt": [0.03 / 0.97 * scene.top.moment_tilt[1], scene.top.moment_tilt[1]]}
 
 
+def field_kinds(scene: Scene) -> tuple[_Kind, ...]:
+    """What the scene's series of the field has beyond r², and what it lacks of the exact ring."""
+    to_exact, to_least = lambda _: {"base.field": "exact"}, {"base.field": "paraxial-2"}
+    if scene.base.field in {"exact", "paraxial-2"}:
+        what = "terms r⁴ and higher of the field's potential, all of them: the exact ring"
+        return (_Kind("field beyond r²", what, lambda s: s.base.field == "exact", to_exact, to_least),)
+    power = scene.base.field.removeprefix("paraxial-")
+    return (
+        _Kind(f"field from r⁴ to r^{power}", "these terms of its potential", lambda _: True, to_exact, to_least),
+        _Kind(f"field beyond r^{power}", "all higher terms: the exact ring", lambda _: False, to_exact, {}),
+    )
+
+
 KINDS = (
-    _Kind(
-        "field beyond r²",
-        "terms r⁴ and higher of the field's potential, all of them: the exact ring",
-        lambda s: s.base.field != "paraxial-2",
-        lambda _: {"base.field": "exact"},
-        {"base.field": "paraxial-2"},
-    ),
     _Kind(
         "thickness of the base",
         "1 cm instead of a sheet at the same height, equally strong in all",
@@ -126,12 +134,12 @@ KINDS = (
 
 
 def explain(scene: Scene, duration: float = 30.0) -> tuple[Effect, ...]:
-    """Every effect of a scene with what it amounts to, in the order of KINDS.  Raises as `simulate` does."""
+    """Every effect of a scene with what it amounts to, the field's first.  Raises as `simulate` does."""
     if scene.observed == "spin":
         scene = scene.changed({"observed": "motion"})
     time = min(abs(duration), LONGEST)
     as_it_is = simulate(scene, time, tolerance=1e-6, rate=rate_for(scene))
-    return tuple(_effect(kind, scene, as_it_is, time) for kind in KINDS)
+    return tuple(_effect(kind, scene, as_it_is, time) for kind in (*field_kinds(scene), *KINDS))
 
 
 def _effect(kind: _Kind, scene: Scene, as_it_is: Trajectory, time: float) -> Effect:
@@ -140,7 +148,7 @@ def _effect(kind: _Kind, scene: Scene, as_it_is: Trajectory, time: float) -> Eff
     try:
         changed = scene.changed(changes)
         other = simulate(changed, time, tolerance=1e-6, rate=rate_for(changed))
-    except SceneError as error:
+    except (SceneError, SimulationError) as error:
         return Effect(kind.name, included, kind.what, math.nan, math.nan, math.nan, str(error))
     with_it, without = (as_it_is, other) if included else (other, as_it_is)
     height, precession, spin = (a - b for a, b in zip(_observed(with_it), _observed(without), strict=True))

@@ -71,6 +71,8 @@ def lines_of(motion: Trajectory) -> AxisLines:
     if time.size < FEWEST or time[-1] - time[0] < SHORTEST_S or motion.scene.observed == "spin":
         return AxisLines()
     rate = (time.size - 1) / float(time[-1] - time[0])
+    if rate < rate_for(motion.scene) / 2:  # too few samples: lines would be seen at other frequencies than their own
+        return AxisLines()
     n = max(round(min(_steady_time(motion), LONGEST_S) * rate), FEWEST)
     signal = (axis[:, 0] + 1j * axis[:, 1])[:n]
     found = spectral_lines(signal, rate, most=MOST, weakest=WEAKEST)

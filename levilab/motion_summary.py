@@ -91,6 +91,8 @@ def _notes(motion: Trajectory, lines: AxisLines, rate: float) -> list[str]:
             f"{rate:g} states per second are less than twice the highest line, {highest:.3g} Hz: the lines here come "
             f"from more of them, but states.csv would show it elsewhere; take --rate {math.ceil(3 * highest / 10) * 10}"
         )
+    if lines.spectrum is None and motion.time[-1] > LONGEST_S and motion.scene.observed == "motion":
+        notes.append(f"no lines: {motion.time.size} states in {motion.time[-1]:g} s are too few to tell them by")
     if lines.lines and lines.until < 0.99 * min(float(motion.time[-1]), LONGEST_S):
         notes.append(
             f"the lines are those of the first {lines.until:.3g} s: later the changing spin has moved them farther "

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from levilab.interruption import interrupted_afterwards
 from levilab.motion_lines import rate_for
 from levilab.motion_summary import as_document, summarise
 from levilab.run import STATES, RunRecord, utc_now
-from levilab.simulator.problem import SimulationError
-from levilab.simulator.single import simulate
+from levilab.simulator.errors import SimulationError
+from levilab.simulator.single import LONGEST_S, simulate
 from levilab.software import software_versions
 from levilab.writing import CannotWrite, RunWriter
 
@@ -98,8 +99,8 @@ def carry_out(
 def _samples_per_state(order: SimulationOrder) -> int:
     """Samples for each state that is kept: the spectrum needs more of them than a file does.  Checks the numbers."""
     for name, value in (("duration", order.duration), ("tolerance", order.tolerance), ("rate", order.rate)):
-        if not (math.isfinite(value) and value > 0):
-            raise SimulationError(f"--{name} {value:g}: a number above 0 is expected")
+        if not 0 < value <= LONGEST_S:
+            raise SimulationError(f"--{name} {value:g}: a number above 0 and up to {LONGEST_S:.0e} is expected")
     states = order.duration * order.rate
     if states > MOST_STATES:
         raise SimulationError(
@@ -107,7 +108,7 @@ def _samples_per_state(order: SimulationOrder) -> int:
             f"are kept: take --rate {MOST_STATES / order.duration:.2g} or less"
         )
     wanted = math.ceil(rate_for(order.scene) / order.rate)
-    return max(min(wanted, int(MOST_STATES / max(states, 1.0))), 1)
+    return max(min(wanted, int(MOST_STATES / states)), 1)
 
 
 def _simulated(
@@ -116,7 +117,7 @@ def _simulated(
     message: Callable[[str], None],
     progress: Callable[[float], None] | None,
 ) -> Summary:
-    with _telling_of_compilation(message):
+    with _telling_of_compilation(message), interrupted_afterwards():
         simulate(order.scene, min(_FIRST_S, order.duration), rate=None)
     begin = time.perf_counter()
     motion = simulate(

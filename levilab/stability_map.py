@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from levilab.simulator.floating import stability_of, survival
+from levilab.simulator.floating import axial_field, lifting, stability_of, survival, symmetric
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
 
 Array = NDArray[np.float64]
+
+TABLE, PICTURE = "survival.csv", "survival.png"
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,8 @@ def survival_map(
     """
     if masses is None:
         found = stability_of(scene)
-        windows = sorted(found.windows, key=lambda w: abs((w.light + w.heavy) / 2 - scene.top.mass_kg))
+        windows = lifting(found.windows, symmetric(scene), axial_field(scene))
+        windows.sort(key=lambda w: abs((w.light + w.heavy) / 2 - scene.top.mass_kg))
         light, heavy = (windows[0].light, windows[0].heavy) if windows else (scene.top.mass_kg * 0.95,) * 2
         margin = 0.2 * (heavy - light) + 1e-5
         masses = (light - margin, heavy + margin, 61)
@@ -72,22 +75,40 @@ def _window(scene: Scene) -> tuple[float, float]:
     return floating.spins[0] if floating and floating.spins else (np.nan, np.nan)
 
 
-def write_map(found: Map, folder: Path) -> list[Path]:
-    """survival.png and survival.csv (one row a mass, one column a spin) into a folder."""
-    from levilab.figures import save_png
-    from levilab.stability_figure import map_figure
-    from levilab.writing import CannotWrite, replace_atomically
+def place_for_map(folder: Path) -> None:
+    """Make the folder, before anything is simulated; a map that is there stays.  Raises CannotWrite."""
+    from levilab.writing import CannotWrite
 
-    rows = ["mass_kg," + ",".join(f"{spin:.6g}" for spin in found.spins)]
-    for mass, alive in zip(found.masses, found.survived, strict=True):
-        rows.append(f"{mass:.8g}," + ",".join("1" if one else "0" for one in alive))
-    table, picture = folder / "survival.csv", folder / "survival.png"
+    for path in (folder / TABLE, folder / PICTURE):
+        if path.exists():
+            raise CannotWrite(f"{path} is there already: give another folder with --out, or move it away")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        replace_atomically(table, "\n".join(rows) + "\n")
-        save_png(map_figure(found), picture)
+        (folder / TABLE).touch()
+        (folder / TABLE).unlink()
     except OSError as error:
-        raise CannotWrite(
-            f"{folder}: the map cannot be written: {error.strerror}; give another folder with --out"
-        ) from None
-    return [table, picture]
+        raise _cannot(folder, error) from None
+
+
+def write_map(found: Map, folder: Path) -> list[Path]:
+    """survival.png and survival.csv (one row a top; 1: survived) into a folder."""
+    from levilab.figures import save_png
+    from levilab.stability_figure import map_figure
+    from levilab.writing import replace_atomically
+
+    rows = ["mass_kg,spin_hz,survived"]
+    for mass, alive in zip(found.masses, found.survived, strict=True):
+        rows += [f"{mass:.8g},{spin:.6g},{one:d}" for spin, one in zip(found.spins, alive, strict=True)]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        replace_atomically(folder / TABLE, "\n".join(rows) + "\n")
+        save_png(map_figure(found), folder / PICTURE)
+    except OSError as error:
+        raise _cannot(folder, error) from None
+    return [folder / TABLE, folder / PICTURE]
+
+
+def _cannot(folder: Path, error: OSError) -> Exception:
+    from levilab.writing import CannotWrite
+
+    return CannotWrite(f"{folder}: the map cannot be written: {error.strerror}; give another folder with --out")

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from levilab.simulator.ensemble import Ensemble, simulate_many
-    from levilab.simulator.problem import SimulationError
+    from levilab.simulator.errors import SimulationError
     from levilab.simulator.scene import Scene, SceneError, preset, presets, read_scene, with_settings
     from levilab.simulator.single import simulate
     from levilab.simulator.trajectory import Accuracy, Event, Trajectory
@@ -29,7 +29,7 @@ _HOME = {
     "presets": "scene",
     "read_scene": "scene",
     "with_settings": "scene",
-    "SimulationError": "problem",
+    "SimulationError": "errors",
     "simulate": "single",
     "Accuracy": "trajectory",
     "Event": "trajectory",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import os
 import shutil
 import sys
 import time
@@ -31,14 +32,23 @@ PART_OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract"}, "forceinl
 
 
 @cache
-def _folder() -> Path:
+def _folder() -> Path | None:
+    """Where compiled code is kept, or None if nothing can be: then it is compiled for each process.
+
+    Numba would look for another place, beside its source, where it takes notice of one file's changes only.
+    """
     digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:2]}".encode())
     for source in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(source.read_bytes())
     folder = user_cache_path("levilab", appauthor=False) / "kernels" / digest.hexdigest()[:16]
-    if not folder.exists():
-        _sweep(folder.parent)
-    return folder
+    try:
+        if not folder.exists():
+            _sweep(folder.parent)
+            folder.mkdir(parents=True)
+        folder.touch()  # that it is in use
+        return folder if os.access(folder, os.W_OK) else None
+    except OSError:
+        return None
 
 
 def _sweep(kernels: Path) -> None:
@@ -58,11 +68,16 @@ def part(function: F) -> F:
 def kernel(function: F) -> F:
     """An entry point: compiled once for each kind of scene, kept on disk, run without the interpreter's lock."""
     config: Any = numba.core.config
-    before = config.CACHE_DIR
-    config.CACHE_DIR = before or str(_folder())  # read by numba here, when the function is decorated
+    before, folder = config.CACHE_DIR, _folder()
+    config.CACHE_DIR = before or str(folder or "")  # read by numba here, when the function is decorated
     try:
         compiled: F = numba.njit(
-            function, error_model="numpy", fastmath={"contract"}, cache=True, nogil=True, boundscheck=False
+            function,
+            error_model="numpy",
+            fastmath={"contract"},
+            cache=bool(before or folder),
+            nogil=True,
+            boundscheck=False,
         )
     finally:
         config.CACHE_DIR = before

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 from concurrent.futures import ThreadPoolExecutor
@@ -11,16 +12,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from levilab.simulator import top
+from levilab.simulator import falls, top
+from levilab.simulator.errors import SimulationError
 from levilab.simulator.estimate import estimate
 from levilab.simulator.keys import SceneError
 from levilab.simulator.lanes import LANES, advance_many, numbers_of
 from levilab.simulator.motion import STATE_SIZE
-from levilab.simulator.problem import NOWHERE, Problem, SimulationError, end_at, scheme_for, travelled
+from levilab.simulator.problem import NOWHERE, Problem, end_at, scheme_for, travelled
 from levilab.simulator.schemes import SCHEMES
-from levilab.simulator.single import check, simulate
+from levilab.simulator.single import ROOM, check, simulate
 from levilab.simulator.steps import longest_step
-from levilab.simulator.stops import kinks, stops_between
+from levilab.simulator.stops import stops_between
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -30,8 +32,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
-#: Tops whose step is found one by one, to choose that of all: the corners of a map and some inside.
-PILOTS = 8
+#: Tops whose step is found one by one, to choose that of all: the corners of a map and so many evenly through it.
+PILOTS = 6
 #: Motion [s] that a step is chosen on; errors grow with the time, and the tolerance is shared out accordingly.
 PILOT_DURATION = 3.0
 
@@ -69,7 +71,7 @@ class Ensemble:
     def spin_hz(self) -> Array:
         """Spins ω₃/2π at the end [Hz]."""
         along = np.sum(self.states[..., top.L] * self.states[..., top.N], axis=-1)
-        washers = self.scene.washers.inertia_kg_m2
+        washers = self.values.get("washers.inertia_kg_m2", np.array(self.scene.washers.inertia_kg_m2))
         inertia = self.values.get("top.inertia_axial_kg_m2", np.array(self.scene.top.inertia_axial_kg_m2))
         return np.asarray((along - self.states[..., top.LOOSE] * (washers > 0)) / (inertia - washers) / (2 * np.pi))
 
@@ -89,7 +91,7 @@ def simulate_many(
 
     over: dotted keys of the scene with their values, broadcast against each other; duration [s]; tolerance: wanted
     error of place [m] and axis [rad] at the end, from which one step is chosen on a few of the tops; step [s]:
-    fixes it instead; cores: threads, as many as there are where None; errors: estimate every top's error by a
+    fixes it for all instead; cores: threads, as many as there are where None; errors: estimate every top's error by a
     second, coarser run, which takes half as long again; progress: is told the share of the work done.
 
     Raises SceneError for keys and values that a scene does not allow, SimulationError for senseless numbers.
@@ -105,20 +107,20 @@ def simulate_many(
         raise SimulationError(f"duration = {duration} s: many at once go forwards only")
     if scene.observed == "spin":
         raise SceneError("observed = spin: the spin alone has a closed form; many at once need observed = motion")
-    keys = list(over)
-    values = np.broadcast_arrays(*(np.asarray(over[key]) for key in keys)) if keys else [np.zeros(1)]
+    keys, values = list(over), _broadcast(over)
     shape = values[0].shape
     tops = [
-        _Top.of(scene.changed({key: _plain(v.flat[i]) for key, v in zip(keys, values, strict=False)}), duration)
+        _Top.of(scene.changed({key: _plain(v.flat[i]) for key, v in zip(keys, values, strict=False)}))
         for i in range(values[0].size)
     ]
-    share = step / tops[0].longest if step else _step_share(tops, duration, tolerance)
+    longest = np.array([one.longest for one in tops])
+    steps = np.full(len(tops), step) if step else longest * _step_share(tops, _pilots(shape), duration, tolerance)
     ends = _Ends.empty(len(tops))
     threads = cores or os.cpu_count() or 1
     work = [part for group in _groups(tops) for part in _parts(group, threads)]
     with ThreadPoolExecutor(threads) as pool:
         for done, _ in enumerate(
-            pool.map(lambda part: _advance(tops, part, duration, share, ends, errors=errors), work), 1
+            pool.map(lambda part: _advance(tops, part, duration, steps, ends, errors=errors), work), 1
         ):
             if progress is not None:
                 progress(done / len(work))
@@ -134,23 +136,37 @@ def simulate_many(
     )
 
 
+def _broadcast(over: Mapping[str, ArrayLike]) -> list[NDArray[Any]]:
+    """The values of all keys in one shape; of no key one value.  Raises SimulationError."""
+    if not over:
+        return [np.zeros(1)]
+    arrays = {key: np.asarray(values) for key, values in over.items()}
+    try:
+        return list(np.broadcast_arrays(*arrays.values()))
+    except ValueError:
+        shapes = ", ".join(f"{key} {array.shape}" for key, array in arrays.items())
+        raise SimulationError(
+            f"these values do not fit together: {shapes}; shapes that broadcast are expected"
+        ) from None
+
+
 def _plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
 @dataclass(frozen=True)
 class _Top:
-    """One top, made ready.  longest: the longest step it allows [s]; kinked: its drive jumps or bends on the way."""
+    """One top, made ready.  longest: the longest step it allows [s]; kinked: its drive is more than a lasting sine."""
 
     problem: Problem
     longest: float
     kinked: bool
 
     @classmethod
-    def of(cls, scene: Scene, duration: float) -> _Top:
+    def of(cls, scene: Scene) -> _Top:
         model, start = top.model_of(scene), top.start_of(scene)
         problem = Problem(scene, model, start, scheme_for(None, model))
-        kinked = model.drive is not None and kinks(scene.drive, 0.0, duration).size > 0
+        kinked = model.drive is not None and (scene.drive.waveform != "sine" or scene.drive.off_s is not None)
         return cls(problem, longest_step(scene, model, start, problem.scheme), kinked)
 
 
@@ -166,12 +182,21 @@ class _Ends:
         return cls(np.empty((n, STATE_SIZE)), np.zeros(n, dtype=np.bool_), np.full(n, np.nan), np.full(n, np.nan))
 
 
-def _step_share(tops: list[_Top], duration: float, tolerance: float) -> float:
+def _pilots(shape: tuple[int, ...]) -> set[int]:
+    """Places in a map of this shape, as flat indices: its corners and some of the rest."""
+    size = math.prod(shape)
+    if size == 0:
+        return set()
+    corners = np.array(list(itertools.islice(itertools.product(*((0, n - 1) for n in shape)), 16)), dtype=np.intp)
+    flat = np.ravel_multi_index(tuple(corners.T), shape) if shape else np.zeros(1, dtype=np.intp)
+    return {int(i) for i in flat} | {round(i) for i in np.linspace(0, size - 1, PILOTS)}
+
+
+def _step_share(tops: list[_Top], pilots: set[int], duration: float, tolerance: float) -> float:
     """The part of a top's longest step that keeps the errors within the tolerance, from a few of them."""
-    some = {round(i) for i in np.linspace(0, len(tops) - 1, PILOTS)}
     time = min(duration, PILOT_DURATION)
     shares = []
-    for i in some:
+    for i in pilots:
         motion = simulate(tops[i].problem.scene, time, tolerance=tolerance * time / duration, rate=None)
         if motion.accuracy.reached:
             shares.append(motion.accuracy.step / tops[i].longest)
@@ -201,24 +226,50 @@ def _parts(group: list[int], threads: int) -> list[list[int]]:
     return [group[i : i + size] for i in range(0, len(group), size)]
 
 
-def _advance(tops: list[_Top], part: list[int], duration: float, share: float, ends: _Ends, *, errors: bool) -> None:
-    some = [tops[i] for i in part]
-    steps = np.array([share * one.longest for one in some])
-    counts = np.maximum(np.ceil(duration / steps), 1).astype(np.int64)
+def _advance(
+    tops: list[_Top], part: list[int], duration: float, all_steps: Array, ends: _Ends, *, errors: bool
+) -> None:
+    some, steps = [tops[i] for i in part], all_steps[part]
+    counts = np.maximum(np.ceil(duration / steps * (1 - 1e-12)), 1).astype(np.int64)
     problem = some[0].problem
     if some[0].kinked:
         states, survived = _one_by_one(some, np.full(len(some), duration), steps, escape=True)
     else:
-        states, taken = _together(some, duration / counts, counts, problem.escape)
-        survived = (taken == counts) & _inside(states, problem.escape)
-    ends.states[part], ends.survived[part] = states, survived
+        starts = np.array([one.problem.start for one in some])
+        states, taken = _together(some, starts, duration / counts, counts, problem.escape)
+        survived = (taken == counts) & falls.inside(states, problem.escape)
     if errors:
-        twice, four = (_coarse(some, states[:, top.TIME], times * steps) for times in (2, 4))
+        lasted = states[:, top.TIME]
+        # where a fall or a kink of the drive leaves no room for longer steps, half of them tell as much
+        room = (lasted > ROOM * steps) & ~np.array([one.kinked for one in some])
+        lengths = [np.where(room, times * steps, np.minimum(steps, lasted) / 2) for times in (2, 4)]
+        twice = _coarse(some, lasted, lengths[0])
+        four = _coarse(some, lasted, lengths[1]) if np.any(room) else twice
         for error, columns in ((ends.position_error, top.R), (ends.axis_error, top.N)):
             error[part] = estimate(states[:, columns], twice[:, columns], four[:, columns], problem.scheme.order)
-    late = ~survived
-    states[late] = _at_the_limit(states[late], steps[late], problem.escape)
-    ends.states[part] = states
+    late = np.flatnonzero(~survived)
+    if late.size:
+        if not some[0].kinked:
+            fallen = [some[i] for i in late]
+            states[late] = falls.at_the_crossing(
+                states[late], (duration / counts)[late], problem.escape, lambda s, h: _in_one_step(fallen, s, h)
+            )
+        _add_uncertain_moment([some[i] for i in late], states[late], np.array(part)[late], ends)
+    ends.states[part], ends.survived[part] = states, survived
+
+
+def _add_uncertain_moment(some: list[_Top], states: Array, where: NDArray[np.intp], ends: _Ends) -> None:
+    """The moment of a fall is uncertain, too: the motion across the limit turns the place's error to time."""
+    height = falls.crossed_height(states, some[0].problem.escape)
+    time = ends.position_error[where] / falls.speeds(states, height)
+    inverse = np.array([one.problem.model.body.inverse_transverse for one in some])
+    ends.position_error[where] += time * np.linalg.norm(states[:, top.V], axis=1)
+    ends.axis_error[where] += time * inverse * np.linalg.norm(np.cross(states[:, top.L], states[:, top.N]), axis=1)
+
+
+def _in_one_step(some: list[_Top], states: Array, times: Array) -> Array:
+    """States so much later [s] or earlier, each in one step."""
+    return _together(some, states, times, np.ones(len(some), dtype=np.int64), NOWHERE)[0]
 
 
 def _coarse(some: list[_Top], times: Array, steps: Array) -> Array:
@@ -226,13 +277,15 @@ def _coarse(some: list[_Top], times: Array, steps: Array) -> Array:
     if some[0].kinked:
         return _one_by_one(some, times, steps, escape=False)[0]
     counts = np.maximum(np.ceil(times / steps), 1).astype(np.int64)
-    return _together(some, times / counts, counts, NOWHERE)[0]
+    starts = np.array([one.problem.start for one in some])
+    return _together(some, starts, times / counts, counts, NOWHERE)[0]
 
 
-def _together(some: list[_Top], steps: Array, counts: Counts, escape: tuple[float, float]) -> tuple[Array, Counts]:
+def _together(
+    some: list[_Top], starts: Array, steps: Array, counts: Counts, escape: tuple[float, float]
+) -> tuple[Array, Counts]:
     """States at the ends and steps taken, by the kernel with lanes."""
     scheme = SCHEMES[some[0].problem.scheme.name]
-    starts = np.array([one.problem.start for one in some])
     numbers = np.array([numbers_of(one.problem.model) for one in some])
     states, taken = np.empty_like(starts), np.zeros(len(some), dtype=np.int64)
     model, a, b = some[0].problem.model, np.array(scheme.drifts), np.array(scheme.kicks)
@@ -252,22 +305,3 @@ def _one_by_one(some: list[_Top], times: Array, steps: Array, *, escape: bool) -
         else:
             states[i] = end_at(one.problem, stops)
     return states, lasted
-
-
-def _inside(states: Array, escape: tuple[float, float]) -> NDArray[np.bool_]:
-    x, y, z = states[:, top.R].T
-    return np.asarray((z > escape[1]) & (np.hypot(x, y) < escape[0]))
-
-
-def _at_the_limit(states: Array, steps: Array, escape: tuple[float, float]) -> Array:
-    """States that are a part of a step outside, taken back to the limit along their velocity."""
-    x, y, z = states[:, top.R].T
-    vx, vy, vz = states[:, top.V].T
-    r = np.hypot(x, y)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        back = np.fmax(np.where(z <= escape[1], (z - escape[1]) / vz, 0), (r - escape[0]) * r / (x * vx + y * vy))
-    back = np.clip(np.nan_to_num(back), 0, steps)
-    taken_back = states.copy()
-    taken_back[:, top.R] -= back[:, None] * states[:, top.V]
-    taken_back[:, top.TIME] -= back
-    return taken_back

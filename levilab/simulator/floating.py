@@ -55,14 +55,42 @@ def symmetric(scene: Scene) -> stability.Symmetric:
         top.inertia_axial_kg_m2,
         top.moment_a_m2 * top.moment_tilt[1],
         scene.gravity_m_s2,
+        _disc_stiffnesses(scene) if top.magnet == "disc" else None,
     )
+
+
+#: Steps for second differences [m, rad]: their error is 1e-7 of the stiffness, rounding 1e-8.
+_DX, _DTHETA = 1e-4, 1e-3
+
+
+def _disc_stiffnesses(scene: Scene) -> Callable[[Array], Array]:
+    """The stiffnesses of a magnet of finite size, from its energy when it is moved and tilted a little."""
+    field = base_field(scene)
+    nodes = disc_nodes(scene.top.magnet_radius_m, scene.top.magnet_height_m)
+    moment = scene.top.moment_a_m2 * scene.top.moment_tilt[1]
+
+    def energy(heights: Array, x: float, theta: float) -> Array:
+        cos, sin = math.cos(theta), math.sin(theta)
+        turned = nodes[:, :3] @ np.array([[cos, 0.0, -sin], [0.0, 1.0, 0.0], [sin, 0.0, cos]])
+        places = turned[None] + np.stack([np.full_like(heights, x), np.zeros_like(heights), heights], axis=-1)[:, None]
+        flux = flux_density(field, places) @ np.array([sin, 0.0, cos])
+        return np.asarray(-moment * (flux @ nodes[:, 3]))
+
+    def stiffnesses(heights: Array) -> Array:
+        upright = energy(heights, 0.0, 0.0)
+        # even in x and θ each, and E(x, θ) = E(−x, −θ)
+        tilt = 2 * (energy(heights, 0.0, _DTHETA) - upright) / _DTHETA**2
+        sideways = 2 * (energy(heights, _DX, 0.0) - upright) / _DX**2
+        both = (energy(heights, _DX, _DTHETA) - energy(heights, _DX, -_DTHETA)) / (2 * _DX * _DTHETA)
+        return np.array([tilt, sideways, both])
+
+    return stiffnesses
 
 
 def axial_field(scene: Scene) -> Callable[[Array], Array]:
     """B, B′ and B″ on the axis as an upright top feels them: at its centre, or averaged over its magnet.
 
-    The average's radial stiffness is that of a field with the averaged B, B′ and B″: exact, because the average over
-    an upright body of a field without sources has none either.
+    The average's force and its stiffness up and down are those of a point in it; what tilting does is in `symmetric`.
     """
     field = base_field(scene)
     if scene.top.magnet == "point":
@@ -86,6 +114,8 @@ def axial_field(scene: Scene) -> Callable[[Array], Array]:
 
 def stability_of(scene: Scene) -> Stability:
     """Windows, equilibria and modes of a scene's top, upright on the axis of its base (a lean of it is left out)."""
+    if scene.gravity_m_s2 == 0:
+        raise SceneError("gravity_m_s2 = 0: without weight there is nothing to float; a number above 0 is expected")
     top, field = symmetric(scene), axial_field(scene)
     low, high = _range(scene)
     found = stability.windows(field, top, low, high)

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from levilab.errors import LevilabError
 from levilab.simulator import escapes, top
 from levilab.simulator.braking import Flowing, LooseFlowing
+from levilab.simulator.errors import SimulationError
 from levilab.simulator.motion import STATE_SIZE
 from levilab.simulator.schemes import SCHEMES, Scheme
 from levilab.simulator.splitting import advance
@@ -32,10 +32,6 @@ NOWHERE = (math.inf, -math.inf)
 
 #: Steps in one call of a kernel; between calls progress is told and Ctrl-C is heard (about 50 ms).
 STEPS_IN_A_CALL = 100_000
-
-
-class SimulationError(LevilabError):
-    """A simulation that cannot be carried out."""
 
 
 @dataclass(frozen=True)
@@ -126,8 +122,8 @@ def _escape(problem: Problem, state: Array, interval: Stops) -> tuple[Array, Eve
     if through:
         return states[-1], None
     at = len(states) - 1
-    after = problem.advanced(states[-1], single.part(at, at + 1), NOWHERE)[0][-1]
-    if not np.all(np.isfinite(after)):
+    after, through = problem.advanced(states[-1], single.part(at, at + 1), NOWHERE)
+    if not (through and np.all(np.isfinite(after[-1]))):
         raise SimulationError(
             f"the motion cannot be followed beyond {states[-1][top.TIME]:.6g} s, where its numbers leave their range; "
             f"the last place was ({', '.join(f'{x:.4g}' for x in states[-1][top.R])}) m: "
@@ -135,7 +131,7 @@ def _escape(problem: Problem, state: Array, interval: Stops) -> tuple[Array, Eve
         )
     moved = mover(problem, single.part(at, at + 1))
     length = float(single.times[at + 1] - single.times[at])
-    return after, escapes.escaped(states[-1], length, moved, problem.escape)
+    return after[-1], escapes.escaped(states[-1], length, moved, problem.escape)
 
 
 def mover(problem: Problem, interval: Stops) -> Callable[[Array, float], Array]:

@@ -10,7 +10,7 @@ import math
 import sys
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, ConfigDict, Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, NonNegativeFloat, model_validator
 from pydantic_core import PydanticCustomError
 
 from levilab.config import Settings
@@ -55,7 +55,15 @@ def _from_zero(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value <= sys.float_info.max
 
 
-Vector = Annotated[tuple[float, float, float], _numbers(3)]
+# what no bench has, and no number of a float stands: named here rather than found as an infinity inside a kernel
+Length = Annotated[float, Field(gt=1e-6, lt=1e3)]
+Mass = Annotated[float, Field(gt=1e-9, lt=1e6)]
+Inertia = Annotated[float, Field(gt=1e-18, lt=1e6)]
+Turns = Annotated[float, Field(gt=-1e6, lt=1e6)]
+Frequency = Annotated[float, Field(gt=0, lt=1e6)]
+Coordinate = Annotated[float, Field(gt=-1e6, lt=1e6)]
+Vector = Annotated[tuple[Coordinate, Coordinate, Coordinate], _numbers(3)]
+Direction = Annotated[tuple[float, float, float], _numbers(3)]
 Pair = Annotated[tuple[float, float], _numbers(2)]
 Coefficient = Annotated[float | tuple[float, float] | None, BeforeValidator(_one_or_two)]
 Never = Annotated[NonNegativeFloat | None, BeforeValidator(lambda value: None if value == "never" else value)]
@@ -73,12 +81,12 @@ class Base(Part):
     origin_m: height of the middle of its thickness; tilt: the base leans by tilt_rad towards tilt_azimuth_rad.
     """
 
-    inner_radius_m: PositiveFloat = 0.030
-    outer_radius_m: PositiveFloat = 0.055
-    strength_t_m: float = 1.40e-3
+    inner_radius_m: Length = 0.030
+    outer_radius_m: Length = 0.055
+    strength_t_m: Coordinate = 1.40e-3
     field: FieldKind = "paraxial-2"
-    thickness_m: NonNegativeFloat = 0.0
-    origin_m: float = 0.0
+    thickness_m: float = Field(default=0.0, ge=0, lt=1e3)
+    origin_m: Coordinate = 0.0
     tilt_rad: float = Field(default=0.0, gt=-math.pi / 2, lt=math.pi / 2)
     tilt_azimuth_rad: float = 0.0
 
@@ -90,14 +98,14 @@ class Top(Part):
     is spread evenly over a disc of magnet_radius_m and magnet_height_m.
     """
 
-    mass_kg: PositiveFloat = 0.02526
-    inertia_transverse_kg_m2: PositiveFloat = 1.04e-6
-    inertia_axial_kg_m2: PositiveFloat = 1.731314e-6
-    moment_a_m2: float = -0.714
+    mass_kg: Mass = 0.02526
+    inertia_transverse_kg_m2: Inertia = 1.04e-6
+    inertia_axial_kg_m2: Inertia = 1.731314e-6
+    moment_a_m2: Coordinate = -0.714
     moment_tilt: Pair = (0.0, 1.0)
     magnet: Literal["point", "disc"] = "point"
-    magnet_radius_m: PositiveFloat = 0.0144
-    magnet_height_m: PositiveFloat = 0.0033
+    magnet_radius_m: Length = 0.0144
+    magnet_height_m: Length = 0.0033
 
     @property
     def aligned(self) -> bool:
@@ -147,10 +155,10 @@ class Drive(Part):
     """
 
     waveform: Literal["off", "sine", "triangle", "square", "unipolar"] = "off"
-    amplitude_t: NonNegativeFloat = 4e-4
-    frequency_hz: PositiveFloat = 30.0
+    amplitude_t: float = Field(default=4e-4, ge=0, lt=1e6)
+    frequency_hz: Frequency = 30.0
     phase_rad: float = math.pi / 2
-    direction: Vector = (0.0, 1.0, 0.0)
+    direction: Direction = (0.0, 1.0, 0.0)
     off_s: Never = None
 
     @property
@@ -173,12 +181,12 @@ class Start(Part):
     position_m: Vector = (0.001, 0.0, 0.071)
     velocity_m_s: Vector = (-0.0007, 0.0, 0.002)
     tilt_rad: float = Field(default=0.01, ge=0, lt=math.pi)
-    spin_hz: float = 30.0
+    spin_hz: Turns = 30.0
     precession: Literal["thesis", "steady", "none"] = "thesis"
 
 
 class Escape(Part):
     """Where the top counts as fallen: farther than radius_m from the base's axis, or at height_m or below."""
 
-    radius_m: PositiveFloat = 0.02
-    height_m: float = 0.0
+    radius_m: Length = 0.02
+    height_m: Coordinate = 0.0

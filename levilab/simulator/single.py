@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from levilab.simulator import escapes, top
+from levilab.simulator.errors import SimulationError
 from levilab.simulator.estimate import estimate
-from levilab.simulator.problem import Problem, SimulationError, end_at, mover, scheme_for, travelled
-from levilab.simulator.spin import DECAYS
+from levilab.simulator.problem import Problem, end_at, mover, scheme_for, travelled
+from levilab.simulator.spin import DECAYS, since_infinity
 from levilab.simulator.steps import longest_step
-from levilab.simulator.stops import every_step, stops_between
+from levilab.simulator.stops import every_step, kinks, stops_between
 from levilab.simulator.trajectory import Accuracy, Event, Trajectory
 
 if TYPE_CHECKING:
@@ -26,6 +27,12 @@ Array = NDArray[np.float64]
 
 #: A chaotic motion has no step that is small enough: below this part of the longest step it is told instead.
 SMALLEST = 1 / 256
+
+#: Thirty years [s].
+LONGEST_S = 1e9
+
+#: Steps between kinks from which on rounding their number up changes twice their length by little.
+ROOM = 16
 
 Watch = Mapping[str, Callable[[Trajectory], Array]]
 
@@ -79,6 +86,12 @@ def simulate(
     """
     check(duration=duration, tolerance=tolerance, rate=rate, step=step)
     if scene.observed == "spin":
+        given = {"events": events, "scheme": scheme, "step": step, "start": start}
+        if senseless := [name for name, value in given.items() if value is not None]:
+            raise SimulationError(
+                f"{senseless[0]}: a scene with observed = spin has a closed form, nothing is integrated: "
+                "take observed = motion"
+            )
         return spin_alone(scene, duration, tolerance, rate)
     model = top.model_of(scene)
     state = top.start_of(scene) if start is None else np.array(start, dtype=np.float64)
@@ -92,8 +105,8 @@ def simulate(
 
 def check(*, duration: float, tolerance: float, rate: float | None, step: float | None) -> None:
     """Refuse numbers that make no sense, by name.  Raises SimulationError."""
-    if not (math.isfinite(duration) and duration != 0):
-        raise SimulationError(f"duration = {duration} s: a finite time other than 0 is expected")
+    if not 0 < abs(duration) <= LONGEST_S:
+        raise SimulationError(f"duration = {duration} s: a time other than 0 and up to {LONGEST_S:.0e} s is expected")
     for name, value in (("tolerance", tolerance), ("rate", rate), ("step", step)):
         if value is not None and not (math.isfinite(value) and value > 0):
             raise SimulationError(f"{name} = {value}: a number above 0 is expected")
@@ -120,7 +133,7 @@ def _to_tolerance(problem: Problem, wanted: _Wanted, tolerance: float, step: flo
 def _errors(problem: Problem, run: Run, step: float) -> tuple[float, float]:
     """Estimated errors of the last state, place [m] and axis [rad]: from the same motion with longer steps."""
     end = run.states[-1]
-    twice, four = (_coarse(problem, end[top.TIME], times * step) for times in (2, 4))
+    twice, four = _others(problem, end[top.TIME], step)
     # rounding: a random walk of half a unit in the last place, twice for each stage
     floor = 2.2e-16 * math.sqrt(2 * run.steps * problem.scheme.stages)
     position = estimate(end[top.R], twice[top.R], four[top.R], problem.scheme.order)
@@ -133,7 +146,21 @@ def _errors(problem: Problem, run: Run, step: float) -> tuple[float, float]:
     return (position, axis) if math.isfinite(position + axis) else (math.inf, math.inf)
 
 
-def _coarse(problem: Problem, until: float, step: float) -> Array:
+def _others(problem: Problem, until: float, step: float) -> tuple[Array, Array]:
+    """The state at a time with steps twice and four times as long, to tell the error from.
+
+    Where there is no room for them, because a fall or the next kink of the drive comes first, with half the steps.
+    """
+    begin = float(problem.start[top.TIME])
+    lasted = abs(until - begin)
+    pieces = 1 + kinks(problem.scene.drive, min(begin, until), max(begin, until)).size
+    if lasted / pieces > ROOM * step:
+        return _with_steps(problem, until, 2 * step), _with_steps(problem, until, 4 * step)
+    half = _with_steps(problem, until, min(step, lasted) / 2)
+    return half, half
+
+
+def _with_steps(problem: Problem, until: float, step: float) -> Array:
     """The state at a time, with steps of that length and no escape."""
     stops = stops_between(problem.start[top.TIME], until, step, problem.scene.drive)
     return end_at(problem, stops)
@@ -200,6 +227,12 @@ def spin_alone(scene: Scene, duration: float, tolerance: float, rate: float | No
     states[:, top.TIME] = times
     spin = abs(start[top.CLOCK])
     if scene.drag.law != "none" and spin > 0 and any(scene.drag.constants):
+        longest_ago = since_infinity(scene.drag.law, spin, scene.drag.constants)
+        if -duration >= longest_ago:
+            raise SimulationError(
+                f"duration = {duration} s: under this drag the spin was infinite {longest_ago:.6g} s ago; "
+                "a shorter way back is expected"
+            )
         now = DECAYS[scene.drag.law].after(spin, times, *scene.drag.constants)
         states[:, top.L] = start[top.L] * (now / spin)[:, None]
         states[:, top.CLOCK] = np.copysign(now, start[top.CLOCK])

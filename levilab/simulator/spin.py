@@ -38,11 +38,29 @@ class SpinDecay:
 
 def _mixed_after(spin: float, t: ArrayLike, c1: float, c2: float) -> Array:
     # Bernoulli: 1/ω obeys the linear equation d(1/ω)/dt = C₁/ω + C₂
-    x = c1 * np.asarray(t, dtype=np.float64)
-    return np.asarray(1 / (np.exp(x) / spin + c2 * np.expm1(x) / c1))
+    t = np.asarray(t, dtype=np.float64)
+    return np.asarray(1 / (np.exp(c1 * t) / spin + c2 * t * _over_its_argument(np.expm1, c1 * t)))
 
 
-#: Stokes −C₁ω, Newton −C₂ω², laminar disc −Cω^(3/2), mixed −C₁ω − C₂ω² (both > 0).
+def _mixed_elapsed(spin: float, end: float, c1: float, c2: float) -> float:
+    # log1p: where one of the constants is small the logarithm is that of nearly one
+    u = (1 / end - 1 / spin) / (c1 / spin + c2)
+    return float(u * _over_its_argument(np.log1p, c1 * u))
+
+
+def _mixed_turned(spin: float, end: ArrayLike, c1: float, c2: float) -> Array:
+    w = (spin - np.asarray(end)) / (c1 + c2 * np.asarray(end))
+    return np.asarray(w * _over_its_argument(np.log1p, c2 * w))
+
+
+def _over_its_argument(function: Callable[[Array], Array], x: ArrayLike) -> Array:
+    """function(x)/x for a function that is x + O(x²): 1 at 0, where one of the two constants is none."""
+    x = np.asarray(x, dtype=np.float64)
+    other = np.where(x == 0, 1.0, x)
+    return np.where(x == 0, 1.0, function(other) / other)
+
+
+#: Stokes −C₁ω, Newton −C₂ω², laminar disc −Cω^(3/2), mixed −C₁ω − C₂ω² (one of them may be 0).
 DECAYS: dict[str, SpinDecay] = {
     "stokes": SpinDecay(
         after=lambda spin, t, c: spin * np.exp(-c * np.asarray(t)),
@@ -61,8 +79,14 @@ DECAYS: dict[str, SpinDecay] = {
     ),
     "mixed": SpinDecay(
         after=_mixed_after,
-        # log1p: where one of the constants is small the logarithm is that of nearly one
-        elapsed=lambda spin, end, c1, c2: np.log1p(c1 * (1 / end - 1 / spin) / (c1 / spin + c2)) / c1,
-        turned=lambda spin, end, c1, c2: np.log1p(c2 * (spin - end) / (c1 + c2 * end)) / c2,
+        elapsed=_mixed_elapsed,
+        turned=_mixed_turned,
     ),
 }
+
+
+def since_infinity(law: str, spin: float, constants: tuple[float, ...]) -> float:
+    """So long ago [s] a spin [rad/s] was infinite, by the law: further back there is none.  inf under Stokes's law."""
+    if law == "stokes" or (law == "mixed" and constants[-1] == 0):
+        return np.inf
+    return float(DECAYS[law].elapsed(np.inf, spin, *constants))

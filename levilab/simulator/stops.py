@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from levilab.simulator.errors import SimulationError
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -59,9 +61,18 @@ def every_step(stops: Stops) -> Stops:
     return Stops(times, np.ones(index.size, dtype=np.int64), stops.levels[index], stops.slopes[index])
 
 
+#: Steps and kinks at most: more would take days, or the machine's memory.
+MOST_STEPS, MOST_KINKS = 10**11, 10**7
+
+
 def stops_between(start: float, end: float, step: float, drive: Drive, samples: Array | None = None) -> Stops:
     """The stops from start to end (either way in time) with steps no longer than `step` [s]."""
     low, high = min(start, end), max(start, end)
+    if not (high - low) / step < MOST_STEPS:
+        raise SimulationError(
+            f"{(high - low) / step:.2g} steps of {step:.2g} s would be needed, at most {MOST_STEPS:.0e} are taken: "
+            "a shorter duration, a slower spin or heavier inertias are expected"
+        )
     wanted = [np.array([low, high]), kinks(drive, low, high)]
     if samples is not None:
         wanted.append(samples[(samples > low) & (samples < high)])
@@ -97,6 +108,11 @@ def kinks(drive: Drive, low: float, high: float) -> Array:
     if offset is not None and drive.amplitude_t != 0:
         f, turns = drive.frequency_hz, drive.phase_rad / (2 * math.pi)
         first, last = math.ceil(2 * (f * low + turns - offset)), math.floor(2 * (f * high + turns - offset))
+        if last - first > MOST_KINKS:
+            raise SimulationError(
+                f"drive.frequency_hz = {f:g}: the {drive.waveform} has {last - first} corners in {high - low:g} s, "
+                f"at most {MOST_KINKS:.0e} are gone through: take a sine, a lower frequency or a shorter duration"
+            )
         found.extend(((np.arange(first, last + 1) / 2 + offset - turns) / f).tolist())
     times = np.array(found, dtype=np.float64)
     return np.asarray(times[(times > low) & (times < high)])

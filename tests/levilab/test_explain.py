@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from levilab.explain import KINDS, explain
+from levilab.explain import KINDS, explain, field_kinds
 from levilab.explain_table import print_effects
 from levilab.simulator.scene import SceneError, preset
 from levilab.simulator.single import simulate
@@ -44,7 +44,7 @@ def test_switching_an_effect_on_changes_the_motion_by_what_was_said(name):
     scene = SCENES[name]
     height, precession = measured(scene)
     compared = 0
-    for kind, effect in zip(KINDS, explain(scene), strict=True):
+    for kind, effect in zip((*field_kinds(scene), *KINDS), explain(scene), strict=True):
         assert effect.name == kind.name
         assert effect.included == kind.included(scene)
         if effect.included or kind.name == "drag of the air":  # its change grows with the time
@@ -92,3 +92,12 @@ def test_the_table_names_every_effect(capsys):
     shown = capsys.readouterr().out
     assert all(kind.name in shown for kind in KINDS)
     assert "out" in shown
+
+
+def test_a_series_is_told_by_what_it_has_and_by_what_it_lacks():
+    has, lacks = explain(preset("undriven").changed({"base.field": "paraxial-4"}), 5.0)[:2]
+    assert (has.name, has.included) == ("field from r⁴ to r^4", True)
+    assert (lacks.name, lacks.included) == ("field beyond r^4", False)
+    whole = explain(preset("undriven"), 5.0)[0]
+    assert has.height_m + lacks.height_m == pytest.approx(whole.height_m, rel=0.05)
+    assert abs(lacks.precession_hz) < abs(has.precession_hz) / 10

@@ -5,11 +5,13 @@ import json
 import numpy as np
 import pytest
 
+from levilab.simulator.ensemble import simulate_many
 from levilab.simulator.floating import axial_field, floating_height, stability_of, survival
 from levilab.simulator.scene import SceneError, preset
 from levilab.simulator.single import simulate
-from levilab.stability_map import survival_map, write_map
+from levilab.stability_map import place_for_map, survival_map, write_map
 from levilab.stability_table import as_document, print_stability
+from levilab.writing import CannotWrite
 
 UNDRIVEN = preset("undriven")
 DISC = UNDRIVEN.changed({"base.field": "exact", "top.magnet": "disc"})
@@ -94,7 +96,48 @@ def test_a_map_is_written_as_a_table_and_a_picture(tmp_path):
     assert found.spin_step == 4.0
     table, picture = write_map(found, tmp_path / "new")
     lines = table.read_text(encoding="utf-8").splitlines()
-    assert lines[0] == "mass_kg,20,24,28,32"
-    assert lines[1] == "0.0252,0,1,1,1"
+    assert lines[:3] == ["mass_kg,spin_hz,survived", "0.0252,20,0", "0.0252,24,1"]
+    assert len(lines) == 1 + 12
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert np.isnan(found.slowest[-1])  # nothing of 25.6 g floats
+
+
+def test_a_map_that_is_there_is_not_written_over(tmp_path):
+    (tmp_path / "survival.csv").write_text("precious", encoding="utf-8")
+    with pytest.raises(CannotWrite, match="there already"):
+        place_for_map(tmp_path)
+    with pytest.raises(CannotWrite, match="another folder"):
+        place_for_map(tmp_path / "survival.csv" / "inside")
+
+
+def test_a_map_is_of_the_masses_that_are_lifted():
+    # the lower region would pull this moment down, though its masses are nearer to 300 g
+    found = survival_map(UNDRIVEN.changed({"top.mass_kg": 0.3}), spins=(28.0, 32.0, 2), duration=0.1)
+    assert 0.024 < found.masses[0] < found.masses[-1] < 0.027
+
+
+def test_without_weight_nothing_floats_and_that_is_said():
+    with pytest.raises(SceneError, match="gravity_m_s2 = 0"):
+        stability_of(UNDRIVEN.changed({"gravity_m_s2": 0.0}))
+
+
+def test_a_tiny_disc_is_a_point():
+    tiny = UNDRIVEN.changed({"base.field": "exact", "top.magnet": "disc", "top.magnet_radius_m": 1e-4})
+    disc = stability_of(tiny.changed({"top.magnet_height_m": 1e-4})).floating
+    point = stability_of(UNDRIVEN.changed({"base.field": "exact"})).floating
+    # (radius/field's length)² of the magnet is 1e-5
+    assert disc.spins[0] == pytest.approx(point.spins[0], rel=2e-5)
+    assert disc.radial == pytest.approx(point.radial, rel=3e-4)
+
+
+def test_the_window_of_a_disc_magnet_is_that_of_its_simulated_motion():
+    scene = UNDRIVEN.changed({"base.field": "exact", "top.magnet": "disc", "top.mass_kg": 0.02628})
+    floating = stability_of(scene).floating
+    slowest = floating.spins[0][0]
+    small = scene.changed({"start.position_m": [1e-5, 0, floating.height], "start.velocity_m_s": [0, 0, 0]})
+    around = simulate_many(
+        small.changed({"start.tilt_rad": 1e-4}), {"start.spin_hz": slowest + np.array([-0.1, 0.1])}, 10.0, errors=False
+    )
+    # a point in the averaged field would have it at 21.68 Hz
+    assert slowest == pytest.approx(21.43, abs=0.01)
+    assert around.survived.tolist() == [False, True]

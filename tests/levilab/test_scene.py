@@ -416,9 +416,9 @@ def finite(low=-1e6, high=1e6, **more):
     return st.floats(low, high, **more)
 
 
-POSITIVE = st.floats(0.0, exclude_min=True, allow_infinity=False)
-FROM_ZERO = st.floats(0.0, allow_infinity=False)
-ANY = st.floats(allow_nan=False, allow_infinity=False)
+POSITIVE = st.floats(1e-6, 9e5)
+FROM_ZERO = st.floats(0.0, 999.0)
+ANY = finite(-9e5, 9e5)
 VECTORS = st.tuples(ANY, ANY, ANY)
 DRAGS = st.one_of(
     st.builds(Drag, law=st.sampled_from(["none", *CONSTANTS])),
@@ -450,7 +450,7 @@ SCENES_DRAWN = st.builds(
     gravity_m_s2=FROM_ZERO,
     base=st.builds(
         Base,
-        inner_radius_m=st.floats(0.0, 0.05, exclude_min=True),
+        inner_radius_m=st.floats(1.1e-6, 0.05),
         strength_t_m=ANY,
         field=st.sampled_from(["exact", *(f"paraxial-{order}" for order in range(2, 21, 2))]),
         thickness_m=FROM_ZERO,

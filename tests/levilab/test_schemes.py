@@ -2,33 +2,11 @@
 
 import numpy as np
 import pytest
+from kinds import KINDS
 
-from levilab.simulator.scene import Scene, preset
+from levilab.simulator.scene import Scene
 from levilab.simulator.schemes import SCHEMES, Scheme
 from levilab.simulator.single import simulate
-
-UNDRIVEN, DRIVEN = preset("undriven"), preset("driven")
-
-#: Drags far stronger than a real one, so that their error can be told from the rounding.
-KINDS = {
-    "aligned": UNDRIVEN,
-    "exact field": UNDRIVEN.changed({"base.field": "exact"}),
-    "disc magnet": UNDRIVEN.changed({"top.magnet": "disc", "base.field": "paraxial-6"}),
-    "stokes": UNDRIVEN.changed({"drag.law": "stokes", "drag.coefficient": 0.3}),
-    "newton": UNDRIVEN.changed({"drag.law": "newton", "drag.coefficient": 2e-3}),
-    "disc": UNDRIVEN.changed({"drag.law": "disc", "drag.coefficient": 2e-2}),
-    "mixed": UNDRIVEN.changed({"drag.law": "mixed", "drag.coefficient": [0.1, 1e-3]}),
-    "tilted": preset("tilted"),
-    "sine": DRIVEN,
-    "triangle": DRIVEN.changed({"drive.waveform": "triangle"}),
-    "square": DRIVEN.changed({"drive.waveform": "square"}),
-    "unipolar": DRIVEN.changed({"drive.waveform": "unipolar"}),
-    "switched off": DRIVEN.changed({"drive.off_s": 0.51}),
-    "tilted with drag": DRIVEN.changed({"drag.law": "disc", "drag.coefficient": 2e-2}),
-    "loose washers": preset("loose-washers").changed(
-        {"washers.coupling_n_m_s": 1e-5, "drag.law": "mixed", "drag.coefficient": [0.1, 1e-3]}
-    ),
-}
 
 #: Steps [1/s] at which each scheme's error lies above rounding (1e-13) and its first term dominates; whole numbers
 #: of them fit into a quarter of the drive's period.
@@ -88,4 +66,4 @@ def test_a_scheme_is_refused_where_it_would_lose_its_order():
     with pytest.raises(SimulationError, match=r"loses its order: take one of strang, suzuki-4, kahan-li-6, kahan-li-8"):
         simulate(KINDS["tilted with drag"], 0.1, scheme="blanes-moan-6")
     with pytest.raises(SimulationError, match="expected one of strang"):
-        simulate(UNDRIVEN, 0.1, scheme="rk4")
+        simulate(KINDS["aligned"], 0.1, scheme="rk4")

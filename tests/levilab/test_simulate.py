@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from kinds import KINDS
 
 from levilab.simulator import SceneError, SimulationError
 from levilab.simulator.scene import preset
@@ -260,14 +261,49 @@ def test_close_to_the_base_the_exact_field_is_followed():
 
 
 def test_a_chaotic_start_is_told_instead_of_a_result_that_only_looks_exact():
-    # at the edge of the upper limit neighbours part by a factor of 1e12 within 30 s
+    # at the edge of the upper limit neighbours part by a factor of ten a second, until the top is lost at 14.75 s
     chaotic = at(UNDRIVEN.changed({"top.mass_kg": 0.02527}), spin_hz=70.75)
-    coarse = simulate(chaotic, 30.0, step=1.3e-3, rate=None)
-    fine = simulate(chaotic, 30.0, step=0.9e-3, rate=None)
-    assert not coarse.accuracy.reached
-    assert coarse.accuracy.position > 1e-7
-    if coarse.survived and fine.survived:
-        assert np.linalg.norm(coarse.position[-1] - fine.position[-1]) < 3 * coarse.accuracy.position
+    told = []
+    for duration in (10.0, 12.0, 14.0):
+        coarse = simulate(chaotic, duration, step=1.3e-3, rate=None)
+        fine = simulate(chaotic, duration, step=0.9e-3, rate=None)
+        assert coarse.survived
+        assert fine.survived
+        assert np.linalg.norm(coarse.position[-1] - fine.position[-1]) < coarse.accuracy.position
+        told.append(coarse.accuracy.position)
+    assert told[2] > 100 * told[1] > 1000 * told[0]
+    assert not simulate(chaotic, 30.0, step=1.3e-3, rate=None).accuracy.reached
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_estimate_bounds_the_true_error_on_every_kind_of_scene(kind):
+    # against a hundredth of the tolerance; starts that rise, drift, spin slowly enough to fall at once, and lean
+    random = np.random.default_rng(7)
+    bounded = []
+    for _ in range(8):
+        scene = KINDS[kind].changed(
+            {
+                "start.position_m": [float(random.uniform(-2e-3, 2e-3)), 0.0, float(random.uniform(0.070, 0.0745))],
+                "start.tilt_rad": float(random.uniform(0, 0.05)),
+                "start.spin_hz": float(random.choice([12.0, 26.0, 30.0, 40.0])),
+            }
+        )
+        rough, fine = (simulate(scene, 0.7, tolerance=tolerance, rate=None) for tolerance in (1e-6, 1e-11))
+        assert rough.survived == fine.survived
+        for what, told in (("position", "position"), ("axis", "axis")):
+            true = np.linalg.norm(getattr(rough, what)[-1] - getattr(fine, what)[-1])
+            bounded.append(true <= getattr(rough.accuracy, told) + getattr(fine.accuracy, told))
+    assert np.mean(bounded) >= 0.9  # 95 % of 16, to within one
+
+
+def test_a_fall_in_the_first_step_has_an_estimate_too():
+    low = at(UNDRIVEN, position_m=[0.0, 0.0, 0.0505], velocity_m_s=[0.0, 0.0, -0.5])
+    scene = low.changed({"escape.height_m": 0.05})
+    rough, fine = simulate(scene, 1.0, step=2e-3, rate=None), simulate(scene, 1.0, step=5e-5, rate=None)
+    assert rough.fell is not None
+    assert rough.fell.time < 2e-3
+    assert np.linalg.norm(rough.axis[-1] - fine.axis[-1]) <= rough.accuracy.axis
+    assert np.linalg.norm(rough.position[-1] - fine.position[-1]) <= rough.accuracy.position
 
 
 # --- what is refused ---
@@ -291,3 +327,44 @@ def test_parameters_that_are_no_numbers_are_refused_by_name(key, value):
 def test_a_start_that_is_no_number_is_refused():
     with pytest.raises(SimulationError, match="no number"):
         simulate(UNDRIVEN, 1.0, start=np.full(18, math.nan))
+
+
+# --- the spin alone ---
+
+
+def test_mixed_drag_of_one_part_is_that_part():
+    spin = UNDRIVEN.changed({"observed": "spin"})
+    for mixed, law, constant in (([0.0, 1.7e-5], "newton", 1.7e-5), ([3e-3, 0.0], "stokes", 3e-3)):
+        both = simulate(spin.changed({"drag.law": "mixed", "drag.coefficient": mixed}), 100.0)
+        one = simulate(spin.changed({"drag.law": law, "drag.coefficient": constant}), 100.0)
+        assert both.spin_hz == pytest.approx(one.spin_hz, rel=1e-14)
+
+
+def test_a_spin_that_would_have_been_infinite_on_the_way_back_is_refused():
+    spin = UNDRIVEN.changed({"observed": "spin", "drag.law": "newton", "drag.coefficient": 1.727e-5})
+    since = 1 / (1.727e-5 * 2 * np.pi * 30)  # 1/ω = 0
+    assert simulate(spin, -0.99 * since, rate=None).spin_hz[-1] == pytest.approx(3000, rel=1e-6)
+    with pytest.raises(SimulationError, match="infinite 307"):
+        simulate(spin, -1.01 * since)
+
+
+@pytest.mark.parametrize("given", [{"step": 0.1}, {"scheme": "strang"}, {"start": np.zeros(18)}, {"events": {}}])
+def test_the_spin_alone_takes_nothing_that_is_for_an_integration(given):
+    with pytest.raises(SimulationError, match=f"{next(iter(given))}: .*closed form"):
+        simulate(UNDRIVEN.changed({"observed": "spin"}), 1.0, **given)
+
+
+# --- more than can be ---
+
+
+@pytest.mark.parametrize(
+    ("changes", "duration", "named"),
+    [
+        ({"drive.waveform": "square", "drive.frequency_hz": 9e5}, 30.0, r"drive\.frequency_hz = 900000: .*corners"),
+        ({"start.spin_hz": 9e5}, 1e6, "steps of .* would be needed"),
+        ({}, 1e10, "duration"),
+    ],
+)
+def test_what_would_take_days_or_all_memory_is_refused_by_name(changes, duration, named):
+    with pytest.raises(SimulationError, match=named):
+        simulate(UNDRIVEN.changed(changes), duration, rate=None)
