@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from typing import Protocol
 
@@ -17,18 +18,25 @@ class Clock(Protocol):
 
 
 class WallClock:
-    """The time of a real bench."""
+    """The time of a real bench, or that time at a multiple.
 
-    def __init__(self) -> None:
+    speed: seconds of the bench per second of the wall, for a virtual bench that somebody watches.  Raises ValueError
+    when it is not a positive number.
+    """
+
+    def __init__(self, *, speed: float = 1.0) -> None:
+        if not 0 < speed < math.inf:
+            raise ValueError(f"speed = {speed:g}, a number above 0 is expected")
+        self.speed = speed
         self._start = time.monotonic()
 
     def now(self) -> float:
         """The time [s]."""
-        return time.monotonic() - self._start
+        return self.speed * (time.monotonic() - self._start)
 
     def sleep(self, duration: float) -> None:
-        """Wait [s]."""
-        time.sleep(max(0.0, duration))
+        """Wait until so much time has passed on the bench [s]."""
+        time.sleep(max(0.0, duration) / self.speed)
 
 
 class VirtualClock:

@@ -1,0 +1,387 @@
+"""Instruments over HiSLIP, the High-Speed LAN Instrument Protocol (port 4880 of real ones).
+
+Source: IVI-6.1, revisions 1.0 and 2.0; section numbers are revision 2.0's.  Synchronized mode only, no secure
+connections (both may be left out by a server), no service requests.  A client has two connections: on the synchronous
+one go messages and answers, on the asynchronous one what must get through meanwhile.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import struct
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import TYPE_CHECKING
+
+from instruments.virtual.servers.station import (
+    FIRST_WORDS,
+    MOST_CLIENTS,
+    Disconnected,
+    Link,
+    Listener,
+    first_of,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable
+
+    from instruments.virtual.servers.station import Station
+
+#: Prologue, message type, control code, message parameter, length of the payload (2.4).
+HEADER = struct.Struct("!2sBBIQ")
+
+#: The newest revision spoken here, the longest payload taken [bytes], and the longest one sent before the client has
+#: said what it takes.
+VERSION, LONGEST, UNASKED = 0x0200, 1 << 20, 1 << 18
+
+#: The MessageID that a client begins with (3.1), and what one message differs from the next.
+_FIRST_ID, _STEP, _IDS = 0xFFFFFF00, 2, 1 << 32
+
+
+class Type(IntEnum):
+    """Message types (2.5, table 4)."""
+
+    INITIALIZE = 0
+    INITIALIZE_RESPONSE = 1
+    FATAL_ERROR = 2
+    ERROR = 3
+    ASYNC_LOCK = 4
+    ASYNC_LOCK_RESPONSE = 5
+    DATA = 6
+    DATA_END = 7
+    DEVICE_CLEAR_COMPLETE = 8
+    DEVICE_CLEAR_ACKNOWLEDGE = 9
+    ASYNC_REMOTE_LOCAL_CONTROL = 10
+    ASYNC_REMOTE_LOCAL_RESPONSE = 11
+    TRIGGER = 12
+    INTERRUPTED = 13
+    ASYNC_INTERRUPTED = 14
+    ASYNC_MAXIMUM_MESSAGE_SIZE = 15
+    ASYNC_MAXIMUM_MESSAGE_SIZE_RESPONSE = 16
+    ASYNC_INITIALIZE = 17
+    ASYNC_INITIALIZE_RESPONSE = 18
+    ASYNC_DEVICE_CLEAR = 19
+    ASYNC_STATUS_QUERY = 21
+    ASYNC_STATUS_RESPONSE = 22
+    ASYNC_DEVICE_CLEAR_ACKNOWLEDGE = 23
+    ASYNC_LOCK_INFO = 24
+    ASYNC_LOCK_INFO_RESPONSE = 25
+
+
+class Fatal(IntEnum):
+    """Why a connection ends (6.2, table 14)."""
+
+    UNIDENTIFIED = 0
+    BAD_HEADER = 1
+    NOT_BOTH_CHANNELS = 2
+    BAD_INITIALIZATION = 3
+    TOO_MANY_CLIENTS = 4
+
+
+class Problem(IntEnum):
+    """What was not done, after which both go on (6.2, table 16)."""
+
+    UNRECOGNIZED_TYPE = 1
+    UNRECOGNIZED_CONTROL = 2
+    TOO_LARGE = 4
+
+
+class LockAnswer(IntEnum):
+    """What became of a lock (6.5, tables 19 and 20)."""
+
+    FAILURE = 0
+    SUCCESS = 1
+    SHARED_RELEASED = 2
+    ERROR = 3
+
+
+@dataclass(frozen=True)
+class Message:
+    """What stands in a header, and the payload."""
+
+    type: int
+    control: int = 0
+    parameter: int = 0
+    payload: bytes = b""
+
+    def packed(self) -> bytes:
+        """As it goes over the wire."""
+        return HEADER.pack(b"HS", self.type, self.control, self.parameter, len(self.payload)) + self.payload
+
+
+class Channel:
+    """One of the two connections."""
+
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._reader, self._writer = reader, writer
+
+    async def receive(self) -> Message:
+        """The next message; one whose payload is too long is refused and skipped.  Raises Disconnected."""
+        while True:
+            prologue, kind, control, parameter, length = HEADER.unpack(await self._reader.readexactly(HEADER.size))
+            if prologue != b"HS":
+                await self.fatal(Fatal.BAD_HEADER, "a header begins with HS")
+            if length <= LONGEST:
+                return Message(kind, control, parameter, await self._reader.readexactly(length))
+            self.send(Message(Type.ERROR, Problem.TOO_LARGE, payload=b"at most %d bytes" % LONGEST))
+            await self._skip(length)
+
+    async def _skip(self, length: int) -> None:
+        while length:
+            piece = await self._reader.read(min(length, 1 << 16))
+            if not piece:
+                raise Disconnected
+            length -= len(piece)
+
+    def send(self, message: Message) -> None:
+        """Send without waiting: for what is short."""
+        self._writer.write(message.packed())
+
+    async def drain(self) -> None:
+        """Wait while the client takes nothing."""
+        await self._writer.drain()
+
+    async def fatal(self, code: Fatal, why: str) -> None:
+        """Tell why, and end the connection.  Raises Disconnected."""
+        self.send(Message(Type.FATAL_ERROR, code, payload=why.encode()))
+        raise Disconnected
+
+
+@dataclass(eq=False)
+class Client:
+    """One client: its link, its two channels, and where they stand with each other."""
+
+    link: Link
+    sync: Channel
+    other: Channel | None = None  # the asynchronous one, once it is there
+    joined: asyncio.Event = field(default_factory=asyncio.Event)
+    gone: asyncio.Event = field(default_factory=asyncio.Event)
+    longest: int = UNASKED
+    clearing: bool = False
+    received: int = _FIRST_ID - _STEP  # MessageID of the last message that came
+    answering: int = 0  # and of the one that the answers under way belong to
+    rmt_expected: bool = False  # an answer was sent to its end, and the client has not said that it has read it
+    locking: asyncio.Task[None] | None = None
+    shared: bool = False  # the lock it has
+
+    # --- the synchronous channel ---
+
+    async def listen(self) -> None:
+        """Messages for the instrument.  Ends by an error, when the client is gone."""
+        while True:
+            message = await self.sync.receive()
+            if message.type == Type.DEVICE_CLEAR_COMPLETE:
+                self._cleared()
+            elif message.type in {Type.DATA, Type.DATA_END, Type.TRIGGER}:
+                await self._take(message)
+            elif message.type in {Type.FATAL_ERROR, Type.ERROR}:
+                if message.type == Type.FATAL_ERROR:
+                    raise Disconnected
+            else:
+                refuse(self.sync, message)
+
+    async def _take(self, message: Message) -> None:
+        if self.other is None:
+            await self.sync.fatal(Fatal.NOT_BOTH_CHANNELS, "the asynchronous channel is missing")
+        # a client that is kept out waits, and a device clear ends that
+        await self.link.turn(given_up=lambda: self.clearing)
+        if self.clearing:
+            return
+        self.received = message.parameter
+        if self.rmt_expected and not message.control & 1:  # 3.1.1, rule 2: the client is not told
+            self.link.interrupted()
+        self.rmt_expected = False
+        if message.type == Type.TRIGGER:
+            self.link.trigger()
+            return
+        end = message.type == Type.DATA_END
+        if end:
+            if self.link.due() is not None:  # rule 1; the session drops the answer
+                self._interrupt(message.parameter)
+            self.answering = message.parameter
+        self.link.write(message.payload, end=end)
+
+    def _interrupt(self, number: int) -> None:
+        """Both are told, the asynchronous channel first (6.11, table 30)."""
+        assert self.other
+        self.other.send(Message(Type.ASYNC_INTERRUPTED, parameter=number))
+        self.sync.send(Message(Type.INTERRUPTED, parameter=number))
+
+    def _cleared(self) -> None:
+        """Both sides have dropped what was under way (6.12); synchronized mode, whatever the client would like."""
+        self.clearing, self.rmt_expected, self.received = False, False, _FIRST_ID - _STEP
+        self.sync.send(Message(Type.DEVICE_CLEAR_ACKNOWLEDGE))
+
+    async def answer(self) -> None:
+        """Send answers when they are ready.  Ends by an error, when the client is gone."""
+        while await self.link.answered():
+            data, end = self.link.take(self.longest)
+            self.sync.send(Message(Type.DATA_END if end else Type.DATA, parameter=self.answering, payload=data))
+            self.rmt_expected = end
+            await self.sync.drain()
+
+    # --- the asynchronous channel ---
+
+    async def listen_aside(self) -> None:
+        """What must get through meanwhile.  Ends by an error, when the client is gone."""
+        assert self.other
+        try:
+            while True:
+                message = await self.other.receive()
+                act = _ASIDE.get(message.type)
+                if act is None:
+                    refuse(self.other, message)
+                else:
+                    act(self, self.other, message)
+                await self.other.drain()
+        finally:
+            if self.locking:
+                self.locking.cancel()
+
+    def negotiate(self, channel: Channel, message: Message) -> None:
+        """AsyncMaximumMessageSize: what the client takes, and what is taken here (6.10)."""
+        wanted = int.from_bytes(message.payload)
+        # a real VISA counts the header to the size, or not: with it, either is content
+        self.longest = min(max(wanted - HEADER.size, 1), LONGEST)
+        channel.send(Message(Type.ASYNC_MAXIMUM_MESSAGE_SIZE_RESPONSE, payload=LONGEST.to_bytes(8)))
+
+    def clear(self, channel: Channel, message: Message) -> None:
+        """AsyncDeviceClear: from now to its end on the other channel what comes there is dropped (6.12)."""
+        self.clearing = True
+        self.link.clear()
+        channel.send(Message(Type.ASYNC_DEVICE_CLEAR_ACKNOWLEDGE))
+
+    def tell_status(self, channel: Channel, message: Message) -> None:
+        """AsyncStatusQuery: the status byte; what makes its bit MAV is in 6.14.1.
+
+        A query with a MessageID other than the last one's asks too early; pyvisa-py 0.8 sends the next one's.
+        """
+        if message.control & 1:
+            self.rmt_expected = False
+        known = message.parameter in {self.received, (self.received + _STEP) % _IDS}
+        channel.send(Message(Type.ASYNC_STATUS_RESPONSE, self.link.status_byte(unread=self.rmt_expected and known)))
+
+    def lock(self, channel: Channel, message: Message) -> None:
+        """AsyncLock: a request, or a release (6.5)."""
+        if message.control > 1:
+            channel.send(Message(Type.ERROR, Problem.UNRECOGNIZED_CONTROL))
+        elif message.control == 0:
+            channel.send(Message(Type.ASYNC_LOCK_RESPONSE, self._release()))
+        elif self.link.holds() or (self.locking and not self.locking.done()):
+            channel.send(Message(Type.ASYNC_LOCK_RESPONSE, LockAnswer.ERROR))
+        else:
+            key = message.payload.decode("latin-1")[:256] or None
+            self.locking = asyncio.ensure_future(self._request(channel, key, message.parameter / 1000))
+
+    async def _request(self, channel: Channel, key: str | None, within: float) -> None:
+        granted = await self.link.lock(key, within)
+        self.shared = granted and key is not None
+        channel.send(Message(Type.ASYNC_LOCK_RESPONSE, LockAnswer.SUCCESS if granted else LockAnswer.FAILURE))
+
+    def _release(self) -> LockAnswer:
+        if not self.link.holds():
+            return LockAnswer.ERROR
+        self.link.unlock()
+        return LockAnswer.SHARED_RELEASED if self.shared else LockAnswer.SUCCESS
+
+    def tell_locks(self, channel: Channel, message: Message) -> None:
+        """AsyncLockInfo: whether somebody has it alone, and how many have it (6.6)."""
+        hold = self.link.session.hold
+        alone = bool(hold.holders) and hold.key is None
+        channel.send(Message(Type.ASYNC_LOCK_INFO_RESPONSE, int(alone), len(hold.holders)))
+
+    def ignore(self, channel: Channel, message: Message) -> None:
+        """Error: what the client did not like would not be said in another way."""
+
+    def hang_up(self, channel: Channel, message: Message) -> None:
+        """FatalError: the client is gone.  Raises Disconnected."""
+        raise Disconnected
+
+    def go_remote(self, channel: Channel, message: Message) -> None:
+        """AsyncRemoteLocalControl: there is no front panel to lock (6.9)."""
+        channel.send(Message(Type.ASYNC_REMOTE_LOCAL_RESPONSE))
+
+
+_ASIDE: dict[int, Callable[[Client, Channel, Message], None]] = {
+    Type.FATAL_ERROR: Client.hang_up,
+    Type.ERROR: Client.ignore,
+    Type.ASYNC_LOCK: Client.lock,
+    Type.ASYNC_REMOTE_LOCAL_CONTROL: Client.go_remote,
+    Type.ASYNC_MAXIMUM_MESSAGE_SIZE: Client.negotiate,
+    Type.ASYNC_DEVICE_CLEAR: Client.clear,
+    Type.ASYNC_STATUS_QUERY: Client.tell_status,
+    Type.ASYNC_LOCK_INFO: Client.tell_locks,
+}
+
+
+def refuse(channel: Channel, message: Message) -> None:
+    """Tell that this type of message is not known, or not on this channel."""
+    channel.send(Message(Type.ERROR, Problem.UNRECOGNIZED_TYPE, payload=b"message type %d" % message.type))
+
+
+class HislipServer:
+    """Both channels of all clients of one instrument, on one port.  subaddress: the only one it knows."""
+
+    def __init__(self, station: Station, *, subaddress: str = "hislip0") -> None:
+        self._station, self._subaddress = station, subaddress
+        self._clients: dict[int, Client] = {}
+        self._numbers = itertools.count(1)
+        self.listener = Listener(self._talk, most=2 * MOST_CLIENTS)
+
+    async def _talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        channel = Channel(reader, writer)
+        try:
+            async with asyncio.timeout(FIRST_WORDS):
+                first = await channel.receive()
+        except TimeoutError:
+            return
+        begin: dict[int, Callable[[Channel, Message], Awaitable[None]]] = {
+            Type.INITIALIZE: self._serve,
+            Type.ASYNC_INITIALIZE: self._serve_aside,
+        }
+        if first.type not in begin:
+            await channel.fatal(Fatal.BAD_INITIALIZATION, "a connection begins with Initialize or AsyncInitialize")
+        await begin[first.type](channel, first)
+
+    async def _serve(self, channel: Channel, first: Message) -> None:
+        """The synchronous channel, from Initialize (6.1) on."""
+        asked = first.payload.decode("latin-1").lower()
+        if asked not in {"", self._subaddress}:
+            await channel.fatal(Fatal.BAD_INITIALIZATION, f"the only subaddress here is {self._subaddress}")
+        if len(self._clients) >= MOST_CLIENTS:
+            await channel.fatal(Fatal.TOO_MANY_CLIENTS, f"at most {MOST_CLIENTS} clients")
+        number = next(number for number in (n % 0xFFFF for n in self._numbers) if number not in self._clients)
+        client = self._clients[number] = Client(Link(self._station), channel)
+        version = min(first.parameter >> 16, VERSION)
+        channel.send(Message(Type.INITIALIZE_RESPONSE, parameter=version << 16 | number))
+        try:
+            await first_of(client.listen(), client.answer(), client.gone.wait(), _both_channels(client))
+        finally:
+            client.gone.set()
+            client.link.close()
+            del self._clients[number]
+
+    async def _serve_aside(self, channel: Channel, first: Message) -> None:
+        """The asynchronous channel, from AsyncInitialize on."""
+        client = self._clients.get(first.parameter & 0xFFFF)
+        if client is None or client.other is not None:
+            await channel.fatal(Fatal.BAD_INITIALIZATION, "no session with this number waits for its second channel")
+            return
+        client.other = channel
+        client.joined.set()
+        channel.send(Message(Type.ASYNC_INITIALIZE_RESPONSE))
+        try:
+            await first_of(client.listen_aside(), client.gone.wait())
+        finally:
+            client.gone.set()
+
+
+async def _both_channels(client: Client) -> None:
+    """Ends when the second channel does not come in time."""
+    try:
+        async with asyncio.timeout(FIRST_WORDS):
+            await client.joined.wait()
+    except TimeoutError:
+        return
+    await client.gone.wait()

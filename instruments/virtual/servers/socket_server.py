@@ -1,0 +1,102 @@
+"""Instruments over bare TCP: a line feed ends a message, answers follow each other (port 5025 of real ones)."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from typing import TYPE_CHECKING, Protocol
+
+from instruments.virtual.servers.station import CHUNK, Link, Listener, first_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from instruments.virtual.servers.station import Station
+
+#: How long answers under way are still delivered to a client that has nothing more to say [s].
+_LINGER = 1.0
+
+
+class Wire(Protocol):
+    """A two-way stream of bytes."""
+
+    async def read(self) -> bytes:
+        """What has come, at least a byte; nothing: it was the end."""
+
+    async def write(self, data: bytes) -> None:
+        """Send; waits while the other side takes nothing."""
+
+
+class TcpWire:
+    """A TCP connection."""
+
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._reader, self._writer = reader, writer
+
+    async def read(self) -> bytes:
+        """See :class:`Wire`."""
+        return await self._reader.read(1 << 16)
+
+    async def write(self, data: bytes) -> None:
+        """See :class:`Wire`."""
+        self._writer.write(data)
+        await self._writer.drain()
+
+
+def socket_listener(station: Station) -> Listener:
+    """Offers an instrument over bare TCP."""
+
+    async def talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await converse(station, TcpWire(reader, writer))
+
+    return Listener(talk)
+
+
+async def converse(station: Station, wire: Wire) -> None:
+    """Let a client talk to an instrument until it goes away.
+
+    A message waits until the answers to those before it have been sent: so no flood of questions piles up answers.
+    An instrument that a client of HiSLIP or VXI-11 has locked waits with everything that comes here.
+    """
+    link = Link(station, stream=True)
+    received: asyncio.Queue[bytes] = asyncio.Queue(1)
+
+    async def receive() -> None:
+        while data := await wire.read():
+            await received.put(data)
+        # somebody who sends no more may still want to read: printf '*IDN?\n' | nc
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(_LINGER):
+                await received.join()
+                await link.quiet()
+
+    async def work() -> None:
+        while True:
+            for piece in _lines(await received.get()):
+                await link.turn()
+                await link.quiet()
+                link.write(piece)
+            received.task_done()
+
+    async def answer() -> None:
+        while await link.answered():
+            await wire.write(link.take(CHUNK)[0])
+
+    try:
+        await first_of(receive(), work(), answer())
+    finally:
+        link.close()
+
+
+def _lines(data: bytes) -> Iterator[bytes]:
+    r"""Cut behind each line feed.
+
+    >>> list(_lines(b"*CLS\n*ID"))
+    [b'*CLS\n', b'*ID']
+    """
+    start = 0
+    while stop := data.find(b"\n", start) + 1:
+        yield data[start:stop]
+        start = stop
+    if start < len(data):
+        yield data[start:]

@@ -1,0 +1,254 @@
+"""What all servers share: links to an instrument that are waited for on an event loop, and listening sockets.
+
+One thread with one event loop serves all clients.  An instrument works while the bus is locked; its answers are waited
+for without that lock, on the bench's clock, and whatever happens to the instrument meanwhile is looked at.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import socket
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from instruments.virtual.scpi import ScpiError
+
+if TYPE_CHECKING:
+    from collections.abc import Coroutine
+
+    from instruments.virtual.bus import Bus, Session
+    from instruments.virtual.device import VirtualInstrument
+
+log = logging.getLogger(__name__)
+
+#: Clients of one instrument by one protocol, and bytes of an answer that are sent at a stretch.
+MOST_CLIENTS, CHUNK = 32, 1 << 20
+
+#: How long a client may take for a protocol's first words [s], as the clock on the wall tells.
+FIRST_WORDS = 5.0
+
+#: A wait that is shorter than this is none [s]: an event loop wakes at whole milliseconds.
+_NO_WAIT = 1e-4
+
+#: How often somebody who is kept out looks whether the lock was given up by a program in our own process [s].
+_LOOK_AGAIN = 0.2
+
+
+class Disconnected(Exception):
+    """The client is gone, or talks what is not the protocol: nothing is left to do for it."""
+
+
+@dataclass(eq=False)
+class Station:
+    """One instrument of a bus, as its servers see it."""
+
+    bus: Bus
+    device: VirtualInstrument
+    _stirred: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def stir(self) -> None:
+        """Something happened to the instrument: whoever waits for it looks again."""
+        self._stirred.set()
+        self._stirred = asyncio.Event()
+
+    async def stirred(self, within: float | None) -> None:
+        """Wait until something happens, at most so long by the clock on the wall [s]."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(within):
+                await self._stirred.wait()
+
+
+class Link:
+    """One client's link to an instrument.
+
+    session: see :class:`instruments.virtual.bus.Session`; to be used from the event loop only.
+    """
+
+    def __init__(self, station: Station, *, stream: bool = False) -> None:
+        self.station, self.closed = station, False
+        self.session = self._new(stream=stream)
+
+    def _new(self, *, stream: bool) -> Session:
+        return self.station.bus.session(self.station.device, stream=stream)
+
+    # --- to the instrument ---
+
+    def write(self, data: bytes, *, end: bool = True) -> None:
+        """Bytes for the instrument; see Session.write."""
+        self.session.write(data, end=end)
+        self.station.stir()
+
+    def trigger(self) -> None:
+        """The interface's trigger message."""
+        self.session.trigger()
+        self.station.stir()
+
+    def clear(self) -> None:
+        """Device clear; a client that is kept out clears what is its own, and the instrument works on."""
+        if self.kept_out():
+            self.session = self._new(stream=self.session.stream)
+        else:
+            self.session.clear()
+        self.station.stir()
+
+    def interrupted(self) -> None:
+        """The client asked anew before it had read the last answer: told in the error queue."""
+        with self.session.lock:
+            self.station.device.parser.report(ScpiError(-410))
+
+    def close(self) -> None:
+        """The client is gone, and its lock with it."""
+        self.closed = True
+        self.session.close()
+        self.station.stir()
+
+    # --- from the instrument ---
+
+    def due(self) -> float | None:
+        """How long until bytes are there [s] by the clock on the wall; None: none are under way."""
+        instant = self.session.ready()
+        if instant is None:
+            return None
+        clock = self.station.device.clock
+        missing = max(0.0, instant - clock.now())
+        speed: float | None = getattr(clock, "speed", None)
+        if speed is None:  # a clock that stands still unless it is told to jump
+            clock.sleep(missing)
+            return 0.0
+        return missing / speed if missing / speed > _NO_WAIT else 0.0
+
+    async def answered(self, within: float | None = None, *, given_up: Callable[[], bool] = lambda: False) -> bool:
+        """Wait until bytes are there; whether they are, within this time by the clock on the wall [s].
+
+        given_up: looked at whenever something happened to the instrument.
+        """
+        loop = asyncio.get_running_loop()
+        end = None if within is None else loop.time() + within
+        while (due := self.due()) != 0.0 and not given_up():
+            left = None if end is None else end - loop.time()
+            if left is not None and left <= 0:
+                return False
+            await self.station.stirred(min((wait for wait in (due, left) if wait is not None), default=None))
+        return due == 0.0
+
+    def take(self, count: int, *, until: bytes = b"") -> tuple[bytes, bool]:
+        """At most count bytes of what is there, and whether the answer ends with them; see Session.take."""
+        taken = self.session.take(count, until=until)
+        self.station.stir()
+        return taken
+
+    async def quiet(self) -> None:
+        """Wait until no answer is under way."""
+        while (due := self.due()) is not None:
+            await self.station.stirred(due or None)
+
+    def status_byte(self, *, unread: bool = False) -> int:
+        """What a serial poll gives.  unread: an answer is on its way to the client, and not read yet."""
+        with self.session.lock:
+            return self.station.device.status_byte(message_available=True) if unread else self.session.status_byte()
+
+    # --- locks ---
+
+    def kept_out(self) -> bool:
+        """Whether another client has locked the instrument."""
+        return self.session.hold.keeps_out(self.session)
+
+    def holds(self) -> bool:
+        """Whether this client has locked the instrument, alone or with others."""
+        return any(holder is self.session for holder in self.session.hold.holders)
+
+    async def turn(self, within: float | None = None, *, given_up: Callable[[], bool] = lambda: False) -> bool:
+        """Wait until nobody else has the instrument locked; whether that is so within this time [s]."""
+        return await self._comes(lambda: not self.kept_out(), within, given_up)
+
+    async def lock(self, key: str | None, within: float) -> bool:
+        """Lock the instrument, alone or with all that know the key; whether that was possible in this time [s]."""
+        return await self._comes(lambda: self.session.hold.take(self.session, key), within, lambda: False)
+
+    def unlock(self) -> None:
+        """Give the lock up."""
+        self.session.hold.let_go(self.session)
+        self.station.stir()
+
+    async def _comes(self, there: Callable[[], bool], within: float | None, given_up: Callable[[], bool]) -> bool:
+        loop = asyncio.get_running_loop()
+        end = None if within is None else loop.time() + within
+        while not self.closed and not given_up():
+            if there():
+                return True
+            left = _LOOK_AGAIN if end is None else min(_LOOK_AGAIN, end - loop.time())
+            if left <= 0:
+                return False
+            await self.station.stirred(left)
+        return False
+
+
+async def first_of(*jobs: Coroutine[None, None, object]) -> None:
+    """Do these at once until one of them ends; the others are given up, and its error is raised."""
+    tasks = [asyncio.ensure_future(job) for job in jobs]
+    try:
+        done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        for task in done:
+            task.result()
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+#: What a server does with one connection.
+Conversation = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
+
+
+class Listener:
+    """A listening TCP socket, and a conversation with everyone who connects, up to a number of them.
+
+    port: known once it is open.
+    """
+
+    def __init__(self, talk: Conversation, *, most: int = MOST_CLIENTS) -> None:
+        self._talk, self._most = talk, most
+        self._server: asyncio.Server | None = None
+        self._talks: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
+        self.port = 0
+
+    async def open(self, host: str, port: int) -> None:
+        """Listen at this address of the machine; port 0: one that is free.  Raises OSError."""
+        self._server = await asyncio.start_server(self._connected, host, port, family=socket.AF_INET)
+        self.port = self._server.sockets[0].getsockname()[1]
+
+    def _connected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        if len(self._talks) >= self._most:
+            writer.transport.abort()
+            return
+        # a client whose machine was switched off does not say so
+        writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        task = asyncio.ensure_future(self._conversation(reader, writer))
+        self._talks[task] = writer
+        task.add_done_callback(self._talks.pop)
+
+    async def _conversation(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        try:
+            await self._talk(reader, writer)
+        except (OSError, EOFError, Disconnected):
+            pass  # the client is gone
+        except Exception:
+            # one client's trouble is not that of the others
+            log.exception("a virtual instrument failed; the connection is closed")
+        finally:
+            writer.close()
+
+    async def close(self) -> None:
+        """Listen no longer, and end all conversations."""
+        if self._server is None:
+            return
+        self._server.close()
+        talks = dict(self._talks)
+        for task, writer in talks.items():
+            task.cancel()
+            writer.transport.abort()
+        await asyncio.gather(*talks, return_exceptions=True)
+        await self._server.wait_closed()

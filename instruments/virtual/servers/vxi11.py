@@ -1,0 +1,419 @@
+"""Instruments over VXI-11, which is remote procedure calls over TCP; no port mapper, the port is told instead.
+
+Source: VXI-11 revision 1.0, TCP/IP Instrument Protocol (section numbers below are its); ONC RPC version 2 (RFC 5531)
+with record marking; XDR (RFC 4506).  No interrupt channel: a client polls the status byte.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import struct
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+from typing import TYPE_CHECKING, NamedTuple
+
+from instruments.virtual.servers.station import CHUNK, MOST_CLIENTS, Disconnected, Link, Listener, first_of
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable
+
+    from instruments.virtual.servers.station import Station
+
+#: Program numbers of the core and the abort channel (B.6, B.7); both are of version 1.
+CORE, ABORT, PROGRAM_VERSION = 0x0607AF, 0x0607B0, 1
+
+#: The longest data taken by one device_write [bytes], the longest record around it, and how many calls may wait for
+#: the one that is worked on.
+LONGEST, LONGEST_RECORD, MOST_CALLS = 1 << 20, (1 << 20) + 1024, 4
+
+
+class Error(IntEnum):
+    """What a call answers (B.5.2, table B.2)."""
+
+    NONE = 0
+    NOT_ACCESSIBLE = 3
+    INVALID_LINK = 4
+    PARAMETER = 5
+    CHANNEL_NOT_ESTABLISHED = 6
+    NOT_SUPPORTED = 8
+    OUT_OF_RESOURCES = 9
+    LOCKED_BY_ANOTHER = 11
+    NOT_LOCKED = 12
+    IO_TIMEOUT = 15
+    ABORT = 23
+
+
+class Flag(IntFlag):
+    """How a call is meant (B.5.3)."""
+
+    WAIT_LOCK = 1
+    END = 8
+    TERMINATION_CHARACTER = 128
+
+
+class Reason(IntFlag):
+    """Why a read has ended (B.6.4)."""
+
+    COUNT = 1
+    CHARACTER = 2
+    END = 4
+
+
+class Refused(IntEnum):
+    """A call that was understood, but not carried out (RFC 5531, accept_stat)."""
+
+    PROGRAM_UNAVAILABLE = 1
+    PROGRAM_MISMATCH = 2
+    PROCEDURE_UNAVAILABLE = 3
+    GARBAGE_ARGUMENTS = 4
+
+
+class Garbage(Exception):
+    """The bytes are not what they should be."""
+
+
+class Reader:
+    """XDR: whole numbers and strings of bytes, each filled up to four bytes."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data, self._place = data, 0
+
+    def number(self) -> int:
+        """An unsigned whole number of 32 bits (a signed one is not negative here).  Raises Garbage."""
+        return int.from_bytes(self._bytes(4))
+
+    def numbers(self, count: int) -> tuple[int, ...]:
+        """So many of them."""
+        return tuple(self.number() for _ in range(count))
+
+    def opaque(self) -> bytes:
+        """A string of bytes."""
+        length = self.number()
+        data = self._bytes(length)
+        self._place += -length % 4
+        return data
+
+    def _bytes(self, count: int) -> bytes:
+        data = self._data[self._place : self._place + count]
+        if len(data) < count:
+            raise Garbage
+        self._place += count
+        return data
+
+
+def packed(*values: int | bytes) -> bytes:
+    r"""The other way round.
+
+    >>> packed(1, b"abc")
+    b'\x00\x00\x00\x01\x00\x00\x00\x03abc\x00'
+    """
+    return b"".join(
+        struct.pack("!I", value)
+        if isinstance(value, int)
+        else struct.pack("!I", len(value)) + value + b"\0" * (-len(value) % 4)
+        for value in values
+    )
+
+
+class Call(NamedTuple):
+    """A remote procedure call, up to its parameters."""
+
+    number: int
+    program: int
+    version: int
+    procedure: int
+    parameters: Reader
+
+
+def read_call(record: bytes) -> Call:
+    """The call in a record.  Raises Garbage."""
+    reader = Reader(record)
+    number, kind, rpc_version, program, version, procedure = reader.numbers(6)
+    if kind != 0 or rpc_version != 2:
+        raise Garbage
+    for _ in ("credentials", "verifier"):
+        reader.number()
+        reader.opaque()
+    return Call(number, program, version, procedure, reader)
+
+
+def reply(call: Call, results: bytes) -> bytes:
+    """The record that answers a call: accepted, no verifier, success."""
+    return packed(call.number, 1, 0, 0, b"", 0) + results
+
+
+def refusal(call: Call, why: Refused) -> bytes:
+    """The record that refuses one; a mismatch tells which versions there are."""
+    versions = (PROGRAM_VERSION, PROGRAM_VERSION) if why == Refused.PROGRAM_MISMATCH else ()
+    return packed(call.number, 1, 0, 0, b"", why, *versions)
+
+
+#: What a program does: the results of one of its procedures, or None if it has none with this number.
+Program = dict[int, "Callable[[Reader], Awaitable[bytes]]"]
+
+
+async def read_record(reader: asyncio.StreamReader) -> bytes:
+    """The next record, from its fragments (RFC 5531, 11).  Raises Disconnected when it is longer than any call."""
+    record = b""
+    while True:
+        head = int.from_bytes(await reader.readexactly(4))
+        length = head & 0x7FFFFFFF
+        if len(record) + length > LONGEST_RECORD:
+            raise Disconnected
+        record += await reader.readexactly(length)
+        if head >> 31:
+            return record
+
+
+async def serve_program(
+    number: int, program: Program, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+) -> None:
+    """Carry out the calls of a connection one after the other, until the client goes away."""
+    calls: asyncio.Queue[bytes] = asyncio.Queue(MOST_CALLS)
+
+    async def receive() -> None:
+        while True:  # while a call is carried out, too: the client may go away
+            record = await read_record(reader)
+            if calls.full():
+                raise Disconnected
+            calls.put_nowait(record)
+
+    async def work() -> None:
+        while True:
+            answer = await _carried_out(number, program, await calls.get())
+            writer.write(struct.pack("!I", 1 << 31 | len(answer)) + answer)
+            await writer.drain()
+
+    await first_of(receive(), work())
+
+
+async def _carried_out(number: int, program: Program, record: bytes) -> bytes:
+    try:
+        call = read_call(record)
+    except Garbage:
+        raise Disconnected from None
+    if call.program != number:
+        return refusal(call, Refused.PROGRAM_UNAVAILABLE)
+    if call.version != PROGRAM_VERSION:
+        return refusal(call, Refused.PROGRAM_MISMATCH)
+    if call.procedure == 0:  # by convention: is anybody there?
+        return reply(call, b"")
+    if call.procedure not in program:
+        return refusal(call, Refused.PROCEDURE_UNAVAILABLE)
+    try:
+        return reply(call, await program[call.procedure](call.parameters))
+    except Garbage:
+        return refusal(call, Refused.GARBAGE_ARGUMENTS)
+
+
+@dataclass(eq=False)
+class OpenLink:
+    """A link that a client has created.  aborted: what it waits for is to be given up."""
+
+    link: Link
+    aborted: bool = False
+
+
+class Generic(NamedTuple):
+    """The parameters that most calls begin with: link, flags, and how long to wait for a lock and for data [ms]."""
+
+    number: int
+    flags: int
+    lock_timeout: int
+    io_timeout: int
+
+
+class Vxi11Server:
+    """The core and the abort channel of one instrument.  device: the only one it knows."""
+
+    def __init__(self, station: Station, *, device: str = "inst0") -> None:
+        self._station, self._device = station, device
+        self._links: dict[int, OpenLink] = {}
+        self._numbers = itertools.count(1)
+        self.core, self.abort = Listener(self._talk), Listener(self._talk_abort)
+
+    async def _talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        connection = _Connection(self)
+        try:
+            await serve_program(CORE, connection.program(), reader, writer)
+        finally:
+            connection.close()
+
+    async def _talk_abort(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await serve_program(ABORT, {1: self._device_abort}, reader, writer)
+
+    async def _device_abort(self, parameters: Reader) -> bytes:
+        """What the link waits for is given up (B.7.1)."""
+        found = self._links.get(parameters.number())
+        if found is None:
+            return packed(Error.INVALID_LINK)
+        found.aborted = True
+        self._station.stir()
+        return packed(Error.NONE)
+
+    def create(self, device: str) -> tuple[Error, int]:
+        """A link to the device, by its number."""
+        if device.lower() not in {"", self._device}:
+            return Error.NOT_ACCESSIBLE, 0
+        if len(self._links) >= MOST_CLIENTS:
+            return Error.OUT_OF_RESOURCES, 0
+        number = next(number for number in (n & 0x7FFFFFFF for n in self._numbers) if number not in self._links)
+        self._links[number] = OpenLink(Link(self._station))
+        return Error.NONE, number
+
+    def destroy(self, number: int) -> None:
+        """The link is gone, and its lock with it."""
+        self._links.pop(number).link.close()
+
+    def link(self, number: int) -> OpenLink:
+        """The link with this number, which exists."""
+        return self._links[number]
+
+
+class _Connection:
+    """One connection to the core channel, and the links that were created by it (they live as long as it does)."""
+
+    def __init__(self, server: Vxi11Server) -> None:
+        self._server = server
+        self._numbers: set[int] = set()
+
+    def close(self) -> None:
+        for number in self._numbers:
+            self._server.destroy(number)
+
+    def program(self) -> Program:
+        """The procedures of the core channel (B.6)."""
+        return {
+            10: self._create_link,
+            11: self._device_write,
+            12: self._device_read,
+            13: self._device_read_status_byte,
+            14: self._device_trigger,
+            15: self._device_clear,
+            16: self._device_remote_or_local,
+            17: self._device_remote_or_local,
+            18: self._device_lock,
+            19: self._device_unlock,
+            20: self._device_enable_request,
+            22: self._device_do_command,
+            23: self._destroy_link,
+            25: self._create_interrupt_channel,
+            26: self._destroy_interrupt_channel,
+        }
+
+    async def _free(self, call: Generic) -> tuple[Error, OpenLink | None]:
+        """The link of a call, once nobody else has the instrument locked (B.4.3)."""
+        if call.number not in self._numbers:
+            return Error.INVALID_LINK, None
+        found = self._server.link(call.number)
+        found.aborted = False
+        within = call.lock_timeout / 1000 if call.flags & Flag.WAIT_LOCK else 0.0
+        if await found.link.turn(within, given_up=lambda: found.aborted):
+            return Error.NONE, found
+        return (Error.ABORT if found.aborted else Error.LOCKED_BY_ANOTHER), None
+
+    async def _create_link(self, parameters: Reader) -> bytes:
+        _, wants_lock, lock_timeout = parameters.numbers(3)
+        error, number = self._server.create(parameters.opaque().decode("latin-1"))
+        if error == Error.NONE:
+            self._numbers.add(number)
+            if wants_lock and not await self._server.link(number).link.lock(None, lock_timeout / 1000):
+                self._forget(number)
+                error, number = Error.LOCKED_BY_ANOTHER, 0
+        return packed(error, number, self._server.abort.port, LONGEST)
+
+    async def _device_write(self, parameters: Reader) -> bytes:
+        number, io_timeout, lock_timeout, flags = parameters.numbers(4)
+        data = parameters.opaque()
+        if len(data) > LONGEST:
+            return packed(Error.PARAMETER, 0)
+        error, found = await self._free(Generic(number, flags, lock_timeout, io_timeout))
+        if found is None:
+            return packed(error, 0)
+        found.link.write(data, end=bool(flags & Flag.END))
+        return packed(Error.NONE, len(data))
+
+    async def _device_read(self, parameters: Reader) -> bytes:
+        number, count, io_timeout, lock_timeout, flags, character = parameters.numbers(6)
+        error, found = await self._free(Generic(number, flags, lock_timeout, io_timeout))
+        if found is None:
+            return packed(error, 0, b"")
+        until = bytes([character & 0xFF]) if flags & Flag.TERMINATION_CHARACTER else b""
+        if not await self._answered(found, io_timeout / 1000):
+            return packed(Error.ABORT if found.aborted else Error.IO_TIMEOUT, 0, b"")
+        data, end = found.link.take(min(count, CHUNK), until=until)
+        reason = Reason.END * end | Reason.COUNT * (len(data) >= count)
+        reason |= Reason.CHARACTER * (bool(until) and data.endswith(until))
+        return packed(Error.NONE, reason, data)
+
+    @staticmethod
+    async def _answered(found: OpenLink, within: float) -> bool:
+        link = found.link
+        if link.due() is None:
+            link.session.read(0, 0.0)  # who reads what was not asked for finds it in the error queue
+        return await link.answered(within, given_up=lambda: found.aborted)
+
+    async def _generic(self, parameters: Reader) -> tuple[Error, OpenLink | None]:
+        return await self._free(Generic(*parameters.numbers(4)))
+
+    async def _device_read_status_byte(self, parameters: Reader) -> bytes:
+        error, found = await self._generic(parameters)
+        return packed(error, found.link.status_byte() if found else 0)
+
+    async def _device_trigger(self, parameters: Reader) -> bytes:
+        error, found = await self._generic(parameters)
+        if found:
+            found.link.trigger()
+        return packed(error)
+
+    async def _device_clear(self, parameters: Reader) -> bytes:
+        error, found = await self._generic(parameters)
+        if found:
+            found.link.clear()
+        return packed(error)
+
+    async def _device_remote_or_local(self, parameters: Reader) -> bytes:
+        error, _ = await self._generic(parameters)  # there is no front panel to lock
+        return packed(error)
+
+    async def _device_lock(self, parameters: Reader) -> bytes:
+        number, flags, lock_timeout = parameters.numbers(3)
+        error, found = await self._free(Generic(number, flags, lock_timeout, 0))
+        if found and not await found.link.lock(None, 0.0):
+            error = Error.LOCKED_BY_ANOTHER
+        return packed(error)
+
+    async def _device_unlock(self, parameters: Reader) -> bytes:
+        number = parameters.number()
+        if number not in self._numbers:
+            return packed(Error.INVALID_LINK)
+        link = self._server.link(number).link
+        if not link.holds():
+            return packed(Error.NOT_LOCKED)
+        link.unlock()
+        return packed(Error.NONE)
+
+    async def _device_enable_request(self, parameters: Reader) -> bytes:
+        number, _ = parameters.numbers(2)
+        return packed(Error.NONE if number in self._numbers else Error.INVALID_LINK)
+
+    async def _device_do_command(self, parameters: Reader) -> bytes:
+        return packed(Error.NOT_SUPPORTED, b"")
+
+    async def _destroy_link(self, parameters: Reader) -> bytes:
+        number = parameters.number()
+        if number not in self._numbers:
+            return packed(Error.INVALID_LINK)
+        self._forget(number)
+        return packed(Error.NONE)
+
+    def _forget(self, number: int) -> None:
+        self._numbers.remove(number)
+        self._server.destroy(number)
+
+    async def _create_interrupt_channel(self, parameters: Reader) -> bytes:
+        return packed(Error.NOT_SUPPORTED)
+
+    async def _destroy_interrupt_channel(self, parameters: Reader) -> bytes:
+        return packed(Error.CHANNEL_NOT_ESTABLISHED)

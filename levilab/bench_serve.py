@@ -1,0 +1,158 @@
+"""`levilab bench serve`: the virtual bench for programs that are not ours, until somebody asks for the end."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import signal
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from instruments.virtual.servers.server import LOOPBACK, PORTS_PER_INSTRUMENT, Place, offered
+from levilab.clock import WallClock
+from levilab.drivers import DRIVERS
+from levilab.errors import LevilabError
+from levilab.simulator.world import SpinScene, SpinWorld
+from levilab.virtual_bench import VIRTUAL, virtual_bus
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from types import FrameType
+
+    from instruments.virtual.bus import Bus
+    from instruments.virtual.servers.server import Offer
+
+#: What asks a server to end: Ctrl-C, kill, a closed terminal, and on Windows Ctrl-Break.
+_SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
+
+#: The greatest port there is.
+_LAST_PORT = 0xFFFF
+
+
+class CannotServe(LevilabError):
+    """The bench cannot be offered there."""
+
+
+class WrongService(LevilabError):
+    """What was asked for does not exist; wrong usage."""
+
+    exit_code = 2
+
+
+@dataclass(frozen=True)
+class Service:
+    """How the bench is to be offered.
+
+    host: an address of this machine; port_base: the first port, None: free ones; speed: seconds of the bench per
+    second; models: by kind of instrument, where it is not the first one.
+    """
+
+    host: str = LOOPBACK
+    port_base: int | None = None
+    speed: float = 1.0
+    models: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Served:
+    """An instrument that can be reached.  resources: the names to copy, by the way that they go."""
+
+    kind: str
+    model: str
+    resources: dict[str, str]
+
+
+def chosen_models(words: list[str]) -> dict[str, str]:
+    """What ``counter=CNT-91`` and its like say, by kind.  Raises WrongService."""
+    chosen = {}
+    for word in words:
+        kind, _, model = word.partition("=")
+        if kind not in VIRTUAL:
+            raise WrongService(f"--model {word}: {kind!r} is no kind of instrument, known are {', '.join(VIRTUAL)}")
+        known = {name.upper(): name for name in DRIVERS[kind]}
+        if model.upper() not in known:
+            raise WrongService(f"--model {word}: no such {kind}, known are {', '.join(known.values())}")
+        chosen[kind] = known[model.upper()]
+    return chosen
+
+
+def serve(service: Service, ready: Callable[[tuple[Served, ...]], None]) -> str:
+    """Offer the bench until a signal asks for the end; its name.
+
+    ready: called once, when all can be reached.  Raises CannotServe, WrongService.
+    """
+    with _asked_to_end() as end:
+        asyncio.run(_serve(service, ready, end))
+    assert end.by
+    return end.by
+
+
+async def _serve(service: Service, ready: Callable[[tuple[Served, ...]], None], end: _End) -> None:
+    bus = _bus(service)
+    place = _place(service, len(bus.instruments))
+    async with contextlib.AsyncExitStack() as opened:
+        try:
+            offers = await opened.enter_async_context(offered(bus, place))
+        except OSError as error:
+            why = f"the bench cannot be offered at {service.host} ({error})"
+            raise CannotServe(f"{why}: try another --host or --port-base") from error
+        ready(tuple(_served(service, offer) for offer in offers))
+        await end.comes()
+
+
+def _bus(service: Service) -> Bus:
+    try:
+        clock = WallClock(speed=service.speed)
+    except ValueError as error:
+        raise WrongService(f"--speed: {error}") from error
+    # the one place where the models chosen meet the bench
+    missing = [model for kind, model in service.models.items() if model != VIRTUAL[kind].model]
+    if missing:
+        raise WrongService(f"--model: the virtual bench has no {', '.join(missing)}")
+    return virtual_bus(SpinWorld(SpinScene(), clock))
+
+
+def _place(service: Service, instruments: int) -> Place:
+    last = (service.port_base or 0) + PORTS_PER_INSTRUMENT * instruments - 1
+    if last > _LAST_PORT:
+        raise WrongService(f"--port-base {service.port_base}: the ports end at {_LAST_PORT}, {last} would be needed")
+    return Place(service.host, service.port_base)
+
+
+def _served(service: Service, offer: Offer) -> Served:
+    kind = next(kind for kind, settings in VIRTUAL.items() if settings.address == offer.address)
+    return Served(kind, service.models.get(kind, VIRTUAL[kind].model), offer.resources)
+
+
+class _End:
+    """Whether a signal asked for the end, and which; a signal handler that wakes an event loop."""
+
+    def __init__(self) -> None:
+        self.by: str | None = None
+        self._woken: tuple[asyncio.AbstractEventLoop, asyncio.Event] | None = None
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        self.by = self.by or signal.Signals(number).name
+        if self._woken:
+            loop, event = self._woken
+            loop.call_soon_threadsafe(event.set)
+
+    async def comes(self) -> None:
+        """Wait for a signal."""
+        event = asyncio.Event()
+        self._woken = asyncio.get_running_loop(), event
+        if self.by is None:
+            await event.wait()
+        self._woken = None
+
+
+@contextlib.contextmanager
+def _asked_to_end() -> Iterator[_End]:
+    """Signals go to the one given here (main thread only); one that was ignored from the start still is."""
+    end = _End()
+    before = {number: signal.signal(number, end) for number in _SIGNALS if signal.getsignal(number) != signal.SIG_IGN}
+    try:
+        yield end
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
