@@ -1,0 +1,174 @@
+"""Edges of a sampled voltage: where a Schmitt trigger fires, looked for piece by piece.
+
+A signal may be looked at for hours: only a piece of it is in memory at a time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+#: The voltage at an input: (start [s], step [s], n) → shape (n,) [V].
+Signal = Callable[[float, float, int], Array]
+
+#: Samples per second with which the models look at the light.  A pulse of 3 % of a turn at 60 Hz lasts
+#: 0.5 ms: ten samples; the crossing is interpolated between two of them.
+RATE = 20_000.0
+#: Samples at a look: a megabyte each for the voltage and for whatever the world needs to make it.
+_SHORTEST, _LONGEST = 1 << 10, 1 << 17
+#: What the mean is taken over that a.c. coupling removes, and how long a level that was found is good for [s].
+_SETTLING, _LEVEL_AGE = 1.0, 1.0
+
+
+def crossings(voltage: Array, level: float, hysteresis: float) -> Array:
+    """Where a sampled voltage rises through a level, in samples, interpolated.
+
+    A crossing counts when the voltage was below level − hysteresis since the last one (a Schmitt trigger).
+
+    >>> crossings(np.array([0.0, 1.0, 0.0, 4.0]), 0.5, 0.1)
+    array([0.5  , 2.125])
+    """
+    return _fires(voltage, level, level - hysteresis, armed=False)[0]
+
+
+def _fires(voltage: Array, level: float, below: float, *, armed: bool) -> tuple[Array, bool]:
+    """Where the trigger fires [samples], and whether it is armed at the end."""
+    above = voltage >= level
+    # +1 where the trigger fires, -1 where it is armed again, 0 where it keeps its state
+    state = above.view(np.int8) - (voltage < below).view(np.int8)
+    decided = np.flatnonzero(state)
+    if not decided.size:
+        return np.empty(0), armed
+    signs = state[decided]
+    turns = decided[1:][np.diff(signs) > 0]
+    if armed and signs[0] > 0:
+        turns = np.concatenate((decided[:1], turns))
+    before, after = voltage[np.maximum(turns - 1, 0)], voltage[turns]
+    # the very first sample can only fire if the level has moved since it was armed
+    rise = np.where(after > before, after - before, 1.0)
+    return np.maximum(turns - 1 + np.clip((level - before) / rise, 0.0, 1.0), 0.0), bool(signs[-1] < 0)
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """A Schmitt trigger: it fires at one voltage and is armed beyond another one [V].
+
+    sign: 1 for rising edges, −1 for falling ones.
+    """
+
+    fire: float
+    arm: float
+    sign: float = 1.0
+
+
+@dataclass(frozen=True)
+class Input:
+    """How an input looks at its signal.
+
+    level: fixed [V], or None to find it; upper, lower: where the trigger fires and is armed, in parts of peak to
+    peak, when it is found; both the same: then the hysteresis [V] lies below.  window: how long the signal is
+    looked at for that [s]; alternating: the mean is taken away (a.c. coupling); falling: the slope.
+    """
+
+    level: float | None
+    hysteresis: float
+    window: float
+    upper: float = 0.5
+    lower: float = 0.5
+    alternating: bool = False
+    falling: bool = False
+
+    @property
+    def ages(self) -> bool:
+        """Whether the thresholds follow the signal."""
+        return self.level is None or self.alternating
+
+    def thresholds(self, signal: Signal, instant: float) -> Thresholds:
+        """The trigger's voltages as the signal lets choose them at this time [s].
+
+        A found level is right if the window holds at least a period of the signal.  A pulse of a slower one may
+        fall outside: the level then stands in the dark noise.
+        """
+        sign = -1.0 if self.falling else 1.0
+        if self.level is None:
+            low, high = self.extremes(signal, instant)
+            upper, lower = (self.lower, self.upper) if self.falling else (self.upper, self.lower)
+            fire, arm = (low + share * (high - low) for share in (upper, lower))
+            return Thresholds(fire, fire - sign * self.hysteresis if fire == arm else arm, sign)
+        mean = float(signal(instant, 1 / RATE, int(_SETTLING * RATE)).mean()) if self.alternating else 0.0
+        return Thresholds(self.level + mean, self.level + mean - sign * self.hysteresis, sign)
+
+    def extremes(self, signal: Signal, instant: float) -> tuple[float, float]:
+        """The least and the greatest voltage within the window [V]."""
+        voltage = signal(instant, 1 / RATE, max(2, int(self.window * RATE)))
+        return float(voltage.min()), float(voltage.max())
+
+
+@dataclass(frozen=True)
+class Edge:
+    """count: edges of the signal before this one, from where the look began; time [s]."""
+
+    count: int
+    time: float
+
+
+class EdgeFinder:
+    """The edges of one input from some time on.  They are asked for in order; those passed are forgotten."""
+
+    def __init__(self, signal: Signal, entry: Input, start: float) -> None:
+        self._signal, self._entry, self._start = signal, entry, start
+        self._samples = 0
+        self._stride = _SHORTEST
+        self._last: Array = np.empty(0)
+        self._armed = False
+        self._times: Array = np.empty(0)
+        self._passed = 0
+        self._triggers, self._found_at = entry.thresholds(signal, start), start
+
+    @property
+    def reached(self) -> float:
+        """Up to here every edge is known [s]."""
+        return self._start + (self._samples - 1) / RATE
+
+    def find(self, instant: float) -> Edge | None:
+        """The first edge at this time or later, if it is known."""
+        count = int(np.searchsorted(self._times, instant))
+        self._times, self._passed = self._times[count:], self._passed + count
+        return Edge(self._passed, float(self._times[0])) if self._times.size else None
+
+    def count_before(self, instant: float) -> int:
+        """How many of the edges that are known lie before this time."""
+        return self._passed + int(np.searchsorted(self._times, instant))
+
+    def refresh(self, instant: float) -> None:
+        """A measurement begins: a level that follows the signal is found anew, if it is old."""
+        if self._entry.ages and instant > self._found_at + _LEVEL_AGE:
+            self._triggers, self._found_at = self._entry.thresholds(self._signal, instant), instant
+
+    def look(self, wanted: float, until: float) -> bool:
+        """Look on at the signal: as far as wanted, or a little further, but not beyond until.
+
+        Returns False if there was nothing left to look at.
+        """
+        wish = math.ceil((wanted - self._start) * RATE) + 1 - self._samples
+        left = math.floor((until - self._start) * RATE) + 1 - self._samples
+        count = min(max(wish, self._stride), _LONGEST, left)
+        if count <= 0:
+            return False
+        voltage = self._signal(self._start + self._samples / RATE, 1 / RATE, count)
+        joined = self._triggers.sign * np.concatenate((self._last, voltage))
+        sign = self._triggers.sign
+        places, self._armed = _fires(joined, sign * self._triggers.fire, sign * self._triggers.arm, armed=self._armed)
+        times = self._start + (self._samples - self._last.size + places) / RATE
+        # darkness is looked through in ever longer pieces
+        self._stride = _SHORTEST if times.size else min(2 * self._stride, _LONGEST)
+        self._times = np.concatenate((self._times, times))
+        self._last = voltage[-1:]
+        self._samples += count
+        return True
