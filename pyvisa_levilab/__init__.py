@@ -1,7 +1,7 @@
 """PyVISA finds the virtual bench here: ``pyvisa.ResourceManager("@levilab")``.
 
 The backend is the few lines between PyVISA's library calls and :class:`instruments.virtual.bus.Bus`.
-Time-outs cost virtual time only.
+Time-outs cost virtual time only; ``"realtime@levilab"`` keeps to the wall clock.
 """
 
 from __future__ import annotations
@@ -16,6 +16,9 @@ from pyvisa.constants import EventAttribute, ResourceAttribute, StatusCode
 from pyvisa.highlevel import VisaLibraryBase
 from pyvisa.util import LibraryPath
 
+from instruments.virtual.faults import LinkLost
+from instruments.virtual.serial_line import LineSettings, SerialLine
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -25,6 +28,9 @@ if TYPE_CHECKING:
     from instruments.virtual.bus import Bus, Session
 
 _numbers = itertools.count(1)
+
+#: What stands before the @ for a bench that is never faster than the wall clock.
+REALTIME = "realtime"
 
 #: What a VISA session says of itself before anything was set (VPP-4.3, 3.2 and 5.1).
 _DEFAULT_ATTRIBUTES: dict[int, Any] = {
@@ -51,7 +57,7 @@ class LevilabVisaLibrary(VisaLibraryBase):
     """A PyVISA library whose only resources are the instruments of one virtual bench."""
 
     bus: Bus | None
-    _sessions: dict[int, tuple[Session, dict[int, Any]]]
+    _sessions: dict[int, tuple[Session | SerialLine, dict[int, Any]]]
 
     @staticmethod
     def get_library_paths() -> Iterable[LibraryPath]:
@@ -63,11 +69,14 @@ class LevilabVisaLibrary(VisaLibraryBase):
         self._sessions = {}
 
     def _bench(self) -> Bus:
-        """The bench given, or a fresh one with its own top when a program just asked for "@levilab"."""
-        if self.bus is None:
-            from levilab.bench import virtual_bus
+        """The bench given, or a fresh one with its own top when a program just asked for "@levilab".
 
-            self.bus = virtual_bus()
+        Asked for as "realtime@levilab" it keeps to the wall clock: for programs that sleep between their questions.
+        """
+        if self.bus is None:
+            from levilab.virtual_bench import own_world, virtual_bus
+
+            self.bus = virtual_bus(own_world(realtime=str(self.library_path) == REALTIME))
         return self.bus
 
     def open_default_resource_manager(self) -> tuple[VISARMSession, StatusCode]:
@@ -91,8 +100,8 @@ class LevilabVisaLibrary(VisaLibraryBase):
         open_timeout: int | None = constants.VI_TMO_IMMEDIATE,
     ) -> tuple[VISASession, StatusCode]:
         """ViOpen."""
-        link = self._bench().open(resource_name)
-        if link is None:
+        session_with_it = self._bench().open(resource_name)
+        if session_with_it is None:
             return cast("VISASession", 0), self.handle_return_value(None, StatusCode.error_resource_not_found)
         parsed = rname.parse_resource_name(resource_name.upper())
         serial = parsed.interface_type_const == constants.InterfaceType.asrl
@@ -105,6 +114,7 @@ class LevilabVisaLibrary(VisaLibraryBase):
                 ResourceAttribute.interface_type: parsed.interface_type_const,
             }
         )
+        link = SerialLine(session_with_it, _line_settings(attributes)) if serial else session_with_it
         number = cast("VISASession", next(_numbers))
         self._sessions[number] = (link, attributes)
         return number, self.handle_return_value(number, StatusCode.success)
@@ -121,7 +131,10 @@ class LevilabVisaLibrary(VisaLibraryBase):
         link, attributes = self._sessions[session]
         if link.hold.keeps_out(link):
             return 0, self.handle_return_value(session, StatusCode.error_resource_locked)
-        link.write(bytes(data), end=bool(attributes[ResourceAttribute.send_end_enabled]))
+        try:
+            link.write(bytes(data), end=bool(attributes[ResourceAttribute.send_end_enabled]))
+        except LinkLost:
+            return 0, self.handle_return_value(session, StatusCode.error_connection_lost)
         return len(data), self.handle_return_value(session, StatusCode.success)
 
     def read(self, session: VISASession, count: int) -> tuple[bytes, StatusCode]:
@@ -129,13 +142,12 @@ class LevilabVisaLibrary(VisaLibraryBase):
         link, attributes = self._sessions[session]
         if link.hold.keeps_out(link):
             return b"", self.handle_return_value(session, StatusCode.error_resource_locked)
-        got = link.read(count, _seconds(attributes[ResourceAttribute.timeout_value]), until=_termchar(attributes))
-        if got is None:
-            return b"", self.handle_return_value(session, StatusCode.error_timeout)
-        data, complete = got
-        status = StatusCode.success if complete else StatusCode.success_max_count_read
-        if data[-1:] == _termchar(attributes):
-            status = StatusCode.success_termination_character_read
+        try:
+            data, status = _read(
+                link, count, _seconds(attributes[ResourceAttribute.timeout_value]), _termchar(attributes)
+            )
+        except LinkLost:
+            data, status = b"", StatusCode.error_connection_lost
         return data, self.handle_return_value(session, status)
 
     def clear(self, session: VISASession) -> StatusCode:
@@ -189,7 +201,10 @@ class LevilabVisaLibrary(VisaLibraryBase):
 
     def set_attribute(self, session: VISASession, attribute: ResourceAttribute, attribute_state: Any) -> StatusCode:
         """ViSetAttribute."""
-        self._sessions[session][1][attribute] = attribute_state
+        link, attributes = self._sessions[session]
+        attributes[attribute] = attribute_state
+        if isinstance(link, SerialLine):
+            link.settings = _line_settings(attributes)
         return self.handle_return_value(session, StatusCode.success)
 
     def disable_event(self, session: VISASession, event_type: Any, mechanism: Any) -> StatusCode:
@@ -201,9 +216,34 @@ class LevilabVisaLibrary(VisaLibraryBase):
         return self.handle_return_value(session, StatusCode.success)
 
 
+def _read(link: Session | SerialLine, count: int, timeout: float, termchar: bytes) -> tuple[bytes, StatusCode]:
+    """Bytes as they come, until there is enough of them, the answer ends, or nothing more comes in time."""
+    data = b""
+    while len(data) < count:
+        got = link.read(count - len(data), timeout, until=termchar)
+        if got is None:
+            return data, StatusCode.error_timeout
+        data += got[0]
+        if termchar and data.endswith(termchar):
+            return data, StatusCode.success_termination_character_read
+        if got[1]:
+            return data, StatusCode.success
+    return data, StatusCode.success_max_count_read
+
+
 def _seconds(timeout: int) -> float:
     """VISA's milliseconds; its largest number stands for ever."""
     return math.inf if timeout == constants.VI_TMO_INFINITE else timeout / 1000
+
+
+def _line_settings(attributes: dict[int, Any]) -> LineSettings:
+    """The program's end of a serial line; VISA counts stop bits in tenths and parities from none to space."""
+    return LineSettings(
+        int(attributes[ResourceAttribute.asrl_baud_rate]),
+        int(attributes[ResourceAttribute.asrl_data_bits]),
+        "NOEMS"[int(attributes[ResourceAttribute.asrl_parity])],
+        int(attributes[ResourceAttribute.asrl_stop_bits]) / 10,
+    )
 
 
 def _termchar(attributes: dict[int, Any]) -> bytes:

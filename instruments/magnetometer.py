@@ -1,0 +1,228 @@
+"""Hall magnetometers: a flux density, whatever the model.
+
+Facts and their sources stand with each driver.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+
+from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange
+from instruments.scpi import ScpiInstrument, Setting
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+#: One of each unit in tesla.  A Hall probe sees B; oersted and A/m are B/μ₀ in air.
+_UNITS_T = {"GAUSS": 1e-4, "TESLA": 1.0, "OERSTED": 1e-4, "A/M": 4e-7 * math.pi}
+
+#: Bits of the answer to OPST?.
+_NO_PROBE, _OVERLOAD, _INVALID_PROBE, _ZERO_DONE = 1, 2, 16, 128
+
+#: TYPE? less 40, or less 50 with a cable that the user has programmed.
+_PROBES = ("HSE", "HST", "UHS")
+
+
+class Magnetometer(Protocol):
+    """What every magnetometer offers."""
+
+    def identity(self) -> str:
+        """Maker, model, serial number, firmware."""
+
+    def settings(self) -> dict[str, bool | float | str]:
+        """Its settings as they stand."""
+
+    def prepare(self, *, range_t: float | None) -> None:
+        """Measure steady flux density up to this [T]; None: the instrument chooses its range."""
+
+    def flux_density(self) -> float | None:
+        """One reading along the probe's axis [T]; None when it is beyond the range."""
+
+    def zero(self) -> None:
+        """Take the present flux density for zero: with the probe in its zero-gauss chamber, and only there."""
+
+    def close(self) -> None:
+        """Give the instrument back."""
+
+
+@dataclass(eq=False)
+class Coded(Setting[str]):
+    """A setting that is a word of the choices here and its number on the wire.  first: the first word's number."""
+
+    first: int = 1
+
+    def _parse(self, address: str, question: str, answer: str) -> str:
+        try:
+            index = int(answer) - self.first
+        except ValueError:
+            index = -1
+        if not 0 <= index < len(self.choices):
+            last = self.first + len(self.choices) - 1
+            raise BadAnswer(address, question, answer, f"a number from {self.first} to {last}")
+        return self.choices[index]
+
+    def _spell(self, value: str) -> str:
+        return str(self.choices.index(str(value).upper()) + self.first)
+
+
+class LakeShoreGaussmeter(ScpiInstrument):
+    """What the Lake Shore gaussmeters 425, 455 and 475 have in common.
+
+    They have no error queue, and ignore what they do not understand.  So each setting is asked back in the same
+    message, ``UNIT 2;UNIT?``: one exchange, for they want to be left alone between two.
+    """
+
+    #: What SerialTransport must be told; pause: between two exchanges [s].
+    SERIAL: ClassVar[Mapping[str, Any]]
+    #: Greatest flux density of each range [T], by probe, lowest first.
+    RANGES_T: ClassVar[Mapping[str, tuple[float, ...]]]
+    #: RDGMODE for steady fields.
+    _STEADY: ClassVar[str]
+
+    unit = Coded("UNIT", str, choices=tuple(_UNITS_T))
+    automatic_range = Coded("AUTO", str, choices=("OFF", "ON"), first=0)
+    mode = Setting("RDGMODE", str)
+
+    def forget_errors(self) -> None:
+        """There is no error queue."""
+
+    def raise_errors(self, after: str) -> None:
+        """There is no error queue."""
+
+    def command(self, message: str) -> None:
+        """Set something and ask it back.  Raises CommandRefused when it is not so afterwards."""
+        header, _, wanted = message.partition(" ")
+        answer = self.transport.query(f"{message};{header}?")
+        if _numbers(answer) != _numbers(wanted):
+            raise CommandRefused(self.transport.address, message, (f"{header}? answers {answer!r} afterwards",))
+
+    def settings(self) -> dict[str, bool | float | str]:
+        """Unit, mode, range and probe as they stand in the instrument."""
+        probe = self.probe()
+        return super().settings() | {"probe": probe, "range_t": self._range_t(probe)}
+
+    def probe(self) -> str:
+        """HSE, HST or UHS: high sensitivity, high stability, ultra-high sensitivity.  Raises BadAnswer."""
+        answer = self._ask("TYPE?")
+        if answer // 10 not in {4, 5} or answer % 10 >= len(_PROBES):
+            raise BadAnswer(self.transport.address, "TYPE?", str(answer), "a probe: is one plugged in?")
+        return _PROBES[answer % 10]
+
+    def _range_t(self, probe: str) -> float:
+        """The greatest flux density of the range in use [T]."""
+        ranges = self.RANGES_T[probe]
+        number = self._ask("RANGE?")
+        if not 1 <= number <= len(ranges):
+            raise BadAnswer(self.transport.address, "RANGE?", str(number), f"1 to {len(ranges)}")
+        return ranges[number - 1]
+
+    def prepare(self, *, range_t: float | None) -> None:
+        """Steady fields in tesla; the smallest range that holds range_t; see :class:`Magnetometer`."""
+        self.unit = "TESLA"
+        self.mode = self._STEADY
+        if range_t is None:
+            self.automatic_range = "ON"
+            return
+        ranges = self.RANGES_T[self.probe()]
+        fitting = [number for number, full in enumerate(ranges, start=1) if 0 < range_t <= full * (1 + 1e-9)]
+        if not fitting:
+            raise OutOfRange(self.transport.address, "range_t", range_t, f"more than 0, up to {ranges[-1]:g} T")
+        self.automatic_range = "OFF"
+        self.command(f"RANGE {fitting[0]}")
+
+    def flux_density(self) -> float | None:
+        """One reading [T]; see :class:`Magnetometer`.
+
+        The unit is asked each time: somebody may have changed it at the front panel.  Raises BadAnswer without a
+        probe.
+        """
+        answer = self.transport.query("RDGFIELD?")
+        per_unit = _UNITS_T[self.unit]
+        status = self._ask("OPST?")
+        if status & (_NO_PROBE | _INVALID_PROBE) or answer == "NO PROBE":
+            expected = "a flux density: is the probe plugged in (with the instrument off)?"
+            raise BadAnswer(self.transport.address, "RDGFIELD?", answer, expected)
+        if status & _OVERLOAD or answer == "OL":
+            return None
+        try:
+            value = float(answer) * per_unit
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise BadAnswer(self.transport.address, "RDGFIELD?", answer, "a number")
+        return value
+
+    def zero(self) -> None:
+        """Zero the probe; see :class:`Magnetometer`.  Raises NoAnswer if that takes too long."""
+        raise NotImplementedError
+
+    def _ask(self, question: str) -> int:
+        answer = self.transport.query(question)
+        try:
+            return int(answer)
+        except ValueError:
+            raise BadAnswer(self.transport.address, question, answer, "a whole number") from None
+
+
+class LakeShore425(LakeShoreGaussmeter):
+    """Lake Shore 425, at its USB socket, which is a serial port to the computer.
+
+    Sources: Model 425 User's Manual, pages 50 (at most 30 messages a second, 30 ms after each) and 52 to 57
+    (commands); Lake Shore's own Python driver (57600 baud, 7 data bits, odd parity); the socs agent of the Simons
+    Observatory (bits of OPST?); PyMeasure (ranges).
+    """
+
+    MODELS: ClassVar[str] = "MODEL425"
+    SERIAL: ClassVar = {"baud_rate": 57600, "data_bits": 7, "parity": "odd", "stop_bits": 1, "pause": 0.03}
+    RANGES_T: ClassVar = {
+        "HSE": (3.5e-3, 35e-3, 0.35, 3.5),
+        "HST": (35e-3, 0.35, 3.5, 35.0),
+        "UHS": (35e-6, 350e-6, 3.5e-3),
+    }
+    _STEADY = "1,1,1"  # with the filter
+
+    #: Zeroing is over after some seconds; more questions than this mean that it never will be.
+    _LONGEST_ZEROING = 600
+
+    def zero(self) -> None:
+        """Zero the probe and wait for the bit that says that it is done; see :class:`Magnetometer`."""
+        self.transport.write("ZPROBE")
+        for _ in range(self._LONGEST_ZEROING):
+            if self._ask("OPST?") & _ZERO_DONE:
+                return
+        raise NoAnswer(self.transport.address, "ZPROBE", self._LONGEST_ZEROING * self.SERIAL["pause"])
+
+
+class LakeShore475(LakeShoreGaussmeter):
+    """Lake Shore 455 and 475, at RS-232 or GPIB.
+
+    Sources: Model 475 User's Manual, chapter 6, in part (``*OPC?`` is held until what was begun is finished); public
+    drivers of the 455 and 475 after their manuals (RS-232: 7 data bits, odd parity, 9600 baud or what is set at the
+    front panel, at most 20 messages a second; ranges by probe; OPST?).
+    """
+
+    MODELS: ClassVar[str] = "MODEL4[57]5"
+    SERIAL: ClassVar = {"baud_rate": 9600, "data_bits": 7, "parity": "odd", "stop_bits": 1, "pause": 0.05}
+    RANGES_T: ClassVar = {
+        "HSE": (350e-6, 3.5e-3, 35e-3, 0.35, 3.5),
+        "HST": (3.5e-3, 35e-3, 0.35, 3.5, 35.0),
+        "UHS": (3.5e-6, 35e-6, 350e-6, 3.5e-3),
+    }
+    _STEADY = "1,2,1,1,1"  # four digits: 10 Hz
+
+    #: How long zeroing may take [s].
+    _LONGEST_ZEROING = 20.0
+
+    def zero(self) -> None:
+        """Zero the probe and wait until the instrument says that it is done; see :class:`Magnetometer`."""
+        self.transport.query("ZPROBE;*OPC?", patience=self._LONGEST_ZEROING)
+
+
+def _numbers(text: str) -> list[float] | None:
+    """The numbers of a list with commas; None if it is none."""
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        return None

@@ -1,0 +1,203 @@
+"""The magnetometers' drivers: the manuals' bytes.
+
+Source: Lake Shore Model 425 User's Manual, chapter 6; Model 475 User's Manual, chapter 6; public drivers.
+"""
+
+import math
+
+import pytest
+from conversation import SILENCE, conversation
+
+from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange, WrongInstrument
+from instruments.magnetometer import LakeShore425, LakeShore475
+
+#: RDGMODE for steady fields: the 425 with its filter, the 475 with four digits.
+STEADY = {LakeShore425: "1,1,1", LakeShore475: "1,2,1,1,1"}
+BOTH = pytest.mark.parametrize("driver", [LakeShore425, LakeShore475])
+
+
+def kept(message, answer=None):
+    """A setting that stays as it was set."""
+    header, _, value = message.partition(" ")
+    return (f"{message};{header}?", answer or value)
+
+
+def steady(driver):
+    return [kept("UNIT 2"), kept(f"RDGMODE {STEADY[driver]}")]
+
+
+def reading(answer, unit="2", status="004"):
+    return [("RDGFIELD?", answer), ("UNIT?", unit), ("OPST?", status)]
+
+
+@pytest.mark.parametrize(
+    ("driver", "identity"),
+    [
+        (LakeShore425, "LSCI,MODEL425,4250022,1.0"),
+        (LakeShore475, "LSCI,MODEL475,4750001,01012020"),
+        (LakeShore475, "LSCI,MODEL455,4550001,01012020"),
+    ],
+)
+def test_the_models_know_themselves(driver, identity):
+    with conversation(driver, ("*IDN?", identity)) as magnetometer:
+        assert magnetometer.identity() == identity
+
+
+@pytest.mark.parametrize(
+    ("driver", "identity"), [(LakeShore425, "LSCI,MODEL475,1,1"), (LakeShore475, "LSCI,MODEL425,4250022,1.0")]
+)
+def test_another_model_is_told(driver, identity):
+    with conversation(driver, ("*IDN?", identity)) as magnetometer, pytest.raises(WrongInstrument, match="MODEL4"):
+        magnetometer.identity()
+
+
+@BOTH
+def test_without_a_range_the_instrument_chooses(driver):
+    with conversation(driver, *steady(driver), kept("AUTO 1")) as magnetometer:
+        magnetometer.prepare(range_t=None)
+
+
+@pytest.mark.parametrize(
+    ("driver", "probe", "range_t", "number"),
+    [
+        (LakeShore425, "40", 3.5e-3, 1),  # 35 G
+        (LakeShore425, "40", 3.6e-3, 2),
+        (LakeShore425, "50", 1.0, 4),  # 35 kG, at a cable of the user's
+        (LakeShore425, "42", 1e-3, 3),
+        (LakeShore475, "41", 1e-3, 1),
+        (LakeShore475, "40", 1e-3, 2),
+        (LakeShore475, "42", 3.5e-6, 1),  # 35 mG
+    ],
+)
+def test_the_smallest_range_that_holds_the_field_depends_on_the_probe(driver, probe, range_t, number):
+    lines = [*steady(driver), ("TYPE?", probe), kept("AUTO 0"), kept(f"RANGE {number}")]
+    with conversation(driver, *lines) as magnetometer:
+        magnetometer.prepare(range_t=range_t)
+
+
+@pytest.mark.parametrize("range_t", [3.6, 0.0, -1.0, math.inf, math.nan])
+def test_a_field_that_the_probe_does_not_measure_is_refused_and_nothing_is_set_for_it(range_t):
+    lines = [*steady(LakeShore425), ("TYPE?", "40")]
+    with conversation(LakeShore425, *lines) as magnetometer, pytest.raises(OutOfRange, match="range_t"):
+        magnetometer.prepare(range_t=range_t)
+
+
+@pytest.mark.parametrize("answer", ["1", "02,1", "", "OL"])
+def test_a_setting_that_did_not_stay_is_told(answer):
+    lines = [kept("UNIT 2", answer)] if answer else [("UNIT 2;UNIT?", answer)]
+    with conversation(LakeShore425, *lines) as magnetometer, pytest.raises(CommandRefused, match="UNIT 2"):
+        magnetometer.prepare(range_t=None)
+
+
+def test_a_setting_may_come_back_with_leading_zeros():
+    lines = [kept("UNIT 2", "02"), kept("RDGMODE 1,1,1", "01,01,01"), kept("AUTO 1", "+1")]
+    with conversation(LakeShore425, *lines) as magnetometer:
+        magnetometer.prepare(range_t=None)
+
+
+@BOTH
+@pytest.mark.parametrize(
+    ("answer", "unit", "tesla"),
+    [
+        ("+123.456E-04", "2", 0.0123456),
+        ("+123.456E+00", "1", 0.0123456),
+        ("-123.456E+00", "3", -0.0123456),
+        ("+100.000E+01", "4", 4e-4 * math.pi),
+        ("+000.000E+00", "2", 0.0),
+    ],
+)
+def test_a_reading_is_in_tesla_whatever_the_unit_at_the_front_panel(driver, answer, unit, tesla):
+    with conversation(driver, *reading(answer, unit)) as magnetometer:
+        assert magnetometer.flux_density() == pytest.approx(tesla, rel=1e-12)
+
+
+@pytest.mark.parametrize(("answer", "status"), [("OL", "002"), ("OL", "000"), ("+350.000E-04", "006")])
+def test_a_field_beyond_the_range_is_no_reading(answer, status):
+    with conversation(LakeShore425, *reading(answer, status=status)) as magnetometer:
+        assert magnetometer.flux_density() is None
+
+
+@pytest.mark.parametrize(("answer", "status"), [("NO PROBE", "001"), ("+000.000E+00", "001"), ("+1.0", "016")])
+def test_no_probe_is_an_error_and_no_field(answer, status):
+    with (
+        conversation(LakeShore475, *reading(answer, status=status)) as magnetometer,
+        pytest.raises(BadAnswer, match="plugged in") as bad,
+    ):
+        magnetometer.flux_density()
+    assert bad.value.answer == answer
+
+
+@pytest.mark.parametrize("garbage", ["", "x", "1,2", "nan", "inf", "+123.4.5E+00"])
+def test_garbage_is_no_reading_but_an_error(garbage):
+    with conversation(LakeShore425, *reading(garbage)) as magnetometer, pytest.raises(BadAnswer) as bad:
+        magnetometer.flux_density()
+    assert (bad.value.question, bad.value.answer) == ("RDGFIELD?", garbage)
+
+
+@pytest.mark.parametrize(
+    ("lines", "question"),
+    [
+        ([("RDGFIELD?", "+1.0"), ("UNIT?", "5")], "UNIT?"),
+        ([("RDGFIELD?", "+1.0"), ("UNIT?", "T")], "UNIT?"),
+        ([("RDGFIELD?", "+1.0"), ("UNIT?", "2"), ("OPST?", "?")], "OPST?"),
+    ],
+)
+def test_a_reading_whose_unit_or_status_is_unknown_is_none(lines, question):
+    with conversation(LakeShore425, *lines) as magnetometer, pytest.raises(BadAnswer) as bad:
+        magnetometer.flux_density()
+    assert bad.value.question == question
+
+
+@pytest.mark.parametrize("probe", ["00", "43", "60", "HSE"])
+def test_an_unknown_probe_is_told(probe):
+    lines = [*steady(LakeShore425), ("TYPE?", probe)]
+    with conversation(LakeShore425, *lines) as magnetometer, pytest.raises(BadAnswer, match=r"TYPE\?"):
+        magnetometer.prepare(range_t=0.1)
+
+
+def test_the_425_says_itself_when_it_is_zeroed():
+    lines = [("ZPROBE", None), ("OPST?", "004"), ("OPST?", "000"), ("OPST?", "132")]
+    with conversation(LakeShore425, *lines) as magnetometer:
+        magnetometer.zero()
+
+
+def test_a_zero_that_never_comes_is_told():
+    lines = [("ZPROBE", None), *[("OPST?", "004")] * 600]
+    with conversation(LakeShore425, *lines) as magnetometer, pytest.raises(NoAnswer, match="ZPROBE"):
+        magnetometer.zero()
+
+
+def test_the_475_answers_when_it_is_zeroed():
+    with conversation(LakeShore475, ("ZPROBE;*OPC?", "1")) as magnetometer:
+        magnetometer.zero()
+        assert magnetometer.transport.waited == [20.0]
+
+
+def test_a_475_that_is_silent_after_a_zero_is_told():
+    with conversation(LakeShore475, ("ZPROBE;*OPC?", SILENCE)) as magnetometer, pytest.raises(NoAnswer):
+        magnetometer.zero()
+
+
+def test_the_settings_are_told_with_their_units():
+    lines = [("TYPE?", "40"), ("UNIT?", "2"), ("AUTO?", "0"), ("RDGMODE?", "1,1,1"), ("RANGE?", "2")]
+    with conversation(LakeShore425, *lines) as magnetometer:
+        assert magnetometer.settings() == {
+            "unit": "TESLA",
+            "automatic_range": "OFF",
+            "mode": "1,1,1",
+            "probe": "HSE",
+            "range_t": 35e-3,
+        }
+
+
+def test_there_is_no_error_queue_to_read():
+    with conversation(LakeShore425) as magnetometer:
+        magnetometer.forget_errors()
+        magnetometer.raise_errors("UNIT 2")
+        magnetometer.close()
+        assert magnetometer.transport.closed
+
+
+def test_a_word_that_is_no_unit_is_refused():
+    with conversation(LakeShore425) as magnetometer, pytest.raises(OutOfRange, match="unit = FURLONG"):
+        magnetometer.unit = "FURLONG"
