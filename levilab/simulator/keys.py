@@ -14,6 +14,32 @@ if TYPE_CHECKING:
 
 Table = dict[str, Any]
 
+#: What people call a key whose name is not at all alike.
+SYNONYMS: dict[str, tuple[str, ...]] = {
+    "kind": ("drive.waveform", "drag.law", "top.magnet"),
+    "type": ("drive.waveform", "drag.law", "top.magnet"),
+    "model": ("drag.law", "base.field"),
+    "shape": ("drive.waveform", "top.magnet"),
+    "form": ("drive.waveform",),
+    "friction": ("drag.law",),
+    "damping": ("drag.law",),
+    "constant": ("drag.coefficient",),
+    "weight": ("top.mass_kg",),
+    "dipole": ("top.moment_a_m2",),
+    "magnetization": ("base.strength_t_m",),
+    "order": ("base.field",),
+    "rotation": ("start.spin_hz",),
+    "rpm": ("start.spin_hz",),
+    "omega": ("start.spin_hz",),
+    "speed": ("start.spin_hz", "start.velocity_m_s"),
+    "angle": ("start.tilt_rad", "base.tilt_rad"),
+    "height": ("start.position_m", "escape.height_m"),
+    "limit": ("escape.radius_m", "escape.height_m"),
+    "g": ("gravity_m_s2",),
+}
+#: How alike names must be, from 0 to 1: beside each other, and anywhere in the tables.
+_ALIKE, _ALIKE_ANYWHERE = 0.5, 0.6
+
 
 class SceneError(LevilabError):
     """A scene that cannot be simulated as it is described."""
@@ -81,18 +107,52 @@ def _step(table: Table, at: Any, way: list[str], given: str) -> str | int:
 
 def _unknown(table: Table, at: Table, way: list[str]) -> str:
     """What to say about a key that nobody knows: what was meant, perhaps, and what there is."""
-    *before, part = way
-    elsewhere = [f"{name}.{part}" for name, inner in table.items() if isinstance(inner, dict) and part in inner]
-    near = nearest(part, at)
-    meant = elsewhere or ([".".join([*before, near])] if near else [])
-    asked = f"; did you mean {' or '.join(meant)}?" if meant else ";"
+    before = way[:-1]
+    meant = _meant(table, at, way)
+    asked = f"; did you mean {' or '.join(meant)}? Known" if meant else "; known"
     where = f" in {'.'.join(before)}" if before else ""
-    return f"there is no key {'.'.join(way)}{asked} Known{where} are {', '.join(at)}"
+    return f"there is no key {'.'.join(way)}{asked}{where} are {', '.join(at)}"
+
+
+def _meant(table: Table, at: Table, way: list[str]) -> list[str]:
+    """What a key that nobody knows may stand for: the same name elsewhere, one of its meaning, one that is alike."""
+    *before, part = way
+    leaves = [(f"{name}.{key}", key) for name, inner in table.items() if isinstance(inner, dict) for key in inner]
+    same = [path for path, key in leaves if key == part]
+    if same:
+        return same
+    near = nearest(part, at)
+    beside = [".".join([*before, near])] if near else []
+    named = _by_meaning(table, before, part)
+    if named or (before and beside):  # in a table one means most likely one of its own keys
+        return named or beside
+    likeness = {path: _likeness(part, key) for path, key in leaves}
+    best = max(likeness.values(), default=0.0)
+    if best < _ALIKE_ANYWHERE or (near and _likeness(part, near) >= best):
+        return beside
+    return [path for path, value in likeness.items() if value == best]
+
+
+def _by_meaning(table: Table, before: list[str], part: str) -> list[str]:
+    """The keys that are often called so: of the named table where it has one, else of all."""
+    known = [path for path in SYNONYMS.get(part.lower(), ()) if _is_key(table, path)]
+    own = [path for path in known if path.split(".")[:-1] == before]
+    return own or known
+
+
+def _is_key(table: Table, path: str) -> bool:
+    name, _, key = path.partition(".")
+    return name in table and (not key or key in table[name])
+
+
+def _likeness(word: str, known: str) -> float:
+    """From 0 to 1."""
+    return difflib.SequenceMatcher(None, known, word.lower()).ratio()
 
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
     """The known word that was most likely meant, if any is near."""
-    found = difflib.get_close_matches(word.lower(), list(known), n=1, cutoff=0.5)
+    found = difflib.get_close_matches(word.lower(), list(known), n=1, cutoff=_ALIKE)
     return found[0] if found else None
 
 

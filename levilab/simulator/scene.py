@@ -183,17 +183,53 @@ REMARKS: tuple[Remark, ...] = (
         lambda s: s.drive.waveform != "off" and s.drive.amplitude_t == 0,
         "the drive does nothing: drive.amplitude_t = 0",
     ),
-    Remark(
-        lambda s: s.drag.law == "none" and s.drag.coefficient is not None,
-        "drag.coefficient = {s.drag.coefficient} does nothing: drag.law = none",
-    ),
     Remark(_ignored_place, "start.position_m and start.velocity_m_s do nothing: start.place = equilibrium"),
+)
+
+
+class Switch(NamedTuple):
+    """What must be on for keys to matter: a table, the test that it is off, the keys, why, and what switches it on."""
+
+    table: str
+    is_off: Callable[[Scene], bool]
+    keys: tuple[str, ...]
+    why: str
+
+
+SWITCHES: tuple[Switch, ...] = (
+    Switch(
+        "drive",
+        lambda s: s.drive.waveform == "off",
+        ("amplitude_t", "frequency_hz", "phase_rad", "direction", "off_s"),
+        "drive.waveform = off; sine, triangle, square or unipolar switches the drive on",
+    ),
+    Switch(
+        "drag",
+        lambda s: s.drag.law == "none",
+        ("coefficient",),
+        "drag.law = none; stokes, newton, disc or mixed switches the drag on",
+    ),
+    Switch(
+        "washers",
+        lambda s: s.washers.inertia_kg_m2 == 0,
+        ("coupling_n_m_s", "drag_share"),
+        "washers.inertia_kg_m2 = 0; a number above 0 makes washers loose",
+    ),
 )
 
 
 def remarks(scene: Scene) -> list[str]:
     """What is set in a scene but has no effect, a sentence each."""
-    return [remark.text.format(s=scene) for remark in REMARKS if remark.applies(scene)]
+    said = [remark.text.format(s=scene) for remark in REMARKS if remark.applies(scene)]
+    return said + [text for switch in SWITCHES if switch.is_off(scene) and (text := _without_effect(scene, switch))]
+
+
+def _without_effect(scene: Scene, switch: Switch) -> str:
+    """The keys of a table that is off which differ from the defaults; empty if there are none."""
+    part, usual = getattr(scene, switch.table), getattr(Scene(), switch.table)
+    keys = [key for key in switch.keys if getattr(part, key) != getattr(usual, key)]
+    named = " and ".join(f"{switch.table}.{key} = {shown(getattr(part, key))}" for key in keys)
+    return f"{named} {'do' if len(keys) > 1 else 'does'} nothing: {switch.why}" if keys else ""
 
 
 def scene_of(table: Mapping[str, Any]) -> Scene:
@@ -227,9 +263,9 @@ def preset(name: str) -> Scene:
     if name in presets():
         return _described(_shipped() / f"{name}.toml", name)
     near = nearest(name, presets())
-    meant = f"did you mean {near}? " if near else ""
+    meant = f"did you mean {near}? Known" if near else "known"
     raise SceneError(
-        f"there is no scene {name!r}: {meant}Known are {', '.join(presets())}; the path to a TOML file goes, too"
+        f"there is no scene {name!r}: {meant} are {', '.join(presets())}; the path to a TOML file goes, too"
     )
 
 

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 import levilab.simulator
 from levilab.errors import LevilabError
-from levilab.simulator.keys import as_toml
+from levilab.simulator.keys import SYNONYMS, as_toml
 from levilab.simulator.scene import (
     Base,
     Drag,
@@ -217,7 +217,15 @@ def test_a_setting_without_key_or_value_is_told_what_one_looks_like(word):
         ("tilt_rad=1", "did you mean base.tilt_rad or start.tilt_rad?"),
         ("drag.frequency_hz=1", "did you mean drive.frequency_hz? Known in drag are law, coefficient"),
         ("top=3", "a table is expected, with the keys mass_kg"),
-        ("top.=3", "there is no key top.;"),
+        ("top.=3", "there is no key top.; known in top are mass_kg"),
+        ("spin=20", "did you mean start.spin_hz?"),
+        ("top.spin=20", "did you mean start.spin_hz?"),
+        ("mass=1", "did you mean top.mass_kg?"),
+        ("top.inertia=1", "did you mean top.inertia_axial_kg_m2?"),
+        ("drive.kind=sine", "did you mean drive.waveform?"),
+        ("drag.type=disc", "did you mean drag.law?"),
+        ("friction=0.1", "did you mean drag.law?"),
+        ("observd=spin", "did you mean observed?"),
         ("top.mass_kg.x=3", "top.mass_kg = 0.02526 has no parts"),
         ("start.position_m.3=1", "start.position_m has 3 numbers, counted from 0 to 2"),
         ("start.position_m.-1=1", "counted from 0 to 2"),
@@ -229,11 +237,20 @@ def test_a_wrong_key_is_named_with_the_nearest_and_the_known(setting, said):
     assert said in refusal(setting)
 
 
+def test_every_synonym_stands_for_keys_that_there_are():
+    known = set(KEYS)
+    assert all(known.issuperset(paths) for paths in SYNONYMS.values())
+    assert not any(path.split(".")[-1] == word for path in known for word in SYNONYMS)
+
+
 # --- values ---
 
 REFUSED = [
     ("top.mass_kg=-1", "top.mass_kg = '-1': Input should be greater than 0"),
     ("top.mass_kg='1'", "top.mass_kg = '1': Input should be a valid number"),
+    ("top.mass_kg=0,025", "should be a valid number; write a decimal point, not a comma"),
+    ("start.spin_hz=30Hz", "valid number; write the number without its unit, which is in the key's name"),
+    ("start.spin_hz=3e1 turns/s", "without its unit"),
     ("top.mass_kg=true", "top.mass_kg = 'True': Input should be a valid number"),
     ("top.mass_kg=inf", "finite number"),
     ("top.mass_kg=nan", "Input should be"),
@@ -390,8 +407,27 @@ def test_a_drive_without_amplitude_and_a_constant_without_a_law_are_remarked_upo
     scene = with_settings(preset("driven"), ["drive.amplitude_t=0", "drag.coefficient=0.003"])
     assert remarks(scene) == [
         "the drive does nothing: drive.amplitude_t = 0",
-        "drag.coefficient = 0.003 does nothing: drag.law = none",
+        "drag.coefficient = 0.003 does nothing: drag.law = none; stokes, newton, disc or mixed switches the drag on",
     ]
+
+
+@pytest.mark.parametrize(
+    ("name", "words", "said"),
+    [
+        ("undriven", ["drive.frequency_hz=29"], ["drive.frequency_hz = 29.0 does nothing: drive.waveform = off; sine"]),
+        ("driven", ["drive.waveform=off", "drive.frequency_hz=29", "drive.off_s=3"], ["frequency_hz = 29.0 and drive"]),
+        ("driven", ["drive.frequency_hz=29"], []),
+        ("driven", ["drive.waveform=off"], []),
+        ("undriven", ["drag.coefficient=0.003"], ["drag.coefficient = 0.003 does nothing: drag.law = none; stokes"]),
+        ("friction", ["drag.law=none"], []),
+        ("undriven", ["washers.drag_share=0.5"], ["washers.drag_share = 0.5 does nothing: washers.inertia_kg_m2 = 0;"]),
+        ("loose-washers", ["washers.drag_share=0.5"], []),
+    ],
+)
+def test_what_is_set_of_a_part_that_is_off_is_told_with_what_switches_it_on(name, words, said):
+    told = remarks(with_settings(preset(name), words))
+    assert len(told) == len(said)
+    assert all(text in one for text, one in zip(said, told, strict=True))
 
 
 # --- there and back ---
