@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from typing import TYPE_CHECKING, Literal
 
@@ -105,5 +106,22 @@ def in_one_line(error: ValidationError) -> str:
     more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
     if first["type"] == "extra_forbidden":
         return f"{where} is no key known here{more}"
+    hint = "" if first["type"] == "literal_error" else _hint(first["input"])  # where words are expected
     seen = "" if first["type"] == "missing" else f" = {str(first['input'])[:60]!r}"
-    return f"{where}{seen}: {first['msg']}{more}"
+    return f"{where}{seen}: {first['msg']}{hint}{more}"
+
+
+#: Numbers as people write them and TOML does not, with what to say.
+_NUMBERS = (
+    (re.compile(r"\s*[+-]?\d+,\d+\s*"), "; write a decimal point, not a comma"),
+    (
+        re.compile(r"\s*[+-]?\d*\.?\d+(e[+-]?\d+)?\s*[A-Za-zµ°%][\w/²^*°]*\s*", re.IGNORECASE),
+        "; write the number without its unit, which is in the key's name",
+    ),
+)
+
+
+def _hint(seen: object) -> str:
+    """What is wrong with a text that was nearly a number."""
+    found = (text for pattern, text in _NUMBERS if isinstance(seen, str) and pattern.fullmatch(seen))
+    return next(found, "")
