@@ -1,13 +1,19 @@
-"""The generator's driver: the manual's bytes.
+"""The generators' drivers: the manual's bytes.
 
-Source: Keysight 33500 Series Operating and Service Guide; public drivers of the family.
+Source: Keysight 33500 Series Operating and Service Guide; Agilent 33220A User's Guide; public drivers of both.
 """
 
 import pytest
 from conversation import NO_ERROR, SILENCE, accepted, conversation
 
-from instruments.errors import CommandRefused, NoAnswer, OutOfRange
-from instruments.generator import Keysight33500B
+from instruments.errors import CommandRefused, NoAnswer, OutOfRange, WrongInstrument
+from instruments.generator import Agilent33220A, Keysight33500B
+from instruments.transport import VisaTransport
+from instruments.virtual.bus import Bus
+from instruments.virtual.generator import Virtual33500B
+from instruments.virtual.generator_33220a import Virtual33220A
+from levilab.clock import VirtualClock
+from pyvisa_levilab import library_for
 
 
 def test_the_signal_is_set_for_a_coil_from_a_clean_state_with_the_offset_gone_before_the_amplitude_comes():
@@ -47,3 +53,94 @@ def test_what_the_generator_itself_finds_wrong_is_told():
     refused = [("VOLT 10.0", None), ("SYST:ERR?", '-222,"Data out of range;value clipped to upper limit"'), NO_ERROR]
     with conversation(Keysight33500B, *refused) as generator, pytest.raises(CommandRefused, match="clipped"):
         generator.amplitude = 10.0
+
+
+# --- the older family ---
+
+
+def test_the_older_generator_is_set_up_in_its_dialect():
+    lines = accepted("*RST", "OUTP:LOAD INF", "VOLT:UNIT VPP", "FUNC SQU", "FREQ 30.5", "VOLT:OFFS 0.0", "VOLT 10.0")
+    with conversation(Agilent33220A, *lines) as generator:
+        generator.prepare(waveform="SQU", frequency_hz=30.5, amplitude_vpp=10.0)
+
+
+def test_its_triangle_is_a_symmetric_ramp():
+    signal = ("FUNC RAMP", "FUNC:RAMP:SYMM 50.0", "FREQ 30.5", "VOLT:OFFS 0.0", "VOLT 10.0")
+    with conversation(Agilent33220A, *accepted("*RST", "OUTP:LOAD INF", "VOLT:UNIT VPP", *signal)) as generator:
+        generator.prepare(waveform="TRI", frequency_hz=30.5, amplitude_vpp=10.0)
+
+
+#: Headers as in the User's Guide, numbers as it prints them: fourteen digits.
+WIRE_33220A = [
+    ("waveform", "RAMP", "FUNC RAMP", "RAMP"),
+    ("symmetry", 50.0, "FUNC:RAMP:SYMM 50.0", "+5.0000000000000E+01"),
+    ("frequency", 38.25, "FREQ 38.25", "+3.8250000000000E+01"),
+    ("amplitude", 10.0, "VOLT 10.0", "+1.0000000000000E+01"),
+    ("offset", 0.5, "VOLT:OFFS 0.5", "+5.0000000000000E-01"),
+    ("load", 50.0, "OUTP:LOAD 50.0", "+5.0000000000000E+01"),
+    ("output", True, "OUTP ON", "1"),
+]
+
+
+@pytest.mark.parametrize(("name", "value", "sent", "answer"), WIRE_33220A)
+def test_a_setting_of_the_older_generator_is_sent_and_asked_for(name, value, sent, answer):
+    with conversation(Agilent33220A, *accepted(sent), (sent.split()[0] + "?", answer)) as generator:
+        setattr(generator, name, value)
+        assert getattr(generator, name) == value
+
+
+def test_the_older_generators_settings_are_all_told_with_their_units():
+    with conversation(
+        Agilent33220A, *((sent.split()[0] + "?", answer) for _, _, sent, answer in WIRE_33220A)
+    ) as generator:
+        assert list(generator.settings()) == [
+            *("waveform", "symmetry_percent", "frequency_hz", "amplitude_vpp", "offset_v", "load_ohm", "output")
+        ]
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("waveform", "TRI"), ("frequency", 21e6), ("amplitude", 0.01), ("offset", 11.0)]
+)
+def test_what_the_older_generator_cannot_do_is_refused_before_it_is_sent(name, value):
+    with conversation(Agilent33220A) as generator, pytest.raises(OutOfRange):
+        setattr(generator, name, value)
+
+
+@pytest.mark.parametrize(
+    ("driver", "answer"),
+    [
+        (Agilent33220A, "Agilent Technologies,33220A,MY44033103,2.02-2.02-22-2"),
+        (Keysight33500B, "Agilent Technologies,33522B,MY52812345,3.05-1.19-2.00-52-00"),
+    ],
+)
+def test_each_driver_knows_its_own_model_and_not_the_others(driver, answer):
+    other = Keysight33500B if driver is Agilent33220A else Agilent33220A
+    with conversation(driver, ("*IDN?", answer)) as generator:
+        assert generator.identity() == answer
+    with conversation(other, ("*IDN?", answer)) as generator, pytest.raises(WrongInstrument):
+        generator.identity()
+
+
+# --- the same experiment, whatever the model ---
+
+
+@pytest.mark.parametrize(("driver", "device"), [(Keysight33500B, Virtual33500B), (Agilent33220A, Virtual33220A)])
+@pytest.mark.parametrize("waveform", ["SIN", "SQU", "TRI", "RAMP"])
+def test_both_families_put_the_same_signal_on_the_coil(driver, device, waveform):
+    address = "TCPIP0::generator.levilab::inst0::INSTR"
+    virtual = device(VirtualClock())
+    transport = VisaTransport(address, library=library_for(Bus({address: virtual})))
+    generator = driver(transport)
+    generator.identity()
+    generator.prepare(waveform=waveform, frequency_hz=30.5, amplitude_vpp=12.0)
+    assert virtual.signal().amplitude == 0.0
+    generator.output = True
+    signal = virtual.signal()
+    assert (signal.frequency, signal.amplitude, signal.offset) == (30.5, 6.0, 0.0)
+    generator.frequency, generator.offset = 31.0, 1.5
+    assert (generator.frequency, generator.offset) == (31.0, 1.5)
+    with pytest.raises(CommandRefused, match="clipped"):
+        generator.offset = 8.0  # 6 V are there already
+    generator.off()
+    assert virtual.signal().amplitude == 0.0
+    generator.close()
