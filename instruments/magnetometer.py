@@ -6,6 +6,7 @@ Facts and their sources stand with each driver.
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
@@ -96,6 +97,7 @@ class LakeShoreGaussmeter(ScpiInstrument):
         header, _, wanted = message.partition(" ")
         answer = self.transport.query(f"{message};{header}?")
         if _numbers(answer) != _numbers(wanted):
+            self.transport.clear()  # it may have been the answer to something else
             raise CommandRefused(self.transport.address, message, (f"{header}? answers {answer!r} afterwards",))
 
     def settings(self) -> dict[str, bool | float | str]:
@@ -106,16 +108,18 @@ class LakeShoreGaussmeter(ScpiInstrument):
     def probe(self) -> str:
         """HSE, HST or UHS: high sensitivity, high stability, ultra-high sensitivity.  Raises BadAnswer."""
         answer = self._ask("TYPE?")
-        if answer // 10 not in {4, 5} or answer % 10 >= len(_PROBES):
-            raise BadAnswer(self.transport.address, "TYPE?", str(answer), "a probe: is one plugged in?")
+        with self.resynchronised():
+            if answer // 10 not in {4, 5} or answer % 10 >= len(_PROBES):
+                raise BadAnswer(self.transport.address, "TYPE?", str(answer), "a probe: is one plugged in?")
         return _PROBES[answer % 10]
 
     def _range_t(self, probe: str) -> float:
         """The greatest flux density of the range in use [T]."""
         ranges = self.RANGES_T[probe]
         number = self._ask("RANGE?")
-        if not 1 <= number <= len(ranges):
-            raise BadAnswer(self.transport.address, "RANGE?", str(number), f"1 to {len(ranges)}")
+        with self.resynchronised():
+            if not 1 <= number <= len(ranges):
+                raise BadAnswer(self.transport.address, "RANGE?", str(number), f"1 to {len(ranges)}")
         return ranges[number - 1]
 
     def prepare(self, *, range_t: float | None) -> None:
@@ -146,13 +150,8 @@ class LakeShoreGaussmeter(ScpiInstrument):
             raise BadAnswer(self.transport.address, "RDGFIELD?", answer, expected)
         if status & _OVERLOAD or answer == "OL":
             return None
-        try:
-            value = float(answer) * per_unit
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            raise BadAnswer(self.transport.address, "RDGFIELD?", answer, "a number")
-        return value
+        with self.resynchronised():
+            return _field(self.transport.address, answer) * per_unit
 
     def zero(self) -> None:
         """Zero the probe; see :class:`Magnetometer`.  Raises NoAnswer if that takes too long."""
@@ -160,10 +159,10 @@ class LakeShoreGaussmeter(ScpiInstrument):
 
     def _ask(self, question: str) -> int:
         answer = self.transport.query(question)
-        try:
-            return int(answer)
-        except ValueError:
-            raise BadAnswer(self.transport.address, question, answer, "a whole number") from None
+        with self.resynchronised():
+            if not answer.isascii() or not answer.isdecimal():
+                raise BadAnswer(self.transport.address, question, answer, "a whole number")
+        return int(answer)
 
 
 class LakeShore425(LakeShoreGaussmeter):
@@ -218,6 +217,13 @@ class LakeShore475(LakeShoreGaussmeter):
     def zero(self) -> None:
         """Zero the probe and wait until the instrument says that it is done; see :class:`Magnetometer`."""
         self.transport.query("ZPROBE;*OPC?", patience=self._LONGEST_ZEROING)
+
+
+def _field(address: str, answer: str) -> float:
+    """The number in an answer to RDGFIELD?.  Raises BadAnswer."""
+    if not re.fullmatch(r"[+-]?\d+\.?\d*(E[+-]?\d{1,2})?", answer, re.ASCII):
+        raise BadAnswer(address, "RDGFIELD?", answer, "a number, as +123.456E-04")
+    return float(answer)
 
 
 def _numbers(text: str) -> list[float] | None:

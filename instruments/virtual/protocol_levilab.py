@@ -7,6 +7,7 @@ Which bench the URL means stands in :data:`instruments.virtual.serial_line.bench
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import math
 from typing import TYPE_CHECKING, Any
@@ -14,9 +15,12 @@ from urllib.parse import parse_qs, urlsplit
 
 from serial.serialutil import PortNotOpenError, SerialBase, SerialException
 
+from instruments.virtual.faults import LinkLost
 from instruments.virtual.serial_line import LineSettings, SerialLine, benches
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from instruments.virtual.bus import Session
 
 
@@ -64,14 +68,16 @@ class Serial(SerialBase):
     @property
     def in_waiting(self) -> int:
         """Bytes that have come."""
-        return self._open_line().waiting()
+        with _link_of(self._open_line()) as line:
+            return line.waiting()
 
     def read(self, size: int = 1, /) -> bytes:
         """So many bytes, or fewer when the time-out is over.  None for a time-out: for ever, if something is to come.
 
         Raises SerialException where a real port would wait for ever.
         """
-        got = self._open_line().receive(size, math.inf if self.timeout is None else float(self.timeout))
+        with _link_of(self._open_line()) as line:
+            got = line.receive(size, math.inf if self.timeout is None else float(self.timeout))
         if not got and size and self.timeout is None:
             raise SerialException("nothing is under way and there is no time-out: this would wait for ever")
         return got
@@ -79,7 +85,8 @@ class Serial(SerialBase):
     def write(self, data: Any, /) -> int:
         """Send bytes."""
         sent = bytes(data)
-        self._open_line().write(sent)
+        with _link_of(self._open_line()) as line:
+            line.write(sent)
         return len(sent)
 
     def flush(self) -> None:
@@ -88,7 +95,8 @@ class Serial(SerialBase):
 
     def reset_input_buffer(self) -> None:
         """Drop what has come."""
-        self._open_line().discard()
+        with _link_of(self._open_line()) as line:
+            line.discard()
 
     def reset_output_buffer(self) -> None:
         """Everything has left already."""
@@ -121,6 +129,15 @@ class Serial(SerialBase):
         return True
 
 
+@contextlib.contextmanager
+def _link_of(line: SerialLine) -> Iterator[SerialLine]:
+    """A lost link as pyserial tells it when a cable is pulled.  Raises SerialException."""
+    try:
+        yield line
+    except LinkLost:
+        raise SerialException(errno.EIO, "the device has been disconnected") from None
+
+
 def _session(url: str) -> Session:
     """A session with the instrument that the URL names.  Raises SerialException."""
     parts = urlsplit(url)
@@ -129,7 +146,8 @@ def _session(url: str) -> Session:
         raise SerialException(errno.ENOENT, f"no virtual bench is named {wanted!r}: known are {sorted(benches)}")
     bus = benches[wanted]()
     name = parts.netloc
-    for address in (f"ASRLlevilab://{name}::INSTR", f"{name}::INSTR", f"ASRL{name}::INSTR"):
+    plain = name.upper().removeprefix("ASRL")
+    for address in (f"ASRLlevilab://{name}::INSTR", f"ASRL{plain}.levilab::INSTR", f"ASRL{plain}::INSTR"):
         if session := bus.open(address):
             return session
     lines = [address for address in bus.instruments if address.upper().startswith("ASRL")]

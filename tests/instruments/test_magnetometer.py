@@ -6,7 +6,7 @@ Source: Lake Shore Model 425 User's Manual, chapter 6; Model 475 User's Manual, 
 import math
 
 import pytest
-from conversation import SILENCE, conversation
+from conversation import CLEAR, SILENCE, conversation
 
 from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange, WrongInstrument
 from instruments.magnetometer import LakeShore425, LakeShore475
@@ -20,6 +20,10 @@ def kept(message, answer=None):
     """A setting that stays as it was set."""
     header, _, value = message.partition(" ")
     return (f"{message};{header}?", answer or value)
+
+
+#: After an answer that makes no sense: it may have been another question's.
+CLEARED = (CLEAR, None)
 
 
 def steady(driver):
@@ -84,7 +88,7 @@ def test_a_field_that_the_probe_does_not_measure_is_refused_and_nothing_is_set_f
 
 @pytest.mark.parametrize("answer", ["1", "02,1", "", "OL"])
 def test_a_setting_that_did_not_stay_is_told(answer):
-    lines = [kept("UNIT 2", answer)] if answer else [("UNIT 2;UNIT?", answer)]
+    lines = [("UNIT 2;UNIT?", answer), CLEARED]
     with conversation(LakeShore425, *lines) as magnetometer, pytest.raises(CommandRefused, match="UNIT 2"):
         magnetometer.prepare(range_t=None)
 
@@ -127,9 +131,9 @@ def test_no_probe_is_an_error_and_no_field(answer, status):
     assert bad.value.answer == answer
 
 
-@pytest.mark.parametrize("garbage", ["", "x", "1,2", "nan", "inf", "+123.4.5E+00"])
+@pytest.mark.parametrize("garbage", ["", "x", "1,2", "nan", "inf", "+123.4.5E+00", "1_0", "1e400"])
 def test_garbage_is_no_reading_but_an_error(garbage):
-    with conversation(LakeShore425, *reading(garbage)) as magnetometer, pytest.raises(BadAnswer) as bad:
+    with conversation(LakeShore425, *reading(garbage), CLEARED) as magnetometer, pytest.raises(BadAnswer) as bad:
         magnetometer.flux_density()
     assert (bad.value.question, bad.value.answer) == ("RDGFIELD?", garbage)
 
@@ -143,14 +147,14 @@ def test_garbage_is_no_reading_but_an_error(garbage):
     ],
 )
 def test_a_reading_whose_unit_or_status_is_unknown_is_none(lines, question):
-    with conversation(LakeShore425, *lines) as magnetometer, pytest.raises(BadAnswer) as bad:
+    with conversation(LakeShore425, *lines, CLEARED) as magnetometer, pytest.raises(BadAnswer) as bad:
         magnetometer.flux_density()
     assert bad.value.question == question
 
 
 @pytest.mark.parametrize("probe", ["00", "43", "60", "HSE"])
 def test_an_unknown_probe_is_told(probe):
-    lines = [*steady(LakeShore425), ("TYPE?", probe)]
+    lines = [*steady(LakeShore425), ("TYPE?", probe), CLEARED]
     with conversation(LakeShore425, *lines) as magnetometer, pytest.raises(BadAnswer, match=r"TYPE\?"):
         magnetometer.prepare(range_t=0.1)
 

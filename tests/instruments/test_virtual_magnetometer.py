@@ -23,7 +23,7 @@ EACH = pytest.mark.parametrize("kind", [Virtual425, Virtual475])
 
 def meter(kind=Virtual425, field=0.0123, **options):
     """A meter without noise of its own probe; field: a number or a function of time [T]."""
-    density = field if callable(field) else lambda time: field
+    density = field if callable(field) else lambda _: field
     return kind(VirtualClock(), flux_density=density, **({"zero_error": 0.0} | options))
 
 
@@ -137,7 +137,7 @@ def test_a_question_mark_alone_asks_again():
 )
 def test_each_range_holds_what_it_says_and_no_more(kind, probe, ranges_g):
     field = [0.0]
-    device = meter(kind, lambda time: field[0], probe=probe)
+    device = meter(kind, lambda _: field[0], probe=probe)
     for number, full in enumerate(ranges_g, start=1):
         send(device, f"RANGE {number}\n".encode())
         for factor, beyond in ((0.99, False), (1.01, True), (-1.01, True)):
@@ -152,7 +152,7 @@ def test_each_range_holds_what_it_says_and_no_more(kind, probe, ranges_g):
 @EACH
 def test_the_automatic_range_follows_the_field_and_does_not_flutter(kind):
     field = [0.0]
-    device = meter(kind, lambda time: field[0])
+    device = meter(kind, lambda _: field[0])
     lowest = {Virtual425: 3.5e-3, Virtual475: 350e-6}[kind]
     seen = []
     for size in (0.5, 0.95, 1.05, 0.95, 0.85, 20.0):
@@ -312,7 +312,7 @@ def test_the_475_takes_the_present_field_as_what_is_relative_to():
 
 def test_extremes_are_kept_until_they_are_reset():
     field = [0.01]
-    device = meter(Virtual475, lambda time: field[0])
+    device = meter(Virtual475, lambda _: field[0])
     for size in (0.01, 0.03, -0.02, 0.0):
         field[0] = size
         device.clock.sleep(2.0)
@@ -480,7 +480,7 @@ DRIVERS = [(LakeShore425, Virtual425, "425"), (LakeShore475, Virtual475, "475"),
 def test_the_drivers_measure_zero_and_tell_an_overload(driver, kind, model):
     field = [0.0]
     options = {} if kind is Virtual425 else {"model": model}
-    device = kind(VirtualClock(), flux_density=lambda time: field[0], zero_error=5e-6, **options)
+    device = kind(VirtualClock(), flux_density=lambda _: field[0], zero_error=5e-6, **options)
     # GPIB has no line settings to get wrong
     address = "GPIB0::12::INSTR"
     magnetometer = driver(VisaTransport(address, library=library_for(Bus({address: device}))))

@@ -1,0 +1,522 @@
+"""The transport over pyserial: a virtual bench in the same process, a socket, a pseudo-terminal, ports that fail."""
+
+import contextlib
+import errno
+import os
+import socketserver
+import sys
+import threading
+import time
+
+import pytest
+import pyvisa
+import serial
+from hypothesis import given
+from hypothesis import strategies as st
+
+from instruments.errors import BadAnswer, NoAnswer, NotConnected, Occupied, OutOfRange
+from instruments.magnetometer import LakeShore425
+from instruments.serial_link import SerialTransport, port_name
+from instruments.virtual.bus import Bus
+from instruments.virtual.device import VirtualInstrument, answers
+from instruments.virtual.magnetometer import Virtual425
+from instruments.virtual.scpi import Command
+from instruments.virtual.serial_line import LineSettings, benches, carried
+from levilab.clock import VirtualClock
+
+METER = "levilab://magnetometer"
+SLOW = "levilab://slow"
+IDENTITY = "levilab,slow,0,0"
+#: The 425's line; the pause between two exchanges is the wall's, and would make the tests wait.
+LINE = dict(LakeShore425.SERIAL) | {"pause": 0.0}
+#: How long a test waits for its own server before it fails [s]; reached by a failure only.
+AT_MOST = 5.0
+
+ANY_BYTES = bytes(range(256)) * 4
+
+
+class Slow(VirtualInstrument):
+    """Answers ``SLOW?`` after five seconds, ``DATA?`` with a block, ``BINary?`` with what is no text."""
+
+    identity = IDENTITY
+
+    def table(self):
+        block = f"#4{len(ANY_BYTES):04d}" + ANY_BYTES.decode("latin-1")
+        return (
+            Command("SLOW", get=answers(self._slow)),
+            Command("DATA", get=answers(lambda: block)),
+            Command("CUT", get=answers(lambda: "#4102")),
+            Command("LIST", get=answers(lambda: "1,2,1,1,1")),
+            Command("BINary", get=answers(lambda: "\xff\xfe")),
+        )
+
+    def _slow(self):
+        self.busy_until(self.clock.now() + 5.0)
+        return "slow"
+
+
+@pytest.fixture
+def clock():
+    return VirtualClock()
+
+
+@pytest.fixture
+def bus(clock, monkeypatch):
+    bus = Bus(
+        {
+            "ASRLlevilab://magnetometer::INSTR": Virtual425(clock, flux_density=lambda _: 0.0123, zero_error=0.0),
+            "ASRLslow::INSTR": Slow(clock),
+            "GPIB0::1::INSTR": Slow(clock),
+        }
+    )
+    monkeypatch.setattr(serial, "protocol_handler_packages", [*serial.protocol_handler_packages, "instruments.virtual"])
+    monkeypatch.setitem(benches, "", lambda: bus)
+    return bus
+
+
+@pytest.fixture
+def slow(bus):
+    with contextlib.closing(SerialTransport(SLOW)) as transport:
+        yield transport
+
+
+# --- messages ---
+
+
+def test_the_driver_reads_the_field_through_the_port(bus):
+    magnetometer = LakeShore425(SerialTransport(METER, **LINE))
+    assert magnetometer.identity() == "LSCI,MODEL425,4250022,1.0"
+    magnetometer.prepare(range_t=0.02)
+    assert magnetometer.flux_density() == pytest.approx(0.0123, rel=2e-4)
+    magnetometer.close()
+
+
+def test_silence_is_told_with_what_to_try_and_costs_virtual_time_only(slow, clock):
+    slow.timeout = 3600.0
+    with pytest.raises(NoAnswer, match="parity") as silence:
+        slow.query("FOO?")
+    assert (silence.value.question, silence.value.timeout) == ("FOO?", 3600.0)
+    assert clock.now() == pytest.approx(3600.0, abs=0.1)
+
+
+def test_an_answer_that_takes_its_time_needs_patience(slow, clock):
+    assert slow.query("SLOW?", patience=4.0) == "slow"
+    assert clock.now() == pytest.approx(5.0, abs=0.1)
+    with pytest.raises(NoAnswer):
+        slow.query("SLOW?")
+
+
+@pytest.mark.parametrize("later", [0.0, 0.5, 2.999, 3.0, 10.0])
+@pytest.mark.parametrize("late", ["SLOW?", "*IDN?;SLOW?", "SLOW?;*IDN?"])
+def test_a_late_answer_never_reaches_the_next_question(slow, clock, late, later):
+    slow.timeout = 4.0
+    with pytest.raises(NoAnswer):
+        slow.query(late)
+    clock.sleep(later)
+    assert slow.query("LIST?") == "1,2,1,1,1"
+    assert slow.query("*IDN?") == IDENTITY
+    assert slow.query("LIST?") == "1,2,1,1,1"
+
+
+def test_a_late_identity_is_not_taken_for_the_one_that_was_asked_for_to_resynchronise(bus, clock):
+    device = bus.instruments["ASRLslow::INSTR"]
+    with contextlib.closing(SerialTransport(SLOW)) as transport:
+        device.busy_until(clock.now() + 3.0)
+        with pytest.raises(NoAnswer):
+            transport.query("*IDN?")
+        assert transport.query("LIST?") == "1,2,1,1,1"
+
+
+def test_an_instrument_that_was_off_is_found_when_it_is_on(bus, clock):
+    device = bus.instruments["ASRLslow::INSTR"]
+    execute, device.execute = device.execute, lambda _: None
+    with contextlib.closing(SerialTransport(SLOW)) as transport:
+        for _ in range(3):
+            with pytest.raises(NoAnswer):
+                transport.query("*IDN?")
+        device.execute = execute
+        assert transport.query("LIST?") == "1,2,1,1,1"
+        before = clock.now()
+        transport.query("LIST?")
+        assert clock.now() - before < 0.1  # in step again
+
+
+def test_what_came_unasked_is_dropped_before_a_question(slow, clock):
+    slow.write("LIST?")
+    clock.sleep(1.0)
+    assert slow.query("*IDN?") == IDENTITY
+
+
+def test_an_interrupted_wait_leaves_no_answer_for_the_next_question(slow, clock, monkeypatch):
+    def interrupted(duration):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(clock, "sleep", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            slow.query("SLOW?")
+    clock.sleep(10.0)
+    assert slow.query("LIST?") == "1,2,1,1,1"
+
+
+def test_an_answer_that_is_no_text_is_told_and_forgotten(slow):
+    with pytest.raises(BadAnswer, match="plain text") as bad:
+        slow.query("BIN?")
+    assert bad.value.question == "BIN?"
+    assert slow.query("LIST?") == "1,2,1,1,1"
+
+
+def test_a_block_of_any_bytes_comes_whole(slow):
+    assert slow.query_block("DATA?") == ANY_BYTES
+    assert slow.query("LIST?") == "1,2,1,1,1"
+
+
+@pytest.mark.parametrize(("question", "error"), [("LIST?", BadAnswer), ("CUT?", BadAnswer), ("FOO?", NoAnswer)])
+def test_what_is_no_block_is_told_and_forgotten(slow, question, error):
+    with pytest.raises(error) as bad:
+        slow.query_block(question)
+    assert bad.value.question == question
+    assert slow.query("LIST?") == "1,2,1,1,1"
+
+
+def test_clearing_drops_what_is_under_way(slow, clock):
+    slow.write("SLOW?")
+    slow.clear()
+    clock.sleep(4.0)
+    assert slow.query("LIST?") == "1,2,1,1,1"
+
+
+def test_the_log_gets_the_bytes_of_both_directions(bus):
+    traffic = []
+    with contextlib.closing(SerialTransport(SLOW, log=lambda *line: traffic.append(line))) as transport:
+        transport.write("*CLS")
+        transport.query("*IDN?")
+        transport.query_block("DATA?")
+    assert traffic == [
+        (SLOW, ">", b"*CLS\n"),
+        (SLOW, ">", b"*IDN?\n"),
+        (SLOW, "<", IDENTITY.encode() + b"\n"),
+        (SLOW, ">", b"DATA?\n"),
+        (SLOW, "<", b"(1024 bytes)\n"),
+    ]
+
+
+def test_the_instrument_is_left_alone_between_two_exchanges(bus, monkeypatch):
+    now, slept = [100.0], []
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(time, "sleep", slept.append)
+    with contextlib.closing(SerialTransport(SLOW, pause=0.03)) as transport:
+        transport.query("*IDN?")
+        transport.query("*IDN?")
+        now[0] += 0.02
+        transport.query("*IDN?")
+    assert slept == [pytest.approx(0.0), pytest.approx(0.03), pytest.approx(0.01)]
+
+
+# --- wrong settings ---
+
+
+@pytest.mark.parametrize(
+    ("wrong", "error"),
+    [
+        ({"parity": "none", "data_bits": 8}, BadAnswer),
+        ({"parity": "even"}, BadAnswer),
+        ({"baud_rate": 9600}, NoAnswer),
+        ({"baud_rate": 115200}, NoAnswer),
+    ],
+)
+def test_wrong_settings_are_told_each_time_with_a_hint(bus, wrong, error):
+    with contextlib.closing(SerialTransport(METER, **(LINE | wrong))) as transport:
+        for _ in range(2):
+            with pytest.raises(error, match="parity"):
+                transport.query("*IDN?")
+
+
+def test_a_parity_that_does_not_exist_is_refused():
+    with pytest.raises(OutOfRange, match="parity = Odd is refused, allowed is one of none, odd"):
+        SerialTransport(METER, parity="Odd")
+
+
+@pytest.mark.parametrize("wrong", [{"data_bits": 9}, {"stop_bits": 3}, {"baud_rate": -1}])
+def test_settings_that_no_port_has_are_told(bus, wrong):
+    with pytest.raises(NotConnected, match="cannot be opened"):
+        SerialTransport(METER, **(LINE | wrong))
+
+
+LINES = st.builds(
+    LineSettings,
+    st.sampled_from([300, 1200, 9600, 19200, 57600, 115200]),
+    st.sampled_from([5, 6, 7, 8]),
+    st.sampled_from("NEOMS"),
+    st.sampled_from([1.0, 1.5, 2.0]),
+)
+
+
+@given(st.binary(max_size=64), LINES)
+def test_between_ends_set_alike_bytes_arrive_as_they_were_sent(data, line):
+    mask = (1 << line.data_bits) - 1
+    assert carried(data, line, line) == bytes(byte & mask for byte in data)
+
+
+@given(st.binary(max_size=64), LINES)
+def test_more_stop_bits_than_needed_change_nothing(data, line):
+    # the samples of a receiver at twice the rate would fall elsewhere: this goes through the bits
+    twice = LineSettings(line.baud_rate, line.data_bits, line.parity, 2.0)
+    other = "O" if line.parity == "E" else "E"
+    assert carried(data, twice, line) == carried(data, line, line)
+    if line.parity != "N":
+        unchecked = LineSettings(line.baud_rate, line.data_bits, other, 1.0)
+        assert carried(data, line, unchecked, checked=False) == carried(data, line, line)
+
+
+@given(st.binary(max_size=64), LINES, LINES)
+def test_garbage_is_the_same_each_time_and_no_longer_than_time_allows(data, sender, receiver):
+    heard = carried(data, sender, receiver)
+    assert heard == carried(data, sender, receiver)
+    shortest = (1 + receiver.data_bits + (receiver.parity != "N") + 0.5) / receiver.baud_rate
+    assert len(heard) <= sender.duration(len(data)) / shortest + 1
+    assert all(byte < 1 << receiver.data_bits for byte in heard)
+
+
+def test_what_a_program_set_to_8n1_hears_of_a_425():
+    # as seen by many who forgot the parity: every other letter has its highest bit set
+    heard = carried(b"LSCI,MODEL425", LineSettings(57600, 7, "O"), LineSettings(57600, 8, "N"))
+    assert heard == b"L\xd3CI,\xcdO\xc4EL42\xb5"
+
+
+# --- ports ---
+
+
+@pytest.mark.parametrize(
+    ("address", "name"),
+    [
+        ("COM3", "COM3"),
+        ("/dev/ttyUSB0", "/dev/ttyUSB0"),
+        ("ASRLCOM3::INSTR", "COM3"),
+        ("ASRL/dev/ttyUSB0::INSTR", "/dev/ttyUSB0"),
+        ("asrl/dev/ttyUSB0", "/dev/ttyUSB0"),
+        ("ASRLsocket://127.0.0.1:4001::INSTR", "socket://127.0.0.1:4001"),
+        ("socket://127.0.0.1:4001", "socket://127.0.0.1:4001"),
+    ],
+)
+def test_a_port_in_each_spelling(address, name):
+    assert port_name(address) == name
+
+
+@pytest.mark.parametrize(("platform", "name"), [("win32", "COM3"), ("linux", "/dev/ttyS2"), ("darwin", "/dev/ttyS2")])
+def test_visas_third_port(monkeypatch, platform, name):
+    monkeypatch.setattr(sys, "platform", platform)
+    assert port_name("ASRL3::INSTR") == name
+
+
+def failing(monkeypatch, error):
+    def fail(*_, **__):
+        raise error
+
+    monkeypatch.setattr(serial, "serial_for_url", fail)
+
+
+@pytest.mark.parametrize(
+    ("platform", "error", "told", "words"),
+    [
+        ("linux", serial.SerialException(errno.EBUSY, "busy"), Occupied, "another program"),
+        ("linux", serial.SerialException(errno.EAGAIN, "exclusively"), Occupied, "another program"),
+        ("linux", serial.SerialException(errno.EACCES, "denied"), NotConnected, "may not use this port"),
+        ("linux", serial.SerialException(errno.ENOENT, "none"), NotConnected, "the serial ports of this computer are"),
+        ("win32", serial.SerialException("PermissionError(13, 'Access is denied.')"), Occupied, "another program"),
+        ("win32", serial.SerialException("FileNotFoundError(2, ...)"), NotConnected, "serial ports of this computer"),
+        ("linux", ValueError("no such\nbaud rate"), NotConnected, "no such baud rate"),
+    ],
+)
+def test_a_port_that_does_not_open_is_told_with_what_to_try(monkeypatch, platform, error, told, words):
+    failing(monkeypatch, error)
+    monkeypatch.setattr(sys, "platform", platform)
+    with pytest.raises(told, match=words) as missing:
+        SerialTransport("/dev/ttyUSB7")
+    assert missing.value.address == "/dev/ttyUSB7"
+    assert "\n" not in str(missing.value)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="groups")
+def test_who_may_not_use_a_port_is_told_its_group(monkeypatch, tmp_path):
+    import grp
+
+    port = tmp_path / "ttyUSB0"
+    port.touch()
+    group = grp.getgrgid(port.stat().st_gid).gr_name
+    failing(monkeypatch, serial.SerialException(errno.EACCES, "denied"))
+    monkeypatch.setattr(sys, "platform", "linux")
+    with pytest.raises(NotConnected, match=f"usermod -aG {group}"):
+        SerialTransport(str(port))
+
+
+def test_a_port_that_is_not_there():
+    with pytest.raises(NotConnected, match="cannot be opened"):
+        SerialTransport("/dev/no-such-port")
+
+
+def test_a_locked_port_is_occupied_until_it_is_given_back(bus):
+    first, second = SerialTransport(SLOW), SerialTransport(SLOW)
+    first.lock()
+    with pytest.raises(Occupied):
+        second.lock()
+    second.close()
+    with pytest.raises(Occupied):
+        SerialTransport(SLOW)
+    first.close()
+    with contextlib.closing(SerialTransport(SLOW)) as third:
+        third.lock()
+        assert third.query("*IDN?") == IDENTITY
+
+
+def test_closing_twice_does_no_harm_and_nothing_is_sent_after_it(bus):
+    transport = SerialTransport(SLOW)
+    transport.close()
+    transport.close()
+    with pytest.raises(NotConnected, match=r"no link at '\*IDN\?'"):
+        transport.query("*IDN?")
+    transport.reopen()
+    assert transport.query("*IDN?") == IDENTITY
+    transport.close()
+
+
+# --- the URL handler ---
+
+
+def test_a_program_with_nothing_but_pyserial(bus):
+    with serial.serial_for_url(METER, baudrate=57600, bytesize=7, parity="O", timeout=1) as port:
+        assert port.write(b"*IDN?\n") == 6
+        assert port.readline() == b"LSCI,MODEL425,4250022,1.0\r\n"
+        port.write(b"UNIT?\n")
+        while not port.in_waiting:  # looking takes time too
+            pass
+        assert port.read(port.in_waiting) == b"1\r\n"
+        assert port.read(1) == b""
+        port.write(b"UNIT?\n")
+        port.flush()
+        port.reset_output_buffer()
+        assert port.read_until(b"\n") == b"1\r\n"
+        assert (port.cts, port.dsr, port.ri, port.cd) == (True, True, False, True)
+    assert not port.is_open
+
+
+def test_a_program_that_would_wait_for_ever_is_told_so(bus):
+    with serial.serial_for_url(SLOW) as port:
+        port.write(b"SLOW?\n")
+        assert port.read(5) == b"slow\n"
+        with pytest.raises(serial.SerialException, match="for ever"):
+            port.read(1)
+
+
+@pytest.mark.parametrize(
+    ("url", "words"),
+    [
+        ("levilab://nobody", "no 'nobody' on a serial line: it has ASRLlevilab"),
+        ("levilab://gpib0::1", "no 'gpib0::1'"),
+        ("levilab://slow?bench=other", "no virtual bench is named 'other'"),
+    ],
+)
+def test_a_url_that_leads_nowhere(bus, url, words):
+    with pytest.raises(serial.SerialException, match=words):
+        serial.serial_for_url(url)
+
+
+def test_benches_have_names(bus, monkeypatch, clock):
+    monkeypatch.setitem(benches, "mine", lambda: Bus({"ASRLslow::INSTR": Virtual425(clock, flux_density=abs)}))
+    with contextlib.closing(SerialTransport("levilab://slow?bench=mine", **LINE)) as transport:
+        assert "MODEL425" in transport.query("*IDN?")
+
+
+def test_a_port_that_is_closed_does_nothing(bus):
+    port = serial.serial_for_url(SLOW, do_not_open=True)
+    for use in (lambda: port.read(1), lambda: port.write(b"x"), lambda: port.in_waiting, port.flush):
+        with pytest.raises(serial.SerialException, match="not open"):
+            use()
+    port.open()
+    with pytest.raises(serial.SerialException, match="already open"):
+        port.open()
+    port.close()
+
+
+def test_pyvisa_py_takes_the_url_too(bus):
+    if sys.platform == "win32":
+        pytest.skip("pyvisa-py writes COM before every port there")
+    manager = pyvisa.ResourceManager("@py")
+    settings = {"baud_rate": 57600, "data_bits": 7, "parity": pyvisa.constants.Parity.odd}
+    with manager.open_resource(f"ASRL{METER}::INSTR", read_termination="\r\n", **settings) as line:
+        line.write_termination = "\n"
+        assert line.query("*IDN?") == "LSCI,MODEL425,4250022,1.0"
+    manager.close()
+
+
+# --- real links ---
+
+
+class Connection(socketserver.StreamRequestHandler):
+    """Answers ``*IDN?`` and ``TEXT?``, byte by byte; ``BYE`` ends the connection."""
+
+    def handle(self):
+        for line in self.rfile:
+            answer = {b"*IDN?\n": b"levilab,loopback,0,0\r\n", b"TEXT?\n": b"+1.0\r\n"}.get(line, b"")
+            if line == b"BYE\n":
+                return
+            for byte in answer:
+                self.wfile.write(bytes([byte]))
+                self.wfile.flush()
+
+
+@contextlib.contextmanager
+def serving():
+    socketserver.ThreadingTCPServer.allow_reuse_address = True
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Connection) as server:
+        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
+        thread.start()
+        try:
+            yield f"socket://127.0.0.1:{server.server_address[1]}"
+        finally:
+            server.shutdown()
+            thread.join(AT_MOST)
+
+
+def test_a_line_behind_a_socket_that_is_lost_and_found_again():
+    with serving() as address, contextlib.closing(SerialTransport(address, timeout=AT_MOST)) as transport:
+        transport.lock()  # sockets have none
+        assert transport.query("TEXT?") == "+1.0"
+        with pytest.raises(NotConnected, match="no link at 'BYE'"):
+            transport.query("BYE")
+        transport.reopen()
+        assert transport.query("TEXT?") == "+1.0"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a pseudo-terminal")
+def test_a_line_at_a_pseudo_terminal():
+    import tty
+
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    address = os.ttyname(slave)
+
+    def instrument():
+        heard = b""
+        while not heard.endswith(b"BYE\n"):
+            heard += os.read(master, 100)
+            if heard.endswith(b"TEXT?\n"):
+                os.write(master, b"+1.0\r\n")
+                heard = b""
+
+    thread = threading.Thread(target=instrument)
+    thread.start()
+    try:
+        with contextlib.closing(SerialTransport(address, timeout=AT_MOST)) as transport:
+            transport.lock()
+            assert transport.query("TEXT?") == "+1.0"
+            second = SerialTransport(address)
+            with pytest.raises(Occupied):
+                second.lock()
+            second.close()
+    finally:
+        os.write(slave, b"BYE\n")
+        thread.join(AT_MOST)
+        os.close(master)
+        os.close(slave)
+    assert not thread.is_alive()
