@@ -51,6 +51,15 @@ class CommandRefused(InstrumentError):
         super().__init__(address, f"after {command!r} the instrument reports {'; '.join(entries[:4])}{more}")
 
 
+class SettingsLost(InstrumentError):
+    """Somebody, or a reset, has changed the instrument's settings.  changed: name → (as set, now)."""
+
+    def __init__(self, address: str, changed: dict[str, tuple[object, object]]) -> None:
+        self.changed = changed
+        told = ", ".join(f"{name} = {now} instead of {then}" for name, (then, now) in list(changed.items())[:3])
+        super().__init__(address, f"its settings were changed meanwhile ({told}): leave its keys alone during a run")
+
+
 class WrongInstrument(InstrumentError):
     """Another model than expected answered.  identity: its answer to ``*IDN?``."""
 

@@ -5,6 +5,7 @@ Source: IEEE 488.2-1992; SCPI-1999 volumes 1 and 2.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar, cast, overloa
 from instruments.errors import BadAnswer, CommandRefused, OutOfRange, WrongInstrument
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from instruments.transport import Transport
 
@@ -72,12 +73,33 @@ class ScpiInstrument:
             answer = self.transport.query("SYST:ERR?")
             number, _, text = answer.partition(",")
             if not re.fullmatch(r"[+-]?\d+", number.strip()):
+                self.transport.clear()
                 raise BadAnswer(self.transport.address, "SYST:ERR?", answer, 'a number and a text, as +0,"No error"')
             if int(number) == 0:
                 break
             entries.append(f"{number} {text}")
         if entries:
             raise CommandRefused(self.transport.address, after, tuple(entries))
+
+    def measured(self, question: str, *, patience: float = 0.0) -> float | None:
+        """A measured number, None where there was nothing to measure.
+
+        The error queue is read first: what went wrong before is told instead of a number that cannot be trusted.
+        patience: how long the measurement takes [s].  Raises CommandRefused, NoAnswer, BadAnswer.
+        """
+        self.raise_errors(question)
+        answer = self.transport.query(question, patience=patience)
+        with self.resynchronised():
+            return parse_reading(self.transport.address, question, answer)
+
+    @contextlib.contextmanager
+    def resynchronised(self) -> Iterator[None]:
+        """After an answer that makes no sense the link is cleared: it may have been another question's."""
+        try:
+            yield
+        except BadAnswer:
+            self.transport.clear()
+            raise
 
     def settings(self) -> dict[str, bool | float | str]:
         """Every declared setting as it stands in the instrument, unit at the end of the name."""
@@ -127,7 +149,9 @@ class Setting(Generic[T]):
         if instrument is None:
             return self
         question = f"{self.header}?"
-        return self._parse(instrument.transport.address, question, instrument.transport.query(question))
+        answer = instrument.transport.query(question)
+        with instrument.resynchronised():
+            return self._parse(instrument.transport.address, question, answer)
 
     def __set__(self, instrument: ScpiInstrument, value: T) -> None:
         """Check, send, and read the error queue."""

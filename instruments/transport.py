@@ -16,6 +16,8 @@ from instruments.blocks import BrokenBlock, block_of, read_block
 from instruments.errors import BadAnswer, NoAnswer, NotConnected, Occupied
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from pyvisa.highlevel import VisaLibraryBase
     from pyvisa.resources import MessageBasedResource
 
@@ -76,14 +78,16 @@ class VisaTransport:
         *,
         library: str | VisaLibraryBase = "@py",
         timeout: float = 2.0,
+        line: Mapping[str, Any] | None = None,
         log: TrafficLog | None = None,
     ) -> None:
         """Open the resource.
 
-        library: a PyVISA library, ``"@py"`` needs nothing installed, ``""`` is the vendor's.
-        timeout: of one answer [s].  Raises NotConnected.
+        library: a PyVISA library, ``"@py"`` needs nothing installed, ``""`` is the vendor's; timeout: of one answer
+        [s]; line: of a serial resource, ``baud_rate``, ``data_bits``, ``parity`` (none, odd, …), ``stop_bits``.
+        Raises NotConnected.
         """
-        self.address, self.timeout = address, timeout
+        self.address, self.timeout, self._line = address, timeout, dict(line or {})
         self._library, self._log = library, log
         self._out_of_step = False
         self._stream = address.upper().endswith(_BARE_SOCKET) or address.upper().startswith("ASRL")
@@ -102,7 +106,17 @@ class VisaTransport:
                 f"cannot be opened ({_one_line(error)}): check the address, the cable and that it is on",
             ) from error
         resource.write_termination = resource.read_termination = "\n"
+        if self.address.upper().startswith("ASRL"):
+            self._set_line(resource)
         return resource  # type: ignore[no-any-return]
+
+    def _set_line(self, resource: Any) -> None:
+        from pyvisa.constants import Parity, StopBits
+
+        given = self._line
+        resource.baud_rate, resource.data_bits = given.get("baud_rate", 9600), given.get("data_bits", 8)
+        resource.parity = Parity[given.get("parity", "none")]
+        resource.stop_bits = {1: StopBits.one, 1.5: StopBits.one_and_a_half, 2: StopBits.two}[given.get("stop_bits", 1)]
 
     def write(self, message: str) -> None:
         """Send one message; see :class:`Transport`."""
@@ -155,10 +169,10 @@ class VisaTransport:
         return block
 
     def _block(self) -> bytes:
-        if not self._stream:
-            return block_of(self._resource.read_raw(_CHUNK))
         self._resource.read_termination = None  # a line feed in the block is a byte like any other
         try:
+            if not self._stream:
+                return block_of(self._resource.read_raw(_CHUNK))
             return read_block(lambda count: self._resource.read_bytes(count, chunk_size=_CHUNK) if count else b"")
         finally:
             self._resource.read_termination = "\n"

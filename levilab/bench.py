@@ -6,37 +6,24 @@ Outputs are off on every way out.
 from __future__ import annotations
 
 import contextlib
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, cast
 
-from instruments.counter import Counter, Keysight53230A
 from instruments.errors import InstrumentError, OutOfRange
-from instruments.generator import Generator, Keysight33500B
-from instruments.transport import TrafficLog, VisaTransport
-from levilab.clock import Clock, VirtualClock, WallClock
+from levilab.clock import Clock, WallClock
 from levilab.config import BenchConfig, ConfigError, InstrumentSettings, Limits
+from levilab.drivers import driver_of, transport_to
+from levilab.virtual_bench import VIRTUAL, virtual_bus
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from instruments.counter import Counter
+    from instruments.generator import Generator
     from instruments.scpi import ScpiInstrument
-    from instruments.virtual.bus import Bus
+    from instruments.transport import TrafficLog
     from levilab.simulator.world import World
-
-#: The drivers by kind and model.
-DRIVERS: dict[str, dict[str, type[ScpiInstrument]]] = {
-    "counter": {"53220A": Keysight53230A, "53230A": Keysight53230A},
-    "generator": {"33500B": Keysight33500B},
-}
-
-#: Where the virtual instruments are plugged in.
-VIRTUAL = {
-    "counter": InstrumentSettings(model="53230A", address="TCPIP0::counter.levilab::inst0::INSTR"),
-    "generator": InstrumentSettings(model="33500B", address="TCPIP0::generator.levilab::inst0::INSTR"),
-}
-
-#: Field of the virtual bench's coil at the top, per volt of the generator [T/V]: 10 Vpp make 0.4 mT.
-COIL_T_PER_V = 0.4e-3 / 5.0
 
 
 class OutputMayBeOn(InstrumentError):
@@ -53,6 +40,7 @@ class Bench:
     clock: Clock
     limits: Limits
     instruments: dict[str, ScpiInstrument] = field(default_factory=dict)
+    _prepared: dict[str, dict[str, bool | float | str]] = field(default_factory=dict)
 
     @property
     def counter(self) -> Counter:
@@ -70,14 +58,45 @@ class Bench:
         self.generator.prepare(waveform=waveform, frequency_hz=frequency_hz, amplitude_vpp=amplitude_vpp)
         self.generator.output = True
 
-    def check_limits(self, *, frequency_hz: float, amplitude_vpp: float) -> None:
+    def drive_at(self, frequency_hz: float) -> None:
+        """Change the frequency of the drive that is on.  Raises OutOfRange beyond the limits of this bench."""
+        self.check_limits(frequency_hz=frequency_hz)
+        self.generator.frequency = frequency_hz
+
+    def check_limits(self, *, frequency_hz: float, amplitude_vpp: float = 0.0, offset_v: float = 0.0) -> None:
         """Raise OutOfRange if this drive is more than the bench stands."""
-        for name, value, limit in (
-            ("drive_amplitude_vpp", amplitude_vpp, self.limits.drive_amplitude_vpp),
-            ("drive_frequency_hz", frequency_hz, self.limits.drive_frequency_hz),
+        limits = self.limits
+        for name, value, low, high in (
+            ("drive_amplitude_vpp", amplitude_vpp, 0.0, limits.drive_amplitude_vpp),
+            ("drive_offset_v", abs(offset_v), 0.0, limits.drive_offset_v),
+            ("drive_frequency_hz", frequency_hz, -math.inf, limits.drive_frequency_hz),
+            ("drive_lowest_hz", frequency_hz, limits.drive_lowest_hz, math.inf),
         ):
-            if not value <= limit:  # nan is more than any bench stands
-                raise OutOfRange("bench", name, value, f"up to {limit:g} (limits.{name} in bench.toml)")
+            if not low <= value <= high:  # nan is in no range
+                allowed = f"up to {high:g}" if high < math.inf else f"from {low:g} on"
+                raise OutOfRange("bench", name, value, f"{allowed} (limits.{name} in bench.toml)")
+
+    # --- instruments that lose their link, or their settings ---
+
+    def remember(self, kind: str) -> None:
+        """An instrument was set up: these are the settings that it is to keep."""
+        self._prepared[kind] = self.instruments[kind].settings()
+
+    def forgotten(self, kind: str) -> dict[str, tuple[object, object]]:
+        """Settings that are no longer as they were set up, by name: (as set up, now).  Somebody has changed them."""
+        now = self.instruments[kind].settings()
+        return {name: (then, now[name]) for name, then in self._prepared.get(kind, {}).items() if now[name] != then}
+
+    def address(self, kind: str) -> str:
+        """Where an instrument is."""
+        return self.instruments[kind].transport.address
+
+    def reopen(self, kind: str) -> None:
+        """Make the link anew and see that the same instrument is there.  Raises InstrumentError."""
+        instrument = self.instruments[kind]
+        instrument.transport.reopen()
+        instrument.identity()
+        instrument.forget_errors()
 
     def outputs_off(self) -> None:
         """Switch off whatever drives something, and see that it is off.
@@ -88,8 +107,9 @@ class Bench:
             return
         try:
             self.generator.off()
-        except Exception:  # noqa: BLE001 - whatever it was, the second try decides
+        except Exception:  # noqa: BLE001 - whatever it was, the second try decides, over a link made anew
             try:
+                self.instruments["generator"].transport.reopen()
                 self.generator.off()
             except Exception as error:
                 raise OutputMayBeOn(self.instruments["generator"].transport.address, error) from error
@@ -120,9 +140,8 @@ def open_bench(
         try:
             for kind in kinds:
                 settings = VIRTUAL[kind] if world else _described(config, kind)
-                transport = VisaTransport(settings.address, library=library, timeout=settings.timeout_s, log=log)
-                links.callback(transport.close)
-                instrument = DRIVERS[kind][settings.model](transport)
+                instrument = opened(kind, settings, library=library, log=log)
+                links.callback(instrument.close)
                 instrument.identity()
                 instrument.forget_errors()
                 bench.instruments[kind] = instrument  # only what is what it should be is ever switched
@@ -133,40 +152,21 @@ def open_bench(
             bench.outputs_off()
 
 
+def opened(
+    kind: str, settings: InstrumentSettings, *, library: Any = "@py", log: TrafficLog | None = None
+) -> ScpiInstrument:
+    """A driver on an open link.  library: PyVISA's.  Raises ConfigError for an unknown model, InstrumentError."""
+    return driver_of(kind, settings.model)(transport_to(kind, settings, library=library, log=log))
+
+
 def check_described(config: BenchConfig, kinds: tuple[str, ...]) -> None:
-    """Raise ConfigError unless all instruments of these kinds are described."""
+    """Raise ConfigError unless all instruments of these kinds are described, and of models that are known."""
     for kind in kinds:
-        _described(config, kind)
+        driver_of(kind, _described(config, kind).model)
 
 
 def _described(config: BenchConfig, kind: str) -> InstrumentSettings:
     settings: InstrumentSettings | None = getattr(config, kind)
     if settings is None:
         raise ConfigError(f"bench.toml describes no {kind}: add a table [{kind}] with model and address")
-    if settings.model not in DRIVERS[kind]:
-        known = ", ".join(DRIVERS[kind])
-        raise ConfigError(f"bench.toml: {kind}.model = {settings.model!r} is unknown, known are {known}")
     return settings
-
-
-def virtual_bus(world: World | None = None) -> Bus:
-    """The virtual instruments joined to one world: the drive moves the top, the top makes the light.
-
-    world: by default a top of its own, on a virtual clock.
-    """
-    from instruments.virtual.bus import Bus
-    from instruments.virtual.counter import Virtual53230A
-    from instruments.virtual.generator import Output, Virtual33500B
-    from levilab.simulator.world import SpinScene, SpinWorld
-
-    world = world or SpinWorld(SpinScene(), VirtualClock())
-
-    def coil(time: float, output: Output) -> None:
-        world.drive(time, output.waveform, output.frequency, COIL_T_PER_V * output.amplitude)
-
-    return Bus(
-        {
-            VIRTUAL["counter"].address: Virtual53230A(world.clock, signal=world.light),
-            VIRTUAL["generator"].address: Virtual33500B(world.clock, listener=coil),
-        }
-    )

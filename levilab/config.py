@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 import tomllib
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveFloat, PositiveInt, ValidationError
 
 from levilab.errors import LevilabError
 
@@ -25,18 +25,37 @@ class Settings(BaseModel):
 
 
 class InstrumentSettings(Settings):
-    """Where an instrument is, and what it is.  timeout_s: of one answer."""
+    """Where an instrument is, and what it is.
+
+    timeout_s: of one answer; baud_rate, data_bits, parity, stop_bits: of a serial line, where they are not those that
+    the instrument leaves the factory with.
+    """
 
     model: str
     address: str
     timeout_s: PositiveFloat = 2.0
+    baud_rate: PositiveInt | None = None
+    data_bits: Literal[5, 6, 7, 8] | None = None
+    parity: Literal["none", "odd", "even", "mark", "space"] | None = None
+    stop_bits: float | None = Field(default=None, ge=1, le=2)
+
+    @property
+    def line(self) -> dict[str, Any]:
+        """What is given of the serial line."""
+        names = ("baud_rate", "data_bits", "parity", "stop_bits")
+        return {name: value for name in names if (value := getattr(self, name)) is not None}
 
 
 class Limits(Settings):
-    """What this bench stands; more is refused, never clipped."""
+    """What this bench stands; more is refused, never clipped.
+
+    drive_amplitude_vpp, drive_offset_v: largest; drive_frequency_hz, drive_lowest_hz: the range of the drive.
+    """
 
     drive_amplitude_vpp: PositiveFloat = 10.0
+    drive_offset_v: NonNegativeFloat = 5.0
     drive_frequency_hz: PositiveFloat = 100.0
+    drive_lowest_hz: NonNegativeFloat = 0.0
 
 
 class ExperimentSettings(Settings):
@@ -68,6 +87,8 @@ class BenchConfig(Settings):
     visa_library: str = "@py"
     counter: InstrumentSettings | None = None
     generator: InstrumentSettings | None = None
+    oscilloscope: InstrumentSettings | None = None
+    magnetometer: InstrumentSettings | None = None
     limits: Limits = Field(default_factory=Limits)
     spin: SpinSettings = Field(default_factory=SpinSettings)
 

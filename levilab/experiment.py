@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, cast
 
+from instruments.errors import InstrumentError, SettingsLost
 from levilab.errors import LevilabError
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ class Missed(StrEnum):
     """Why there is no reading."""
 
     DARK = "no light pulses"
+    LOST = "the instrument did not answer as it should"
     UNSTEADY = "no two counts that agree with each other or with the last reading"
 
 
@@ -98,6 +100,7 @@ def _spin_channels(settings: ExperimentSettings) -> tuple[Channel, ...]:
 def _connect_spin(session: Session) -> None:
     settings = _settings(session)
     session.bench.counter.prepare(gate_s=settings.gate_s, trigger_level_v=settings.trigger_level_v)
+    session.bench.remember("counter")
 
 
 def _drive_up_and_let_go(session: Session) -> None:
@@ -123,7 +126,7 @@ def _ramp(session: Session, start: float, settings: SpinSettings) -> None:
     step = settings.ramp_hz_per_s * _RAMP_STEP_S
     steps = max(1, round(abs(target - start) / step))
     for k in range(1, steps + 1):
-        session.bench.generator.frequency = start + (target - start) * k / steps
+        session.bench.drive_at(start + (target - start) * k / steps)
         session.show.preparing(f"drive at {start + (target - start) * k / steps:.2f} Hz", k / steps)
         session.wait(_RAMP_STEP_S)
 
@@ -142,8 +145,17 @@ def _check_lock(session: Session, settings: SpinSettings) -> None:
 def _read_spin(session: Session) -> Row | Missed:
     """A reading; a count that is missing or does not follow from the last reading is asked for once more.
 
-    Two counts that agree are a reading, even if it does not follow: then the one before was the miscount.
+    Two counts that agree are a reading, even if it does not follow: then the one before was the miscount.  A counter
+    that fails, or that somebody has set otherwise, costs this reading and is set up anew.
     """
+    try:
+        return _read_or_ask_again(session)
+    except InstrumentError as error:
+        session.find_again("counter", error, _connect_spin)
+        return Missed.LOST
+
+
+def _read_or_ask_again(session: Session) -> Row | Missed:
     first = _count(session)
     if first and _follows(session, first):
         return first
@@ -168,7 +180,14 @@ def _count(session: Session) -> Row | None:
     if spin is None:
         return None
     row: Row = {"time_s": (before + session.now()) / 2, "spin_frequency_hz": spin}
+    _check_settings(session)
     return row | {"spin_frequency_u_hz": _settings(session).reading_u_hz}
+
+
+def _check_settings(session: Session) -> None:
+    """Raise SettingsLost where a reading was taken with other settings than the counter was given."""
+    if forgotten := session.bench.forgotten("counter"):
+        raise SettingsLost(session.bench.address("counter"), forgotten)
 
 
 def _follows(session: Session, row: Row) -> bool:
@@ -195,8 +214,9 @@ def _fallen(session: Session) -> tuple[str, str] | None:
     last = float(session.rows[-1]["time_s"] or 0.0) if session.rows else 0.0
     if session.missed[-1] is Missed.DARK:
         return "fell", f"no light pulses any more: the top fell between {last:.1f} s and {session.asked:.1f} s"
-    if len(session.missed) >= _MOST_MISSED:
-        return "fell", f"no steady pulses at {len(session.missed)} times in a row: the top fell after {last:.1f} s"
+    seen = [why for why in session.missed if why is not Missed.LOST]
+    if len(seen) >= _MOST_MISSED:
+        return "fell", f"no steady pulses at {len(seen)} times in a row: the top fell after {last:.1f} s"
     return None
 
 

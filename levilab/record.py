@@ -13,11 +13,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from instruments.errors import InstrumentError
-from levilab.bench import VIRTUAL, Bench, check_described, open_bench
+from levilab.bench import Bench, check_described, open_bench
 from levilab.experiment import EXPERIMENTS, Experiment, ExperimentFailed, Missed, Row
 from levilab.interruption import Interrupted, Stop, watching_for_interruption
 from levilab.run import Run, RunRecord, utc_now
 from levilab.software import software_versions
+from levilab.virtual_bench import VIRTUAL
 from levilab.writing import CannotWrite, RunWriter
 
 if TYPE_CHECKING:
@@ -30,6 +31,10 @@ if TYPE_CHECKING:
 
 #: So long is slept at a stretch before looking whether somebody asked for the end [s].
 _NAP_S = 0.2
+#: Pauses [s] before the tries to reach an instrument again, half a minute in all.
+REOPENING_S = (0.0, 1.0, 2.0, 4.0, 8.0, 16.0)
+#: An instrument that is lost so many times in a row, with no reading in between, is broken.
+MOST_LOSSES = 5
 
 
 @dataclass
@@ -39,7 +44,8 @@ class Session:
     zero: bench time of time_s = 0 [s], None before it is reached;
     replaying: while a virtual top is brought to where a resumed run left it; that is no event of the run;
     asked: when the last reading was asked for [s];
-    rows: the readings so far; missed: why there was none at the last times asked, empty after a reading.
+    rows: the readings so far; missed: why there was none at the last times asked, empty after a reading;
+    losses: how often an instrument was lost since the last reading.
     """
 
     bench: Bench
@@ -52,6 +58,7 @@ class Session:
     asked: float = 0.0
     rows: list[Row] = field(default_factory=list)
     missed: list[Missed] = field(default_factory=list)
+    losses: int = 0
 
     def now(self) -> float:
         """Seconds since time zero."""
@@ -74,6 +81,27 @@ class Session:
         self.writer.event(None if self.zero is None else self.now(), kind, text, **data)
         self.show.message(text)
 
+    def find_again(self, kind: str, error: InstrumentError, set_up: Callable[[Session], None]) -> None:
+        """An instrument failed in the middle of a run: reach it again and set it up anew, or give up.
+
+        Raises the error that began it after the last of the tries in REOPENING_S, or where it is lost again and again.
+        """
+        self.losses += 1
+        self.event("instrument lost", f"{kind}: {error}")
+        if self.losses > MOST_LOSSES:
+            raise error
+        for tries, pause in enumerate(REOPENING_S, 1):
+            self.wait(pause)
+            try:
+                self.bench.reopen(kind)
+                set_up(self)
+            except InstrumentError as again:
+                self.event("not reached", f"{kind}, try {tries} of {len(REOPENING_S)}: {again}")
+            else:
+                self.event("found again", f"{kind} answers again and is set up as before")
+                return
+        raise error
+
     def keep(self, row: Row, remaining: float) -> None:
         """Write a reading down, then show it: what was shown is on the disk.
 
@@ -84,6 +112,7 @@ class Session:
         self.writer.reading(row)
         self.rows.append(row)
         self.missed.clear()
+        self.losses = 0
         self.show.reading(_in_words(row), float(row["time_s"] or 0.0), remaining)
 
 

@@ -7,6 +7,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from instruments.virtual.faults import LinkLost
 from instruments.virtual.framing import Framer, Overrun
 from instruments.virtual.scpi import ScpiError
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from instruments.virtual.device import Answer, VirtualInstrument
+    from instruments.virtual.faults import Fault
 
 
 @dataclass
@@ -52,11 +54,14 @@ class Hold:
 class Bus:
     """The instruments of one virtual bench by resource name.
 
-    lock: whoever lets an instrument work holds it; servers do so from several threads.
+    lock: whoever lets an instrument work holds it; servers do so from several threads; faults: that are to happen;
+    away: until when [s] instruments cannot be reached, by the id of the device.
     """
 
     instruments: Mapping[str, VirtualInstrument]
     lock: threading.RLock = field(default_factory=threading.RLock)
+    faults: list[Fault] = field(default_factory=list)
+    away: dict[int, float] = field(default_factory=dict)
     _holds: dict[int, Hold] = field(default_factory=dict)
 
     def open(self, address: str) -> Session | None:
@@ -64,13 +69,18 @@ class Bus:
         wanted = address.upper()
         found = (device for name, device in self.instruments.items() if name.upper() == wanted)
         device = next(found, None)
-        if device is None:
+        if device is None or not self.reachable(device):
             return None
         return self.session(device, stream=wanted.startswith("ASRL") or wanted.endswith("::SOCKET"))
 
+    def reachable(self, device: VirtualInstrument) -> bool:
+        """Whether anybody can connect to it now."""
+        return device.clock.now() >= self.away.get(id(device), 0.0)
+
     def session(self, device: VirtualInstrument, *, stream: bool) -> Session:
         """A link to one of the instruments."""
-        return Session(device, stream=stream, lock=self.lock, hold=self._holds.setdefault(id(device), Hold()))
+        hold = self._holds.setdefault(id(device), Hold())
+        return Session(device, stream=stream, lock=self.lock, hold=hold, bus=self)
 
 
 @dataclass(eq=False)
@@ -79,21 +89,27 @@ class Session:
 
     stream: bytes without ends, as over a serial line or a bare socket: a line feed ends a message, and answers follow
     each other.  Else the interface marks the end of a message (GPIB, USBTMC, VXI-11, HiSLIP), and a question that is
-    sent before the last answer was read interrupts that one (IEEE 488.2, 6.3.2.3).
+    sent before the last answer was read interrupts that one (IEEE 488.2, 6.3.2.3).  Every method raises LinkLost when
+    the link is gone.
     """
 
     device: VirtualInstrument
     stream: bool = False
     lock: threading.RLock = field(default_factory=threading.RLock)
     hold: Hold = field(default_factory=Hold)
+    bus: Bus | None = None
+    chunk: int = 1 << 30  # bytes that are given at once, at most
+    lost_after: int | None = None  # bytes until the link is lost
     _framer: Framer = field(default_factory=Framer)
     _answers: deque[Answer] = field(default_factory=deque)
     _rest: bytes = b""
+    _complete: bool = True
     _asked: bool = False  # something was sent since the last answer was read
 
     def write(self, data: bytes, *, end: bool = True) -> None:
         """Bytes for the instrument; it works on every message that they complete.  end: marked by the interface."""
         with self.lock:
+            self._check_link()
             # END takes the place of a line feed if there is none (IEEE 488.2, 7.5)
             for message in self._framer.feed(data + b"\n" if end and not self.stream else data):
                 if isinstance(message, Overrun):
@@ -109,9 +125,16 @@ class Session:
             self._rest = b""
         self._asked = True
         answer = self.device.execute(message)
+        for fault in self.bus.faults if self.bus else ():
+            if answer is not None and fault.strikes(message):
+                answer = fault.act(self, answer)
         self._drop_what_is_abandoned()
         if answer is not None:
             self._answers.append(answer)
+
+    def _check_link(self) -> None:
+        if self.lost_after is not None and self.lost_after <= 0:
+            raise LinkLost
 
     def _drop_what_is_abandoned(self) -> None:
         while self._answers and self._answers[0].epoch != self.device.epoch:
@@ -120,6 +143,7 @@ class Session:
     def ready(self) -> float | None:
         """When the next bytes are there [s], or None if none are under way."""
         with self.lock:
+            self._check_link()
             self._drop_what_is_abandoned()
             if self._rest:
                 return self.device.clock.now()
@@ -142,12 +166,17 @@ class Session:
     def take(self, count: int, *, until: bytes = b"") -> tuple[bytes, bool]:
         """At most count bytes of what is ready, and whether the answer ends with them."""
         with self.lock:
+            self._check_link()
             if not self._rest and self._answers:
-                self._rest = self._answers.popleft().data
+                answer = self._answers.popleft()
+                self._rest, self._complete = answer.data, answer.complete
             self._asked = False
-            stop = self._rest.find(until, 0, count) + 1 if until else 0
-            chunk, self._rest = self._rest[: stop or count], self._rest[stop or count :]
-            return chunk, not self._rest
+            most = min(count, self.chunk, self.lost_after if self.lost_after is not None else count)
+            stop = self._rest.find(until, 0, most) + 1 if until else 0
+            chunk, self._rest = self._rest[: stop or most], self._rest[stop or most :]
+            if self.lost_after is not None:
+                self.lost_after -= len(chunk)
+            return chunk, not self._rest and self._complete
 
     def discard(self) -> None:
         """Drop what is ready and was not read."""

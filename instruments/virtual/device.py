@@ -37,11 +37,15 @@ class Clock(Protocol):
 
 @dataclass(frozen=True)
 class Answer:
-    """What an instrument says: the bytes, and when they are ready [s].  epoch: of the measurement they come from."""
+    """What an instrument says: the bytes, and when they are ready [s].
+
+    epoch: of the measurement they come from; complete: whether its end is among them.
+    """
 
     data: bytes
     ready: float
     epoch: int
+    complete: bool = True
 
 
 class VirtualInstrument:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from levilab.simulator.coil import Coil
 from levilab.simulator.spin import DECAYS
 
 if TYPE_CHECKING:
@@ -22,6 +23,9 @@ Array = NDArray[np.float64]
 
 #: First harmonic of a waveform of amplitude 1: the only one that can hold a top that turns with it.
 _FUNDAMENTAL = {"SIN": 1.0, "SQU": 4 / math.pi, "TRI": 8 / math.pi**2, "RAMP": 2 / math.pi}
+
+#: Flux density [T] of the thesis's base on its axis at 7.2 cm.
+BASE_FIELD = 0.0190937938
 
 
 class World(Protocol):
@@ -35,6 +39,12 @@ class World(Protocol):
     def drive(self, time: float, waveform: str, frequency: float, amplitude: float) -> None:
         """From this time on the coil's field is this: short name, [Hz], amplitude [T]."""
 
+    def coil_field(self, start: float, step: float, n: int) -> Array:
+        """The coil's field at start + step·k, shape (n,) [T]."""
+
+    def flux_density(self, time: float) -> float:
+        """What a magnetometer's probe at the place of the top sees, along the base's axis [T]."""
+
 
 @dataclass(frozen=True)
 class SpinScene:
@@ -45,7 +55,8 @@ class SpinScene:
     [rad s⁻² T⁻¹], the dipole's transverse part over I₃, half of it because half of a field along one line
     turns with the top; pulse_duty: FWHM of a light pulse in turns; jitter: scatter of a pulse's
     place, in turns, 1σ (0.0212 makes 0.03 Hz of a reading over 1 s); dark, bright: voltage without and at
-    the tape [V]; noise: of the voltage, 1σ [V].
+    the tape [V]; noise: of the voltage, 1σ [V]; base_field_t: the base's field at the probe, which stands where the
+    top would float, 7.2 cm above the thesis's base.
     """
 
     start_hz: float = 30.0
@@ -58,6 +69,7 @@ class SpinScene:
     dark: float = 0.1
     bright: float = 1.2
     noise: float = 0.01
+    base_field_t: float = BASE_FIELD
     seed: int = 0
 
 
@@ -104,12 +116,14 @@ class SpinWorld:
         self._decay = DECAYS[scene.drag]
         self._jitter = np.random.default_rng((scene.seed, 1)).standard_normal(1 << 16) * scene.jitter
         self._stretches: list[_Stretch] = []
+        self._coil = Coil()
         self._go_on(_Stretch(0.0, 2 * math.pi * scene.start_hz, 0.0, "coasts"), drive_spin=0.0, hold=0.0)
 
     # --- the drive ---
 
     def drive(self, time: float, waveform: str, frequency: float, amplitude: float) -> None:
         """From this time on the coil's field is this; see :class:`World`."""
+        self._coil.change(time, waveform, frequency, amplitude)
         while self._stretches and self._stretches[-1].start > time:
             self._stretches.pop()  # what would have come without this change
         hold = _FUNDAMENTAL.get(waveform, 0.0) * amplitude * self.scene.lock_torque
@@ -185,3 +199,11 @@ class SpinWorld:
         pulse = np.exp(-0.5 * (place / sigma) ** 2) * (spin > 0)
         noise = np.random.default_rng((scene.seed, round(start * 1e6))).standard_normal(n) * scene.noise
         return np.asarray(scene.dark + (scene.bright - scene.dark) * pulse + noise)
+
+    def coil_field(self, start: float, step: float, n: int) -> Array:
+        """The coil's field; see :class:`World`."""
+        return self._coil.field(start + step * np.arange(n, dtype=np.float64))
+
+    def flux_density(self, time: float) -> float:
+        """The base's field; the coil's lies across the axis, and the probe does not see it."""
+        return self.scene.base_field_t

@@ -4,12 +4,13 @@ import pytest
 
 from instruments.errors import InstrumentError, NotConnected, OutOfRange, WrongInstrument
 from instruments.virtual.generator import Virtual33500B
-from levilab.bench import VIRTUAL, OutputMayBeOn, open_bench
+from levilab.bench import OutputMayBeOn, open_bench
 from levilab.clock import VirtualClock, WallClock
 from levilab.config import BenchConfig, ConfigError, InstrumentSettings, Limits, SpinSettings, read_bench
 from levilab.errors import LevilabError
 from levilab.interruption import Interrupted
 from levilab.simulator.world import SpinScene, SpinWorld
+from levilab.virtual_bench import VIRTUAL
 
 KINDS = ("counter", "generator")
 
@@ -181,7 +182,7 @@ def test_the_wire_log_reaches_every_instrument(world):
     traffic = []
     with open_bench(BenchConfig(), KINDS, world=world, log=lambda *line: traffic.append(line)):
         pass
-    assert {address for address, *_ in traffic} == {settings.address for settings in VIRTUAL.values()}
+    assert {address for address, *_ in traffic} == {VIRTUAL[kind].address for kind in KINDS}
     assert (VIRTUAL["generator"].address, ">", b"OUTP1 OFF\n") in traffic
 
 
@@ -238,9 +239,9 @@ def test_an_instrument_that_is_not_described_is_asked_for_by_name():
 
 
 def test_an_unknown_model_is_told_with_its_key_and_the_known_ones():
-    config = described(counter=InstrumentSettings(model="CNT-91", address="GPIB0::10::INSTR"))
+    config = described(counter=InstrumentSettings(model="SR620", address="GPIB0::10::INSTR"))
     with (
-        pytest.raises(ConfigError, match=r"counter\.model = 'CNT-91' is unknown, known are 53220A, 53230A"),
+        pytest.raises(ConfigError, match=r"counter\.model = 'SR620' is unknown, known are 53220A, 53230A, CNT-91"),
         open_bench(config, ("counter",)),
     ):
         pass

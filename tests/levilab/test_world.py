@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from wire import received, send
 
 from instruments.virtual.counter import Virtual53230A
 from levilab.clock import VirtualClock
@@ -285,12 +286,35 @@ def test_readings_over_a_second_scatter_as_the_thesiss_do_and_are_unbiased():
     top = world(SpinScene(start_hz=30.5, fall_hz=1.0, seed=1))
     top.drive(0.0, "SIN", 30.5, FIELD)
     device = Virtual53230A(top.clock, signal=top.light)
-    device.receive(b"INP1:COUP DC;LEV:AUTO OFF;:INP1:LEV1 0.6;:SENS:FREQ:GATE:TIME 1;:SYST:TIM 1.2\n")
+    send(device, b"INP1:COUP DC;LEV:AUTO OFF;:INP1:LEV1 0.6;:SENS:FREQ:GATE:TIME 1;:SYST:TIM 1.2\n")
     readings = []
     for _ in range(400):
-        device.receive(b"READ?\n")
-        readings.append(float(device.read(5.0)))
+        send(device, b"READ?\n")
+        readings.append(float(received(device, 5.0)))
     # standard error of a standard deviation from 400: 3.5 %; about three of them
     assert np.std(readings) == pytest.approx(0.03, rel=0.10)
     # and of their mean: 0.03/√400; three of them
     assert np.mean(readings) == pytest.approx(30.5, abs=3 * 0.0015)
+
+
+# --- the coil and the base, as instruments see them ---
+
+
+def test_the_coils_field_is_what_the_generator_last_put_there_and_its_phase_runs_on():
+    top = world(SpinScene())
+    top.drive(1.0, "SIN", 2.0, 4e-4)
+    top.drive(1.3, "SIN", 5.0, 4e-4)
+    top.drive(2.0, "SQU", 1.0, 0.0)
+    t = 0.01 * np.arange(300)
+    seen = top.coil_field(0.0, 0.01, 300)
+    phase = np.where(t < 1.3, 2.0 * (t - 1.0), 0.6 + 5.0 * (t - 1.3))
+    expected = np.where((t >= 1.0) & (t < 2.0), 4e-4 * np.sin(2 * np.pi * phase), 0.0)
+    assert seen == pytest.approx(expected, abs=1e-15)
+
+
+def test_the_magnetometer_sees_the_base_as_the_simulator_has_it():
+    from levilab.simulator.floating import axial_field
+    from levilab.simulator.scene import preset
+
+    there = axial_field(preset("undriven"))(np.array([0.072]))[0, 0]
+    assert world(SpinScene()).flux_density(3.0) == pytest.approx(there, rel=1e-8)

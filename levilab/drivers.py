@@ -1,0 +1,65 @@
+"""Which driver speaks to which model, and over which link."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from levilab.config import ConfigError
+
+if TYPE_CHECKING:
+    from instruments.scpi import ScpiInstrument
+    from instruments.transport import TrafficLog, Transport
+    from levilab.config import InstrumentSettings
+
+_COUNTERS, _GENERATORS = "instruments.counter", "instruments.generator"
+_SCOPES, _MAGNETOMETERS = "instruments.oscilloscope", "instruments.magnetometer"
+
+#: Kind → model as one writes it in bench.toml → module and class of its driver.
+DRIVERS: dict[str, dict[str, tuple[str, str]]] = {
+    "counter": {
+        "53220A": (_COUNTERS, "Keysight53230A"),
+        "53230A": (_COUNTERS, "Keysight53230A"),
+        "CNT-91": (_COUNTERS, "PendulumCNT91"),
+        "FCA3000": (_COUNTERS, "PendulumCNT91"),
+        "FCA3100": (_COUNTERS, "PendulumCNT91"),
+    },
+    "generator": {
+        "33500B": (_GENERATORS, "Keysight33500B"),
+        "33220A": (_GENERATORS, "Agilent33220A"),
+    },
+    "oscilloscope": {
+        "DS1000Z": (_SCOPES, "RigolDS1000Z"),
+        "DSOX1000": (_SCOPES, "KeysightDSOX"),
+        "DSOX2000": (_SCOPES, "KeysightDSOX"),
+    },
+    "magnetometer": {
+        "425": (_MAGNETOMETERS, "LakeShore425"),
+        "455": (_MAGNETOMETERS, "LakeShore475"),
+        "475": (_MAGNETOMETERS, "LakeShore475"),
+    },
+}
+
+
+def driver_of(kind: str, model: str) -> type[ScpiInstrument]:
+    """The driver's class.  Raises ConfigError for a model that has none."""
+    models = {name.upper(): place for name, place in DRIVERS[kind].items()}
+    if model.upper() not in models:
+        known = ", ".join(DRIVERS[kind])
+        raise ConfigError(f"bench.toml: {kind}.model = {model!r} is unknown, known are {known}")
+    module, name = models[model.upper()]
+    driver: type[ScpiInstrument] = getattr(import_module(module), name)
+    return driver
+
+
+def transport_to(
+    kind: str, settings: InstrumentSettings, *, library: Any = "@py", log: TrafficLog | None = None
+) -> Transport:
+    """An open link: pyserial's where the address is a port or its URL, else PyVISA's.  Raises NotConnected."""
+    from instruments.serial_link import SerialTransport
+    from instruments.transport import VisaTransport
+
+    line = dict(getattr(driver_of(kind, settings.model), "SERIAL", {})) | settings.line
+    if "::" not in settings.address:
+        return SerialTransport(settings.address, timeout=settings.timeout_s, log=log, **line)
+    return VisaTransport(settings.address, library=library, timeout=settings.timeout_s, line=line, log=log)

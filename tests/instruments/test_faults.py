@@ -1,0 +1,197 @@
+"""Faults of links and instruments: each is told as what it is, and the next question gets its own answer."""
+
+import pytest
+
+from instruments.errors import BadAnswer, CommandRefused, InstrumentError, NoAnswer, NotConnected
+from instruments.scpi import ScpiInstrument, Setting
+from instruments.transport import VisaTransport
+from instruments.virtual.bus import Bus
+from instruments.virtual.device import VirtualInstrument, answers
+from instruments.virtual.faults import AWAY, FAULTS, LATE, Fault
+from instruments.virtual.scpi import Command
+from levilab.clock import VirtualClock
+from pyvisa_levilab import library_for
+
+MESSAGES, STREAM = "TCPIP0::box.levilab::inst0::INSTR", "TCPIP0::box.levilab::5025::SOCKET"
+DATA = bytes(range(256)) * 3
+
+
+class VirtualBox(VirtualInstrument):
+    """A number that can be set and asked for, a reading, and a block of every byte there is."""
+
+    identity = "levilab,box,VIRTUAL,0"
+
+    def table(self):
+        block = f"#3{len(DATA)}" + DATA.decode("latin-1")
+        return (
+            self.numeric("LEVel", "level", low=-5, high=5, default=1.5, unit="V"),
+            Command("READ", get=answers(lambda: "+2.500000000000000E+01")),
+            Command("DATA", get=answers(lambda: block)),
+        )
+
+
+class Box(ScpiInstrument):
+    """Its driver."""
+
+    MODELS = "box"
+    level = Setting("LEV", float, unit="V", low=-5.0, high=5.0)
+
+    def reading(self):
+        return self.measured("READ?")
+
+    def data(self):
+        return self.transport.query_block("DATA?")
+
+
+@pytest.fixture(params=[MESSAGES, STREAM], ids=["messages", "stream"])
+def box(request):
+    clock = VirtualClock()
+    bus = Bus({request.param: VirtualBox(clock)})
+    box = Box(VisaTransport(request.param, library=library_for(bus)))
+    box.bus, box.clock = bus, clock
+    return box
+
+
+#: What a question for a number ends in, by the fault: a value, or an error and what it says.
+READING = {
+    "no answer": (NoAnswer, "no answer to 'READ\\?' within 2 s"),
+    "late answer": (NoAnswer, "no answer to 'READ\\?' within 2 s"),
+    "single bytes": 25.0,
+    "two answers at once": 25.0,
+    "garbage before": (BadAnswer, "expected a number"),
+    "bytes that are no text before": (BadAnswer, "expected plain text"),
+    "garbage after": 25.0,
+    "block longer than it says": 25.0,
+    "block shorter than it says": 25.0,
+    "cut in the middle": (NoAnswer, "no answer"),
+    "disconnected": (NotConnected, "no link at 'READ\\?'"),
+    "away for 5 s": (NotConnected, "no link"),
+    "error queue overflow": 25.0,
+    "reset": 25.0,
+    "taken by another": (NotConnected, "locked"),
+    "9.91E37": None,
+}
+
+
+def test_every_fault_is_tried():
+    assert set(READING) == set(FAULTS)
+
+
+@pytest.mark.parametrize("what", FAULTS)
+def test_a_fault_is_told_as_what_it_is_and_the_next_question_gets_its_own_answer(box, what):
+    box.bus.faults.append(Fault(what, question=r"READ\?"))
+    expected = READING[what]
+    if isinstance(expected, tuple):
+        error, told = expected
+        with pytest.raises(error, match=told) as caught:
+            box.reading()
+        assert caught.value.address == box.transport.address
+        assert "\n" not in str(caught.value)
+    else:
+        assert box.reading() == expected
+    # whatever was late, doubled or left over: it never reaches the driver
+    box.clock.sleep(2 * LATE)
+    if what == "taken by another":
+        release(box)
+    if what in {"disconnected", "away for 5 s"}:
+        box.transport.reopen()
+    box.forget_errors()
+    for _ in range(3):
+        assert box.level == 1.5
+        assert box.reading() == 25.0
+        assert box.data() == DATA
+
+
+def release(box):
+    (hold,) = box.bus._holds.values()
+    hold.holders.clear()
+
+
+@pytest.mark.parametrize(
+    ("what", "error", "told"),
+    [
+        ("no answer", NoAnswer, "no answer"),
+        ("late answer", NoAnswer, "no answer"),
+        ("garbage before", BadAnswer, "expected a definite-length block"),
+        ("block longer than it says", BadAnswer, "a block of 758 bytes that goes on with"),
+        ("block shorter than it says", (BadAnswer, NoAnswer), r"76\d bytes of a block of 778|no answer"),
+        ("cut in the middle", (BadAnswer, NoAnswer), "of a block of 768|no answer"),
+        ("disconnected", NotConnected, "no link"),
+        ("9.91E37", BadAnswer, "expected a definite-length block"),
+    ],
+)
+def test_a_broken_block_is_refused_and_what_is_left_of_it_forgotten(box, what, error, told):
+    box.bus.faults.append(Fault(what, question=r"DATA\?"))
+    with pytest.raises(error, match=told):
+        box.data()
+    box.clock.sleep(2 * LATE)
+    if what == "disconnected":
+        box.transport.reopen()
+    for _ in range(3):
+        assert box.data() == DATA
+        assert box.level == 1.5
+
+
+@pytest.mark.parametrize("what", ["single bytes", "two answers at once", "garbage after"])
+def test_a_block_is_read_whole_however_it_comes(box, what):
+    box.bus.faults.append(Fault(what, question=r"DATA\?"))
+    if what == "single bytes" or box.transport.address == STREAM:
+        assert box.data() == DATA
+    else:  # the interface marks the end of a message: more behind the block is seen, and refused
+        with pytest.raises(BadAnswer, match="goes on with"):
+            box.data()
+    assert box.data() == DATA
+
+
+def test_an_error_queue_that_overflowed_is_told_with_its_first_entries_and_is_empty_afterwards(box):
+    box.bus.faults.append(Fault("error queue overflow", question=r"READ\?"))
+    assert box.reading() == 25.0
+    with pytest.raises(CommandRefused, match=r"Undefined header.* and 16 more") as refused:
+        box.level = 2.0
+    assert len(refused.value.entries) == 20
+    assert "Error queue overflow" in refused.value.entries[-1]
+    box.level = 2.0
+    assert box.level == 2.0
+
+
+def test_an_error_that_stood_in_the_queue_before_a_reading_is_told_with_it(box):
+    box.transport.write("NONSENSE")
+    with pytest.raises(CommandRefused, match=r"READ.*Undefined header"):
+        box.reading()
+    assert box.reading() == 25.0
+
+
+def test_an_instrument_that_is_away_is_refused_until_it_is_back(box):
+    box.bus.faults.append(Fault("away for 5 s", question=r"READ\?"))
+    with pytest.raises(NotConnected):
+        box.reading()
+    with pytest.raises(NotConnected, match="cannot be opened"):
+        box.transport.reopen()
+    box.clock.sleep(AWAY)
+    box.transport.reopen()
+    assert box.reading() == 25.0
+
+
+def test_a_lock_keeps_another_program_out_and_is_gone_with_its_link(box):
+    other = Box(VisaTransport(box.transport.address, library=library_for(box.bus)))
+    other.transport.lock()
+    for act in (box.transport.lock, box.reading):
+        with pytest.raises(NotConnected, match=r"locked|another program"):
+            act()
+    other.close()
+    box.transport.lock()
+    assert box.reading() == 25.0
+
+
+@pytest.mark.parametrize("what", [what for what in FAULTS if what != "taken by another"])
+def test_faults_one_after_the_other_never_give_a_wrong_number(box, what):
+    box.bus.faults.append(Fault(what, times=7, after=1))
+    seen = []
+    for _ in range(30):
+        try:
+            seen.append(box.reading())
+        except InstrumentError:
+            box.clock.sleep(LATE)
+            box.transport.reopen()
+    assert set(seen) <= {25.0, None}
+    assert seen[-1] == 25.0

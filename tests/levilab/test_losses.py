@@ -1,0 +1,152 @@
+"""An instrument that fails in the middle of a run: told, reached again, set up anew; a gap, and no made-up value."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from instruments.errors import InstrumentError
+from instruments.virtual.faults import FAULTS, Fault
+from levilab import bench as benches
+from levilab.order import spin_order
+from levilab.record import MOST_LOSSES, Order, acquire
+from levilab.virtual_bench import virtual_bus
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from instruments.virtual.bus import Bus
+    from levilab.run import Run
+
+
+class Silent:
+    """Shows nothing."""
+
+    def preparing(self, text: str, fraction: float) -> None: ...
+
+    def reading(self, text: str, elapsed: float, remaining: float) -> None: ...
+
+    def message(self, text: str) -> None: ...
+
+    def close(self) -> None: ...
+
+
+def mock(out: Path) -> Order:
+    return spin_order(mock=True, out=out, seed=1, bench=None, note="", realtime=False, resume=None, wire_log=False)
+
+
+def acquired(folder: Path, monkeypatch: pytest.MonkeyPatch, *faults: Fault) -> Run:
+    def with_faults(*given: object) -> Bus:
+        bus = virtual_bus(*given)  # type: ignore[arg-type]
+        bus.faults.extend(faults)
+        return bus
+
+    monkeypatch.setattr(benches, "virtual_bus", with_faults)
+    return acquire(mock(folder), Silent())
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return acquire(mock(tmp_path_factory.mktemp("whole")), Silent())
+
+
+def kinds(run: Run) -> list[str]:
+    return [event["kind"] for event in run.events()]
+
+
+#: What a fault of the counter's eighth reading costs: nothing, or that reading.
+COSTS = {
+    "no answer": "asked again",
+    "late answer": "asked again",
+    "single bytes": "",
+    "two answers at once": "",
+    "garbage before": "instrument lost",
+    "bytes that are no text before": "instrument lost",
+    "garbage after": "",
+    "block longer than it says": "",
+    "block shorter than it says": "",
+    "cut in the middle": "asked again",
+    "disconnected": "instrument lost",
+    "away for 5 s": "instrument lost",
+    "error queue overflow": "instrument lost",
+    "reset": "instrument lost",
+    "9.91E37": "asked again",
+}
+
+
+def test_every_fault_is_tried() -> None:
+    assert set(COSTS) | {"taken by another"} == set(FAULTS)
+
+
+@pytest.mark.parametrize("what", COSTS)
+def test_a_fault_of_one_reading_is_told_and_the_run_goes_on(
+    what: str, whole: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # two readings come before the drive is off
+    run = acquired(tmp_path, monkeypatch, Fault(what, question=r"READ\?", after=9))
+    before, frame = whole.readings().frame, run.readings().frame
+    assert run.status == "finished"
+    assert kinds(run)[-1] == "fell"
+    assert not COSTS[what] or COSTS[what] in kinds(run)
+    assert len(before) - 2 <= len(frame) <= len(before)
+    # each reading is of the same top at its time: nothing is made up
+    expected = np.interp(frame["time_s"], before["time_s"], before["spin_frequency_hz"])
+    inside = frame["time_s"] < before["time_s"].max() - 1
+    assert frame["spin_frequency_hz"][inside].to_numpy() == pytest.approx(expected[inside], abs=0.2)
+    if COSTS[what] == "instrument lost":
+        assert "found again" in kinds(run)
+
+
+def test_an_instrument_that_is_gone_for_a_while_is_tried_until_it_is_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = acquired(tmp_path, monkeypatch, Fault("away for 5 s", question=r"READ\?", after=9))
+    tries = [event for event in run.events() if event["kind"] == "not reached"]
+    assert len(tries) == 3  # at once, and 1 s and 3 s later; 7 s later it is back
+    assert "try 3 of 6" in tries[-1]["text"]
+    gaps = np.diff(run.readings().frame["time_s"])
+    assert gaps.max() == pytest.approx(20.0, abs=1.0)  # one reading of every 10 s is missing
+
+
+def test_an_instrument_that_another_program_keeps_ends_the_run_with_what_there_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from levilab.run import Run
+
+    with pytest.raises(InstrumentError, match="locked"):
+        acquired(tmp_path, monkeypatch, Fault("taken by another", question=r"READ\?", after=9))
+    (run,) = [Run.load(path) for path in tmp_path.iterdir()]
+    assert run.status == "failed"
+    assert len(run.readings().frame) == 7
+    assert kinds(run).count("not reached") == 6
+
+
+def test_an_instrument_that_is_lost_again_and_again_is_given_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from levilab.run import Run
+
+    with pytest.raises(InstrumentError):
+        acquired(tmp_path, monkeypatch, Fault("disconnected", question=r"READ\?", after=9, times=1000))
+    (run,) = [Run.load(path) for path in tmp_path.iterdir()]
+    assert kinds(run).count("instrument lost") == MOST_LOSSES + 1
+
+
+def test_settings_that_somebody_changed_are_told_by_name_and_set_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = acquired(tmp_path, monkeypatch, Fault("reset", question=r"READ\?", after=9))
+    (lost,) = [event for event in run.events() if event["kind"] == "instrument lost"]
+    assert "gate_s = 0.1 instead of 1.0" in lost["text"]
+    assert run.record.instruments["counter"]["settings_end"]["gate_s"] == 1.0
+
+
+def test_a_drive_whose_link_is_lost_is_switched_off_over_a_new_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # the first question after the ramp of 50 steps is whether the output is off
+    run = acquired(tmp_path, monkeypatch, Fault("disconnected", question=r"OUTP1\?", after=2))
+    assert run.status == "finished"
+    assert run.record.instruments["generator"]["settings_end"]["output"] is False
