@@ -196,7 +196,12 @@ class VirtualCounter(VirtualInstrument):
     def measure(self, looks: Looks, span: Span) -> Measurement:
         """One measurement of the function that is set."""
         falling = self.settings[f"slope{self._channels[0]}"] == "NEG"
-        return measurement(self._function, looks, self._channels, span, falling=falling)
+        return measurement(self.kind, looks, self._channels, span, falling=falling)
+
+    @property
+    def kind(self) -> str:
+        """What is measured, as the table of measurements calls it."""
+        return self._function
 
     def found_level(self, channel: int) -> float:
         """Where the trigger fires now, if it is found automatically [V]."""
@@ -221,7 +226,8 @@ class VirtualCounter(VirtualInstrument):
         self._completion_awaited = True
 
     def _completion(self) -> str:
-        self.wait_for()
+        if self._run and math.isfinite(self._run.wanted):  # a counter that runs freely has nothing pending
+            self.wait_for()
         return "1"
 
     def toggle(self, pattern: str, name: str, *, default: bool = False) -> Command:

@@ -33,7 +33,7 @@ def test_the_counter_is_prepared_with_direct_coupling_and_a_fixed_level():
 
 @pytest.mark.parametrize(("gate", "patience"), [(0.1, 1.2), (1.0, 3.0), (10.0, 21.0)])
 def test_the_answer_is_waited_for_beyond_the_time_at_which_the_counter_itself_gives_up(gate, patience):
-    lines = [*preparation(f"{gate}", "0.6", f"{patience}"), ("READ?", "+9.91E+37")]
+    lines = [*preparation(f"{gate}", "0.6", f"{patience}"), NO_ERROR, ("READ?", "+9.91E+37")]
     with conversation(Keysight53230A, *lines) as counter:
         counter.prepare(gate_s=gate, trigger_level_v=0.6)
         counter.frequency()
@@ -55,23 +55,23 @@ def test_a_gate_that_the_counter_does_not_have_is_refused_by_name():
 
 
 def test_a_reading_is_a_number_in_hertz():
-    with conversation(Keysight53230A, ("READ?", "+2.345678900000000E+01")) as counter:
+    with conversation(Keysight53230A, NO_ERROR, ("READ?", "+2.345678900000000E+01")) as counter:
         assert counter.frequency() == 23.4567890
 
 
 def test_the_counters_own_time_out_is_no_reading():
-    with conversation(Keysight53230A, ("READ?", "+9.91000000000000E+037")) as counter:
+    with conversation(Keysight53230A, NO_ERROR, ("READ?", "+9.91000000000000E+037")) as counter:
         assert counter.frequency() is None
 
 
 def test_a_counter_that_waits_for_ever_is_cleared_and_aborted_and_gives_no_reading():
-    lines = [("READ?", SILENCE), (CLEAR, None), ("*CLS", None), ("ABOR", None), NO_ERROR]
+    lines = [NO_ERROR, ("READ?", SILENCE), (CLEAR, None), ("*CLS", None), ("ABOR", None), NO_ERROR]
     with conversation(Keysight53230A, *lines) as counter:
         assert counter.frequency() is None
 
 
 def test_a_link_that_is_dead_is_not_taken_for_a_missing_signal():
-    lines = [("READ?", SILENCE), (CLEAR, None), ("*CLS", None), ("ABOR", None), ("SYST:ERR?", SILENCE)]
+    lines = [NO_ERROR, ("READ?", SILENCE), (CLEAR, None), ("*CLS", None), ("ABOR", None), ("SYST:ERR?", SILENCE)]
     with conversation(Keysight53230A, *lines) as counter, pytest.raises(NoAnswer) as silence:
         counter.frequency()
     assert silence.value.question == "SYST:ERR?"
@@ -79,7 +79,7 @@ def test_a_link_that_is_dead_is_not_taken_for_a_missing_signal():
 
 @pytest.mark.parametrize("garbage", ["", "DC", "+2.3E+01,+2.4E+01", '-230,"Data corrupt or stale"'])
 def test_garbage_is_no_reading_but_an_error(garbage):
-    with conversation(Keysight53230A, ("READ?", garbage)) as counter, pytest.raises(BadAnswer) as bad:
+    with conversation(Keysight53230A, NO_ERROR, ("READ?", garbage)) as counter, pytest.raises(BadAnswer) as bad:
         counter.frequency()
     assert (bad.value.question, bad.value.answer) == ("READ?", garbage)
 
