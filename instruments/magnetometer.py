@@ -22,6 +22,9 @@ _UNITS_T = {"GAUSS": 1e-4, "TESLA": 1.0, "OERSTED": 1e-4, "A/M": 4e-7 * math.pi}
 #: Bits of the answer to OPST?.
 _NO_PROBE, _OVERLOAD, _INVALID_PROBE, _ZERO_DONE = 1, 2, 16, 128
 
+#: No probe of the family measures more.
+_STRONGEST_T = 35.1
+
 #: TYPE? less 40, or less 50 with a cable that the user has programmed.
 _PROBES = ("HSE", "HST", "UHS")
 
@@ -81,6 +84,10 @@ class LakeShoreGaussmeter(ScpiInstrument):
     RANGES_T: ClassVar[Mapping[str, tuple[float, ...]]]
     #: RDGMODE for steady fields.
     _STEADY: ClassVar[str]
+    #: So many readings are tried while the unit changes.
+    _MOST_UNITS = 3
+    #: The unit as it was asked for last.
+    _unit: str | None = None
 
     unit = Coded("UNIT", str, choices=tuple(_UNITS_T))
     automatic_range = Coded("AUTO", str, choices=("OFF", "ON"), first=0)
@@ -124,7 +131,7 @@ class LakeShoreGaussmeter(ScpiInstrument):
 
     def prepare(self, *, range_t: float | None) -> None:
         """Steady fields in tesla; the smallest range that holds range_t; see :class:`Magnetometer`."""
-        self.unit = "TESLA"
+        self.unit = self._unit = "TESLA"
         self.mode = self._STEADY
         if range_t is None:
             self.automatic_range = "ON"
@@ -139,11 +146,19 @@ class LakeShoreGaussmeter(ScpiInstrument):
     def flux_density(self) -> float | None:
         """One reading [T]; see :class:`Magnetometer`.
 
-        The unit is asked each time: somebody may have changed it at the front panel.  Raises BadAnswer without a
-        probe.
+        The unit is asked after each: somebody may have changed it at the front panel, or a reset.  Then it is not
+        known which one the reading was in, and another is taken.  Raises BadAnswer without a probe.
         """
-        answer = self.transport.query("RDGFIELD?")
-        per_unit = _UNITS_T[self.unit]
+        for _ in range(self._MOST_UNITS):
+            unit = self._unit or self.unit
+            answer = self.transport.query("RDGFIELD?")
+            self._unit = self.unit
+            if self._unit == unit:
+                return self._checked(answer, _UNITS_T[unit])
+        raise BadAnswer(self.transport.address, "UNIT?", str(self._unit), "a unit that stays what it is")
+
+    def _checked(self, answer: str, per_unit: float) -> float | None:
+        """A reading, given the answer and the unit [T]."""
         status = self._ask("OPST?")
         if status & (_NO_PROBE | _INVALID_PROBE) or answer == "NO PROBE":
             expected = "a flux density: is the probe plugged in (with the instrument off)?"
@@ -151,7 +166,10 @@ class LakeShoreGaussmeter(ScpiInstrument):
         if status & _OVERLOAD or answer == "OL":
             return None
         with self.resynchronised():
-            return _field(self.transport.address, answer) * per_unit
+            field_t = _number(self.transport.address, answer) * per_unit
+            if abs(field_t) > _STRONGEST_T:
+                raise BadAnswer(self.transport.address, "RDGFIELD?", answer, f"at most {_STRONGEST_T:g} T")
+        return field_t
 
     def zero(self) -> None:
         """Zero the probe; see :class:`Magnetometer`.  Raises NoAnswer if that takes too long."""
@@ -219,7 +237,7 @@ class LakeShore475(LakeShoreGaussmeter):
         self.transport.query("ZPROBE;*OPC?", patience=self._LONGEST_ZEROING)
 
 
-def _field(address: str, answer: str) -> float:
+def _number(address: str, answer: str) -> float:
     """The number in an answer to RDGFIELD?.  Raises BadAnswer."""
     if not re.fullmatch(r"[+-]?\d+\.?\d*(E[+-]?\d{1,2})?", answer, re.ASCII):
         raise BadAnswer(address, "RDGFIELD?", answer, "a number, as +123.456E-04")

@@ -82,7 +82,7 @@ class SerialTransport:
             "stopbits": stop_bits,
         }
         self._log = log
-        self._out_of_step = False
+        self._out_of_step = self._locked = False
         self._identities_due = 0  # answers to *IDN? that were not received, and may still come
         self._received = bytearray()
         self._rested_at = 0.0
@@ -218,6 +218,8 @@ class SerialTransport:
         self.close()
         self._port = self._open()
         self._out_of_step = True  # the instrument was not told, and may still be answering
+        if self._locked:
+            self.lock()
 
     def lock(self) -> None:
         """Keep other programs that ask for it from the port (POSIX); on Windows a port has one user at any time."""
@@ -227,6 +229,7 @@ class SerialTransport:
             self._port.exclusive = True
         except serial.SerialException as error:
             raise Occupied(self.address) from error
+        self._locked = True
 
     def close(self) -> None:
         """Give the port back; closing twice does no harm."""
@@ -260,6 +263,8 @@ class SerialTransport:
             if isinstance(error, InstrumentError) or not isinstance(error, Exception):
                 raise
             # SerialException, OSError, termios.error
+            if getattr(error, "errno", None) in _IN_USE:
+                raise Occupied(self.address) from error
             told = f"no link at {question!r} ({_one_line(error)}): check the cable, and that it is on"
             raise NotConnected(self.address, told) from error
 

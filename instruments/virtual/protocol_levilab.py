@@ -131,7 +131,9 @@ class Serial(SerialBase):
 
 @contextlib.contextmanager
 def _link_of(line: SerialLine) -> Iterator[SerialLine]:
-    """A lost link as pyserial tells it when a cable is pulled.  Raises SerialException."""
+    """The line; raises SerialException when another program has taken it, or when the link is lost."""
+    if line.hold.keeps_out(line):
+        raise SerialException(errno.EBUSY, "another program has taken the port")
     try:
         yield line
     except LinkLost:

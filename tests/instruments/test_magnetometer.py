@@ -31,7 +31,8 @@ def steady(driver):
 
 
 def reading(answer, unit="2", status="004"):
-    return [("RDGFIELD?", answer), ("UNIT?", unit), ("OPST?", status)]
+    """A first reading: the unit is asked before and after."""
+    return [("UNIT?", unit), ("RDGFIELD?", answer), ("UNIT?", unit), ("OPST?", status)]
 
 
 @pytest.mark.parametrize(
@@ -115,6 +116,28 @@ def test_a_reading_is_in_tesla_whatever_the_unit_at_the_front_panel(driver, answ
         assert magnetometer.flux_density() == pytest.approx(tesla, rel=1e-12)
 
 
+def test_after_the_preparation_the_unit_is_asked_once_for_each_reading():
+    one = [("RDGFIELD?", "+100.000E-05"), ("UNIT?", "2"), ("OPST?", "004")]
+    with conversation(LakeShore425, *steady(LakeShore425), kept("AUTO 1"), *one, *one) as magnetometer:
+        magnetometer.prepare(range_t=None)
+        assert [magnetometer.flux_density() for _ in range(2)] == [1e-3, 1e-3]
+
+
+def test_a_reading_during_which_the_unit_changed_is_taken_again():
+    # tesla or gauss: who knows
+    lines = [*steady(LakeShore425), kept("AUTO 1"), ("RDGFIELD?", "+100.000E-05"), ("UNIT?", "1")]
+    lines += [("RDGFIELD?", "+100.000E-01"), ("UNIT?", "1"), ("OPST?", "004")]
+    with conversation(LakeShore425, *lines) as magnetometer:
+        magnetometer.prepare(range_t=None)
+        assert magnetometer.flux_density() == pytest.approx(1e-3, rel=1e-12)
+
+
+def test_a_unit_that_changes_all_the_time_is_told():
+    lines = [("UNIT?", "2"), *[pair for unit in "121" for pair in (("RDGFIELD?", "+1.0"), ("UNIT?", unit))]]
+    with conversation(LakeShore425, *lines) as magnetometer, pytest.raises(BadAnswer, match="a unit that stays"):
+        magnetometer.flux_density()
+
+
 @pytest.mark.parametrize(("answer", "status"), [("OL", "002"), ("OL", "000"), ("+350.000E-04", "006")])
 def test_a_field_beyond_the_range_is_no_reading(answer, status):
     with conversation(LakeShore425, *reading(answer, status=status)) as magnetometer:
@@ -131,7 +154,9 @@ def test_no_probe_is_an_error_and_no_field(answer, status):
     assert bad.value.answer == answer
 
 
-@pytest.mark.parametrize("garbage", ["", "x", "1,2", "nan", "inf", "+123.4.5E+00", "1_0", "1e400"])
+@pytest.mark.parametrize(
+    "garbage", ["", "x", "1,2", "nan", "inf", "+123.4.5E+00", "1_0", "1e400", "+9.91E+37", "-360.000E-01"]
+)
 def test_garbage_is_no_reading_but_an_error(garbage):
     with conversation(LakeShore425, *reading(garbage), CLEARED) as magnetometer, pytest.raises(BadAnswer) as bad:
         magnetometer.flux_density()
@@ -141,9 +166,9 @@ def test_garbage_is_no_reading_but_an_error(garbage):
 @pytest.mark.parametrize(
     ("lines", "question"),
     [
-        ([("RDGFIELD?", "+1.0"), ("UNIT?", "5")], "UNIT?"),
-        ([("RDGFIELD?", "+1.0"), ("UNIT?", "T")], "UNIT?"),
-        ([("RDGFIELD?", "+1.0"), ("UNIT?", "2"), ("OPST?", "?")], "OPST?"),
+        ([("UNIT?", "5")], "UNIT?"),
+        ([("UNIT?", "2"), ("RDGFIELD?", "+1.0"), ("UNIT?", "T")], "UNIT?"),
+        ([("UNIT?", "2"), ("RDGFIELD?", "+1.0"), ("UNIT?", "2"), ("OPST?", "?")], "OPST?"),
     ],
 )
 def test_a_reading_whose_unit_or_status_is_unknown_is_none(lines, question):

@@ -19,6 +19,7 @@ from instruments.magnetometer import LakeShore425
 from instruments.serial_link import SerialTransport, port_name
 from instruments.virtual.bus import Bus
 from instruments.virtual.device import VirtualInstrument, answers
+from instruments.virtual.faults import FAULTS, Fault
 from instruments.virtual.magnetometer import Virtual425
 from instruments.virtual.scpi import Command
 from instruments.virtual.serial_line import LineSettings, benches, carried
@@ -213,6 +214,38 @@ def test_the_instrument_is_left_alone_between_two_exchanges(bus, monkeypatch):
     assert slept == [pytest.approx(0.0), pytest.approx(0.03), pytest.approx(0.01)]
 
 
+# --- faults ---
+
+
+@pytest.mark.parametrize("what", FAULTS)
+def test_after_each_fault_there_is_an_error_or_the_right_reading_and_soon_right_ones_again(bus, clock, what):
+    magnetometer = LakeShore425(SerialTransport(METER, **LINE))
+    magnetometer.prepare(range_t=0.02)
+    bus.faults.append(Fault(what, question=r"RDGFIELD\?", after=1))
+    readings = []
+    for _ in range(20):
+        clock.sleep(1.0)
+        try:
+            readings.append(magnetometer.flux_density())
+        except (NoAnswer, BadAnswer):
+            pass
+        except NotConnected:
+            for hold in bus._holds.values():  # the other program has ended
+                hold.holders.clear()
+            with contextlib.suppress(NotConnected):
+                magnetometer.transport.reopen()
+    assert readings == pytest.approx([0.0123] * len(readings), rel=3e-4)
+    assert len(readings) >= 12
+    magnetometer.close()
+
+
+def test_a_port_that_another_program_has_taken_is_occupied(bus):
+    with contextlib.closing(SerialTransport(SLOW)) as transport:
+        next(iter(bus._holds.values())).holders[:] = ["another program"]
+        with pytest.raises(Occupied):
+            transport.query("*IDN?")
+
+
 # --- wrong settings ---
 
 
@@ -361,6 +394,7 @@ def test_a_locked_port_is_occupied_until_it_is_given_back(bus):
     with pytest.raises(Occupied):
         second.lock()
     second.close()
+    first.reopen()
     with pytest.raises(Occupied):
         SerialTransport(SLOW)
     first.close()
