@@ -679,7 +679,7 @@ WORDS = (
 )
 
 
-@settings(deadline=None, max_examples=150)
+@settings(deadline=None, max_examples=60)
 @given(commands=st.lists(st.tuples(st.sampled_from(HEADERS), st.sampled_from(WORDS)), max_size=30))
 def test_whatever_is_set_the_settings_fit_each_other(commands):
     for kind in (Virtual33500B, Virtual33220A):
