@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from levilab.motion_lines import LONGEST_S, AxisLines, lines_of
+from levilab.motion_lines import LONGEST_S, AxisLines, lines_of, rate_for
 from levilab.simulator.scene import remarks
 
 if TYPE_CHECKING:
@@ -18,7 +18,14 @@ if TYPE_CHECKING:
 #: An error [m, rad] at the end that nobody sees.
 SMALL = 1e-5
 
+#: A spin that changes by less than this part of itself changes by rounding only.
+CONSTANT = 1e-9
+#: A spin that leaves the range between its start and its end by more than this [Hz] swings.
+SWINGS_HZ = 0.002
+
 FALLS = {"radius": "drifted out to {cm:.3g} cm from the axis", "height": "came down to {cm:.3g} cm"}
+#: How a motion ended, before the colon and what happened: a top that drifts out has not fallen yet.
+ENDINGS = {"radius": "was lost", "height": "fell"}
 
 
 @dataclass(frozen=True)
@@ -63,6 +70,32 @@ class Summary:
         limit = {"radius": escape.radius_m, "height": escape.height_m}[self.motion.fell.name]
         return FALLS[self.motion.fell.name].format(cm=100 * limit)
 
+    @property
+    def ending(self) -> str:
+        """How the motion ended, in words."""
+        if self.motion.scene.observed == "spin":
+            return f"the spin alone, {self.end:g} s"
+        if self.motion.fell is None:
+            return f"stayed up for {self.end:g} s"
+        return f"{ENDINGS[self.motion.fell.name]} after {self.end:.4g} s: it {self.fell}"
+
+    @property
+    def spin(self) -> str:
+        """The spin in words, with range and mean where its start and end do not tell them."""
+        spin = self.motion.spin_hz
+        first, last, low, high = (float(x) for x in (spin[0], spin[-1], spin.min(), spin.max()))
+        if high - low <= CONSTANT * abs(first):
+            return f"constant, {first:.3f} Hz"
+        said = f"{first:.3f} Hz at the start, {last:.3f} Hz at the end"
+        if high - low <= abs(last - first) + SWINGS_HZ:
+            return said
+        return f"{said}; {low:.3f} to {high:.3f} Hz, mean {spin.mean():.3f} Hz"
+
+    @property
+    def why_no_lines(self) -> str:
+        """Why there are no lines, and what would give some; empty if there are."""
+        return "" if self.lines.lines else _why_no_lines(self.motion, self.lines)
+
 
 def summarise(motion: Trajectory, duration: float, rate: float, computing: float) -> Summary:
     """Look at a motion; rate: states per second that are kept."""
@@ -72,11 +105,27 @@ def summarise(motion: Trajectory, duration: float, rate: float, computing: float
     return Summary(motion, duration, rate, computing, lines, change, tuple(_notes(motion, lines, rate)))
 
 
-def conserved(scene: Scene) -> bool:
-    """Whether the energy stays as it is: neither drag nor drive nor friction of loose washers."""
-    driven = scene.drive.waveform != "off" and scene.drive.amplitude_t > 0
-    dragged = scene.drag.law != "none" and any(scene.drag.constants)
-    return not (driven or dragged or scene.washers.inertia_kg_m2 > 0)
+def changing_energy(scene: Scene) -> tuple[str, ...]:
+    """What in a scene changes the energy, in words; nothing where it stays as it is."""
+    there = {
+        "drag": scene.drag.law != "none" and any(scene.drag.constants),
+        "drive": scene.drive.waveform != "off" and scene.drive.amplitude_t > 0,
+        "friction of the washers": scene.washers.inertia_kg_m2 > 0,
+    }
+    return tuple(name for name, is_there in there.items() if is_there)
+
+
+def _why_no_lines(motion: Trajectory, lines: AxisLines) -> str:
+    end, states = float(motion.time[-1]), motion.time.size
+    if motion.scene.observed == "spin":
+        return "the spin alone is simulated, and the lines are those of the axis"
+    if lines.spectrum is not None:
+        return "the axis stands still"
+    if (states - 1) < end * rate_for(motion.scene) / 2:
+        return f"{states} states in {end:.3g} s are too few to tell them by"
+    if motion.fell is not None:
+        return f"the top was up for {end:.3g} s only, which is too short; 2 s would be enough"
+    return f"{end:.3g} s are too short; 2 s are enough, and with 10 s the resolution is 0.2 Hz (--duration 10)"
 
 
 def _notes(motion: Trajectory, lines: AxisLines, rate: float) -> list[str]:
@@ -91,8 +140,8 @@ def _notes(motion: Trajectory, lines: AxisLines, rate: float) -> list[str]:
             f"{rate:g} states per second are less than twice the highest line, {highest:.3g} Hz: the lines here come "
             f"from more of them, but states.csv would show it elsewhere; take --rate {math.ceil(3 * highest / 10) * 10}"
         )
-    if lines.spectrum is None and motion.time[-1] > LONGEST_S and motion.scene.observed == "motion":
-        notes.append(f"no lines: {motion.time.size} states in {motion.time[-1]:g} s are too few to tell them by")
+    if not lines.lines and motion.scene.observed == "motion":
+        notes.append(f"no lines of the axis: {_why_no_lines(motion, lines)}")
     if lines.lines and lines.until < 0.99 * min(float(motion.time[-1]), LONGEST_S):
         notes.append(
             f"the lines are those of the first {lines.until:.3g} s: later the changing spin has moved them farther "
@@ -103,10 +152,11 @@ def _notes(motion: Trajectory, lines: AxisLines, rate: float) -> list[str]:
 
 def _cannot_float(scene: Scene) -> list[str]:
     """Why a top was lost that had no chance."""
-    from levilab.simulator.floating import advice, stability_of
+    from levilab.simulator.floating import stability_of
+    from levilab.stability_table import why_not
 
     found = stability_of(scene)
-    return [] if found.floating else [advice(found)]
+    return [] if found.floating else [why_not(found)]
 
 
 def _not_reached(accuracy: Accuracy) -> str:
@@ -137,13 +187,17 @@ def as_document(summary: Summary) -> dict[str, Any]:
         "tilt_max_rad": float(motion.tilt.max()),
         "spin_start_hz": float(motion.spin_hz[0]),
         "spin_end_hz": float(motion.spin_hz[-1]),
-        "washer_spin_end_hz": float(motion.washer_spin_hz[-1]),
-        "energy_conserved": conserved(motion.scene),
+        "spin_mean_hz": float(motion.spin_hz.mean()),
+        "spin_min_hz": float(motion.spin_hz.min()),
+        "spin_max_hz": float(motion.spin_hz.max()),
+        **_washers(motion),
+        "energy_conserved": not changing_energy(motion.scene),
         "energy_change_relative": summary.energy_change,
         "lines": [
             {"frequency_hz": line.frequency, "amplitude_rad": line.amplitude, "name": line.name}
             for line in summary.lines.lines
         ],
+        "no_lines_because": summary.why_no_lines or None,
         "line_resolution_hz": summary.lines.resolution,
         "lines_until_s": summary.lines.until,
         "position_error_m": float(accuracy.position),
@@ -158,6 +212,11 @@ def as_document(summary: Summary) -> dict[str, Any]:
         "notes": list(summary.notes),
     }
     return {key: finite(value) for key, value in document.items()}
+
+
+def _washers(motion: Trajectory) -> dict[str, float]:
+    loose = motion.scene.washers.inertia_kg_m2 > 0
+    return {"washer_spin_end_hz": float(motion.washer_spin_hz[-1])} if loose else {}
 
 
 def finite(value: Any) -> Any:

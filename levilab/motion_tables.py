@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
-from levilab.motion_summary import conserved
+from levilab.motion_summary import changing_energy
 from levilab.tables import new_table, terminal
 
 if TYPE_CHECKING:
@@ -37,21 +37,26 @@ def _headline(summary: Summary) -> str:
         return f"{name}: the spin alone, for {summary.duration:g} s"
     if summary.motion.survived:
         return f"{name}: the top stayed up for all of {summary.duration:g} s"
-    return f"{name}: the top fell after {summary.end:.5g} s, it {summary.fell}"
+    return f"{name}: the top {summary.ending}"
 
 
 def _motion_facts(summary: Summary) -> list[tuple[str, str]]:
     motion = summary.motion
-    spin = motion.spin_hz
-    facts = [("spin", f"{spin[0]:.3f} Hz at the start, {spin[-1]:.3f} Hz at the end")]
+    facts = [("spin", summary.spin)]
     if motion.scene.observed == "spin":
         return facts
     facts.insert(0, ("height", summary.heights))
     if motion.scene.washers.inertia_kg_m2 > 0:
         washers = motion.washer_spin_hz
         facts.append(("loose washers", f"{washers[0]:.3f} Hz at the start, {washers[-1]:.3f} Hz at the end"))
-    facts.append(("tilt", f"up to {1000 * motion.tilt.max():.3g} mrad, {math.degrees(motion.tilt.max()):.3g}°"))
+    facts.append(("tilt", f"up to {_angle(float(motion.tilt.max()))}"))
     return facts
+
+
+def _angle(angle: float) -> str:
+    """In mrad only as long as it is small."""
+    degrees = f"{math.degrees(angle):.3g}°"
+    return degrees if angle > 1 else f"{1000 * angle:.3g} mrad, {degrees}"
 
 
 def _quality_facts(summary: Summary) -> list[tuple[str, str]]:
@@ -66,9 +71,10 @@ def _quality_facts(summary: Summary) -> list[tuple[str, str]]:
         ),
         ("", f"{verdict} the tolerance of {accuracy.tolerance:g}"),
     ]
-    if conserved(summary.motion.scene):
-        facts.append(("energy", f"constant to {summary.energy_change:.1g} of itself"))
-    steps = f"{accuracy.steps} steps of {1000 * accuracy.step:.3g} ms by {accuracy.scheme}"
+    if not changing_energy(summary.motion.scene):
+        change = summary.energy_change
+        facts.append(("energy", f"constant to {change:.1g} of itself" if change else "exactly constant"))
+    steps = f"{accuracy.steps} steps of at most {1000 * accuracy.step:.3g} ms by {accuracy.scheme}"
     speed = f", {_rounded(summary.speed)} times faster than the real top" if summary.end >= 1 else ""
     facts.append(("computed", steps + speed))  # of less than a second nothing but the overhead would be seen
     return facts
@@ -88,8 +94,8 @@ def _lines_table(summary: Summary) -> Table:
         numbers=("frequency \\[Hz]", "amplitude \\[mrad]"),
     )  # fmt: skip
     for line in summary.lines.lines:
-        shown.add_row(f"{line.frequency:.{digits}f}", f"{1000 * line.amplitude:.3g}", line.name)
+        shown.add_row(f"{line.frequency:.{digits}f}", f"{1000 * line.amplitude:.3g}", line.name or "not identified")
     of = f", of the first {summary.lines.until:.3g} s" if summary.lines.until < 0.99 * summary.end else ""
-    shown.caption = f"those {resolution:.2g} Hz apart are told apart{of}"
+    shown.caption = f"resolution {resolution:.2g} Hz{of}"
     shown.caption_justify = "left"
     return shown

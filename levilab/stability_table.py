@@ -11,9 +11,10 @@ from levilab.simulator.floating import advice, axial_field, lifting, symmetric
 from levilab.tables import new_table, terminal
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from levilab.simulator.floating import Stability
+    from levilab.simulator.scene import Scene
 
 #: The master's thesis on the Levitron: its simulated limits of four starts, and what it measured.
 THESIS = {
@@ -22,6 +23,24 @@ THESIS = {
     "height": "7.3 measured",
     "mass": "25.5 printed, which its own field cannot lift",
 }
+
+#: What a scene may have and the theory has not: the test, and what to say.
+LEFT_OUT: tuple[tuple[Callable[[Scene], bool], str], ...] = (
+    (
+        lambda s: s.drag.law != "none" and any(s.drag.constants),
+        "the drag is left out here; it slows the spin, in the end below the slowest one, and the top is lost",
+    ),
+    (
+        lambda s: s.drive.waveform != "off" and s.drive.amplitude_t > 0,
+        "the drive is left out here; it tilts the top and may hold its spin",
+    ),
+    (
+        lambda s: s.washers.inertia_kg_m2 > 0,
+        "the loose washers are left out here: they turn with the top as if they were fixed",
+    ),
+)
+#: A heavier top was most likely given in grams [kg].
+HEAVIEST_KG = 1.0
 
 
 def _is_thesis_device(found: Stability) -> bool:
@@ -46,8 +65,21 @@ def print_stability(found: Stability) -> None:
 
 def _headline(found: Stability) -> str:
     if not found.floating:
-        return advice(found)
+        return why_not(found)
     return f"a top of {1000 * found.scene.top.mass_kg:.2f} g floats at {100 * found.floating.height:.3f} cm"
+
+
+def why_not(found: Stability) -> str:
+    """Why the top does not float and which one does, with its mass in grams."""
+    if found.nearest is None:
+        return advice(found)
+    kilograms = found.scene.top.mass_kg
+    said = (
+        f"a top of {1000 * kilograms:.6g} g does not float over this base; "
+        f"the nearest that does has {1000 * found.nearest:.2f} g"
+    )
+    asked = f".  Were grams meant?  {kilograms:g} g are top.mass_kg = {kilograms / 1000:g}"
+    return said + (asked if kilograms > HEAVIEST_KG else "")
 
 
 def _windows_table(found: Stability) -> Any:
@@ -92,7 +124,11 @@ def _facts_table(found: Stability) -> Any:
         ("slowest spin \\[Hz]", f"{lower:.2f} for small motions", THESIS["lower"]),
         ("fastest spin \\[Hz]", f"{upper:.2f} for small motions", THESIS["upper"]),
         ("sleeping top's limit \\[Hz]", f"{found.sleeping:.2f}", ""),
-        ("the thesis's estimate \\[Hz]", f"{found.thesis_estimate:.3f}", "14.005, which lacks a factor 2√(I₁/I₃)"),
+        (
+            "the thesis's estimate \\[Hz]",
+            f"{found.thesis_estimate:.3f}, lacks the factor 2√(I₁/I₃)",
+            "14.005, lacks it, too",
+        ),
         (f"modes at {found.scene.start.spin_hz:g} Hz \\[Hz]", _modes(found), ""),
         ("up-and-down mode \\[Hz]", f"{found.vertical:.3f}", ""),
     ]
@@ -108,7 +144,8 @@ def _modes(found: Stability) -> str:
 
 def remarks(found: Stability) -> list[str]:
     """What to mind."""
-    scene, said = found.scene, []
+    scene = found.scene
+    said = [text for is_there, text in LEFT_OUT if is_there(scene)]
     if scene.base.tilt_rad:
         said.append("the base leans; this is of an upright one")
     if scene.top.moment_tilt[0]:

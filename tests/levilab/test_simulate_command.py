@@ -17,6 +17,7 @@ import pytest
 from levilab.motion_figures import motion_figure
 from levilab.motion_lines import lines_of, rate_for
 from levilab.motion_summary import as_document, summarise
+from levilab.motion_tables import print_motion
 from levilab.progress import Share
 from levilab.run import Run
 from levilab.simulation import COLUMNS, SimulationOrder, carry_out, kept_rows
@@ -134,6 +135,68 @@ def test_too_low_a_rate_for_the_lines_is_told(levilab: Command) -> None:
     assert any("take --rate 1" in note for note in told["notes"])  # three times the 42 to 43 Hz of the nutation
 
 
+def test_a_fall_and_a_drift_are_told_as_what_they_are() -> None:
+    fell = summary(preset("undriven").changed({"start.spin_hz": 15.0}), 1.0)
+    drifted = summary(preset("undriven").changed({"escape.radius_m": 0.002}), 5.0)
+    assert fell.ending.startswith("fell after 0.18")
+    assert fell.ending.endswith(" s: it came down to 0 cm")
+    assert drifted.ending.startswith("was lost after ")
+    assert drifted.ending.endswith(" s: it drifted out to 0.2 cm from the axis")
+    assert "was lost after" in texts(drifted)
+
+
+def test_the_spin_is_told_with_its_range_where_it_swings_and_as_constant_where_it_is() -> None:
+    driven, friction, free = (summary(preset(name), 5.0) for name in ("driven", "friction", "undriven"))
+    low, high, mean = (f(driven.motion.spin_hz) for f in (np.min, np.max, np.mean))
+    assert driven.spin.endswith(f"at the end; {low:.3f} to {high:.3f} Hz, mean {mean:.3f} Hz")
+    assert friction.spin == "30.000 Hz at the start, 29.527 Hz at the end"
+    assert free.spin == "constant, 30.000 Hz"
+    assert "Spin: constant, 30.000 Hz" in texts(free)
+    assert as_document(driven)["spin_max_hz"] == high
+
+
+def test_the_table_says_what_its_numbers_are(capsys: pytest.CaptureFixture[str]) -> None:
+    told = summary(preset("undriven"), 5.0)
+    unknown = replace(told.lines, lines=(replace(told.lines.lines[0], name=""),))
+    print_motion(replace(told, lines=unknown, energy_change=0.0))
+    shown = capsys.readouterr().out
+    for words in ("steps of at most 3.71 ms", "exactly constant", "not identified", "resolution 0.4 Hz", "mrad, 2"):
+        assert words in shown
+    print_motion(summary(preset("undriven").changed({"start.spin_hz": 15.0}), 1.0))
+    tilt = next(line for line in capsys.readouterr().out.splitlines() if "tilt" in line)
+    assert tilt.split() == ["tilt", "up", "to", "101°"]
+
+
+def test_where_there_are_no_lines_it_is_said_why_and_what_is_enough() -> None:
+    short = summary(preset("undriven"), 0.5)
+    assert any("0.5 s are too short; 2 s are enough" in note for note in short.notes)
+    assert summary(preset("undriven"), 2.0).lines.lines
+    fell = as_document(summary(preset("undriven").changed({"start.spin_hz": 15.0}), 5.0))
+    assert "the top was up for 0.185 s only" in fell["no_lines_because"]
+    few = summarise(simulate(preset("undriven"), 3.0, rate=20.0), 3.0, 20.0, 0.01)
+    assert "61 states in 3 s are too few" in few.why_no_lines
+    spin = summary(preset("friction").changed({"observed": "spin"}), 5.0)
+    assert "spin alone" in as_document(spin)["no_lines_because"]
+    assert not any("no lines" in note for note in spin.notes)
+    upright = {"start.place": "equilibrium", "start.tilt_rad": 0.0}
+    assert summary(preset("undriven").changed(upright), 5.0).why_no_lines == "the axis stands still"
+    assert as_document(summary(preset("undriven"), 2.0))["no_lines_because"] is None
+
+
+def test_washers_are_in_the_document_where_there_are_some() -> None:
+    assert "washer_spin_end_hz" not in as_document(summary(preset("driven"), 1.0))
+    assert as_document(summary(preset("loose-washers"), 1.0))["washer_spin_end_hz"] > 29
+
+
+def test_a_mass_that_cannot_float_is_named_in_grams_and_one_in_grams_is_asked_about() -> None:
+    lost = summary(preset("undriven").changed({"top.mass_kg": 25.3}), 2.0)
+    (note,) = (note for note in lost.notes if "does not float" in note)
+    assert note.startswith("a top of 25300 g does not float over this base; the nearest that does has 25.48 g")
+    assert note.endswith("Were grams meant?  25.3 g are top.mass_kg = 0.0253")
+    heavy = summary(preset("undriven").changed({"top.mass_kg": 0.0265}), 2.0)
+    assert not any("grams" in note for note in heavy.notes)
+
+
 # --- the lines ---
 
 
@@ -195,7 +258,10 @@ def test_the_figure_calls_a_change_of_the_energy_an_error_only_where_nothing_cha
     assert "Error of the energy" in texts(summary(preset("undriven"), 2.0))
     dragged = texts(summary(preset("friction"), 2.0))
     assert "Error" not in dragged
-    assert "drag" in dragged
+    assert "since the start: drag changes it\n" in dragged
+    washers = texts(summary(preset("loose-washers"), 2.0))
+    assert "drag, drive and friction of the washers change it (without the drive's own part)" in washers
+    assert "since the start: drive changes it (without" in texts(summary(preset("driven"), 2.0))
 
 
 def test_the_figure_shows_the_path_to_scale_and_that_it_is_synthetic() -> None:
@@ -205,8 +271,42 @@ def test_the_figure_shows_the_path_to_scale_and_that_it_is_synthetic() -> None:
 
 
 def test_a_scene_without_motion_has_the_spin_drawn_alone() -> None:
-    told = summary(preset("friction").changed({"observed": "spin"}), 30.0)
+    told = summary(preset("friction").changed({"observed": "spin"}), 5.0)
     assert len(motion_figure(told).axes) == 1
+    assert "friction, the spin alone, 5 s" in texts(told)
+    assert "stayed up" not in texts(told)
+
+
+def test_a_motion_too_short_for_a_spectrum_has_a_shorter_figure() -> None:
+    short, long = (motion_figure(summary(preset("undriven"), s)) for s in (0.5, 2.0))
+    assert len(short.axes) == len(long.axes) - 1
+    assert short.get_figheight() < long.get_figheight() - 2
+    assert min(panel.get_position().y0 for panel in short.axes) * short.get_figheight() == pytest.approx(0.55)
+
+
+def test_both_views_of_the_path_share_their_x_and_show_all_of_it() -> None:
+    told = summary(preset("driven"), 5.0)
+    side, above = motion_figure(told).axes[:2]
+    assert side.get_xlim() == above.get_xlim()
+    place = 100 * told.motion.position
+    for panel, up in ((side, 2), (above, 1)):
+        assert panel.get_xlim()[0] < place[:, 0].min() < place[:, 0].max() < panel.get_xlim()[1]
+        assert panel.get_ylim()[0] < place[:, up].min() < place[:, up].max() < panel.get_ylim()[1]
+
+
+@pytest.mark.parametrize(("name", "spin"), [("driven", 30.03), ("undriven", -30.0), ("undriven", 60.0)])
+def test_the_lines_are_named_inside_of_their_panel_and_apart(name: str, spin: float) -> None:
+    figure = motion_figure(summary(preset(name).changed({"start.spin_hz": spin}), 10.0))
+    panel = figure.axes[-1]
+    frame = panel.get_window_extent()
+    boxes = [text.get_window_extent() for text in panel.texts]
+    shown = [text.get_text() for text in panel.texts]
+    assert any(text.endswith(" precession") for text in shown)
+    assert any(text.endswith(" nutation") for text in shown)
+    for k, box in enumerate(boxes):
+        assert frame.x0 <= box.x0 < box.x1 <= frame.x1
+        assert frame.y0 <= box.y0 < box.y1 <= frame.y1
+        assert not any(box.overlaps(other) for other in boxes[k + 1 :])
 
 
 # --- what is refused, and what ends it ---
