@@ -59,14 +59,15 @@ class _ReciprocalCounter(ScpiInstrument):
     def frequency(self) -> float | None:
         """One reading [Hz], or None; see :class:`Counter`.  Raises CommandRefused if an error was waiting."""
         answer = self._ask("READ?", self._patience)
-        return None if answer is None else self._parse(answer)
+        with self.resynchronised():
+            return None if answer is None else self._parse(answer)
 
     def _parse(self, answer: str) -> float | None:
         return parse_reading(self.transport.address, "READ?", answer)
 
     def _ask(self, question: str, patience: float) -> str | None:
         """Read the error queue, then the data; None when the counter never answers."""
-        self.raise_errors(f"what came before {question}")
+        self.raise_errors(question)
         try:
             return self.transport.query(question, patience=patience)
         except NoAnswer:

@@ -1,13 +1,25 @@
-"""The counter's driver: the manual's bytes.
+"""The counters' drivers: the manuals' bytes, and the same drivers on the virtual instruments.
 
-Source: Keysight 53220A/53230A Programmer's Reference; public drivers of the family.
+Sources: Keysight 53220A/53230A Programmer's Reference; Programmer's Handbook of the CNT-90 series; public drivers of
+both families.
 """
 
+import math
+
+import numpy as np
 import pytest
+import pyvisa
 from conversation import CLEAR, NO_ERROR, SILENCE, accepted, conversation
 
-from instruments.counter import Keysight53230A
+from instruments.counter import Keysight53230A, PendulumCNT91
 from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange
+from instruments.scpi import NOT_A_NUMBER
+from instruments.transport import VisaTransport
+from instruments.virtual.bus import Bus
+from instruments.virtual.counter import Virtual53230A
+from instruments.virtual.counter_cnt91 import VirtualCNT91
+from levilab.clock import VirtualClock
+from pyvisa_levilab import library_for
 
 
 def preparation(gate, level, timeout):
@@ -79,7 +91,8 @@ def test_a_link_that_is_dead_is_not_taken_for_a_missing_signal():
 
 @pytest.mark.parametrize("garbage", ["", "DC", "+2.3E+01,+2.4E+01", '-230,"Data corrupt or stale"'])
 def test_garbage_is_no_reading_but_an_error(garbage):
-    with conversation(Keysight53230A, NO_ERROR, ("READ?", garbage)) as counter, pytest.raises(BadAnswer) as bad:
+    lines = [NO_ERROR, ("READ?", garbage), (CLEAR, None)]  # it may have been the answer to something else
+    with conversation(Keysight53230A, *lines) as counter, pytest.raises(BadAnswer) as bad:
         counter.frequency()
     assert (bad.value.question, bad.value.answer) == ("READ?", garbage)
 
@@ -88,3 +101,215 @@ def test_a_refused_step_of_the_preparation_ends_it():
     refused = [("CONF:FREQ (@1)", None), ("SYST:ERR?", '-221,"Settings conflict"'), NO_ERROR]
     with conversation(Keysight53230A, *refused) as counter, pytest.raises(CommandRefused, match="CONF:FREQ"):
         counter.prepare(gate_s=1.0, trigger_level_v=0.6)
+
+
+def test_an_error_that_waits_is_told_before_a_number_is_believed():
+    waiting = [("SYST:ERR?", '-222,"Data out of range"'), NO_ERROR]
+    with conversation(Keysight53230A, *waiting) as counter, pytest.raises(CommandRefused, match=r"READ\?.*-222"):
+        counter.frequency()
+
+
+# --- series of readings ---
+
+
+def test_a_series_is_fetched_as_it_comes_and_the_counter_is_left_as_it_was():
+    lines = [
+        *accepted("SAMP:COUN 1002", "INIT"),
+        NO_ERROR,
+        ("DATA:REM? 1000,WAIT", ",".join(["+2.5E+01"] * 1000)),
+        NO_ERROR,
+        ("DATA:REM? 2,WAIT", "+2.6E+01,+9.91E+37"),
+        *accepted("SAMP:COUN 1"),
+    ]
+    with conversation(Keysight53230A, *lines) as counter:
+        found = counter.readings(1002)
+    np.testing.assert_array_equal(found, [25.0] * 1000 + [26.0, np.nan])
+    assert counter.transport.waited[-2:] == [6.0, 0.0]  # two readings, then the queue
+
+
+def test_a_series_that_stops_is_filled_up_with_missing_readings():
+    lines = [
+        *accepted("SAMP:COUN 3", "INIT"),
+        NO_ERROR,
+        ("DATA:REM? 3,WAIT", SILENCE),
+        (CLEAR, None),
+        ("*CLS", None),
+        *accepted("ABOR", "SAMP:COUN 1"),
+    ]
+    with conversation(Keysight53230A, *lines) as counter:
+        assert np.isnan(counter.readings(3)).tolist() == [True] * 3
+
+
+def test_a_series_of_the_wrong_length_is_none():
+    lines = [
+        *accepted("SAMP:COUN 3", "INIT"),
+        NO_ERROR,
+        ("DATA:REM? 3,WAIT", "+2.5E+01,+2.5E+01"),
+        (CLEAR, None),
+        ("*CLS", None),
+        *accepted("ABOR", "SAMP:COUN 1"),
+    ]
+    with conversation(Keysight53230A, *lines) as counter, pytest.raises(BadAnswer, match="3 numbers, not 2"):
+        counter.readings(3)
+
+
+@pytest.mark.parametrize("driver", [Keysight53230A, PendulumCNT91])
+@pytest.mark.parametrize("count", [0, -1, 1_000_001])
+def test_a_series_longer_than_the_memory_is_refused(driver, count):
+    with conversation(driver) as counter, pytest.raises(OutOfRange, match="count"):
+        counter.readings(count)
+
+
+# --- CNT-91 ---
+
+NONE_WRONG = ("SYST:ERR?", '0,"No error"')
+
+
+def test_the_cnt91_is_prepared_with_direct_coupling_a_fixed_level_and_a_time_out():
+    lines = accepted(
+        "CONF:FREQ (@1)",
+        "INIT:CONT OFF",
+        "CALC:AVER:STAT OFF",
+        "FORM ASC",
+        "FORM:TINF OFF",
+        "ACQ:APER 10.0",
+        "INP1:COUP DC",
+        "INP1:IMP 1000000.0",
+        "INP1:ATT 1.0",
+        "INP1:FILT OFF",
+        "INP1:LEV:AUTO OFF",
+        "INP1:LEV 0.6",
+        "INP1:SLOP POS",
+        "ARM:SOUR IMM",
+        "TRIG:COUN 1",
+        "ARM:COUN 1",
+        "SYST:TOUT:TIME 21.0",
+        "SYST:TOUT ON",
+    )
+    with conversation(PendulumCNT91, *lines, NONE_WRONG, ("READ?", "+2.5000000000000E+01")) as counter:
+        counter.prepare(gate_s=10.0, trigger_level_v=0.6)
+        assert counter.frequency() == 25.0
+    assert counter.transport.waited[-1] == 21.0
+
+
+@pytest.mark.parametrize("nothing", ["+9.9100000000000E+37", ""])
+def test_the_cnt91_has_two_ways_to_say_that_there_was_nothing(nothing):
+    # compatible and native mode: handbook, 8-36
+    with conversation(PendulumCNT91, NONE_WRONG, ("READ?", nothing)) as counter:
+        assert counter.frequency() is None
+
+
+def test_the_cnt91_gives_time_stamps_beside_the_readings():
+    lines = [
+        *accepted("FORM:TINF ON", "ARM:COUN 2", "INIT"),
+        NONE_WRONG,
+        ("*OPC?", "1"),
+        NONE_WRONG,
+        ("FETC:ARR? 2", "+2.5E+01,+7.0E+02,+9.91E+37,+7.1E+02"),
+        *accepted("ARM:COUN 1", "FORM:TINF OFF"),
+    ]
+    with conversation(PendulumCNT91, *lines) as counter:
+        np.testing.assert_array_equal(counter.timed_readings(2), [[25.0, 700.0], [np.nan, 710.0]])
+
+
+@pytest.mark.parametrize(
+    "identity",
+    ["PENDULUM, CNT-91, 123456, V1.28 7 Jan 2012", "TEKTRONIX,FCA3000,579249,V1.32 26 May 2022 09:54"],
+)
+def test_the_cnt91_is_known_under_the_names_of_both_makers(identity):
+    with conversation(PendulumCNT91, ("*IDN?", identity)) as counter:
+        assert counter.identity() == identity
+
+
+# --- the drivers on the virtual instruments ---
+
+ADDRESS = "TCPIP0::counter::inst0::INSTR"
+PAIRS = [(Keysight53230A, Virtual53230A), (PendulumCNT91, VirtualCNT91)]
+
+
+def light(start, step, n):
+    """25 Hz, pulses of 3 % of a turn between 0.1 V and 1.2 V; from 1000 s on it is dark."""
+    times = start + step * np.arange(n)
+    sigma = 0.03 / math.sqrt(8 * math.log(2))
+    return 0.1 + 1.1 * np.exp(-0.5 * (((25.0 * times) % 1.0 - 0.5) / sigma) ** 2) * (times < 1000.0)
+
+
+@pytest.fixture(params=PAIRS, ids=["53230A", "CNT-91"])
+def bench(request):
+    """A driver, and the clock of its virtual instrument."""
+    driver, virtual = request.param
+    clock = VirtualClock()
+    library = library_for(Bus({ADDRESS: virtual(clock, signal=light)}))
+    counter = driver(VisaTransport(ADDRESS, library=library))
+    yield counter, clock
+    counter.close()
+    pyvisa.ResourceManager(library).close()
+
+
+@pytest.mark.parametrize("gate", [0.1, 1.0, 10.0, 100.0])
+def test_a_gate_longer_than_the_transports_time_out_is_waited_for(bench, gate):
+    counter, clock = bench
+    assert counter.transport.timeout == 2.0
+    counter.identity()
+    counter.prepare(gate_s=gate, trigger_level_v=0.6)
+    before = clock.now()
+    # at each end of the gate an edge may be misplaced by interpolation, by microseconds
+    assert counter.frequency() == pytest.approx(25.0, rel=1e-5 / gate)
+    assert gate <= clock.now() - before <= gate + 0.2
+
+
+def test_a_dark_room_is_no_reading_and_no_error(bench):
+    counter, clock = bench
+    counter.prepare(gate_s=1.0, trigger_level_v=0.6)
+    clock.sleep(1000.0)
+    assert counter.frequency() is None
+    assert counter.frequency() is None
+
+
+def test_a_level_above_the_pulses_is_no_reading(bench):
+    counter, _ = bench
+    counter.prepare(gate_s=0.1, trigger_level_v=1.5)
+    assert counter.frequency() is None
+
+
+def test_a_series_is_as_good_as_single_readings_which_work_afterwards(bench):
+    counter, _ = bench
+    counter.prepare(gate_s=0.1, trigger_level_v=0.6)
+    found = counter.readings(25)
+    assert found.shape == (25,)
+    np.testing.assert_allclose(found, 25.0, rtol=1e-4)
+    assert counter.frequency() == pytest.approx(25.0, rel=1e-4)
+
+
+def test_a_series_into_the_dark_ends_with_missing_readings(bench):
+    counter, clock = bench
+    counter.prepare(gate_s=0.1, trigger_level_v=0.6)
+    clock.sleep(999.0 - clock.now())
+    found = counter.readings(20)
+    missing = np.isnan(found)
+    assert 5 <= np.argmax(missing) <= 9
+    assert missing[np.argmax(missing) :].all()
+
+
+def test_the_settings_can_all_be_asked_for(bench):
+    counter, _ = bench
+    counter.prepare(gate_s=1.0, trigger_level_v=0.6)
+    settings = counter.settings()
+    assert settings["trigger_level_v"] == 0.6
+    assert settings["gate_s"] == 1.0
+    assert settings["coupling"] == "DC"
+    assert NOT_A_NUMBER not in settings.values()
+
+
+def test_time_stamps_are_the_gates_openings():
+    clock = VirtualClock()
+    counter = PendulumCNT91(
+        VisaTransport(ADDRESS, library=library_for(Bus({ADDRESS: VirtualCNT91(clock, signal=light)})))
+    )
+    counter.prepare(gate_s=0.09, trigger_level_v=0.6)
+    values, times = counter.timed_readings(5).T
+    np.testing.assert_allclose(values, 25.0, rtol=1e-4)
+    # three periods of 40 ms hold the gate, and the next edge opens the next one
+    np.testing.assert_allclose(np.diff(times), 0.16, atol=1e-5)
+    assert counter.frequency() == pytest.approx(25.0, rel=1e-4)
+    counter.close()
