@@ -153,11 +153,11 @@ class Edge:
         while self.position < stop:
             n = min(PIECE, math.ceil((stop - self.position) / self.step) + 1)
             volts, before = self.volts(self.position, self.step, n), list(self._armed)
-            found = [
-                i for k, slope in enumerate(self.slopes) if (i := self._first(k, slope * volts, slope)) is not None
-            ]
+            looks = ((self._first(k, slope * volts, slope), slope) for k, slope in enumerate(self.slopes))
+            found = [(i, slope) for i, slope in looks if i is not None]
             if found:
-                at = self._placed(self.position + (min(found) - 1) * self.step, self.step)
+                i, slope = min(found)
+                at = self._placed(self.position + (i - 1) * self.step, self.step, slope)
                 self._armed = before  # the last look may lie behind the stop: such an edge is found again
                 return at if at < stop else None
             self.position += (n - 1) * self.step
@@ -179,14 +179,15 @@ class Edge:
         self._armed[k] = True
         return None
 
-    def _placed(self, start: float, step: float) -> float:
+    def _placed(self, start: float, step: float, slope: float) -> float:
         """The crossing between two looks, looked at ever closer."""
         while step > self.fine:
             step /= 1000
             volts = self.volts(start, step, 1001)
-            above = volts >= self.level
+            above = slope * volts >= slope * self.level
             turns = np.flatnonzero(above[1:] != above[:-1])
-            start += step * (int(turns[0]) if turns.size else 0)
+            # an edge that only the coarse look saw stands, but for the rounding of its time, at that look
+            start += step * (int(turns[0]) if turns.size else 999)
         before, after = self.volts(start, step, 2)
         part = (self.level - before) / (after - before) if after != before else 0.5
         return start + step * float(min(max(part, 0.0), 1.0))
@@ -351,7 +352,8 @@ class VirtualOscilloscope(VirtualInstrument):
     @property
     def now(self) -> float:
         """When the message under way is worked on [s]."""
-        return self._ready if math.isfinite(self._ready) else self.clock.now()
+        now = self.clock.now()
+        return max(self._ready, now) if math.isfinite(self._ready) else now
 
     def _input(self, channel: int, start: float) -> Input:
         signal = self._signals.get(channel, _open_input)

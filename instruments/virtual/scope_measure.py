@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 #: A level of the histogram must hold this part of the samples, else the extreme itself is taken.
 _FLAT = 0.05
-#: A pulse must come back by this part of the amplitude before it counts again.
-_HYSTERESIS = 0.1
+#: A pulse must come back by this part of the amplitude before it counts again; less than the 10 % of a rise.
+_HYSTERESIS = 0.05
 
 
 @dataclass(frozen=True, eq=False)

@@ -225,7 +225,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
     def _status(self) -> str:
         if not self.running():
             return "STOP"
-        if self.now < self.filled and self._record is None:
+        if self.now < self.filled and (self._once or self._record is None):
             return "RUN"
         under_way = self._first_record(self.now)
         latest = under_way or (None if self._once else self._record)
