@@ -9,9 +9,11 @@ from __future__ import annotations
 import contextlib
 import select
 import socket
+import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol
 
+from instruments.advice import advice, one_line
 from instruments.blocks import BrokenBlock, block_of, read_block
 from instruments.errors import BadAnswer, NoAnswer, NotConnected, Occupied
 
@@ -103,7 +105,7 @@ class VisaTransport:
         except Exception as error:  # pyvisa-py raises plain Exception when a host is unknown or unreachable
             raise NotConnected(
                 self.address,
-                f"cannot be opened ({_one_line(error)}): check the address, the cable and that it is on",
+                f"cannot be opened ({one_line(error)}){advice(error)}",
             ) from error
         resource.write_termination = resource.read_termination = "\n"
         if self.address.upper().startswith("ASRL"):
@@ -243,9 +245,18 @@ class VisaTransport:
             raise
 
 
+def addresses(library: str | VisaLibraryBase) -> tuple[str, ...]:
+    """The resource names that a PyVISA library finds by itself, serial ports included.  Raises NotConnected."""
+    import pyvisa
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # pyvisa-py recommends packages; the documentation does it here
+            names = pyvisa.ResourceManager(library).list_resources("?*")  # type: ignore[arg-type, unused-ignore]
+        return tuple(name for name in names if name.upper().endswith(("::INSTR", _BARE_SOCKET)))
+    except Exception as error:  # whatever a vendor's library raises
+        raise NotConnected(str(library), f"nothing can be listed ({one_line(error)}){advice(error)}") from error
+
+
 def _broken(question: str, error: BaseException) -> str:
-    return f"no link at {question!r} ({_one_line(error)}): check the address and the cable, and that it is on"
-
-
-def _one_line(error: BaseException) -> str:
-    return " ".join(str(error).split())
+    return f"no link at {question!r} ({one_line(error)}): check the address and the cable, and that it is on"

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn, cast
 
 import typer
 
-from levilab import cli_simulator
+from levilab import cli_bench, cli_simulator
 from levilab.cli_simulator import EXIT_INTERRUPTED, Json
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ acquire_app = typer.Typer(no_args_is_help=True, help="Run an experiment on the b
 analyze_app = typer.Typer(no_args_is_help=True, help="Analyze runs or data files.")
 app.add_typer(acquire_app, name="acquire")
 app.add_typer(analyze_app, name="analyze")
+app.add_typer(cli_bench.bench_app, name="bench")
 
 EXIT_FAILED, EXIT_INSTRUMENT = 1, 3
 

@@ -2,16 +2,103 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
+    from levilab.bench_check import Checked
+    from levilab.bench_search import Found
     from levilab.bench_serve import Served
 
-EXIT_INTERRUPTED = 130
+EXIT_INSTRUMENT, EXIT_INTERRUPTED = 3, 130
 
 bench_app = typer.Typer(no_args_is_help=True, help="The instruments: what answers, and a virtual bench to practise.")
+
+
+@bench_app.command("init", epilog="Example: levilab bench init --address TCPIP0::192.168.1.20::5025::SOCKET")
+def bench_init(
+    addresses: Annotated[
+        list[str] | None,
+        typer.Option("--address", metavar="NAME", help="Ask there, too: a resource name or a serial port; repeatable."),
+    ] = None,
+    library: Annotated[
+        str, typer.Option(metavar="NAME", help="PyVISA's library: @py is its own, '' a vendor's, @levilab virtual.")
+    ] = "@py",
+    out: Annotated[Path, typer.Option(metavar="FILE", help="The file to write.")] = Path("bench.toml"),
+    force: Annotated[bool, typer.Option("--force", help="Replace the file if it is there.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print what was found as one JSON document.")] = False,
+) -> None:
+    """Ask everybody on the buses who they are, and write a commented bench.toml with those that have a driver.
+
+    Only *IDN? is sent.  Instruments on the network are found by themselves where PyVISA can look for them (pip install
+    psutil zeroconf); else name them with --address.
+    """
+    from levilab.bench_file import bench_text, refuse_to_overwrite, write_bench
+    from levilab.bench_search import search
+
+    if not force:
+        refuse_to_overwrite(out)
+    found = search(library, addresses or [], lambda text: typer.echo(text, err=True))
+    if as_json:
+        import json
+        from dataclasses import asdict
+
+        typer.echo(json.dumps({"found": [asdict(one) for one in found], "file": str(out)}))
+    else:
+        _tell_found(found)
+    write_bench(out, bench_text(found, library))
+    typer.echo(f"wrote {out}: look it over, then try it with `levilab bench check`", err=True)
+
+
+def _tell_found(found: list[Found]) -> None:
+    for one in found:
+        if one.identity:
+            what = f"{one.kind} {one.model}" if one.kind else "no driver of levilab's"
+            typer.echo(f"{one.address}\n  {one.identity}: {what}")
+        else:
+            typer.echo(f"{one.address}\n  {one.trouble.removeprefix(one.address + ': ')}")
+    if not any(one.kind for one in found):
+        typer.echo("nobody answered that levilab has a driver for: is it on and connected?  Name it with --address")
+
+
+@bench_app.command("check", epilog="Example: levilab bench check --bench lab2.toml")
+def bench_check(
+    bench: Annotated[Path, typer.Option(metavar="FILE", help="Describes the bench.")] = Path("bench.toml"),
+    mock: Annotated[bool, typer.Option("--mock", help="Check the virtual bench.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")] = False,
+) -> None:
+    """Connect to each instrument of the bench: who it is, one reading, what failed and what to try.
+
+    The drive stays off.  Exit status 3 if one did not answer as it should.
+    """
+    from levilab.bench_check import check
+    from levilab.config import BenchConfig, read_bench
+    from levilab.virtual_bench import own_world
+
+    config = BenchConfig() if mock else read_bench(bench)
+    checked = []
+    for one in check(config, own_world() if mock else None):
+        checked.append(one)
+        if not as_json:
+            _tell_checked(one)
+    if as_json:
+        import json
+        from dataclasses import asdict
+
+        typer.echo(json.dumps({"instruments": [asdict(one) for one in checked]}))
+    if any(one.trouble for one in checked):
+        raise typer.Exit(EXIT_INSTRUMENT)
+
+
+def _tell_checked(one: Checked) -> None:
+    typer.echo(f"{one.kind} at {one.address}")
+    if one.model:
+        typer.echo(
+            f"  {one.maker} {one.model}, serial number {one.serial_number or '-'}, firmware {one.firmware or '-'}"
+        )
+    typer.echo(f"  {'FAILED: ' + one.trouble if one.trouble else one.reading}")
 
 
 @bench_app.command("serve", epilog="Example: levilab bench serve --speed 10 --port-base 15000")

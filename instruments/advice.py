@@ -1,0 +1,35 @@
+"""What to try when an instrument cannot be reached: from the words of whoever failed to reach it."""
+
+from __future__ import annotations
+
+import re
+
+#: What an error's text tells, and what to try.
+_ADVICE = {
+    r"could not locate a visa|wrapper.*not found|no module named 'pyvisa_": (
+        'no such VISA library is installed: take visa_library = "@py", which comes with this program'
+    ),
+    r"pyusb|libusb|usb.*(backend|session)": (
+        "for USB install pyusb and libusb (pip install pyusb libusb-package), or a VISA library of a vendor"
+    ),
+    r"gpib": "for GPIB install linux-gpib or gpib-ctypes, or a VISA library of a vendor",
+    r"permission|access denied|errno 13": "you may not use this device: on Linux a udev rule gives the right to it",
+    r"name or service not known|getaddrinfo|nodename": "this computer does not know that name: try the number",
+    r"refused": "somebody is there, but not at this port: check port and protocol",
+}
+_ALWAYS = "check the address, the cable and that it is on"
+
+
+def advice(error: BaseException) -> str:
+    """What to try, as the end of a sentence.
+
+    >>> advice(OSError("[Errno 111] Connection refused"))
+    ': somebody is there, but not at this port: check port and protocol'
+    """
+    text = one_line(error).lower()
+    return ": " + next((what for pattern, what in _ADVICE.items() if re.search(pattern, text)), _ALWAYS)
+
+
+def one_line(error: BaseException) -> str:
+    """An error's text without line breaks."""
+    return " ".join(str(error).split())

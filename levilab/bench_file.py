@@ -1,0 +1,71 @@
+"""A commented bench.toml from what was found."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from levilab.drivers import DRIVERS
+from levilab.errors import LevilabError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from levilab.bench_search import Found
+
+#: What a kind is for, and an address as one of it may have.
+KINDS = {
+    "counter": ("counts the light pulses", "TCPIP0::192.168.1.20::5025::SOCKET"),
+    "generator": ("drives the coil", "USB0::0x0957::0x2807::MY52400001::INSTR"),
+    "oscilloscope": ("records the phototransistor", "TCPIP0::192.168.1.22::INSTR"),
+    "magnetometer": ("measures the base's field", "COM3"),
+}
+
+
+class WouldOverwrite(LevilabError):
+    """A file that is there already."""
+
+
+def bench_text(found: Sequence[Found], library: str) -> str:
+    """The text of a bench.toml: the first instrument of each kind, the others as comments."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(  # noqa: S701 - no HTML
+        loader=PackageLoader("levilab", "."), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    # TOML's strings are JSON's; jinja's own filter would escape signs of HTML
+    environment.policies["json.dumps_function"] = lambda value, **_: _quoted(value)
+    by_kind = {kind: [one for one in found if one.kind == kind] for kind in KINDS}
+    about = {
+        kind: {"what": what, "address": address, "model": next(iter(DRIVERS[kind])), "models": ", ".join(DRIVERS[kind])}
+        for kind, (what, address) in KINDS.items()
+    }
+    return environment.get_template("bench.toml.j2").render(
+        library=library,
+        kinds=about,
+        chosen={kind: ones[0] if ones else None for kind, ones in by_kind.items()},
+        others={kind: ones[1:] for kind, ones in by_kind.items()},
+        unknown=[one for one in found if one.identity and not one.kind],
+    )
+
+
+def _quoted(value: str) -> str:
+    import json
+
+    return json.dumps(value, ensure_ascii=False)
+
+
+def refuse_to_overwrite(path: Path) -> None:
+    """Raise WouldOverwrite if there is such a file."""
+    if path.exists():
+        raise WouldOverwrite(f"{path} is there already: give another name with --out, or --force to replace it")
+
+
+def write_bench(path: Path, text: str) -> None:
+    """Write the file.  Raises CannotWrite."""
+    from levilab.writing import CannotWrite, replace_atomically
+
+    try:
+        replace_atomically(path, text)
+    except OSError as error:
+        raise CannotWrite(f"{path} cannot be written ({error.strerror}): give another name with --out") from error

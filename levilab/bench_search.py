@@ -1,0 +1,106 @@
+"""Which instruments answer: every address that PyVISA lists, and those that are named, asked who they are."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from instruments.errors import InstrumentError
+from levilab.config import InstrumentSettings
+from levilab.drivers import DRIVERS, driver_of, transport_to
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+#: How long one address is waited for [s]: who is there answers within some milliseconds.
+PATIENCE_S = 1.0
+
+
+@dataclass(frozen=True)
+class Found:
+    """What is at an address.
+
+    identity: its answer, None if there was none; kind, model: None where no driver of ours speaks to it; line: how the
+    serial line was set when it answered; trouble: why there was no answer.
+    """
+
+    address: str
+    identity: str | None = None
+    kind: str | None = None
+    model: str | None = None
+    line: dict[str, Any] | None = None
+    trouble: str = ""
+
+
+def listed(library: str) -> tuple[str, ...]:
+    """The addresses that a PyVISA library finds by itself.  Raises NotConnected."""
+    from instruments.transport import addresses
+
+    return addresses(library)
+
+
+def search(library: str, named: Sequence[str], tell: Callable[[str], None]) -> list[Found]:
+    """Ask everybody.  named: addresses beside those that are listed; tell: is told who is being asked.
+
+    Raises NotConnected where there is no such library.
+    """
+    everybody = dict.fromkeys((*named, *listed(library)))
+    found = []
+    for address in everybody:
+        tell(f"asking {address}")
+        found.append(asked(address, library))
+    return found
+
+
+def asked(address: str, library: str) -> Found:
+    """Who is at an address, with each of the ways that a serial line may be set."""
+    trouble = ""
+    for kind, model, line in _ways(address):
+        settings = InstrumentSettings(model=model, address=address, timeout_s=PATIENCE_S)
+        try:
+            transport = transport_to(kind, settings, library=library)
+        except InstrumentError as error:
+            return Found(address, trouble=str(error))
+        try:
+            identity = transport.query("*IDN?")
+        except InstrumentError as error:
+            trouble = str(error)
+        else:
+            kind_of_it, model_of_it = recognised(identity) or (None, None)
+            return Found(address, identity, kind_of_it, model_of_it, line)
+        finally:
+            transport.close()
+    return Found(address, trouble=trouble)
+
+
+def _ways(address: str) -> Iterator[tuple[str, str, dict[str, Any]]]:
+    """Kind, model and line to ask with: for a serial port every line that a driver knows, else any."""
+    if "::" in address and not address.upper().startswith("ASRL"):
+        yield "counter", next(iter(DRIVERS["counter"])), {}
+        return
+    seen: list[dict[str, Any]] = []
+    for kind, models in DRIVERS.items():
+        for model in models:
+            line = dict(getattr(driver_of(kind, model), "SERIAL", {}))
+            if line and line not in seen:
+                seen.append(line)
+                yield kind, model, line
+
+
+def recognised(identity: str) -> tuple[str, str] | None:
+    """Kind and model of our driver for an answer to ``*IDN?``; None if there is none.
+
+    >>> recognised("Keysight Technologies,53220A,MY1,2.1"), recognised("RIGOL TECHNOLOGIES,DS1104Z,DS1Z,00.04")
+    (('counter', '53220A'), ('oscilloscope', 'DS1000Z'))
+    """
+    fields = identity.split(",")
+    field = fields[1].strip() if len(fields) > 1 else ""
+    fitting = [
+        (kind, model)
+        for kind, models in DRIVERS.items()
+        for model in models
+        if re.fullmatch(driver_of(kind, model).MODELS, field, re.IGNORECASE)
+    ]
+    # of several names for one driver the one that the instrument gives itself
+    return min(fitting, key=lambda what: what[1].upper() not in field.upper(), default=None)

@@ -1,0 +1,120 @@
+"""levilab bench init and check: who answers, a bench.toml from it, and whether all of it is there."""
+
+import json
+
+import pytest
+
+from levilab.bench_check import check
+from levilab.bench_file import bench_text
+from levilab.bench_search import Found, asked, recognised, search
+from levilab.config import BenchConfig, InstrumentSettings, Limits, SpinSettings, read_bench
+from levilab.virtual_bench import MODELS, VIRTUAL, own_world
+
+#: Answers to *IDN? as instruments give them.
+IDENTITIES = {
+    "Keysight Technologies,53230A,MY58120113,03.09-4144.2-1.19-4.15": ("counter", "53230A"),
+    "Agilent Technologies,53220A,MY50001484,02.05-1519.666-1.19-4.15": ("counter", "53220A"),
+    "PENDULUM,CNT-91,123456,V1.28 09 May 2012": ("counter", "CNT-91"),
+    "TEKTRONIX,FCA3100,C010123,V1.32": ("counter", "FCA3100"),
+    "Agilent Technologies,33522B,MY57800456,4.00-1.19-2.00-58-00": ("generator", "33500B"),
+    "Agilent Technologies,33220A,MY44035849,2.07-2.06-22-2": ("generator", "33220A"),
+    "RIGOL TECHNOLOGIES,DS1054Z,DS1ZA200502312,00.04.04.SP4": ("oscilloscope", "DS1000Z"),
+    "KEYSIGHT TECHNOLOGIES,DSOX1102G,CN57096441,01.20.2019061038": ("oscilloscope", "DSOX1000"),
+    "AGILENT TECHNOLOGIES,DSO-X 2012A,MY53160181,02.43.2018020635": ("oscilloscope", "DSOX1000"),
+    "LSCI,MODEL425,4250022,1.0": ("magnetometer", "425"),
+    "LSCI,MODEL475,1234567,091504": ("magnetometer", "475"),
+    "LSCI,MODEL455,1234567,061505": ("magnetometer", "455"),
+    "Stanford Research Systems,SR620,10123,1.2": None,
+    "nonsense": None,
+}
+
+
+@pytest.mark.parametrize("identity", IDENTITIES)
+def test_an_instrument_is_recognised_by_its_answer(identity):
+    assert recognised(identity) == IDENTITIES[identity]
+
+
+def test_everybody_who_is_listed_or_named_is_asked():
+    told = []
+    found = search("@levilab", ["TCPIP0::nobody::inst0::INSTR"], told.append)
+    assert [one.address for one in found] == ["TCPIP0::nobody::inst0::INSTR", *(s.address for s in VIRTUAL.values())]
+    assert len(told) == 5
+    assert "cannot be opened" in found[0].trouble
+    assert {(one.kind, one.model) for one in found[1:]} == {(kind, s.model) for kind, s in VIRTUAL.items()}
+
+
+def test_a_serial_port_is_asked_at_every_speed_that_a_driver_knows():
+    found = asked(VIRTUAL["magnetometer"].address, "@levilab")
+    assert found.identity.startswith("LSCI,MODEL425")
+    assert found.line["parity"] == "odd"
+
+
+def test_what_was_found_becomes_a_bench_that_can_be_read_and_checked(tmp_path):
+    path = tmp_path / "bench.toml"
+    path.write_text(bench_text(search("@levilab", [], lambda _: None), "@levilab"), encoding="utf-8")
+    config = read_bench(path)
+    assert {kind: getattr(config, kind).model for kind in VIRTUAL} == {k: s.model for k, s in VIRTUAL.items()}
+    # what is written beside the instruments are the defaults
+    assert config.limits == Limits()
+    assert config.spin == SpinSettings()
+    assert [(one.kind, one.trouble) for one in check(config)] == [(kind, "") for kind in VIRTUAL]
+
+
+def test_kinds_that_were_not_found_stand_there_as_comments_and_others_are_told(tmp_path):
+    path = tmp_path / "bench.toml"
+    odd = 'maker,"quoted" <tag> \\ ,1,2'
+    found = [
+        Found("A::1", "Keysight Technologies,53230A,1,2", "counter", "53230A"),
+        Found("A::2", "Keysight Technologies,53220A,1,2", "counter", "53220A"),
+        Found("A::3", odd),
+        Found("A::4", trouble="no answer"),
+    ]
+    text = bench_text(found, "@py")
+    path.write_text(text, encoding="utf-8")
+    config = read_bench(path)
+    assert config.counter == InstrumentSettings(model="53230A", address="A::1")
+    assert config.generator is config.magnetometer is config.oscilloscope is None
+    assert '# also found: model = "53220A", address = "A::2"' in text
+    assert f"# somebody without a driver here: A::3  {odd}" in text
+    for kind in ("generator", "oscilloscope", "magnetometer"):
+        assert f"# [{kind}]" in text
+    assert max(map(len, text.splitlines())) <= 125
+
+
+def test_a_check_reads_each_kind_and_leaves_the_output_off():
+    seen = {one.kind: one for one in check(BenchConfig(), own_world())}
+    assert all(not one.trouble for one in seen.values())
+    assert seen["counter"].value == pytest.approx(30, abs=0.2)  # the virtual top spins at 30 Hz
+    assert seen["oscilloscope"].value == pytest.approx(1.1, abs=0.1)  # between dark, 0.1 V, and the tape, 1.2 V
+    assert seen["magnetometer"].value == pytest.approx(0.01909, abs=1e-4)
+    assert seen["generator"].reading.startswith("output off")
+    assert seen["counter"].serial_number == "VIRTUAL"
+
+
+@pytest.mark.parametrize(("kind", "model"), [(kind, model) for kind, models in MODELS.items() for model in models])
+def test_every_virtual_model_is_recognised_by_what_it_says_of_itself(kind, model):
+    device = MODELS[kind][model](own_world())
+    assert recognised(device.identity) == (kind, model)
+    assert "VIRTUAL" in device.identity  # so that a run with it is known as synthetic
+
+
+def test_the_commands_find_write_and_check(levilab, tmp_path):
+    done = levilab("bench", "init", "--library", "@levilab")
+    assert "counter 53230A" in done.stdout
+    assert "wrote bench.toml" in done.stderr
+    assert "there already" in levilab("bench", "init", "--library", "@levilab", check=1).stderr
+    checked = levilab("bench", "check")
+    assert "29.9" in checked.stdout
+    path = tmp_path / "bench.toml"
+    path.write_text(path.read_text(encoding="utf-8").replace("counter.levilab", "nobody"), encoding="utf-8")
+    failed = levilab("bench", "check", "--json", check=3)
+    by_kind = {one["kind"]: one for one in json.loads(failed.stdout)["instruments"]}
+    assert "check the address" in by_kind["counter"]["trouble"]
+    assert not by_kind["magnetometer"]["trouble"]
+
+
+def test_no_library_and_no_bench_are_told(levilab, tmp_path):
+    assert 'take visa_library = "@py"' in levilab("bench", "init", "--library", "@nolibrary", check=3).stderr
+    assert "no such file" in levilab("bench", "check", check=1).stderr
+    (tmp_path / "empty.toml").write_text("", encoding="utf-8")
+    assert "describes no instrument" in levilab("bench", "check", "--bench", "empty.toml", check=1).stderr
