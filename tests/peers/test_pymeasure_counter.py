@@ -1,0 +1,137 @@
+"""PyMeasure's CNT91 class, unmodified, on the virtual counter.
+
+PyMeasure's requirements clash with ours in places: it runs in an environment of its own, and is passed over where
+it is not installed.
+"""
+
+import math
+
+import numpy as np
+import pytest
+import pyvisa
+
+from instruments.virtual.bus import Bus
+from instruments.virtual.counter_cnt91 import VirtualCNT91
+from levilab.clock import VirtualClock
+from pyvisa_levilab import library_for
+
+pytest.importorskip("pymeasure")
+
+from pymeasure.adapters import VISAAdapter
+from pymeasure.instruments.pendulum import CNT91
+
+# PyMeasure says so of each driver that does not declare its dialect
+pytestmark = pytest.mark.filterwarnings("ignore:It is not known whether this device support SCPI:FutureWarning")
+
+ADDRESS = "GPIB0::10::INSTR"
+SPIN = 27.3
+
+
+def light(start, step, n):
+    """A top that keeps its spin: pulses of 3 % of a turn, FWHM, between 0.1 V and 1.2 V."""
+    sigma = 0.03 / math.sqrt(8 * math.log(2))
+    place = (SPIN * (start + step * np.arange(n))) % 1.0 - 0.5
+    return 0.1 + 1.1 * np.exp(-0.5 * (place / sigma) ** 2)
+
+
+@pytest.fixture
+def bench():
+    """PyMeasure's class, and the virtual instrument that it talks to."""
+    device = VirtualCNT91(VirtualClock(), signal=light)
+    library = library_for(Bus({ADDRESS: device}))
+    counter = CNT91(VISAAdapter(ADDRESS, visa_library=library, read_termination="\n", timeout=86_400_000))
+    yield counter, device
+    assert counter.check_errors() == []
+    counter.adapter.close()
+    pyvisa.ResourceManager(library).close()
+
+
+def count_pulses(counter):
+    """What PyMeasure's class has no property for: the fixed level that slow pulses need."""
+    counter.write("INP1:COUP DC")
+    counter.write("INP1:LEV 0.65")
+
+
+def test_it_is_identified_and_its_queue_is_empty(bench):
+    counter, _ = bench
+    assert "CNT-91" in counter.id
+    assert counter.options == "0"
+    assert counter.check_errors() == []
+
+
+def test_every_property_can_be_set_and_asked_for(bench):
+    counter, _ = bench
+    for source in ("A", "B", "E", "IMM"):
+        counter.external_start_arming_source = source
+        assert counter.external_start_arming_source == source
+    for slope in ("NEG", "POS"):
+        counter.external_arming_start_slope = slope
+        assert counter.external_arming_start_slope == slope
+    for switch in (True, False):
+        counter.continuous = switch
+        assert counter.continuous is switch
+        counter.interpolator_autocalibrated = switch
+        assert counter.interpolator_autocalibrated is switch
+    for gate in (2e-8, 0.01, 1, 1000):
+        counter.gate_time = gate
+        assert counter.gate_time == gate
+    for kind in ("REAL", "ASCII"):
+        counter.format = kind
+        assert counter.format == kind
+    assert counter.batch_size == 10000
+
+
+@pytest.mark.parametrize("back_to_back", [True, False])
+@pytest.mark.parametrize(("samples", "gate"), [(4, 1.0), (25, 0.1), (300, 0.05)])
+def test_a_buffered_time_series_of_frequencies(bench, samples, gate, back_to_back):
+    counter, device = bench
+    count_pulses(counter)
+    before = device.clock.now()
+    counter.buffer_frequency_time_series("A", samples, gate_time=gate, back_to_back=back_to_back)
+    found = counter.read_buffer()
+    assert len(found) == samples
+    np.testing.assert_allclose(found, SPIN, rtol=1e-5 / gate)
+    # back to back: nothing but the gates, and the first edge; else up to two periods more for each
+    assert device.clock.now() - before >= samples * gate
+    assert device.clock.now() - before <= (samples if back_to_back else samples * (1 + 2 / SPIN / gate)) * gate + 0.2
+
+
+def test_a_part_of_the_buffer(bench):
+    counter, _ = bench
+    count_pulses(counter)
+    counter.buffer_frequency_time_series("A", 20, gate_time=0.1)
+    assert len(counter.read_buffer(8)) == 8
+    assert len(counter.read_buffer(12)) == 12
+
+
+def test_a_long_gate_is_waited_for(bench):
+    counter, device = bench
+    count_pulses(counter)
+    counter.buffer_frequency_time_series("A", 4, gate_time=100)
+    np.testing.assert_allclose(counter.read_buffer(), SPIN, rtol=1e-7)
+    assert device.clock.now() > 400
+
+
+def test_arming_by_the_signal_itself(bench):
+    counter, _ = bench
+    count_pulses(counter)
+    counter.buffer_frequency_time_series("A", 5, gate_time=0.1, trigger_source="A")
+    np.testing.assert_allclose(counter.read_buffer(), SPIN, rtol=1e-4)
+
+
+def test_what_it_sends_without_a_fixed_level_miscounts(bench):
+    """The automatic level needs 100 Hz: PyMeasure's class alone does not count a spin."""
+    counter, _ = bench
+    counter.write("SYST:TOUT 1;:SYST:TOUT:TIME 2")
+    counter.write("INP1:COUP AC;LEV:AUTO OFF;:INP1:LEV 2")
+    counter.buffer_frequency_time_series("A", 4, gate_time=0.1)
+    assert counter.read_buffer() == [9.91e37] * 4
+
+
+def test_reset_and_clear(bench):
+    counter, _ = bench
+    counter.gate_time = 1
+    counter.reset()
+    assert counter.gate_time == 0.01
+    counter.write("FOO")
+    counter.clear()
