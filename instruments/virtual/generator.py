@@ -46,6 +46,11 @@ _PLAIN_33500: tuple[Plain, ...] = (
     ("MARKer:CYCle", "marker_cycle", 2, 100e6, 2, ("",)),
     ("BPSK[:PHASe]", "bpsk_phase", 0, 360, 180, _DEG),
     ("BPSK:INTernal:RATE", "bpsk_rate", 1e-3, 1e6, 10, _HZ),
+    ("LIST:DWELl", "list_dwell", 1e-6, 3600, 1, _S),
+    ("MARKer:POINt", "marker_point", 4, 1e6, 10, ("",)),
+    ("PHASe:ARBitrary", "arb_phase", -360, 360, 0, _DEG),
+    ("PHASe:MODulation", "modulation_phase", -360, 360, 0, _DEG),
+    ("PWM:DEViation:DCYCle", "pwm_duty", 0, 100, 1, _PERCENT),
     ("SUM:AMPLitude", "sum_amplitude", 0, 100, 0.1, _PERCENT),
     ("SUM:INTernal:FREQuency", "sum_frequency", 1e-6, 30e6, 100, _HZ),
 )
@@ -731,6 +736,8 @@ class Virtual33500B(VirtualGenerator):
             Command("[SOURce[1|2]:]PHASe:SYNChronize", set=does(lambda: None)),
             Command(f"INITiate[{channel.index}][:IMMediate][:ALL]", set=does(lambda: None)),
             self.switch(f"INITiate{_suffix(channel)}:CONTinuous", prefix + "continuous", default=True),
+            self.switch(source + "AM:DSSC", prefix + "am_dssc"),
+            self._list_row(channel, source + "LIST:FREQuency"),
             self.word(f"{output}:MODE", prefix + "output_mode", ("NORMal", "GATed"), "NORM"),
             self.word(f"{output}:SYNC:MODE", prefix + "sync_mode", ("NORMal", "CARRier", "MARKer"), "NORM"),
             self.word(f"{output}:SYNC:POLarity", prefix + "sync_polarity", ("NORMal", "INVerted"), "NORM"),
@@ -739,12 +746,32 @@ class Virtual33500B(VirtualGenerator):
             self.quantity(channel, f"{trigger}:LEVel", "trigger_level", lambda: (0.9, 3.8), 3.3, units=_V),
         )
 
+    def _list_row(self, channel: Channel, pattern: str) -> Command:
+        """The frequencies of a list sweep, which this model only keeps."""
+        key = channel.prefix + "list"
+        self._defaults[key] = "1e2,1e3,5.5e2"
+
+        def keep(parameters: list[str]) -> None:
+            if not 1 <= len(parameters) <= 128:
+                raise ScpiError(-109 if not parameters else -108)
+            low, high = channel.frequency_limits()
+            self.settings[key] = ",".join(str(channel.read(text, low, high, 1e3, _HZ)) for text in parameters)
+
+        def tell() -> str:
+            numbers = (f"{float(text):+.8E}" for text in str(self.settings[key]).split(","))
+            # three digits of exponent, as the instrument prints its lists
+            return ",".join(f"{number[:-2]}0{number[-2:]}" for number in numbers)
+
+        return Command(pattern, keep, answers(tell))
+
     def _shared(self) -> tuple[Command, ...]:
         return (
             *super()._shared(),
             self.word("OUTPut[1|2]:SYNC:SOURce", "sync_source", ("CH1", "CH2"), "CH1"),
             self.word("OUTPut:TRIGger:SOURce", "trigger_out_source", ("CH1", "CH2"), "CH1"),
             self.word("ROSCillator:SOURce", "clock_source", ("INTernal", "EXTernal"), "INT"),
+            self.word("ROSCillator:SOURce:AUTO", "clock_automatic", ("ON", "OFF"), "ON"),
+            self.word("UNIT:ARBitrary:ANGLe", "arb_angle_unit", ("DEGree", "RADian", "SECond", "SAMPle"), "DEG"),
         )
 
     def _memory_rows(self, channel: Channel, data: str) -> tuple[Command, ...]:
