@@ -2,14 +2,17 @@
 
 import itertools
 import math
+import struct
+import tracemalloc
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from wire import received, send
+from wire import ask, cable, errors, received, send
 
 from instruments.virtual.counter import Virtual53230A, crossings
+from instruments.virtual.edges import RATE, EdgeFinder, Input
 from levilab.clock import VirtualClock
 
 DARK, BRIGHT, DUTY = 0.1, 1.2, 0.03
@@ -218,3 +221,314 @@ def test_crossings_lie_between_samples_and_one_turn_back_apart(voltage, level, h
     got = crossings(np.array(voltage), level, hysteresis)
     assert np.all((got >= 0) & (got <= len(voltage) - 1))
     assert np.all(np.diff(got) > 0)
+
+
+# --- light that is looked at in pieces ---
+
+
+@given(
+    voltage=VOLTAGES,
+    level=st.sampled_from([-0.25, 0.0, 0.3]),
+    hysteresis=st.sampled_from([0.0, 0.1, 0.6]),
+    falling=st.booleans(),
+    steps=st.lists(st.integers(1, 9), min_size=60, max_size=60),
+)
+def test_edges_found_in_pieces_are_those_of_the_whole(voltage, level, hysteresis, falling, steps):
+    def signal(start, step, n):
+        first = round(start * RATE)
+        return np.array((voltage + [voltage[-1]] * 100)[first : first + n])
+
+    finder = EdgeFinder(signal, Input(level, hysteresis, 0.02, falling=falling), 0.0)
+    for reached in itertools.accumulate(steps):
+        finder.look(reached / RATE, min(reached, len(voltage) - 1 + 1e-6) / RATE)
+    sign = -1 if falling else 1
+    whole = crossings(sign * np.array(voltage), sign * level, hysteresis)
+    found = []
+    while edge := finder.find(found[-1][1] + 1e-12 if found else 0.0):
+        found.append((edge.count, edge.time))
+    assert [count for count, _ in found] == list(range(len(whole)))
+    np.testing.assert_allclose([time * RATE for _, time in found], whole, rtol=1e-12, atol=1e-9)
+
+
+def test_a_gate_of_a_thousand_seconds_needs_little_memory():
+    device = counter(pulses(40.0), FIXED_LEVEL, "SENS:FREQ:GATE:TIME 1000", "SYST:TIM 2000")
+    tracemalloc.start()
+    got, took = reading(device, timeout=3000.0)
+    assert tracemalloc.get_traced_memory()[1] < 50e6
+    tracemalloc.stop()
+    assert got == pytest.approx(40.0, rel=1e-8)
+    assert took == pytest.approx(1000.0, abs=0.1)
+
+
+def test_it_looks_no_further_than_the_edge_that_ends_the_gate():
+    looked = []
+
+    def light(start, step, n):
+        looked.append(start + step * n)
+        return pulses(40.0)(start, step, n)
+
+    reading(counter(light, FIXED_LEVEL, "SENS:FREQ:GATE:TIME 1", "SYST:TIM 2000"))
+    assert max(looked) < 1.3
+
+
+def test_what_is_out_of_reach_is_not_worked_out():
+    device = counter(pulses(40.0), FIXED_LEVEL, "SENS:FREQ:GATE:TIME 1000;:SAMP:COUN MAX;:TRIG:COUN MAX")
+    assert ask(device, "READ?", 10.0) is None
+    cable(device).clear()
+    assert ask(device, "*OPC?") == "1"
+
+
+# --- several readings, and the memory ---
+
+
+def numbers(answer):
+    return [float(word) for word in answer.split(",")]
+
+
+@pytest.fixture
+def five():
+    """A counter that takes five readings of 0.1 s."""
+    return counter(pulses(40.0), FIXED_LEVEL, "SAMP:COUN 5", "SYST:TIM 2")
+
+
+def test_readings_are_samples_times_triggers(five):
+    assert ask(five, "SAMP:COUN?") == "+5"
+    assert len(numbers(ask(five, "READ?"))) == 5
+    send(five, b"TRIG:COUN 3\n")
+    assert len(numbers(ask(five, "READ?"))) == 15
+
+
+def test_fetch_waits_for_what_was_begun_and_leaves_it_in_the_memory(five):
+    before = five.clock.now()
+    first = ask(five, "INIT;:FETC?")
+    assert five.clock.now() - before >= 0.5
+    assert ask(five, "FETC?") == first
+    assert len(numbers(first)) == 5
+
+
+def test_nothing_measured_is_nothing_to_fetch():
+    device = counter(pulses(40.0))
+    assert ask(device, "FETC?") is None
+    assert ask(device, "R?") is None
+    assert errors(device) == [-230, -230]
+
+
+def test_the_memory_fills_while_nobody_asks(five):
+    send(five, b"INIT\n")
+    five.clock.sleep(0.3)
+    assert ask(five, "DATA:POIN?") == "+2"
+    assert ask(five, "STAT:OPER:COND?") == "+16"
+    five.clock.sleep(1.0)
+    assert ask(five, "DATA:POIN?;:STAT:OPER:COND?") == "+5;+0"
+
+
+def test_r_takes_what_is_there_as_a_block(five):
+    # joewhalen/keysight_53230A polls so
+    send(five, b"INIT\n")
+    assert ask(five, "R?") == "#10"
+    five.clock.sleep(0.3)
+    first = ask(five, "R?")
+    assert first.startswith("#245+")
+    assert len(numbers(first[4:])) == 2
+    five.clock.sleep(1.0)
+    assert len(numbers(ask(five, "R? 2")[4:])) == 2
+    assert ask(five, "DATA:POIN?") == "+1"
+
+
+def test_data_remove_takes_so_many_and_waits_if_told(five):
+    # opronningen/53230A-Toolkit reads so
+    send(five, b"INIT\n")
+    assert ask(five, "DATA:REM? 2", 0.0) is None
+    assert errors(five) == [-230]
+    before = five.clock.now()
+    assert len(numbers(ask(five, "DATA:REM? 2,WAIT"))) == 2
+    assert 0.2 <= five.clock.now() - before <= 0.3  # two gates, their edges, and a message
+    assert len(numbers(ask(five, "DATA:REM? 3, WAIT"))) == 3
+    assert ask(five, "DATA:REM? 1,WAIT", 0.0) is None
+    assert errors(five) == [-230]
+
+
+def test_gap_free_readings_follow_each_other(five):
+    send(five, b"FREQ:MODE CONT;:FREQ:GATE:TIME 0.09;:SAMP:COUN 20\n")
+    before = five.clock.now()
+    assert len(numbers(ask(five, "READ?"))) == 20
+    assert five.clock.now() - before == pytest.approx(20 * 0.1, abs=0.04)  # four periods hold the gate
+
+
+def test_a_second_init_is_ignored_while_it_measures(five):
+    send(five, b"INIT;:INIT\n")
+    assert errors(five) == [-213]
+
+
+def test_abort_ends_a_measurement_and_keeps_what_it_brought(five):
+    send(five, b"INIT\n")
+    five.clock.sleep(0.3)
+    send(five, b"ABOR\n")
+    assert len(numbers(ask(five, "FETC?"))) == 2
+    assert ask(five, "*OPC?;:STAT:OPER:COND?") == "1;+0"
+
+
+def test_a_device_clear_ends_a_reading():
+    device = counter(pulses(40.0), FIXED_LEVEL, "INP1:LEV1 2", "SYST:TIM INF")
+    assert reading(device, timeout=5.0)[0] is None
+    cable(device).clear()
+    assert ask(device, "*OPC?") == "1"
+
+
+def test_operation_complete_is_noted_when_the_last_reading_is_there(five):
+    send(five, b"*CLS;*ESE 1;*SRE 32;:INIT;*OPC\n")
+    assert cable(five).status_byte() & 64 == 0
+    five.clock.sleep(1.0)
+    assert cable(five).status_byte() & 64
+
+
+def test_on_the_bus_it_waits_for_a_trigger(five):
+    send(five, b"TRIG:SOUR BUS;COUN 2;:INIT\n")
+    five.clock.sleep(3.0)
+    assert ask(five, "STAT:OPER:COND?;:DATA:POIN?") == "+32;+0"
+    send(five, b"*TRG\n")
+    five.clock.sleep(1.0)
+    assert ask(five, "DATA:POIN?") == "+5"
+    cable(five).trigger()
+    assert len(numbers(ask(five, "FETC?"))) == 10
+
+
+def test_a_trigger_delay_passes_before_the_gate_opens(five):
+    send(five, b"TRIG:DEL 2;:SAMP:COUN 1\n")
+    assert reading(five)[1] == pytest.approx(2.1, abs=0.06)
+
+
+# --- formats ---
+
+
+@pytest.mark.parametrize(("border", "order"), [("NORM", ">"), ("SWAP", "<")])
+def test_real_readings_come_as_a_block(five, border, order):
+    send(five, f"FORM REAL;:FORM:BORD {border};:READ?\n".encode())
+    answer = received(five, 5.0)
+    assert answer[:2] == b"#0"  # of indefinite length: programmer's reference, FORMat:DATA
+    assert struct.unpack(order + "5d", answer[2:-1]) == pytest.approx([40.0] * 5, rel=1e-4)
+    send(five, b"R? 2\n")
+    answer = received(five, 5.0)
+    assert answer[:4] == b"#216"
+    assert struct.unpack(order + "2d", answer[4:-1]) == pytest.approx([40.0] * 2, rel=1e-4)
+    assert ask(five, "FORM?") == "REAL,64"
+
+
+# --- other functions, and both inputs ---
+
+
+@pytest.mark.parametrize(
+    ("function", "expected"),
+    [
+        ("FREQ", 40.0),
+        ("PER", 0.025),
+        ("SPER", 0.025),
+        ("PWID", 0.025 * DUTY),
+        ("NWID", 0.025 * (1 - DUTY)),
+        ("PDUT", DUTY),
+        ("NDUT", 1 - DUTY),
+        ("TOT:TIM", 4.0),
+    ],
+)
+@pytest.mark.parametrize("slope", ["POS", "NEG"])
+def test_every_function_gives_what_the_pulses_are(function, expected, slope):
+    device = counter(pulses(40.0), "INP:COUP DC", f"INP:SLOP {slope}", "SYST:TIM 2")
+    # the middle between dark and bright is where a pulse has its width; edges are misplaced by 3 µs
+    answer = ask(device, f"CONF:{function} (@1);:INP:LEV 0.65;:READ?")
+    assert float(answer) == pytest.approx(expected, rel=1e-2)
+
+
+def test_an_interval_goes_from_one_input_to_the_other():
+    def later(start, step, n):
+        return pulses(40.0)(start - 0.004, step, n)
+
+    device = Virtual53230A(VirtualClock(), signal=pulses(40.0), second=later)
+    for message in ("INP1:COUP DC", "INP2:COUP DC", "SYST:TIM 2"):
+        send(device, message.encode() + b"\n")
+    levels = "INP1:LEV 0.65;:INP2:LEV 0.65"
+    assert float(ask(device, f"CONF:TINT (@1),(@2);:{levels};:READ?")) == pytest.approx(0.004, rel=1e-2)
+    assert float(ask(device, f"CONF:TINT (@2),(@1);:{levels};:READ?")) == pytest.approx(0.021, rel=1e-2)
+
+
+def test_the_second_input_is_counted_when_it_is_named():
+    device = Virtual53230A(VirtualClock(), signal=pulses(40.0), second=pulses(30.0))
+    send(device, b"CONF:FREQ (@2);:INP2:COUP DC;LEV 0.65\n")
+    assert float(ask(device, "READ?")) == pytest.approx(30.0, rel=1e-4)
+    assert ask(device, "CONF?") == '"FREQ (@2)"'
+
+
+@pytest.mark.parametrize("bad", ["CONF:FREQ (@3)", "CONF:FREQ 1,2,3", "CONF:FREQ (@1),(@2)", "CONF:FREQ ten"])
+def test_a_configuration_that_makes_no_sense_changes_nothing(bad):
+    device = counter(pulses(40.0), "SAMP:COUN 3")
+    send(device, bad.encode() + b"\n")
+    assert len(errors(device)) == 1
+    assert ask(device, "SAMP:COUN?") == "+3"
+
+
+def test_configure_turns_the_automatic_level_on_and_a_level_turns_it_off():
+    # user's guide, Measuring Low Frequency Signals
+    device = counter(pulses(40.0), "CONF:FREQ 10,(@1)")
+    assert ask(device, "INP:LEV:AUTO?;:INP:LEV 1;LEV:AUTO?") == "1;0"
+
+
+def test_measure_uses_the_automatic_level_and_so_fails_for_slow_signals():
+    # user's guide: MEASure should not be used below 50 Hz
+    # pulses are at 20 ms, 60 ms …: from 24 ms on there is none within 20 ms
+    device = counter(pulses(25.0, noise=0.01), "INP:COUP DC", "SYST:TIM 2", start=0.024)
+    assert not right(float(ask(device, "MEAS:FREQ? (@1)")))
+    device = counter(pulses(200.0, noise=0.01), "INP:COUP DC", "SYST:TIM 2")
+    assert float(ask(device, "MEAS:FREQ? 200,0.1,(@1)")) == pytest.approx(200.0, rel=0.05)
+
+
+def test_the_level_found_once_stays():
+    device = counter(pulses(200.0), "INP:COUP DC;LEV:AUTO ONCE")
+    assert ask(device, "INP:LEV:AUTO?") == "0"
+    assert float(ask(device, "INP:LEV?")) == pytest.approx(0.65, abs=0.05)
+    assert float(ask(device, "INP:LEV:PTP?")) == pytest.approx(1.1, abs=0.05)
+
+
+def test_a_probes_factor_is_in_the_levels():
+    device = counter(pulses(40.0), "INP:COUP DC;PROB 10", "SYST:TIM 2", "INP:LEV 6.5")
+    assert reading(device)[0] == pytest.approx(40.0, rel=1e-4)
+
+
+def test_a_function_is_chosen_by_name():
+    device = counter(pulses(40.0), FIXED_LEVEL)
+    assert ask(device, 'FUNC "PER 1";FUNC?') == '"PER"'
+    assert reading(device)[0] == pytest.approx(0.025, rel=1e-4)
+    send(device, b'FUNC "VOLT"\n')
+    assert errors(device) == [-224]
+
+
+# --- statistics, and what keeps ---
+
+
+def test_statistics_are_those_of_the_readings(five):
+    send(five, b"CALC:AVER:STAT ON\n")
+    values = np.array(numbers(ask(five, "READ?")))
+    mean, deviation, least, greatest = numbers(ask(five, "CALC:AVER:ALL?"))
+    assert mean == pytest.approx(values.mean(), rel=1e-14)
+    assert deviation == pytest.approx(values.std(ddof=1), rel=1e-6, abs=1e-12)
+    assert (least, greatest) == (values.min(), values.max())
+    assert ask(five, "CALC:AVER:COUN?") == "+5"
+    assert numbers(ask(five, "CALC:AVER:AVER?"))[0] == mean
+    assert ask(five, "CALC:AVER:CLE;:CALC:AVER:COUN?") == "+0"
+    assert float(ask(five, "CALC:AVER:AVER?")) == NO_READING
+
+
+def test_statistics_that_are_off_are_no_numbers(five):
+    ask(five, "READ?")
+    assert numbers(ask(five, "CALC:AVER:ALL?")) == [NO_READING] * 4
+
+
+def test_the_time_out_outlives_a_reset():
+    # programmer's reference, SYSTem:TIMeout: it is in non-volatile memory
+    device = counter(pulses(40.0), "SYST:TIM 7", "SENS:FREQ:GATE:TIME 5", "*RST")
+    assert [float(ask(device, question)) for question in ("SYST:TIM?", "SENS:FREQ:GATE:TIME?")] == [7.0, 0.1]
+
+
+@pytest.mark.parametrize("bad", ["SYST:TIM 2001", "SYST:TIM 0.001", "SAMP:COUN 0", "INP:LEV 6", "TRIG:COUN 1e7"])
+def test_what_the_counter_does_not_take_is_out_of_range(bad):
+    device = counter(pulses(40.0))
+    send(device, bad.encode() + b"\n")
+    assert errors(device) == [-222]
