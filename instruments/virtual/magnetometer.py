@@ -10,6 +10,7 @@ There is no error queue.  What is not understood is ignored: a question gets no 
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
@@ -38,6 +39,9 @@ _NO_PROBE, _OVERLOAD, _NEW_READING, _ALARM, _RAMP_DONE, _ZERO_DONE = 1, 2, 4, 8,
 
 #: How long zeroing takes (assumed) [s].
 _ZEROING = 5.0
+
+#: What is in no command: taken for blanks (some programs in C send the NUL behind their strings).
+_UNPRINTABLE = re.compile(r"[^ -~]")
 
 #: Noise of a reading, standard deviation, in units of the last digit (assumed).
 _NOISE = 0.5
@@ -91,7 +95,7 @@ class Reading:
 class VirtualGaussmeter(VirtualInstrument):
     """What 425, 455 and 475 have in common.
 
-    flux_density: at the probe, along its axis, at a time [s] → [T]; asked at times up to 0.2 s back.
+    flux_density: at the probe, along its axis, at a time [s] → [T]; asked at times up to a second back.
     probe: HSE, HST or UHS, None when none is plugged in; zero_error: before ZPROBE [T]; seed: of the noise.
     The extremes (MXHOLD) are of the readings that were asked for, not of those in between.
     """
@@ -129,7 +133,7 @@ class VirtualGaussmeter(VirtualInstrument):
 
     def execute(self, message: str) -> Answer | None:
         """Run one message; ``?`` alone asks the last question again."""
-        message = message.strip("\0 ")
+        message = _UNPRINTABLE.sub(" ", message).strip()
         if message == "?":
             message = self._last_question
         elif "?" in message:

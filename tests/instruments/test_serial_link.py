@@ -14,7 +14,7 @@ import serial
 from hypothesis import given
 from hypothesis import strategies as st
 
-from instruments.errors import BadAnswer, NoAnswer, NotConnected, Occupied, OutOfRange
+from instruments.errors import BadAnswer, InstrumentError, NoAnswer, NotConnected, Occupied, OutOfRange
 from instruments.magnetometer import LakeShore425
 from instruments.serial_link import SerialTransport, port_name
 from instruments.virtual.bus import Bus
@@ -315,6 +315,53 @@ def test_what_a_program_set_to_8n1_hears_of_a_425():
     # as seen by many who forgot the parity: every other letter has its highest bit set
     heard = carried(b"LSCI,MODEL425", LineSettings(57600, 7, "O"), LineSettings(57600, 8, "N"))
     assert heard == b"L\xd3CI,\xcdO\xc4EL42\xb5"
+
+
+class Port:
+    """A port that hears these bytes, one piece after each message, whatever was sent."""
+
+    def __init__(self, pieces):
+        self.pieces, self.heard, self.timeout = list(pieces), b"", 1.0
+
+    def write(self, data):
+        self.heard += self.pieces.pop(0) if self.pieces else b""
+
+    @property
+    def in_waiting(self):
+        return len(self.heard)
+
+    def read(self, count):
+        got, self.heard = self.heard[:count], self.heard[count:]
+        return got
+
+    def reset_input_buffer(self):
+        self.heard = b""
+
+    def reset_output_buffer(self): ...
+    def close(self): ...
+
+
+PIECES = st.lists(
+    st.binary(max_size=30)
+    | st.sampled_from(
+        [b"1\r\n", b"LSCI,MODEL425,1,1.0\r\n", b"#15abcde\n", b"#9999999999", b"#0", b"\n\n\n", b"#210ab\r\n"]
+    ),
+    max_size=12,
+)
+
+
+@given(PIECES)
+def test_whatever_is_heard_is_text_or_a_block_or_an_error(pieces):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(serial, "serial_for_url", lambda *_, **__: Port(pieces))
+        transport = SerialTransport("COM1", timeout=1.0)
+        for _ in range(3):
+            with contextlib.suppress(InstrumentError):
+                answer = transport.query("UNIT?")
+                assert answer.isprintable() or "\t" in answer
+            with contextlib.suppress(InstrumentError):
+                assert len(transport.query_block("DATA?")) < 100
+        assert len(transport._received) < 100
 
 
 # --- ports ---
