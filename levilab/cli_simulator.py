@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from levilab.explain import Effect
     from levilab.simulator.scene import Scene
+    from levilab.stability_map import Span
 
 EXIT_INTERRUPTED = 130
 
@@ -47,7 +48,12 @@ def simulate(
     scene: Presets,
     duration: Annotated[float, typer.Option(metavar="S", help="How many seconds are simulated.")] = 30.0,
     tolerance: Annotated[
-        float, typer.Option(metavar="X", help="Wanted error at the end, of the place in m and of the axis in rad.")
+        float,
+        typer.Option(
+            metavar="X",
+            help="Wanted error at the end, of the place in m and of the axis in rad.  It only shortens a longest step: "
+            "1e-7 and larger mostly give the same.",
+        ),
     ] = 1e-7,
     rate: Annotated[float, typer.Option(metavar="HZ", help="States per second that are written.")] = 100.0,
     settings: Settings = None,
@@ -117,7 +123,7 @@ def _simulate(
 def _explained(scene: Scene, duration: float) -> tuple[Effect, ...]:
     from levilab.explain import explain
 
-    typer.echo("switching each effect on or off: some seconds, more where code must be compiled first", err=True)
+    typer.echo("switching each effect on or off: some seconds, up to 15 where code must be compiled first", err=True)
     return explain(scene, duration)
 
 
@@ -125,8 +131,15 @@ def stability(
     scene: Presets,
     settings: Settings = None,
     survival: Annotated[
-        bool, typer.Option("--map", help="Simulate a map of survival over spin and mass, too; takes a while.")
+        bool, typer.Option("--map", help="Simulate a map of survival over spin and mass, too; 10 s or more.")
     ] = False,
+    spins: Annotated[
+        str | None, typer.Option(metavar="LOW:HIGH:STEP", help="Spins of the map in Hz, 18:90:0.5 unless given.")
+    ] = None,
+    masses: Annotated[
+        str | None,
+        typer.Option(metavar="LOW:HIGH:STEP", help="Masses of the map in kg, unless given 61 around those that float."),
+    ] = None,
     duration: Annotated[float, typer.Option(metavar="S", help="How long a top of the map has to stay up.")] = 30.0,
     out: Annotated[
         Path, typer.Option(metavar="DIR", help="Where the map is written: survival.png and survival.csv.")
@@ -134,36 +147,53 @@ def stability(
     as_json: Json = False,
 ) -> None:
     """Where the top floats: heights, masses and spins, from the field and the theory of small motions."""
+    chosen = _scene(scene, settings)
+    spans = _spans(spins, masses, survival=survival)
+
     from levilab.simulator.floating import stability_of
     from levilab.stability_table import as_document, print_stability
 
-    chosen = _scene(scene, settings)
     found = stability_of(chosen)
     document = as_document(found)
     if not as_json:
         print_stability(found)
     if survival:
-        document["map"] = _mapped(chosen, duration, out)
+        document["map"] = _mapped(chosen, spans, duration, out)
     if as_json:
         import json
 
         typer.echo(json.dumps(document, indent=2, allow_nan=False))
 
 
-def _mapped(scene: Scene, duration: float, out: Path) -> dict[str, object]:
+def _spans(spins: str | None, masses: str | None, *, survival: bool) -> tuple[Span | None, Span | None]:
+    """What --spins and --masses ask for, checked before anything is computed."""
+    from levilab.simulator.errors import SimulationError
+    from levilab.stability_map import span_of
+
+    if (spins or masses) and not survival:
+        raise SimulationError("--spins and --masses are those of a map: give --map, too")
+    return span_of("--spins", spins) if spins else None, span_of("--masses", masses) if masses else None
+
+
+def _mapped(scene: Scene, spans: tuple[Span | None, Span | None], duration: float, out: Path) -> dict[str, object]:
     from levilab.progress import Share
     from levilab.stability_map import place_for_map, survival_map, write_map
 
     place_for_map(out)
     with _interruptible("no map was written"), contextlib.closing(Share("simulating the map")) as share:
-        found = survival_map(scene, duration=duration, progress=share)
+        found = survival_map(scene, *spans, duration=duration, progress=share)
     for path in write_map(found, out):
         typer.echo(f"wrote {path}", err=True)
+    for note in found.notes:
+        typer.echo(f"note: {note}", err=True)
     return {
+        "duration_s": found.duration,
         "spin_step_hz": found.spin_step,
         "spins_hz": found.spins.tolist(),
         "masses_kg": found.masses.tolist(),
         "survived": found.survived.tolist(),
+        "floating_kg": [list(region) for region in found.floating],
+        "notes": list(found.notes),
     }
 
 
@@ -175,9 +205,10 @@ def benchmark_simulator(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Speed against error of the simulator, with scipy's and heyoka's integrators on the same motion.
+    r"""Speed against error of the simulator, with scipy's and heyoka's integrators on the same motion.
 
-    heyoka takes part if it is installed: pip install 'levilab[peers]'.  Leave the machine alone meanwhile.
+    heyoka takes part if it is installed: pip install 'levilab\[peers]', in a clone
+    pip install -e '.\[peers]'.  Leave the machine alone meanwhile.
     """
     from levilab.benchmark.command import run_and_tell
 

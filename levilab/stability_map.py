@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from levilab.simulator.errors import SimulationError
 from levilab.simulator.floating import axial_field, lifting, stability_of, survival, symmetric
 
 if TYPE_CHECKING:
@@ -20,10 +22,21 @@ Array = NDArray[np.float64]
 
 TABLE, PICTURE = "survival.csv", "survival.png"
 
+#: Tops that a map may have: some minutes of 30 s each.
+MOST_TOPS = 250_000
+#: A top outside of the window can take this long to be lost [s].
+SHORT_S = 10.0
+USUAL_SPINS = (18.0, 90.0, 145)
+#: Spins and masses: the first, the last, how many.
+Span = tuple[float, float, int]
+
 
 @dataclass(frozen=True)
 class Map:
-    """survived: shape (masses, spins); slowest, fastest: the linear window [Hz] of each mass, NaN where none floats."""
+    """survived: shape (masses, spins); slowest, fastest: the linear window [Hz] of each mass, NaN where none floats.
+
+    floating: lightest and heaviest mass [kg] of each region in which the top can float.
+    """
 
     scene: Scene
     spins: Array
@@ -32,31 +45,56 @@ class Map:
     survived: NDArray[np.bool_]
     slowest: Array
     fastest: Array
+    floating: tuple[tuple[float, float], ...] = ()
 
     @property
     def spin_step(self) -> float:
         """The scan's step [Hz]: a limit is known no better."""
         return float(self.spins[1] - self.spins[0])
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What to mind."""
+        if self.duration >= SHORT_S:
+            return ()
+        reason = f"{self.duration:g} s are short: tops outside of the window may only last a while"
+        return (f"{reason}; take --duration {SHORT_S:g} or more",)
+
+
+def span_of(option: str, text: str) -> Span:
+    """LOW:HIGH:STEP as the first, the last and how many.  Raises SimulationError.
+
+    >>> span_of("--spins", "20:30:0.5")
+    (20.0, 30.0, 21)
+    """
+    expected = "LOW:HIGH:STEP is expected, such as 20:30:0.5"
+    try:
+        low, high, step = map(float, text.split(":"))
+    except ValueError:
+        raise SimulationError(f"{option} {text}: {expected}") from None
+    if not (all(map(math.isfinite, (low, high, step))) and step > 0 and high >= low + step):
+        raise SimulationError(f"{option} {text}: {expected}, with HIGH at least one STEP above LOW")
+    steps = (high - low) / step * (1 + 1e-9)  # rounding must not lose the last one
+    if steps > MOST_TOPS:
+        raise SimulationError(f"{option} {text}: at most {MOST_TOPS} values are possible, take a longer STEP")
+    return low, low + math.floor(steps) * step, math.floor(steps) + 1
+
 
 def survival_map(
     scene: Scene,
-    spins: tuple[float, float, int] = (18.0, 90.0, 145),
-    masses: tuple[float, float, int] | None = None,
+    spins: Span | None = None,
+    masses: Span | None = None,
     duration: float = 30.0,
     progress: Callable[[float], None] | None = None,
 ) -> Map:
     """Whether the scene's top survives, over spins [Hz] and masses [kg], each (first, last, how many).
 
-    masses: from a little below to a little above the window that floats where none are given.
+    Where none are given: 18 to 90 Hz, and from a little below to a little above the masses that float.
+    Raises SimulationError for more tops than a map may have, or masses that are not above 0.
     """
-    if masses is None:
-        found = stability_of(scene)
-        windows = lifting(found.windows, symmetric(scene), axial_field(scene))
-        windows.sort(key=lambda w: abs((w.light + w.heavy) / 2 - scene.top.mass_kg))
-        light, heavy = (windows[0].light, windows[0].heavy) if windows else (scene.top.mass_kg * 0.95,) * 2
-        margin = 0.2 * (heavy - light) + 1e-5
-        masses = (light - margin, heavy + margin, 61)
+    floating = _floating(scene)
+    spins, masses = spins or USUAL_SPINS, masses or _usual_masses(scene, floating)
+    _check(spins, masses)
     over_spins, over_masses = np.linspace(*spins), np.linspace(*masses)
     edges = [_window(scene.changed({"top.mass_kg": float(mass)})) for mass in over_masses]
     return Map(
@@ -67,7 +105,31 @@ def survival_map(
         survival(scene, over_spins, over_masses, duration, progress),
         np.array([low for low, _ in edges]),
         np.array([high for _, high in edges]),
+        floating,
     )
+
+
+def _floating(scene: Scene) -> tuple[tuple[float, float], ...]:
+    """The masses [kg] that float, the region nearest to the scene's mass first."""
+    windows = lifting(stability_of(scene).windows, symmetric(scene), axial_field(scene))
+    windows.sort(key=lambda w: abs((w.light + w.heavy) / 2 - scene.top.mass_kg))
+    return tuple((window.light, window.heavy) for window in windows)
+
+
+def _usual_masses(scene: Scene, floating: tuple[tuple[float, float], ...]) -> Span:
+    light, heavy = floating[0] if floating else (scene.top.mass_kg * 0.95,) * 2
+    margin = 0.2 * (heavy - light) + 1e-5
+    return light - margin, heavy + margin, 61
+
+
+def _check(spins: Span, masses: Span) -> None:
+    if masses[0] <= 0:
+        raise SimulationError(f"--masses from {masses[0]:g} kg: masses above 0 are expected")
+    if (tops := spins[2] * masses[2]) > MOST_TOPS:
+        raise SimulationError(
+            f"{spins[2]} spins and {masses[2]} masses are {tops} tops, at most {MOST_TOPS} are possible: "
+            "take longer steps in --spins or --masses"
+        )
 
 
 def _window(scene: Scene) -> tuple[float, float]:
