@@ -6,8 +6,8 @@ functions of time.
 
 What is simpler than in the instrument, and said here once: alternating coupling takes the mean of the second around the
 arming away and does not droop; trigger coupling, noise rejection, holdoff, bandwidth limit and averaging are settings
-without an effect on the samples; the trigger sees a signal at 20 kHz or more, faster if the record is short, and then
-finds the crossing to a small part of a sample.
+without an effect on the samples; the trigger looks at a signal at 20 kHz, for its first hundred thousand looks faster
+if the record is short, and then finds the crossing to a small part of a sample.
 """
 
 from __future__ import annotations
@@ -42,6 +42,8 @@ Codes = NDArray[np.uint8]
 PIECE = 250_000
 #: The coarsest look of the trigger at the signal [s]: a pulse of 3 % of a turn at 60 Hz lasts 0.5 ms.
 _COARSEST = 50e-6
+#: So many looks are as fine as the record wants; a signal too fast for the coarse ones has triggered by then.
+_FINE_LOOKS = 100_000
 #: Below the level by this part of a division the trigger is armed again.
 _HYSTERESIS = 0.3
 #: With sweep AUTO a record is taken without a trigger after this time [s] (assumed; no source at hand).
@@ -50,6 +52,8 @@ AUTO_AFTER = 0.05
 LOOK_AHEAD = 60.0
 #: What would end a string or a message.
 _NOT_IN_LABELS = dict.fromkeys(map(ord, "\"';\n"))
+#: How far back a running scope looks for the last record it may have taken [s].
+LOOK_BACK = 600.0
 #: Between two records of a running scope [s] (assumed).
 _DEAD_TIME = 1e-3
 
@@ -146,12 +150,13 @@ class Edge:
     fine: float
     position: float
     _armed: list[bool] = field(default_factory=list)
+    _looks: int = 0
 
     def until(self, stop: float) -> float | None:
         """When the first edge is, if it is before stop [s]."""
         self._armed = self._armed or [False] * len(self.slopes)
         while self.position < stop:
-            n = min(PIECE, math.ceil((stop - self.position) / self.step) + 1)
+            n = min(_FINE_LOOKS, math.ceil((stop - self.position) / self.step) + 1)
             volts, before = self.volts(self.position, self.step, n), list(self._armed)
             looks = ((self._first(k, slope * volts, slope), slope) for k, slope in enumerate(self.slopes))
             found = [(i, slope) for i, slope in looks if i is not None]
@@ -161,6 +166,9 @@ class Edge:
                 self._armed = before  # the last look may lie behind the stop: such an edge is found again
                 return at if at < stop else None
             self.position += (n - 1) * self.step
+            self._looks += n
+            if self._looks >= _FINE_LOOKS:
+                self.step = max(self.step, _COARSEST)
         return None
 
     def _first(self, k: int, volts: NDArray[np.float64], slope: float) -> int | None:
@@ -257,6 +265,8 @@ class VirtualOscilloscope(VirtualInstrument):
         self._remember(pattern, name)
 
         def set_(parameters: list[str]) -> None:
+            if len(parameters) > 2:  # a second one, as the source of a level, changes nothing here
+                raise ScpiError(-108)
             low, high = limits()
             value = number(one(parameters[:1]), low=low, high=high, default=default, unit=unit)
             before, self.settings[name] = self.settings[name], rounded(value)
@@ -446,10 +456,15 @@ class VirtualOscilloscope(VirtualInstrument):
         # a scope that runs shows a late record; which of them is the chance of its dead times
         armed, reach = self._armed, 2 * self._next.points / self._next.rate + 2 * AUTO_AFTER
         while True:
-            recent = max(armed, self.now - reach)
+            recent = max(armed, self.now - min(reach, LOOK_BACK))
             if recent > armed:
                 self._armed, self._edge = recent, None
-            if self._settle(self._first_record(self.now)) or recent == armed:
+            record = self._first_record(self.now)
+            if self._settle(record):
+                return
+            if recent == armed or reach >= LOOK_BACK:
+                if record is None:  # nothing up to now: the next look begins here
+                    self._armed, self._edge = max(armed, self.now + min(0.0, self._next.origin)), None
                 return
             self._armed, self._edge, reach = armed, None, 4 * reach
 

@@ -96,6 +96,8 @@ class VirtualDS1000Z(VirtualOscilloscope):
             Command("AUToscale", set=does(self.autoscale)),
             Command("CLEar", set=does(self._clear_screen)),
             Command("DISPlay:CLEar", set=does(self._clear_screen)),
+            Command("CLS", set=does(self._clear_status)),
+            *(Command(f"CALibrate:{word}", set=does(lambda: None)) for word in ("STARt", "QUIT")),
             *self.presets(),
         )
 

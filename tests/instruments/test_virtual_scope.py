@@ -410,6 +410,39 @@ def test_a_running_scope_shows_late_records_even_after_an_hour():
         assert device.clock.now() - device.record().done < 0.5
 
 
+def test_a_short_record_does_not_make_the_trigger_look_at_every_nanosecond():
+    looks = []
+
+    def watched(start, step, n):
+        looks.append(n)
+        return pulses(start, step, n)
+
+    device = rigol(watched, *RIGOL_READY, ":TIM:SCAL 0.0000001")
+    for level in (0.65, 1.3):
+        told(device, f":TRIG:EDGE:LEV {level}", ":SING")
+        device.clock.sleep(20.0)
+        assert ask(device, ":TRIG:STAT?") == ("STOP" if level < 1 else "WAIT")
+    # twenty seconds at 20 kHz, and some finer looks in the beginning; the first level is met at once
+    assert sum(looks) < 1_500_000
+    assert max(looks) <= 1_000_000
+
+
+def test_a_scope_that_ran_for_an_hour_in_vain_does_not_look_twice():
+    looks = []
+
+    def watched(start, step, n):
+        looks.append(n)
+        return np.zeros(n)
+
+    device = rigol(watched, *RIGOL_READY)
+    device.clock.sleep(3600.0)
+    assert ask(device, ":TRIG:STAT?") == "WAIT"
+    looks.clear()
+    device.clock.sleep(1.0)
+    assert ask(device, ":TRIG:STAT?") == "WAIT"
+    assert sum(looks) < 100_000
+
+
 def test_a_running_scope_keeps_the_last_record_when_triggers_are_rare():
     device = rigol(once, *RIGOL_READY, ":TIM:SCAL 0.0001")
     device.clock.sleep(600.0)
