@@ -19,7 +19,11 @@ from instruments.virtual.edges import Array, Edge, EdgeFinder, Input, Signal
 #: A message may make a model look so far ahead [s]; an answer that is further away does not come.  Three hours are
 #: ten readings with the longest gate there is.
 FARTHEST = 12_000.0
-#: It does so in steps, to stop where the result is known [s].
+#: Nor does one that has to wait for more readings than this.
+_MOST_AHEAD = 100_000
+#: Light that nobody has asked about for longer than this [s] is passed over.
+_CATCH_UP = 4000.0
+#: A model looks ahead in steps, to stop where the result is known [s].
 _STEP = 60.0
 #: Readings that are kept; then the oldest is lost (53220A/53230A User's Guide: 1 000 000).
 CAPACITY = 1_000_000
@@ -274,10 +278,10 @@ class Run:
     def advance(self, until: float, count: float = math.inf) -> None:
         """Everything that happens up to this time [s], or until so many readings have been taken in all.
 
-        Light that nobody has asked about for hours is passed over.
+        A program that stays away for hours finds that time passed over.
         """
-        if until > self._seen + 2 * FARTHEST and not self.waiting:
-            self._under_way, self._next = None, until - FARTHEST
+        if until > self._seen + _CATCH_UP and not self.waiting:
+            self._under_way, self._next = None, until - _CATCH_UP
             self.looks.forget()
         self._seen = max(self._seen, until)
         while self.taken < min(count, self.wanted):
@@ -305,7 +309,7 @@ class Run:
         """When so many readings have been taken in all, or all of them [s]; infinity if that is out of reach."""
         count = min(count, self.wanted)
         self.advance(now)
-        if (count - self.taken) * self.least > FARTHEST:
+        if count - self.taken > _MOST_AHEAD or (count - self.taken) * self.least > FARTHEST:
             return math.inf
         ahead, stirred, taken = 0.0, 0.0, self.taken
         while self.taken < count and ahead < min(FARTHEST, stirred + self.quiet + _STEP) and not self.waiting:
