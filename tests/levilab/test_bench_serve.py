@@ -1,0 +1,185 @@
+"""``levilab bench serve``: a process that other programs talk to, and that ends when it is asked to."""
+
+import contextlib
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+import pyvisa
+from typer.testing import CliRunner
+
+from instruments.virtual.servers.server import LOOPBACK
+from levilab.bench_serve import Service, WrongService, chosen_models, serve
+from levilab.cli_bench import bench_app
+from levilab.clock import WallClock
+
+#: How long something is waited for [s]; reached by a failure only.
+AT_MOST = 20.0
+
+#: The command as the console script has it, whether or not the application knows the sub-application already.
+PROGRAM = """
+from levilab import cli
+from levilab.cli_bench import bench_app
+if "bench" not in {group.name for group in cli.app.registered_groups}:
+    cli.app.add_typer(bench_app, name="bench")
+cli.main()
+"""
+
+
+@contextlib.contextmanager
+def serving(*words):
+    """The process and what it said when it was ready."""
+    command = [sys.executable, "-c", PROGRAM, "bench", "serve", "--json", *words]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        line = process.stdout.readline()
+        assert line, process.stderr.read()
+        yield process, json.loads(line)
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def ended(process, number):
+    """The exit status after a signal, and what was said from then on."""
+    process.send_signal(number)
+    out, errors = process.communicate(timeout=AT_MOST)
+    return process.returncode, out, errors
+
+
+def ask(resource, question):
+    with pyvisa.ResourceManager("@py").open_resource(resource, timeout=1000 * AT_MOST) as client:
+        client.read_termination = client.write_termination = "\n"
+        return client.query(question).strip()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows ends a process, it does not ask")
+def test_the_line_names_every_instrument_each_answers_and_sigterm_ends_it():
+    with serving("--speed", "100") as (process, said):
+        assert said["ready"] is True
+        counter, generator = said["instruments"]["counter"], said["instruments"]["generator"]
+        assert (counter["model"], generator["model"]) == ("53230A", "33500B")
+        assert set(counter["resources"]) == {"socket", "hislip", "vxi11"}
+        for resource in counter["resources"].values():
+            assert "53230A" in ask(resource, "*IDN?")
+        assert "33522B" in ask(generator["resources"]["hislip"], "*IDN?")
+        # ten seconds of the bench
+        with pyvisa.ResourceManager("@py").open_resource(counter["resources"]["hislip"], timeout=5000) as client:
+            client.write("INP1:COUP DC;:INP1:LEV:AUTO OFF;:INP1:LEV 0.6;:SENS:FREQ:GATE:TIME 10;:SYST:TIM 20")
+            assert 15 < float(client.query("READ?")) < 45
+            assert ended(process, signal.SIGTERM) == (0, "", "")
+            with contextlib.suppress(pyvisa.VisaIOError):
+                client.close()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for one process")
+def test_ctrl_c_ends_it_in_the_middle_of_an_answer():
+    with serving() as (process, said):
+        port = int(said["instruments"]["counter"]["resources"]["socket"].split("::")[2])
+        with socket.create_connection((LOOPBACK, port), timeout=AT_MOST) as client:
+            client.sendall(b"SENS:FREQ:GATE:TIME 100;:SYST:TIM 1000;:READ?\n")
+            assert ended(process, signal.SIGINT) == (130, "", "")
+            with contextlib.suppress(ConnectionError):
+                assert client.recv(10) == b""
+
+
+def interrupt_when(said, name="SIGTERM"):
+    """A `ready` that keeps what is told and asks for the end."""
+
+    def ready(instruments):
+        said.extend(instruments)
+        signal.raise_signal(getattr(signal, name))
+
+    return ready
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_signal_ends_it_and_threads_and_handlers_are_as_before(name):
+    before, threads = signal.getsignal(signal.SIGINT), threading.active_count()
+    said = []
+    assert serve(Service(), interrupt_when(said, name)) == name
+    assert {served.kind for served in said} >= {"counter", "generator"}
+    assert signal.getsignal(signal.SIGINT) is before
+    assert threading.active_count() == threads
+
+
+def test_models_are_chosen_by_kind_in_any_case():
+    assert chosen_models(["counter=53230a", "generator=33500B"]) == {"counter": "53230A", "generator": "33500B"}
+    said = []
+    serve(Service(models=chosen_models(["counter=CNT-91"])), interrupt_when(said))
+    assert {served.kind: served.model for served in said}["counter"] == "CNT-91"
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["counter=DVM"], "no such counter, known are 53230A"),
+        (["piano=1"], "'piano' is no kind of instrument"),
+        (["counter"], "no such counter"),
+    ],
+)
+def test_a_model_that_there_is_not_is_wrong_usage(words, says):
+    with pytest.raises(WrongService, match=says) as wrong:
+        chosen_models(words)
+    assert wrong.value.exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("service", "says"),
+    [
+        (Service(speed=0), "speed = 0"),
+        (Service(speed=float("nan")), "speed = nan"),
+        (Service(speed=float("inf")), "speed = inf"),
+        (Service(port_base=65535), "the ports end at 65535"),
+        (Service(host="nowhere.invalid"), "try another --host or --port-base"),
+    ],
+    ids=["0", "nan", "inf", "ports", "host"],
+)
+def test_what_cannot_be_served_is_told(service, says):
+    with pytest.raises(Exception, match=says):
+        serve(service, lambda _: pytest.fail("it was served"))
+
+
+def test_a_port_that_is_taken_is_told_with_what_to_do():
+    with socket.create_server((LOOPBACK, 0)) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(Exception, match=rf"{port}.*try another --host or --port-base"):
+            serve(Service(port_base=port), lambda _: pytest.fail("it was served"))
+
+
+def test_people_see_a_table_of_names(monkeypatch):
+    def serve_and_end(service, ready):
+        return serve(service, lambda instruments: (ready(instruments), signal.raise_signal(signal.SIGINT)))
+
+    monkeypatch.setattr("levilab.bench_serve.serve", serve_and_end)
+    shown = CliRunner().invoke(bench_app, ["serve"] if len(bench_app.registered_commands) > 1 else [])
+    assert shown.exit_code == 130
+    assert "counter 53230A" in shown.stdout
+    assert "::SOCKET" in shown.stdout
+    assert "a line feed ends every message" in shown.stdout
+    assert "Ctrl-C ends the bench" not in shown.stdout
+
+
+def test_other_addresses_only_when_told_to():
+    said = []
+    serve(Service(), interrupt_when(said))
+    assert all(LOOPBACK in name for served in said for way, name in served.resources.items() if way != "pty")
+    said.clear()
+    serve(Service(host="0.0.0.0"), interrupt_when(said))
+    assert socket.gethostname() in said[0].resources["socket"]
+
+
+def test_a_clock_runs_at_a_multiple_of_the_walls():
+    clock = WallClock(speed=1000.0)
+    before = time.monotonic()
+    clock.sleep(5.0)
+    assert 0.005 <= time.monotonic() - before < 1.0
+    assert clock.now() >= 5.0
+    with pytest.raises(ValueError, match="a number above 0"):
+        WallClock(speed=-1.0)
