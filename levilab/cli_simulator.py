@@ -67,7 +67,7 @@ def simulate(
 ) -> None:
     """Simulate the motion: does the top stay up, where and how fast does it turn, which frequencies are in it.
 
-    The first run for a kind of scene compiles for a few seconds.  Ctrl-C ends it, and nothing is written then.
+    The first run for a kind of scene compiles for 4 to 7 s.  Ctrl-C ends it, and nothing is written then.
     """
     _simulate(_scene(scene, settings), duration, tolerance, rate, out, explain=explain, as_json=as_json)
 

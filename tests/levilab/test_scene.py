@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+import re
 import tomllib
 from pathlib import Path
 
@@ -68,6 +69,16 @@ def test_undriven_is_the_default_and_its_file_names_every_key():
     for name, value in Scene().as_table().items():
         for key in value if isinstance(value, dict) else [name]:
             assert key == "name" or f"{key} = " in text, key
+
+
+def test_the_page_of_the_simulator_has_every_key_in_its_table():
+    page = Path(levilab.simulator.__file__).parents[2] / "docs" / "simulator.md"
+    rows = re.findall(r"^\| (`\w+`|none|) ?\| ([^|]*) \|", page.read_text(encoding="utf-8"), re.MULTILINE)
+    found, table = [], ""
+    for name, keys in rows:
+        table = {"none": "", "": table}.get(name, f"{name.strip('`')}.")
+        found += [table + key for key in re.findall(r"`(\w+)`", keys)]
+    assert sorted(found) == sorted(KEYS)
 
 
 def test_presets_are_the_thesiss_four_runs():
