@@ -73,7 +73,7 @@ _SUPPLIES = ("EXT", "EXT5", "ACLine")
 class VirtualDS1000Z(VirtualOscilloscope):
     """A DS1054Z: four channels, 24 million points, 50 MHz."""
 
-    identity = "RIGOL TECHNOLOGIES,DS1054Z,DS1ZA000000001,00.04.04.SP4"
+    identity = "RIGOL TECHNOLOGIES,DS1054Z,DS1ZVIRTUAL,00.04.04.SP4"
     no_error = '0,"No error"'
     columns, lowest, keeps_old = 12, 0, True
     transfer: ClassVar[float] = 1e6
@@ -168,9 +168,13 @@ class VirtualDS1000Z(VirtualOscilloscope):
 
         def set_(parameters: list[str]) -> None:
             text = one(parameters).upper()
-            if text != "AUTO" and int(number(text, low=0, high=24e6, default=0)) not in self._depths():
-                raise ScpiError(-222)
-            self.settings["depth"] = text if text == "AUTO" else str(int(float(text)))
+            if text != "AUTO":
+                depths = self._depths()
+                points = int(number(text, low=0, high=depths[-1], default=depths[0]))
+                if points not in depths:
+                    raise ScpiError(-222)
+                text = str(points)
+            self.settings["depth"] = text
             self.changed("depth")
 
         return Command("ACQuire:MDEPth", set_, answers(lambda: str(self.settings["depth"])))
