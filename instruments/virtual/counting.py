@@ -22,7 +22,7 @@ FARTHEST = 12_000.0
 #: Nor does one that has to wait for more readings than this.
 _MOST_AHEAD = 100_000
 #: Light that nobody has asked about for longer than this [s] is passed over.
-_CATCH_UP = 4000.0
+_CATCH_UP = 2500.0
 #: A model looks ahead in steps, to stop where the result is known [s].
 _STEP = 60.0
 #: Readings that are kept; then the oldest is lost (53220A/53230A User's Guide: 1 000 000).
