@@ -170,7 +170,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
             text = one(parameters).upper()
             if text != "AUTO":
                 depths = self._depths()
-                points = int(number(text, low=0, high=depths[-1], default=depths[0]))
+                points = int(number(text, low=depths[0], high=depths[-1], default=depths[0]))
                 if points not in depths:
                     raise ScpiError(-222)
                 text = str(points)
