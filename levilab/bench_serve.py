@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 
 from instruments.virtual.servers.server import LOOPBACK, PORTS_PER_INSTRUMENT, Place, offered
 from levilab.clock import WallClock
-from levilab.drivers import DRIVERS
 from levilab.errors import LevilabError
 from levilab.simulator.world import SpinScene, SpinWorld
-from levilab.virtual_bench import VIRTUAL, virtual_bus
+from levilab.virtual_bench import MODELS, VIRTUAL, virtual_bus
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -67,9 +66,9 @@ def chosen_models(words: list[str]) -> dict[str, str]:
     chosen = {}
     for word in words:
         kind, _, model = word.partition("=")
-        if kind not in VIRTUAL:
-            raise WrongService(f"--model {word}: {kind!r} is no kind of instrument, known are {', '.join(VIRTUAL)}")
-        known = {name.upper(): name for name in DRIVERS[kind]}
+        if kind not in MODELS:
+            raise WrongService(f"--model {word}: {kind!r} is no kind of instrument, known are {', '.join(MODELS)}")
+        known = {name.upper(): name for name in MODELS[kind]}
         if model.upper() not in known:
             raise WrongService(f"--model {word}: no such {kind}, known are {', '.join(known.values())}")
         chosen[kind] = known[model.upper()]
@@ -105,11 +104,7 @@ def _bus(service: Service) -> Bus:
         clock = WallClock(speed=service.speed)
     except ValueError as error:
         raise WrongService(f"--speed: {error}") from error
-    # the one place where the models chosen meet the bench
-    missing = [model for kind, model in service.models.items() if model != VIRTUAL[kind].model]
-    if missing:
-        raise WrongService(f"--model: the virtual bench has no {', '.join(missing)}")
-    return virtual_bus(SpinWorld(SpinScene(), clock))
+    return virtual_bus(SpinWorld(SpinScene(), clock), service.models)
 
 
 def _place(service: Service, instruments: int) -> Place:

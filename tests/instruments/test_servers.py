@@ -2,6 +2,7 @@
 
 import contextlib
 import gc
+import os
 import socket
 import struct
 import threading
@@ -16,6 +17,7 @@ from pyvisa_py.tcpip import Vxi11CoreClient
 
 from instruments.virtual.bus import Bus
 from instruments.virtual.device import VirtualInstrument, answers
+from instruments.virtual.faults import Fault
 from instruments.virtual.scpi import Command
 from instruments.virtual.servers import station
 from instruments.virtual.servers.hislip import HEADER, LONGEST, Type
@@ -42,7 +44,7 @@ class Thing(VirtualInstrument):
     """Answers ``BLOC?`` with a block, ``SLOW?`` after ten seconds; counts its triggers."""
 
     identity = "levilab,thing,7,1.0"
-    triggers = 0
+    triggers = blocks = 0
 
     def __init__(self, clock):
         super().__init__(clock, pace=0.0)
@@ -50,7 +52,7 @@ class Thing(VirtualInstrument):
 
     def table(self):
         return (
-            Command("BLOCk", self._take, answers(lambda: f"#7{len(BLOCK)}{BLOCK.decode('latin-1')}")),
+            Command("BLOCk", self._take, answers(self._give)),
             Command("SLOW", get=answers(self._slow)),
             Command("FAIL", get=answers(lambda: str(1 // 0))),
             self.numeric("LEVel", "level", low=0, high=10, default=0),
@@ -59,6 +61,10 @@ class Thing(VirtualInstrument):
     def _slow(self):
         self.busy_until(self._ready + 10.0)
         return "slow"
+
+    def _give(self):
+        self.blocks += 1
+        return f"#7{len(BLOCK)}{BLOCK.decode('latin-1')}"
 
     def _take(self, parameters):
         self.taken = parameters[0].encode("latin-1")
@@ -232,7 +238,7 @@ def test_one_world_is_behind_all_ways(served):
 @pytest.mark.parametrize("way", ["socket", "hislip", "vxi11"])
 def test_a_client_that_goes_away_in_the_middle_harms_nobody(served, way):
     other = served.open(way)
-    client = served.open(way, timeout=SHORT)
+    client = served.open(way)
     client.write("BLOC?")
     client.read_bytes(10)
     client.close()
@@ -325,24 +331,90 @@ def test_a_faster_bench_answers_sooner():
         assert 0.03 - 0.002 < time.monotonic() - before < 1.0
 
 
+def in_a_row():
+    """The first of ten ports that are free, below those that systems give away."""
+    for first in range(15_000 + 10 * (os.getpid() % 1000), 32_000, 10):
+        with contextlib.suppress(OSError), contextlib.ExitStack() as held:
+            for port in range(first, first + 10):
+                held.enter_context(socket.create_server(("127.0.0.1", port)))
+            return first
+    pytest.fail("no ports are free")
+
+
 def test_a_port_that_is_taken_is_told_and_nothing_is_left_behind():
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        port = taken.getsockname()[1]
-        with pytest.raises(OSError, match="in use"), serving(place=Place(port_base=port - 2)):
+    first = in_a_row()
+    with socket.create_server(("127.0.0.1", first + 2)):
+        with pytest.raises(OSError, match=str(first + 2)), serving(place=Place(port_base=first)):
             pass
-        with socket.create_server(("127.0.0.1", port - 2)):
+        with socket.create_server(("127.0.0.1", first)):
             pass
 
 
 def test_ports_are_counted_from_the_first_one():
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
-    with serving(place=Place(port_base=port)) as served:
+    first = in_a_row()
+    with serving(place=Place(port_base=first)) as served:
         names = served.names()
-    assert names["socket"] == f"TCPIP0::127.0.0.1::{port}::SOCKET"
-    assert names["hislip"] == f"TCPIP0::127.0.0.1::hislip0,{port + 1}::INSTR"
-    assert names["vxi11"] == f"TCPIP0::127.0.0.1,{port + 2}::inst0::INSTR"
-    assert names["serial"] == f"ASRLsocket://127.0.0.1:{port + 4}::INSTR"
+    assert names["socket"] == f"TCPIP0::127.0.0.1::{first}::SOCKET"
+    assert names["hislip"] == f"TCPIP0::127.0.0.1::hislip0,{first + 1}::INSTR"
+    assert names["vxi11"] == f"TCPIP0::127.0.0.1,{first + 2}::inst0::INSTR"
+    assert names["serial"] == f"ASRLsocket://127.0.0.1:{first + 4}::INSTR"
+
+
+# --- faults ---
+
+
+def cut(served, way):
+    """What a client gets of an answer in which the link is cut, to its end."""
+    if way == "hislip":
+        bare, _ = channels(served)
+        send(bare, Type.DATA_END, 0, 2, b"*IDN?")
+    else:
+        bare = served.bare(way)
+    if way == "vxi11":
+        *_, link, _, _ = rpc(bare, parameters=struct.pack("!4I8s", 1, 0, 0, 5, b"inst0"))
+        rpc(bare, procedure=11, parameters=struct.pack("!5I8s", link, 0, 0, 8, 5, b"*IDN?"))
+        assert rpc(bare, procedure=12, parameters=struct.pack("!6I", link, 100, 1000, 0, 0, 0))[5:7] == [0, 0]
+        with pytest.raises(EOFError):
+            rpc(bare, procedure=12, parameters=struct.pack("!6I", link, 100, 1000, 0, 0, 0))
+        return b""
+    if way == "socket":
+        bare.sendall(b"*IDN?\n")
+    return b"".join(iter(lambda: bare.recv(100), b""))
+
+
+@pytest.mark.parametrize("way", ["socket", "hislip", "vxi11"])
+def test_a_link_that_is_cut_in_an_answer_is_closed_and_another_one_works(served, way):
+    served.server.bus.faults.append(Fault("disconnected", question=r"\*IDN\?"))
+    assert b"1.0\n" not in cut(served, way)
+    assert served.open(way).query("*IDN?").strip() == Thing.identity
+
+
+def test_an_instrument_that_is_away_takes_no_connection_until_it_is_back(served):
+    served.server.bus.away[id(served.thing)] = served.thing.clock.now() + 3600
+    assert not any(welcome(served, way) for way in ("socket", "hislip", "vxi11"))
+    served.server.bus.away[id(served.thing)] = served.thing.clock.now()
+    assert all(welcome(served, way) for way in ("socket", "hislip", "vxi11"))
+
+
+@pytest.mark.skipif(not HAS_PSEUDO_TERMINALS, reason="no pseudo-terminals here")
+def test_a_pseudo_terminal_outlives_a_failing_instrument(served, caplog):
+    client = served.open("pty")
+    client.write("FAIL?")
+    until(lambda: "ZeroDivisionError" in caplog.text)
+    assert client.query("*OPC?").strip() == "1"
+
+
+@pytest.mark.skipif(not HAS_PSEUDO_TERMINALS, reason="no pseudo-terminals here")
+def test_a_pseudo_terminal_loses_what_nobody_fetches(served):
+    served.open("pty").write("BLOC?;*OPC?")
+    until(lambda: served.serial.blocks == 1)
+    client = served.open("pty", timeout=100)
+
+    def answers_again():
+        with contextlib.suppress(UnicodeDecodeError, pyvisa.VisaIOError):  # the rest of the block
+            return client.query("*IDN?").strip() == Thing.identity
+
+    until(answers_again)
 
 
 # --- locks ---

@@ -22,20 +22,11 @@ from levilab.clock import WallClock
 #: How long something is waited for [s]; reached by a failure only.
 AT_MOST = 20.0
 
-#: The command as the console script has it, whether or not the application knows the sub-application already.
-PROGRAM = """
-from levilab import cli
-from levilab.cli_bench import bench_app
-if "bench" not in {group.name for group in cli.app.registered_groups}:
-    cli.app.add_typer(bench_app, name="bench")
-cli.main()
-"""
-
 
 @contextlib.contextmanager
 def serving(*words):
     """The process and what it said when it was ready."""
-    command = [sys.executable, "-c", PROGRAM, "bench", "serve", "--json", *words]
+    command = [sys.executable, "-m", "levilab", "bench", "serve", "--json", *words]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         line = process.stdout.readline()
@@ -158,7 +149,7 @@ def test_people_see_a_table_of_names(monkeypatch):
         return serve(service, lambda instruments: (ready(instruments), signal.raise_signal(signal.SIGINT)))
 
     monkeypatch.setattr("levilab.bench_serve.serve", serve_and_end)
-    shown = CliRunner().invoke(bench_app, ["serve"] if len(bench_app.registered_commands) > 1 else [])
+    shown = CliRunner().invoke(bench_app, ["serve"])
     assert shown.exit_code == 130
     assert "counter 53230A" in shown.stdout
     assert "::SOCKET" in shown.stdout

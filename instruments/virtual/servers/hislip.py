@@ -327,7 +327,7 @@ class HislipServer:
         self._station, self._subaddress = station, subaddress
         self._clients: dict[int, Client] = {}
         self._numbers = itertools.count(1)
-        self.listener = Listener(self._talk, most=2 * MOST_CLIENTS)
+        self.listener = Listener(station, self._talk, most=2 * MOST_CLIENTS)
 
     async def _talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         channel = Channel(reader, writer)

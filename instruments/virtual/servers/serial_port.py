@@ -10,7 +10,9 @@ import contextlib
 import os
 from typing import TYPE_CHECKING
 
+from instruments.virtual.faults import LinkLost
 from instruments.virtual.servers.socket_server import converse
+from instruments.virtual.servers.station import log
 
 try:
     import pty
@@ -40,7 +42,17 @@ class PseudoTerminal:
 
     def open(self) -> None:
         """Begin to listen; needs a running event loop."""
-        self._talk = asyncio.ensure_future(converse(self._station, self))
+        self._talk = asyncio.ensure_future(self._serve())
+
+    async def _serve(self) -> None:
+        """The cable stays plugged in, whatever happens to those who talk through it."""
+        while True:
+            try:
+                await converse(self._station, self)
+            except LinkLost:
+                pass
+            except Exception:  # noqa: BLE001 - told, and the next client shall find the line alive
+                log.exception("a virtual instrument failed; its serial line begins anew")
 
     async def read(self) -> bytes:
         """What has come; see :class:`instruments.virtual.servers.socket_server.Wire`."""

@@ -49,7 +49,7 @@ def socket_listener(station: Station) -> Listener:
     async def talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         await converse(station, TcpWire(reader, writer))
 
-    return Listener(talk)
+    return Listener(station, talk)
 
 
 async def converse(station: Station, wire: Wire) -> None:

@@ -14,6 +14,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from instruments.virtual.faults import LinkLost
 from instruments.virtual.scpi import ScpiError
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ class Station:
 
 
 class Link:
-    """One client's link to an instrument.
+    """One client's link to an instrument; whatever is done with it raises LinkLost when a fault has cut it.
 
     session: see :class:`instruments.virtual.bus.Session`; to be used from the event loop only.
     """
@@ -209,8 +210,8 @@ class Listener:
     port: known once it is open.
     """
 
-    def __init__(self, talk: Conversation, *, most: int = MOST_CLIENTS) -> None:
-        self._talk, self._most = talk, most
+    def __init__(self, station: Station, talk: Conversation, *, most: int = MOST_CLIENTS) -> None:
+        self._station, self._talk, self._most = station, talk, most
         self._server: asyncio.Server | None = None
         self._talks: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
         self.port = 0
@@ -221,7 +222,7 @@ class Listener:
         self.port = self._server.sockets[0].getsockname()[1]
 
     def _connected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        if len(self._talks) >= self._most:
+        if len(self._talks) >= self._most or not self._station.bus.reachable(self._station.device):
             writer.transport.abort()
             return
         # a client whose machine was switched off does not say so
@@ -233,7 +234,7 @@ class Listener:
     async def _conversation(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         try:
             await self._talk(reader, writer)
-        except (OSError, EOFError, Disconnected):
+        except (OSError, EOFError, Disconnected, LinkLost):
             pass  # the client is gone
         except Exception:
             # one client's trouble is not that of the others

@@ -231,7 +231,7 @@ class Vxi11Server:
         self._station, self._device = station, device
         self._links: dict[int, OpenLink] = {}
         self._numbers = itertools.count(1)
-        self.core, self.abort = Listener(self._talk), Listener(self._talk_abort)
+        self.core, self.abort = Listener(station, self._talk), Listener(station, self._talk_abort)
 
     async def _talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         connection = _Connection(self)
