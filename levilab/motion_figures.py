@@ -236,26 +236,37 @@ class _Flag:
 
     def _under(self, other: _Flag) -> bool:
         """Whether the other's pole goes up through this name."""
-        return self.row <= other.row and self.left - _GAP / 2 < other.pole < self.right + _GAP / 2
+        return self.row <= other.row and self.covers([other.pole])
+
+    def covers(self, poles: list[float]) -> bool:
+        """Whether one of the poles would go through this name if it were high enough."""
+        return any(self.left - _GAP / 2 < pole < self.right + _GAP / 2 for pole in poles)
 
 
 def _name_lines(axes: Axes, summary: Summary) -> None:
     """Frequency and name of the strongest lines, where there is room; of sidebands, which come last, the frequency."""
     flags: list[_Flag] = []
-    for line in sorted(summary.lines.lines, key=lambda line: line.sideband)[:MOST_NAMED]:
+    lines = sorted(summary.lines.lines, key=lambda line: line.sideband)[:MOST_NAMED]
+    for k, line in enumerate(lines):
+        waiting = [_pole(axes, other.frequency) for other in lines[k + 1 :] if not other.sideband]
         number = f"{line.frequency:.2f}".replace("-", "−")
         texts = [number] if line.sideband or not line.name else [f"{number} {line.name}", number]
-        places = ((text, flag) for text in texts for flag in _flags(axes, line.frequency, text))
-        found = next(((text, flag) for text, flag in places if flag.fits(flags)), None)
-        if found:
+        places = [(text, flag) for text in texts for flag in _flags(axes, line.frequency, text) if flag.fits(flags)]
+        if places:
+            # the first place that leaves room for the poles to come, if there is one
+            found = next((place for place in places if not place[1].covers(waiting)), places[0])
             flags.append(found[1])
             _hoist(axes, line, *found)
 
 
+def _pole(axes: Axes, frequency: float) -> float:
+    low, high = axes.get_xlim()
+    return float((frequency - low) / (high - low))
+
+
 def _flags(axes: Axes, frequency: float, text: str) -> Iterator[_Flag]:
     """Where a name may hang: away from zero or towards it, in the lowest row first."""
-    low, high = axes.get_xlim()
-    pole = (frequency - low) / (high - low)
+    pole = _pole(axes, frequency)
     probe = axes.text(0, 0, text, fontsize=_FONT)
     width = 1.03 * probe.get_window_extent().width / axes.get_window_extent().width
     probe.remove()

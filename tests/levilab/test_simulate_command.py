@@ -294,6 +294,12 @@ def test_both_views_of_the_path_share_their_x_and_show_all_of_it() -> None:
         assert panel.get_ylim()[0] < place[:, up].min() < place[:, up].max() < panel.get_ylim()[1]
 
 
+def test_a_name_leaves_room_for_the_next_line() -> None:
+    told = summary(preset("driven").changed({"drive.frequency_hz": 35.0}), 10.0)
+    shown = [text.get_text().partition(" ")[2] for text in motion_figure(told).axes[-1].texts]
+    assert {"drive", "wobble, once a turn", "nutation", "precession", "swing sideways"} <= set(shown)
+
+
 @pytest.mark.parametrize(("name", "spin"), [("driven", 30.03), ("undriven", -30.0), ("undriven", 60.0)])
 def test_the_lines_are_named_inside_of_their_panel_and_apart(name: str, spin: float) -> None:
     figure = motion_figure(summary(preset(name).changed({"start.spin_hz": spin}), 10.0))
