@@ -7,8 +7,10 @@ from a virtual one.
 from __future__ import annotations
 
 import contextlib
+import re
 import select
 import socket
+import time
 import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol
@@ -31,6 +33,9 @@ _BARE_SOCKET = "::SOCKET"
 
 #: Bytes read at a stretch, and the longest answer that is text.
 _CHUNK, _LONGEST_ANSWER = 1 << 20, 1 << 22
+
+#: The answer to ``*IDN?``: four fields.
+_IDENTITY = re.compile(rb"[^,]+,[^,]+,[^,]*,[^\n]*\n?")
 
 #: VISA's numbers for: locked, busy.
 _HELD_BY_ANOTHER = {-1073807345, -1073807246}
@@ -91,7 +96,7 @@ class VisaTransport:
         """
         self.address, self.timeout, self._line = address, timeout, dict(line or {})
         self._library, self._log = library, log
-        self._out_of_step = False
+        self._out_of_step = self._closed = False
         self._stream = address.upper().endswith(_BARE_SOCKET) or address.upper().startswith("ASRL")
         self._resource = self._open()
 
@@ -180,18 +185,41 @@ class VisaTransport:
             self._resource.read_termination = "\n"
 
     def clear(self) -> None:
-        """Resynchronise: a late answer to an old question never reaches the driver."""
-        import pyvisa
-
+        """Resynchronise: a late answer to an old question never reaches the driver.  Raises NotConnected."""
         if self.address.upper().endswith(_BARE_SOCKET):
             self.reopen()
+        elif self._stream:
+            self._drain_line()
         else:
-            with contextlib.suppress(pyvisa.Error, NotImplementedError):
+            try:
                 self._resource.clear()
+            except NotImplementedError:
+                pass
+            except Exception:  # noqa: BLE001 - pyvisa-py's HiSLIP raises RuntimeError when an answer came meanwhile
+                self.reopen()
         self._out_of_step = False
+
+    def _drain_line(self) -> None:
+        """A serial line has no clear: ask who is there, and drop all that comes before the answer to that.
+
+        Raises NoAnswer when none comes: the line is still out of step then.
+        """
+        question = "*IDN?"
+        self._out_of_step = False
+        with self._told_as_ours(question, self.timeout):
+            self._resource.timeout = 1000 * self.timeout
+            self._discard_received()
+            self._resource.write("")  # ends what may have been sent in part
+            self._resource.write(question)
+            deadline = time.monotonic() + 10 * self.timeout
+            while not _IDENTITY.fullmatch(self._resource.read_bytes(_LONGEST_ANSWER, break_on_termchar=True)):
+                if time.monotonic() > deadline:
+                    raise BrokenBlock("one line after the other, and no name among them")
 
     def reopen(self) -> None:
         """Open the resource anew; see :class:`Transport`."""
+        if self._closed:
+            raise NotConnected(self.address, "this session was closed: open another one")
         with contextlib.suppress(Exception):  # it may be gone for good
             self._resource.close()
         self._resource = self._open()
@@ -212,6 +240,7 @@ class VisaTransport:
 
     def close(self) -> None:
         """Close the resource; closing twice does no harm."""
+        self._closed = True
         self._resource.close()
 
     def _record(self, direction: str, message: str) -> None:

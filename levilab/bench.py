@@ -140,7 +140,7 @@ def open_bench(
         try:
             for kind in kinds:
                 settings = VIRTUAL[kind] if world else _described(config, kind)
-                instrument = opened(kind, settings, library=library, log=log)
+                instrument = opened(kind, settings, bench.clock, library=library, log=log)
                 links.callback(instrument.close)
                 instrument.identity()
                 instrument.forget_errors()
@@ -153,10 +153,14 @@ def open_bench(
 
 
 def opened(
-    kind: str, settings: InstrumentSettings, *, library: Any = "@py", log: TrafficLog | None = None
+    kind: str, settings: InstrumentSettings, clock: Clock, *, library: Any = "@py", log: TrafficLog | None = None
 ) -> ScpiInstrument:
     """A driver on an open link.  library: PyVISA's.  Raises ConfigError for an unknown model, InstrumentError."""
-    return driver_of(kind, settings.model)(transport_to(kind, settings, library=library, log=log))
+    driver: Any = driver_of(kind, settings.model)
+    transport = transport_to(kind, settings, library=library, log=log)
+    # a scope is waited for: on the bench's clock
+    one: ScpiInstrument = driver(transport, clock=clock) if kind == "oscilloscope" else driver(transport)
+    return one
 
 
 def check_described(config: BenchConfig, kinds: tuple[str, ...]) -> None:

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 from instruments.virtual.servers.server import LOOPBACK, PORTS_PER_INSTRUMENT, Place, offered
 from levilab.clock import WallClock
 from levilab.errors import LevilabError
-from levilab.simulator.world import SpinScene, SpinWorld
-from levilab.virtual_bench import MODELS, VIRTUAL, virtual_bus
+from levilab.virtual_bench import MODELS, VIRTUAL, own_world, virtual_bus
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -104,7 +103,7 @@ def _bus(service: Service) -> Bus:
         clock = WallClock(speed=service.speed)
     except ValueError as error:
         raise WrongService(f"--speed: {error}") from error
-    return virtual_bus(SpinWorld(SpinScene(), clock), service.models)
+    return virtual_bus(own_world(clock), service.models)
 
 
 def _place(service: Service, instruments: int) -> Place:

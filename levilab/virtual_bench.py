@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from levilab.clock import VirtualClock, WallClock
+from levilab.clock import VirtualClock
 from levilab.config import ConfigError, InstrumentSettings
 
 if TYPE_CHECKING:
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from instruments.virtual.bus import Bus
     from instruments.virtual.device import VirtualInstrument
     from instruments.virtual.generator import Output
+    from levilab.clock import Clock
     from levilab.simulator.world import World
 
 #: Where the virtual instruments are plugged in, and what they are unless other models are asked for.
@@ -110,11 +111,15 @@ def virtual_bus(world: World | None = None, models: Mapping[str, str] | None = N
     return Bus({VIRTUAL[kind].address: _maker(kind, model)(world) for kind, model in chosen.items()})
 
 
-def own_world(*, realtime: bool = False) -> World:
-    """A top of its own, on a clock that jumps, or on the wall's."""
+#: A top that falls on a bench to practise at is put back after so long [s].
+AGAIN_S = 15.0
+
+
+def own_world(clock: Clock | None = None) -> World:
+    """A top to practise with, put back whenever it falls.  clock: by default one that jumps."""
     from levilab.simulator.world import SpinScene, SpinWorld
 
-    return SpinWorld(SpinScene(), WallClock() if realtime else VirtualClock())
+    return SpinWorld(SpinScene(again_s=AGAIN_S), clock or VirtualClock())
 
 
 def _maker(kind: str, model: str) -> Callable[[World], VirtualInstrument]:

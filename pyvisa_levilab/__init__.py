@@ -74,9 +74,10 @@ class LevilabVisaLibrary(VisaLibraryBase):
         Asked for as "realtime@levilab" it keeps to the wall clock: for programs that sleep between their questions.
         """
         if self.bus is None:
+            from levilab.clock import WallClock
             from levilab.virtual_bench import own_world, virtual_bus
 
-            self.bus = virtual_bus(own_world(realtime=str(self.library_path) == REALTIME))
+            self.bus = virtual_bus(own_world(WallClock() if str(self.library_path) == REALTIME else None))
         return self.bus
 
     def open_default_resource_manager(self) -> tuple[VISARMSession, StatusCode]:
@@ -100,7 +101,7 @@ class LevilabVisaLibrary(VisaLibraryBase):
         open_timeout: int | None = constants.VI_TMO_IMMEDIATE,
     ) -> tuple[VISASession, StatusCode]:
         """ViOpen."""
-        session_with_it = self._bench().open(resource_name)
+        session_with_it = self._bench().open(self._as_plugged_in(resource_name))
         if session_with_it is None:
             return cast("VISASession", 0), self.handle_return_value(None, StatusCode.error_resource_not_found)
         parsed = rname.parse_resource_name(resource_name.upper())
@@ -118,6 +119,11 @@ class LevilabVisaLibrary(VisaLibraryBase):
         number = cast("VISASession", next(_numbers))
         self._sessions[number] = (link, attributes)
         return number, self.handle_return_value(number, StatusCode.success)
+
+    def _as_plugged_in(self, resource_name: str) -> str:
+        """The bench's own spelling of a name: PyVISA fills in what is left out (USB's interface, boards)."""
+        wanted = _canonical(resource_name)
+        return next((name for name in self._bench().instruments if _canonical(name) == wanted), resource_name)
 
     def close(self, session: Any) -> StatusCode:
         """ViClose."""
@@ -214,6 +220,13 @@ class LevilabVisaLibrary(VisaLibraryBase):
     def discard_events(self, session: VISASession, event_type: Any, mechanism: Any) -> StatusCode:
         """ViDiscardEvents: there are no events."""
         return self.handle_return_value(session, StatusCode.success)
+
+
+def _canonical(resource_name: str) -> str:
+    try:
+        return rname.to_canonical_name(resource_name.upper()).upper()
+    except rname.InvalidResourceName:
+        return resource_name.upper()
 
 
 def _read(link: Session | SerialLine, count: int, timeout: float, termchar: bytes) -> tuple[bytes, StatusCode]:

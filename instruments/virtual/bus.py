@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from instruments.virtual.faults import Fault
 
 
+_NOTHING = memoryview(b"")
+
+
 @dataclass
 class Hold:
     """Who keeps the others from an instrument: one, or all that know the key.
@@ -100,11 +103,14 @@ class Session:
     bus: Bus | None = None
     chunk: int = 1 << 30  # bytes that are given at once, at most
     lost_after: int | None = None  # bytes until the link is lost
-    _framer: Framer = field(default_factory=Framer)
+    _framer: Framer = field(init=False)
     _answers: deque[Answer] = field(default_factory=deque)
-    _rest: bytes = b""
+    _rest: memoryview = _NOTHING
     _complete: bool = True
     _asked: bool = False  # something was sent since the last answer was read
+
+    def __post_init__(self) -> None:
+        self._framer = Framer(blocks=self.device.takes_blocks)
 
     def write(self, data: bytes, *, end: bool = True) -> None:
         """Bytes for the instrument; it works on every message that they complete.  end: marked by the interface."""
@@ -122,7 +128,7 @@ class Session:
         if not self.stream and (self._answers or self._rest):
             self.device.parser.report(ScpiError(-410))
             self._answers.clear()
-            self._rest = b""
+            self._rest = _NOTHING
         self._asked = True
         answer = self.device.execute(message)
         for fault in self.bus.faults if self.bus else ():
@@ -169,11 +175,13 @@ class Session:
             self._check_link()
             if not self._rest and self._answers:
                 answer = self._answers.popleft()
-                self._rest, self._complete = answer.data, answer.complete
+                self._rest, self._complete = memoryview(answer.data), answer.complete
             self._asked = False
             most = min(count, self.chunk, self.lost_after if self.lost_after is not None else count)
-            stop = self._rest.find(until, 0, most) + 1 if until else 0
-            chunk, self._rest = self._rest[: stop or most], self._rest[stop or most :]
+            chunk = bytes(self._rest[:most])
+            if until and until in chunk:
+                chunk = chunk[: chunk.index(until) + 1]
+            self._rest = self._rest[len(chunk) :]
             if self.lost_after is not None:
                 self.lost_after -= len(chunk)
             return chunk, not self._rest and self._complete
@@ -181,7 +189,7 @@ class Session:
     def discard(self) -> None:
         """Drop what is ready and was not read."""
         with self.lock:
-            self._rest = b""
+            self._rest = _NOTHING
             self._drop_what_is_abandoned()
             while self._answers and self._answers[0].ready <= self.device.clock.now():
                 self._answers.popleft()
@@ -206,7 +214,7 @@ class Session:
         with self.lock:
             self._framer.clear()
             self._answers.clear()
-            self._rest = b""
+            self._rest = _NOTHING
             self.device.abandon()
 
     def status_byte(self) -> int:

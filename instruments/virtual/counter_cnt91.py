@@ -92,7 +92,7 @@ class VirtualCNT91(VirtualCounter):
     of a statistic, and that CONFigure:ARRay sets the trigger count.
     """
 
-    identity = "PENDULUM, CNT-91, 000001, V1.28 levilab"
+    identity = "PENDULUM, CNT-91, VIRTUAL, V1.28 levilab"
     no_error = '0,"No error"'
 
     def __init__(self, clock: Clock, *, signal: Signal, second: Signal = darkness, native: bool = False) -> None:

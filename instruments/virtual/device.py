@@ -59,6 +59,8 @@ class VirtualInstrument:
     identity = "levilab,virtual,0,0"
     #: What ``SYST:ERR?`` answers when there is nothing to tell, how many entries it keeps, and what ends an answer.
     no_error, queue_size, line_end = '+0,"No error"', 20, "\n"
+    #: Whether it knows blocks (IEEE 488.2, 7.7.6).
+    takes_blocks = True
 
     def __init__(self, clock: Clock, *, pace: float = 2e-3) -> None:
         self.clock, self.pace = clock, pace

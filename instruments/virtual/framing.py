@@ -10,10 +10,13 @@ import re
 from dataclasses import dataclass, field
 
 #: A line longer than this is dropped, and a block that says that it is longer is no block [bytes].
-LONGEST_LINE, LONGEST_BLOCK = 1 << 20, 1 << 26
+LONGEST_LINE, LONGEST_BLOCK = 1 << 22, 1 << 26
 
 #: What decides: the end of a line, a quote, or a block's head where a parameter can begin.
-_SPECIAL = re.compile(rb"[\n\"']|(?<=[ ,\t])#[1-9]")
+_SPECIAL = re.compile(rb"[\n\"']|(?<=[\x00-\x20,])#[1-9]")
+_LINE_END = re.compile(rb"\n")
+#: White space (IEEE 488.2, 7.4.1.2).
+_BLANK = bytes(range(0x21))
 
 
 class Overrun(Exception):
@@ -24,10 +27,13 @@ class Overrun(Exception):
 class Framer:
     r"""Takes bytes as they come and gives whole messages, decoded as Latin-1 (each byte a character).
 
+    blocks: whether the instrument knows blocks; to others # is a sign like any other.
+
     >>> Framer().feed(b"*IDN?\nDATA #12\n\n\nFR")
     ['*IDN?', 'DATA #12\n\n']
     """
 
+    blocks: bool = True
     _buffer: bytearray = field(default_factory=bytearray)
     _looked: int = 0  # so far nothing ends the message
     _block_end: int = 0  # up to here are the bytes of blocks
@@ -40,8 +46,8 @@ class Framer:
         messages: list[str | Overrun] = []
         while (end := self._end_of_message()) is not None:
             if not self._dropping:
-                text = bytes(self._buffer[: self._block_end]) + self._buffer[self._block_end : end].rstrip(b" \t\r")
-                messages.append(text.decode("latin-1").lstrip(" \t\r"))
+                text = bytes(self._buffer[: self._block_end]) + self._buffer[self._block_end : end].rstrip(_BLANK)
+                messages.append(text.lstrip(_BLANK).decode("latin-1"))
             self._forget(end + 1)
         if len(self._buffer) > max(self._block_end, 0) + LONGEST_LINE:
             if not self._dropping:
@@ -60,7 +66,8 @@ class Framer:
 
     def _end_of_message(self) -> int | None:
         """Where the line feed stands that ends the first message, or None if it is not there yet."""
-        while found := _SPECIAL.search(self._buffer, self._looked):
+        special = _SPECIAL if self.blocks else _LINE_END
+        while found := special.search(self._buffer, self._looked):
             what = found[0]
             if what == b"\n":
                 return found.start()
@@ -87,4 +94,5 @@ class Framer:
         if len(length) < self._buffer[head + 1] - ord("0"):
             return None
         size = int(length)
-        return head + 2 + len(length) + (size if size <= LONGEST_BLOCK else 0)
+        # of all the blocks of a message together no more is kept than of the longest one
+        return head + 2 + len(length) + (size if head + size <= LONGEST_BLOCK else 0)

@@ -100,6 +100,8 @@ class VirtualGaussmeter(VirtualInstrument):
     The extremes (MXHOLD) are of the readings that were asked for, not of those in between.
     """
 
+    takes_blocks = False
+
     line_end = "\r\n"
     #: Ranges by probe, lowest first [T].
     RANGES_T: ClassVar[dict[str, tuple[float, ...]]]
@@ -371,7 +373,7 @@ class Virtual425(VirtualGaussmeter):
     Assumed: 3¾ digits, one more with the filter; 0.1 s for the filter, 0.01 s without.
     """
 
-    identity = "LSCI,MODEL425,4250022,1.0"
+    identity = "LSCI,MODEL425,VIRTUAL,1.0"
     serial_settings = LineSettings(57600, 7, "O", 1.0)
     RANGES_T: ClassVar = {
         "HSE": (3.5e-3, 35e-3, 0.35, 3.5),
@@ -423,7 +425,7 @@ class Virtual475(VirtualGaussmeter):
     _TIME_CONSTANTS, _RATES = (0.01, 0.1, 1.0), (30.0, 30.0, 10.0)
 
     def __init__(self, clock: Clock, *, model: str = "475", **options: object) -> None:
-        self.identity = f"LSCI,MODEL{model},4750001,01012020"
+        self.identity = f"LSCI,MODEL{model},VIRTUAL,01012020"
         self.serial_settings = LineSettings(9600, 7, "O", 1.0)
         self._events = 0
         super().__init__(clock, **options)  # type: ignore[arg-type]

@@ -71,7 +71,7 @@ _EMPTY_SOURCES = ("FUNCtion", "MATH", "FFT", "WMEMory1", "WMEMory2", "EXTernal",
 class VirtualDSOX1000(VirtualOscilloscope):
     """A DSOX1102G: two channels, a million points, 100 MHz."""
 
-    identity = "KEYSIGHT TECHNOLOGIES,DSO-X 1102G,CN00000001,01.20.2019061038"
+    identity = "KEYSIGHT TECHNOLOGIES,DSO-X 1102G,VIRTUAL,01.20.2019061038"
     queue_size = 30
     columns, lowest = 10, 1
     transfer = 5e6

@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from collections import deque
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -33,12 +33,18 @@ ERRORS = {
     -363: "Input buffer overrun",
     -410: "Query INTERRUPTED",
     -420: "Query UNTERMINATED",
+    -430: "Query DEADLOCKED",
 }
+
+#: More than this in answer to one message fits into no output buffer (IEEE 488.2, 6.3.1.7) [bytes].
+LONGEST_ANSWER = 1 << 26
 
 _MULTIPLIERS = {"": 1.0, "N": 1e-9, "U": 1e-6, "M": 1e-3, "K": 1e3, "MA": 1e6, "G": 1e9}
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*([a-zA-Z]*)")
 _CHANNEL_LIST = re.compile(r"\(@[\d,: !]*\)")
-_BLANK, _DIGITS = " \t\r\n", re.compile("[0-9]+")
+#: White space is every control character and the space (IEEE 488.2, 7.4.1.2), and no other sign of Latin-1.
+_BLANK, _DIGITS = "".join(map(chr, range(0x21))), re.compile("[0-9]+")
+_UNIT = re.compile(r"([^\x00-\x20]+)[\x00-\x20]*(.*)", re.DOTALL)
 
 
 class ScpiError(Exception):
@@ -65,10 +71,15 @@ class Command:
     set: Callable[[list[str]], None] | None = None
     get: Callable[[list[str]], str] | None = None
 
-    @cached_property
+    @property
     def header(self) -> re.Pattern[str]:
         """The pattern as a regular expression for a header without its question mark."""
-        return re.compile(_expression(self.pattern), re.IGNORECASE)
+        return _header(self.pattern)
+
+
+@cache
+def _header(pattern: str) -> re.Pattern[str]:
+    return re.compile(_expression(pattern), re.IGNORECASE)
 
 
 def _expression(pattern: str) -> str:
@@ -107,15 +118,20 @@ class Parser:
         answers: list[str] = []
         path = ""
         for unit in split_units(message):
-            header, *rest = unit.split(maxsplit=1)
+            parts = _UNIT.fullmatch(unit)
+            assert parts, "a unit begins with no blank"
+            header, rest = parts.groups()
             full, path = _resolve(header, path)
             try:
-                answer = self._execute(full, split_parameters("".join(rest)))
+                answer = self._execute(full, split_parameters(rest))
             except ScpiError as error:
                 self.report(error)
                 break
             if answer is not None:
                 answers.append(answer)
+            if sum(map(len, answers)) > LONGEST_ANSWER:
+                self.report(ScpiError(-430))
+                return None
         return ";".join(answers) if answers else None
 
     def _execute(self, header: str, parameters: list[str]) -> str | None:
@@ -176,10 +192,10 @@ def split_parameters(text: str) -> list[str]:
     >>> split_parameters("ARB1,#13,;,")
     ['ARB1', '#13,;,']
     """
-    return list(_split(text, ",")) if text.strip() else []
+    return list(_split(text, ",")) if text.strip(_BLANK) else []
 
 
-_SPECIAL = re.compile(r"[\"'();,]|(?<![^\s,])#[1-9]")
+_SPECIAL = re.compile(r"[\"'();,]|(?<![^\x00-\x20,])#[1-9]")
 
 
 def _split(text: str, separator: str) -> Iterator[str]:
@@ -292,11 +308,18 @@ def choice(text: str, words: tuple[str, ...]) -> str:
 
 
 def boolean(text: str) -> bool:
-    """ON, OFF, 1 or 0.  Raises ScpiError."""
-    words = {"ON": True, "1": True, "OFF": False, "0": False}
-    if text.upper() not in words:
+    """ON, OFF, 1 or 0, however the number is written.  Raises ScpiError.
+
+    >>> boolean("on"), boolean("1.0"), boolean("0")
+    (True, True, False)
+    """
+    words = {"ON": True, "OFF": False}
+    if text.upper() in words:
+        return words[text.upper()]
+    number = _NUMBER.fullmatch(text)
+    if not number or number[2] or float(number[1]) not in {0.0, 1.0}:
         raise ScpiError(-224, text[:20])
-    return words[text.upper()]
+    return float(number[1]) == 1.0
 
 
 def nr3(value: float) -> str:

@@ -56,7 +56,8 @@ class SpinScene:
     turns with the top; pulse_duty: FWHM of a light pulse in turns; jitter: scatter of a pulse's
     place, in turns, 1σ (0.0212 makes 0.03 Hz of a reading over 1 s); dark, bright: voltage without and at
     the tape [V]; noise: of the voltage, 1σ [V]; base_field_t: the base's field at the probe, which stands where the
-    top would float, 7.2 cm above the thesis's base.
+    top would float, 7.2 cm above the thesis's base; again_s: so long
+    after a fall somebody has put the top back, None: nobody does [s].
     """
 
     start_hz: float = 30.0
@@ -70,6 +71,7 @@ class SpinScene:
     bright: float = 1.2
     noise: float = 0.01
     base_field_t: float = BASE_FIELD
+    again_s: float | None = None
     seed: int = 0
 
 
@@ -117,17 +119,29 @@ class SpinWorld:
         self._jitter = np.random.default_rng((scene.seed, 1)).standard_normal(1 << 16) * scene.jitter
         self._stretches: list[_Stretch] = []
         self._coil = Coil()
-        self._go_on(_Stretch(0.0, 2 * math.pi * scene.start_hz, 0.0, "coasts"), drive_spin=0.0, hold=0.0)
+        self._drive_spin, self._hold = 0.0, 0.0  # [rad/s], [rad/s²]
+        self._go_on(_Stretch(0.0, 2 * math.pi * scene.start_hz, 0.0, "coasts"))
 
     # --- the drive ---
 
     def drive(self, time: float, waveform: str, frequency: float, amplitude: float) -> None:
         """From this time on the coil's field is this; see :class:`World`."""
         self._coil.change(time, waveform, frequency, amplitude)
+        self._put_back_until(time)
         while self._stretches and self._stretches[-1].start > time:
             self._stretches.pop()  # what would have come without this change
-        hold = _FUNDAMENTAL.get(waveform, 0.0) * amplitude * self.scene.lock_torque
-        self._go_on(self._state(time), drive_spin=2 * math.pi * frequency, hold=hold)
+        self._drive_spin = 2 * math.pi * frequency
+        self._hold = _FUNDAMENTAL.get(waveform, 0.0) * amplitude * self.scene.lock_torque
+        self._go_on(self._state(time))
+
+    def _put_back_until(self, time: float) -> None:
+        """Lay down the life of every top that follows on one that falls."""
+        while self.scene.again_s is not None and self._stretches[-1].rule == "fallen":
+            fallen = self._stretches[-1]
+            begin = fallen.start + self.scene.again_s
+            if begin > time:
+                return
+            self._go_on(_Stretch(begin, 2 * math.pi * self.scene.start_hz, fallen.angle, "coasts"))
 
     def _state(self, time: float) -> _Stretch:
         """The stretch that would begin now, before a rule is chosen for it."""
@@ -135,10 +149,12 @@ class SpinWorld:
         spin, angle = self._motion(here, np.array([time]))
         return replace(here, start=time, spin=float(spin[0]), angle=float(angle[0]), acceleration=0.0)
 
-    def _go_on(self, now: _Stretch, *, drive_spin: float, hold: float) -> None:
+    def _go_on(self, now: _Stretch) -> None:
         """Lay down the future from this state on, as it is without a further change."""
-        fall = 2 * math.pi * self.scene.fall_hz
-        if now.rule == "fallen" or now.spin <= fall:
+        fall, hold, drive_spin = 2 * math.pi * self.scene.fall_hz, self._hold, self._drive_spin
+        if now.rule == "fallen":
+            return
+        if now.spin <= fall:
             self._stretches.append(replace(now, rule="fallen", spin=0.0))
             return
         # deceleration by drag at this spin: its change over a time that is short against 1/C ~ 300 s
@@ -178,6 +194,7 @@ class SpinWorld:
 
     def motion(self, times: Array) -> tuple[Array, Array]:
         """Spin [rad/s], 0 once fallen, and angle turned [rad] at the given times, shape (n,) each."""
+        self._put_back_until(float(times.max(initial=0.0)))
         spin, angle = np.empty_like(times), np.empty_like(times)
         index = self._index(times)
         for i in np.unique(index):

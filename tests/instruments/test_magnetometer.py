@@ -38,8 +38,8 @@ def reading(answer, unit="2", status="004"):
 @pytest.mark.parametrize(
     ("driver", "identity"),
     [
-        (LakeShore425, "LSCI,MODEL425,4250022,1.0"),
-        (LakeShore475, "LSCI,MODEL475,4750001,01012020"),
+        (LakeShore425, "LSCI,MODEL425,VIRTUAL,1.0"),
+        (LakeShore475, "LSCI,MODEL475,VIRTUAL,01012020"),
         (LakeShore475, "LSCI,MODEL455,4550001,01012020"),
     ],
 )
@@ -49,7 +49,7 @@ def test_the_models_know_themselves(driver, identity):
 
 
 @pytest.mark.parametrize(
-    ("driver", "identity"), [(LakeShore425, "LSCI,MODEL475,1,1"), (LakeShore475, "LSCI,MODEL425,4250022,1.0")]
+    ("driver", "identity"), [(LakeShore425, "LSCI,MODEL475,1,1"), (LakeShore475, "LSCI,MODEL425,VIRTUAL,1.0")]
 )
 def test_another_model_is_told(driver, identity):
     with conversation(driver, ("*IDN?", identity)) as magnetometer, pytest.raises(WrongInstrument, match="MODEL4"):

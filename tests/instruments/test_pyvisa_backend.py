@@ -1,7 +1,9 @@
 """The virtual bench as a PyVISA library: what any program that speaks PyVISA sees of it."""
 
+import contextlib
 import subprocess
 import sys
+import time
 
 import pytest
 import pyvisa
@@ -15,6 +17,8 @@ from pyvisa_levilab import LevilabVisaLibrary, library_for
 
 COUNTER = "TCPIP0::counter.levilab::inst0::INSTR"
 GENERATOR = "TCPIP0::generator.levilab::inst0::INSTR"
+OSCILLOSCOPE = "TCPIP0::oscilloscope.levilab::inst0::INSTR"
+MAGNETOMETER = "ASRLmagnetometer.levilab::INSTR"
 BLOCKS = "TCPIP0::blocks.levilab::inst0::INSTR"
 
 #: Every byte there is, line feeds and the end of a chunk of PyVISA's included.
@@ -47,7 +51,7 @@ def blocks():
 
 
 def test_the_instruments_of_the_bench_are_listed(manager):
-    assert manager.list_resources() == (COUNTER, GENERATOR)
+    assert manager.list_resources() == (COUNTER, GENERATOR, OSCILLOSCOPE, MAGNETOMETER)
     assert manager.list_resources("?*generator?*") == (GENERATOR,)
     assert manager.list_resources("GPIB?*::INSTR") == ()
 
@@ -56,6 +60,20 @@ def test_the_instruments_of_the_bench_are_listed(manager):
 def test_a_resource_opens_in_any_case(manager, address):
     with manager.open_resource(address, read_termination="\n") as generator:
         assert generator.query("*IDN?").split(",")[1] == "33522B"
+
+
+@pytest.mark.parametrize(
+    ("plugged_in", "asked_for"),
+    [
+        ("USB0::0x14EB::0x0091::123456::INSTR", "USB0::0x14EB::0x0091::123456::INSTR"),
+        ("USB0::0x14EB::0x0091::123456::INSTR", "USB::0x14eb::0x0091::123456::0::INSTR"),
+        ("GPIB0::10::INSTR", "GPIB::10"),
+        ("TCPIP0::box::inst0::INSTR", "TCPIP::box"),
+    ],
+)
+def test_a_resource_opens_by_every_spelling_of_its_name(plugged_in, asked_for):
+    manager = pyvisa.ResourceManager(library_for(Bus({plugged_in: Blocks(VirtualClock())})))
+    assert manager.open_resource(asked_for).query("*OPC?").strip() == "1"
 
 
 def test_a_resource_that_is_not_there_is_not_found(manager):
@@ -134,3 +152,50 @@ print(float(generator.query("FREQ?")))
         [sys.executable, "-W", "error", "-c", program], capture_output=True, text=True, timeout=60, check=False
     )
     assert (ended.stdout.strip(), ended.stderr) == ("38.5", "")
+
+
+def test_a_bench_in_real_time_keeps_to_the_wall_clock():
+    with contextlib.closing(pyvisa.ResourceManager("realtime@levilab")) as manager:
+        counter = manager.open_resource(COUNTER, read_termination="\n", timeout=5000)
+        counter.write("INP1:COUP DC;LEV:AUTO OFF;:INP1:LEV1 0.6;:SENS:FREQ:GATE:TIME 0.1")
+        begin = time.monotonic()
+        assert float(counter.query("READ?")) == pytest.approx(30, abs=2)
+        assert 0.1 <= time.monotonic() - begin < 5
+
+
+# --- what VISA offers beside reading and writing ---
+
+
+def test_a_status_byte_tells_of_an_answer_and_of_errors(blocks):
+    assert blocks.read_stb() == 0
+    blocks.write("*OPC?")
+    blocks.clock.sleep(1.0)
+    assert blocks.read_stb() == 16
+    blocks.read()
+    blocks.write("NONSENSE")
+    assert blocks.read_stb() == 4
+
+
+def test_a_question_before_the_last_answer_was_read_interrupts_it(blocks):
+    blocks.write("*IDN?")
+    assert blocks.query("*OPC?").strip() == "1"
+    assert blocks.query("SYST:ERR?").startswith("-410")
+
+
+def test_waiting_for_what_nobody_asked_is_told_in_the_queue(blocks):
+    with pytest.raises(pyvisa.VisaIOError):
+        blocks.read()
+    assert blocks.query("SYST:ERR?").startswith("-420")
+
+
+def test_a_shared_lock_is_for_those_who_know_its_key(blocks):
+    others = [pyvisa.ResourceManager(blocks.visalib).open_resource(BLOCKS) for _ in range(2)]
+    key = blocks.lock(requested_key="ours")
+    assert others[0].lock(requested_key=key) == key
+    assert others[0].query("*OPC?").strip() == "1"
+    with pytest.raises(pyvisa.VisaIOError) as refused:
+        others[1].write("*CLS")
+    assert refused.value.error_code == StatusCode.error_resource_locked
+    for holder in (blocks, others[0]):
+        holder.unlock()
+    assert others[1].query("*OPC?").strip() == "1"

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from conversation import NO_ERROR, accepted, conversation
+from conversation import CLEAR, NO_ERROR, accepted, conversation
 
 from instruments.counter import Keysight53230A
 from instruments.errors import BadAnswer, CommandRefused, InstrumentError, OutOfRange, WrongInstrument
@@ -82,7 +82,7 @@ def test_choices_are_taken_in_any_case_and_sent_in_capitals():
 
 @pytest.mark.parametrize("answer", ["", "twelve", "1,2"])
 def test_an_answer_that_is_no_number_is_told_with_its_question(answer):
-    with conversation(Keysight33500B, ("FREQ?", answer)) as generator, pytest.raises(BadAnswer) as bad:
+    with conversation(Keysight33500B, ("FREQ?", answer), (CLEAR, None)) as generator, pytest.raises(BadAnswer) as bad:
         _ = generator.frequency
     assert (bad.value.question, bad.value.answer) == ("FREQ?", answer)
 
@@ -125,7 +125,7 @@ def test_a_maker_who_prints_no_plus_is_understood():
 @pytest.mark.parametrize("answer", ["", "+2.5E+01", "No error", "DC"])
 def test_an_answer_that_is_no_queue_entry_is_not_taken_for_one(answer):
     with (
-        conversation(ScpiInstrument, ("FOO", None), ("SYST:ERR?", answer)) as instrument,
+        conversation(ScpiInstrument, ("FOO", None), ("SYST:ERR?", answer), (CLEAR, None)) as instrument,
         pytest.raises(BadAnswer, match="SYST:ERR"),
     ):
         instrument.command("FOO")

@@ -86,7 +86,7 @@ def slow(bus):
 
 def test_the_driver_reads_the_field_through_the_port(bus):
     magnetometer = LakeShore425(SerialTransport(METER, **LINE))
-    assert magnetometer.identity() == "LSCI,MODEL425,4250022,1.0"
+    assert magnetometer.identity() == "LSCI,MODEL425,VIRTUAL,1.0"
     magnetometer.prepare(range_t=0.02)
     assert magnetometer.flux_density() == pytest.approx(0.0123, rel=2e-4)
     magnetometer.close()
@@ -467,7 +467,7 @@ def test_closing_twice_does_no_harm_and_nothing_is_sent_after_it(bus):
 def test_a_program_with_nothing_but_pyserial(bus):
     with serial.serial_for_url(METER, baudrate=57600, bytesize=7, parity="O", timeout=1) as port:
         assert port.write(b"*IDN?\n") == 6
-        assert port.readline() == b"LSCI,MODEL425,4250022,1.0\r\n"
+        assert port.readline() == b"LSCI,MODEL425,VIRTUAL,1.0\r\n"
         port.write(b"UNIT?\n")
         while not port.in_waiting:  # looking takes time too
             pass
@@ -526,7 +526,7 @@ def test_pyvisa_py_takes_the_url_too(bus):
     settings = {"baud_rate": 57600, "data_bits": 7, "parity": pyvisa.constants.Parity.odd}
     with manager.open_resource(f"ASRL{METER}::INSTR", read_termination="\r\n", **settings) as line:
         line.write_termination = "\n"
-        assert line.query("*IDN?") == "LSCI,MODEL425,4250022,1.0"
+        assert line.query("*IDN?") == "LSCI,MODEL425,VIRTUAL,1.0"
     manager.close()
 
 

@@ -37,9 +37,9 @@ def value(answer):
 @pytest.mark.parametrize(
     ("device", "identity"),
     [
-        (meter(), "LSCI,MODEL425,4250022,1.0"),
-        (meter(Virtual475), "LSCI,MODEL475,4750001,01012020"),
-        (meter(Virtual475, model="455"), "LSCI,MODEL455,4750001,01012020"),
+        (meter(), "LSCI,MODEL425,VIRTUAL,1.0"),
+        (meter(Virtual475), "LSCI,MODEL475,VIRTUAL,01012020"),
+        (meter(Virtual475, model="455"), "LSCI,MODEL455,VIRTUAL,01012020"),
     ],
 )
 def test_who_they_are(device, identity):
@@ -417,7 +417,7 @@ def resource(device, **settings):
 
 def test_a_program_with_the_right_settings_is_understood():
     line = resource(meter())
-    assert line.query("*IDN?") == "LSCI,MODEL425,4250022,1.0"
+    assert line.query("*IDN?") == "LSCI,MODEL425,VIRTUAL,1.0"
     assert line.query_ascii_values("RDGFIELD?") == [pytest.approx(123.0, rel=1e-3)]
 
 
@@ -449,7 +449,7 @@ def test_settings_may_be_put_right_while_the_port_is_open():
     assert silence.value.error_code == StatusCode.error_timeout
     line.data_bits, line.parity = 7, Parity.odd
     line.flush(pyvisa.constants.BufferOperation.discard_read_buffer)
-    assert line.query("*IDN?") == "LSCI,MODEL425,4250022,1.0"
+    assert line.query("*IDN?") == "LSCI,MODEL425,VIRTUAL,1.0"
 
 
 def test_the_475_changes_its_baud_rate_when_told():
@@ -460,7 +460,7 @@ def test_the_475_changes_its_baud_rate_when_told():
         line.query("*IDN?")
     line.baud_rate = 57600
     line.write("")  # ends what it heard of the last question
-    assert line.query("*IDN?") == "LSCI,MODEL475,4750001,01012020"
+    assert line.query("*IDN?") == "LSCI,MODEL475,VIRTUAL,01012020"
 
 
 def test_bytes_take_their_time_on_the_line():

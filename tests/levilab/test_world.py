@@ -318,3 +318,20 @@ def test_the_magnetometer_sees_the_base_as_the_simulator_has_it():
 
     there = axial_field(preset("undriven"))(np.array([0.072]))[0, 0]
     assert world(SpinScene()).flux_density(3.0) == pytest.approx(there, rel=1e-8)
+
+
+def test_a_top_that_falls_is_put_back_where_somebody_does_so():
+    top = world(SpinScene(again_s=10.0))
+    fallen = next(s.start for s in top._stretches if s.rule == "fallen")
+    spin, angle = top.motion(np.array([fallen - 1, fallen + 9, fallen + 10.001, fallen + 11 + fallen]))
+    assert spin[0] > 0
+    assert spin[1] == 0
+    assert spin[2] == pytest.approx(2 * np.pi * 30, rel=1e-4)
+    assert spin[3] == 0
+    assert np.all(np.diff(angle) >= 0)
+    top.drive(fallen + 12.0, "SIN", 30.0, FIELD)
+    assert top.motion(np.array([fallen + 500.0]))[0] == pytest.approx(2 * np.pi * 30)
+
+
+def test_else_it_lies_there():
+    assert world(SpinScene()).motion(np.array([1e5]))[0] == 0
