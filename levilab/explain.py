@@ -18,7 +18,7 @@ from analysis import stability
 from analysis.lines import spectral_lines
 from levilab.motion_lines import rate_for
 from levilab.simulator.errors import SimulationError
-from levilab.simulator.floating import axial_field, stability_of, symmetric
+from levilab.simulator.floating import advice, axial_field, stability_of, symmetric
 from levilab.simulator.keys import SceneError
 from levilab.simulator.single import simulate
 
@@ -207,7 +207,5 @@ def _remark(included: bool, as_it_is: Trajectory, other: Trajectory) -> str:  # 
 
 
 def _why(scene: Scene) -> str:
-    from levilab.stability_table import why_not
-
     found = stability_of(scene)
-    return "" if found.floating else f": {why_not(found)}"
+    return "" if found.floating else f": {advice(found)}"

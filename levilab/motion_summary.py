@@ -152,11 +152,10 @@ def _notes(motion: Trajectory, lines: AxisLines, rate: float) -> list[str]:
 
 def _cannot_float(scene: Scene) -> list[str]:
     """Why a top was lost that had no chance."""
-    from levilab.simulator.floating import stability_of
-    from levilab.stability_table import why_not
+    from levilab.simulator.floating import advice, stability_of
 
     found = stability_of(scene)
-    return [] if found.floating else [why_not(found)]
+    return [] if found.floating else [advice(found)]
 
 
 def _not_reached(accuracy: Accuracy) -> str:

@@ -39,8 +39,6 @@ LEFT_OUT: tuple[tuple[Callable[[Scene], bool], str], ...] = (
         "the loose washers are left out here: they turn with the top as if they were fixed",
     ),
 )
-#: A heavier top was most likely given in grams [kg].
-HEAVIEST_KG = 1.0
 
 
 def _is_thesis_device(found: Stability) -> bool:
@@ -65,21 +63,8 @@ def print_stability(found: Stability) -> None:
 
 def _headline(found: Stability) -> str:
     if not found.floating:
-        return why_not(found)
-    return f"a top of {1000 * found.scene.top.mass_kg:.2f} g floats at {100 * found.floating.height:.3f} cm"
-
-
-def why_not(found: Stability) -> str:
-    """Why the top does not float and which one does, with its mass in grams."""
-    if found.nearest is None:
         return advice(found)
-    kilograms = found.scene.top.mass_kg
-    said = (
-        f"a top of {1000 * kilograms:.6g} g does not float over this base; "
-        f"the nearest that does has {1000 * found.nearest:.2f} g"
-    )
-    asked = f".  Were grams meant?  {kilograms:g} g are top.mass_kg = {kilograms / 1000:g}"
-    return said + (asked if kilograms > HEAVIEST_KG else "")
+    return f"a top of {1000 * found.scene.top.mass_kg:.2f} g floats at {100 * found.floating.height:.3f} cm"
 
 
 def _windows_table(found: Stability) -> Any:

@@ -24,6 +24,9 @@ Array = NDArray[np.float64]
 #: Heights in which a top is looked for: from a tenth of the inner radius to four outer radii above the base.
 _LOW, _HIGH = 0.1, 4.0
 
+#: A heavier top was most likely given in grams [kg].
+HEAVIEST_KG = 1.0
+
 
 @dataclass(frozen=True)
 class Stability:
@@ -168,13 +171,19 @@ def floating_height(scene: Scene) -> float:
 
 
 def advice(found: Stability) -> str:
-    """What to do about a top that does not float."""
+    """Why a top does not float, and which one does."""
     if found.nearest is None:
         return (
             "no top with this moment floats over this base, whatever its mass: "
             "the moment must point against the field (top.moment_a_m2 of the other sign)"
         )
-    return f"a top of this mass does not float over this base; the nearest that does has {1000 * found.nearest:.2f} g"
+    kilograms = found.scene.top.mass_kg
+    said = (
+        f"a top of {1000 * kilograms:.6g} g does not float over this base; "
+        f"the nearest that does has {1000 * found.nearest:.2f} g"
+    )
+    asked = f".  Were grams meant?  {kilograms:g} g are top.mass_kg = {kilograms / 1000:g}"
+    return said + (asked if kilograms > HEAVIEST_KG else "")
 
 
 def survival(

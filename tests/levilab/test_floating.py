@@ -7,12 +7,12 @@ import pytest
 
 from levilab.simulator.ensemble import simulate_many
 from levilab.simulator.errors import SimulationError
-from levilab.simulator.floating import axial_field, floating_height, stability_of, survival
+from levilab.simulator.floating import advice, axial_field, floating_height, stability_of, survival
 from levilab.simulator.scene import SceneError, preset
 from levilab.simulator.single import simulate
 from levilab.stability_figure import map_figure
 from levilab.stability_map import place_for_map, span_of, survival_map, write_map
-from levilab.stability_table import as_document, print_stability, remarks, why_not
+from levilab.stability_table import as_document, print_stability, remarks
 from levilab.writing import CannotWrite
 
 UNDRIVEN = preset("undriven")
@@ -181,10 +181,10 @@ def test_what_the_theory_leaves_out_of_a_scene_is_told():
 
 
 def test_a_mass_that_cannot_float_is_named_in_grams():
-    assert why_not(stability_of(UNDRIVEN.changed({"top.mass_kg": 0.0255}))).startswith("a top of 25.5 g does not float")
-    asked = why_not(stability_of(UNDRIVEN.changed({"top.mass_kg": 25.26})))
+    assert advice(stability_of(UNDRIVEN.changed({"top.mass_kg": 0.0255}))).startswith("a top of 25.5 g does not float")
+    asked = advice(stability_of(UNDRIVEN.changed({"top.mass_kg": 25.26})))
     assert asked.endswith("Were grams meant?  25.26 g are top.mass_kg = 0.02526")
-    other = why_not(stability_of(UNDRIVEN.changed({"top.moment_a_m2": 1e-9, "top.mass_kg": 0.0255})))
+    other = advice(stability_of(UNDRIVEN.changed({"top.moment_a_m2": 1e-9, "top.mass_kg": 0.0255})))
     assert "grams" not in other
 
 
