@@ -4,7 +4,7 @@ BIN    := .venv/bin
 DEMO   := demo
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test explore lint all-pythons wheel bench clean
+.PHONY: help setup demo test explore lint all-pythons wheel peers bench clean
 
 help:  ## list the targets
 	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -44,6 +44,9 @@ all-pythons: setup  ## the tests on every Python from 3.11 on that is installed
 
 wheel: setup  ## build the wheel into dist/ and try it in a clean environment, beside a decoy
 	$(BIN)/nox --session wheel
+
+peers: setup  ## other people's drivers, in an environment of their own, on the virtual bench
+	$(BIN)/nox --session peers
 
 bench: setup  ## speed, as ratios within one run (a few minutes); the kept results are in docs/speed.md
 	$(BIN)/python benchmarks/spindown.py

@@ -1,6 +1,7 @@
-"""The longer checks: every Python that is installed, and the wheel as a user gets it."""
+"""The longer checks: every Python, the wheel as a user gets it, other people's drivers on the virtual bench."""
 
 import sys
+import tarfile
 from pathlib import Path
 
 import nox
@@ -12,6 +13,7 @@ nox.options.error_on_missing_interpreters = False
 PYTHONS = ["3.11", "3.12", "3.13", "3.14"]
 CONSTRAINTS = Path("constraints.txt").resolve()
 DIST = Path("dist").resolve()
+PEERS = Path("tests/peers").resolve()
 
 
 def install_wheel(session: nox.Session, *extras: str) -> None:
@@ -46,3 +48,30 @@ def wheel(session: nox.Session) -> None:
     (folder / "levilab.py").unlink()
     session.run("python", "-m", "levilab", "acquire", "spin", "--mock", "--out", "runs")
     session.log(f"the wheel works on {sys.platform}")
+
+
+@nox.session
+def peers(session: nox.Session) -> None:
+    """Other people's drivers, unmodified, on the virtual bench; and PyMeasure's own suite for a real instrument."""
+    install_wheel(session)
+    wanted = PEERS / "requirements.txt"
+    constrained = ("--constraint", str(CONSTRAINTS))
+    session.install("--requirement", str(wanted), "pytest", "pytest-xdist", "hypothesis", *constrained)
+    session.run("pytest", str(PEERS), *session.posargs)
+    (pymeasure,) = (line for line in wanted.read_text(encoding="utf-8").splitlines() if line.startswith("pymeasure=="))
+    source = unpacked_source(session, pymeasure)
+    session.run("python", str(PEERS / "run_pymeasure_suite.py"), str(source))
+    session.run("python", str(PEERS / "run_pymeasure_suite.py"), str(source), "--server", "hislip")
+
+
+def unpacked_source(session: nox.Session, package: str) -> Path:
+    """The folder of a package's source distribution; fetched once.  package: as in name==version."""
+    folder = Path(session.create_tmp()).resolve()
+    source = folder / package.replace("==", "-")
+    if not source.exists():
+        # only this one from source: what it is built with comes as wheels
+        fetch = ("python", "-m", "pip", "download", "--no-deps", "--no-binary", package.partition("==")[0])
+        session.run_install(*fetch, "--dest", str(folder), package, silent=True)
+        with tarfile.open(source.with_name(f"{source.name}.tar.gz")) as archive:
+            archive.extractall(folder, filter="data")
+    return source

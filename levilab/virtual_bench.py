@@ -111,6 +111,19 @@ def virtual_bus(world: World | None = None, models: Mapping[str, str] | None = N
     return Bus({VIRTUAL[kind].address: _maker(kind, model)(world) for kind, model in chosen.items()})
 
 
+def plug_in_serial(bus: Bus | None = None) -> Bus:
+    """Let pyserial find a virtual bench; which one.
+
+    From then on ``serial.serial_for_url("levilab://magnetometer")`` is its magnetometer, and for pyvisa-py
+    ``ASRLlevilab://magnetometer::INSTR``.  bus: by default a fresh bench with a top of its own.
+    """
+    from instruments.virtual.protocol_levilab import plug_in
+
+    bus = bus or virtual_bus()
+    plug_in(lambda: bus)
+    return bus
+
+
 #: A top that falls on a bench to practise at is put back after so long [s].
 AGAIN_S = 15.0
 

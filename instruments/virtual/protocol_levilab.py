@@ -1,7 +1,7 @@
 """pyserial finds the virtual instruments here: ``serial.serial_for_url("levilab://magnetometer")``.
 
-For that, the package is named to pyserial once: ``serial.protocol_handler_packages.append("instruments.virtual")``.
-Which bench the URL means stands in :data:`instruments.virtual.serial_line.benches`.  pyvisa-py takes the same URL as
+For that, :func:`plug_in` names this package to pyserial, and the bench that the URL means, which then stands in
+:data:`instruments.virtual.serial_line.benches`.  pyvisa-py takes the same URL as
 ``ASRLlevilab://magnetometer::INSTR``.
 """
 
@@ -13,15 +13,26 @@ import math
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
+import serial
 from serial.serialutil import PortNotOpenError, SerialBase, SerialException
 
 from instruments.virtual.faults import LinkLost
 from instruments.virtual.serial_line import LineSettings, SerialLine, benches
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
-    from instruments.virtual.bus import Session
+    from instruments.virtual.bus import Bus, Session
+
+#: Where pyserial looks for the module of a URL's scheme: the package that this one is in.
+_PACKAGE = __name__.rpartition(".")[0]
+
+
+def plug_in(bench: Callable[[], Bus], name: str = "") -> None:
+    """Let pyserial find this bench from now on, as ``levilab://instrument?bench=name`` (no name: without the query)."""
+    if _PACKAGE not in serial.protocol_handler_packages:
+        serial.protocol_handler_packages.append(_PACKAGE)
+    benches[name] = bench
 
 
 class Serial(SerialBase):

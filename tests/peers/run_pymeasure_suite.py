@@ -1,11 +1,13 @@
 """PyMeasure's own device suite for the Agilent 33500, run against the virtual one.
 
-    python tests/peers/run_pymeasure_suite.py pymeasure-0.16.0/ [--device-address TCPIP0::...::INSTR]
+    python tests/peers/run_pymeasure_suite.py pymeasure-0.16.0/ [--server hislip | --device-address TCPIP0::...::INSTR]
 
-In an environment with PyMeasure and levilab; the argument is PyMeasure's unpacked source distribution.  The suite's
-files stay as they are, byte for byte.  As published the suite skips itself ("only works with connected hardware")
-and knows one address, its author's, whatever ``--device-address`` says: so while it runs `pytest.skip` does not skip
-whole modules, and a resource opened at the author's address is the one at ours.
+In an environment with PyMeasure and levilab; the argument is PyMeasure's unpacked source distribution.  Without
+options the virtual instrument is in this process, by "@levilab"; with --server pyvisa-py reaches it through a server.
+
+The suite's files stay as they are, byte for byte.  As published the suite skips itself ("only works with connected
+hardware") and knows one address, its author's, whatever ``--device-address`` says: so while it runs `pytest.skip` does
+not skip whole modules, and a resource opened at the author's address is the one at ours.
 
 Ends with 0 if every case passes but for those excused in agilent33500_excuses.toml, which must not pass.
 """
@@ -13,6 +15,7 @@ Ends with 0 if every case passes but for those excused in agilent33500_excuses.t
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import sys
 import tomllib
@@ -90,9 +93,26 @@ def complaints(outcomes: dict[str, str], excused: dict[str, str]) -> list[str]:
 def run(source: Path, address: str) -> dict[str, str]:
     """How each case of the suite ends."""
     bench = Bench(address)
-    options = ["-q", "-p", "no:cacheprovider", "-p", "no:randomly", "-o", "addopts=", "--tb=short", "--no-header"]
-    pytest.main([str(source / SUITE), f"--rootdir={source}", f"--device-address={address}", *options], plugins=[bench])
+    settings = ["-c", str(source / "pyproject.toml"), f"--rootdir={source}"]  # PyMeasure's, wherever it was unpacked
+    options = ["-q", "-p", "no:cacheprovider", "--tb=short", "--no-header"]
+    pytest.main([str(source / SUITE), *settings, f"--device-address={address}", *options], plugins=[bench])
     return bench.outcomes
+
+
+@contextlib.contextmanager
+def reached(way: str | None, address: str):
+    """The address to use while this lasts, and PyVISA's library set for it.  way: of a server's of our own, if any."""
+    if way is None:
+        os.environ.setdefault("PYVISA_LIBRARY", "@levilab")
+        yield address
+        return
+    from instruments.virtual.servers.server import BenchServer
+    from levilab.virtual_bench import virtual_bus
+
+    os.environ["PYVISA_LIBRARY"] = "@py"
+    with BenchServer(virtual_bus()) as server:
+        (offer,) = (offer for offer in server.offers if offer.address == OURS)
+        yield offer.resources[way]
 
 
 def main() -> int:
@@ -100,9 +120,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("source", type=Path, help="PyMeasure's unpacked source distribution")
     parser.add_argument("--device-address", default=OURS)
+    parser.add_argument("--server", choices=["hislip", "vxi11"], help="reach a server of our own by this protocol")
     wanted = parser.parse_args()
-    os.environ.setdefault("PYVISA_LIBRARY", "@levilab")
-    outcomes, excused = run(wanted.source.resolve(), wanted.device_address), excuses()
+    with reached(wanted.server, wanted.device_address) as address:
+        outcomes, excused = run(wanted.source.resolve(), address), excuses()
     wrong = complaints(outcomes, excused)
     passed = sum(how == "passed" for how in outcomes.values())
     told = [f"{passed} of {len(outcomes)} cases pass, {len(excused)} are excused", *wrong]

@@ -1,29 +1,17 @@
-"""PyMeasure's CNT91 class, unmodified, on the virtual counter.
-
-PyMeasure's requirements clash with ours in places: it runs in an environment of its own, and is passed over where
-it is not installed.
-"""
+"""PyMeasure's CNT91 class, unmodified, on the virtual counter, by each of the ways that lead there."""
 
 import math
 
 import numpy as np
 import pytest
-import pyvisa
 
-from instruments.virtual.bus import Bus
 from instruments.virtual.counter_cnt91 import VirtualCNT91
 from levilab.clock import VirtualClock
-from pyvisa_levilab import library_for
 
 pytest.importorskip("pymeasure")
 
-from pymeasure.adapters import VISAAdapter
 from pymeasure.instruments.pendulum import CNT91
 
-# PyMeasure says so of each driver that does not declare its dialect
-pytestmark = pytest.mark.filterwarnings("ignore:It is not known whether this device support SCPI:FutureWarning")
-
-ADDRESS = "GPIB0::10::INSTR"
 SPIN = 27.3
 
 
@@ -35,15 +23,12 @@ def light(start, step, n):
 
 
 @pytest.fixture
-def bench():
+def bench(opened):
     """PyMeasure's class, and the virtual instrument that it talks to."""
     device = VirtualCNT91(VirtualClock(), signal=light)
-    library = library_for(Bus({ADDRESS: device}))
-    counter = CNT91(VISAAdapter(ADDRESS, visa_library=library, read_termination="\n", timeout=86_400_000))
+    counter = opened(CNT91, device)
     yield counter, device
     assert counter.check_errors() == []
-    counter.adapter.close()
-    pyvisa.ResourceManager(library).close()
 
 
 def count_pulses(counter):

@@ -1,4 +1,4 @@
-"""PyMeasure's classes for the two generators, unmodified, against the virtual ones, property by property."""
+"""PyMeasure's classes for the two generators, unmodified, on the virtual ones: property by property, by each way."""
 
 import pytest
 
@@ -6,38 +6,43 @@ pytest.importorskip("pymeasure")
 
 from pymeasure.instruments.agilent import Agilent33220A, Agilent33500
 
-from instruments.virtual.bus import Bus
 from instruments.virtual.generator import Virtual33500B
 from instruments.virtual.generator_33220a import Virtual33220A
 from levilab.clock import VirtualClock
-from pyvisa_levilab import library_for
 
-# PyMeasure says so of each driver that does not declare its dialect
-pytestmark = pytest.mark.filterwarnings("ignore:It is not known whether this device support SCPI:FutureWarning")
-
-ADDRESS = "TCPIP0::generator.levilab::inst0::INSTR"
-
-
-def opened(driver, device):
-    """PyMeasure's driver and the instrument that it speaks to."""
-    virtual = device(VirtualClock())
-    return driver(ADDRESS, visa_library=library_for(Bus({ADDRESS: virtual}))), virtual
+#: PyMeasure's class and the instrument that it is for.
+NEWER, OLDER = (Agilent33500, Virtual33500B), (Agilent33220A, Virtual33220A)
+BOTH = pytest.mark.parametrize("family", [NEWER, OLDER], ids=["33500", "33220A"])
 
 
 @pytest.fixture
-def newer():
-    driver, device = opened(Agilent33500, Virtual33500B)
-    yield driver, device
-    assert driver.check_errors() == []
-    driver.adapter.close()
+def family():
+    return NEWER
 
 
 @pytest.fixture
-def older():
-    driver, device = opened(Agilent33220A, Virtual33220A)
-    yield driver, device
-    assert list(device.parser.errors) == []
-    driver.adapter.close()
+def heard():
+    """What the instrument has put out, change by change."""
+    return []
+
+
+@pytest.fixture
+def plugged(opened, family, heard):
+    """The driver and the instrument that it speaks to."""
+    driver, device = family[0], family[1](VirtualClock(), listener=lambda _, output: heard.append(output.amplitude))
+    there = opened(driver, device)
+    yield there, device
+    assert there.ask("SYST:ERR?").strip() == '+0,"No error"'
+
+
+@pytest.fixture
+def newer(plugged):
+    return plugged
+
+
+def settled(driver):
+    """What was sent has been worked on: a server does so after the program has gone on."""
+    assert driver.ask("*IDN?")
 
 
 #: Of the 33500 and of each of its channels.
@@ -68,7 +73,7 @@ COMMON = [
     ("arb_srate", [1e-6, 1.6e8, 4e4]),
 ]
 ALONE = [("trigger_source", ["EXT", "BUS", "IMM"]), ("ext_trig_out", [True, False])]
-OLDER = [
+OF_THE_OLDER = [
     ("shape", ["SQU", "RAMP", "PULS", "NOIS", "DC", "USER", "SIN"]),
     ("frequency", [25.0, 20e6]),
     ("amplitude", [10.0, 0.01]),
@@ -115,9 +120,10 @@ def test_a_property_of_a_channel_of_the_33500(newer, name, values, channel):
     assert device.signal(3 - channel) == other
 
 
-@pytest.mark.parametrize(("name", "values"), OLDER, ids=lambda value: value if isinstance(value, str) else "")
-def test_a_property_of_the_33220a(older, name, values):
-    exercise(older[0], name, values)
+@pytest.mark.parametrize("family", [OLDER], ids=["33220A"])
+@pytest.mark.parametrize(("name", "values"), OF_THE_OLDER, ids=lambda value: value if isinstance(value, str) else "")
+def test_a_property_of_the_33220a(plugged, name, values):
+    exercise(plugged[0], name, values)
 
 
 def test_every_property_of_both_classes_is_exercised():
@@ -126,7 +132,7 @@ def test_every_property_of_both_classes_is_exercised():
         return own - {"display", "remote_local_state", "arb_file"}  # set only, and one that is tested with its waveform
 
     assert properties(Agilent33500) == {name for name, _ in COMMON + ALONE}
-    assert properties(Agilent33220A) == {name for name, _ in OLDER}
+    assert properties(Agilent33220A) == {name for name, _ in OF_THE_OLDER}
 
 
 def test_the_33500_says_who_it_is(newer):
@@ -139,6 +145,7 @@ def test_a_load_that_is_infinite(newer):
     driver.output_load = "INF"
     assert (driver.output_load, driver.amplitude) == (9.9e37, 20)
     driver.output = "on"
+    settled(driver)
     assert device.signal().amplitude == 10
 
 
@@ -155,32 +162,37 @@ def test_a_waveform_is_sent_selected_and_put_out(newer, form, scale):
         assert target.arb_file == '"INT:\\BUILTIN\\EXP_RISE.ARB"'
 
 
-@pytest.mark.parametrize("family", ["newer", "older"])
-def test_a_burst_is_triggered_and_waited_for(family, request):
-    driver, device = request.getfixturevalue(family)
+@BOTH
+def test_a_burst_is_triggered_and_waited_for(plugged, heard):
+    driver, device = plugged
     driver.frequency, driver.burst_ncycles, driver.trigger_source = 100, 50, "BUS"
     driver.burst_state = driver.output = True
+    settled(driver)
+    heard.clear()
     driver.trigger()
-    assert device.signal().amplitude > 0
     driver.wait_for_trigger()
+    assert heard[0] > 0
     assert device.clock.now() > 0.5
     assert device.signal().amplitude == 0
 
 
-@pytest.mark.parametrize("family", ["newer", "older"])
-def test_it_beeps(family, request):
-    request.getfixturevalue(family)[0].beep()
+@BOTH
+def test_it_beeps(plugged):
+    plugged[0].beep()
 
 
 def test_a_text_is_displayed(newer):
     driver, device = newer
     driver.display = "coil on"
+    settled(driver)
     assert device.text == "coil on"
     driver.clear_display()
     driver.phase_sync()
+    settled(driver)
     assert device.text == ""
 
 
-def test_the_front_panel_is_locked_and_freed(older):
+@pytest.mark.parametrize("family", [OLDER], ids=["33220A"])
+def test_the_front_panel_is_locked_and_freed(plugged):
     for state in ("RWLOCK", "REM", "LOC"):
-        older[0].remote_local_state = state
+        plugged[0].remote_local_state = state

@@ -1,0 +1,72 @@
+"""The ways by which other people's drivers reach a virtual instrument.
+
+PyMeasure has requirements of its own: these tests run in an environment of their own (`make peers`).  Where it is not
+installed nothing of this folder is collected.
+"""
+
+import contextlib
+from importlib.util import find_spec
+
+import pytest
+import pyvisa
+
+from instruments.virtual.bus import Bus
+from instruments.virtual.servers.server import BenchServer
+from levilab.virtual_bench import plug_in_serial
+from pyvisa_levilab import library_for
+
+if not find_spec("pymeasure"):
+    collect_ignore_glob = ["*"]
+
+#: Where an instrument is plugged in unless a test says otherwise, and where one on a serial line is.
+ADDRESS, LINE = "TCPIP0::there.levilab::inst0::INSTR", "ASRLthere::INSTR"
+
+#: PyVISA's backend in the process, and the servers with pyvisa-py.
+WAYS = ["@levilab", "socket", "hislip", "vxi11"]
+#: The same for a serial line: the servers' is one over TCP, and pyserial's URL is in the process.
+LINES = ["@levilab", "socket", "pyserial"]
+
+#: A bare socket has no ends: both sides must be told.
+_ENDS = {"read_termination": "\n", "write_termination": "\n"}
+
+
+def pytest_configure(config):
+    """PyMeasure says so of each driver that does not declare its dialect."""
+    config.addinivalue_line("filterwarnings", "ignore:It is not known whether this device support SCPI:FutureWarning")
+
+
+@pytest.fixture(params=WAYS)
+def way(request):
+    return request.param
+
+
+@pytest.fixture
+def opened(way):
+    """Plugs an instrument in and opens somebody's driver for it; unplugs it after the test."""
+    with contextlib.ExitStack() as stack:
+
+        def open_driver(driver, device, **options):
+            address = LINE if hasattr(device, "serial_settings") else ADDRESS
+            name, how = stack.enter_context(_reached(Bus({address: device}), way))
+            there = driver(name, **how, **options)
+            stack.callback(there.adapter.close)
+            return there
+
+        yield open_driver
+
+
+@contextlib.contextmanager
+def _reached(bus, way):
+    """The resource name of the one instrument of a bus, and what else PyMeasure must be told."""
+    (address,) = bus.instruments
+    if way == "@levilab":
+        library = library_for(bus)
+        yield address, {"visa_library": library}
+        pyvisa.ResourceManager(library).close()
+    elif way == "pyserial":
+        plug_in_serial(bus)
+        yield "ASRLlevilab://there::INSTR", {"visa_library": "@py"}
+    else:
+        with BenchServer(bus) as server:
+            bare = way == "socket" and not address.startswith("ASRL")
+            yield server.offers[0].resources[way], {"visa_library": "@py"} | (_ENDS if bare else {})
