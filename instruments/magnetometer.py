@@ -178,7 +178,7 @@ class LakeShoreGaussmeter(ScpiInstrument):
     def _ask(self, question: str) -> int:
         answer = self.transport.query(question)
         with self.resynchronised():
-            if not answer.isascii() or not answer.isdecimal():
+            if not re.fullmatch("[0-9]{1,9}", answer):
                 raise BadAnswer(self.transport.address, question, answer, "a whole number")
         return int(answer)
 

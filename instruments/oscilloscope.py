@@ -5,6 +5,7 @@ Facts and their sources stand with each driver.
 
 from __future__ import annotations
 
+import math
 import re
 import time
 from dataclasses import dataclass
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 _POLL = 0.02
 #: Beyond the transport's time-out, a block may take this long on its way [s]; 1 MB over a slow link.
 _BLOCK_PATIENCE = 10.0
+#: No scope of these families has a longer record; a preamble that says so was misheard.
+_MOST_POINTS = 100_000_000
 
 
 class Clock(Protocol):
@@ -98,6 +101,12 @@ class Preamble:
     volts_per_code: float
     offset_v: float
 
+    @property
+    def plausible(self) -> bool:
+        """Whether a scope can have such a record."""
+        numbers = (self.dt_s, self.t0_s, self.volts_per_code, self.offset_v)
+        return 1 <= self.points <= _MOST_POINTS and self.dt_s > 0 and all(map(math.isfinite, numbers))
+
 
 class Oscilloscope(Protocol):
     """What every oscilloscope offers."""
@@ -167,13 +176,16 @@ class _Channel(ScpiInstrument):
 
 
 class _Headed:
-    """A transport for questions that begin with the same header."""
+    """A transport for questions that begin with the same header, and for what an answer that makes no sense needs."""
 
     def __init__(self, transport: Transport, head: str) -> None:
         self.address, self._transport, self._head = transport.address, transport, head
 
     def query(self, message: str, *, patience: float = 0.0) -> str:
         return self._transport.query(self._head + message, patience=patience)
+
+    def clear(self) -> None:
+        self._transport.clear()
 
 
 class _Scope(ScpiInstrument):
@@ -196,7 +208,8 @@ class _Scope(ScpiInstrument):
     def identity(self) -> str:
         """The answer to ``*IDN?``; see :class:`Oscilloscope`."""
         answer = super().identity()
-        self._inputs = self._number_of_inputs(answer.split(",")[1])
+        model = answer.split(",")[1] if "," in answer else answer
+        self._inputs = self._number_of_inputs(model)
         return answer
 
     _inputs: int | None = None
@@ -290,9 +303,10 @@ class _Scope(ScpiInstrument):
         try:
             numbers = [float(field) for field in fields]
             preamble = self._read_preamble(numbers)
-        except (ValueError, IndexError):
-            raise BadAnswer(self.transport.address, ":WAV:PRE?", answer, "ten numbers") from None
-        if len(fields) != 10 or preamble.points < 1 or preamble.dt_s <= 0:
+        except (ValueError, OverflowError):
+            preamble = None
+        # of some nothing follows, of others no record that any of these scopes has
+        if preamble is None or not preamble.plausible:
             raise BadAnswer(self.transport.address, ":WAV:PRE?", answer, "ten numbers, with points and their distance")
         return preamble
 

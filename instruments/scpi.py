@@ -72,7 +72,7 @@ class ScpiInstrument:
         for _ in range(_LONGEST_ERROR_QUEUE):
             answer = self.transport.query("SYST:ERR?")
             number, _, text = answer.partition(",")
-            if not re.fullmatch(r"[+-]?\d+", number.strip()):
+            if not re.fullmatch(r"[+-]?\d{1,9}", number.strip()):
                 self.transport.clear()
                 raise BadAnswer(self.transport.address, "SYST:ERR?", answer, 'a number and a text, as +0,"No error"')
             if int(number) == 0:

@@ -40,10 +40,10 @@ def channels_of(parameters: list[str]) -> tuple[int, ...]:
     (2, 1)
     """
     lists = [found for text in parameters if (found := _CHANNELS.fullmatch(text))]
-    named = tuple(int(word) for found in lists for word in found[1].split(",") if word.strip())
-    if any(channel not in {1, 2} for channel in named):
+    named = [word.strip().lstrip("0") for found in lists for word in found[1].split(",") if word.strip()]
+    if any(word not in {"1", "2"} for word in named):  # compared as text: a number may have any length
         raise ScpiError(-224, "channel")
-    return named
+    return tuple(map(int, named))
 
 
 def without_channels(parameters: list[str]) -> list[str]:

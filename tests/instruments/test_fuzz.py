@@ -1,0 +1,549 @@
+"""Whatever comes over the wire, in either direction: nothing hangs, crashes or grows, and it works on afterwards."""
+
+import contextlib
+import itertools
+import math
+import tracemalloc
+
+import hostile
+import numpy as np
+import pytest
+import serial
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, rule, run_state_machine_as_test
+
+from instruments.counter import Keysight53230A, PendulumCNT91
+from instruments.errors import InstrumentError
+from instruments.generator import Agilent33220A, Keysight33500B
+from instruments.magnetometer import LakeShore425, LakeShore475
+from instruments.oscilloscope import KeysightDSOX, RigolDS1000Z, Trace
+from instruments.serial_link import SerialTransport
+from instruments.transport import VisaTransport
+from instruments.virtual.bus import Bus
+from instruments.virtual.device import Answer
+from instruments.virtual.faults import FAULTS, LATE, Fault
+from instruments.virtual.serial_line import benches
+from pyvisa_levilab import library_for
+
+#: `make explore` draws forty times as many; a machine that is busy is no reason to fail.
+EXPLORING = settings.get_current_profile_name() == "explore"
+FEW = settings(max_examples=1000 if EXPLORING else 25, deadline=None, suppress_health_check=list(HealthCheck))
+
+
+# --- messages ---
+
+
+def parameters(device):
+    word, nasty = st.sampled_from(hostile.words(device)), st.sampled_from(hostile.NASTY)
+    number = st.one_of(st.integers(-3, 20), st.floats(allow_nan=False)).map(str)
+    block = st.binary(max_size=40).map(lambda data: f"#{len(str(len(data)))}{len(data)}{data.decode('latin-1')}")
+    text = st.text(st.characters(max_codepoint=255), max_size=20)
+    single = st.one_of(word, nasty, nasty, number, block, text)
+    return st.one_of(st.just(""), word, single, st.lists(single, max_size=9).map(",".join))
+
+
+def units(device):
+    header = st.sampled_from(hostile.headers(device))
+    question = st.sampled_from([header for header in hostile.headers(device) if header.endswith("?")])
+    whole = st.tuples(st.sampled_from(["", ":"]), header, st.sampled_from([" ", "", "\t"]), parameters(device))
+    return st.one_of(whole.map("".join), question)
+
+
+def messages(device):
+    """Compounds of the instrument's own commands with any parameters, and noise."""
+    compound = st.lists(units(device), min_size=1, max_size=4).map(";".join)
+    text = compound.map(lambda message: message.encode("latin-1"))
+    return st.one_of(text, text, text, st.binary(max_size=60))
+
+
+MESSAGES = {name: messages(hostile.instrument(name)) for name in hostile.NAMES}
+
+
+@pytest.mark.parametrize("stream", [False, True], ids=["messages", "stream"])
+@pytest.mark.parametrize("name", hostile.NAMES)
+def test_no_message_makes_an_instrument_crash_hang_or_grow(name, stream):
+    @FEW
+    @given(st.lists(st.tuples(MESSAGES[name], st.sampled_from([None, 0.0, 0.01, 1.0, 30.0])), max_size=12))
+    def any_messages(sent):
+        bench = hostile.Bench(name, stream=stream)
+        for message, timeout in sent:
+            bench.send(message + b"\n")
+            if timeout is not None:
+                bench.read(timeout)
+        bench.recover()
+
+    any_messages()
+
+
+@pytest.mark.parametrize("name", hostile.NAMES)
+def test_bytes_cut_anywhere_make_the_same_messages(name):
+    @FEW
+    @given(st.lists(MESSAGES[name], min_size=1, max_size=4).map(b"\n".join), st.lists(st.integers(1, 30), min_size=1))
+    def any_cuts(data, sizes):
+        data += b"\n"
+        whole, pieces = hostile.Bench(name, stream=True), hostile.Bench(name, stream=True)
+        whole.send(data)
+        place = 0
+        for size in itertools.cycle(sizes):
+            pieces.send(data[place : place + size])
+            place += size
+            if place >= len(data):
+                break
+        assert pieces.device.settings == whole.device.settings
+        assert pieces.device.parser.errors == whole.device.parser.errors
+        assert pieces.read() == whole.read()
+
+    any_cuts()
+
+
+@pytest.mark.parametrize("name", ["53230A", "33500B", "DS1000Z", "475"])
+def test_an_instrument_that_is_talked_to_for_long_keeps_no_more_memory(name):
+    bench = hostile.Bench(name)
+    every = hostile.headers(bench.device)
+    nasty = [word for word in hostile.NASTY if len(word) < 1000]
+
+    def talk(turns):
+        for k in range(turns):
+            header = every[7 * k % len(every)]
+            if not header.upper().startswith(("DATA", "SOUR:DATA", "*SAV")):  # what is there to keep
+                bench.send(f"{header} {nasty[k % len(nasty)]}".encode("latin-1"))
+            bench.send(b"NO%d:SUCH%d %d" % (k, k, k))
+        bench.recover()
+
+    talk(500)  # all that is made once is there
+    tracemalloc.start()
+    try:
+        talk(50)
+        before, _ = tracemalloc.get_traced_memory()
+        talk(600)
+        after, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    # a kilobyte kept of each message would be 1.2 MB
+    assert after - before < 300_000
+
+
+# --- what was found ---
+
+
+@pytest.mark.parametrize(
+    ("name", "message", "number"),
+    [
+        ("53230A", "CONF:FREQ (@" + "9" * 5000 + ")", -224),  # longer than Python makes a whole number of
+        ("CNT-91", "MEAS:FREQ? (@" + "9" * 5000 + ")", -224),
+        ("33500B", "DATA:ARB T,#\xb2\xb2", -102),  # a digit, but no number
+        ("33500B", "DATA:ARB T,#3\xb2\xb3\xb9", -102),
+    ],
+)
+def test_a_number_that_is_none_is_refused(name, message, number):
+    bench = hostile.Bench(name)
+    bench.send(message.encode("latin-1"))
+    assert [int(entry.split(",")[0]) for entry in bench.device.parser.errors] == [number]
+    bench.recover()
+
+
+# --- drivers ---
+
+
+class Liar:
+    """An instrument that answers the next questions with these replies, and then as it should.
+
+    replies: bytes, their delay [s], and whether their end is marked; None in the place of an honest answer.
+    """
+
+    def __init__(self, device, replies=()):
+        self._device, self.replies = device, list(replies)
+
+    def __getattr__(self, name):
+        return getattr(self._device, name)
+
+    def execute(self, message):
+        answer = self._device.execute(message)
+        if "?" not in message or not self.replies or (reply := self.replies.pop(0)) is None:
+            return answer
+        data, delay, complete = reply
+        return Answer(data, self._device.clock.now() + delay, self._device.epoch, complete) if data else None
+
+
+def _block(size, data):
+    return b"#%d%d" % (len(str(size)), size) + data
+
+
+#: Answers that have broken programs before, without their line ends.
+LINES = (
+    *b"0 1 -1 nan inf -inf 1e999 9.91E37 1_0 STOP TD WAIT OL 040 049 128 255 1,2 1,2,3 1,1,1 , ,,, ,,,,,,,,,".split(),
+    *b"0,0,1e999,1,1,0,0,1,0,0 0,0,nan,1,1,0,0,1,0,0 0,0,1e18,1,1,0,0,1,0,0 0,0,3.5,1,1,0,0,1,0,0".split(),
+    *b"0,0,1000,1,nan,0,0,nan,0,0 0,0,10,1,1e-3,0,0,inf,0,0 a,DS1054Z,b,c DS1054Z MODEL425 MODEL475".split(),
+    *(b'+0,"No error"', b'-113,"Undefined header"', b"DSO-X 1102G", b"NO PROBE", b"", b"\r", b"\n" * 30, b"1\n" * 100),
+    *(b"+" + b"9" * 5000, b"9" * 5000 + b",x", b"9" * 400, b"\xb2", b"\0" * 50, b"#0", b"#10", b"#9999999999"),
+    *(b"#15abc", b"#13abc", b"#13abcdef", b"#800000003abc", b"#3\xb2\xb2\xb2", b"1;2", b"#11\n"),
+)
+LIES = st.one_of(
+    st.sampled_from(LINES).map(lambda line: line + b"\n"),
+    st.sampled_from(LINES),
+    st.binary(max_size=40),
+    st.one_of(st.integers(), st.floats()).map(lambda number: b"%s\n" % str(number).encode()),
+    st.lists(st.floats().map(str), min_size=1, max_size=11).map(lambda numbers: ",".join(numbers).encode() + b"\n"),
+    st.tuples(st.integers(0, 2000), st.binary(max_size=30)).map(lambda drawn: _block(*drawn) + b"\n"),
+)
+MOST_LATE = 60.0
+REPLIES = st.lists(
+    st.one_of(
+        st.none(),
+        st.none(),
+        st.tuples(LIES, st.sampled_from([0.0, 0.0, 0.0, 1.0, 5.0, MOST_LATE]), st.booleans()),
+        st.just((b"", 0.0, False)),
+    ),
+    min_size=1,
+    max_size=30,
+)
+
+
+def is_settings(value):
+    return isinstance(value, dict) and all(isinstance(setting, bool | float | str) for setting in value.values())
+
+
+def is_number(value):
+    return isinstance(value, float) and math.isfinite(value)
+
+
+def is_reading(value):
+    return value is None or is_number(value)
+
+
+def is_nothing(value):
+    return value is None
+
+
+def is_text(value):
+    return isinstance(value, str)
+
+
+def are_readings(shape):
+    return lambda value: value.shape == shape and not np.isinf(value).any()
+
+
+def is_trace(value):
+    numbers = (value.dt_s, value.t0_s, value.volts_per_code, value.offset_v)
+    return isinstance(value, Trace) and value.codes.size >= 1 and all(map(math.isfinite, numbers))
+
+
+def _prepared(driver):
+    driver.prepare(channels=[1], duration_s=0.1, points=1000, volts_per_division=0.5, trigger_level_v=0.6)
+
+
+ANY = {
+    "identity": (lambda driver: driver.identity(), is_text),
+    "settings": (lambda driver: driver.settings(), is_settings),
+    "forget_errors": (lambda driver: driver.forget_errors(), is_nothing),
+    "clear": (lambda driver: driver.transport.clear(), is_nothing),
+}
+COUNTER = ANY | {
+    "prepare": (lambda driver: driver.prepare(gate_s=0.5, trigger_level_v=0.6), is_nothing),
+    "frequency": (lambda driver: driver.frequency(), is_reading),
+    "readings": (lambda driver: driver.readings(3), are_readings((3,))),
+}
+GENERATOR = ANY | {
+    "prepare": (lambda driver: driver.prepare(waveform="TRI", frequency_hz=25.0, amplitude_vpp=2.0), is_nothing),
+    "on": (lambda driver: setattr(driver, "output", True), is_nothing),
+    "is it on": (lambda driver: driver.output, lambda value: isinstance(value, bool)),
+    "off": (lambda driver: driver.off(), is_nothing),
+}
+SCOPE = ANY | {
+    "prepare": (_prepared, is_nothing),
+    "acquire": (lambda driver: driver.acquire(timeout_s=0.5), is_nothing),
+    "trace": (lambda driver: driver.trace(1), is_trace),
+    "blocks": (lambda driver: sum(piece.size for piece in driver.blocks(1)), lambda size: size >= 1),
+    "off": (lambda driver: driver.off(), is_nothing),
+}
+MAGNETOMETER = ANY | {
+    "prepare": (lambda driver: driver.prepare(range_t=0.035), is_nothing),
+    "prepare, any range": (lambda driver: driver.prepare(range_t=None), is_nothing),
+    "flux_density": (lambda driver: driver.flux_density(), is_reading),
+    "probe": (lambda driver: driver.probe(), is_text),
+    "zero": (lambda driver: driver.zero(), is_nothing),
+}
+#: Model → its driver, what can be called, and in what a measurement with a good far end must end.
+DRIVERS = {
+    "53230A": (Keysight53230A, COUNTER | {"gate": (lambda driver: driver.gate, lambda v: isinstance(v, float))}),
+    "CNT-91": (PendulumCNT91, COUNTER | {"timed": (lambda driver: driver.timed_readings(3), are_readings((3, 2)))}),
+    "33500B": (Keysight33500B, GENERATOR),
+    "33220A": (Agilent33220A, GENERATOR),
+    "DS1000Z": (RigolDS1000Z, SCOPE),
+    "DSOX1000": (KeysightDSOX, SCOPE),
+    "425": (LakeShore425, MAGNETOMETER),
+    "475": (LakeShore475, MAGNETOMETER),
+}
+
+
+def good(name, driver):
+    """A measurement as a program makes it, with a far end that is in order."""
+    driver.forget_errors()
+    if name in {"53230A", "CNT-91"}:
+        driver.prepare(gate_s=0.5, trigger_level_v=0.6)
+        assert driver.frequency() == pytest.approx(30.0, rel=1e-3)
+        assert driver.readings(2) == pytest.approx([30.0, 30.0], rel=1e-3)
+    elif name in {"33500B", "33220A"}:
+        driver.prepare(waveform="SIN", frequency_hz=30.0, amplitude_vpp=3.0)
+        driver.output = True
+        assert (driver.frequency, driver.amplitude, driver.output) == (30.0, 3.0, True)
+        driver.off()
+        assert driver.output is False
+    elif name in {"DS1000Z", "DSOX1000"}:
+        _prepared(driver)
+        driver.acquire(timeout_s=1.0)
+        volts = driver.trace(1).volts
+        assert -0.1 < volts.min() < 0.1
+        assert 1.1 < volts.max() < 1.3
+    else:
+        driver.transport.write("ZCLEAR")  # it may have been zeroed in the field
+        driver.prepare(range_t=0.035)
+        assert driver.flux_density() == pytest.approx(0.019, abs=2e-4)
+
+
+ADDRESSES = {
+    "messages": "TCPIP0::box.levilab::inst0::INSTR",
+    "stream": "TCPIP0::box.levilab::5025::SOCKET",
+    "serial": "ASRLbox.levilab::INSTR",
+}
+_bench_numbers = itertools.count()
+
+
+@pytest.fixture(autouse=True)
+def our_handler(monkeypatch):
+    """pyserial knows the URLs of the virtual bench."""
+    monkeypatch.setattr(serial, "protocol_handler_packages", ["instruments.virtual"])
+
+
+class Pair:
+    """A driver, and a liar in a room of its own behind a link of this kind."""
+
+    def __init__(self, name, way, replies=()):
+        self.room = hostile.Room()
+        self.liar = Liar(hostile.instrument(name, self.room))
+        address = ADDRESSES["serial" if way == "pyserial" else way]
+        self.bus = Bus({address: self.liar})
+        kind = DRIVERS[name][0]
+        line = dict(getattr(kind, "SERIAL", {})) | {"pause": 0.0}
+        if way == "pyserial":
+            self.bench = f"fuzz{next(_bench_numbers)}"
+            benches[self.bench] = lambda: self.bus
+            self.transport = SerialTransport(f"levilab://box?bench={self.bench}", **line)
+        else:
+            del line["pause"]
+            self.transport = VisaTransport(address, library=library_for(self.bus), line=line)
+        clock = {"clock": self.room.clock} if name in {"DS1000Z", "DSOX1000"} else {}
+        self.driver = kind(self.transport, **clock)
+        self.liar.replies = list(replies)
+
+    def close(self):
+        self.driver.close()
+        benches.pop(getattr(self, "bench", ""), None)
+
+
+WAYS = [
+    *((name, way) for name in DRIVERS if name not in {"425", "475"} for way in ("messages", "stream")),
+    *((name, way) for name in ("425", "475") for way in ("serial", "pyserial")),
+    ("475", "messages"),
+]
+
+
+@pytest.mark.parametrize(("name", "way"), WAYS)
+def test_a_driver_whose_instrument_answers_anything_gives_a_value_or_an_instrument_error(name, way):
+    calls = DRIVERS[name][1]
+
+    @FEW
+    @given(REPLIES, st.lists(st.sampled_from(sorted(calls)), min_size=1, max_size=6))
+    def any_answers(replies, wanted):
+        pair = Pair(name, way, replies)
+        try:
+            for call in wanted:
+                act, is_right = calls[call]
+                with contextlib.suppress(InstrumentError):
+                    value = act(pair.driver)
+                    assert is_right(value), (call, value)
+            pair.liar.replies.clear()
+            pair.room.clock.sleep(MOST_LATE)  # what is late has come, and nobody may take it for an answer
+            good(name, pair.driver)
+        finally:
+            pair.close()
+
+    any_answers()
+
+
+@pytest.mark.parametrize(
+    ("name", "call", "line"),
+    [
+        ("53230A", "prepare", b"9" * 5000 + b",x"),  # longer than Python makes a whole number of
+        ("425", "probe", b"9" * 5000),
+        ("DS1000Z", "settings", b""),
+        ("DS1000Z", "blocks", b"0,0,1e999,1,1,0,0,1,0,0"),
+        ("DSOX1000", "trace", b"0,0,1e18,1,1,0,0,1,0,0"),  # more than there is memory for
+        ("DSOX1000", "trace", b"0,0,1000,1,nan,0,0,nan,0,0"),
+    ],
+)
+def test_an_answer_that_was_misheard_ends_in_an_instrument_error(name, call, line):
+    pair = Pair(name, "serial" if name == "425" else "messages")
+    prepare = DRIVERS[name][1]["prepare"][0]
+    prepare(pair.driver)
+    if name in {"DS1000Z", "DSOX1000"}:
+        pair.driver.acquire(timeout_s=1.0)
+    act, _ = DRIVERS[name][1][call]
+    for honest in range(60):  # whichever question it is
+        pair.liar.replies = [None] * honest + [(line + b"\n", 0.0, True)]
+        with contextlib.suppress(InstrumentError):
+            act(pair.driver)
+    pair.liar.replies.clear()
+    good(name, pair.driver)
+    pair.close()
+
+
+def test_a_scope_that_says_its_model_and_no_more_is_known_by_it():
+    pair = Pair("DS1000Z", "messages", [(b"DS1054Z\n", 0.0, True)])
+    assert pair.driver.identity() == "DS1054Z"
+    good("DS1000Z", pair.driver)
+    pair.close()
+
+
+# --- pairs, and faults at any time ---
+
+
+class Pairing(RuleBasedStateMachine):
+    """A driver and its virtual instrument, while faults strike: no reading is one that the world could not give."""
+
+    name, way = "53230A", "messages"
+
+    def __init__(self):
+        super().__init__()
+        self.pair = Pair(self.name, self.way)
+        self.driver = self.pair.driver
+        self.prepared = False
+
+    def teardown(self):
+        """Whatever was wrong is over: then everything works, at once."""
+        self.pair.bus.faults.clear()
+        self.pair.room.clock.sleep(10 * LATE)
+        self.come_back()
+        good(self.name, self.driver)
+        self.pair.close()
+
+    def come_back(self):
+        """What a program does when it has lost an instrument, or another one has taken it."""
+        for hold in self.pair.bus._holds.values():
+            hold.holders.clear()
+        self.driver.transport.reopen()
+
+    @rule(
+        what=st.sampled_from(sorted(FAULTS)),
+        question=st.sampled_from([r".*\?.*", r".*(READ|RDGFIELD|TRAC|DATA|FETC).*\?.*", r"SYST:ERR\?"]),
+        after=st.integers(0, 12),
+        times=st.integers(1, 3),
+    )
+    def a_fault(self, what, question, after, times):
+        self.pair.bus.faults.append(Fault(what, question=question, after=after, times=times))
+
+    @rule(seconds=st.sampled_from([0.01, 1.0, 4.0, 20.0]))
+    def time_passes(self, seconds):
+        self.pair.room.clock.sleep(seconds)
+
+    @rule()
+    def the_link_is_made_anew(self):
+        with contextlib.suppress(InstrumentError):
+            self.come_back()
+
+    @rule()
+    def errors_are_forgotten(self):
+        with contextlib.suppress(InstrumentError):
+            self.driver.forget_errors()
+
+    @rule()
+    def who_is_there(self):
+        with contextlib.suppress(InstrumentError):
+            assert self.driver.identity() == self.pair.liar.identity
+
+    @rule()
+    def it_is_prepared(self):
+        self.prepared = False
+        with contextlib.suppress(InstrumentError):
+            DRIVERS[self.name][1]["prepare"][0](self.driver)
+            self.prepared = True
+
+    @rule()
+    def it_is_read(self):
+        if self.prepared:
+            with contextlib.suppress(InstrumentError):
+                self.read()
+
+    def read(self):
+        raise NotImplementedError
+
+
+def is_world_frequency(value):
+    return value is None or math.isnan(value) or value == pytest.approx(30.0, rel=1e-3)
+
+
+class CounterPairing(Pairing):
+    def read(self):
+        assert is_world_frequency(self.driver.frequency())
+
+    @rule(count=st.integers(1, 4))
+    def several_are_read(self, count):
+        if self.prepared:
+            with contextlib.suppress(InstrumentError):
+                found = self.driver.readings(count)
+                assert found.shape == (count,)
+                assert all(map(is_world_frequency, found))
+
+
+class GeneratorPairing(Pairing):
+    def read(self):
+        # as it was set, or as after the reset that a fault was
+        assert self.driver.frequency in {25.0, 1000.0}
+        assert self.driver.waveform in {"TRI", "RAMP", "SIN"}
+        assert self.driver.output is self.pair.liar.settings["output"]
+
+    @rule()
+    def it_is_switched_off(self):
+        with contextlib.suppress(InstrumentError):
+            self.driver.off()
+            assert self.pair.liar.settings["output"] is False
+
+    @rule()
+    def it_is_switched_on(self):
+        with contextlib.suppress(InstrumentError):
+            self.driver.output = True
+
+
+class ScopePairing(Pairing):
+    def read(self):
+        self.driver.acquire(timeout_s=1.0)
+        trace = self.driver.trace(1)
+        volts = trace.volts
+        assert volts.min() > -0.1
+        assert volts.max() < 1.3
+        assert trace.dt_s * volts.size == pytest.approx(0.1, rel=0.3)
+
+
+class MagnetometerPairing(Pairing):
+    def read(self):
+        value = self.driver.flux_density()
+        assert value is None or value == pytest.approx(0.019, abs=2e-4)
+
+
+PAIRINGS = {
+    "53230A": CounterPairing,
+    "CNT-91": CounterPairing,
+    "33500B": GeneratorPairing,
+    "33220A": GeneratorPairing,
+    "DS1000Z": ScopePairing,
+    "DSOX1000": ScopePairing,
+    "425": MagnetometerPairing,
+    "475": MagnetometerPairing,
+}
+
+
+@pytest.mark.parametrize(("name", "way"), WAYS)
+def test_no_fault_at_any_time_makes_a_reading_that_the_world_could_not_give(name, way):
+    machine = type("Pairing", (PAIRINGS[name],), {"name": name, "way": way})
+    run_state_machine_as_test(machine, settings=settings(FEW, stateful_step_count=12))
