@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from instruments.scpi import INFINITY
 from instruments.virtual.faults import LinkLost
 from instruments.virtual.framing import Framer, Overrun
-from instruments.virtual.scpi import ScpiError
+from instruments.virtual.scpi import LONGEST_ANSWER, ScpiError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 
 
 _NOTHING = memoryview(b"")
+#: Answers that wait to be read, at most.
+MOST_ANSWERS = 1000
 
 
 @dataclass
@@ -137,6 +141,16 @@ class Session:
         self._drop_what_is_abandoned()
         if answer is not None:
             self._answers.append(answer)
+            self._keep_within_bounds()
+
+    def _keep_within_bounds(self) -> None:
+        """Who asks on and on and never reads gets nothing of it (IEEE 488.2, 6.3.1.7)."""
+        if len(self._answers) < 2:
+            return
+        if len(self._answers) > MOST_ANSWERS or sum(len(answer.data) for answer in self._answers) > LONGEST_ANSWER:
+            self._answers.clear()
+            self._rest = _NOTHING
+            self.device.parser.report(ScpiError(-430))
 
     def _check_link(self) -> None:
         if self.lost_after is not None and self.lost_after <= 0:
@@ -162,9 +176,10 @@ class Session:
         """
         clock = self.device.clock
         ready = self.ready()
-        if ready is None or ready > clock.now() + timeout:
+        if ready is None or ready > clock.now() + timeout or ready >= INFINITY:
             self._note_silence(ready)
-            clock.sleep(timeout)
+            if math.isfinite(timeout):  # for ever is no time to jump to
+                clock.sleep(timeout)
             return None
         clock.sleep(max(0.0, ready - clock.now()))
         return self.take(count, until=until)

@@ -20,7 +20,7 @@ from instruments.magnetometer import LakeShore425, LakeShore475
 from instruments.oscilloscope import KeysightDSOX, RigolDS1000Z, Trace
 from instruments.serial_link import SerialTransport
 from instruments.transport import VisaTransport
-from instruments.virtual.bus import Bus
+from instruments.virtual.bus import MOST_ANSWERS, Bus
 from instruments.virtual.device import Answer
 from instruments.virtual.faults import FAULTS, LATE, Fault
 from instruments.virtual.serial_line import benches
@@ -140,6 +140,28 @@ def test_a_number_that_is_none_is_refused(name, message, number):
     bench = hostile.Bench(name)
     bench.send(message.encode("latin-1"))
     assert [int(entry.split(",")[0]) for entry in bench.device.parser.errors] == [number]
+    bench.recover()
+
+
+@pytest.mark.parametrize("name", ["53230A", "DSOX1000"])
+def test_a_program_that_waits_for_ever_for_nothing_leaves_the_clock_alone(name):
+    bench = hostile.Bench(name)
+    assert bench.session.read(100, math.inf) is None
+    never = b"TRIG:SOUR BUS;:INIT;*OPC?" if name == "53230A" else b":TRIG:SWE NORM;:TRIG:SOUR EXT;:DIG;*OPC?"
+    bench.send(never)
+    assert bench.session.read(100, math.inf) is None
+    assert bench.room.clock.now() < 1.0
+    bench.recover()
+
+
+def test_a_program_that_asks_on_and_never_reads_gets_nothing_and_is_told():
+    bench = hostile.Bench("33500B", stream=True)
+    bench.send(b"*IDN?\n" * 10_000)
+    assert len(bench.session._answers) <= MOST_ANSWERS
+    bench.session.clear()
+    bench.send(b"SYST:ERR?\n")
+    assert bench.read()[0] == b'-430,"Query DEADLOCKED"\n'
+    bench.send(b"*CLS\n")
     bench.recover()
 
 
