@@ -113,6 +113,8 @@ class VisaTransport:
                 f"cannot be opened ({one_line(error)}){advice(error)}",
             ) from error
         resource.write_termination = resource.read_termination = "\n"
+        if self.address.upper().endswith(_BARE_SOCKET):
+            _send_at_once(resource)
         if self.address.upper().startswith("ASRL"):
             self._set_line(resource)
         return resource  # type: ignore[no-any-return]
@@ -127,13 +129,19 @@ class VisaTransport:
 
     def write(self, message: str) -> None:
         """Send one message; see :class:`Transport`."""
+        self._begin(message)
+        with self._told_as_ours(message, self.timeout):
+            self._send(message)
+
+    def _begin(self, message: str) -> None:
         if self._out_of_step:
             self.clear()
         self._record(">", message)
-        with self._told_as_ours(message, self.timeout):
-            if self._stream:  # an answer that nobody waited for is no answer to this
-                self._discard_received()
-            self._resource.write(message)
+
+    def _send(self, message: str) -> None:
+        if self._stream:  # an answer that nobody waited for is no answer to this
+            self._discard_received()
+        self._resource.write(message)
 
     def _discard_received(self) -> None:
         """Empty the pipe without waiting.
@@ -143,9 +151,8 @@ class VisaTransport:
         """
         import pyvisa
 
-        link: Any = getattr(self._resource.visalib, "sessions", {}).get(self._resource.session)
-        interface = getattr(link, "interface", None)
-        if not isinstance(interface, socket.socket):
+        link, interface = _bare_socket(self._resource)
+        if interface is None:
             self._resource.flush(pyvisa.constants.BufferOperation.discard_read_buffer)
             return
         link._pending_buffer.clear()
@@ -155,9 +162,10 @@ class VisaTransport:
 
     def query(self, message: str, *, patience: float = 0.0) -> str:
         """Ask; see :class:`Transport`."""
-        self.write(message)
+        self._begin(message)
         within = self.timeout + patience
         with self._told_as_ours(message, within):
+            self._send(message)
             self._resource.timeout = 1000 * within
             # more than the longest answer without an end is noise: it is left for the next resynchronisation
             answer = self._resource.read_bytes(_LONGEST_ANSWER, chunk_size=_CHUNK, break_on_termchar=True)
@@ -167,9 +175,10 @@ class VisaTransport:
 
     def query_block(self, message: str, *, patience: float = 0.0) -> bytes:
         """Ask for a block; see :class:`Transport`."""
-        self.write(message)
+        self._begin(message)
         within = self.timeout + patience
         with self._told_as_ours(message, within):
+            self._send(message)
             self._resource.timeout = 1000 * within
             block = self._block()
         self._record("<", f"({len(block)} bytes)")
@@ -272,6 +281,23 @@ class VisaTransport:
             # an interruption between question and answer leaves the answer in the pipe
             self._out_of_step = True
             raise
+
+
+def _bare_socket(resource: Any) -> tuple[Any, socket.socket | None]:
+    """pyvisa-py's session with a bare socket, and the socket; None from any other library."""
+    link = getattr(resource.visalib, "sessions", {}).get(resource.session)
+    interface = getattr(link, "interface", None)
+    return link, interface if isinstance(interface, socket.socket) else None
+
+
+def _send_at_once(resource: Any) -> None:
+    """VISA's default (VPP-4.3, VI_ATTR_TCPIP_NODELAY), which pyvisa-py leaves out and has no switch for.
+
+    Without it a message that follows one without an answer waits until that one is acknowledged: 0.04 s.
+    """
+    _, interface = _bare_socket(resource)
+    if interface is not None:
+        interface.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
 
 def addresses(library: str | VisaLibraryBase) -> tuple[str, ...]:
