@@ -108,7 +108,8 @@ def virtual_bus(world: World | None = None, models: Mapping[str, str] | None = N
 
     world = world or own_world()
     chosen = {kind: settings.model for kind, settings in VIRTUAL.items()} | dict(models or {})
-    return Bus({VIRTUAL[kind].address: _maker(kind, model)(world) for kind, model in chosen.items()})
+    instruments = {kind: _maker(kind, model)(world) for kind, model in chosen.items()}
+    return Bus({VIRTUAL[kind].address: instrument for kind, instrument in instruments.items()})
 
 
 def plug_in_serial(bus: Bus | None = None) -> Bus:

@@ -21,10 +21,9 @@ if not find_spec("pymeasure"):
 #: Where an instrument is plugged in unless a test says otherwise, and where one on a serial line is.
 ADDRESS, LINE = "TCPIP0::there.levilab::inst0::INSTR", "ASRLthere::INSTR"
 
-#: PyVISA's backend in the process, and the servers with pyvisa-py.
+#: PyVISA's backend in the process, and the servers with pyvisa-py.  Tests of serial lines name others: over TCP
+#: ("socket", too), and pyserial's URL.
 WAYS = ["@levilab", "socket", "hislip", "vxi11"]
-#: The same for a serial line: the servers' is one over TCP, and pyserial's URL is in the process.
-LINES = ["@levilab", "socket", "pyserial"]
 
 #: A bare socket has no ends: both sides must be told.
 _ENDS = {"read_termination": "\n", "write_termination": "\n"}
