@@ -4,7 +4,7 @@ BIN    := .venv/bin
 DEMO   := demo
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test explore lint all-pythons wheel peers bench clean
+.PHONY: help setup demo test explore fuzz lint all-pythons wheel peers bench clean
 
 help:  ## list the targets
 	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -29,6 +29,9 @@ test: setup lint  ## everything that must pass: style, types, imports, tests
 
 explore: setup  ## the property tests with new random examples
 	HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest tests/levilab/test_formats.py tests/analysis tests/instruments
+
+fuzz: setup  ## what a fuzzer guided by coverage finds, SECONDS for each target (60); see docs/fuzzing.md
+	$(BIN)/nox --session fuzz -- --seconds $(or $(SECONDS),60)
 
 lint: setup  ## style, types and import rules
 	$(BIN)/ruff check .

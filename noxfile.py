@@ -50,6 +50,13 @@ def wheel(session: nox.Session) -> None:
     session.log(f"the wheel works on {sys.platform}")
 
 
+@nox.session(python="3.11")
+def fuzz(session: nox.Session) -> None:
+    """Bytes that a fuzzer guided by coverage makes up; for the folders here, not for the wheel."""
+    session.install("--editable", ".[fuzz]", "--constraint", str(CONSTRAINTS))
+    session.run("python", "fuzz/run.py", *session.posargs)
+
+
 @nox.session
 def peers(session: nox.Session) -> None:
     """Other people's drivers, unmodified, on the virtual bench; and PyMeasure's own suite for a real instrument."""

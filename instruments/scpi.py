@@ -29,10 +29,17 @@ _LONGEST_ERROR_QUEUE = 64
 
 #: An answer's text as a value.  Instruments quote some words, and print switches as 0 or 1.
 _FROM_WIRE: dict[type, Callable[[str], Any]] = {
-    float: float,
+    float: lambda answer: _setting_of(float(answer)),
     bool: lambda answer: bool(int(answer)),
     str: lambda answer: answer.strip('"'),
 }
+
+
+def _setting_of(number: float) -> float:
+    """The number, if a setting can be it: infinity is printed as 9.9E37.  Raises ValueError."""
+    if not math.isfinite(number) or abs(number) >= NOT_A_NUMBER:
+        raise ValueError(number)
+    return number
 
 
 class ScpiInstrument:
@@ -47,8 +54,11 @@ class ScpiInstrument:
         self.transport = transport
 
     def identity(self) -> str:
-        """The answer to ``*IDN?``.  Raises WrongInstrument when another model answers."""
+        """The answer to ``*IDN?``.  Raises WrongInstrument when another model answers, BadAnswer when it is no text."""
         answer = self.transport.query("*IDN?")
+        if not answer.isprintable():
+            with self.resynchronised():
+                raise BadAnswer(self.transport.address, "*IDN?", answer, "maker, model, serial number, firmware")
         model = answer.split(",")[1].strip() if answer.count(",") >= 2 else answer
         if not re.fullmatch(self.MODELS, model, re.IGNORECASE):
             raise WrongInstrument(self.transport.address, answer, f"a model like {self.MODELS}")

@@ -120,12 +120,18 @@ class Session:
         """Bytes for the instrument; it works on every message that they complete.  end: marked by the interface."""
         with self.lock:
             self._check_link()
-            # END takes the place of a line feed if there is none (IEEE 488.2, 7.5)
-            for message in self._framer.feed(data + b"\n" if end and not self.stream else data):
+            for message in self._messages(data, end=end and not self.stream):
                 if isinstance(message, Overrun):
                     self.device.parser.report(ScpiError(-363))
                 elif message:
                     self._run(message)
+
+    def _messages(self, data: bytes, *, end: bool) -> list[str | Overrun]:
+        """What these bytes complete.  END takes the place of a line feed if there is none (IEEE 488.2, 7.5)."""
+        messages = self._framer.feed(data if not end or data.endswith(b"\n") else data + b"\n")
+        if end and self._framer.begun:  # that line feed was a byte of a block
+            messages += self._framer.feed(b"\n")
+        return messages
 
     def _run(self, message: str) -> None:
         self._drop_what_is_abandoned()
@@ -212,7 +218,10 @@ class Session:
     def trigger(self) -> None:
         """The interface's trigger message."""
         with self.lock:
-            self.device.trigger()
+            try:
+                self.device.trigger()
+            except ScpiError as error:  # as in answer to *TRG: told in the error queue
+                self.device.parser.report(error)
 
     def close(self) -> None:
         """The program is gone."""

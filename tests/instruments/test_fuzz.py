@@ -9,12 +9,13 @@ import hostile
 import numpy as np
 import pytest
 import serial
+from fuzz_targets import TARGETS
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, rule, run_state_machine_as_test
 
 from instruments.counter import Keysight53230A, PendulumCNT91
-from instruments.errors import InstrumentError
+from instruments.errors import BadAnswer, InstrumentError
 from instruments.generator import Agilent33220A, Keysight33500B
 from instruments.magnetometer import LakeShore425, LakeShore475
 from instruments.oscilloscope import KeysightDSOX, RigolDS1000Z, Trace
@@ -28,7 +29,7 @@ from pyvisa_levilab import library_for
 
 #: `make explore` draws forty times as many; a machine that is busy is no reason to fail.
 EXPLORING = settings.get_current_profile_name() == "explore"
-FEW = settings(max_examples=1000 if EXPLORING else 25, deadline=None, suppress_health_check=list(HealthCheck))
+FEW = settings(max_examples=1000 if EXPLORING else 60, deadline=None, suppress_health_check=list(HealthCheck))
 
 
 # --- messages ---
@@ -111,16 +112,16 @@ def test_an_instrument_that_is_talked_to_for_long_keeps_no_more_memory(name):
             bench.send(b"NO%d:SUCH%d %d" % (k, k, k))
         bench.recover()
 
-    talk(500)  # all that is made once is there
+    talk(400)  # all that is made once is there
     tracemalloc.start()
     try:
         talk(50)
         before, _ = tracemalloc.get_traced_memory()
-        talk(600)
+        talk(400)
         after, _ = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
-    # a kilobyte kept of each message would be 1.2 MB
+    # a kilobyte kept of each message would be 0.8 MB
     assert after - before < 300_000
 
 
@@ -163,6 +164,29 @@ def test_a_program_that_asks_on_and_never_reads_gets_nothing_and_is_told():
     assert bench.read()[0] == b'-430,"Query DEADLOCKED"\n'
     bench.send(b"*CLS\n")
     bench.recover()
+
+
+def test_a_trigger_that_nothing_waits_for_is_told_in_the_error_queue():
+    bench = hostile.Bench("33500B")
+    bench.session.trigger()
+    bench.send(b"SYST:ERR?")
+    assert bench.read()[0] == b'-211,"Trigger ignored"\n'
+
+
+@pytest.mark.parametrize("name", ["framer", "blocks", "hislip", "vxi11"])
+def test_no_bytes_break_a_framer_a_block_reader_or_a_server(name):
+    target = TARGETS[name]()
+    piece = st.tuples(st.integers(0, 255), st.binary(max_size=40)).map(
+        lambda drawn: bytes([drawn[0], len(drawn[1])]) + drawn[1]
+    )
+    seed = st.sampled_from(target.seeds)
+
+    @FEW
+    @given(st.one_of(st.binary(max_size=100), st.lists(st.one_of(piece, seed), max_size=8).map(b"".join)))
+    def any_bytes(data):
+        target.run(data)
+
+    any_bytes()
 
 
 # --- drivers ---
@@ -421,6 +445,22 @@ def test_an_answer_that_was_misheard_ends_in_an_instrument_error(name, call, lin
     pair.close()
 
 
+@pytest.mark.parametrize(
+    ("line", "ask"),
+    [
+        (b"+9.91E+37", lambda driver: driver.frequency),  # "not a number" is no setting
+        (b"nan", lambda driver: driver.amplitude),
+        (b"\x7f~#!Agilent Technologies,33522B,1,1", lambda driver: driver.identity()),
+    ],
+)
+def test_what_no_setting_and_no_name_can_be_is_refused(line, ask):
+    pair = Pair("33500B", "messages", [(line + b"\n", 0.0, True)])
+    with pytest.raises(BadAnswer):
+        ask(pair.driver)
+    good("33500B", pair.driver)
+    pair.close()
+
+
 def test_a_scope_that_says_its_model_and_no_more_is_known_by_it():
     pair = Pair("DS1000Z", "messages", [(b"DS1054Z\n", 0.0, True)])
     assert pair.driver.identity() == "DS1054Z"
@@ -440,7 +480,8 @@ class Pairing(RuleBasedStateMachine):
         super().__init__()
         self.pair = Pair(self.name, self.way)
         self.driver = self.pair.driver
-        self.prepared = False
+        self.prepare()
+        self.wanted = dict(self.pair.liar.settings)
 
     def teardown(self):
         """Whatever was wrong is over: then everything works, at once."""
@@ -449,6 +490,17 @@ class Pairing(RuleBasedStateMachine):
         self.come_back()
         good(self.name, self.driver)
         self.pair.close()
+
+    def prepare(self):
+        DRIVERS[self.name][1]["prepare"][0](self.driver)
+
+    def is_as_prepared(self):
+        """Whether no reset has come in between: the application looks for that itself, see `Bench.forgotten`."""
+        now = self.pair.liar.settings
+        return all(now[name] == value for name, value in self.wanted.items() if name not in self.CHANGING)
+
+    #: What a reading changes, or what has no part in it.
+    CHANGING = frozenset({"samples", "armings", "range", "output", "wav_source", "wav_stop", "wav_start"})
 
     def come_back(self):
         """What a program does when it has lost an instrument, or another one has taken it."""
@@ -482,22 +534,22 @@ class Pairing(RuleBasedStateMachine):
     @rule()
     def who_is_there(self):
         with contextlib.suppress(InstrumentError):
-            assert self.driver.identity() == self.pair.liar.identity
+            assert self.driver.identity().startswith(self.pair.liar.identity)  # text behind it is text
 
     @rule()
     def it_is_prepared(self):
-        self.prepared = False
         with contextlib.suppress(InstrumentError):
-            DRIVERS[self.name][1]["prepare"][0](self.driver)
-            self.prepared = True
+            self.prepare()
 
     @rule()
     def it_is_read(self):
-        if self.prepared:
-            with contextlib.suppress(InstrumentError):
-                self.read()
+        with contextlib.suppress(InstrumentError):
+            good_before = self.is_as_prepared()
+            right = self.read()
+            assert right or not (good_before and self.is_as_prepared())
 
     def read(self):
+        """Whether what was read is what the world can give."""
         raise NotImplementedError
 
 
@@ -506,24 +558,23 @@ def is_world_frequency(value):
 
 
 class CounterPairing(Pairing):
-    def read(self):
-        assert is_world_frequency(self.driver.frequency())
+    count = 0
 
-    @rule(count=st.integers(1, 4))
-    def several_are_read(self, count):
-        if self.prepared:
-            with contextlib.suppress(InstrumentError):
-                found = self.driver.readings(count)
-                assert found.shape == (count,)
-                assert all(map(is_world_frequency, found))
+    def read(self):
+        if not self.count:
+            return is_world_frequency(self.driver.frequency())
+        found = self.driver.readings(self.count)
+        return found.shape == (self.count,) and all(map(is_world_frequency, found))
+
+    @rule(count=st.integers(0, 4))
+    def so_many_are_read(self, count):
+        self.count = count
+        self.it_is_read()
 
 
 class GeneratorPairing(Pairing):
     def read(self):
-        # as it was set, or as after the reset that a fault was
-        assert self.driver.frequency in {25.0, 1000.0}
-        assert self.driver.waveform in {"TRI", "RAMP", "SIN"}
-        assert self.driver.output is self.pair.liar.settings["output"]
+        return self.driver.frequency == 25.0 and self.driver.output is self.pair.liar.settings["output"]
 
     @rule()
     def it_is_switched_off(self):
@@ -541,16 +592,14 @@ class ScopePairing(Pairing):
     def read(self):
         self.driver.acquire(timeout_s=1.0)
         trace = self.driver.trace(1)
-        volts = trace.volts
-        assert volts.min() > -0.1
-        assert volts.max() < 1.3
-        assert trace.dt_s * volts.size == pytest.approx(0.1, rel=0.3)
+        volts, whole = trace.volts, trace.dt_s * trace.codes.size
+        return volts.min() > -0.1 and volts.max() < 1.3 and whole == pytest.approx(0.1, rel=0.3)
 
 
 class MagnetometerPairing(Pairing):
     def read(self):
         value = self.driver.flux_density()
-        assert value is None or value == pytest.approx(0.019, abs=2e-4)
+        return value is None or value == pytest.approx(0.019, abs=2e-4)
 
 
 PAIRINGS = {
