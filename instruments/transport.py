@@ -31,8 +31,9 @@ TrafficLog = Callable[[str, str, bytes], None]
 #: PyVISA's own reading of a resource name that is a bare TCP connection: only reopening empties its pipe.
 _BARE_SOCKET = "::SOCKET"
 
-#: Bytes read at a stretch, and the longest answer that is text.
-_CHUNK, _LONGEST_ANSWER = 1 << 20, 1 << 22
+#: Bytes of a block and of a text read at a stretch, and the longest answer that is text.  pyvisa-py's HiSLIP clears so
+#: much memory for each answer.
+_CHUNK, _TEXT_CHUNK, _LONGEST_ANSWER = 1 << 20, 1 << 16, 1 << 22
 
 #: The answer to ``*IDN?``: four fields.
 _IDENTITY = re.compile(rb"[^,]+,[^,]+,[^,]*,[^\n]*\n?")
@@ -168,7 +169,7 @@ class VisaTransport:
             self._send(message)
             self._resource.timeout = 1000 * within
             # more than the longest answer without an end is noise: it is left for the next resynchronisation
-            answer = self._resource.read_bytes(_LONGEST_ANSWER, chunk_size=_CHUNK, break_on_termchar=True)
+            answer = self._resource.read_bytes(_LONGEST_ANSWER, chunk_size=_TEXT_CHUNK, break_on_termchar=True)
             text = answer.decode("ascii")
         self._record("<", text.rstrip("\r\n"))
         return text.strip()

@@ -56,6 +56,11 @@ class Framer:
             self._dropping = True
         return messages
 
+    @property
+    def begun(self) -> bool:
+        """Whether a message has begun that has not ended yet."""
+        return bool(self._buffer) or self._dropping
+
     def clear(self) -> None:
         """Drop what has not become a message yet."""
         self._forget(len(self._buffer))
