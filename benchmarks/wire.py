@@ -1,6 +1,6 @@
 """How fast the way to an instrument is, real protocols and virtual far ends, as ratios within one run.
 
-``python benchmarks/wire.py`` (a minute and a half; needs the extra ``peers``) prints four tables and writes
+``python benchmarks/wire.py`` (two minutes; needs the extra ``peers``) prints four tables and writes
 benchmarks/results/instruments.json:
 
 1. Round trips in process, against pyvisa-sim with a device that gives the same answers.
