@@ -11,6 +11,7 @@ import time
 import pytest
 import pyvisa
 import serial
+import serial.tools.list_ports  # before a test changes what platform this is
 from hypothesis import given
 from hypothesis import strategies as st
 
