@@ -21,6 +21,7 @@ import resource
 import socket
 import statistics
 import tempfile
+import threading
 import time
 import tracemalloc
 from contextlib import ExitStack, contextmanager, suppress
@@ -168,16 +169,22 @@ def serve_bench(told: Connection) -> None:
 
 
 def serve_plainly(told: Connection) -> None:
-    """The same number in answer to every line, with nothing but a socket; one connection after the other."""
+    """The same number in answer to every line, with nothing but sockets: a thread for each of two connections."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         told.send(server.getsockname()[1])
-        for _ in range(2):
-            link, _ = server.accept()
-            with link:
-                link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-                while link.recv(4096):
-                    link.sendall(NUMBER.encode() + b"\n")
+        threads = [threading.Thread(target=_repeat, args=server.accept()[:1]) for _ in range(2)]
+        for thread in threads:
+            thread.start()
         told.recv()
+        for thread in threads:
+            thread.join()
+
+
+def _repeat(link: socket.socket) -> None:
+    with link:
+        link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        while link.recv(4096):
+            link.sendall(NUMBER.encode() + b"\n")
 
 
 class PlainClient:
@@ -204,23 +211,16 @@ def over_loopback(rounds: int, duration: float) -> dict[str, Any]:
     """Round trips per second of a number, by contender."""
     with in_another_process(serve_bench) as bench, in_another_process(serve_plainly) as alone:
         resources, port = bench.recv(), alone.recv()
-        # one of them at a time is connected: an idle link costs a server that is no event loop nothing
-        plain = PlainClient(port)
-        links: dict[str, Any] = {"plain sockets": plain}
+        links: dict[str, Any] = {
+            "plain sockets": PlainClient(port),
+            "PyVISA to a plain socket server": opened(f"TCPIP0::127.0.0.1::{port}::SOCKET", "@py"),
+        }
         for way, name in resources.items():
             links[f"PyVISA, {way}"] = opened(name, "@py")
             links[f"our transport, {way}"] = VisaTransport(name, library="@py")
         asking: Contenders = {name: partial(link.query, "FREQ?") for name, link in links.items()}
         found = measured(asking, rounds=rounds, duration=duration)
-        plain.close()
-        echo = opened(f"TCPIP0::127.0.0.1::{port}::SOCKET", "@py")
-        again: Contenders = {
-            "PyVISA to a plain socket server": partial(echo.query, "FREQ?"),
-            "PyVISA, socket": asking["PyVISA, socket"],
-        }
-        name = "PyVISA to a plain socket server"
-        found[name] = measured(again, rounds=rounds, duration=duration)[name]
-        for link in (*list(links.values())[1:], echo):
+        for link in links.values():
             link.close()
     return found
 
@@ -424,15 +424,15 @@ def print_acquisition(found: dict[str, float]) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description="How fast the way to an instrument is.")
-    parser.add_argument("--rounds", type=int, default=12, help="of each contender")
-    parser.add_argument("--seconds", type=float, default=0.25, help="how long a contender's round lasts")
+    parser.add_argument("--rounds", type=int, default=20, help="of each contender")
+    parser.add_argument("--seconds", type=float, default=0.1, help="how long a contender's round lasts")
     given = parser.parse_args()
     inside = in_process(given.rounds, given.seconds)
     for question, one in inside.items():
         print_round_trips(f"{question} in process", one, "PyVISA on @sim")
     outside = over_loopback(given.rounds, given.seconds)
     print_round_trips("FREQ? over loopback", outside, "PyVISA to a plain socket server")
-    trace = long_trace(max(2, given.rounds // 4))
+    trace = long_trace(max(2, given.rounds // 5))
     print_trace(trace)
     spin = acquisition(given.rounds)
     print_acquisition(spin)
