@@ -52,6 +52,8 @@ class ScpiInstrument:
 
     def __init__(self, transport: Transport) -> None:
         self.transport = transport
+        #: What was set last of each declared setting, since the last reset.
+        self.set_to: dict[str, bool | float | str] = {}
 
     def identity(self) -> str:
         """The answer to ``*IDN?``.  Raises WrongInstrument when another model answers, BadAnswer when it is no text."""
@@ -70,6 +72,8 @@ class ScpiInstrument:
 
     def command(self, message: str) -> None:
         """Send a command and read the error queue.  Raises CommandRefused with the queue's texts."""
+        if message.upper().startswith("*RST"):
+            self.set_to.clear()
         self.transport.write(message)
         self.raise_errors(message)
 
@@ -113,12 +117,22 @@ class ScpiInstrument:
 
     def settings(self) -> dict[str, bool | float | str]:
         """Every declared setting as it stands in the instrument, unit at the end of the name."""
+        return {setting.full_name: getattr(self, setting.name) for setting in self.declared()}
+
+    def unlike(self, now: dict[str, bool | float | str]) -> dict[str, tuple[object, object]]:
+        """Settings that stand in the instrument otherwise than they were set: name → (as set, now)."""
         return {
-            f"{name}_{setting.suffix}" if setting.suffix else name: getattr(self, name)
-            for owner in reversed(type(self).__mro__)
-            for name, setting in vars(owner).items()
-            if isinstance(setting, Setting)
+            setting.full_name: (asked, now[setting.full_name])
+            for setting in self.declared()
+            if (asked := self.set_to.get(setting.full_name)) is not None
+            and setting.differs(asked, now[setting.full_name])
         }
+
+    @classmethod
+    def declared(cls) -> list[Setting[Any]]:
+        """Its declared settings, those of a base first."""
+        rows = (row for owner in reversed(cls.__mro__) for row in vars(owner).values())
+        return [row for row in rows if isinstance(row, Setting)]
 
     def close(self) -> None:
         """Give the instrument back."""
@@ -130,8 +144,7 @@ class Setting(Generic[T]):
     """A quantity of an instrument that can be set and asked for, declared in one line.
 
     header: the SCPI header; kind: float, bool or str; unit: of the number on the wire;
-    low, high: what the instrument takes; choices: the words it takes, in their short form;
-    suffix: the unit as it stands in names that leave the program (``hz``).
+    low, high: what the instrument takes; choices: the words it takes, in their short form.
     """
 
     header: str
@@ -146,9 +159,9 @@ class Setting(Generic[T]):
         self.name = name
 
     @property
-    def suffix(self) -> str:
-        """The unit for the end of a name: Hz → hz."""
-        return self.unit.lower()
+    def full_name(self) -> str:
+        """The name with its unit, as it leaves the program: gate_s."""
+        return f"{self.name}_{self.unit.lower()}" if self.unit else self.name
 
     @overload
     def __get__(self, instrument: None, owner: type) -> Setting[T]: ...
@@ -167,6 +180,13 @@ class Setting(Generic[T]):
         """Check, send, and read the error queue."""
         self._check(instrument.transport.address, value)
         instrument.command(f"{self.header} {self._spell(value)}")
+        instrument.set_to[self.full_name] = value
+
+    def differs(self, asked: T, answered: T) -> bool:
+        """Whether an answer is another value than the one that was set; instruments round by a hundredth at most."""
+        if self.kind is float:
+            return not abs(float(answered) - float(asked)) <= 0.01 * abs(float(asked)) + 5e-3
+        return bool(str(asked).upper() != str(answered).upper())
 
     def _parse(self, address: str, question: str, answer: str) -> T:
         convert: Callable[[str], Any] = _FROM_WIRE[self.kind]

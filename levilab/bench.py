@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, cast
 
-from instruments.errors import InstrumentError, OutOfRange
+from instruments.errors import InstrumentError, OutOfRange, SettingsLost
 from levilab.clock import Clock, WallClock
 from levilab.config import BenchConfig, ConfigError, InstrumentSettings, Limits
 from levilab.drivers import driver_of, transport_to
@@ -79,8 +79,14 @@ class Bench:
     # --- instruments that lose their link, or their settings ---
 
     def remember(self, kind: str) -> None:
-        """An instrument was set up: these are the settings that it is to keep."""
-        self._prepared[kind] = self.instruments[kind].settings()
+        """An instrument was set up: these are the settings that it is to keep.
+
+        Raises SettingsLost where some are not as they were set: somebody has reset it meanwhile.
+        """
+        now = self.instruments[kind].settings()
+        if lost := self.instruments[kind].unlike(now):
+            raise SettingsLost(self.address(kind), lost)
+        self._prepared[kind] = now
 
     def forgotten(self, kind: str) -> dict[str, tuple[object, object]]:
         """Settings that are no longer as they were set up, by name: (as set up, now).  Somebody has changed them."""

@@ -150,3 +150,12 @@ def test_a_drive_whose_link_is_lost_is_switched_off_over_a_new_one(
     run = acquired(tmp_path, monkeypatch, Fault("disconnected", question=r"OUTP1\?", after=2))
     assert run.status == "finished"
     assert run.record.instruments["generator"]["settings_end"]["output"] is False
+
+
+@pytest.mark.parametrize("when", range(2, 10))
+def test_a_reset_while_it_is_set_up_is_found_before_anything_is_measured(
+    when: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # each command of the setting up is followed by a look into the error queue
+    with pytest.raises(InstrumentError, match=r"_s = |_v = |coupling|automatic_level|impedance"):
+        acquired(tmp_path, monkeypatch, Fault("reset", question=r"SYST:ERR\?", after=when))
