@@ -55,6 +55,8 @@ class _ReciprocalCounter(ScpiInstrument):
 
     #: How long the counter may work on one reading [s]; prepare() sets it.
     _patience = 3.0
+    #: Whether it says so itself when there is no signal; prepare() sets it up to do so.
+    _gives_up = False
 
     def frequency(self) -> float | None:
         """One reading [Hz], or None; see :class:`Counter`.  Raises CommandRefused if an error was waiting."""
@@ -66,12 +68,20 @@ class _ReciprocalCounter(ScpiInstrument):
         return parse_reading(self.transport.address, "READ?", answer)
 
     def _ask(self, question: str, patience: float) -> str | None:
-        """Read the error queue, then the data; None when the counter never answers."""
+        """Read the error queue, then the data; None when a counter that may wait for ever never answers.
+
+        One that was told to give up says so itself: then silence is a fault of the link, and no sign of a dark signal.
+        """
         self.raise_errors(question)
         try:
             return self.transport.query(question, patience=patience)
-        except NoAnswer:
-            self._give_up()
+        except NoAnswer as silence:
+            try:
+                self._give_up()
+            except InstrumentError:
+                raise silence from None
+            if self._gives_up:
+                raise
             return None
 
     def _give_up(self) -> None:
@@ -135,6 +145,7 @@ class Keysight53230A(_ReciprocalCounter):
         # Without a signal the answer, "no reading", comes after this time (2000 s is the longest there is).
         self._patience = min(2 * gate_s + 1.0, 2000.0)
         self.measurement_timeout = self._patience
+        self._gives_up = True
 
     def readings(self, count: int) -> NDArray[np.float64]:
         """So many readings; see :class:`Counter`.  They are fetched as they come, each with its own patience."""
@@ -211,7 +222,7 @@ class PendulumCNT91(_ReciprocalCounter):
         # 1000 s is the longest there is: a gate that comes near it must not be cut off
         if self._patience <= 1000.0:
             self.measurement_timeout = self._patience
-        self.gives_up = self._patience <= 1000.0
+        self.gives_up = self._gives_up = self._patience <= 1000.0
 
     def _parse(self, answer: str) -> float | None:
         return parse_reading(self.transport.address, "READ?", answer or "nan")

@@ -144,15 +144,16 @@ def open_bench(
     bench = Bench(world.clock if world else WallClock(), config.limits)
     with contextlib.ExitStack() as links:
         try:
-            for kind in kinds:
+            for kind in sorted(kinds, key=lambda kind: kind != "generator"):  # first what may have been left on
                 settings = VIRTUAL[kind] if world else _described(config, kind)
                 instrument = opened(kind, settings, bench.clock, library=library, log=log)
                 links.callback(instrument.close)
                 instrument.identity()
                 instrument.forget_errors()
                 bench.instruments[kind] = instrument  # only what is what it should be is ever switched
+                if kind == "generator":
+                    bench.outputs_off()  # a program that was killed may have left them on
                 check()
-            bench.outputs_off()  # a program that was killed may have left them on
             yield bench
         finally:
             bench.outputs_off()

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, cast
 
-from instruments.errors import InstrumentError, SettingsLost
+from instruments.errors import InstrumentError, OutOfRange, SettingsLost
 from levilab.errors import LevilabError
 
 if TYPE_CHECKING:
@@ -104,8 +104,23 @@ def _connect_spin(session: Session) -> None:
 
 
 def _drive_up_and_let_go(session: Session) -> None:
+    """Drive the top up; if the generator fails on the way, from its new spin once more."""
+    while True:
+        try:
+            _drive_up(session)
+            session.bench.outputs_off()
+        except InstrumentError as error:
+            if error.address != session.bench.address("generator") or isinstance(error, OutOfRange):
+                raise
+            session.find_again("generator", error, lambda session: session.bench.outputs_off())
+        else:
+            session.event("drive off", "drive off, the top spins down freely")
+            return
+
+
+def _drive_up(session: Session) -> None:
     settings = _settings(session)
-    spin = session.bench.counter.frequency()
+    spin = _spin_now(session)
     if spin is None:
         raise ExperimentFailed(
             f"the counter sees no light pulses at {settings.trigger_level_v:g} V: is the top floating and lit, "
@@ -116,8 +131,6 @@ def _drive_up_and_let_go(session: Session) -> None:
     session.bench.drive(waveform=settings.drive_waveform, frequency_hz=spin, amplitude_vpp=settings.drive_amplitude_vpp)
     _ramp(session, spin, settings)
     _check_lock(session, settings)
-    session.bench.outputs_off()
-    session.event("drive off", "drive off, the top spins down freely")
 
 
 def _ramp(session: Session, start: float, settings: SpinSettings) -> None:
@@ -131,8 +144,20 @@ def _ramp(session: Session, start: float, settings: SpinSettings) -> None:
         session.wait(_RAMP_STEP_S)
 
 
+def _spin_now(session: Session) -> float | None:
+    """What the counter counts before there are readings; one that fails is reached again, a few times."""
+    while True:
+        try:
+            spin = session.bench.counter.frequency()
+            _check_settings(session)
+        except InstrumentError as error:
+            session.find_again("counter", error, _connect_spin)
+        else:
+            return spin
+
+
 def _check_lock(session: Session, settings: SpinSettings) -> None:
-    spin = session.bench.counter.frequency()
+    spin = _spin_now(session)
     if spin is None or abs(spin - settings.drive_frequency_hz) > _LOCKED_WITHIN_HZ:
         seen = "no light pulses" if spin is None else f"{spin:.2f} Hz"
         raise ExperimentFailed(

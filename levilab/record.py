@@ -6,7 +6,7 @@ Whatever ends it, the outputs are off, the run is kept and says how it ended.
 from __future__ import annotations
 
 import contextlib
-import itertools
+import math
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -218,13 +218,16 @@ def _catch_up(experiment: Experiment, session: Session, order: Order, run: Run) 
 
 def _read_until_the_end(experiment: Experiment, session: Session) -> None:
     settings = session.settings
-    first = int(session.now() // settings.interval_s) + 1 if session.rows else 0
-    for k in itertools.count(first):
+    k = int(session.now() // settings.interval_s) + 1 if session.rows else 0
+    while True:
         session.wait(k * settings.interval_s - session.now())
         session.asked = session.now()
         got = experiment.read(session)
+        k += 1
         if isinstance(got, Missed):
             session.missed.append(got)
+            if got is Missed.LOST:  # what was missed meanwhile is missed: it is not caught up with
+                k = max(k, math.ceil(session.now() / settings.interval_s))
             if end := experiment.over(session):
                 session.event(*end)
                 return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,7 @@ from instruments.virtual.faults import FAULTS, Fault
 from levilab import bench as benches
 from levilab.order import spin_order
 from levilab.record import MOST_LOSSES, Order, acquire
-from levilab.virtual_bench import virtual_bus
+from levilab.virtual_bench import VIRTUAL, virtual_bus
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -58,16 +59,16 @@ def kinds(run: Run) -> list[str]:
 
 #: What a fault of the counter's eighth reading costs: nothing, or that reading.
 COSTS = {
-    "no answer": "asked again",
-    "late answer": "asked again",
+    "no answer": "instrument lost",
+    "late answer": "instrument lost",
     "single bytes": "",
-    "two answers at once": "",
+    "two answers at once": "instrument lost",  # the rest of the message interrupts the next question: −410
     "garbage before": "instrument lost",
     "bytes that are no text before": "instrument lost",
-    "garbage after": "",
+    "garbage after": "instrument lost",
     "block longer than it says": "",
     "block shorter than it says": "",
-    "cut in the middle": "asked again",
+    "cut in the middle": "instrument lost",
     "disconnected": "instrument lost",
     "away for 5 s": "instrument lost",
     "error queue overflow": "instrument lost",
@@ -80,17 +81,23 @@ def test_every_fault_is_tried() -> None:
     assert set(COSTS) | {"taken by another"} == set(FAULTS)
 
 
-@pytest.mark.parametrize("what", COSTS)
-def test_a_fault_of_one_reading_is_told_and_the_run_goes_on(
-    what: str, whole: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+#: Once, and again when it is asked once more; but a counter that says twice that it is dark is believed.
+OFTEN = [(what, times) for what in COSTS for times in (1, 2, 3) if what != "9.91E37" or times == 1]
+
+
+@pytest.mark.parametrize(("what", "times"), OFTEN)
+def test_a_fault_of_a_reading_is_told_and_the_run_goes_on(
+    what: str, times: int, whole: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # two readings come before the drive is off
-    run = acquired(tmp_path, monkeypatch, Fault(what, question=r"READ\?", after=9))
+    run = acquired(tmp_path, monkeypatch, Fault(what, question=r"READ\?", after=9, times=times))
     before, frame = whole.readings().frame, run.readings().frame
     assert run.status == "finished"
     assert kinds(run)[-1] == "fell"
-    assert not COSTS[what] or COSTS[what] in kinds(run)
-    assert len(before) - 2 <= len(frame) <= len(before)
+    assert kinds(run).count("instrument lost") == (times if COSTS[what] == "instrument lost" else 0)
+    # at the end of every run the counter is asked twice whether it is dark
+    assert kinds(run).count("asked again") == 1 + (COSTS[what] == "asked again")
+    assert len(before) - 2 * times <= len(frame) <= len(before)
     # each reading is of the same top at its time: nothing is made up
     expected = np.interp(frame["time_s"], before["time_s"], before["spin_frequency_hz"])
     inside = frame["time_s"] < before["time_s"].max() - 1
@@ -159,3 +166,64 @@ def test_a_reset_while_it_is_set_up_is_found_before_anything_is_measured(
     # each command of the setting up is followed by a look into the error queue
     with pytest.raises(InstrumentError, match=r"_s = |_v = |coupling|automatic_level|impedance"):
         acquired(tmp_path, monkeypatch, Fault("reset", question=r"SYST:ERR\?", after=when))
+
+
+@pytest.mark.parametrize("after", [0, 1])
+@pytest.mark.parametrize("what", ["no answer", "disconnected", "reset"])
+def test_a_counter_that_fails_before_the_first_reading_is_reached_again(
+    what: str, after: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = acquired(tmp_path, monkeypatch, Fault(what, question=r"READ\?", after=after))
+    assert run.status == "finished"
+    assert kinds(run)[:3].count("found again") == 1
+    assert kinds(run).count("drive on") == 1
+
+
+def test_a_generator_that_fails_on_the_way_up_is_off_and_the_way_is_gone_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # at the generator's address only the ramp asks for its error queue so often
+    cut = Fault("disconnected", question=r"SYST:ERR\?", after=45)
+    run = acquired(tmp_path, monkeypatch, cut)
+    told = kinds(run)
+    assert run.status == "finished"
+    assert told.count("drive on") == 2
+    assert told.index("drive on") < told.index("instrument lost") < told.index("found again") < told.index("locked")
+    assert 35 < run.readings().frame["spin_frequency_hz"].iloc[0] < 41
+
+
+def test_what_was_missed_is_not_caught_up_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    order = mock(tmp_path)
+    often = order.config.spin.model_copy(update={"interval_s": 2.0})
+
+    def with_faults(*given: object) -> Bus:
+        bus = virtual_bus(*given)  # type: ignore[arg-type]
+        bus.faults.append(Fault("away for 5 s", question=r"READ\?", after=9))
+        return bus
+
+    monkeypatch.setattr(benches, "virtual_bus", with_faults)
+    changed = replace(order, config=order.config.model_copy(update={"spin": often}))
+    gaps = np.diff(acquire(changed, Silent()).readings().frame["time_s"])
+    assert gaps.max() > 5
+    assert gaps.min() > 1.9
+
+
+def test_a_drive_that_was_left_on_goes_off_even_if_the_counter_is_not_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left: list[Bus] = []
+
+    def left_on(*given: object) -> Bus:
+        bus = virtual_bus(*given)  # type: ignore[arg-type]
+        generator, counter = (bus.instruments[VIRTUAL[kind].address] for kind in ("generator", "counter"))
+        generator.execute("OUTP1 ON")
+        bus.away[id(counter)] = 1e9
+        left.append(bus)
+        return bus
+
+    monkeypatch.setattr(benches, "virtual_bus", left_on)
+    with pytest.raises(InstrumentError, match="counter"):
+        acquire(mock(tmp_path), Silent())
+    answer = left[0].instruments[VIRTUAL["generator"].address].execute("OUTP1?")
+    assert answer is not None
+    assert answer.data == b"0\n"
