@@ -35,8 +35,11 @@ _BARE_SOCKET = "::SOCKET"
 #: much memory for each answer.
 _CHUNK, _TEXT_CHUNK, _LONGEST_ANSWER = 1 << 20, 1 << 16, 1 << 22
 
-#: The answer to ``*IDN?``: four fields.
-_IDENTITY = re.compile(rb"[^,]+,[^,]+,[^,]*,[^\n]*\n?")
+#: Of a block that is longer the traffic log shows so many bytes.
+_SHORT = 64
+
+#: What an instrument is asked for its name, and the answer: four fields, the maker's first.
+_WHO, _IDENTITY = "*IDN?", re.compile(rb"[A-Za-z][^,\n]*,[^,\n]*,[^,\n]*,[^\n]*\n?")
 
 #: VISA's numbers for: locked, busy.
 _HELD_BY_ANOTHER = {-1073807345, -1073807246}
@@ -98,6 +101,7 @@ class VisaTransport:
         self.address, self.timeout, self._line = address, timeout, dict(line or {})
         self._library, self._log = library, log
         self._out_of_step = self._closed = False
+        self._identities_due = 0  # answers to it that may still come
         self._stream = address.upper().endswith(_BARE_SOCKET) or address.upper().startswith("ASRL")
         self._resource = self._open()
 
@@ -137,7 +141,7 @@ class VisaTransport:
     def _begin(self, message: str) -> None:
         if self._out_of_step:
             self.clear()
-        self._record(">", message)
+        self._record(">", message.encode(errors="replace"))
 
     def _send(self, message: str) -> None:
         if self._stream:  # an answer that nobody waited for is no answer to this
@@ -170,8 +174,8 @@ class VisaTransport:
             self._resource.timeout = 1000 * within
             # more than the longest answer without an end is noise: it is left for the next resynchronisation
             answer = self._resource.read_bytes(_LONGEST_ANSWER, chunk_size=_TEXT_CHUNK, break_on_termchar=True)
+            self._record("<", answer)
             text = answer.decode("ascii")
-        self._record("<", text.rstrip("\r\n"))
         return text.strip()
 
     def query_block(self, message: str, *, patience: float = 0.0) -> bytes:
@@ -182,7 +186,7 @@ class VisaTransport:
             self._send(message)
             self._resource.timeout = 1000 * within
             block = self._block()
-        self._record("<", f"({len(block)} bytes)")
+            self._record("<", block if len(block) <= _SHORT else block[:_SHORT] + b"... (%d bytes)" % len(block))
         return block
 
     def _block(self) -> bytes:
@@ -196,6 +200,8 @@ class VisaTransport:
 
     def clear(self) -> None:
         """Resynchronise: a late answer to an old question never reaches the driver.  Raises NotConnected."""
+        if self._log:
+            self._record(">", b"(device clear)")
         if self.address.upper().endswith(_BARE_SOCKET):
             self.reopen()
         elif self._stream:
@@ -212,19 +218,34 @@ class VisaTransport:
     def _drain_line(self) -> None:
         """A serial line has no clear: ask who is there, and drop all that comes before the answer to that.
 
+        Answers come in the order of the questions; one for each time that this was asked in vain is dropped, too.
         Raises NoAnswer when none comes: the line is still out of step then.
         """
-        question = "*IDN?"
-        self._out_of_step = False
-        with self._told_as_ours(question, self.timeout):
+        due, self._identities_due, self._out_of_step = self._identities_due + 1, 0, False
+        with self._told_as_ours(_WHO, self.timeout):
             self._resource.timeout = 1000 * self.timeout
             self._discard_received()
             self._resource.write("")  # ends what may have been sent in part
-            self._resource.write(question)
-            deadline = time.monotonic() + 10 * self.timeout
-            while not _IDENTITY.fullmatch(self._resource.read_bytes(_LONGEST_ANSWER, break_on_termchar=True)):
-                if time.monotonic() > deadline:
-                    raise BrokenBlock("one line after the other, and no name among them")
+            self._record(">", _WHO.encode())
+            self._resource.write(_WHO)
+            self._read_identities(due)
+
+    def _read_identities(self, due: int) -> None:
+        """Lines up to so many names; fewer where a time-out tells that the other questions were never heard."""
+        import pyvisa
+
+        seen, deadline = 0, time.monotonic() + 10 * self.timeout
+        while seen < due:
+            try:
+                line = self._resource.read_bytes(_LONGEST_ANSWER, break_on_termchar=True)
+            except pyvisa.VisaIOError:
+                if seen:
+                    return
+                raise
+            self._record("<", line)
+            seen += bool(_IDENTITY.fullmatch(line))
+            if time.monotonic() > deadline:
+                raise BrokenBlock("one line after the other, and no name among them")
 
     def reopen(self) -> None:
         """Open the resource anew; see :class:`Transport`."""
@@ -253,9 +274,9 @@ class VisaTransport:
         self._closed = True
         self._resource.close()
 
-    def _record(self, direction: str, message: str) -> None:
+    def _record(self, direction: str, data: bytes) -> None:
         if self._log:
-            self._log(self.address, direction, message.encode(errors="replace") + b"\n")
+            self._log(self.address, direction, data if data.endswith(b"\n") else data + b"\n")
 
     @contextlib.contextmanager
     def _told_as_ours(self, question: str, within: float) -> Any:
@@ -266,6 +287,7 @@ class VisaTransport:
             yield
         except pyvisa.VisaIOError as error:
             self._out_of_step = True
+            self._identities_due += question == _WHO
             if error.error_code == pyvisa.constants.StatusCode.error_timeout:
                 raise NoAnswer(self.address, question, within) from error
             raise NotConnected(self.address, _broken(question, error)) from error

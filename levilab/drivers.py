@@ -60,6 +60,7 @@ def transport_to(
     from instruments.transport import VisaTransport
 
     line = dict(getattr(driver_of(kind, settings.model), "SERIAL", {})) | settings.line
-    if "::" not in settings.address:
+    serial_name = settings.address.upper().startswith("ASRL") and library == "@py"
+    if "::" not in settings.address or serial_name:
         return SerialTransport(settings.address, timeout=settings.timeout_s, log=log, **line)
     return VisaTransport(settings.address, library=library, timeout=settings.timeout_s, line=line, log=log)

@@ -175,3 +175,61 @@ def test_closing_twice_does_no_harm_and_nothing_is_sent_after_it(bus):
     transport.close()
     with pytest.raises(NotConnected, match="session"):
         transport.query("*IDN?")
+
+
+# --- a serial line, which has no device clear ---
+
+LINE = "ASRLslow.levilab::INSTR"
+
+
+class SlowOnce(Slow):
+    """Answers ``LIST?`` with words, and the first time that it is asked who it is after five seconds."""
+
+    slow = 0
+
+    def table(self):
+        return (*super().table(), Command("LIST", get=answers(self._list)), Command("*IDN", get=answers(self._who)))
+
+    def _late(self, answer):
+        if self.slow:
+            self.slow -= 1
+            self.busy_until(self.clock.now() + 5.0)
+        return answer
+
+    def _list(self):
+        return self._late("1,2,1,1,1")
+
+    def _who(self):
+        return self._late(IDENTITY)
+
+
+@pytest.mark.parametrize("questions", [["LIST?"], ["*IDN?"], ["LIST?", "*IDN?"], ["*IDN?", "*IDN?"], ["SLOW?"]])
+def test_on_a_serial_line_no_late_answer_is_taken_for_another(clock, questions):
+    device = SlowOnce(clock)
+    device.parser.commands = (*device.table(), *device.parser.commands)
+    transport = VisaTransport(LINE, library=library_for(Bus({LINE: device})))
+    device.slow = len(questions)
+    right = {"*OPC?": "1", "LIST?": "1,2,1,1,1", "*IDN?": IDENTITY, "SLOW?": "slow"}
+    silent = 0
+    for question in [*questions, *3 * ["*OPC?", "LIST?", "*IDN?"]]:
+        try:
+            assert transport.query(question) == right[question]
+        except NoAnswer:
+            silent += 1
+    assert 1 <= silent <= 6
+    assert transport.query("LIST?") == "1,2,1,1,1"
+
+
+def test_the_log_has_what_could_not_be_read_either(bus):
+    traffic = []
+    transport = VisaTransport(ADDRESS, library=library_for(bus), log=lambda *line: traffic.append(line[1:]))
+    with pytest.raises(BadAnswer):
+        transport.query("BIN?")
+    transport.query("*IDN?")
+    assert traffic == [
+        (">", b"BIN?\n"),
+        ("<", b"\xff\xfe\n"),
+        (">", b"(device clear)\n"),
+        (">", b"*IDN?\n"),
+        ("<", IDENTITY.encode() + b"\n"),
+    ]
