@@ -9,23 +9,28 @@ from __future__ import annotations
 import fnmatch
 import itertools
 import math
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from pyvisa import constants, rname
 from pyvisa.constants import EventAttribute, ResourceAttribute, StatusCode
 from pyvisa.highlevel import VisaLibraryBase
 from pyvisa.util import LibraryPath
 
+from instruments.virtual.bus import Session
 from instruments.virtual.faults import LinkLost
 from instruments.virtual.serial_line import LineSettings, SerialLine
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from pyvisa.highlevel import ResourceInfo
     from pyvisa.typing import VISARMSession, VISASession
 
-    from instruments.virtual.bus import Bus, Session
+    from instruments.virtual.bus import Bus
+
+T = TypeVar("T")
+Link = Session | SerialLine
+Attributes = dict[int, Any]
 
 _numbers = itertools.count(1)
 
@@ -57,7 +62,7 @@ class LevilabVisaLibrary(VisaLibraryBase):
     """A PyVISA library whose only resources are the instruments of one virtual bench."""
 
     bus: Bus | None
-    _sessions: dict[int, tuple[Session | SerialLine, dict[int, Any]]]
+    _sessions: dict[int, tuple[Link, Attributes]]
 
     @staticmethod
     def get_library_paths() -> Iterable[LibraryPath]:
@@ -116,6 +121,9 @@ class LevilabVisaLibrary(VisaLibraryBase):
             }
         )
         link = SerialLine(session_with_it, _line_settings(attributes)) if serial else session_with_it
+        if access_mode == constants.AccessModes.exclusive_lock and not link.hold.take(link, None):
+            return cast("VISASession", 0), self.handle_return_value(None, StatusCode.error_resource_locked)
+        attributes[ResourceAttribute.resource_lock_state] = access_mode
         number = cast("VISASession", next(_numbers))
         self._sessions[number] = (link, attributes)
         return number, self.handle_return_value(number, StatusCode.success)
@@ -132,48 +140,53 @@ class LevilabVisaLibrary(VisaLibraryBase):
             link.close()
         return self.handle_return_value(session, StatusCode.success)
 
+    def _let(
+        self, session: VISASession, act: Callable[[Link, Attributes], tuple[T, StatusCode]], otherwise: T
+    ) -> tuple[T, StatusCode]:
+        """What an act on a session's link gives; otherwise where another program holds it, or the link is lost."""
+        link, attributes = self._sessions[session]
+        try:
+            if link.hold.keeps_out(link):
+                result, status = otherwise, StatusCode.error_resource_locked
+            else:
+                result, status = act(link, attributes)
+        except LinkLost:
+            result, status = otherwise, StatusCode.error_connection_lost
+        return result, self.handle_return_value(session, status)
+
     def write(self, session: VISASession, data: bytes) -> tuple[int, StatusCode]:
         """ViWrite."""
-        link, attributes = self._sessions[session]
-        if link.hold.keeps_out(link):
-            return 0, self.handle_return_value(session, StatusCode.error_resource_locked)
-        try:
+
+        def act(link: Link, attributes: Attributes) -> tuple[int, StatusCode]:
             link.write(bytes(data), end=bool(attributes[ResourceAttribute.send_end_enabled]))
-        except LinkLost:
-            return 0, self.handle_return_value(session, StatusCode.error_connection_lost)
-        return len(data), self.handle_return_value(session, StatusCode.success)
+            return len(data), StatusCode.success
+
+        return self._let(session, act, 0)
 
     def read(self, session: VISASession, count: int) -> tuple[bytes, StatusCode]:
         """ViRead: up to the end of the answer, the termination character if that is on, or so many bytes."""
-        link, attributes = self._sessions[session]
-        if link.hold.keeps_out(link):
-            return b"", self.handle_return_value(session, StatusCode.error_resource_locked)
-        try:
-            data, status = _read(
-                link, count, _seconds(attributes[ResourceAttribute.timeout_value]), _termchar(attributes)
-            )
-        except LinkLost:
-            data, status = b"", StatusCode.error_connection_lost
-        return data, self.handle_return_value(session, status)
+
+        def act(link: Link, attributes: Attributes) -> tuple[bytes, StatusCode]:
+            timeout = _seconds(attributes[ResourceAttribute.timeout_value])
+            return _read(link, count, timeout, _termchar(attributes))
+
+        return self._let(session, act, b"")
 
     def clear(self, session: VISASession) -> StatusCode:
         """ViClear."""
-        self._sessions[session][0].clear()
-        return self.handle_return_value(session, StatusCode.success)
+        return self._let(session, lambda link, _: (link.clear(), StatusCode.success), None)[1]
 
     def flush(self, session: VISASession, mask: constants.BufferOperation) -> StatusCode:
         """ViFlush: what was received and not read is dropped."""
-        self._sessions[session][0].discard()
-        return self.handle_return_value(session, StatusCode.success)
+        return self._let(session, lambda link, _: (link.discard(), StatusCode.success), None)[1]
 
     def read_stb(self, session: VISASession) -> tuple[int, StatusCode]:
         """ViReadSTB."""
-        return self._sessions[session][0].status_byte(), self.handle_return_value(session, StatusCode.success)
+        return self._let(session, lambda link, _: (link.status_byte(), StatusCode.success), 0)
 
     def assert_trigger(self, session: VISASession, protocol: constants.TriggerProtocol) -> StatusCode:
         """ViAssertTrigger."""
-        self._sessions[session][0].trigger()
-        return self.handle_return_value(session, StatusCode.success)
+        return self._let(session, lambda link, _: (link.trigger(), StatusCode.success), None)[1]
 
     # --- locks ---
 
@@ -229,7 +242,7 @@ def _canonical(resource_name: str) -> str:
         return resource_name.upper()
 
 
-def _read(link: Session | SerialLine, count: int, timeout: float, termchar: bytes) -> tuple[bytes, StatusCode]:
+def _read(link: Link, count: int, timeout: float, termchar: bytes) -> tuple[bytes, StatusCode]:
     """Bytes as they come, until there is enough of them, the answer ends, or nothing more comes in time."""
     data = b""
     while len(data) < count:
@@ -249,7 +262,7 @@ def _seconds(timeout: int) -> float:
     return math.inf if timeout == constants.VI_TMO_INFINITE else timeout / 1000
 
 
-def _line_settings(attributes: dict[int, Any]) -> LineSettings:
+def _line_settings(attributes: Attributes) -> LineSettings:
     """The program's end of a serial line; VISA counts stop bits in tenths and parities from none to space."""
     return LineSettings(
         int(attributes[ResourceAttribute.asrl_baud_rate]),
@@ -259,7 +272,7 @@ def _line_settings(attributes: dict[int, Any]) -> LineSettings:
     )
 
 
-def _termchar(attributes: dict[int, Any]) -> bytes:
+def _termchar(attributes: Attributes) -> bytes:
     """What ends a read, or nothing.  A serial line ends one there by itself (VPP-4.3, VI_ATTR_ASRL_END_IN)."""
     serial = attributes.get(ResourceAttribute.asrl_end_in) == constants.SerialTermination.termination_char
     wanted = attributes[ResourceAttribute.termchar_enabled] or serial

@@ -11,6 +11,7 @@ from pyvisa.constants import StatusCode
 
 from instruments.virtual.bus import Bus
 from instruments.virtual.device import VirtualInstrument, answers
+from instruments.virtual.faults import Fault
 from instruments.virtual.scpi import Command
 from levilab.clock import VirtualClock
 from pyvisa_levilab import LevilabVisaLibrary, library_for
@@ -199,3 +200,35 @@ def test_a_shared_lock_is_for_those_who_know_its_key(blocks):
     for holder in (blocks, others[0]):
         holder.unlock()
     assert others[1].query("*OPC?").strip() == "1"
+
+
+def test_a_program_that_is_locked_out_can_do_nothing_to_the_instrument(blocks):
+    other = pyvisa.ResourceManager(blocks.visalib).open_resource(BLOCKS)
+    blocks.lock_excl()
+    blocks.write("*OPC?")
+    for act in (other.clear, other.assert_trigger, other.read_stb, other.read, lambda: other.write("*RST")):
+        with pytest.raises(pyvisa.VisaIOError) as refused:
+            act()
+        assert refused.value.error_code == StatusCode.error_resource_locked
+    assert blocks.read().strip() == "1"
+
+
+def test_a_resource_that_is_opened_for_oneself_alone_is_locked(blocks):
+    alone = pyvisa.constants.AccessModes.exclusive_lock
+    mine = pyvisa.ResourceManager(blocks.visalib).open_resource(BLOCKS, access_mode=alone)
+    with pytest.raises(pyvisa.VisaIOError):
+        blocks.query("*OPC?")
+    with pytest.raises(pyvisa.VisaIOError) as refused:
+        pyvisa.ResourceManager(blocks.visalib).open_resource(BLOCKS, access_mode=alone)
+    assert refused.value.error_code == StatusCode.error_resource_locked
+    mine.close()
+    assert blocks.query("*OPC?").strip() == "1"
+
+
+def test_a_link_that_is_lost_is_told_in_visas_words_by_whatever_is_tried(blocks):
+    blocks.visalib.bus.faults.append(Fault("disconnected", question=r"DATA\?"))
+    blocks.write("DATA?")
+    for act in (blocks.read_raw, blocks.read_stb, lambda: blocks.write("*CLS")):
+        with pytest.raises(pyvisa.VisaIOError) as lost:
+            act()
+        assert lost.value.error_code == StatusCode.error_connection_lost
