@@ -20,12 +20,18 @@ _ADVICE = {
 _ALWAYS = "check the address, the cable and that it is on"
 
 
-def advice(error: BaseException) -> str:
+def advice(error: BaseException, address: str = "", library: object = "@py") -> str:
     """What to try, as the end of a sentence.
+
+    address: what was to be opened; library: by which PyVISA library.
 
     >>> advice(OSError("[Errno 111] Connection refused"))
     ': somebody is there, but not at this port: check port and protocol'
     """
+    if ".levilab" in address.lower() and library == "@py":
+        return ': an address of the virtual bench: take visa_library = "@levilab"'
+    if isinstance(library, str) and re.fullmatch(r"\w+", library):
+        return f": a library that is no file begins with @: did you mean @{library}?"
     text = one_line(error).lower()
     return ": " + next((what for pattern, what in _ADVICE.items() if re.search(pattern, text)), _ALWAYS)
 

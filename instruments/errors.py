@@ -34,6 +34,14 @@ class NoAnswer(InstrumentError):
         )
 
 
+class SilentLine(NoAnswer):
+    """No answer on a serial line: what can be tried there stands in the message too."""
+
+    def __init__(self, address: str, question: str, timeout: float) -> None:
+        super().__init__(address, question, timeout)
+        self.args = (f"{self} Are baud rate, data bits and parity those of the instrument?",)
+
+
 class BadAnswer(InstrumentError):
     """The instrument answered something else than was expected."""
 

@@ -63,8 +63,13 @@ class ScpiInstrument:
                 raise BadAnswer(self.transport.address, "*IDN?", answer, "maker, model, serial number, firmware")
         model = answer.split(",")[1].strip() if answer.count(",") >= 2 else answer
         if not re.fullmatch(self.MODELS, model, re.IGNORECASE):
-            raise WrongInstrument(self.transport.address, answer, f"a model like {self.MODELS}")
+            raise WrongInstrument(self.transport.address, answer, f"one of {self.kind_of_instrument()}")
         return answer
+
+    @classmethod
+    def kind_of_instrument(cls) -> str:
+        """What it drives, in words: the first line of its documentation."""
+        return (cls.__doc__ or cls.__name__).splitlines()[0].rstrip(".")
 
     def forget_errors(self) -> None:
         """Empty the error queue: what an earlier program left there is not ours."""

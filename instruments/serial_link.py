@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from instruments.blocks import BrokenBlock, read_block
-from instruments.errors import BadAnswer, InstrumentError, NoAnswer, NotConnected, Occupied, OutOfRange
+from instruments.errors import BadAnswer, InstrumentError, NotConnected, Occupied, OutOfRange, SilentLine
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -35,14 +35,6 @@ _WHO, _IDENTITY = "*IDN?", re.compile(rb"[A-Za-z][^,]*,[^,]+,[^,]*,[^,]+")
 
 _IN_USE = {errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK}
 _WRONG_SETTINGS = "plain text (wrong baud rate or parity?)"
-
-
-class SilentLine(NoAnswer):
-    """No answer on a serial line: what can be tried there stands in the message too."""
-
-    def __init__(self, address: str, question: str, timeout: float) -> None:
-        super().__init__(address, question, timeout)
-        self.args = (f"{self} Are baud rate, data bits and parity those of the instrument?",)
 
 
 class SerialTransport:
@@ -307,6 +299,8 @@ def _ports_hint(port: str) -> str:
     """Which ports there are, for a name that is none of them."""
     if "://" in port:
         return "check the address, and that it is on"
+    if re.fullmatch(r"[\d.]+|[\w-]+(\.[\w-]+)+", port):
+        return f"an instrument on the network has a resource name, as TCPIP0::{port}::5025::SOCKET"
     from serial.tools.list_ports import comports
 
     present = ", ".join(sorted(found.device for found in comports()))

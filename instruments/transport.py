@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from instruments.advice import advice, one_line
 from instruments.blocks import BrokenBlock, block_of, read_block
-from instruments.errors import BadAnswer, NoAnswer, NotConnected, Occupied
+from instruments.errors import BadAnswer, NoAnswer, NotConnected, Occupied, SilentLine
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -115,7 +115,7 @@ class VisaTransport:
         except Exception as error:  # pyvisa-py raises plain Exception when a host is unknown or unreachable
             raise NotConnected(
                 self.address,
-                f"cannot be opened ({one_line(error)}){advice(error)}",
+                f"cannot be opened ({one_line(error)}){advice(error, self.address, self._library)}",
             ) from error
         resource.write_termination = resource.read_termination = "\n"
         if self.address.upper().endswith(_BARE_SOCKET):
@@ -289,7 +289,8 @@ class VisaTransport:
             self._out_of_step = True
             self._identities_due += question == _WHO
             if error.error_code == pyvisa.constants.StatusCode.error_timeout:
-                raise NoAnswer(self.address, question, within) from error
+                silence = SilentLine if self.address.upper().startswith("ASRL") else NoAnswer
+                raise silence(self.address, question, within) from error
             raise NotConnected(self.address, _broken(question, error)) from error
         except BrokenBlock as error:
             self._out_of_step = True
@@ -333,7 +334,9 @@ def addresses(library: str | VisaLibraryBase) -> tuple[str, ...]:
             names = pyvisa.ResourceManager(library).list_resources("?*")  # type: ignore[arg-type, unused-ignore]
         return tuple(name for name in names if name.upper().endswith(("::INSTR", _BARE_SOCKET)))
     except Exception as error:  # whatever a vendor's library raises
-        raise NotConnected(str(library), f"nothing can be listed ({one_line(error)}){advice(error)}") from error
+        raise NotConnected(
+            str(library), f"nothing can be listed ({one_line(error)}){advice(error, library=library)}"
+        ) from error
 
 
 def _broken(question: str, error: BaseException) -> str:

@@ -26,6 +26,18 @@ class WouldOverwrite(LevilabError):
     """A file that is there already."""
 
 
+class NobodyFound(LevilabError):
+    """Nobody answered that there is a driver for."""
+
+    exit_code = 3
+
+    def __init__(self) -> None:
+        super().__init__(
+            "nobody answered that levilab has a driver for, so no file was written: is it on and connected?  Name it "
+            "with --address, or take --force for a file to fill in by hand"
+        )
+
+
 def bench_text(found: Sequence[Found], library: str) -> str:
     """The text of a bench.toml: the first instrument of each kind, the others as comments."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -56,7 +68,11 @@ def _quoted(value: str) -> str:
 
 
 def refuse_to_overwrite(path: Path) -> None:
-    """Raise WouldOverwrite if there is such a file."""
+    """Raise WouldOverwrite if there is such a file, CannotWrite if there is no folder for it."""
+    from levilab.writing import CannotWrite
+
+    if not path.parent.is_dir():
+        raise CannotWrite(f"{path.parent} is no folder: give another name with --out")
     if path.exists():
         raise WouldOverwrite(f"{path} is there already: give another name with --out, or --force to replace it")
 

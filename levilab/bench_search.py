@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from instruments.advice import one_line
 from instruments.errors import InstrumentError
 from levilab.config import InstrumentSettings
 from levilab.drivers import DRIVERS, driver_of, transport_to
@@ -62,8 +63,10 @@ def asked(address: str, library: str) -> Found:
             transport = transport_to(kind, settings, library=library)
         except InstrumentError as error:
             return Found(address, trouble=str(error))
+        except Exception as error:  # noqa: BLE001 - a port that is no port: others are still to be asked
+            return Found(address, trouble=f"{address}: cannot be asked ({one_line(error)})")
         try:
-            identity = transport.query("*IDN?")
+            identity = _printable(transport.query("*IDN?"))
         except InstrumentError as error:
             trouble = str(error)
         else:
@@ -86,6 +89,11 @@ def _ways(address: str) -> Iterator[tuple[str, str, dict[str, Any]]]:
             if line and line not in seen:
                 seen.append(line)
                 yield kind, model, line
+
+
+def _printable(identity: str) -> str:
+    """What can stand in a file: control characters, which no instrument has in its name, as question marks."""
+    return "".join(sign if sign.isprintable() else "?" for sign in identity)
 
 
 def recognised(identity: str) -> tuple[str, str] | None:

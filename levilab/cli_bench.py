@@ -27,7 +27,9 @@ def bench_init(
         str, typer.Option(metavar="NAME", help="PyVISA's library: @py is its own, '' a vendor's, @levilab virtual.")
     ] = "@py",
     out: Annotated[Path, typer.Option(metavar="FILE", help="The file to write.")] = Path("bench.toml"),
-    force: Annotated[bool, typer.Option("--force", help="Replace the file if it is there.")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace the file if it is there; write one to fill in if nobody answers.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print what was found as one JSON document.")] = False,
 ) -> None:
     """Ask everybody on the buses who they are, and write a commented bench.toml with those that have a driver.
@@ -35,7 +37,7 @@ def bench_init(
     Only *IDN? is sent.  Instruments on the network are found by themselves where PyVISA can look for them (pip install
     psutil zeroconf); else name them with --address.
     """
-    from levilab.bench_file import bench_text, refuse_to_overwrite, write_bench
+    from levilab.bench_file import NobodyFound, bench_text, refuse_to_overwrite, write_bench
     from levilab.bench_search import search
 
     if not force:
@@ -48,6 +50,8 @@ def bench_init(
         typer.echo(json.dumps({"found": [asdict(one) for one in found], "file": str(out)}))
     else:
         _tell_found(found)
+    if not any(one.kind for one in found) and not force:
+        raise NobodyFound
     write_bench(out, bench_text(found, library))
     typer.echo(f"wrote {out}: look it over, then try it with `levilab bench check`", err=True)
 
@@ -59,13 +63,13 @@ def _tell_found(found: list[Found]) -> None:
             typer.echo(f"{one.address}\n  {one.identity}: {what}")
         else:
             typer.echo(f"{one.address}\n  {one.trouble.removeprefix(one.address + ': ')}")
-    if not any(one.kind for one in found):
-        typer.echo("nobody answered that levilab has a driver for: is it on and connected?  Name it with --address")
 
 
 @bench_app.command("check", epilog="Example: levilab bench check --bench lab2.toml")
 def bench_check(
-    bench: Annotated[Path, typer.Option(metavar="FILE", help="Describes the bench.")] = Path("bench.toml"),
+    bench: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Describes the bench.", show_default="bench.toml")
+    ] = None,
     mock: Annotated[bool, typer.Option("--mock", help="Check the virtual bench.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")] = False,
 ) -> None:
@@ -77,7 +81,9 @@ def bench_check(
     from levilab.config import BenchConfig, read_bench
     from levilab.virtual_bench import own_world
 
-    config = BenchConfig() if mock else read_bench(bench)
+    if mock and bench:
+        raise typer.BadParameter("--mock checks the virtual bench, which no file describes", param_hint="--bench")
+    config = BenchConfig() if mock else read_bench(bench or Path("bench.toml"))
     checked = []
     for one in check(config, own_world() if mock else None):
         checked.append(one)

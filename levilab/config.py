@@ -113,16 +113,23 @@ def read_bench(path: Path) -> BenchConfig:
 
 def within_limits(config: BenchConfig) -> BenchConfig:
     """The configuration, if what its spin-down wants is allowed on its bench.  Raises ConfigError."""
+    spin, limits = config.spin, config.limits
     for name in ("drive_amplitude_vpp", "drive_frequency_hz"):
-        wanted, limit = getattr(config.spin, name), getattr(config.limits, name)
+        wanted, limit = getattr(spin, name), getattr(limits, name)
         if wanted > limit:
             raise ConfigError(f"spin.{name} = {wanted:g} is more than this bench stands, limits.{name} = {limit:g}")
+    if spin.drive_frequency_hz < limits.drive_lowest_hz:
+        raise ConfigError(
+            f"spin.drive_frequency_hz = {spin.drive_frequency_hz:g} is less than this bench stands, "
+            f"limits.drive_lowest_hz = {limits.drive_lowest_hz:g}"
+        )
     return config
 
 
 def in_one_line(error: ValidationError) -> str:
     """The first thing that is wrong, with its path and what is allowed, and how many more there are."""
-    first = error.errors()[0]
+    # a key that is unknown may be why another one is missing
+    first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
     where = ".".join(str(part) for part in first["loc"]) or "the whole"
     more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
     if first["type"] == "extra_forbidden":

@@ -5,9 +5,10 @@ import json
 import pytest
 
 from levilab.bench_check import check
-from levilab.bench_file import bench_text
+from levilab.bench_file import NobodyFound, bench_text
 from levilab.bench_search import Found, asked, recognised, search
-from levilab.config import BenchConfig, InstrumentSettings, Limits, SpinSettings, read_bench
+from levilab.cli_bench import bench_init
+from levilab.config import BenchConfig, ConfigError, InstrumentSettings, Limits, SpinSettings, read_bench
 from levilab.virtual_bench import MODELS, VIRTUAL, own_world
 
 #: Answers to *IDN? as instruments give them.
@@ -111,6 +112,32 @@ def test_the_commands_find_write_and_check(levilab, tmp_path):
     by_kind = {one["kind"]: one for one in json.loads(failed.stdout)["instruments"]}
     assert "check the address" in by_kind["counter"]["trouble"]
     assert not by_kind["magnetometer"]["trouble"]
+
+
+def test_where_nobody_answers_no_file_is_written_but_one_to_fill_in_when_asked_for(monkeypatch, tmp_path, capsys):
+    nobody = [Found("A::1", trouble="A::1: no answer")]
+    monkeypatch.setattr("levilab.bench_search.search", lambda *_: nobody)
+    path = tmp_path / "bench.toml"
+    with pytest.raises(NobodyFound, match="--address"):
+        bench_init([], "@py", path, force=False, as_json=False)
+    assert not path.exists()
+    assert "no answer" in capsys.readouterr().out
+    bench_init([], "@py", path, force=True, as_json=False)
+    assert read_bench(path).counter is None
+
+
+def test_signs_that_no_file_can_hold_are_no_part_of_a_name(tmp_path):
+    path = tmp_path / "bench.toml"
+    odd = [Found("A::1", 'ma"ker,B#1,\\,"""')]
+    path.write_text(bench_text(odd, "@py"), encoding="utf-8")
+    assert read_bench(path).counter is None
+
+
+def test_a_wrong_key_is_told_before_the_one_that_it_was_to_be(tmp_path):
+    path = tmp_path / "bench.toml"
+    path.write_text('[counter]\nmodell = "53230A"\naddress = "A::1"\n', encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"counter\.modell is no key known here"):
+        read_bench(path)
 
 
 def test_no_library_and_no_bench_are_told(levilab, tmp_path):
