@@ -6,11 +6,11 @@ Outputs are off on every way out.
 from __future__ import annotations
 
 import contextlib
-import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, cast
 
-from instruments.errors import InstrumentError, OutOfRange, SettingsLost
+from instruments.errors import InstrumentError, SettingsLost
+from instruments.generator import Limits as CoilLimits
 from levilab.clock import Clock, WallClock
 from levilab.config import BenchConfig, ConfigError, InstrumentSettings, Limits
 from levilab.drivers import driver_of, transport_to
@@ -52,10 +52,12 @@ class Bench:
         """The function generator."""
         return cast("Generator", self.instruments["generator"])
 
-    def drive(self, *, waveform: str, frequency_hz: float, amplitude_vpp: float) -> None:
+    def drive(self, *, waveform: str, frequency_hz: float, amplitude_vpp: float, offset_v: float = 0.0) -> None:
         """Put the drive on the coil.  Raises OutOfRange beyond the limits of this bench."""
-        self.check_limits(frequency_hz=frequency_hz, amplitude_vpp=amplitude_vpp)
-        self.generator.prepare(waveform=waveform, frequency_hz=frequency_hz, amplitude_vpp=amplitude_vpp)
+        self.check_limits(frequency_hz=frequency_hz, amplitude_vpp=amplitude_vpp, offset_v=offset_v)
+        self.generator.prepare(
+            waveform=waveform, frequency_hz=frequency_hz, amplitude_vpp=amplitude_vpp, offset_v=offset_v
+        )
         self.generator.output = True
 
     def drive_at(self, frequency_hz: float) -> None:
@@ -65,16 +67,9 @@ class Bench:
 
     def check_limits(self, *, frequency_hz: float, amplitude_vpp: float = 0.0, offset_v: float = 0.0) -> None:
         """Raise OutOfRange if this drive is more than the bench stands."""
-        limits = self.limits
-        for name, value, low, high in (
-            ("drive_amplitude_vpp", amplitude_vpp, 0.0, limits.drive_amplitude_vpp),
-            ("drive_offset_v", abs(offset_v), 0.0, limits.drive_offset_v),
-            ("drive_frequency_hz", frequency_hz, -math.inf, limits.drive_frequency_hz),
-            ("drive_lowest_hz", frequency_hz, limits.drive_lowest_hz, math.inf),
-        ):
-            if not low <= value <= high:  # nan is in no range
-                allowed = f"up to {high:g}" if high < math.inf else f"from {low:g} on"
-                raise OutOfRange("bench", name, value, f"{allowed} (limits.{name} in bench.toml)")
+        _coil_limits(self.limits).check(
+            "bench", frequency_hz=frequency_hz, amplitude_vpp=amplitude_vpp, offset_v=offset_v
+        )
 
     # --- instruments that lose their link, or their settings ---
 
@@ -121,6 +116,11 @@ class Bench:
                 raise OutputMayBeOn(self.instruments["generator"].transport.address, error) from error
 
 
+def _coil_limits(limits: Limits) -> CoilLimits:
+    """The limits of bench.toml as the generator's driver keeps them."""
+    return CoilLimits(**limits.model_dump())
+
+
 @contextlib.contextmanager
 def open_bench(
     config: BenchConfig,
@@ -148,6 +148,8 @@ def open_bench(
                 settings = VIRTUAL[kind] if world else _described(config, kind)
                 instrument = opened(kind, settings, bench.clock, library=library, log=log)
                 links.callback(instrument.close)
+                if kind == "generator":
+                    cast("Generator", instrument).limits = _coil_limits(config.limits)
                 instrument.identity()
                 instrument.forget_errors()
                 bench.instruments[kind] = instrument  # only what is what it should be is ever switched

@@ -6,7 +6,7 @@ from instruments.errors import InstrumentError, NotConnected, OutOfRange, WrongI
 from instruments.virtual.generator import Virtual33500B
 from levilab.bench import OutputMayBeOn, open_bench
 from levilab.clock import VirtualClock, WallClock
-from levilab.config import BenchConfig, ConfigError, InstrumentSettings, Limits, SpinSettings, read_bench
+from levilab.config import BenchConfig, ConfigError, InstrumentSettings, Limits, SpinSettings, read_bench, within_limits
 from levilab.errors import LevilabError
 from levilab.interruption import Interrupted
 from levilab.simulator.world import SpinScene, SpinWorld
@@ -186,7 +186,57 @@ def test_the_wire_log_reaches_every_instrument(world):
     assert (VIRTUAL["generator"].address, ">", b"OUTP1 OFF\n") in traffic
 
 
+def test_the_second_output_is_off_as_soon_as_the_bench_is_open_and_when_it_is_left(world, monkeypatch):
+    made = []
+
+    class LeftOn(Virtual33500B):
+        """A generator that an earlier user has left on, on both channels."""
+
+        def __init__(self, *args, **kwargs):
+            super().__init__(*args, **kwargs)
+            self.settings |= {"output": True, "2:output": True}
+            made.append(self)
+
+    monkeypatch.setattr("instruments.virtual.generator.Virtual33500B", LeftOn)
+    with open_bench(BenchConfig(), KINDS, world=world):
+        assert (made[0].settings["output"], made[0].settings["2:output"]) == (False, False)
+        made[0].settings["2:output"] = True
+    assert made[0].settings["2:output"] is False
+
+
 # --- limits ---
+
+TIGHT = Limits(drive_amplitude_vpp=4.0, drive_offset_v=1.0, drive_frequency_hz=50.0, drive_lowest_hz=5.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("amplitude", 4.1), ("offset", 1.1), ("frequency", 51.0), ("load", 50.0), ("output", True)]
+)
+def test_the_generator_of_an_open_bench_keeps_to_its_limits_by_itself(world, name, value):
+    with open_bench(BenchConfig(limits=TIGHT), KINDS, world=world) as bench:
+        with pytest.raises(OutOfRange, match=r"limits\.drive_\w+ in bench\.toml"):
+            setattr(bench.generator, name, value)
+        assert all(field == 0 for *_, field in world.coil)
+
+
+def test_a_drive_with_an_offset_is_put_on_the_coil(world):
+    with open_bench(BenchConfig(limits=TIGHT), KINDS, world=world) as bench:
+        bench.drive(waveform="SQU", frequency_hz=30.0, amplitude_vpp=4.0, offset_v=-1.0)
+        assert (bench.generator.amplitude, bench.generator.offset, bench.generator.output) == (4.0, -1.0, True)
+
+
+@pytest.mark.parametrize(
+    ("limits", "says"),
+    [
+        (Limits(drive_lowest_hz=41.0), r"= 40 is less than this bench stands, limits\.drive_lowest_hz = 41"),
+        (Limits(drive_frequency_hz=39.0), r"= 40 is more than this bench stands, limits\.drive_frequency_hz = 39"),
+        (Limits(drive_amplitude_vpp=9.0), r"= 10 is more than this bench stands, limits\.drive_amplitude_vpp = 9"),
+    ],
+)
+def test_a_spin_down_that_the_bench_does_not_stand_is_refused_beforehand(limits, says):
+    with pytest.raises(ConfigError, match=says):
+        within_limits(BenchConfig(limits=limits))
+    assert within_limits(BenchConfig()) == BenchConfig()
 
 
 @pytest.mark.parametrize(
@@ -195,10 +245,14 @@ def test_the_wire_log_reaches_every_instrument(world):
         ({"frequency_hz": 30.0, "amplitude_vpp": 4.01}, "drive_amplitude_vpp"),
         ({"frequency_hz": 50.1, "amplitude_vpp": 4.0}, "drive_frequency_hz"),
         ({"frequency_hz": float("nan"), "amplitude_vpp": 4.0}, "drive_frequency_hz"),
+        ({"frequency_hz": 30.0, "amplitude_vpp": float("nan")}, "drive_amplitude_vpp"),
+        ({"frequency_hz": 30.0, "amplitude_vpp": 4.0, "offset_v": -1.1}, "drive_offset_v"),
+        ({"frequency_hz": 30.0, "amplitude_vpp": 4.0, "offset_v": float("nan")}, "drive_offset_v"),
+        ({"frequency_hz": 4.9, "amplitude_vpp": 4.0}, "drive_lowest_hz"),
     ],
 )
 def test_a_drive_beyond_the_limits_is_refused_by_name_and_nothing_is_sent(world, drive, name):
-    config = BenchConfig(limits=Limits(drive_amplitude_vpp=4.0, drive_frequency_hz=50.0))
+    config = BenchConfig(limits=TIGHT)
     with open_bench(config, KINDS, world=world) as bench:
         with pytest.raises(OutOfRange) as refusal:
             bench.drive(waveform="SIN", **drive)

@@ -257,14 +257,16 @@ def test_a_signal_while_connecting_never_lets_the_drive_on(
     tmp_path: Path, outputs: list[bool], monkeypatch: pytest.MonkeyPatch, moment: int
 ) -> None:
     asked = itertools.count()
-    identity = Keysight33500B.identity
+    driver: Any = Keysight53230A if moment % 2 else Keysight33500B
+    identity = driver.identity
 
-    def interrupted(self: Keysight33500B) -> str:
+    def interrupted(self: Any) -> str:
         if next(asked) == moment // 2:
             signal.raise_signal(signal.SIGINT)
-        return identity(self)
+        answer: str = identity(self)
+        return answer
 
-    monkeypatch.setattr(Keysight53230A if moment % 2 else Keysight33500B, "identity", interrupted)
+    monkeypatch.setattr(driver, "identity", interrupted)
     run = acquire(mock(tmp_path), Silent())
     assert run.status == "interrupted"
     assert True not in outputs
