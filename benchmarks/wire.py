@@ -33,7 +33,7 @@ from unittest import mock
 
 import pyvisa
 
-from instruments.oscilloscope import RigolDS1000Z
+from instruments.oscilloscope_rigol import RigolDS1000Z
 from instruments.transport import VisaTransport
 from instruments.virtual.bus import Bus
 from instruments.virtual.generator import Virtual33500B

@@ -72,8 +72,10 @@ def _seen(instrument: ScpiInstrument, config: BenchConfig) -> Reading:
         sweep="auto",
     )
     scope.acquire(timeout_s=5.0)
-    volts = scope.trace(1).volts
-    low, high = float(volts.min()), float(volts.max())
+    volts = [v for v in scope.trace(1).volts.tolist() if math.isfinite(v)]
+    if not volts:
+        return "no sample on channel 1 in 0.1 s", None, "V"
+    low, high = min(volts), max(volts)
     return f"channel 1 between {low:.2f} and {high:.2f} V in 0.1 s", high - low, "V"
 
 

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from levilab.config import InstrumentSettings
 
 _COUNTERS, _GENERATORS = "instruments.counter", "instruments.generator"
-_SCOPES, _MAGNETOMETERS = "instruments.oscilloscope", "instruments.magnetometer"
+_RIGOL, _KEYSIGHT = "instruments.oscilloscope_rigol", "instruments.oscilloscope_keysight"
+_MAGNETOMETERS = "instruments.magnetometer"
 
 #: Kind → model as one writes it in bench.toml → module and class of its driver.
 DRIVERS: dict[str, dict[str, tuple[str, str]]] = {
@@ -29,9 +30,9 @@ DRIVERS: dict[str, dict[str, tuple[str, str]]] = {
         "33220A": (_GENERATORS, "Agilent33220A"),
     },
     "oscilloscope": {
-        "DS1000Z": (_SCOPES, "RigolDS1000Z"),
-        "DSOX1000": (_SCOPES, "KeysightDSOX"),
-        "DSOX2000": (_SCOPES, "KeysightDSOX"),
+        "DS1000Z": (_RIGOL, "RigolDS1000Z"),
+        "DSOX1000": (_KEYSIGHT, "KeysightDSOX"),
+        "DSOX2000": (_KEYSIGHT, "KeysightDSOX"),
     },
     "magnetometer": {
         "425": (_MAGNETOMETERS, "LakeShore425"),

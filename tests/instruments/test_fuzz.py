@@ -18,7 +18,9 @@ from instruments.counter import Keysight53230A, PendulumCNT91
 from instruments.errors import BadAnswer, InstrumentError
 from instruments.generator import Agilent33220A, Keysight33500B
 from instruments.magnetometer import LakeShore425, LakeShore475
-from instruments.oscilloscope import KeysightDSOX, RigolDS1000Z, Trace
+from instruments.oscilloscope import Trace
+from instruments.oscilloscope_keysight import KeysightDSOX
+from instruments.oscilloscope_rigol import RigolDS1000Z
 from instruments.serial_link import SerialTransport
 from instruments.transport import VisaTransport
 from instruments.virtual.bus import MOST_ANSWERS, Bus

@@ -5,10 +5,12 @@ Sources: MSO1000Z/DS1000Z Programming Guide, InfiniiVision X-Series Programmer's
 
 import numpy as np
 import pytest
-from conversation import NO_ERROR, SILENCE, Script, accepted
+from conversation import CLEAR, NO_ERROR, SILENCE, Script, accepted
 
 from instruments.errors import BadAnswer, CommandRefused, InstrumentError, NoAnswer, OutOfRange, WrongInstrument
-from instruments.oscilloscope import KeysightDSOX, NeverTriggered, NothingAcquired, RigolDS1000Z
+from instruments.oscilloscope import NeverTriggered, NothingAcquired
+from instruments.oscilloscope_keysight import KeysightDSOX
+from instruments.oscilloscope_rigol import RigolDS1000Z
 from levilab.clock import VirtualClock
 
 RIGOL = "RIGOL TECHNOLOGIES,DS1054Z,DS1ZA171812345,00.04.04.SP4"
@@ -47,6 +49,44 @@ PULSES = {
     "trigger_level_v": 0.65,
 }
 
+#: What the scope was told, as it tells it itself: numbers in another form, a depth and switches as numbers.
+RIGOL_KEPT = [
+    ("CHAN1:DISP?", "1"),
+    ("CHAN1:PROB?", "1.000000e+00"),
+    ("CHAN1:COUP?", "DC"),
+    ("CHAN1:INV?", "0"),
+    ("CHAN1:SCAL?", "2.000000e-01"),
+    ("CHAN1:OFFS?", "-6.000000e-01"),
+    (":TIM:MODE?", "MAIN"),
+    (":TIM:SCAL?", "1.000000e-02"),
+    (":TIM:OFFS?", "0.000000e+00"),
+    (":ACQ:TYPE?", "NORM"),
+    (":ACQ:MDEP?", "1.200000e+05"),
+    (":TRIG:MODE?", "EDGE"),
+    (":TRIG:EDGE:SOUR?", "CHAN1"),
+    (":TRIG:EDGE:SLOP?", "POS"),
+    (":TRIG:EDGE:LEV?", "6.480000e-01"),
+    (":TRIG:SWE?", "NORM"),
+]
+KEYSIGHT_KEPT = [
+    ("CHAN1:DISP?", "1"),
+    ("CHAN1:PROB?", "+1.0E+00"),
+    ("CHAN1:COUP?", "DC"),
+    ("CHAN1:INV?", "0"),
+    ("CHAN1:SCAL?", "+200E-03"),
+    ("CHAN1:OFFS?", "+6.03015E-01"),
+    (":TIM:MODE?", "MAIN"),
+    (":TIM:REF?", "CENT"),
+    (":TIM:RANG?", "+1.00E-01"),
+    (":TIM:POS?", "+0.0E+00"),
+    (":ACQ:TYPE?", "NORM"),
+    (":TRIG:MODE?", "EDGE"),
+    (":TRIG:EDGE:SOUR?", "CHAN1"),
+    (":TRIG:EDGE:SLOP?", "POSITIVE"),
+    (":TRIG:EDGE:LEV?", "+650E-03"),
+    (":TRIG:SWE?", "NORM"),
+]
+
 RIGOL_PREPARED = [
     ("*IDN?", RIGOL),
     ("*CLS", None),
@@ -72,6 +112,7 @@ RIGOL_PREPARED = [
         ":TRIG:EDGE:LEV 0.65",
         ":TRIG:SWE NORM",
     ),
+    *RIGOL_KEPT,
 ]
 
 KEYSIGHT_PREPARED = [
@@ -97,8 +138,10 @@ KEYSIGHT_PREPARED = [
         ":TRIG:EDGE:LEV 0.65",
         ":TRIG:SWE NORM",
     ),
+    *KEYSIGHT_KEPT,
 ]
 
+STOPPED = [("*CLS", None), *accepted(":STOP")]
 RIGOL_ACQUIRED = [*accepted(":SING"), *((":TRIG:STAT?", word) for word in ("WAIT", "TD", "STOP"))]
 RIGOL_SELECTED = accepted(":WAV:SOUR CHAN1", ":WAV:MODE RAW", ":WAV:FORM BYTE")
 KEYSIGHT_ACQUIRED = [
@@ -205,6 +248,20 @@ def test_a_scope_with_two_inputs_is_not_asked_for_four():
     said(script)
 
 
+@pytest.mark.parametrize(
+    ("driver", "lines", "answer", "name"),
+    [
+        (RigolDS1000Z, RIGOL_PREPARED, ("CHAN1:OFFS?", "0.0"), "channel1_offset_v"),
+        (KeysightDSOX, KEYSIGHT_PREPARED, (":TIM:RANG?", "+5E-02"), "time_range_s"),
+    ],
+)
+def test_what_the_scope_sets_otherwise_without_a_word_is_out_of_range(driver, lines, answer, name):
+    _, scope = talk(driver, *(answer if line[0] == answer[0] else line for line in lines))
+    with pytest.raises(OutOfRange) as refused:
+        scope.prepare(**PULSES)
+    assert refused.value.name == name
+
+
 # --- acquiring ---
 
 
@@ -229,7 +286,8 @@ def test_a_record_that_was_complete_before_the_first_question_is_one():
 
 
 def test_with_sweep_auto_the_rigol_is_triggered_by_force():
-    auto = [*RIGOL_PREPARED[:-2], *accepted(":TRIG:SWE AUTO")]
+    auto = [*RIGOL_PREPARED[: -2 - len(RIGOL_KEPT)], *accepted(":TRIG:SWE AUTO"), *RIGOL_KEPT[:-1]]
+    auto += [(":TRIG:SWE?", "AUTO")]
     lines = [*accepted(":SING"), *[(":TRIG:STAT?", "WAIT")] * 6, *accepted(":TFOR"), (":TRIG:STAT?", "STOP")]
     script, scope = talk(RigolDS1000Z, *auto, *lines)
     scope.prepare(**PULSES, sweep="auto")
@@ -251,9 +309,9 @@ def test_the_keysight_is_asked_whether_it_was_armed_then_until_it_no_longer_runs
             [
                 *accepted(":SING"),
                 *[(":TRIG:STAT?", "WAIT")] * 26,
-                *accepted(":STOP"),
                 (":TRIG:EDGE:LEV?", "1.300000e+00"),
                 (":TRIG:EDGE:SOUR?", "CHAN1"),
+                *STOPPED,
             ],
         ),
         (
@@ -263,9 +321,9 @@ def test_the_keysight_is_asked_whether_it_was_armed_then_until_it_no_longer_runs
                 *accepted(":SING"),
                 (":AER?", "+1"),
                 *[(":OPER:COND?", "+40")] * 26,
-                *accepted(":STOP"),
                 (":TRIG:EDGE:LEV?", "+1.300000E+00"),
                 (":TRIG:EDGE:SOUR?", "CHAN1"),
+                *STOPPED,
             ],
         ),
     ],
@@ -289,10 +347,21 @@ def test_a_trigger_that_never_comes_stops_the_scope_and_says_at_which_level(driv
         (KeysightDSOX, [(":AER?", "+0"), *accepted(":SING"), (":AER?", "perhaps")]),
     ],
 )
-def test_a_state_that_is_none_is_an_error(driver, lines):
-    _, scope = talk(driver, *lines)
+def test_after_a_state_that_is_none_the_link_is_cleared_and_the_scope_stopped(driver, lines):
+    script, scope = talk(driver, *lines, (CLEAR, None), *STOPPED)
     with pytest.raises(BadAnswer):
         scope.acquire(timeout_s=1.0)
+    said(script)
+    with pytest.raises(NothingAcquired):
+        scope.trace(1)
+
+
+def test_what_goes_wrong_while_it_is_stopped_does_not_hide_why_it_is():
+    lines = [*accepted(":SING"), (":TRIG:STAT?", SILENCE), ("*CLS", None), (":STOP", None), ("SYST:ERR?", SILENCE)]
+    script, scope = talk(RigolDS1000Z, *lines)
+    with pytest.raises(NoAnswer, match="TRIG:STAT"):
+        scope.acquire(timeout_s=1.0)
+    said(script)
 
 
 # --- reading ---
@@ -315,6 +384,7 @@ def test_a_trace_of_the_rigol_is_scaled_by_its_preamble():
     assert (trace.dt_s, trace.t0_s, trace.channel) == (2e-5, -1.456e-2, 1)
     # (code + 75 − 127)·0.04 V
     np.testing.assert_allclose(trace.volts, [-2.08, -1.68, 0.0, 3.0, 8.12], atol=1e-12)
+    assert trace.clipped.tolist() == [True, False, False, False, True]
 
 
 def test_a_trace_of_the_keysight_is_scaled_by_its_preamble():
@@ -324,7 +394,8 @@ def test_a_trace_of_the_keysight_is_scaled_by_its_preamble():
         *KEYSIGHT_SELECTED,
         (":WAV:PRE?", KEYSIGHT_PREAMBLE),
         NO_ERROR,
-        (":WAV:DATA?", bytes([1, 10, 128, 129, 255])),
+        (":WAV:DATA?", bytes([1, 10, 128, 0, 255])),
+        *KEYSIGHT_KEPT,
     ]
     script, scope = talk(KeysightDSOX, *lines)
     scope.prepare(**PULSES)
@@ -332,8 +403,9 @@ def test_a_trace_of_the_keysight_is_scaled_by_its_preamble():
     trace = scope.trace(1)
     said(script)
     assert (trace.dt_s, trace.t0_s) == (1.6e-8, -5e-4)
-    expected = 1.5 + 0.201005025 * np.array([-127, -118, 0, 1, 127])
+    expected = 1.5 + 0.201005025 * np.array([-127, -118, 0, np.nan, 127])  # code 0: no sample
     np.testing.assert_allclose(trace.volts, expected, rtol=1e-12)
+    assert trace.clipped.tolist() == [True, False, False, False, True]
 
 
 def test_a_long_trace_comes_in_blocks_of_250000_bytes():
@@ -350,11 +422,12 @@ def test_a_long_trace_comes_in_blocks_of_250000_bytes():
 @pytest.mark.parametrize("block", [b"", bytes(4), bytes(6)])
 def test_a_block_of_another_length_is_no_trace(block):
     lines = [*RIGOL_ACQUIRED, *RIGOL_SELECTED, (":WAV:PRE?", RIGOL_PREAMBLE)]
-    lines += [(":WAV:STAR 1", None), (":WAV:STOP 5", None), NO_ERROR, (":WAV:DATA?", block)]
-    _, scope = talk(RigolDS1000Z, *lines)
+    lines += [(":WAV:STAR 1", None), (":WAV:STOP 5", None), NO_ERROR, (":WAV:DATA?", block), (CLEAR, None)]
+    script, scope = talk(RigolDS1000Z, *lines)
     scope.acquire(timeout_s=1.0)
     with pytest.raises(BadAnswer, match="5 bytes"):
         scope.trace(1)
+    said(script)
 
 
 def test_a_block_that_does_not_come_is_explained_by_the_error_queue():
@@ -374,10 +447,11 @@ def test_a_block_that_does_not_come_is_explained_by_the_error_queue():
 
 @pytest.mark.parametrize("preamble", ["", "0,2,5", "0,2,x,1,1,0,0,1,0,0", "0,2,0,1,1,0,0,1,0,0", "0,2,5,1,0,0,0,1,0,0"])
 def test_a_preamble_that_is_none_is_an_error(preamble):
-    _, scope = talk(RigolDS1000Z, *RIGOL_ACQUIRED, *RIGOL_SELECTED, (":WAV:PRE?", preamble))
+    script, scope = talk(RigolDS1000Z, *RIGOL_ACQUIRED, *RIGOL_SELECTED, (":WAV:PRE?", preamble), (CLEAR, None))
     scope.acquire(timeout_s=1.0)
     with pytest.raises(BadAnswer):
         scope.trace(1)
+    said(script)
 
 
 @pytest.mark.parametrize("driver", [RigolDS1000Z, KeysightDSOX])
@@ -388,9 +462,9 @@ def test_what_an_earlier_program_left_in_the_memory_is_not_read(driver):
 
 
 def test_after_a_trigger_that_did_not_come_the_old_record_is_not_read():
-    never = [*accepted(":SING"), (":TRIG:STAT?", "WAIT"), *accepted(":STOP")]
+    never = [*accepted(":SING"), (":TRIG:STAT?", "WAIT")]
     asked = [(":TRIG:EDGE:LEV?", "1.3"), (":TRIG:EDGE:SOUR?", "CHAN1")]
-    _, scope = talk(RigolDS1000Z, *RIGOL_ACQUIRED, *never, *asked)
+    _, scope = talk(RigolDS1000Z, *RIGOL_ACQUIRED, *never, *asked, *STOPPED)
     scope.acquire(timeout_s=1.0)
     with pytest.raises(NeverTriggered):
         scope.acquire(timeout_s=0.0)

@@ -1,5 +1,6 @@
 """The virtual oscilloscopes against signals that are known at every instant."""
 
+import contextlib
 import io
 import json
 import math
@@ -15,9 +16,13 @@ from hypothesis import strategies as st
 from wire import ask, cable, errors, received, send
 
 import pyvisa_levilab
-from instruments.oscilloscope import KeysightDSOX, NeverTriggered, RigolDS1000Z
+from instruments.errors import BadAnswer, SettingsLost
+from instruments.oscilloscope import NeverTriggered, NothingAcquired
+from instruments.oscilloscope_keysight import KeysightDSOX
+from instruments.oscilloscope_rigol import RigolDS1000Z
 from instruments.transport import VisaTransport
 from instruments.virtual.bus import Bus
+from instruments.virtual.faults import Fault
 from instruments.virtual.scope import AUTO_AFTER, PIECE, Edge, one_two_five
 from instruments.virtual.scope_keysight import VirtualDSOX1000
 from instruments.virtual.scope_measure import MEASUREMENTS, Measured, measure
@@ -756,3 +761,132 @@ def test_pyvisa_reads_the_block_as_of_any_scope():
     codes = scope.query_binary_values(":WAV:DATA?", datatype="H", is_big_endian=True, container=np.array)
     assert codes.size == 1000
     scope.close()
+
+
+# --- a scope that is changed under way ---
+
+
+@contextlib.contextmanager
+def prepared(driver, make, address="TCPIP0::scope.levilab::inst0::INSTR"):
+    """A scope that waits for pulses at 0.65 V, its driver, and the bus for faults."""
+    clock = VirtualClock()
+    device = make(clock, signals={1: pulses})
+    bus = Bus({address: device})
+    scope = driver(VisaTransport(address, library=pyvisa_levilab.library_for(bus)), clock=clock)
+    scope.prepare(**PULSES, trigger_level_v=0.65)
+    yield device, scope, bus
+    scope.close()
+
+
+def read(scope, how):
+    scope.acquire(timeout_s=1.0)
+    return scope.trace(1).codes if how == "trace" else np.concatenate(list(scope.blocks(1)))
+
+
+READING = pytest.mark.parametrize("how", ["trace", "blocks"])
+
+
+@BOTH
+@READING
+def test_a_reset_after_the_preparation_gives_no_trace(driver, make, how):
+    with prepared(driver, make) as (device, scope, _):
+        device.reset()
+        with pytest.raises(SettingsLost, match=r"probe_factor = 10\.0 instead of 1\.0") as lost:
+            read(scope, how)
+        assert {"channel1_scale_v", "channel1_offset_v", "trigger_level_v"} <= set(lost.value.changed)
+        with pytest.raises(NothingAcquired):
+            scope.trace(1)
+        scope.prepare(**PULSES, trigger_level_v=0.65)
+        assert read(scope, how).size >= 10_000
+
+
+@BOTH
+@READING
+@pytest.mark.parametrize(
+    "question", [r":TRIG:STAT\?|:OPER:COND\?|:AER\?", r":WAV:PRE\?", r":WAV:DATA\?", r"SYST:ERR\?"]
+)
+@pytest.mark.parametrize("after", [0, 1, 3])
+def test_a_reset_at_any_time_gives_no_trace(driver, make, how, question, after):
+    with prepared(driver, make) as (_, scope, bus):
+        bus.faults.append(fault := Fault("reset", question=question, after=after))
+        with contextlib.suppress(SettingsLost):
+            read(scope, how)
+            assert fault.seen <= after  # it was not asked so often
+
+
+@BOTH
+def test_a_reset_during_the_preparation_is_told_by_it(driver, make):
+    with prepared(driver, make) as (_, scope, bus):
+        bus.faults.append(Fault("reset", question=r"SYST:ERR\?", after=10))
+        with pytest.raises(SettingsLost):
+            scope.prepare(**PULSES, trigger_level_v=0.65)
+
+
+@BOTH
+@pytest.mark.parametrize(
+    ("setting", "value", "name"),
+    [
+        ("chan1_probe", 10.0, "channel1_probe_factor"),
+        ("chan1_scale", 0.5, "channel1_scale_v"),
+        ("chan1_offset", 0.0, "channel1_offset_v"),
+        ("chan1_coupling", "AC", "channel1_coupling"),
+        ("chan1_invert", True, "channel1_inverted"),
+        ("chan1_display", False, "channel1_display"),
+        ("time_scale", 0.001, None),
+        ("time_offset", 0.03, None),
+        ("time_mode", "ROLL", "time_mode"),
+        ("trigger_level", 1.3, "trigger_level_v"),
+        ("trigger_source", "CHAN2", "trigger_source"),
+        ("trigger_slope", "NEG", "trigger_slope"),
+        ("trigger_sweep", "AUTO", "sweep"),
+    ],
+)
+def test_a_key_of_the_front_panel_is_told_instead_of_a_trace_or_of_a_dark_signal(driver, make, setting, value, name):
+    with prepared(driver, make) as (device, scope, _):
+        start = scope._start
+
+        def start_and_be_changed():
+            start()
+            device.settings[setting] = value
+            device.changed(setting)  # what was begun begins anew
+
+        scope._start = start_and_be_changed
+        with pytest.raises(SettingsLost) as lost:
+            read(scope, "trace")
+        assert len(lost.value.changed) == 1
+        assert name is None or name in lost.value.changed
+
+
+@BOTH
+def test_what_is_rounded_is_not_changed(driver, make):
+    with prepared(driver, make) as (device, scope, _):
+        device.settings |= {"chan1_offset": 1.005 * device.settings["chan1_offset"], "trigger_level": 0.66}
+        assert read(scope, "trace").size >= 10_000
+
+
+@BOTH
+@pytest.mark.parametrize("address", ["TCPIP0::scope.levilab::inst0::INSTR", "TCPIP0::scope.levilab::5025::SOCKET"])
+@pytest.mark.parametrize("question", [r":WAV:PRE\?", r":TRIG:STAT\?|:OPER:COND\?"])
+def test_after_an_answer_that_makes_no_sense_the_link_is_in_step_and_the_scope_stopped(driver, make, address, question):
+    with prepared(driver, make, address) as (device, scope, bus):
+        bus.faults.append(Fault("garbage before", question=question))
+        with pytest.raises(BadAnswer):
+            read(scope, "trace")
+        assert not scope.transport._out_of_step
+        assert not device.running()
+        assert scope.identity().startswith(device.identity)
+        assert read(scope, "trace").size >= 10_000
+
+
+@BOTH
+def test_an_interruption_stops_the_scope(driver, make):
+    with prepared(driver, make) as (device, scope, _):
+
+        def interrupted(_):
+            raise KeyboardInterrupt
+
+        scope._clock.sleep, sleep = interrupted, scope._clock.sleep
+        with pytest.raises(KeyboardInterrupt):
+            scope.acquire(timeout_s=1.0)
+        scope._clock.sleep = sleep
+        assert not device.running()

@@ -1,0 +1,341 @@
+"""What the drivers of oscilloscopes do in the same way: preparing, waiting for the trigger, reading, and comparing.
+
+A scope that was reset, or whose keys were turned, gives good records of something else: its probe factor makes every
+voltage ten times too large, its level lets no pulse trigger.  So the driver keeps what it prepared, and compares before
+it hands a record out and before it says that the signal never triggered.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from typing import TYPE_CHECKING, ClassVar, NoReturn
+
+import numpy as np
+
+from instruments.errors import BadAnswer, InstrumentError, NoAnswer, OutOfRange, SettingsLost
+from instruments.oscilloscope import Clock, NeverTriggered, NothingAcquired, Preamble, Trace, WallClock
+from instruments.oscilloscope_setup import Channel, Setup, is_still
+from instruments.scpi import ScpiInstrument, Setting
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from instruments.oscilloscope_setup import Value
+    from instruments.transport import Transport
+
+#: Between two questions whether the record is complete [s].
+_POLL = 0.02
+#: Beyond the transport's time-out, a block may take this long on its way [s]; 1 MB over a slow link.
+_BLOCK_PATIENCE = 10.0
+
+
+class Scope(ScpiInstrument):
+    """What the drivers do in the same way; a subclass gives headers, time base, states and blocks.
+
+    CHANNEL: the class of its inputs; OFFSET_SIGN: of the voltage in the middle of the screen, in its offset; READY: how
+    it acquires while it is set up; SLOPES, SWEEPS: its words for them; CODES: of a clipped trace, and of no sample;
+    PASSING: settings that acquire() leaves in another state than they were prepared.
+    """
+
+    CHANNEL: ClassVar[type[Channel]]
+    OFFSET_SIGN: ClassVar[float] = 1.0
+    READY: ClassVar[str]
+    SLOPES: ClassVar[Mapping[str, str]]
+    SWEEPS: ClassVar[Mapping[str, str]]
+    CODES: ClassVar[tuple[int, int, int | None]] = (0, 255, None)
+    PASSING: ClassVar[Mapping[str, str]] = {}
+
+    time_mode = Setting(":TIM:MODE", str)
+    trigger_mode = Setting(":TRIG:MODE", str)
+    trigger_source = Setting(":TRIG:EDGE:SOUR", str)
+    trigger_level = Setting(":TRIG:EDGE:LEV", float, unit="V", low=-1e5, high=1e5)
+
+    def __init__(self, transport: Transport, *, clock: Clock | None = None) -> None:
+        """Drive the scope.  clock: the one its trigger is waited for with; by default the wall's."""
+        super().__init__(transport)
+        self._clock: Clock = clock or WallClock()
+        self._acquired = False
+        self._duration = 0.0
+        self._setup: Setup | None = None
+        self._wanted: dict[ScpiInstrument, dict[str, Value]] = {}
+
+    def identity(self) -> str:
+        """The answer to ``*IDN?``; see :class:`instruments.oscilloscope.Oscilloscope`."""
+        answer = super().identity()
+        model = answer.split(",")[1] if "," in answer else answer
+        self._inputs = self._number_of_inputs(model)
+        return answer
+
+    _inputs: int | None = None
+
+    @staticmethod
+    def _number_of_inputs(model: str) -> int:
+        """The last digit of the model's number: DS1054Z, DSO-X 1102G."""
+        digits = re.findall(r"\d", model)
+        return int(digits[3]) if len(digits) > 3 and digits[3] in "1248" else 4
+
+    def settings(self) -> dict[str, bool | float | str]:
+        """Every declared setting, those of the prepared channels as ``channel1_…``."""
+        channels = {
+            f"channel{n}_{name}": value
+            for n in self._channels
+            for name, value in self.CHANNEL(self, n).settings().items()
+        }
+        return super().settings() | channels
+
+    @property
+    def _channels(self) -> tuple[int, ...]:
+        return self._setup.channels if self._setup else (1,)
+
+    # --- preparing ---
+
+    def prepare(
+        self,
+        *,
+        channels: Sequence[int] = (1,),
+        duration_s: float,
+        points: int,
+        volts_per_division: float,
+        offset_v: float = 0.0,
+        coupling: str = "DC",
+        trigger_level_v: float,
+        trigger_slope: str = "rising",
+        trigger_source: int = 1,
+        sweep: str = "normal",
+    ) -> None:
+        """Set the scope up; see :class:`instruments.oscilloscope.Oscilloscope`."""
+        setup = Setup(
+            tuple(channels),
+            duration_s,
+            points,
+            volts_per_division,
+            offset_v,
+            coupling,
+            trigger_level_v,
+            trigger_slope,
+            trigger_source,
+            sweep,
+        )
+        self._acquired = False  # a new preparation ends the old record, even one that is refused
+        inputs = self._check_setup(setup)
+        times = self._times(setup)
+        self._setup = setup
+        self._wanted = {self.CHANNEL(self, n): self._scaling(setup) for n in setup.shown}
+        self._wanted[self] = {"time_mode": "MAIN"} | times | self._trigger(setup)
+        self.forget_errors()
+        self.command(self.READY)
+        self._set(inputs)
+        self._check_taken()
+
+    def _check_setup(self, setup: Setup) -> int:
+        """What is checked before anything is sent; the number of inputs.  Raises OutOfRange."""
+        self._check("sweep", setup.sweep, tuple(self.SWEEPS))
+        self._check("trigger_slope", setup.trigger_slope, tuple(self.SLOPES))
+        self._check("coupling", setup.coupling, ("DC", "AC"))
+        if self._inputs is None:
+            self.identity()
+        inputs = self._inputs or 4
+        for channel in (*setup.channels, setup.trigger_source):
+            self._check("channel", channel, range(1, inputs + 1))
+        return inputs
+
+    def _check(self, name: str, value: object, choices: Sequence[object]) -> None:
+        if value not in choices:
+            raise OutOfRange(self.transport.address, name, value, "one of " + ", ".join(map(str, choices)))
+
+    def _times(self, setup: Setup) -> dict[str, Value]:
+        """The settings of time base and memory, in the order in which they are set.  Raises OutOfRange."""
+        raise NotImplementedError
+
+    def _scaling(self, setup: Setup) -> dict[str, Value]:
+        return {
+            "display": True,
+            "probe_factor": 1.0,
+            "coupling": setup.coupling,
+            "inverted": False,
+            "scale": setup.volts_per_division,
+            "offset": self.OFFSET_SIGN * setup.offset_v,
+        }
+
+    def _trigger(self, setup: Setup) -> dict[str, Value]:
+        return {
+            "trigger_mode": "EDGE",
+            "trigger_source": f"CHAN{setup.trigger_source}",
+            "trigger_slope": self.SLOPES[setup.trigger_slope],
+            "trigger_level": setup.trigger_level_v,
+            "sweep": self.SWEEPS[setup.sweep],
+        }
+
+    def _set(self, inputs: int) -> None:
+        """Send what is wanted: the inputs first, for the trigger's level depends on their scales."""
+        wanted = {part.number: part for part in self._wanted if isinstance(part, Channel)}
+        for n in range(1, inputs + 1):
+            if n in wanted:
+                self._give(wanted[n])
+            else:
+                self.CHANNEL(self, n).display = False
+        self._give(self)
+
+    def _give(self, part: ScpiInstrument) -> None:
+        for name, value in self._wanted[part].items():
+            setattr(part, name, value)
+
+    # --- comparing ---
+
+    def lost(self) -> dict[str, tuple[object, object]]:
+        """Settings that are no longer as prepare() wanted them: name → (as prepared, now)."""
+        differing: dict[str, tuple[object, object]] = {}
+        for part, rows in self._wanted.items():
+            head = f"channel{part.number}_" if isinstance(part, Channel) else ""
+            declared = {row.name: row for row in part.declared()}
+            for name, value in rows.items():
+                now = getattr(part, name)
+                if now != self.PASSING.get(name) and not is_still(self._setup, declared[name], value, now):
+                    differing[head + declared[name].full_name] = (value, now)
+        return differing
+
+    def _check_taken(self) -> None:
+        """Whether the scope set what it was told to.
+
+        Raises OutOfRange for a voltage or a time that it set otherwise, without a word; SettingsLost if more than these
+        differ, as after a reset.
+        """
+        differing = self.lost()
+        if not differing:
+            return
+        if all(name.endswith(("_v", "_s")) for name in differing):
+            name, (wanted, now) = next(iter(differing.items()))
+            raise OutOfRange(self.transport.address, name, wanted, f"{now}, as the scope has set it")
+        raise SettingsLost(self.transport.address, differing)
+
+    def _check_kept(self) -> None:
+        """Raise SettingsLost, and hand nothing out, if the scope is no longer as it was prepared."""
+        if differing := self.lost():
+            self._acquired = False
+            raise SettingsLost(self.transport.address, differing)
+
+    @contextlib.contextmanager
+    def _blaming_changes(self) -> Iterator[None]:
+        """An error that came because the scope was changed is told as SettingsLost."""
+        try:
+            yield
+        except SettingsLost:
+            raise
+        except InstrumentError as error:
+            differing: dict[str, tuple[object, object]] = {}
+            with contextlib.suppress(InstrumentError):  # if it does not answer at all, the first error tells more
+                differing = self.lost()
+            if not differing:
+                raise
+            self._acquired = False
+            raise SettingsLost(self.transport.address, differing) from error
+
+    # --- acquiring ---
+
+    def off(self) -> None:
+        """Acquire no more; see :class:`instruments.oscilloscope.Oscilloscope`."""
+        self.forget_errors()
+        self.command(":STOP")
+
+    def acquire(self, *, timeout_s: float) -> None:
+        """Take one record; see :class:`instruments.oscilloscope.Oscilloscope`."""
+        self._acquired = False
+        try:
+            self._start()
+            self._wait(timeout_s)
+        except BaseException:
+            with contextlib.suppress(
+                InstrumentError
+            ):  # it may not trigger when nobody waits; the first error tells more
+                self.off()
+            raise
+        self._acquired = True
+
+    def _wait(self, timeout: float) -> None:
+        """Wait until the record is complete.  Raises NeverTriggered, SettingsLost."""
+        deadline = self._clock.now() + self._duration + timeout
+        while not self._complete():
+            if self._clock.now() >= deadline:
+                self._check_kept()
+                level, source = self.trigger_level, self.trigger_source
+                raise NeverTriggered(self.transport.address, level_v=level, source=source, waited_s=timeout)
+            self._clock.sleep(_POLL)
+
+    def _start(self) -> None:
+        raise NotImplementedError
+
+    def _complete(self) -> bool:
+        raise NotImplementedError
+
+    # --- reading ---
+
+    def trace(self, channel: int) -> Trace:
+        """The record of one channel; see :class:`instruments.oscilloscope.Oscilloscope`."""
+        self._check_readable(channel)
+        with self._blaming_changes():
+            preamble = self.preamble(channel)
+            codes = np.empty(preamble.points, dtype=np.uint8)
+            at = 0
+            for piece in self._pieces(preamble):
+                codes[at : at + piece.size] = piece
+                at += piece.size
+        self._check_kept()
+        scaling = (preamble.dt_s, preamble.t0_s, preamble.volts_per_code, preamble.offset_v)
+        return Trace(codes, *scaling, channel, *self.CODES)
+
+    def blocks(self, channel: int) -> Iterator[NDArray[np.uint8]]:
+        """The codes of one channel, piece by piece; see :class:`instruments.oscilloscope.Oscilloscope`."""
+        self._check_readable(channel)
+        self._check_kept()
+        with self._blaming_changes():
+            yield from self._pieces(self.preamble(channel))
+        self._check_kept()
+
+    def _check_readable(self, channel: int) -> None:
+        if not self._acquired:
+            raise NothingAcquired(self.transport.address)
+        self._check("channel", channel, self._channels)
+
+    def preamble(self, channel: int) -> Preamble:
+        """How the record of one channel is read; it is the one that is read next.  Raises NothingAcquired."""
+        self._check_readable(channel)
+        self._select(channel)
+        answer = self.transport.query(":WAV:PRE?")
+        try:
+            preamble = self._read_preamble([float(field) for field in answer.split(",")])
+        except (ValueError, OverflowError):
+            preamble = None
+        # of some nothing follows, of others no record that any of these scopes has
+        if preamble is None or not preamble.plausible:
+            self._misheard(":WAV:PRE?", answer, "ten numbers, with points and their distance")
+        return preamble
+
+    def _misheard(self, question: str, answer: str, expected: str) -> NoReturn:
+        """Raise BadAnswer; the link is cleared, for the answer may have been another question's."""
+        with self.resynchronised():
+            raise BadAnswer(self.transport.address, question, answer, expected)
+
+    def _select(self, channel: int) -> None:
+        raise NotImplementedError
+
+    def _read_preamble(self, numbers: list[float]) -> Preamble:
+        raise NotImplementedError
+
+    def _pieces(self, preamble: Preamble) -> Iterator[NDArray[np.uint8]]:
+        raise NotImplementedError
+
+    def _block(self, points: int) -> NDArray[np.uint8]:
+        """The next block, which must hold so many codes.  Raises BadAnswer, CommandRefused."""
+        self.raise_errors(":WAV:DATA?")
+        try:
+            with self.resynchronised():
+                block = self.transport.query_block(":WAV:DATA?", patience=_BLOCK_PATIENCE)
+        except NoAnswer:
+            self.raise_errors(":WAV:DATA?")  # the reason stands in the queue, if there is one
+            raise
+        if len(block) != points:
+            self._misheard(":WAV:DATA?", f"{len(block)} bytes", f"{points} bytes")
+        return np.frombuffer(block, dtype=np.uint8)

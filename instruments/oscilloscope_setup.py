@@ -1,0 +1,91 @@
+"""What an oscilloscope was asked for, its inputs' settings, and whether an answer is what was set."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
+
+from instruments.scpi import ScpiInstrument, Setting
+
+if TYPE_CHECKING:
+    from instruments.transport import Transport
+
+    Value = bool | float | str
+
+#: Scopes round what they are given: by so much of a division, of the record, and of the number itself.
+_OF_A_DIVISION, _OF_THE_RECORD, _OF_ITSELF = 0.1, 0.01, 0.01
+
+SLOPES = {"rising": "POS", "falling": "NEG"}
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What prepare() was asked for; see :class:`instruments.oscilloscope.Oscilloscope`."""
+
+    channels: tuple[int, ...]
+    duration_s: float
+    points: int
+    volts_per_division: float
+    offset_v: float
+    coupling: str
+    trigger_level_v: float
+    trigger_slope: str
+    trigger_source: int
+    sweep: str
+
+    @property
+    def shown(self) -> tuple[int, ...]:
+        """The channels that are on: the recorded ones, and the trigger's."""
+        return tuple(sorted({*self.channels, self.trigger_source}))
+
+    def rounding(self, unit: str) -> float:
+        """How far from what it was given a scope may set a number of this unit."""
+        return {"V": _OF_A_DIVISION * self.volts_per_division, "s": _OF_THE_RECORD * self.duration_s}.get(unit, 0.0)
+
+
+class Channel(ScpiInstrument):
+    """The settings of one input: headers that begin with its name."""
+
+    display = Setting("DISP", bool)
+    inverted = Setting("INV", bool)
+
+    def __init__(self, scope: ScpiInstrument, number: int) -> None:
+        super().__init__(scope.transport)
+        self.scope, self.number = scope, number
+        self.head = f"CHAN{number}:"
+        # only its question is used here: commands go through the scope, which reads its error queue
+        self.transport = cast("Transport", _Headed(scope.transport, self.head))
+
+    def command(self, message: str) -> None:
+        """Send a command of this input."""
+        self.scope.command(self.head + message)
+
+
+class _Headed:
+    """A transport for questions that begin with the same header, and for what an answer that makes no sense needs."""
+
+    def __init__(self, transport: Transport, head: str) -> None:
+        self.address, self._transport, self._head = transport.address, transport, head
+
+    def query(self, message: str, *, patience: float = 0.0) -> str:
+        return self._transport.query(self._head + message, patience=patience)
+
+    def clear(self) -> None:
+        self._transport.clear()
+
+
+def is_still(setup: Setup | None, setting: Setting[Any], wanted: Value, now: Value) -> bool:
+    """Whether an answer is what was set, but for rounding and for long forms of words."""
+    if setting.kind is float:
+        rounding = setup.rounding(setting.unit) if setup else 0.0
+        return abs(float(now) - float(wanted)) <= rounding + _OF_ITSELF * abs(float(wanted))
+    word, answer = str(wanted).upper(), str(now).upper()
+    # a number as a word is the same in any spelling
+    return float(word) == _number(answer) if word.isdigit() else answer.startswith(word)
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
