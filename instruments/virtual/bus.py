@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -12,17 +13,21 @@ from instruments.scpi import INFINITY
 from instruments.virtual.faults import LinkLost
 from instruments.virtual.framing import Framer, Overrun
 from instruments.virtual.scpi import LONGEST_ANSWER, ScpiError
+from instruments.virtual.steps import SteppedInstrument, Work, at_once
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     from instruments.virtual.device import Answer, VirtualInstrument
     from instruments.virtual.faults import Fault
+    from instruments.virtual.steps import Steps
 
 
 _NOTHING = memoryview(b"")
 #: Answers that wait to be read, at most.
 MOST_ANSWERS = 1000
+#: How long an instrument works in one slice [s], as the clock on the wall tells.
+SLICE = 0.01
 
 
 @dataclass
@@ -112,6 +117,7 @@ class Session:
     _rest: memoryview = _NOTHING
     _complete: bool = True
     _asked: bool = False  # something was sent since the last answer was read
+    _clears: int = 0
 
     def __post_init__(self) -> None:
         self._framer = Framer(blocks=self.device.takes_blocks)
@@ -119,12 +125,45 @@ class Session:
     def write(self, data: bytes, *, end: bool = True) -> None:
         """Bytes for the instrument; it works on every message that they complete.  end: marked by the interface."""
         with self.lock:
-            self._check_link()
-            for message in self._messages(data, end=end and not self.stream):
-                if isinstance(message, Overrun):
-                    self.device.parser.report(ScpiError(-363))
-                elif message:
-                    self._run(message)
+            at_once(self._steps(data, end=end))
+
+    def slices(self, data: bytes, *, end: bool = True) -> Iterator[None]:
+        """What write() does, in slices: the bus is locked while one is worked on, and free between them.
+
+        Whoever closes this gives the rest up; so does a device clear.
+        """
+        return self._sliced(self._steps(data, end=end))
+
+    def catch_up(self) -> Iterator[None]:
+        """What has gone on in the instrument while nobody asked, in slices."""
+        return self._sliced(self.device.catch_up()) if isinstance(self.device, SteppedInstrument) else iter(())
+
+    def _sliced(self, steps: Steps[None]) -> Iterator[None]:
+        work = Work(steps)
+        try:
+            while not work.done:
+                with self.lock:
+                    end = time.monotonic() + SLICE
+                    while work.step() and time.monotonic() < end:
+                        pass
+                if work.error:
+                    raise work.error
+                if not work.done:
+                    yield
+        finally:
+            with self.lock:
+                work.give_up()
+
+    def _steps(self, data: bytes, *, end: bool) -> Steps[None]:
+        self._check_link()
+        clears = self._clears
+        for message in self._messages(data, end=end and not self.stream):
+            if clears != self._clears:
+                return
+            if isinstance(message, Overrun):
+                self.device.parser.report(ScpiError(-363))
+            elif message:
+                yield from self._run(message)
 
     def _messages(self, data: bytes, *, end: bool) -> list[str | Overrun]:
         """What these bytes complete.  END takes the place of a line feed if there is none (IEEE 488.2, 7.5)."""
@@ -133,14 +172,14 @@ class Session:
             messages += self._framer.feed(b"\n")
         return messages
 
-    def _run(self, message: str) -> None:
+    def _run(self, message: str) -> Steps[None]:
         self._drop_what_is_abandoned()
         if not self.stream and (self._answers or self._rest):
             self.device.parser.report(ScpiError(-410))
             self._answers.clear()
             self._rest = _NOTHING
         self._asked = True
-        answer = self.device.execute(message)
+        answer = yield from self._answer(message)
         for fault in self.bus.faults if self.bus else ():
             if answer is not None and fault.strikes(message):
                 answer = fault.act(self, answer)
@@ -148,6 +187,15 @@ class Session:
         if answer is not None:
             self._answers.append(answer)
             self._keep_within_bounds()
+
+    def _answer(self, message: str) -> Steps[Answer | None]:
+        if isinstance(self.device, SteppedInstrument):
+            return (yield from self.device.steps(message))
+        return self.device.execute(message)
+
+    def cut_off_by(self, data: bytes) -> bool:
+        """Whether these bytes end what the instrument works on."""
+        return isinstance(self.device, SteppedInstrument) and self.device.cut_off_by(data.decode("latin-1"))
 
     def _keep_within_bounds(self) -> None:
         """Who asks on and on and never reads gets nothing of it (IEEE 488.2, 6.3.1.7)."""
@@ -236,6 +284,7 @@ class Session:
     def clear(self) -> None:
         """Device clear: what is under way in either direction is dropped, settings stay."""
         with self.lock:
+            self._clears += 1
             self._framer.clear()
             self._answers.clear()
             self._rest = _NOTHING

@@ -11,13 +11,17 @@ import numpy as np
 
 from instruments.scpi import INFINITY, NOT_A_NUMBER
 from instruments.virtual.counting import Looks, Measurement, Memory, Run, Span, measurement, statistics
-from instruments.virtual.device import Answer, Clock, VirtualInstrument, answers, does
+from instruments.virtual.device import answers, does
 from instruments.virtual.edges import Array, Input, Signal, crossings
 from instruments.virtual.scpi import Command, ScpiError, at_most_one, choice, limit, none, nr3, number, one
 from instruments.virtual.status import OPERATION_COMPLETE
+from instruments.virtual.steps import SteppedInstrument, at_once, plainly, slow
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from instruments.virtual.device import Clock
+    from instruments.virtual.steps import Steps
 
 __all__ = ["Signal", "Virtual53230A", "VirtualCounter", "crossings"]
 
@@ -25,6 +29,7 @@ __all__ = ["Signal", "Virtual53230A", "VirtualCounter", "crossings"]
 NEVER = INFINITY
 
 _CHANNELS = re.compile(r"\(@\s*([\d,\s]+)\)")
+_ABORT = re.compile(r"[\x00-\x20]*:?ABORT?[\x00-\x20]*", re.IGNORECASE)
 _BRACKETED = re.compile(r"\(\s*([^@()]*)\)")
 
 
@@ -89,7 +94,7 @@ class Function:
     inputs: int = 1
 
 
-class VirtualCounter(VirtualInstrument):
+class VirtualCounter(SteppedInstrument):
     """What both counters are: two inputs, one run at a time, and a memory for its readings.
 
     signal, second: the voltages at the inputs 1 and 2.
@@ -107,14 +112,13 @@ class VirtualCounter(VirtualInstrument):
 
     # --- what goes on while nobody asks ---
 
-    def execute(self, message: str) -> Answer | None:
-        """Run one message; a measurement under way goes on first."""
-        self._go_on()
-        return super().execute(message)
+    def cut_off_by(self, message: str) -> bool:
+        """See the base: ABORt does."""
+        return bool(_ABORT.fullmatch(message))
 
     def status_byte(self, *, message_available: bool = False) -> int:
         """The status byte; see the base."""
-        self._go_on()
+        at_once(self.catch_up())
         return super().status_byte(message_available=message_available)
 
     def abandon(self) -> None:
@@ -134,10 +138,11 @@ class VirtualCounter(VirtualInstrument):
         if self._run:
             self._run.trigger(self._ready)
 
-    def _go_on(self) -> None:
+    def catch_up(self) -> Steps[None]:
+        """See the base: a measurement under way goes on."""
         now = self.clock.now()
         if self._run:
-            self._run.advance(now)
+            yield from self._run.advance(now)
         if self._completion_awaited and self.idle(now):
             self._completion_awaited = False
             self.status.events |= OPERATION_COMPLETE
@@ -155,17 +160,17 @@ class VirtualCounter(VirtualInstrument):
     def there(self) -> int:
         """Readings in the memory by now."""
         if self._run and self._ready < NEVER:
-            self._run.advance(self._ready)
+            at_once(self._run.advance(self._ready))
         return self._memory.there(self._ready)
 
-    def wait_for(self, count: float = math.inf) -> bool:
+    def wait_for(self, count: float = math.inf) -> Steps[bool]:
         """The answer to the message under way is ready when so many readings have been taken since INITiate.
 
         Returns whether that will be; if not, the answer never comes.
         """
         if self._run is None:
             return True
-        instant = self._run.reach(count, self._ready) if self._ready < NEVER else NEVER
+        instant = (yield from self._run.reach(count, self._ready)) if self._ready < NEVER else NEVER
         self.busy_until(min(instant, NEVER))
         if instant < NEVER:
             return True
@@ -214,20 +219,20 @@ class VirtualCounter(VirtualInstrument):
 
     def _common(self) -> tuple[Command, ...]:
         own = (
-            Command("*OPC", set=does(self._note_when_complete), get=answers(self._completion)),
-            Command("*WAI", set=does(self._wait)),
+            slow("*OPC", plainly(self._completion), set=does(self._note_when_complete)),
+            slow("*WAI", act=plainly(self._wait)),
         )
         return (*own, *super()._common())
 
-    def _wait(self) -> None:
-        self.wait_for()
+    def _wait(self) -> Steps[None]:
+        yield from self.wait_for()
 
     def _note_when_complete(self) -> None:
         self._completion_awaited = True
 
-    def _completion(self) -> str:
+    def _completion(self) -> Steps[str]:
         if self._run and math.isfinite(self._run.wanted):  # a counter that runs freely has nothing pending
-            self.wait_for()
+            yield from self.wait_for()
         return "1"
 
     def toggle(self, pattern: str, name: str, *, default: bool = False) -> Command:
@@ -361,21 +366,21 @@ class Virtual53230A(VirtualCounter):
             def configure(parameters: list[str], name: str = name) -> None:
                 self._configure(name, parameters)
 
-            def measure(parameters: list[str], name: str = name) -> str:
+            def measure(parameters: list[str], name: str = name) -> Steps[str]:
                 self._configure(name, parameters)
-                return self._read()
+                return (yield from self._read())
 
             rows += [
                 Command("CONFigure" + function.header, configure, answers(self._configuration)),
-                Command("MEASure" + function.header, get=measure),
+                slow("MEASure" + function.header, measure),
             ]
         return (
             *rows,
             Command("CONFigure", get=answers(self._configuration)),
             Command("[SENSe[1]:]FUNCtion[:ON]", self._set_function, answers(lambda: f'"{self._function}"')),
             Command("INITiate[:IMMediate]", set=does(self._initiate)),
-            Command("READ", get=answers(self._read)),
-            Command("FETCh", get=answers(self._fetch)),
+            slow("READ", plainly(self._read)),
+            slow("FETCh", plainly(self._fetch)),
             Command("ABORt", set=does(self.abandon)),
         )
 
@@ -427,7 +432,7 @@ class Virtual53230A(VirtualCounter):
     def _memory_rows(self) -> tuple[Command, ...]:
         return (
             Command("R", get=self._remove_what_is_there),
-            Command("DATA:REMove", get=self._remove),
+            slow("DATA:REMove", self._remove),
             Command("DATA:POINts", get=answers(lambda: f"{self.there() - self._memory.fetched:+d}")),
             Command("DATA:LAST", get=answers(self._last)),
             Command("FORMat[:DATA]", self._set_format, answers(self._format)),
@@ -599,19 +604,19 @@ class Virtual53230A(VirtualCounter):
             )
         )
 
-    def _read(self) -> str:
+    def _read(self) -> Steps[str]:
         """READ?: INITiate, and the answer comes with the last reading."""
         if self.settings["trigger_source"] == "BUS":
             # the question would wait for a trigger that cannot come before it is answered
             raise ScpiError(-221)
         self._initiate()
-        return self._fetch()
+        return (yield from self._fetch())
 
-    def _fetch(self) -> str:
+    def _fetch(self) -> Steps[str]:
         """FETCh?: all readings, when there are all; they stay in the memory."""
         if self._run is None and not self._memory.held:
             raise ScpiError(-230)
-        if not self.wait_for():
+        if not (yield from self.wait_for()):
             return ""
         values, _ = self._memory.part(self._memory.fetched, self._memory.held)
         return self._spell(values, head="#0")
@@ -625,7 +630,7 @@ class Virtual53230A(VirtualCounter):
             raise ScpiError(-230)
         return self._take(int(min(most, there - self._memory.fetched)), as_block=True)
 
-    def _remove(self, parameters: list[str]) -> str:
+    def _remove(self, parameters: list[str]) -> Steps[str]:
         """DATA:REMove? n[,WAIT]: n readings, taken out of the memory, waited for if they are still to come."""
         words = without_channels(parameters)
         if not words:
@@ -639,7 +644,7 @@ class Virtual53230A(VirtualCounter):
             wanted = gone + self._memory.fetched + count
             if len(words) == 1 or self._run is None or wanted > self._run.wanted:
                 raise ScpiError(-230)
-            if not self.wait_for(wanted):
+            if not (yield from self.wait_for(wanted)):
                 return ""
         return self._take(count, as_block=False)
 

@@ -20,9 +20,12 @@ from instruments.virtual.counting import Looks, Measurement, Memory, Run, Span, 
 from instruments.virtual.device import Clock, answers, does
 from instruments.virtual.edges import Array, Input, Signal
 from instruments.virtual.scpi import Command, ScpiError, at_most_one, choice, limit, none, number, one
+from instruments.virtual.steps import plainly, slow
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
+
+    from instruments.virtual.steps import Steps
 
 #: Schmitt trigger at a fixed level [V] (CNT-90 series data sheet: sensitivity 15 mV r.m.s.); ten times that behind
 #: the attenuator.
@@ -162,20 +165,20 @@ class VirtualCNT91(VirtualCounter):
         def configure(parameters: list[str]) -> None:
             self._configure(name, parameters, several=several)
 
-        def measure(parameters: list[str]) -> str:
+        def measure(parameters: list[str]) -> Steps[str]:
             self._configure(name, parameters, several=several)
             self._initiate()
-            return self._fetch(int(self._wanted()) if several else 1)
+            return (yield from self._fetch(int(self._wanted()) if several else 1))
 
-        return [Command("CONFigure" + header, configure), Command("MEASure" + header, get=measure)]
+        return [Command("CONFigure" + header, configure), slow("MEASure" + header, measure)]
 
     def _fetching(self) -> tuple[Command, ...]:
         return (
-            Command("FETCh[:SCALar]", get=answers(lambda: self._fetch(1))),
-            Command("FETCh:ARRay", get=self._fetch_array),
-            Command("READ[:SCALar]", get=answers(self._read)),
-            Command("READ:ARRay", get=self._read_array),
-            Command("CALCulate:DATA", get=answers(lambda: self._fetch(-1))),
+            slow("FETCh[:SCALar]", plainly(lambda: self._fetch(1))),
+            slow("FETCh:ARRay", self._fetch_array),
+            slow("READ[:SCALar]", plainly(self._read)),
+            slow("READ:ARRay", self._read_array),
+            slow("CALCulate:DATA", plainly(lambda: self._fetch(-1))),
         )
 
     def _input(self, channel: int, suffix: str) -> tuple[Command, ...]:
@@ -226,7 +229,7 @@ class VirtualCNT91(VirtualCounter):
             self.integer(head + "COUNt", "averaged", low=2, high=2e9, default=100),
             Command(head + "COUNt:CURRent", get=answers(lambda: str(self.there()))),
             self.word(head + "TYPE", "average_type", (*words, "MINMax"), "MEAN"),
-            Command(head + "ALL", get=answers(self._all_statistics)),
+            slow(head + "ALL", plainly(self._all_statistics)),
         )
 
     def _system(self) -> tuple[Command, ...]:
@@ -390,17 +393,18 @@ class VirtualCNT91(VirtualCounter):
         edge = yield from first_edge(looks.finder(channel, begin), begin, math.inf)
         return edge.time if edge else begin
 
-    def _read(self) -> str:
+    def _read(self) -> Steps[str]:
         """READ? is ABORt, INITiate and FETCh?."""
         self._restart()
-        return self._fetch(1)
+        return (yield from self._fetch(1))
 
-    def _read_array(self, parameters: list[str]) -> str:
+    def _read_array(self, parameters: list[str]) -> Steps[str]:
         count = self._size(parameters)
         if count > self._wanted():
             raise ScpiError(-221)
         self._restart()
-        return self._fetch(int(count if math.isfinite(count) else min(self._wanted(), self._value("most"))))
+        most = count if math.isfinite(count) else min(self._wanted(), self._value("most"))
+        return (yield from self._fetch(int(most)))
 
     def _restart(self) -> None:
         self._stop()
@@ -415,57 +419,57 @@ class VirtualCNT91(VirtualCounter):
             return math.inf
         return float(round(number(words[0], low=-_MOST, high=_MOST, default=1)))
 
-    def _fetch_array(self, parameters: list[str]) -> str:
+    def _fetch_array(self, parameters: list[str]) -> Steps[str]:
         count = self._size(parameters)
         if not count:
             raise ScpiError(-222)
         if math.isfinite(count):
-            return self._fetch(int(count))
+            return (yield from self._fetch(int(count)))
         there = self.there()
         fresh = there - self._memory.fetched
         if not fresh and not self.idle(self._ready):
             raise ScpiError(-230)
         if not fresh:  # all were fetched: it begins again with the first one
             self._memory.fetched, fresh = 0, there
-        return self._fetch(int(min(fresh, self._value("most"))), size_known=False)
+        return (yield from self._fetch(int(min(fresh, self._value("most"))), size_known=False))
 
-    def _fetch(self, count: int, *, size_known: bool = True) -> str:
+    def _fetch(self, count: int, *, size_known: bool = True) -> Steps[str]:
         """So many results, from where the last fetch ended; a negative number: the last ones, the place is kept."""
         if self._run is None and not self._memory.held:
             raise ScpiError(-230)
         if self.settings["averaging"]:
-            return self._fetch_statistic()
+            return (yield from self._fetch_statistic())
         if count < 0:
             there = self.there()
-            if there < -count and not self._wait_until(-count):
+            if there < -count and not (yield from self._wait_until(-count)):
                 return ""
             there = self.there()
             return self._spell(*self._memory.part(there + count, there))
         if self._memory.fetched >= self._memory.held and self.idle(self._ready):
             self._memory.fetched = 0
         start = self._memory.fetched
-        if not self._wait_until(start + count):
+        if not (yield from self._wait_until(start + count)):
             return ""
         self._memory.fetched = start + count
         return self._spell(*self._memory.part(start, start + count), size_known=size_known)
 
-    def _wait_until(self, held: int) -> bool:
+    def _wait_until(self, held: int) -> Steps[bool]:
         """Wait until the memory holds so many.  Raises ScpiError if it never will."""
         gone = self._run.taken - self._memory.held if self._run else 0
         if held > self._memory.held and (self._run is None or gone + held > self._run.wanted):
             raise ScpiError(-230)
-        return self.wait_for(gone + held)
+        return (yield from self.wait_for(gone + held))
 
-    def _fetch_statistic(self) -> str:
+    def _fetch_statistic(self) -> Steps[str]:
         """With statistics on, what is fetched is their result."""
-        if not self.wait_for():
+        if not (yield from self.wait_for()):
             return ""
         name = {"MEAN": "mean", "SDEV": "sdev", "MIN": "min", "MAX": "max", "ADEV": "adev", "MINM": "min"}
         return number_text(self.statistics()[name[str(self.settings["average_type"])]])
 
-    def _all_statistics(self) -> str:
+    def _all_statistics(self) -> Steps[str]:
         """Mean, standard deviation, least, greatest, peak to peak."""
-        self.wait_for()
+        yield from self.wait_for()
         found = self.statistics()
         return ",".join(number_text(found[name]) for name in ("mean", "sdev", "min", "max", "ptp"))
 

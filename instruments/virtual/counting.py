@@ -1,7 +1,8 @@
 """What the virtual counters share: measurements that take their time, and the memory for readings.
 
 A measurement is a generator: it asks for edges, and waits where it may not look any further.  So one that is
-under way (INITiate) goes on as the bench's clock does, and one that is waited for (READ?) is worked out at once.
+under way (INITiate) goes on as the bench's clock does, and one that is waited for (READ?) is worked out ahead of it,
+in steps.
 """
 
 from __future__ import annotations
@@ -10,11 +11,15 @@ import math
 from array import array
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from instruments.scpi import NOT_A_NUMBER
 from instruments.virtual.edges import Array, Edge, EdgeFinder, Input, Signal
+
+if TYPE_CHECKING:
+    from instruments.virtual.steps import Steps
 
 #: A message may make a model look so far ahead [s]; an answer that is further away does not come.  Three hours are
 #: ten readings with the longest gate there is.
@@ -275,10 +280,11 @@ class Run:
         if self.waiting:
             self._next = now + self.delay
 
-    def advance(self, until: float, count: float = math.inf) -> None:
+    def advance(self, until: float, count: float = math.inf) -> Steps[None]:
         """Everything that happens up to this time [s], or until so many readings have been taken in all.
 
-        A program that stays away for hours finds that time passed over.
+        A program that stays away for hours finds that time passed over.  Between two steps anything may happen to the
+        run, but for being advanced beyond this time.
         """
         if until > self._seen + _CATCH_UP and not self.waiting:
             self._under_way, self._next = None, until - _CATCH_UP
@@ -296,6 +302,7 @@ class Run:
             else:
                 if not finder.look(wanted, until):
                     return
+            yield
 
     def _take(self, reading: Reading) -> None:
         self._under_way = None
@@ -305,16 +312,16 @@ class Run:
         if self.taken % self.samples == 0:
             self._next = self._next + self.delay if self.immediate else math.inf
 
-    def reach(self, count: float, now: float) -> float:
+    def reach(self, count: float, now: float) -> Steps[float]:
         """When so many readings have been taken in all, or all of them [s]; infinity if that is out of reach."""
         count = min(count, self.wanted)
-        self.advance(now)
+        yield from self.advance(now)
         if count - self.taken > _MOST_AHEAD or (count - self.taken) * self.least > FARTHEST:
             return math.inf
         ahead, stirred, taken = 0.0, 0.0, self.taken
         while self.taken < count and ahead < min(FARTHEST, stirred + self.quiet + _STEP) and not self.waiting:
             ahead += _STEP
-            self.advance(now + ahead, count)
+            yield from self.advance(now + ahead, count)
             if self.taken > taken:
                 taken, stirred = self.taken, ahead
         if self.taken < count:

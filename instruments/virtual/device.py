@@ -61,6 +61,7 @@ class VirtualInstrument:
     no_error, queue_size, line_end = '+0,"No error"', 20, "\n"
     #: Whether it knows blocks (IEEE 488.2, 7.7.6).
     takes_blocks = True
+    parser_type: type[Parser] = Parser
 
     def __init__(self, clock: Clock, *, pace: float = 2e-3) -> None:
         self.clock, self.pace = clock, pace
@@ -69,17 +70,22 @@ class VirtualInstrument:
         self.status = Status()
         self.epoch = 0
         self._ready = 0.0
-        self.parser = Parser(queue_size=self.queue_size, no_error=self.no_error, noted=self.status.note_error)
+        self.parser = self.parser_type(queue_size=self.queue_size, no_error=self.no_error, noted=self.status.note_error)
         self.parser.commands = (*self._common(), *self.table())
         self.settings |= self._defaults
 
     def execute(self, message: str) -> Answer | None:
         """Run one message, a line without its end; the answers of its queries, if it has any."""
+        self._begin_message()
+        return self._answer(self.parser.run(message))
+
+    def _begin_message(self) -> None:
         self._ready = max(self._ready, self.clock.now()) + self.pace
-        answer = self.parser.run(message)
-        if answer is None:
+
+    def _answer(self, text: str | None) -> Answer | None:
+        if text is None:
             return None
-        return Answer((answer + self.line_end).encode("latin-1"), self._ready, self.epoch)
+        return Answer((text + self.line_end).encode("latin-1"), self._ready, self.epoch)
 
     def abandon(self) -> None:
         """What is under way is given up, and what has not been read yet is lost."""

@@ -174,3 +174,19 @@ def test_a_clock_runs_at_a_multiple_of_the_walls():
     assert clock.now() >= 5.0
     with pytest.raises(ValueError, match="a number above 0"):
         WallClock(speed=-1.0)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows ends a process, it does not ask")
+def test_sigterm_ends_it_while_nine_thousand_readings_are_worked_out():
+    with serving() as (process, said):
+        port = int(said["instruments"]["counter"]["resources"]["socket"].split("::")[2])
+        with socket.create_connection((LOOPBACK, port), timeout=AT_MOST) as client:
+            client.sendall(
+                b"INP1:COUP DC;:INP1:LEV:AUTO OFF;:INP1:LEV 0.6;:SENS:FREQ:GATE:TIME 1;:SYST:TIM MAX;*OPC?\n"
+            )
+            assert client.recv(10) == b"1\n"
+            client.sendall(b"SAMP:COUN 9000;:READ?\n")
+            time.sleep(0.1)  # it has begun
+            before = time.monotonic()
+            assert ended(process, signal.SIGTERM) == (0, "", "")
+            assert time.monotonic() - before < 1.0

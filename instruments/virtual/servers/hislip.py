@@ -186,6 +186,8 @@ class Client:
             await self.sync.fatal(Fatal.NOT_BOTH_CHANNELS, "the asynchronous channel is missing")
         # a client that is kept out waits, and a device clear ends that
         await self.link.turn(given_up=lambda: self.clearing)
+        if not self.link.cut_off_by(message.payload):
+            await self.link.finished(given_up=lambda: self.clearing)
         if self.clearing:
             return
         self.received = message.parameter
@@ -200,7 +202,7 @@ class Client:
             if self.link.due() is not None:  # rule 1; the session drops the answer
                 self._interrupt(message.parameter)
             self.answering = message.parameter
-        self.link.write(message.payload, end=end)
+        await self.link.write(message.payload, end=end)
 
     def _interrupt(self, number: int) -> None:
         """Both are told, the asynchronous channel first (6.11, table 30)."""
@@ -232,8 +234,10 @@ class Client:
                 act = _ASIDE.get(message.type)
                 if act is None:
                     refuse(self.other, message)
-                else:
-                    act(self, self.other, message)
+                    continue
+                if message.type == Type.ASYNC_STATUS_QUERY:
+                    await self.link.caught_up()
+                act(self, self.other, message)
                 await self.other.drain()
         finally:
             if self.locking:

@@ -75,7 +75,7 @@ async def converse(station: Station, wire: Wire) -> None:
             for piece in _lines(await received.get()):
                 await link.turn()
                 await link.quiet()
-                link.write(piece)
+                await link.write(piece)
             received.task_done()
 
     async def answer() -> None:

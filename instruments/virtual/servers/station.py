@@ -1,7 +1,8 @@
 """What all servers share: links to an instrument that are waited for on an event loop, and listening sockets.
 
-One thread with one event loop serves all clients.  An instrument works while the bus is locked; its answers are waited
-for without that lock, on the bench's clock, and whatever happens to the instrument meanwhile is looked at.
+One thread with one event loop serves all clients.  An instrument works while the bus is locked, in slices between which
+the other clients have their turn; its answers are waited for without that lock, on the bench's clock, and whatever
+happens to the instrument meanwhile is looked at.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from instruments.virtual.faults import LinkLost
 from instruments.virtual.scpi import ScpiError
 
 if TYPE_CHECKING:
-    from collections.abc import Coroutine
+    from collections.abc import Coroutine, Iterator
 
     from instruments.virtual.bus import Bus, Session
     from instruments.virtual.device import VirtualInstrument
@@ -45,10 +46,11 @@ class Disconnected(Exception):
 
 @dataclass(eq=False)
 class Station:
-    """One instrument of a bus, as its servers see it."""
+    """One instrument of a bus, as its servers see it.  at_work: held by the client whose message takes long."""
 
     bus: Bus
     device: VirtualInstrument
+    at_work: asyncio.Lock = field(default_factory=asyncio.Lock)
     _stirred: asyncio.Event = field(default_factory=asyncio.Event)
 
     def stir(self) -> None:
@@ -72,16 +74,62 @@ class Link:
     def __init__(self, station: Station, *, stream: bool = False) -> None:
         self.station, self.closed = station, False
         self.session = self._new(stream=stream)
+        self._slices: Iterator[None] = iter(())
+        self._work: asyncio.Task[None] | None = None
 
     def _new(self, *, stream: bool) -> Session:
         return self.station.bus.session(self.station.device, stream=stream)
 
     # --- to the instrument ---
 
-    def write(self, data: bytes, *, end: bool = True) -> None:
-        """Bytes for the instrument; see Session.write."""
-        self.session.write(data, end=end)
-        self.station.stir()
+    async def write(
+        self,
+        data: bytes,
+        *,
+        end: bool = True,
+        within: float | None = None,
+        given_up: Callable[[], bool] = lambda: False,
+    ) -> bool:
+        """Bytes for the instrument, once it has worked on those before; see Session.write.
+
+        What takes long goes on when this has returned.  Returns False if they were not taken within this time [s].
+        """
+        cut_off = self.cut_off_by(data)
+        if not cut_off and not await self.finished(within, given_up=given_up):
+            return False
+        slices = self.session.slices(data, end=end)
+        if (cut_off or not self.station.at_work.locked()) and next(slices, self) is self:
+            self.station.stir()
+        elif await self.finished():
+            self._slices, self._work = slices, asyncio.ensure_future(self._work_on(slices))
+        return True
+
+    def cut_off_by(self, data: bytes) -> bool:
+        """Whether these bytes end what the instrument works on; see Session.cut_off_by."""
+        return self.session.cut_off_by(data)
+
+    async def _work_on(self, slices: Iterator[None]) -> None:
+        try:
+            async with self.station.at_work:
+                for _ in slices:
+                    await asyncio.sleep(0)  # the others' turn
+        finally:
+            self.station.stir()
+
+    async def finished(self, within: float | None = None, *, given_up: Callable[[], bool] = lambda: False) -> bool:
+        """Wait until the instrument has worked on everything; whether that is so within this time [s]."""
+        return await self._comes(lambda: self._work is None or self._work.done(), within, given_up)
+
+    def _drop_work(self) -> None:
+        if self._work is not None:
+            self._work.cancel()
+            self._slices.close()  # type: ignore[attr-defined]
+        self._work = None
+
+    async def caught_up(self) -> None:
+        """Let the instrument do what has gone on while nobody asked."""
+        for _ in self.session.catch_up():
+            await asyncio.sleep(0)
 
     def trigger(self) -> None:
         """The interface's trigger message."""
@@ -90,6 +138,7 @@ class Link:
 
     def clear(self) -> None:
         """Device clear; a client that is kept out clears what is its own, and the instrument works on."""
+        self._drop_work()
         if self.kept_out():
             self.session = self._new(stream=self.session.stream)
         else:
@@ -104,6 +153,7 @@ class Link:
     def close(self) -> None:
         """The client is gone, and its lock with it."""
         self.closed = True
+        self._drop_work()
         self.session.close()
         self.station.stir()
 
@@ -111,6 +161,8 @@ class Link:
 
     def due(self) -> float | None:
         """How long until bytes are there [s] by the clock on the wall; None: none are under way."""
+        if self._work and self._work.done():
+            self._work.result()  # the instrument, or the link, may have failed
         instant = self.session.ready()
         if instant is None:
             return None
@@ -145,8 +197,8 @@ class Link:
         return taken
 
     async def quiet(self) -> None:
-        """Wait until no answer is under way."""
-        while (due := self.due()) is not None:
+        """Wait until the instrument has nothing to do, and no answer is under way."""
+        while await self.finished() and (due := self.due()) is not None:
             await self.station.stirred(due or None)
 
     def status_byte(self, *, unread: bool = False) -> int:

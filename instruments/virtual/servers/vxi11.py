@@ -331,8 +331,10 @@ class _Connection:
         error, found = await self._free(Generic(number, flags, lock_timeout, io_timeout))
         if found is None:
             return packed(error, 0)
-        found.link.write(data, end=bool(flags & Flag.END))
-        return packed(Error.NONE, len(data))
+        end = bool(flags & Flag.END)
+        if await found.link.write(data, end=end, within=io_timeout / 1000, given_up=lambda: found.aborted):
+            return packed(Error.NONE, len(data))
+        return packed(Error.ABORT if found.aborted else Error.IO_TIMEOUT, 0)
 
     async def _device_read(self, parameters: Reader) -> bytes:
         number, count, io_timeout, lock_timeout, flags, character = parameters.numbers(6)
@@ -359,6 +361,8 @@ class _Connection:
 
     async def _device_read_status_byte(self, parameters: Reader) -> bytes:
         error, found = await self._generic(parameters)
+        if found:
+            await found.link.caught_up()
         return packed(error, found.link.status_byte() if found else 0)
 
     async def _device_trigger(self, parameters: Reader) -> bytes:
