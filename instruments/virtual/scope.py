@@ -1,8 +1,6 @@
-"""What the virtual oscilloscopes have in common: sampling, scaling to codes, the trigger, the record.
+"""What the virtual oscilloscopes have in common: acquiring, and what they tell of the record.
 
-A record keeps the time of its trigger and the settings it was taken with, not its samples: whoever reads a piece of it
-samples the signal for that piece again.  So 24 million points need the memory of one piece, and the signals must be
-functions of time.
+The record itself is in scope_record.py, the settings are in scope_setup.py.
 
 What is simpler than in the instrument, and said here once: alternating coupling takes the mean of the second around the
 arming away and does not droop; trigger coupling, noise rejection, holdoff, bandwidth limit and averaging are settings
@@ -13,195 +11,36 @@ if the record is short, and then finds the crossing to a small part of a sample.
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from instruments.virtual.device import Clock, Value, VirtualInstrument, answers
 from instruments.virtual.scope_measure import Measured, edges, measure
-from instruments.virtual.scpi import (
-    Command,
-    ScpiError,
-    at_most_one,
-    choice,
-    limit,
-    number,
-    one,
-)
+from instruments.virtual.scope_record import COARSEST, Edge, Input, Record, open_input
+from instruments.virtual.scope_setup import ScopeSetup, one_two_five
+from instruments.virtual.scpi import ScpiError, choice
 
-#: The voltage at an input: (start [s], step [s], n) → shape (n,) [V].
-Signal = Callable[[float, float, int], NDArray[np.float64]]
-Codes = NDArray[np.uint8]
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
-#: Samples taken from a signal at once, and at which places a record is cut into pieces: a multiple of what one block
-#: of the DS1000Z holds, so that reading block by block samples every point once.
-PIECE = 250_000
-#: The coarsest look of the trigger at the signal [s]: a pulse of 3 % of a turn at 60 Hz lasts 0.5 ms.
-_COARSEST = 50e-6
-#: So many looks are as fine as the record wants; a signal too fast for the coarse ones has triggered by then.
-_FINE_LOOKS = 100_000
+    from numpy.typing import NDArray
+
+    from instruments.virtual.device import Clock
+    from instruments.virtual.scope_record import Signal
+
 #: Below the level by this part of a division the trigger is armed again.
 _HYSTERESIS = 0.3
 #: With sweep AUTO a record is taken without a trigger after this time [s] (assumed; no source at hand).
 AUTO_AFTER = 0.05
 #: How far a question may look ahead for a trigger; later than this is never [s].
 LOOK_AHEAD = 60.0
-#: What would end a string or a message.
-_NOT_IN_LABELS = dict.fromkeys(map(ord, "\"';\n"))
 #: How far back a running scope looks for the last record it may have taken [s].
 LOOK_BACK = 600.0
 #: Between two records of a running scope [s] (assumed).
 _DEAD_TIME = 1e-3
 
 
-def _open_input(_start: float, _step: float, n: int) -> NDArray[np.float64]:
-    return np.zeros(n)
-
-
-@dataclass(frozen=True)
-class Input:
-    """One channel as it was set when the scope was armed.
-
-    factor: of the probe, negative if inverted; mean: what the coupling takes away [V]; volts_per_code: of the
-    converter; zero: the code of 0 V; lowest, highest: the codes of a clipped trace.
-    """
-
-    signal: Signal
-    factor: float
-    mean: float
-    volts_per_code: float
-    zero: int
-    lowest: int
-    highest: int
-
-    def volts(self, start: float, step: float, n: int) -> NDArray[np.float64]:
-        """What the scope takes the voltage at the probe's tip for."""
-        return self.factor * (self.signal(start, step, n) - self.mean)
-
-    def codes(self, start: float, step: float, n: int) -> Codes:
-        """The same as the converter gives it."""
-        codes = np.rint(self.volts(start, step, n) / self.volts_per_code) + self.zero
-        return np.asarray(np.clip(codes, self.lowest, self.highest), dtype=np.uint8)
-
-
-@dataclass(frozen=True, eq=False)
-class Record:
-    """One acquisition.
-
-    trigger: when it was triggered [s]; forced: without an edge; rate: samples per second; points: in memory;
-    origin: of the first sample, counted from the trigger [s]; done: when the last sample was taken [s];
-    screen: where the screen begins [s from the trigger] and how long it is [s].
-    """
-
-    trigger: float
-    forced: bool
-    rate: float
-    points: int
-    origin: float
-    screen: tuple[float, float]
-    inputs: Mapping[int, Input]
-    _kept: dict[tuple[int, int, float], tuple[int, Codes]] = field(default_factory=dict)
-
-    @property
-    def done(self) -> float:
-        """When the last sample was taken [s]."""
-        return self.trigger + self.origin + self.points / self.rate
-
-    def codes(self, channel: int, first: int, count: int, *, of: int, start: float, step: float) -> Codes:
-        """Codes first … first + count − 1 of those that begin at start [s from the trigger], a step apart [s].
-
-        of: how many there are.
-        """
-        pieces = range(first // PIECE, -(-(first + count) // PIECE))
-        whole = [self._piece(channel, k, of, start, step) for k in pieces]
-        offset = first - pieces.start * PIECE if pieces else 0
-        return (whole[0] if len(whole) == 1 else np.concatenate([np.empty(0, np.uint8), *whole]))[
-            offset : offset + count
-        ]
-
-    def _piece(self, channel: int, k: int, of: int, start: float, step: float) -> Codes:
-        """Cut at fixed places, so that noise of a seeded signal is the same whichever way a record is read."""
-        key = (channel, of, step)
-        kept = self._kept.get(key)
-        if kept is None or kept[0] != k:
-            begin = self.trigger + start + k * PIECE * step
-            kept = (k, self.inputs[channel].codes(begin, step, min(PIECE, of - k * PIECE)))
-            self._kept.clear()
-            self._kept[key] = kept
-        return kept[1]
-
-
-@dataclass
-class Edge:
-    """Looks for the first edge in a signal, and goes on where it was when it looks again.
-
-    slopes: 1.0 rising, −1.0 falling; step: between looks, fine: how well the crossing is to be placed [s].
-    """
-
-    volts: Signal
-    level: float
-    hysteresis: float
-    slopes: tuple[float, ...]
-    step: float
-    fine: float
-    position: float
-    _armed: list[bool] = field(default_factory=list)
-    _looks: int = 0
-
-    def until(self, stop: float) -> float | None:
-        """When the first edge is, if it is before stop [s]."""
-        self._armed = self._armed or [False] * len(self.slopes)
-        while self.position < stop:
-            n = min(_FINE_LOOKS, math.ceil((stop - self.position) / self.step) + 1)
-            volts, before = self.volts(self.position, self.step, n), list(self._armed)
-            looks = ((self._first(k, slope * volts, slope), slope) for k, slope in enumerate(self.slopes))
-            found = [(i, slope) for i, slope in looks if i is not None]
-            if found:
-                i, slope = min(found)
-                at = self._placed(self.position + (i - 1) * self.step, self.step, slope)
-                self._armed = before  # the last look may lie behind the stop: such an edge is found again
-                return at if at < stop else None
-            self.position += (n - 1) * self.step
-            self._looks += n
-            if self._looks >= _FINE_LOOKS:
-                self.step = max(self.step, _COARSEST)
-        return None
-
-    def _first(self, k: int, volts: NDArray[np.float64], slope: float) -> int | None:
-        """The first sample at or above the level after one below it less the hysteresis."""
-        level = slope * self.level
-        begin = 0
-        if not self._armed[k]:
-            below = volts < level - self.hysteresis
-            begin = int(np.argmax(below))
-            if not below[begin]:
-                return None
-        above = volts[begin:] >= level
-        i = int(np.argmax(above))
-        if above[i]:
-            return begin + i
-        self._armed[k] = True
-        return None
-
-    def _placed(self, start: float, step: float, slope: float) -> float:
-        """The crossing between two looks, looked at ever closer."""
-        while step > self.fine:
-            step /= 1000
-            volts = self.volts(start, step, 1001)
-            above = slope * volts >= slope * self.level
-            turns = np.flatnonzero(above[1:] != above[:-1])
-            # an edge that only the coarse look saw stands, but for the rounding of its time, at that look
-            start += step * (int(turns[0]) if turns.size else 999)
-        before, after = self.volts(start, step, 2)
-        part = (self.level - before) / (after - before) if after != before else 0.5
-        return start + step * float(min(max(part, 0.0), 1.0))
-
-
-class VirtualOscilloscope(VirtualInstrument):
+class VirtualOscilloscope(ScopeSetup):
     """A digital oscilloscope of eight bits; a subclass gives the commands and how codes and records are scaled.
 
     signals: the voltage at each input, by channel; an input without one is open, 0 V.
@@ -231,82 +70,15 @@ class VirtualOscilloscope(VirtualInstrument):
         self.channels = range(1, channels + 1)
         self._signals = signals
         self.identity = identity or self.identity
-        self._headers: dict[str, str] = {}
         self._record: Record | None = None
         self._armed: float | None = None
         self._edge: Edge | None = None
         self._once = False
         self._forced = math.inf
         self._blocked = False
-        self._restoring = False
         self.triggered = False
         super().__init__(clock)
         self.run()
-
-    # --- rows of the table ---
-
-    def spell(self, value: float) -> str:
-        """A number as this maker prints it."""
-        raise NotImplementedError
-
-    def quantity(
-        self,
-        pattern: str,
-        name: str,
-        default: float,
-        *,
-        unit: str = "",
-        limits: Callable[[], tuple[float, float]],
-        rounded: Callable[[float], float] = lambda value: value,
-        spell: Callable[[float], str] | None = None,
-    ) -> Command:
-        """A row for a number whose limits depend on other settings.  rounded: to what the instrument can do."""
-        self._defaults[name] = default
-        self._remember(pattern, name)
-
-        def set_(parameters: list[str]) -> None:
-            if len(parameters) > 2:  # a second one, as the source of a level, changes nothing here
-                raise ScpiError(-108)
-            low, high = limits()
-            value = number(one(parameters[:1]), low=low, high=high, default=default, unit=unit)
-            before, self.settings[name] = self.settings[name], rounded(value)
-            self.adjusted(name, float(before))
-
-        def ask(parameters: list[str]) -> str:
-            asked = at_most_one(parameters[:1])
-            low, high = limits()
-            bound = asked.upper() in {"MIN", "MAX", "DEF", "MINIMUM", "MAXIMUM", "DEFAULT"}
-            value = limit(asked, low=low, high=high, default=default) if bound else float(self.settings[name])
-            return (spell or self.spell)(value)
-
-        return Command(pattern, set_, ask)
-
-    def word(self, pattern: str, name: str, words: tuple[str, ...], default: str) -> Command:
-        """A row for one word of several, as everywhere; it is part of the setup."""
-        self._remember(pattern, name)
-        return super().word(pattern, name, words, default)
-
-    def switch(self, pattern: str, name: str, *, default: bool = False) -> Command:
-        """A row for ON or OFF, as everywhere; it is part of the setup."""
-        self._remember(pattern, name)
-        return super().switch(pattern, name, default=default)
-
-    def text(self, pattern: str, name: str, default: str, *, longest: int) -> Command:
-        """A row for a string in quotes, cut to its greatest length, in capitals."""
-        self._defaults[name] = default
-        self._remember(pattern, name)
-
-        def set_(parameters: list[str]) -> None:
-            given = one(parameters)
-            if len(given) < 2 or given[0] not in "\"'" or given[-1] != given[0]:
-                raise ScpiError(-104)
-            self.settings[name] = given[1:-1].translate(_NOT_IN_LABELS)[:longest].upper()
-
-        return Command(pattern, set_, answers(lambda: f'"{self.settings[name]}"'))
-
-    def _remember(self, pattern: str, name: str) -> None:
-        short = re.sub(r"\[[^\]]*\]", "", pattern)
-        self._headers[name] = ":" + re.sub("[a-z]", "", short)
 
     def changed(self, name: str) -> None:
         """A setting has changed: what runs begins anew."""
@@ -325,10 +97,6 @@ class VirtualOscilloscope(VirtualInstrument):
             self.settings[f"{channel}_{what}"] = ratio * float(self.settings[f"{channel}_{what}"])
         if self.settings["trigger_source"] == channel.upper():
             self.settings["trigger_level"] = ratio * float(self.settings["trigger_level"])
-
-    def value(self, name: str) -> float:
-        """A setting that is a number."""
-        return float(self.settings[name])
 
     def channel_of(self, text: str) -> int:
         """The channel of ``CHAN1`` or ``CHANnel1``.  Raises ScpiError."""
@@ -366,14 +134,14 @@ class VirtualOscilloscope(VirtualInstrument):
         return max(self._ready, now) if math.isfinite(self._ready) else now
 
     def _input(self, channel: int, start: float) -> Input:
-        signal = self._signals.get(channel, _open_input)
+        signal = self._signals.get(channel, open_input)
         coupling = self.settings[f"chan{channel}_coupling"]
         if coupling == "GND":
-            signal = _open_input
+            signal = open_input
         mean = 0.0
         if coupling == "AC":
             begin = max(0.0, start - 0.5)
-            mean = float(np.mean(signal(begin, _COARSEST, round(1 / _COARSEST))))
+            mean = float(np.mean(signal(begin, COARSEST, round(1 / COARSEST))))
         factor = self.value(f"chan{channel}_probe") * (-1.0 if self.settings[f"chan{channel}_invert"] else 1.0)
         volts_per_code, zero = self.scaling(channel)
         return Input(signal, factor, mean, volts_per_code, zero, self.lowest, self.highest)
@@ -416,7 +184,7 @@ class VirtualOscilloscope(VirtualInstrument):
         if not source.startswith("CHAN"):
             return None
         channel = int(source[4:])
-        step = max(min(_COARSEST, self._next.points / self._next.rate / 1000), 1 / self._next.rate)
+        step = max(min(COARSEST, self._next.points / self._next.rate / 1000), 1 / self._next.rate)
         return Edge(
             volts=self._next.inputs[channel].volts,
             level=self.value("trigger_level"),
@@ -432,9 +200,6 @@ class VirtualOscilloscope(VirtualInstrument):
         """When the part of the record before the trigger is filled: no trigger is taken earlier [s]."""
         return (self._armed or 0.0) + max(0.0, -self._next.origin)
 
-    def _taken(self, trigger: float, *, forced: bool) -> Record:
-        return replace(self._next, trigger=trigger, forced=forced, _kept={})
-
     def _first_record(self, until: float) -> Record | None:
         """The record for which the scope is armed, if its trigger comes before that time [s]."""
         if self._edge is None:
@@ -443,8 +208,8 @@ class VirtualOscilloscope(VirtualInstrument):
         automatic = min(automatic, self._forced)
         edge = self._edge.until(min(until, automatic)) if self._edge else None
         if edge is not None:
-            return self._taken(edge, forced=False)
-        return self._taken(automatic, forced=True) if automatic <= until else None
+            return self._next.taken(edge, forced=False)
+        return self._next.taken(automatic, forced=True) if automatic <= until else None
 
     def follow(self) -> None:
         """Let what has happened up to now have happened."""
@@ -486,7 +251,7 @@ class VirtualOscilloscope(VirtualInstrument):
         if self._armed is not None and self._record is None and self.settings["trigger_sweep"] == "AUTO":
             length = self._next.points / self._next.rate
             trigger = max(self.now - length, 0.0) - self._next.origin
-            self._record = self._taken(trigger, forced=True)
+            self._record = self._next.taken(trigger, forced=True)
         self._armed = None
 
     def force(self) -> None:
@@ -534,6 +299,14 @@ class VirtualOscilloscope(VirtualInstrument):
 
     # --- what it tells ---
 
+    def half_level(self) -> None:
+        """The trigger level half way between the lowest and the highest voltage on the screen."""
+        source = str(self.settings["trigger_source"])
+        if source.startswith("CHAN"):
+            trace = self.on_screen(int(source[4:]))
+            self.settings["trigger_level"] = float(trace.volts.max() + trace.volts.min()) / 2
+            self.changed("trigger_level")
+
     def block(self, data: bytes, *, digits: int) -> str:
         """A definite-length block as text, and the time that it takes."""
         self.busy_until(self._ready + len(data) / self.transfer)
@@ -572,8 +345,8 @@ class VirtualOscilloscope(VirtualInstrument):
     def autoscale(self) -> None:
         """Scale, offset, time base and level to fit what stands at the inputs."""
         for n in self.channels:
-            signal, factor = self._signals.get(n, _open_input), self.value(f"chan{n}_probe")
-            volts = factor * signal(max(0.0, self.now - 0.5), _COARSEST, round(0.5 / _COARSEST))
+            signal, factor = self._signals.get(n, open_input), self.value(f"chan{n}_probe")
+            volts = factor * signal(max(0.0, self.now - 0.5), COARSEST, round(0.5 / COARSEST))
             low, high = float(volts.min()), float(volts.max())
             if high - low < 0.02 * factor:
                 continue
@@ -581,7 +354,7 @@ class VirtualOscilloscope(VirtualInstrument):
             self.fit(n, (low + high) / 2, one_two_five((high - low) / 6, up=True))
             found = edges(volts, (low + high) / 2, 0.1 * (high - low))
             if found.size > 1:
-                period = float(np.diff(found).mean()) * _COARSEST
+                period = float(np.diff(found).mean()) * COARSEST
                 self.settings["time_scale"] = one_two_five(3 * period / self.columns, up=True)
             self.settings |= {"trigger_source": f"CHAN{n}", "trigger_level": (low + high) / 2, "trigger_slope": "POS"}
             break
@@ -592,78 +365,8 @@ class VirtualOscilloscope(VirtualInstrument):
         """Show this voltage in the middle of the screen, with so many volts per division."""
         raise NotImplementedError
 
-    # --- the setup as a whole ---
-
-    def setup(self) -> bytes:
-        """All settings, as messages that restore them."""
-        return "\n".join(f"{header} {self._spelled(name)}" for name, header in self._headers.items()).encode("latin-1")
-
-    def _spelled(self, name: str) -> str:
-        value: Value = self.settings[name]
-        if isinstance(value, bool):
-            return str(int(value))
-        if isinstance(value, float):
-            return f"{value:.15G}"
-        return f'"{value}"' if name.endswith("_label") else value
-
-    def restore(self, setup: str) -> None:
-        """Settings from messages; a setup that is none leaves what it had already set.  Raises ScpiError."""
-        if self._restoring:
-            raise ScpiError(-224)
-        known = set(self._headers.values())
-        self._restoring = True
-        try:
-            for line in setup.split("\n"):
-                header = line.partition(" ")[0]
-                if header not in known:
-                    raise ScpiError(-224)
-                self.parser.run(line.partition(";")[0])
-        finally:
-            self._restoring = False
-
-    def presets(self) -> tuple[Command, ...]:
-        """Setups as blocks and in ten places."""
-        kept: dict[int, str] = {}
-
-        def place(parameters: list[str]) -> int:
-            return int(number(one(parameters), low=0, high=9, default=0))
-
-        def keep(parameters: list[str]) -> None:
-            kept[place(parameters)] = self.setup().decode("latin-1")
-
-        def recall(parameters: list[str]) -> None:
-            where = place(parameters)
-            if where in kept:
-                self.restore(kept[where])
-
-        return (Command("*SAV", set=keep), Command("*RCL", set=recall))
-
     def reset(self) -> None:
         """The state after ``*RST``: it runs."""
         self._blocked = False
         super().reset()
         self.run()
-
-
-def block_content(text: str) -> str:
-    """The content of a definite-length block that was sent as a parameter.  Raises ScpiError."""
-    if len(text) < 2 or text[0] != "#" or not "1" <= text[1] <= "9":
-        raise ScpiError(-104)
-    begin = 2 + int(text[1])
-    digits = text[2:begin]
-    if not digits.isascii() or not digits.isdigit() or len(text) - begin != int(digits):
-        raise ScpiError(-104)
-    return text[begin:]
-
-
-def one_two_five(value: float, *, up: bool = False) -> float:
-    """The number of the series 1, 2, 5, 10 … nearest to a positive one, or the next that is not less.
-
-    >>> one_two_five(3e-3), one_two_five(4e-3), one_two_five(2.1, up=True), one_two_five(0.2, up=True)
-    (0.002, 0.005, 5.0, 0.2)
-    """
-    decade = math.floor(math.log10(value))
-    series = [float(f"{m}e{decade}") for m in (1, 2, 5, 10, 20)]
-    if up:
-        return next(s for s in series if s >= value * (1 - 1e-9))
-    return min(series, key=lambda s: abs(s - value))

@@ -8,69 +8,22 @@ Assumed: what the error queue says when too much is asked for, the depth that AU
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from instruments.virtual.device import answers, does
-from instruments.virtual.scope import VirtualOscilloscope, block_content, one_two_five
-from instruments.virtual.scope_screen import bmp8, bmp24, draw, grey, png
-from instruments.virtual.scpi import Command, ScpiError, boolean, choice, number, one
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from instruments.virtual.scope import Codes, Record
+from instruments.virtual.scope_rigol_reading import MIDDLE, RigolReading
+from instruments.virtual.scope_setup import one_two_five
+from instruments.virtual.scpi import Command, ScpiError, number, one
 
 #: Points of the record for one channel shown; half of it for two, a quarter for more.
 _DEPTHS = (12_000, 120_000, 1_200_000, 12_000_000, 24_000_000)
 _FASTEST = 1e9
-#: Points that one block may have, by format.
-_LONGEST = {"BYTE": 250_000, "WORD": 125_000, "ASC": 15_625}
-_ON_SCREEN, _CODES_PER_DIVISION, _MIDDLE = 1200, 25, 127
+_CODES_PER_DIVISION = 25
 
-#: The items of :MEASure:ITEM as this maker spells them, and what they are called here.
-_ITEMS = {
-    "VMAX": "VMAX",
-    "VMIN": "VMIN",
-    "VPP": "VPP",
-    "VTOP": "VTOP",
-    "VBASe": "VBASE",
-    "VAMP": "VAMPLITUDE",
-    "VAVG": "VAVERAGE",
-    "VRMS": "VRMS",
-    "PVRMS": "PVRMS",
-    "VARIance": "VARIANCE",
-    "VUPPer": "VUPPER",
-    "VUP": "VUPPER",
-    "VMID": "VMID",
-    "VLOWer": "VLOWER",
-    "OVERshoot": "OVERSHOOT",
-    "PREShoot": "PRESHOOT",
-    "MARea": "AREA",
-    "MPARea": "PERIODAREA",
-    "PERiod": "PERIOD",
-    "FREQuency": "FREQUENCY",
-    "RTIMe": "RISETIME",
-    "FTIMe": "FALLTIME",
-    "PWIDth": "PWIDTH",
-    "NWIDth": "NWIDTH",
-    "PDUTy": "PDUTY",
-    "NDUTy": "NDUTY",
-    "TVMAX": "TVMAX",
-    "TVMIN": "TVMIN",
-    "PSLEWrate": "PSLEWRATE",
-    "NSLEWrate": "NSLEWRATE",
-    "PPULses": "PPULSES",
-    "NPULses": "NPULSES",
-    "PEDGes": "PEDGES",
-    "NEDGes": "NEDGES",
-}
-_WORDS = tuple(_ITEMS)
-_STATISTICS = ("MAXimum", "MINimum", "CURRent", "AVERages", "DEViation")
-_PERSISTENCES = ("MIN", "0.1", "0.2", "0.5", "1", "5", "10", "INF")
 _SUPPLIES = ("EXT", "EXT5", "ACLine")
 
 
-class VirtualDS1000Z(VirtualOscilloscope):
+class VirtualDS1000Z(RigolReading):
     """A DS1054Z: four channels, 24 million points, 50 MHz."""
 
     identity = "RIGOL TECHNOLOGIES,DS1054Z,DS1ZVIRTUAL,00.04.04.SP4"
@@ -85,7 +38,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
     def table(self) -> tuple[Command, ...]:
         """Its commands."""
         channels = tuple(row for n in self.channels for row in self._channel(n))
-        return (*self._control(), *channels, *self._time(), *self._trigger(), *self._waveform(), *self._rest())
+        return (*self._control(), *channels, *self._time(), *self._trigger(), *self.waveform(), *self.rest())
 
     def _control(self) -> tuple[Command, ...]:
         return (
@@ -119,16 +72,17 @@ class VirtualDS1000Z(VirtualOscilloscope):
             reach = (100.0 if self.value(name + "scale") / probe() >= 0.5 else 2.0) * probe()
             return -reach, reach
 
-        def set_range(parameters: list[str]) -> None:
-            whole = number(one(parameters), low=8e-3 * probe(), high=80 * probe(), default=8 * probe(), unit="V")
-            self.settings[name + "scale"] = whole / 8
-            self.changed(name + "scale")
-
         return (
             self.quantity(head + "PROBe", name + "probe", 10.0, limits=lambda: (0.01, 1000.0), rounded=one_two_five),
             self.quantity(head + "SCALe", name + "scale", 1.0, unit="V", limits=lambda: (1e-3 * probe(), 10 * probe())),
             self.quantity(head + "OFFSet", name + "offset", 0.0, unit="V", limits=offsets),
-            Command(head + "RANGe", set_range, answers(lambda: self.spell(8 * self.value(name + "scale")))),
+            self.full_range(
+                head + "RANGe",
+                name + "scale",
+                divisions=8,
+                limits=lambda: (8e-3 * probe(), 80 * probe(), 8 * probe()),
+                unit="V",
+            ),
             self.quantity(head + "TCAL", name + "delay", 0.0, unit="S", limits=lambda: (-1e-7, 1e-7)),
             self.word(head + "COUPling", name + "coupling", ("AC", "DC", "GND"), "DC"),
             self.word(head + "BWLimit", name + "bandwidth", ("20M", "OFF"), "OFF"),
@@ -155,9 +109,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
             self.word("TIMebase:MODE", "time_mode", ("MAIN", "XY", "ROLL"), "MAIN"),
             self.switch("TIMebase:DELay:ENABle", "zoom"),
             self.word("ACQuire:TYPE", "acquisition", ("NORMal", "AVERages", "PEAK", "HRESolution"), "NORM"),
-            self.quantity(
-                "ACQuire:AVERages", "averages", 2.0, limits=lambda: (2, 1024), spell=lambda value: f"{value:.0f}"
-            ),
+            self.whole("ACQuire:AVERages", "averages", 2.0, low=2, high=1024),
             Command("ACQuire:SRATe", get=answers(lambda: self.spell(self.full_scale()[0]))),
             self._depth(),
         )
@@ -206,7 +158,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
             self.quantity("TRIGger:HOLDoff", "holdoff", 16e-9, unit="S", limits=lambda: (16e-9, 10.0)),
             self.switch("TRIGger:NREJect", "noise_rejection"),
             Command("TRIGger:STATus", get=answers(self._status)),
-            Command("TLHAlf", set=does(self._half_level)),
+            Command("TLHAlf", set=does(self.half_level)),
         )
 
     def adjusted(self, name: str, before: float) -> None:
@@ -220,13 +172,6 @@ class VirtualDS1000Z(VirtualOscilloscope):
         if self.settings["trigger_sweep"] == "SING":
             self.settings["trigger_sweep"] = "NORM"
         super().run()
-
-    def _half_level(self) -> None:
-        source = str(self.settings["trigger_source"])
-        if source.startswith("CHAN"):
-            trace = self.on_screen(int(source[4:]))
-            self.settings["trigger_level"] = float(trace.volts.max() + trace.volts.min()) / 2
-            self.changed("trigger_level")
 
     def _status(self) -> str:
         if not self.running():
@@ -262,182 +207,12 @@ class VirtualDS1000Z(VirtualOscilloscope):
     def scaling(self, channel: int) -> tuple[float, int]:
         """25 codes per division; the offset lifts the trace by whole codes."""
         volts_per_code = self.division(channel) / _CODES_PER_DIVISION
-        return volts_per_code, _MIDDLE + round(self.value(f"chan{channel}_offset") / volts_per_code)
+        return volts_per_code, MIDDLE + round(self.value(f"chan{channel}_offset") / volts_per_code)
 
     def window(self, channel: int) -> tuple[float, float]:
         """Eight divisions around the middle."""
-        return float(_MIDDLE), 8.0 * _CODES_PER_DIVISION
+        return float(MIDDLE), 8.0 * _CODES_PER_DIVISION
 
     def fit(self, channel: int, middle: float, division: float) -> None:
         """The offset is what is added to the trace."""
         self.settings |= {f"chan{channel}_scale": division, f"chan{channel}_offset": -middle}
-
-    # --- reading the record ---
-
-    def _waveform(self) -> tuple[Command, ...]:
-        sources = tuple(f"CHANnel{n}" for n in self.channels)
-        parts: tuple[tuple[str, int], ...] = (
-            ("XINCrement", 4),
-            ("XORigin", 5),
-            ("XREFerence", 6),
-            ("YINCrement", 7),
-            ("YORigin", 8),
-            ("YREFerence", 9),
-        )
-        return (
-            self.word("WAVeform:SOURce", "wav_source", sources, "CHAN1"),
-            self.word("WAVeform:MODE", "wav_mode", ("NORMal", "MAXimum", "RAW"), "NORM"),
-            self.word("WAVeform:FORMat", "wav_format", ("WORD", "BYTE", "ASCii"), "BYTE"),
-            self._place("WAVeform:STARt", "wav_start", 1.0),
-            self._place("WAVeform:STOP", "wav_stop", float(_ON_SCREEN)),
-            Command("WAVeform:PREamble", get=answers(lambda: ",".join(self._preamble()))),
-            *(Command(f"WAVeform:{word}", get=answers(self._part(k))) for word, k in parts),
-            Command("WAVeform:DATA", get=answers(self._data)),
-            Command("WAVeform:POINts", get=answers(lambda: str(self._sequence()[3]))),
-        )
-
-    def _part(self, k: int) -> Callable[[], str]:
-        return lambda: self._preamble()[k]
-
-    def _place(self, pattern: str, name: str, default: float) -> Command:
-        return self.quantity(pattern, name, default, limits=lambda: (1, 24e6), spell=lambda value: f"{value:.0f}")
-
-    def _sequence(self) -> tuple[Record, float, float, int]:
-        """The record, and of the points that can be read: where they begin [s], their distance [s], how many.
-
-        Raises ScpiError: the memory can only be read when the scope has stopped.
-        """
-        mode = str(self.settings["wav_mode"])
-        if mode == "RAW" and self.running():
-            raise ScpiError(-221)
-        record = self.record()
-        if mode == "RAW" or (mode == "MAX" and not self.running()):
-            return record, record.origin, 1 / record.rate, record.points
-        start, length = record.screen
-        return record, start, length / _ON_SCREEN, _ON_SCREEN
-
-    def _source(self) -> int:
-        return int(str(self.settings["wav_source"])[4:])
-
-    def _preamble(self) -> list[str]:
-        record, start, step, points = self._sequence()
-        scale = record.inputs[self._source()]
-        kind = {"BYTE": 0, "WORD": 1, "ASC": 2}[str(self.settings["wav_format"])]
-        mode = {"NORM": 0, "MAX": 1, "RAW": 2}[str(self.settings["wav_mode"])]
-        averages = round(self.value("averages")) if self.settings["acquisition"] == "AVER" else 1
-        times = (self.spell(step), self.spell(start), "0")
-        volts = (self.spell(scale.volts_per_code), str(scale.zero - _MIDDLE), str(_MIDDLE))
-        return [str(kind), str(mode), str(points), str(averages), *times, *volts]
-
-    def _data(self) -> str:
-        record, start, step, points = self._sequence()
-        first = round(self.value("wav_start"))
-        last = min(points, round(self.value("wav_stop")))
-        form = str(self.settings["wav_format"])
-        if first > last or last - first + 1 > _LONGEST[form]:
-            raise ScpiError(-222)
-        channel = self._source()
-        codes = record.codes(channel, first - 1, last - first + 1, of=points, start=start, step=step)
-        return self.block(self._encoded(form, codes, record, channel), digits=9)
-
-    def _encoded(self, form: str, codes: Codes, record: Record, channel: int) -> bytes:
-        if form == "BYTE":
-            return codes.tobytes()
-        if form == "WORD":  # the higher byte is always 0
-            return codes.astype("<u2").tobytes()
-        scale = record.inputs[channel]
-        volts = (codes.astype(float) - scale.zero) * scale.volts_per_code
-        return ",".join(self.spell(v) for v in volts).encode()
-
-    # --- measurements, pictures, setups ---
-
-    def _rest(self) -> tuple[Command, ...]:
-        def ignored(_: list[str]) -> None:
-            """What only changes the picture."""
-
-        sources = tuple(f"CHANnel{n}" for n in self.channels)
-        return (
-            self.word("MEASure:SOURce", "measure_source", sources, "CHAN1"),
-            Command("MEASure:ITEM", set=self._install, get=self._item),
-            Command("MEASure:STATistic:ITEM", set=self._install, get=self._statistic),
-            *(Command(f"MEASure:{word}", set=self._install_one(word), get=self._one_item(word)) for word in _WORDS),
-            *(
-                Command(f"MEASure:{header}", set=ignored)
-                for header in ("CLEar", "RECover", "ADISplay", "AMSource", "STATistic:DISPlay", "STATistic:RESet")
-            ),
-            self.word("MEASure:STATistic:MODE", "statistic_mode", ("DIFFerence", "EXTRemum"), "EXTR"),
-            Command("MEASure:COUNter:VALue", get=answers(self._counter)),
-            self.word("DISPlay:TYPE", "display_type", ("VECTors", "DOTS"), "VECT"),
-            self.word("DISPlay:GRID", "grid", ("FULL", "HALF", "NONE"), "FULL"),
-            self.word("DISPlay:GRADing:TIME", "persistence", _PERSISTENCES, "MIN"),
-            self._percent("DISPlay:WBRightness", "brightness"),
-            self._percent("DISPlay:GBRightness", "grid_brightness"),
-            Command("DISPlay:DATA", get=self._picture),
-            Command("SYSTem:SETup", set=lambda p: self.restore(block_content(one(p))), get=answers(self._setup)),
-            Command("SYSTem:ERRor:COUNt", get=answers(lambda: str(len(self.parser.errors)))),
-            Command("SYSTem:GAM", get=answers(lambda: "12")),
-            Command("SYSTem:RAM", get=answers(lambda: str(len(self.channels)))),
-            Command("MATH:DISPlay", set=lambda p: _never(boolean(one(p))), get=answers(lambda: "0")),
-        )
-
-    def _percent(self, pattern: str, name: str) -> Command:
-        return self.quantity(pattern, name, 50.0, limits=lambda: (0, 100), spell=lambda value: f"{value:.0f}")
-
-    def _setup(self) -> str:
-        return self.block(self.setup(), digits=9)
-
-    def _where(self, parameters: list[str]) -> int:
-        if len(parameters) > 1:
-            raise ScpiError(-108)
-        return self.channel_of(parameters[0] if parameters else str(self.settings["measure_source"]))
-
-    def _install(self, parameters: list[str]) -> None:
-        if not parameters:
-            raise ScpiError(-109)
-        _named(parameters[0])
-        self._where(parameters[1:])
-
-    def _install_one(self, word: str) -> Callable[[list[str]], None]:
-        return lambda parameters: self._install([word, *parameters])
-
-    def _one_item(self, word: str) -> Callable[[list[str]], str]:
-        return lambda parameters: self._item([word, *parameters])
-
-    def _item(self, parameters: list[str]) -> str:
-        if not parameters:
-            raise ScpiError(-109)
-        name, channel = _named(parameters[0]), self._where(parameters[1:])
-        return self.spell(self.measured(name, channel))
-
-    def _statistic(self, parameters: list[str]) -> str:
-        """Statistics of one: every value but the deviation is the present one."""
-        if not parameters:
-            raise ScpiError(-109)
-        kind = choice(parameters[0], _STATISTICS)
-        return self.spell(0.0) if kind == "DEV" else self._item(parameters[1:])
-
-    def _counter(self) -> str:
-        return self.spell(self.measured("FREQUENCY", self._where([])))
-
-    def _picture(self, parameters: list[str]) -> str:
-        """``[<colour>[,<invert>[,<format>]]]``; without, a picture with 24 bits in colours."""
-        if len(parameters) > 3:
-            raise ScpiError(-108)
-        colour, invert, form = (*parameters, *("ON", "OFF", "BMP24")[len(parameters) :])
-        writers = {"BMP24": lambda p: bmp24(p) + b"\0\0", "BMP8": bmp8, "PNG": png}
-        name = choice(form, tuple(writers))
-        picture = draw(self.heights(), columns=self.columns)
-        picture = picture if boolean(colour) else grey(picture)
-        picture = 255 - picture if invert.upper() in {"ON", "1", "INVERT", "INV"} else picture
-        return self.block(writers[name](picture), digits=9)
-
-
-def _never(on: bool) -> None:  # noqa: FBT001
-    """There is no mathematics in this model.  Raises ScpiError when it is switched on."""
-    if on:
-        raise ScpiError(-221)
-
-
-def _named(item: str) -> str:
-    spelled = choice(item, _WORDS)
-    return next(name for word, name in _ITEMS.items() if choice(word, (word,)) == spelled)

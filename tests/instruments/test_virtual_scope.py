@@ -23,10 +23,12 @@ from instruments.oscilloscope_rigol import RigolDS1000Z
 from instruments.transport import VisaTransport
 from instruments.virtual.bus import Bus
 from instruments.virtual.faults import Fault
-from instruments.virtual.scope import AUTO_AFTER, PIECE, Edge, one_two_five
+from instruments.virtual.scope import AUTO_AFTER
 from instruments.virtual.scope_keysight import VirtualDSOX1000
 from instruments.virtual.scope_measure import MEASUREMENTS, Measured, measure
+from instruments.virtual.scope_record import PIECE, Edge
 from instruments.virtual.scope_rigol import VirtualDS1000Z
+from instruments.virtual.scope_setup import one_two_five
 from levilab.clock import VirtualClock
 
 DARK, BRIGHT, DUTY = 0.1, 1.2, 0.03
@@ -615,6 +617,13 @@ def test_a_setup_that_is_none_is_an_error(make, setup):
     send(device, f":SYST:SET {setup}\n".encode())
     assert ask(device, "*IDN?").count(",") == 3
     assert errors(device) != []
+
+
+def test_measurements_that_were_installed_can_be_cleared():
+    device = keysight(pulses, *KEYSIGHT_READY, ":MEAS:VMAX", ":MEAS:VMIN")
+    assert len(ask(device, ":MEAS:RES?").split(",")) == 2
+    told(device, ":MEAS:CLE")
+    assert ask(device, ":MEAS:RES?") == "NONE"
 
 
 # --- limits ---
