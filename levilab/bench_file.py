@@ -43,7 +43,11 @@ def bench_text(found: Sequence[Found], library: str) -> str:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(  # noqa: S701 - no HTML
-        loader=PackageLoader("levilab", "."), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=PackageLoader("levilab", "."),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
     )
     # TOML's strings are JSON's; jinja's own filter would escape signs of HTML
     environment.policies["json.dumps_function"] = lambda value, **_: _quoted(value)

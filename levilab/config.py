@@ -6,7 +6,17 @@ import re
 import tomllib
 from typing import TYPE_CHECKING, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveFloat, PositiveInt, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveInt,
+    ValidationError,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
 
 from levilab.errors import LevilabError
 
@@ -79,6 +89,16 @@ class SpinSettings(ExperimentSettings):
     gate_s: PositiveFloat = 1.0
     trigger_level_v: float = 0.6
     reading_u_hz: PositiveFloat | None = None
+
+    @model_validator(mode="after")
+    def _gate_within_interval(self) -> SpinSettings:
+        if self.gate_s >= self.interval_s:
+            raise PydanticCustomError(
+                "gate",
+                "gate_s = {gate:g} must be shorter than interval_s = {interval:g}: a reading takes the gate and more",
+                {"gate": self.gate_s, "interval": self.interval_s},
+            )
+        return self
 
 
 class BenchConfig(Settings):

@@ -47,7 +47,7 @@ def driver_of(kind: str, model: str) -> type[ScpiInstrument]:
     models = {name.upper(): place for name, place in DRIVERS[kind].items()}
     if model.upper() not in models:
         known = ", ".join(DRIVERS[kind])
-        raise ConfigError(f"bench.toml: {kind}.model = {model!r} is unknown, known are {known}")
+        raise ConfigError(f"{kind}.model = {model!r} is unknown, known are {known}")
     module, name = models[model.upper()]
     driver: type[ScpiInstrument] = getattr(import_module(module), name)
     return driver

@@ -127,6 +127,7 @@ def _drive_up(session: Session) -> None:
             "and the trigger level between dark and bright (spin.trigger_level_v in bench.toml)?"
         )
     session.stop.check()  # nobody who asked for the end wants the drive on
+    session.bench.check_limits(frequency_hz=spin, amplitude_vpp=settings.drive_amplitude_vpp)
     session.event("drive on", f"drive on at the top's spin, {spin:.2f} Hz", frequency_hz=spin)
     session.bench.drive(waveform=settings.drive_waveform, frequency_hz=spin, amplitude_vpp=settings.drive_amplitude_vpp)
     _ramp(session, spin, settings)

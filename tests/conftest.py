@@ -6,6 +6,9 @@ import signal
 import pytest
 from hypothesis import settings
 
+#: Makes the golden data, with a package that the tests do not need.
+collect_ignore = ["golden/make_trajectories.py"]
+
 # What is green stays green: the same examples each time. `make explore` looks for others.
 settings.register_profile("repeat", derandomize=True)
 settings.register_profile("explore", max_examples=1000)
