@@ -95,8 +95,8 @@ class SpinSettings(ExperimentSettings):
         if self.gate_s >= self.interval_s:
             raise PydanticCustomError(
                 "gate",
-                "gate_s = {gate:g} must be shorter than interval_s = {interval:g}: a reading takes the gate and more",
-                {"gate": self.gate_s, "interval": self.interval_s},
+                "gate_s = {gate} must be shorter than interval_s = {interval}: a reading takes the gate and more",
+                {"gate": f"{self.gate_s:g}", "interval": f"{self.interval_s:g}"},
             )
         return self
 
@@ -155,7 +155,8 @@ def in_one_line(error: ValidationError) -> str:
     if first["type"] == "extra_forbidden":
         return f"{where} is no key known here{more}"
     hint = "" if first["type"] == "literal_error" else _hint(first["input"])  # where words are expected
-    seen = "" if first["type"] == "missing" else f" = {str(first['input'])[:60]!r}"
+    whole_table = first["type"] == "missing" or isinstance(first["input"], dict)
+    seen = "" if whole_table else f" = {str(first['input'])[:60]!r}"
     return f"{where}{seen}: {first['msg']}{hint}{more}"
 
 
