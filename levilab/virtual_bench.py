@@ -45,7 +45,7 @@ def _counter_cnt91(world: World) -> VirtualInstrument:
 
 def _coil_of(world: World) -> Callable[[float, Output], None]:
     """What a generator does to the world."""
-    return lambda time, output: world.drive(time, output.waveform, output.frequency, COIL_T_PER_V * output.amplitude)
+    return lambda time, output: world.drive(time, output.times(COIL_T_PER_V))
 
 
 def _generator_33500b(world: World) -> VirtualInstrument:

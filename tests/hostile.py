@@ -44,8 +44,8 @@ class Room:
         assert n >= 0
         self.looks += n
 
-    def drive(self, time, waveform, frequency, amplitude):
-        assert all(map(math.isfinite, (time, frequency, amplitude)))
+    def drive(self, time, output):
+        assert all(map(math.isfinite, (time, output.frequency, output.amplitude, output.offset)))
         self.driven += 1
 
     def flux_density(self, time):

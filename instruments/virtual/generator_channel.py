@@ -9,7 +9,7 @@ a public driver).  When a setting makes another one impossible the other one giv
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -43,7 +43,8 @@ class Burst:
 class Output:
     """What stands at the open terminals from some time on.
 
-    waveform: short form; frequency [Hz]; amplitude: half of peak to peak [V], 0 when off; offset [V]; phase [°];
+    waveform: short form; frequency [Hz]; amplitude: half of peak to peak [V], 0 when off; offset [V]; phase [°], of
+    bursts that at which they start;
     duty: part of a period that a SQU or PULS is high; symmetry: part of a period that a RAMP rises; inverted: by
     OUTPut:POLarity; burst: None when it runs on; samples: of an arbitrary waveform, −1 to 1, shape (n,).
 
@@ -61,6 +62,10 @@ class Output:
     inverted: bool = False
     burst: Burst | None = None
     samples: NDArray[np.float64] | None = field(default=None, compare=False, repr=False)
+
+    def times(self, factor: float) -> Output:
+        """The same in another unit: what it makes of something, where it makes so much per volt."""
+        return replace(self, amplitude=factor * self.amplitude, offset=factor * self.offset)
 
 
 @dataclass(frozen=True)
@@ -445,7 +450,7 @@ class Channel:
             frequency=self.number("prbs_rate") if short == "PRBS" else self.frequency,
             amplitude=swing,
             offset=self.number("offset") * volt if on else 0.0,
-            phase=self.number("phase"),
+            phase=self.number("burst_phase" if self["burst"] else "phase"),
             duty={"SQU": self.number("duty"), "PULS": self.number("pulse_duty")}.get(short, 50.0) / 100,
             symmetry=self.number("symmetry") / 100 if short == "RAMP" else 1.0,
             inverted=inverted,

@@ -2,71 +2,88 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from instruments.virtual.generator_channel import Output
+from instruments.virtual.generator_voltage import voltage
+from levilab.simulator.history import History
+
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from instruments.virtual.generator_channel import Burst
 
 Array = NDArray[np.float64]
 
 
-def _sawtooth(turns: Array) -> Array:
-    return np.asarray(2 * ((turns + 0.5) % 1.0) - 1)
-
-
-#: Waveforms of amplitude 1 by their short name: turns since the start → value.
-WAVEFORMS: dict[str, Callable[[Array], Array]] = {
-    "SIN": lambda turns: np.asarray(np.sin(2 * np.pi * turns)),
-    "SQU": lambda turns: np.where(turns % 1.0 < 0.5, 1.0, -1.0),
-    "TRI": lambda turns: np.asarray(1 - 4 * np.abs((turns + 0.25) % 1.0 - 0.5)),
-    "RAMP": _sawtooth,
-    "DC": np.zeros_like,
-}
-
-
 @dataclass(frozen=True)
 class _Stretch:
-    """From start [s] on: waveform, frequency [Hz], amplitude [T], and the turns the phase had made at the start."""
+    """From some time on.  output: amplitude and offset in T; origin [s]: when its phase was turns."""
 
-    start: float
-    waveform: str
-    frequency: float
-    amplitude: float
+    output: Output
+    origin: float
     turns: float
+
+    def field(self, times: Array) -> Array:
+        """The field at times within it [T]."""
+        since, burst = times - self.origin, self.output.burst
+        if burst is None or burst.period is None:
+            return voltage(self.output, self.turns + self.output.frequency * since, times)
+        turns = self.output.frequency * (since % burst.period)
+        # 1e-9 of a turn: the end of a burst is no sample of its beginning
+        playing = turns < burst.cycles - 1e-9
+        return np.where(playing, voltage(self.output, turns, times), self.output.offset)
+
+
+def _goes_on(before: Output, after: Output) -> bool:
+    """Whether bursts that start by themselves go on in their rhythm."""
+    return (before.burst, before.frequency) == (after.burst, after.frequency)
+
+
+def _repeats(burst: Burst | None) -> bool:
+    return burst is not None and burst.period is not None
 
 
 class Coil:
-    """The field of a coil that is driven; where the frequency changes the phase runs on.
+    """The field of a coil that is driven.
+
+    Where the frequency changes the phase runs on; a signal begins at its start where there was none, and bursts do.
 
     >>> coil = Coil()
-    >>> coil.change(1.0, "SQU", 2.0, 4e-4)
+    >>> coil.change(1.0, Output("SQU", 2.0, 4e-4, 0.0))
     >>> coil.field(np.array([0.9, 1.1, 1.3])).tolist()
     [0.0, 0.0004, -0.0004]
     """
 
     def __init__(self) -> None:
-        self._stretches = [_Stretch(-np.inf, "DC", 0.0, 0.0, 0.0)]
+        self.history = History(-math.inf, _Stretch(Output("DC", 0.0, 0.0, 0.0), 0.0, 0.0))
 
-    def change(self, time: float, waveform: str, frequency: float, amplitude: float) -> None:
-        """From this time [s] on it is this: short name, [Hz], amplitude [T]; what was said of later times is gone."""
-        while self._stretches[-1].start >= time:
-            self._stretches.pop()
-        last = self._stretches[-1]
-        turns = last.turns + last.frequency * (time - last.start) if last.amplitude else 0.0
-        self._stretches.append(_Stretch(time, waveform, frequency, amplitude, turns % 1.0))
+    def change(self, time: float, output: Output) -> None:
+        """From this time [s] on it is this, amplitude and offset in T; what was said of later times is gone."""
+        last = self.history.at(math.nextafter(time, -math.inf))
+        same = last.output == output and last.output.samples is output.samples
+        if same and last is self.history.last:
+            return
+        self.history.cut(time)
+        if not same:
+            self.history.append(time, self._next(last, time, output))
+
+    @staticmethod
+    def _next(last: _Stretch, time: float, output: Output) -> _Stretch:
+        if not last.output.amplitude:
+            return _Stretch(output, time, 0.0)
+        if _repeats(output.burst):
+            return _Stretch(output, last.origin if _goes_on(last.output, output) else time, 0.0)
+        turns = last.turns + last.output.frequency * (time - last.origin)
+        # the random bits repeat after 127 turns, all others after one
+        return _Stretch(output, time, turns % 127.0)
 
     def field(self, times: Array) -> Array:
-        """The field at increasing times, shape (n,) [T]."""
-        field = np.zeros_like(times)
-        starts = np.array([stretch.start for stretch in self._stretches])
-        index = np.searchsorted(starts, times, side="right") - 1
-        for i in np.unique(index):
-            stretch, here = self._stretches[i], index == i
-            if stretch.amplitude and stretch.waveform in WAVEFORMS:
-                turns = stretch.turns + stretch.frequency * (times[here] - stretch.start)
-                field[here] = stretch.amplitude * WAVEFORMS[stretch.waveform](turns)
+        """The field at these times, shape (n,) [T]."""
+        field = np.empty_like(times)
+        for stretch, part in self.history.pieces(times):
+            field[part] = stretch.field(times[part])
         return field

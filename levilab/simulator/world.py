@@ -13,16 +13,20 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from instruments.virtual.generator_voltage import fundamental
 from levilab.simulator.coil import Coil
+from levilab.simulator.history import History
 from levilab.simulator.spin import DECAYS
 
 if TYPE_CHECKING:
+    from instruments.virtual.generator_channel import Output
     from levilab.clock import Clock
 
 Array = NDArray[np.float64]
 
-#: First harmonic of a waveform of amplitude 1: the only one that can hold a top that turns with it.
-_FUNDAMENTAL = {"SIN": 1.0, "SQU": 4 / math.pi, "TRI": 8 / math.pi**2, "RAMP": 2 / math.pi}
+#: Nobody asks for what is longer ago [s]: the counters look 12 000 s ahead and leave 2500 s out, the scopes look 600 s
+#: back.
+KEPT_S = 15_000.0
 
 #: Flux density [T] of the thesis's base on its axis at 7.2 cm.
 BASE_FIELD = 0.0190937938
@@ -36,8 +40,8 @@ class World(Protocol):
     def light(self, start: float, step: float, n: int) -> Array:
         """The phototransistor's voltage at start + step·k, shape (n,) [V]."""
 
-    def drive(self, time: float, waveform: str, frequency: float, amplitude: float) -> None:
-        """From this time on the coil's field is this: short name, [Hz], amplitude [T]."""
+    def drive(self, time: float, output: Output) -> None:
+        """From this time on the coil's field is this: a generator's output, amplitude and offset in T."""
 
     def coil_field(self, start: float, step: float, n: int) -> Array:
         """The coil's field at start + step·k, shape (n,) [T]."""
@@ -117,45 +121,61 @@ class SpinWorld:
         self.scene, self.clock = scene, clock
         self._decay = DECAYS[scene.drag]
         self._jitter = np.random.default_rng((scene.seed, 1)).standard_normal(1 << 16) * scene.jitter
-        self._stretches: list[_Stretch] = []
         self._coil = Coil()
         self._drive_spin, self._hold = 0.0, 0.0  # [rad/s], [rad/s²]
-        self._go_on(_Stretch(0.0, 2 * math.pi * scene.start_hz, 0.0, "coasts"))
+        self._told = 0.0  # the last time that a change was told for [s]
+        first = _Stretch(0.0, 2 * math.pi * scene.start_hz, 0.0, "coasts")
+        self._stretches = History(0.0, first)
+        self._stretches.cut(0.0)
+        self._go_on(first)
 
     # --- the drive ---
 
-    def drive(self, time: float, waveform: str, frequency: float, amplitude: float) -> None:
-        """From this time on the coil's field is this; see :class:`World`."""
-        self._coil.change(time, waveform, frequency, amplitude)
+    def drive(self, time: float, output: Output) -> None:
+        """From this time on the coil's field is this; see :class:`World`.
+
+        Only the first harmonic holds the top: an offset has no torque that turns with it.
+        """
+        self._forget()
+        self._coil.change(time, output)
+        hold = fundamental(output) * self.scene.lock_torque
+        if hold == self._hold == 0 and time >= self._told:
+            return  # nothing that the top could feel
         self._put_back_until(time)
-        while self._stretches and self._stretches[-1].start > time:
-            self._stretches.pop()  # what would have come without this change
-        self._drive_spin = 2 * math.pi * frequency
-        self._hold = _FUNDAMENTAL.get(waveform, 0.0) * amplitude * self.scene.lock_torque
-        self._go_on(self._state(time))
+        now = self._state(time)
+        fallen = now.rule == "fallen"
+        # what would have come without this change; a fall at this moment stays
+        self._stretches.cut(math.nextafter(time, math.inf) if fallen else time)
+        self._told, self._drive_spin, self._hold = time, 2 * math.pi * output.frequency, hold
+        if not fallen:
+            self._go_on(now)
+
+    def _forget(self) -> None:
+        horizon = self.clock.now() - KEPT_S
+        self._coil.history.forget(horizon)
+        self._stretches.forget(horizon)
 
     def _put_back_until(self, time: float) -> None:
         """Lay down the life of every top that follows on one that falls."""
-        while self.scene.again_s is not None and self._stretches[-1].rule == "fallen":
-            fallen = self._stretches[-1]
+        while self.scene.again_s is not None and self._stretches.last.rule == "fallen":
+            fallen = self._stretches.last
             begin = fallen.start + self.scene.again_s
             if begin > time:
                 return
+            self._forget()
             self._go_on(_Stretch(begin, 2 * math.pi * self.scene.start_hz, fallen.angle, "coasts"))
 
     def _state(self, time: float) -> _Stretch:
         """The stretch that would begin now, before a rule is chosen for it."""
-        here: _Stretch = self._stretches[int(self._index(np.array([time]))[0])]
+        here = self._stretches.at(time)
         spin, angle = self._motion(here, np.array([time]))
         return replace(here, start=time, spin=float(spin[0]), angle=float(angle[0]), acceleration=0.0)
 
     def _go_on(self, now: _Stretch) -> None:
         """Lay down the future from this state on, as it is without a further change."""
         fall, hold, drive_spin = 2 * math.pi * self.scene.fall_hz, self._hold, self._drive_spin
-        if now.rule == "fallen":
-            return
         if now.spin <= fall:
-            self._stretches.append(replace(now, rule="fallen", spin=0.0))
+            self._lay(replace(now, rule="fallen", spin=0.0))
             return
         # deceleration by drag at this spin: its change over a time that is short against 1/C ~ 300 s
         drag = (now.spin - float(self._decay.after(now.spin, 1e-3, *self.scene.constants))) / 1e-3
@@ -163,10 +183,10 @@ class SpinWorld:
         if captured:
             self._lock(now, drive_spin, hold, drag)
         else:
-            self._stretches.append(replace(now, rule="coasts"))
+            self._lay(replace(now, rule="coasts"))
             lasts = float(self._decay.elapsed(now.spin, fall, *self.scene.constants))
             angle = now.angle + float(self._decay.turned(now.spin, fall, *self.scene.constants))
-            self._stretches.append(_Stretch(now.start + lasts, 0.0, angle, "fallen"))
+            self._lay(_Stretch(now.start + lasts, 0.0, angle, "fallen"))
 
     def _lock(self, now: _Stretch, drive_spin: float, hold: float, drag: float) -> None:
         missing = drive_spin - now.spin
@@ -174,14 +194,13 @@ class SpinWorld:
         lasts = missing / acceleration
         angle = now.angle + (now.spin + drive_spin) / 2 * lasts
         if lasts > 0:
-            self._stretches.append(replace(now, rule="pulled", acceleration=acceleration))
-        self._stretches.append(_Stretch(now.start + lasts, drive_spin, angle, "locked"))
+            self._lay(replace(now, rule="pulled", acceleration=acceleration))
+        self._lay(_Stretch(now.start + lasts, drive_spin, angle, "locked"))
+
+    def _lay(self, stretch: _Stretch) -> None:
+        self._stretches.append(stretch.start, stretch)
 
     # --- the motion ---
-
-    def _index(self, times: Array) -> NDArray[np.intp]:
-        starts = np.array([stretch.start for stretch in self._stretches])
-        return np.maximum(np.searchsorted(starts, times, side="right") - 1, 0)
 
     def _motion(self, stretch: _Stretch, times: Array) -> tuple[Array, Array]:
         """Spin [rad/s] and angle [rad] at times within one stretch."""
@@ -196,10 +215,8 @@ class SpinWorld:
         """Spin [rad/s], 0 once fallen, and angle turned [rad] at the given times, shape (n,) each."""
         self._put_back_until(float(times.max(initial=0.0)))
         spin, angle = np.empty_like(times), np.empty_like(times)
-        index = self._index(times)
-        for i in np.unique(index):
-            here = index == i
-            spin[here], angle[here] = self._motion(self._stretches[i], times[here])
+        for stretch, part in self._stretches.pieces(times):
+            spin[part], angle[part] = self._motion(stretch, times[part])
         return spin, angle
 
     # --- what is seen ---

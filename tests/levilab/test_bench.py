@@ -22,9 +22,9 @@ class World(SpinWorld):
         self.coil = []
         super().__init__(SpinScene(), VirtualClock())
 
-    def drive(self, time, waveform, frequency, amplitude):
-        self.coil.append((waveform, frequency, amplitude))
-        super().drive(time, waveform, frequency, amplitude)
+    def drive(self, time, output):
+        self.coil.append((output.waveform, output.frequency, output.amplitude))
+        super().drive(time, output)
 
     @property
     def field(self):

@@ -1,6 +1,7 @@
 """The virtual world: the top under its drive, its fall, and the light that it makes."""
 
 import math
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -8,12 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from wire import received, send
+from wire import ask, received, send
 
 from instruments.virtual.counter import Virtual53230A
+from instruments.virtual.generator import Burst, Output
+from instruments.virtual.generator_voltage import fundamental, voltage
+from levilab import virtual_bench
 from levilab.clock import VirtualClock
 from levilab.simulator.spin import DECAYS
-from levilab.simulator.world import SpinScene, SpinWorld, drawn
+from levilab.simulator.world import KEPT_S, SpinScene, SpinWorld, drawn
 
 TURN = 2 * math.pi
 #: Field of the drive at the top [T]: what 10 Vpp make on the virtual bench.
@@ -37,8 +41,13 @@ def angle(top, time):
     return float(top.motion(np.array([float(time)]))[1][0])
 
 
+def drive(top, time, waveform, frequency, field, **rest):
+    """Put this field on the coil, amplitude and offset in T."""
+    top.drive(time, Output(waveform, frequency, field, **{"offset": 0.0} | rest))
+
+
 def off(top, time):
-    top.drive(time, "SIN", 40.0, 0.0)
+    drive(top, time, "SIN", 40.0, 0.0)
 
 
 # --- the drive ---
@@ -51,10 +60,10 @@ def test_the_capture_range_is_that_of_the_thesiss_drive():
 
 def test_a_ramp_in_steps_of_a_fifth_of_a_hertz_is_followed():
     top = world()
-    top.drive(1.0, "SIN", spin_hz(top, 1.0), FIELD)
+    drive(top, 1.0, "SIN", spin_hz(top, 1.0), FIELD)
     start = spin_hz(top, 1.0)
     for k in range(51):
-        top.drive(2.0 + k, "SIN", start + 0.2 * k, FIELD)
+        drive(top, 2.0 + k, "SIN", start + 0.2 * k, FIELD)
         # a step of 1.26 rad/s takes 0.7 to 0.8 s: α is 2.5 rad/s², of which drag takes 0.6 to 0.9
         assert spin_hz(top, 2.95 + k) == pytest.approx(start + 0.2 * k, rel=1e-12)
 
@@ -62,15 +71,15 @@ def test_a_ramp_in_steps_of_a_fifth_of_a_hertz_is_followed():
 @pytest.mark.parametrize(("step", "followed"), [(0.95, True), (1.05, False), (-0.95, True), (-1.05, False)])
 def test_a_jump_is_followed_within_the_capture_range_only(step, followed):
     top = world()
-    top.drive(0.0, "SIN", 30.0, FIELD)
-    top.drive(1.0, "SIN", 30.0 + step * CAPTURE, FIELD)
+    drive(top, 0.0, "SIN", 30.0, FIELD)
+    drive(top, 1.0, "SIN", 30.0 + step * CAPTURE, FIELD)
     reached = spin_hz(top, 10.0) == pytest.approx(30.0 + step * CAPTURE, abs=1e-9)
     assert reached is followed
 
 
 def test_a_top_out_of_the_drives_reach_spins_down_as_if_there_were_none():
     driven, free = world(), world()
-    driven.drive(0.0, "SIN", 35.0, FIELD)
+    drive(driven, 0.0, "SIN", 35.0, FIELD)
     times = np.linspace(0.0, 50.0, 11)
     np.testing.assert_array_equal(driven.motion(times), free.motion(times))
 
@@ -78,8 +87,8 @@ def test_a_top_out_of_the_drives_reach_spins_down_as_if_there_were_none():
 def test_a_drive_that_is_weaker_than_drag_holds_nothing():
     # drag at 30 Hz: C ω^1.5 = 0.61 rad/s², a quarter of the hold at 0.4 mT
     strong, weak = world(), world()
-    strong.drive(0.0, "SIN", 30.0, 0.3 * FIELD)
-    weak.drive(0.0, "SIN", 30.0, 0.2 * FIELD)
+    drive(strong, 0.0, "SIN", 30.0, 0.3 * FIELD)
+    drive(weak, 0.0, "SIN", 30.0, 0.2 * FIELD)
     assert spin_hz(strong, 20.0) == pytest.approx(30.0, rel=1e-15)
     assert spin_hz(weak, 20.0) < 29.0
 
@@ -95,15 +104,15 @@ def test_a_waveform_holds_with_its_first_harmonic(waveform, fundamental):
     reach = 2 * math.sqrt(fundamental * HOLD) / TURN
     for step, followed in ((0.99, True), (1.01, False)):
         top = world()
-        top.drive(0.0, waveform, 30.0, FIELD)
-        top.drive(1.0, waveform, 30.0 + step * reach, FIELD)
+        drive(top, 0.0, waveform, 30.0, FIELD)
+        drive(top, 1.0, waveform, 30.0 + step * reach, FIELD)
         assert (abs(spin_hz(top, 10.0) - 30.0 - step * reach) < 1e-9) is followed
 
 
 def test_a_top_let_go_while_it_is_pulled_spins_down_from_there():
     top = world()
-    top.drive(0.0, "SIN", 30.0, FIELD)
-    top.drive(1.0, "SIN", 30.4, FIELD)
+    drive(top, 0.0, "SIN", 30.0, FIELD)
+    drive(top, 1.0, "SIN", 30.4, FIELD)
     off(top, 1.5)
     let_go = spin_hz(top, 1.5)
     assert 30.05 < let_go < 30.35
@@ -113,7 +122,7 @@ def test_a_top_let_go_while_it_is_pulled_spins_down_from_there():
 
 def test_after_the_drive_is_off_the_top_follows_its_law_of_drag():
     top = world()
-    top.drive(0.0, "SIN", 30.0, FIELD)
+    drive(top, 0.0, "SIN", 30.0, FIELD)
     off(top, 25.0)
     times = np.linspace(25.0, 80.0, 12)
     exact = solve_ivp(
@@ -151,7 +160,7 @@ def test_angle_and_spin_are_continuous_whatever_the_drive_does(changes, drag):
     for wait, waveform, away, amplitude in changes:
         now += wait
         # near the spin that it has, so that it is caught now and then
-        top.drive(now, waveform, max(1.0, (spin_hz(top, now) or 30.0) + away), amplitude * FIELD)
+        drive(top, now, waveform, max(1.0, (spin_hz(top, now) or 30.0) + away), amplitude * FIELD)
     step = 1e-3
     times = np.arange(0.0, now + 20.0, step)
     spin, turned = top.motion(times)
@@ -174,7 +183,7 @@ def test_angle_and_spin_are_continuous_whatever_the_drive_does(changes, drag):
 
 def test_the_top_falls_at_its_lower_limit_and_stays_dark():
     top = world()
-    top.drive(0.0, "SIN", 30.0, FIELD)
+    drive(top, 0.0, "SIN", 30.0, FIELD)
     off(top, 5.0)
     time = 5.0 + float(DECAYS["disc"].elapsed(TURN * 30.0, TURN * QUIET.fall_hz, 2.34e-4))
     assert spin_hz(top, time - 1e-6) == pytest.approx(QUIET.fall_hz, abs=1e-6)
@@ -189,7 +198,7 @@ def test_the_top_falls_at_its_lower_limit_and_stays_dark():
 def test_no_drive_raises_a_top_that_has_fallen():
     top = world()
     for k in range(5):
-        top.drive(200.0 + k, "SIN", 30.0 + k, FIELD)
+        drive(top, 200.0 + k, "SIN", 30.0 + k, FIELD)
     assert spin_hz(top, 210.0) == 0.0
     assert angle(top, 210.0) == angle(top, 200.0)
     assert np.all(top.light(210.0, 1e-4, 10_000) == QUIET.dark)
@@ -197,7 +206,7 @@ def test_no_drive_raises_a_top_that_has_fallen():
 
 def test_a_held_top_does_not_fall():
     top = world()
-    top.drive(0.0, "SIN", 30.0, FIELD)
+    drive(top, 0.0, "SIN", 30.0, FIELD)
     assert spin_hz(top, 10_000.0) == pytest.approx(30.0, rel=1e-15)
 
 
@@ -211,7 +220,7 @@ def test_a_top_that_was_never_spun_up_is_dark_from_the_start():
 
 def test_light_is_one_pulse_a_turn_of_the_width_that_was_asked_for():
     top = world(replace(QUIET, fall_hz=1.0))
-    top.drive(0.0, "SIN", 30.0, FIELD)
+    drive(top, 0.0, "SIN", 30.0, FIELD)
     step = 1e-6
     light = top.light(0.0, step, 1_000_000)
     half = (QUIET.dark + QUIET.bright) / 2
@@ -243,7 +252,7 @@ def test_the_past_is_not_changed_by_what_the_drive_does_now():
     top = world()
     times = np.linspace(0.0, 9.9, 100)
     before = top.motion(times)
-    top.drive(10.0, "SIN", 27.0, FIELD)
+    drive(top, 10.0, "SIN", 27.0, FIELD)
     off(top, 12.0)
     np.testing.assert_array_equal(top.motion(times), before)
 
@@ -284,7 +293,7 @@ def test_what_is_drawn_leaves_the_rest_of_the_scene_as_it_was():
 def test_readings_over_a_second_scatter_as_the_thesiss_do_and_are_unbiased():
     # 30.5 Hz: no edge falls on the end of the gate, where the counter would choose between two of them
     top = world(SpinScene(start_hz=30.5, fall_hz=1.0, seed=1))
-    top.drive(0.0, "SIN", 30.5, FIELD)
+    drive(top, 0.0, "SIN", 30.5, FIELD)
     device = Virtual53230A(top.clock, signal=top.light)
     send(device, b"INP1:COUP DC;LEV:AUTO OFF;:INP1:LEV1 0.6;:SENS:FREQ:GATE:TIME 1;:SYST:TIM 1.2\n")
     readings = []
@@ -302,14 +311,220 @@ def test_readings_over_a_second_scatter_as_the_thesiss_do_and_are_unbiased():
 
 def test_the_coils_field_is_what_the_generator_last_put_there_and_its_phase_runs_on():
     top = world(SpinScene())
-    top.drive(1.0, "SIN", 2.0, 4e-4)
-    top.drive(1.3, "SIN", 5.0, 4e-4)
-    top.drive(2.0, "SQU", 1.0, 0.0)
+    drive(top, 1.0, "SIN", 2.0, 4e-4)
+    drive(top, 1.3, "SIN", 5.0, 4e-4)
+    drive(top, 2.0, "SQU", 1.0, 0.0)
     t = 0.01 * np.arange(300)
     seen = top.coil_field(0.0, 0.01, 300)
     phase = np.where(t < 1.3, 2.0 * (t - 1.0), 0.6 + 5.0 * (t - 1.3))
     expected = np.where((t >= 1.0) & (t < 2.0), 4e-4 * np.sin(2 * np.pi * phase), 0.0)
     assert seen == pytest.approx(expected, abs=1e-15)
+
+
+def coil_at(top, times):
+    """The field at times in steps of 10 ms [T]."""
+    steps = np.rint(np.asarray(times) / 0.01).astype(int)
+    return top.coil_field(0.005, 0.01, int(steps.max()) + 1)[steps]  # between the steps, where nothing jumps
+
+
+SAMPLES = np.array([1.0, -0.5, 0.0, 0.25])
+
+
+@pytest.mark.parametrize(
+    ("output", "times", "seen"),
+    [
+        (Output("DC", 1.0, 0.0, 3.0), [0.1, 0.9, 7.3], [3, 3, 3]),
+        (Output("SIN", 1.0, 2.0, 0.5, phase=90.0), [0.0, 0.25, 0.5], [2.5, 0.5, -1.5]),
+        (Output("SIN", 1.0, 2.0, 0.5, phase=90.0, inverted=True), [0.0, 0.25, 0.5], [-1.5, 0.5, 2.5]),
+        (Output("SQU", 1.0, 2.0, -0.5, duty=0.2), [0.1, 0.3, 0.9, 1.1], [1.5, -2.5, -2.5, 1.5]),
+        (Output("PULS", 1.0, 2.0, 0.0, duty=0.2, inverted=True), [0.1, 0.3, 0.9, 1.1], [-2, 2, 2, -2]),
+        (Output("RAMP", 1.0, 1.0, 0.0, symmetry=1.0), [0.0, 0.25, 0.49, 0.51, 0.75], [0, 0.5, 0.98, -0.98, -0.5]),
+        (Output("RAMP", 1.0, 1.0, 0.0, symmetry=0.0), [0.01, 0.25, 0.5, 0.99], [0.98, 0.5, 0, -0.98]),
+        (Output("RAMP", 1.0, 1.0, 0.0, symmetry=0.2), [0.0, 0.1, 0.5, 0.9], [0, 1, 0, -1]),
+        (Output("TRI", 1.0, 1.0, 1.0), [0.0, 0.25, 0.5, 0.75], [1, 2, 1, 0]),
+        (Output("ARB", 0.5, 2.0, 1.0, samples=SAMPLES), [0.1, 0.6, 1.1, 1.9, 2.1], [3, 0, 1, 1.5, 3]),
+        (Output("USER", 1.0, 2.0, 0.0, samples=np.array([1.0, -1.0])), [0.1, 0.6], [2, -2]),
+        # two cycles of half a second at the beginning of every three seconds
+        (Output("SQU", 2.0, 1.0, 0.5, burst=Burst(2, 3.0)), [0.1, 0.3, 1.1, 2.9, 3.1], [1.5, -0.5, 0.5, 0.5, 1.5]),
+        (Output("SQU", 2.0, 1.0, 0.5, burst=Burst(math.inf, None)), [0.1, 0.3, 1.1, 2.9], [1.5, -0.5, 1.5, -0.5]),
+    ],
+)  # fmt: skip
+def test_the_coils_field_is_the_generators_voltage_in_time(output, times, seen):
+    top = world()
+    top.drive(0.005, output.times(1e-4))
+    assert coil_at(top, times) == pytest.approx(1e-4 * np.array(seen), abs=1e-4 * 1e-9)
+
+
+def test_bursts_keep_their_rhythm_when_their_size_changes_and_begin_anew_with_another():
+    top = world()
+    drive(top, 0.005, "SQU", 2.0, 1.0, burst=Burst(1, 2.0))
+    drive(top, 3.005, "SQU", 2.0, 2.0, burst=Burst(1, 2.0))
+    drive(top, 7.105, "SQU", 2.0, 2.0, burst=Burst(1, 1.0))
+    seen = coil_at(top, [0.1, 0.3, 1.0, 2.1, 4.1, 4.3, 5.0, 6.1, 7.0, 7.2, 7.4, 7.7, 8.2])
+    assert seen.tolist() == [1, -1, 0, 1, 2, -2, 0, 2, 0, 2, -2, 0, 2]
+
+
+@pytest.mark.parametrize("waveform", ["NOIS", "PRBS"])
+def test_what_is_random_is_the_same_for_everybody_who_looks(waveform):
+    top, other = world(), world()
+    for one in (top, other):
+        drive(one, 0.0, waveform, 1e3, 2.0, offset=0.5)
+    seen = top.coil_field(1.0, 1e-4, 20_000)
+    assert np.array_equal(other.coil_field(1.0 + 1e-4 * 5_000, 1e-4, 100), seen[5_000:5_100])
+    assert (seen.min(), seen.max()) == (-1.5, 2.5)
+    # four standard errors; the r.m.s. of noise is a third of its peak, of bits all of it
+    assert seen.mean() == pytest.approx(0.5, abs=4 * 2.0 / math.sqrt(2_000))
+    assert np.std(seen) == pytest.approx({"NOIS": 2.0 / 3.3, "PRBS": 2.0}[waveform], rel=0.05)
+    drive(top, 4.0, waveform, 30.0, FIELD)
+    assert spin_hz(top, 20.0) < 29.0  # and nothing that a top could follow
+
+
+def test_random_bits_are_all_states_of_their_register():
+    top = world()
+    drive(top, 0.0, "PRBS", 1.0, 1.0)
+    bits = (top.coil_field(0.5, 1.0, 254) > 0).astype(int)
+    assert np.array_equal(bits[:127], bits[127:])
+    assert len({tuple(bits[k : k + 7]) for k in range(127)}) == 127  # PN7: each but seven zeros
+
+
+@pytest.mark.parametrize(
+    "output",
+    [
+        *(Output("SQU", 1.0, 2.0, 0.7, duty=duty) for duty in (0.01, 0.3, 0.5, 0.9)),
+        *(Output("RAMP", 1.0, 2.0, 0.7, symmetry=symmetry) for symmetry in (0.0, 0.1, 0.5, 0.95, 1.0)),
+        *(Output(waveform, 1.0, 2.0, 0.7, inverted=True) for waveform in ("SIN", "TRI", "NOIS")),
+        Output("PULS", 1.0, 2.0, 0.7, duty=0.1),
+        Output("ARB", 1.0, 2.0, 0.7, samples=np.array([0.1, 1.0, -0.3, -1.0, 0.5])),
+        Output("DC", 1.0, 0.0, 0.7),
+    ],
+    ids=repr,
+)
+def test_the_first_harmonic_is_that_of_the_voltage(output):
+    turns = (np.arange(200_000) + 0.5) / 200_000
+    volts = voltage(output, turns, 1e3 * turns)
+    summed = 2 * abs(np.mean(volts * np.exp(-2j * np.pi * turns)))
+    assert fundamental(output) == pytest.approx(summed, abs=5e-3 if output.waveform == "NOIS" else 1e-4)
+
+
+def test_an_offset_holds_no_top_and_does_not_disturb_one_that_is_held():
+    with_offset, without, dc = world(), world(), world()
+    drive(with_offset, 0.0, "SIN", 30.0, FIELD, offset=5 * FIELD)
+    drive(without, 0.0, "SIN", 30.0, FIELD)
+    drive(dc, 0.0, "DC", 30.0, 0.0, offset=5 * FIELD)
+    times = np.linspace(0.0, 50.0, 11)
+    np.testing.assert_array_equal(with_offset.motion(times), without.motion(times))
+    np.testing.assert_array_equal(dc.motion(times), world().motion(times))
+
+
+def test_a_drive_with_pauses_holds_less():
+    # drag takes a quarter of the hold: half of the time is enough, a fifth is not
+    busy, idle = world(), world()
+    drive(busy, 0.0, "SIN", 30.0, FIELD, burst=Burst(15, 1.0))
+    drive(idle, 0.0, "SIN", 30.0, FIELD, burst=Burst(6, 1.0))
+    assert spin_hz(busy, 20.0) == pytest.approx(30.0)
+    assert spin_hz(idle, 20.0) < 29.0
+
+
+# --- from the generator's commands to the oscilloscope's second channel ---
+
+
+SQUARE = "FUNC SQU;FREQ 1;VOLT 4;"
+
+
+def second_channel(top, at):
+    """Volts at times [s] after now, where nothing jumps."""
+    now = top.clock.now()
+    look = virtual_bench._signals(top)[2]
+    return [float(look(now + t, 1e-3, 1)[0]) for t in at]
+
+
+@pytest.mark.parametrize("model", ["33500B", "33220A"])
+@pytest.mark.parametrize(
+    ("commands", "at", "volts"),
+    [
+        (SQUARE + "VOLT:OFFS 1;:OUTP ON", [0.1, 0.6], [3, -1]),
+        (SQUARE + "VOLT:OFFS 1;:OUTP:POL INV;:OUTP ON", [0.1, 0.6], [-1, 3]),
+        ("FUNC SQU;FREQ 1;FUNC:SQU:DCYC 20;:VOLT 4;:OUTP ON", [0.1, 0.3, 0.9], [2, -2, -2]),
+        ("FUNC DC;VOLT:OFFS -2.5;:OUTP ON", [0.1, 10.6], [-2.5, -2.5]),
+        ("FUNC DC;VOLT:OFFS -2.5;:OUTP ON;:OUTP OFF", [0.1, 10.6], [0, 0]),
+        (SQUARE + ":OUTP:LOAD 50;:VOLT 4;:OUTP ON", [0.1, 0.6], [4, -4]),
+        ("FUNC RAMP;FUNC:RAMP:SYMM 0;:FREQ 1;VOLT 4;:OUTP ON", [0.01, 0.25, 0.99], [1.96, 1, -1.96]),
+        ("FUNC PULS;FREQ 1;FUNC:PULS:WIDT 0.1;:VOLT 4;:OUTP ON", [0.05, 0.15, 1.05], [2, -2, 2]),
+        (SQUARE + "BURS:NCYC 2;INT:PER 5;:BURS:STAT ON;:OUTP ON", [0.1, 0.6, 1.1, 2.5, 5.1], [2, -2, 2, 0, 2]),
+        (SQUARE + "TRIG:SOUR BUS;:BURS:NCYC 2;STAT ON;:OUTP ON", [0.1, 0.6], [0, 0]),
+        (SQUARE + "TRIG:SOUR BUS;:BURS:NCYC 2;STAT ON;:OUTP ON;*TRG", [0.1, 0.6, 1.1, 2.1], [2, -2, 2, 0]),
+        ("FUNC SIN;FREQ 1;VOLT 4;TRIG:SOUR BUS;:BURS:NCYC 2;PHAS 90;STAT ON;:OUTP ON;*TRG", [0.0, 0.5], [2, -2]),
+        (SQUARE + "BURS:MODE GAT;STAT ON;:OUTP ON", [0.1, 0.6], [0, 0]),
+        (SQUARE + "BURS:MODE GAT;GATE:POL INV;:BURS:STAT ON;:OUTP ON", [0.1, 0.6], [2, -2]),
+    ],
+)  # fmt: skip
+def test_the_oscilloscope_sees_what_the_generator_was_told(model, commands, at, volts):
+    top = world()
+    device = virtual_bench.MODELS["generator"][model](top)
+    send(device, f"OUTP:LOAD INF;:{commands}\n".encode())
+    assert list(iter(lambda: ask(device, "SYST:ERR?"), device.no_error)) == []
+    # a message takes a little time, and so the signal began a little before now
+    assert second_channel(top, at) == pytest.approx(volts, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("model", "load"),
+    [
+        ("33500B", "DATA:ARB:DAC steps,32767,0,-32767,0,0,0,16384,16384;:FUNC:ARB steps;:FUNC ARB;:FUNC:ARB:SRAT 8"),
+        ("33220A", "DATA VOLATILE,1,0,-1,0,0,0,0.5,0.5;:FUNC:USER VOLATILE;:FUNC USER;:FREQ 1"),
+    ],
+)
+def test_it_sees_an_arbitrary_waveform_too(model, load):
+    top = world()
+    device = virtual_bench.MODELS["generator"][model](top)
+    send(device, f"OUTP:LOAD INF;:{load};:VOLT 4;VOLT:OFFS 1;:OUTP ON\n".encode())
+    at = (np.arange(8) + 0.5) / 8
+    assert second_channel(top, at) == pytest.approx([3, 1, -1, 1, 1, 1, 2, 2], abs=1e-3)
+
+
+# --- many changes ---
+
+
+def test_twenty_thousand_changes_cost_little_to_look_at_and_are_forgotten_when_nobody_can_ask_for_them():
+    top = world()
+    drive(top, 0.0, "SIN", 30.0, FIELD)
+    for k in range(20_000):
+        top.clock.sleep(1.0)
+        drive(top, top.clock.now(), "SIN", 30.0 + 0.1 * (k % 2), FIELD)
+    now = top.clock.now()
+    kept = len(top._stretches), len(top._coil.history)
+    assert kept[0] <= 2 * (KEPT_S + 1001)  # pulled and locked, and a thousand that are not let go yet
+    assert kept[1] <= KEPT_S + 1001
+    assert spin_hz(top, now - KEPT_S + 1.9) == pytest.approx(spin_hz(top, now - KEPT_S + 3.9), rel=1e-12)
+    begin = time.perf_counter()
+    for k in range(1000):
+        top.motion(np.array([now - k]))
+        top.coil_field(now - k, 1e-3, 2)
+    assert time.perf_counter() - begin < 1.0  # 0.03 s here; 5 s and more where each look goes through all of them
+
+
+def test_settings_at_one_time_and_of_an_output_that_is_off_leave_no_trace():
+    top = world()
+    for k in range(1000):
+        drive(top, 5.0, "SIN", 30.0 + k, FIELD)  # at one and the same time
+    for k in range(1000):
+        drive(top, 6.0 + k / 1000, "SIN", 30.0, 0.0)  # off, again and again
+    assert len(top._stretches) <= 4
+    assert len(top._coil.history) == 3
+
+
+def test_a_change_at_the_time_of_a_fall_or_of_a_burst_that_was_to_end_changes_nothing_before():
+    top = world()
+    fallen = next(s.start for s in top._stretches if s.rule == "fallen")
+    drive(top, fallen, "SIN", 30.0, FIELD)
+    assert spin_hz(top, fallen - 0.1) > 21.8
+    assert spin_hz(top, fallen + 10.0) == 0
+    told = world()
+    drive(told, 1.0, "SIN", 30.0, FIELD)
+    drive(told, 60.0, "SIN", 30.0, 0.0)  # the end of a burst, told beforehand
+    drive(told, 2.0, "SIN", 30.0, 0.0)  # but it is switched off
+    assert spin_hz(told, 50.0) < 27.0
+    assert coil_at(told, [1.5, 3.0, 59.0]).tolist() == [pytest.approx(0, abs=1), 0, 0]
 
 
 def test_the_magnetometer_sees_the_base_as_the_simulator_has_it():
@@ -329,7 +544,7 @@ def test_a_top_that_falls_is_put_back_where_somebody_does_so():
     assert spin[2] == pytest.approx(2 * np.pi * 30, rel=1e-4)
     assert spin[3] == 0
     assert np.all(np.diff(angle) >= 0)
-    top.drive(fallen + 12.0, "SIN", 30.0, FIELD)
+    drive(top, fallen + 12.0, "SIN", 30.0, FIELD)
     assert top.motion(np.array([fallen + 500.0]))[0] == pytest.approx(2 * np.pi * 30)
 
 

@@ -1,0 +1,168 @@
+"""What an Output is in volts: the waveform in time, and the one harmonic that can turn a top.
+
+The phase of a waveform is counted in turns, from where it starts: there sine, square and ramp cross their middle
+upwards (33220A User's Guide, BURSt:PHASe), pulses begin, and an arbitrary waveform has its first sample.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from instruments.virtual.generator_channel import Output
+
+Array = NDArray[np.float64]
+
+#: Noise holds each value so long [s]: its bandwidth is 100 kHz, that of a 33500B after ``*RST``.
+_NOISE_CELL = 5e-6
+#: Peak over r.m.s. of the noise; see the families' crest.
+_NOISE_PEAK = 3.3
+
+
+def voltage(output: Output, turns: Array, times: Array) -> Array:
+    """Volts at the terminals where the waveform has made so many turns, shape (n,); times [s]: of noise.
+
+    >>> from instruments.virtual.generator_channel import Output
+    >>> voltage(Output("SQU", 1.0, 2.0, 0.5, duty=0.25), np.array([0.2, 0.3]), np.zeros(2)).tolist()
+    [2.5, -1.5]
+    """
+    if not output.amplitude or output.waveform not in _SHAPES:
+        return np.full_like(turns, output.offset)
+    shape = _SHAPES[output.waveform](turns + output.phase / 360, times, output)
+    # a polarity turns the waveform about the offset, which stays (33220A User's Guide, OUTPut:POLarity)
+    return np.asarray(output.offset + (-output.amplitude if output.inverted else output.amplitude) * shape)
+
+
+def fundamental(output: Output) -> float:
+    """Amplitude of the first harmonic [V].  Of bursts with pauses between them the mean over their period."""
+    one = _FUNDAMENTALS.get(output.waveform, _none)(output) if output.amplitude else 0.0
+    return output.amplitude * one * _busy(output)
+
+
+def _busy(output: Output) -> float:
+    """Part of the time in which there is something."""
+    burst = output.burst
+    if burst is None or burst.period is None or not output.frequency:
+        return 1.0
+    return min(1.0, burst.cycles / output.frequency / burst.period)
+
+
+# --- waveforms of amplitude 1: turns, times [s], output → value ---
+
+
+def _sine(turns: Array, _: Array, _output: Output) -> Array:
+    return np.asarray(np.sin(2 * np.pi * turns))
+
+
+def _square(turns: Array, _: Array, output: Output) -> Array:
+    return np.where(turns % 1.0 < output.duty, 1.0, -1.0)
+
+
+def _slopes(turns: Array, rises: float) -> Array:
+    """Up for this part of a period, down for the rest."""
+    place = (turns + rises / 2) % 1.0
+    up = 2 * place / (rises or 1.0) - 1
+    down = 1 - 2 * (place - rises) / ((1 - rises) or 1.0)
+    return np.where(place < rises, up, down)
+
+
+def _ramp(turns: Array, _: Array, output: Output) -> Array:
+    return _slopes(turns, output.symmetry)
+
+
+def _triangle(turns: Array, _: Array, _output: Output) -> Array:
+    return _slopes(turns, 0.5)
+
+
+def _sampled(turns: Array, _: Array, output: Output) -> Array:
+    """Each sample holds until the next; 1e-9: a time that is meant to be that of a sample may be a little before it."""
+    samples = _samples(output)
+    return samples[(((turns % 1.0) * samples.size + 1e-9).astype(np.int64)) % samples.size]
+
+
+def _samples(output: Output) -> Array:
+    return np.zeros(1) if output.samples is None else output.samples
+
+
+def _noise(_: Array, times: Array, _output: Output) -> Array:
+    """The same at the same time, whoever looks: a table, entered at a hash of the time (splitmix64)."""
+    # 0.38: no round time lies between two cells, where rounding would choose
+    cell = np.floor(times / _NOISE_CELL + 0.38).astype(np.int64).astype(np.uint64)
+    cell = (cell ^ (cell >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    cell = (cell ^ (cell >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return _noise_table()[(cell >> np.uint64(48)).astype(np.int64)]
+
+
+@cache
+def _noise_table() -> Array:
+    return np.clip(np.random.default_rng(0).standard_normal(1 << 16) / _NOISE_PEAK, -1.0, 1.0)
+
+
+def _bits(turns: Array, _: Array, _output: Output) -> Array:
+    """PN7, the sequence after ``*RST``; a turn is a bit."""
+    return _pn7()[np.floor(turns).astype(np.int64) % 127]
+
+
+@cache
+def _pn7() -> Array:
+    """x⁷ + x⁶ + 1."""
+    register, bits = 127, []
+    for _ in range(127):
+        bits.append(1.0 if register & 1 else -1.0)
+        register = register >> 1 | ((register ^ register >> 1) & 1) << 6
+    return np.array(bits)
+
+
+_SHAPES: dict[str, Callable[[Array, Array, Output], Array]] = {
+    "SIN": _sine,
+    "SQU": _square,
+    "PULS": _square,
+    "TRI": _triangle,
+    "RAMP": _ramp,
+    "ARB": _sampled,
+    "USER": _sampled,
+    "NOIS": _noise,
+    "PRBS": _bits,
+}
+
+
+# --- their first harmonics ---
+
+
+def _none(_: Output) -> float:
+    return 0.0
+
+
+def _of_square(output: Output) -> float:
+    return 4 / math.pi * math.sin(math.pi * output.duty)
+
+
+def _of_slopes(rises: float) -> float:
+    falls = 1 - rises
+    return 2 / math.pi if not 0 < rises < 1 else 2 * math.sin(math.pi * rises) / (math.pi**2 * rises * falls)
+
+
+def _of_samples(output: Output) -> float:
+    samples = _samples(output)
+    n = samples.size
+    turned = np.exp(-2j * np.pi * np.arange(n) / n)
+    return float(2 / n * abs(np.dot(samples, turned)) * np.sinc(1 / n))  # held: each is 1/n of a turn wide
+
+
+#: Noise and random bits have no line that a top could follow.
+_FUNDAMENTALS: dict[str, Callable[[Output], float]] = {
+    "SIN": lambda _: 1.0,
+    "SQU": _of_square,
+    "PULS": _of_square,
+    "TRI": lambda _: _of_slopes(0.5),
+    "RAMP": lambda output: _of_slopes(output.symmetry),
+    "ARB": _of_samples,
+    "USER": _of_samples,
+}

@@ -1,0 +1,74 @@
+"""What holds from when on: a list in time, as cheap to look into when it is long."""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+T = TypeVar("T")
+
+Array = NDArray[np.float64]
+
+#: So much that nobody asks for any more is let go at once: what is behind it in the list has to be moved.
+_AT_ONCE = 1000
+
+
+class History(Generic[T]):
+    """Items, each from its start [s] until the next.
+
+    >>> history = History(0.0, "a")
+    >>> history.append(1.0, "b")
+    >>> [(item, list(range(5))[part]) for item, part in history.pieces(np.array([-1.0, 0.5, 1.0, 1.5, 2.0]))]
+    [('a', [0, 1]), ('b', [2, 3, 4])]
+    """
+
+    def __init__(self, start: float, item: T) -> None:
+        self._starts, self._items = [start], [item]
+
+    def __iter__(self) -> Iterator[T]:
+        return iter(self._items)
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    @property
+    def last(self) -> T:
+        """The one that holds for ever, as far as is known."""
+        return self._items[-1]
+
+    def at(self, time: float) -> T:
+        """What holds at this time; before all others the first."""
+        return self._items[max(bisect_right(self._starts, time) - 1, 0)]
+
+    def cut(self, time: float) -> None:
+        """Drop what was to begin at this time or later."""
+        k = bisect_left(self._starts, time)
+        del self._starts[k:], self._items[k:]
+
+    def append(self, start: float, item: T) -> None:
+        """From this time on, no earlier than all others, it is this."""
+        self._starts.append(start)
+        self._items.append(item)
+
+    def forget(self, before: float) -> None:
+        """Nobody will ask for times before this one."""
+        stale = bisect_right(self._starts, before) - 1
+        if stale >= _AT_ONCE:
+            del self._starts[:stale], self._items[:stale]
+
+    def pieces(self, times: Array) -> Iterator[tuple[T, slice]]:
+        """What holds at these times, shape (n,), piece by piece: an item and which of the times are its."""
+        if not times.size:
+            return
+        low = max(bisect_right(self._starts, float(times.min())) - 1, 0)
+        high = bisect_right(self._starts, float(times.max()))
+        index = np.searchsorted(np.array(self._starts[low + 1 : high]), times, side="right")
+        ends = [*(np.flatnonzero(np.diff(index)) + 1).tolist(), times.size]
+        for begin, end in zip([0, *ends[:-1]], ends, strict=True):
+            yield self._items[low + int(index[begin])], slice(begin, end)
