@@ -43,7 +43,6 @@ class Limits:
             if value is not None and not low <= value <= high:  # nan is in no range
                 allowed = f"up to {high:g}" if high < math.inf else f"from {low:g} on"
                 raise OutOfRange(address, name, value, f"{allowed} (limits.{name} in bench.toml)")
-        check_peak(address, amplitude_vpp, offset_v)
 
 
 #: Of a generator by itself.
@@ -98,10 +97,12 @@ class _Limited(Setting[float]):
     partner: str = ""
 
     def __set__(self, instrument: ScpiInstrument, value: float) -> None:
-        known = {self.quantity: value}
+        address = instrument.transport.address
+        cast("_Drive", instrument).limits.check(address, **{self.quantity: value})
+        self._check(address, value)
         if self.partner in instrument.set_to:
-            known[self.partner] = cast("float", instrument.set_to[self.partner])
-        cast("_Drive", instrument).limits.check(instrument.transport.address, **known)
+            both = {self.quantity: value, self.partner: cast("float", instrument.set_to[self.partner])}
+            check_peak(address, **both)
         super().__set__(instrument, value)
 
 
@@ -171,9 +172,9 @@ class _Drive(ScpiInstrument):
 
         See :class:`Generator`.  The reset switches all outputs off.
         """
-        self.limits.check(
-            self.transport.address, frequency_hz=frequency_hz, amplitude_vpp=amplitude_vpp, offset_v=offset_v
-        )
+        address = self.transport.address
+        self.limits.check(address, frequency_hz=frequency_hz, amplitude_vpp=amplitude_vpp, offset_v=offset_v)
+        check_peak(address, amplitude_vpp, offset_v)
         self.command("*RST")
         self.command(f"{self.OUTPUT}:LOAD INF")
         self.command("VOLT:UNIT VPP")
