@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 #: Readings that are fetched with one question: an answer of 25 kB, seconds apart at most.
 _AT_ONCE = 1000
 
+#: Readings that are waited for with one question: so long, at most [s].  VISA waits for 49 days and no longer.
+_LONGEST_WAIT = 30 * 86400.0
+
 
 class Counter(Protocol):
     """What every counter offers."""
@@ -227,8 +230,15 @@ class PendulumCNT91(_ReciprocalCounter):
     def _parse(self, answer: str) -> float | None:
         return parse_reading(self.transport.address, "READ?", answer or "nan")
 
+    def _check_count(self, count: int) -> None:
+        super()._check_count(count)
+        most = int(_LONGEST_WAIT / self._patience)
+        if count > most:
+            allowed = f"1 to {most} with this gate: they are waited for together, 30 days at most"
+            raise OutOfRange(self.transport.address, "count", count, allowed)
+
     def readings(self, count: int) -> NDArray[np.float64]:
-        """So many readings; see :class:`Counter`."""
+        """So many readings; see :class:`Counter`.  Raises OutOfRange if they could take longer than 30 days."""
         return self._block(count, columns=1)[:, 0]
 
     def timed_readings(self, count: int) -> NDArray[np.float64]:
@@ -236,6 +246,7 @@ class PendulumCNT91(_ReciprocalCounter):
 
         Times are the counter's: only their differences mean something.  Raises OutOfRange as readings() does.
         """
+        self._check_count(count)
         self.time_stamps = True
         try:
             return self._block(count, columns=2)

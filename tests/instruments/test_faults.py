@@ -1,5 +1,7 @@
 """Faults of links and instruments: each is told as what it is, and the next question gets its own answer."""
 
+import contextlib
+
 import pytest
 
 from instruments.errors import BadAnswer, CommandRefused, InstrumentError, NoAnswer, NotConnected
@@ -9,7 +11,8 @@ from instruments.virtual.bus import Bus
 from instruments.virtual.device import VirtualInstrument, answers
 from instruments.virtual.faults import AWAY, FAULTS, LATE, Fault
 from instruments.virtual.scpi import Command
-from levilab.clock import VirtualClock
+from instruments.virtual.servers.server import BenchServer
+from levilab.clock import VirtualClock, WallClock
 from pyvisa_levilab import library_for
 
 MESSAGES, STREAM = "TCPIP0::box.levilab::inst0::INSTR", "TCPIP0::box.levilab::5025::SOCKET"
@@ -195,3 +198,67 @@ def test_faults_one_after_the_other_never_give_a_wrong_number(box, what):
             box.transport.reopen()
     assert set(seen) <= {25.0, None}
     assert seen[-1] == 25.0
+
+
+# --- the same at the servers, with other people's client ---
+
+#: Seconds of the bench per second; an answer that is waited for in vain, and one that comes [s].
+SPEED, IN_VAIN, AT_MOST = 20.0, 0.2, 5.0
+LOST = {"disconnected", "away for 5 s"}
+#: What differs from READING.  pyvisa-py waits on at a bare socket that was closed; over HiSLIP it does not end a
+#: message at a line feed, so what comes behind one is seen; a lock holds back questions, not an answer on its way,
+#: but for VXI-11, where it is an I/O error.
+SERVED = {
+    ("socket", "disconnected"): (NoAnswer, "no answer"),
+    ("socket", "away for 5 s"): (NoAnswer, "no answer"),
+    ("hislip", "two answers at once"): (BadAnswer, "expected a number"),
+    ("hislip", "garbage after"): (BadAnswer, "expected a number"),
+    ("socket", "taken by another"): 25.0,
+    ("hislip", "taken by another"): 25.0,
+    ("vxi11", "taken by another"): (NotConnected, "no link at"),
+}
+
+
+@contextlib.contextmanager
+def served_box(way):
+    clock = WallClock(speed=SPEED)
+    bus = Bus({MESSAGES: VirtualBox(clock)})
+    with BenchServer(bus) as server:
+        box = Box(VisaTransport(server.offers[0].resources[way], library="@py", timeout=AT_MOST))
+        box.bus, box.clock = bus, clock
+        try:
+            yield box
+        finally:
+            box.close()
+
+
+@pytest.mark.parametrize("what", FAULTS)
+@pytest.mark.parametrize("way", ["socket", "hislip", "vxi11"])
+def test_over_a_server_a_fault_is_told_as_what_it_is_and_the_next_question_gets_its_own_answer(way, what, monkeypatch):
+    if what in LOST:  # pyvisa-py waits five seconds for an answer to its farewell, on a connection that is gone
+        monkeypatch.setattr("pyvisa_py.tcpip.Vxi11CoreClient.destroy_link", lambda *_: 0)
+    with served_box(way) as box:
+        box.identity()
+        box.bus.faults.append(Fault(what, question=r"READ\?"))
+        expected = SERVED.get((way, what), READING[what])
+        box.transport.timeout = IN_VAIN if isinstance(expected, tuple) else AT_MOST
+        if isinstance(expected, tuple):
+            error, told = expected
+            with pytest.raises(error, match=told.partition(" within")[0]) as caught:
+                box.reading()
+            assert caught.value.address == box.transport.address
+        else:
+            assert box.reading() == expected
+        if what == "late answer":
+            box.clock.sleep(LATE)
+        if what == "taken by another":
+            release(box)
+        if what in LOST:
+            box.clock.sleep(AWAY)
+            box.transport.reopen()
+        box.transport.timeout = AT_MOST
+        box.forget_errors()
+        for _ in range(3):
+            assert box.level == 1.5
+            assert box.reading() == 25.0
+            assert box.data() == DATA

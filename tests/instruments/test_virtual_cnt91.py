@@ -12,8 +12,13 @@ import numpy as np
 import pytest
 from wire import ask, cable, errors, received, send
 
+from instruments.counter import PendulumCNT91
+from instruments.errors import OutOfRange
+from instruments.transport import VisaTransport
+from instruments.virtual.bus import Bus
 from instruments.virtual.counter_cnt91 import VirtualCNT91
 from levilab.clock import VirtualClock
+from pyvisa_levilab import library_for
 
 FIXED_LEVEL = "INP:COUP DC;LEV 0.65"
 
@@ -290,3 +295,18 @@ def test_what_is_out_of_reach_is_not_worked_out(ready):
     assert ask(ready, "*OPC?", 10.0) is None  # busy still
     cable(ready).clear()
     assert ask(ready, "*OPC?") == "1"
+
+
+def test_readings_that_could_take_longer_than_visa_waits_are_refused_before_anything_is_sent():
+    address = "GPIB0::10::INSTR"
+    bus = Bus({address: VirtualCNT91(VirtualClock(), signal=pulses(25.0))})
+    sent = []
+    transport = VisaTransport(address, library=library_for(bus), log=lambda *what: sent.append(what))
+    driver = PendulumCNT91(transport)
+    driver.prepare(gate_s=100.0, trigger_level_v=0.6)
+    sent.clear()
+    for readings in (driver.readings, driver.timed_readings):
+        with pytest.raises(OutOfRange, match="count = 22000 is refused, allowed is 1 to 12895 with this gate"):
+            readings(22_000)
+    assert not sent
+    assert driver.readings(3) == pytest.approx(25.0)
