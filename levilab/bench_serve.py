@@ -107,6 +107,8 @@ def _bus(service: Service) -> Bus:
 
 
 def _place(service: Service, instruments: int) -> Place:
+    if ":" in service.host:  # a resource name is cut at its colons
+        raise WrongService(f"--host {service.host}: IPv6 has no place in VISA resource names, give an IPv4 address")
     last = (service.port_base or 0) + PORTS_PER_INSTRUMENT * instruments - 1
     if last > _LAST_PORT:
         raise WrongService(f"--port-base {service.port_base}: the ports end at {_LAST_PORT}, {last} would be needed")

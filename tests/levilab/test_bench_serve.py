@@ -129,8 +129,9 @@ def test_a_model_that_there_is_not_is_wrong_usage(words, says):
         (Service(speed=float("inf")), "speed = inf"),
         (Service(port_base=65535), "the ports end at 65535"),
         (Service(host="nowhere.invalid"), "try another --host or --port-base"),
+        (Service(host="::1"), "--host ::1: IPv6 has no place in VISA resource names, give an IPv4 address"),
     ],
-    ids=["0", "nan", "inf", "ports", "host"],
+    ids=["0", "nan", "inf", "ports", "host", "IPv6"],
 )
 def test_what_cannot_be_served_is_told(service, says):
     with pytest.raises(Exception, match=says):
