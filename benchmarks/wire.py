@@ -36,7 +36,7 @@ import pyvisa
 from instruments.oscilloscope_rigol import RigolDS1000Z
 from instruments.transport import VisaTransport
 from instruments.virtual.bus import Bus
-from instruments.virtual.generator import Virtual33500B
+from instruments.virtual.generator_33500b import Virtual33500B
 from instruments.virtual.scope_rigol import VirtualDS1000Z
 from instruments.virtual.servers.server import BenchServer
 from levilab.clock import VirtualClock

@@ -49,7 +49,7 @@ def _coil_of(world: World) -> Callable[[float, Output], None]:
 
 
 def _generator_33500b(world: World) -> VirtualInstrument:
-    from instruments.virtual.generator import Virtual33500B
+    from instruments.virtual.generator_33500b import Virtual33500B
 
     return Virtual33500B(world.clock, listener=_coil_of(world))
 

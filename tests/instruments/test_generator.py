@@ -10,8 +10,8 @@ from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange, 
 from instruments.generator import Agilent33220A, Keysight33500B, Limits
 from instruments.transport import VisaTransport
 from instruments.virtual.bus import Bus
-from instruments.virtual.generator import Virtual33500B
 from instruments.virtual.generator_33220a import Virtual33220A
+from instruments.virtual.generator_33500b import Virtual33500B
 from levilab.clock import VirtualClock
 from pyvisa_levilab import library_for
 

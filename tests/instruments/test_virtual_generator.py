@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from wire import ask, cable, errors, received, send
 
 from instruments.virtual.arbitrary import samples
-from instruments.virtual.generator import Burst, Output, Virtual33500B
+from instruments.virtual.generator import Burst, Output
 from instruments.virtual.generator_33220a import Virtual33220A
+from instruments.virtual.generator_33500b import Virtual33500B
 from instruments.virtual.scpi import ScpiError
 from levilab.clock import VirtualClock
 

@@ -11,7 +11,7 @@ from wire import ask, cable, errors, received, send
 from instruments.virtual.counter import Virtual53230A
 from instruments.virtual.device import VirtualInstrument, answers
 from instruments.virtual.framing import LONGEST_LINE
-from instruments.virtual.generator import Virtual33500B
+from instruments.virtual.generator_33500b import Virtual33500B
 from instruments.virtual.scpi import Command
 from levilab.clock import VirtualClock
 

@@ -1,9 +1,11 @@
 """The bench, opened and left: whatever happens, the drive is off and everything is closed."""
 
+import time
+
 import pytest
 
 from instruments.errors import InstrumentError, NotConnected, OutOfRange, WrongInstrument
-from instruments.virtual.generator import Virtual33500B
+from instruments.virtual.generator_33500b import Virtual33500B
 from levilab.bench import OutputMayBeOn, open_bench
 from levilab.clock import VirtualClock, WallClock
 from levilab.config import BenchConfig, ConfigError, InstrumentSettings, Limits, SpinSettings, read_bench, within_limits
@@ -54,7 +56,7 @@ def faulty(monkeypatch):
     """The virtual bench with a generator whose faults a test can switch on."""
     monkeypatch.setattr(Faulty, "silent", 0)
     monkeypatch.setattr(Faulty, "stuck", False)
-    monkeypatch.setattr("instruments.virtual.generator.Virtual33500B", Faulty)
+    monkeypatch.setattr("instruments.virtual.generator_33500b.Virtual33500B", Faulty)
     return Faulty
 
 
@@ -197,7 +199,7 @@ def test_the_second_output_is_off_as_soon_as_the_bench_is_open_and_when_it_is_le
             self.settings |= {"output": True, "2:output": True}
             made.append(self)
 
-    monkeypatch.setattr("instruments.virtual.generator.Virtual33500B", LeftOn)
+    monkeypatch.setattr("instruments.virtual.generator_33500b.Virtual33500B", LeftOn)
     with open_bench(BenchConfig(), KINDS, world=world):
         assert (made[0].settings["output"], made[0].settings["2:output"]) == (False, False)
         made[0].settings["2:output"] = True
@@ -403,3 +405,16 @@ def test_a_description_that_is_missing_is_told_with_what_to_do(tmp_path):
 def test_a_description_does_not_change_once_it_is_read():
     with pytest.raises(ValueError, match="frozen"):
         BenchConfig().limits.drive_amplitude_vpp = 20.0
+
+
+def test_a_virtual_bench_that_is_described_keeps_to_the_wall_clock_as_whoever_measures_does():
+    with open_bench(described(**VIRTUAL), ("counter",)) as bench:
+        begin = time.monotonic()
+        bench.counter.prepare(gate_s=0.05, trigger_level_v=0.6)
+        assert bench.counter.frequency() == pytest.approx(30, abs=3)
+        assert time.monotonic() - begin > 0.05
+
+
+def test_a_gate_must_fit_into_the_interval(tmp_path):
+    with pytest.raises(ConfigError, match=r"gate_s = 12 must be shorter than interval_s = 10"):
+        read_bench(written(tmp_path, "[spin]\ngate_s = 12\ninterval_s = 10\n"))

@@ -6,8 +6,8 @@ pytest.importorskip("pymeasure")
 
 from pymeasure.instruments.agilent import Agilent33220A, Agilent33500
 
-from instruments.virtual.generator import Virtual33500B
 from instruments.virtual.generator_33220a import Virtual33220A
+from instruments.virtual.generator_33500b import Virtual33500B
 from levilab.clock import VirtualClock
 
 #: PyMeasure's class and the instrument that it is for.
