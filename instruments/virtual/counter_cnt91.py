@@ -8,14 +8,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from instruments.scpi import INFINITY, NOT_A_NUMBER
-from instruments.virtual.counter import (
-    Function,
-    VirtualCounter,
-    block,
-    channels_of,
-    darkness,
-    without_channels,
-)
+from instruments.virtual.counter_base import Function, VirtualCounter, darkness
+from instruments.virtual.counter_parameters import block, channels_of, without_channels
 from instruments.virtual.counting import Looks, Measurement, Memory, Run, Span, Wish, first_edge
 from instruments.virtual.device import Clock, answers, does
 from instruments.virtual.edges import Array, Input, Signal

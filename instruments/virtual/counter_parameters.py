@@ -1,0 +1,58 @@
+"""What the commands of the virtual counters are given and answer: channel lists, numbers in brackets, blocks."""
+
+from __future__ import annotations
+
+import re
+
+from instruments.virtual.scpi import ScpiError
+
+_CHANNELS = re.compile(r"\(@\s*([\d,\s]+)\)")
+_BRACKETED = re.compile(r"\(\s*([^@()]*)\)")
+
+
+def channels_of(parameters: list[str]) -> tuple[int, ...]:
+    """The channels in channel lists, in their order.  Raises ScpiError for one that is not there.
+
+    >>> channels_of(["10", "(@2)", "(@1)"])
+    (2, 1)
+    """
+    lists = [found for text in parameters if (found := _CHANNELS.fullmatch(text))]
+    named = [word.strip().lstrip("0") for found in lists for word in found[1].split(",") if word.strip()]
+    if any(word not in {"1", "2"} for word in named):  # compared as text: a number may have any length
+        raise ScpiError(-224, "channel")
+    return tuple(map(int, named))
+
+
+def without_channels(parameters: list[str]) -> list[str]:
+    """The other parameters; a number may stand in brackets, as the CNT-91's handbook prints it.
+
+    >>> without_channels(["(100)", "(@1)"])
+    ['100']
+    """
+    plain = [text for text in parameters if not _CHANNELS.fullmatch(text)]
+    return [found[1].strip() if (found := _BRACKETED.fullmatch(text)) else text for text in plain]
+
+
+def truth(text: str) -> bool:
+    """ON, OFF, or a number: what rounds to nought is OFF (SCPI-1999, volume 1, 7.3).  Raises ScpiError.
+
+    >>> truth("1.0"), truth("off")
+    (True, False)
+    """
+    words = {"ON": True, "OFF": False}
+    if text.upper() in words:
+        return words[text.upper()]
+    try:
+        return round(float(text)) != 0
+    except (ValueError, OverflowError):
+        raise ScpiError(-224, text[:20]) from None
+
+
+def block(data: bytes) -> str:
+    """A definite-length block (IEEE 488.2, 8.7.9), a character for each byte.
+
+    >>> block(b"abc"), block(b"")
+    ('#13abc', '#10')
+    """
+    size = str(len(data))
+    return f"#{len(size)}{size}" + data.decode("latin-1")
