@@ -1,6 +1,7 @@
 """levilab bench init and check: who answers, a bench.toml from it, and whether all of it is there."""
 
 import json
+import re
 
 import pytest
 
@@ -105,7 +106,7 @@ def test_the_commands_find_write_and_check(levilab, tmp_path):
     assert "wrote bench.toml" in done.stderr
     assert "there already" in levilab("bench", "init", "--library", "@levilab", check=1).stderr
     checked = levilab("bench", "check")
-    assert "29.9" in checked.stdout
+    assert re.search(r"\b(29|30)\.\d{4} Hz", checked.stdout)
     path = tmp_path / "bench.toml"
     path.write_text(path.read_text(encoding="utf-8").replace("counter.levilab", "nobody"), encoding="utf-8")
     failed = levilab("bench", "check", "--json", check=3)
