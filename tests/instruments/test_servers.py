@@ -1,5 +1,6 @@
 """The virtual bench over real sockets on loopback, with other people's clients: pyvisa-py, and bare sockets."""
 
+import asyncio
 import contextlib
 import gc
 import os
@@ -23,6 +24,8 @@ from instruments.virtual.servers import station
 from instruments.virtual.servers.hislip import HEADER, LONGEST, Type
 from instruments.virtual.servers.serial_port import HAS_PSEUDO_TERMINALS
 from instruments.virtual.servers.server import BenchServer, Place
+from instruments.virtual.servers.socket_server import socket_listener
+from instruments.virtual.servers.station import Station
 from levilab.clock import VirtualClock, WallClock
 
 #: What is waited for at most [s], reached by a failure only; and a time-out that is meant to be reached [ms].
@@ -262,6 +265,23 @@ def test_the_end_of_the_server_ends_waiting_clients_and_its_thread():
                 assert connection.recv(10) == b""
         del served.server
         gc.collect()  # a socket left open would warn
+
+
+@pytest.mark.parametrize("turns", range(6))  # of the event loop, until a connection is handed over
+def test_the_end_of_the_server_ends_a_client_that_is_just_connecting(turns):
+    thing = Thing(WallClock())
+
+    async def end_while_connecting():
+        listener = socket_listener(Station(Bus({NETWORK: thing}), thing))
+        await listener.open("127.0.0.1", 0)
+        with socket.create_connection(("127.0.0.1", listener.port), timeout=AT_MOST):
+            for _ in range(turns):
+                await asyncio.sleep(0)
+            async with asyncio.timeout(AT_MOST):
+                await listener.close()
+
+    asyncio.run(end_while_connecting())
+    gc.collect()  # a socket left open would warn
 
 
 @pytest.mark.parametrize("way", ["socket", "hislip", "vxi11"])

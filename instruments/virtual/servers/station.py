@@ -267,27 +267,40 @@ class Listener:
 
     def __init__(self, station: Station, talk: Conversation, *, most: int = MOST_CLIENTS) -> None:
         self._station, self._talk, self._most = station, talk, most
-        self._server: asyncio.Server | None = None
+        self._listening: socket.socket | None = None
+        self._accepting: asyncio.Task[None] | None = None
         self._talks: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
         self.port = 0
 
     async def open(self, host: str, port: int) -> None:
         """Listen at this address of the machine; port 0: one that is free.  Raises OSError."""
-        self._server = await asyncio.start_server(self._connected, host, port, family=socket.AF_INET)
-        self.port = self._server.sockets[0].getsockname()[1]
+        self._listening = socket.create_server((host, port), family=socket.AF_INET, backlog=self._most)
+        self._listening.settimeout(0)
+        self.port = self._listening.getsockname()[1]
+        self._accepting = asyncio.ensure_future(self._accept(self._listening))
+
+    async def _accept(self, listening: socket.socket) -> None:
+        # asyncio's own server, closed while somebody connects, waits for ever (3.12) or stumbles (3.13)
+        loop = asyncio.get_running_loop()
+        while True:
+            try:
+                connection, _ = await loop.sock_accept(listening)
+                self._connected(*await asyncio.open_connection(sock=connection))
+            except OSError:  # gone already, or this process has too much open
+                await asyncio.sleep(_LOOK_AGAIN)
 
     def _connected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if len(self._talks) >= self._most or not self._station.bus.reachable(self._station.device):
             writer.transport.abort()
             return
-        # a client whose machine was switched off does not say so
-        writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
         task = asyncio.ensure_future(self._conversation(reader, writer))
         self._talks[task] = writer
         task.add_done_callback(self._talks.pop)
 
     async def _conversation(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         try:
+            # a client whose machine was switched off does not say so
+            writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
             await self._talk(reader, writer)
         except (OSError, EOFError, Disconnected, LinkLost):
             pass  # the client is gone
@@ -299,12 +312,13 @@ class Listener:
 
     async def close(self) -> None:
         """Listen no longer, and end all conversations."""
-        if self._server is None:
+        if self._accepting is None or self._listening is None:
             return
-        self._server.close()
+        self._accepting.cancel()
+        await asyncio.wait([self._accepting])
+        self._listening.close()
         talks = dict(self._talks)
         for task, writer in talks.items():
             task.cancel()
             writer.transport.abort()
-        await asyncio.gather(*talks, return_exceptions=True)
-        await self._server.wait_closed()
+        await asyncio.gather(*talks, *(writer.wait_closed() for writer in talks.values()), return_exceptions=True)
