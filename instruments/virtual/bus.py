@@ -13,7 +13,8 @@ from instruments.scpi import INFINITY
 from instruments.virtual.faults import LinkLost
 from instruments.virtual.framing import Framer, Overrun
 from instruments.virtual.scpi import LONGEST_ANSWER, ScpiError
-from instruments.virtual.steps import SteppedInstrument, Work, at_once
+from instruments.virtual.stepped_instrument import SteppedInstrument
+from instruments.virtual.steps import Work, at_once
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

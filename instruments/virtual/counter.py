@@ -15,7 +15,6 @@ from instruments.virtual.counting import Looks, Measurement, Memory, Run, Span
 from instruments.virtual.device import answers, does
 from instruments.virtual.edges import Array, Input, Signal, crossings
 from instruments.virtual.scpi import Command, ScpiError, at_most_one, choice, limit, none, nr3, number, one
-from instruments.virtual.steps import plainly, slow
 
 if TYPE_CHECKING:
     from instruments.virtual.device import Clock
@@ -97,15 +96,15 @@ class Virtual53230A(VirtualCounter):
 
             rows += [
                 Command("CONFigure" + function.header, configure, answers(self._configuration)),
-                slow("MEASure" + function.header, measure),
+                Command("MEASure" + function.header, get=measure),
             ]
         return (
             *rows,
             Command("CONFigure", get=answers(self._configuration)),
             Command("[SENSe[1]:]FUNCtion[:ON]", self._set_function, answers(lambda: f'"{self._function}"')),
             Command("INITiate[:IMMediate]", set=does(self._initiate)),
-            slow("READ", plainly(self._read)),
-            slow("FETCh", plainly(self._fetch)),
+            Command("READ", get=answers(self._read)),
+            Command("FETCh", get=answers(self._fetch)),
             Command("ABORt", set=does(self.abandon)),
         )
 
@@ -157,7 +156,7 @@ class Virtual53230A(VirtualCounter):
     def _memory_rows(self) -> tuple[Command, ...]:
         return (
             Command("R", get=self._remove_what_is_there),
-            slow("DATA:REMove", self._remove),
+            Command("DATA:REMove", get=self._remove),
             Command("DATA:POINts", get=answers(lambda: f"{self.there() - self._memory.fetched:+d}")),
             Command("DATA:LAST", get=answers(self._last)),
             Command("FORMat[:DATA]", self._set_format, answers(self._format)),

@@ -15,7 +15,8 @@ from instruments.virtual.counting import Looks, Measurement, Memory, Run, Span, 
 from instruments.virtual.device import answers, does
 from instruments.virtual.scpi import Command, ScpiError, at_most_one, limit, nr3, number, one
 from instruments.virtual.status import OPERATION_COMPLETE
-from instruments.virtual.steps import SteppedInstrument, at_once, plainly, slow
+from instruments.virtual.stepped_instrument import SteppedInstrument
+from instruments.virtual.steps import at_once
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -168,8 +169,8 @@ class VirtualCounter(SteppedInstrument):
 
     def _common(self) -> tuple[Command, ...]:
         own = (
-            slow("*OPC", plainly(self._completion), set=does(self._note_when_complete)),
-            slow("*WAI", act=plainly(self._wait)),
+            Command("*OPC", set=does(self._note_when_complete), get=answers(self._completion)),
+            Command("*WAI", set=does(self._wait)),
         )
         return (*own, *super()._common())
 

@@ -14,7 +14,6 @@ from instruments.virtual.counting import Looks, Measurement, Memory, Run, Span, 
 from instruments.virtual.device import Clock, answers, does
 from instruments.virtual.edges import Array, Input, Signal
 from instruments.virtual.scpi import Command, ScpiError, at_most_one, choice, limit, none, number, one
-from instruments.virtual.steps import plainly, slow
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -164,15 +163,15 @@ class VirtualCNT91(VirtualCounter):
             self._initiate()
             return (yield from self._fetch(int(self._wanted()) if several else 1))
 
-        return [Command("CONFigure" + header, configure), slow("MEASure" + header, measure)]
+        return [Command("CONFigure" + header, configure), Command("MEASure" + header, get=measure)]
 
     def _fetching(self) -> tuple[Command, ...]:
         return (
-            slow("FETCh[:SCALar]", plainly(lambda: self._fetch(1))),
-            slow("FETCh:ARRay", self._fetch_array),
-            slow("READ[:SCALar]", plainly(self._read)),
-            slow("READ:ARRay", self._read_array),
-            slow("CALCulate:DATA", plainly(lambda: self._fetch(-1))),
+            Command("FETCh[:SCALar]", get=answers(lambda: self._fetch(1))),
+            Command("FETCh:ARRay", get=self._fetch_array),
+            Command("READ[:SCALar]", get=answers(self._read)),
+            Command("READ:ARRay", get=self._read_array),
+            Command("CALCulate:DATA", get=answers(lambda: self._fetch(-1))),
         )
 
     def _input(self, channel: int, suffix: str) -> tuple[Command, ...]:
@@ -223,7 +222,7 @@ class VirtualCNT91(VirtualCounter):
             self.integer(head + "COUNt", "averaged", low=2, high=2e9, default=100),
             Command(head + "COUNt:CURRent", get=answers(lambda: str(self.there()))),
             self.word(head + "TYPE", "average_type", (*words, "MINMax"), "MEAN"),
-            slow(head + "ALL", plainly(self._all_statistics)),
+            Command(head + "ALL", get=answers(self._all_statistics)),
         )
 
     def _system(self) -> tuple[Command, ...]:

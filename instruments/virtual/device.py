@@ -22,6 +22,8 @@ from instruments.virtual.status import OPERATION_COMPLETE, Status
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from instruments.virtual.steps import Steps
+
 Value = float | str | bool
 
 
@@ -61,7 +63,6 @@ class VirtualInstrument:
     no_error, queue_size, line_end = '+0,"No error"', 20, "\n"
     #: Whether it knows blocks (IEEE 488.2, 7.7.6).
     takes_blocks = True
-    parser_type: type[Parser] = Parser
 
     def __init__(self, clock: Clock, *, pace: float = 2e-3) -> None:
         self.clock, self.pace = clock, pace
@@ -70,7 +71,7 @@ class VirtualInstrument:
         self.status = Status()
         self.epoch = 0
         self._ready = 0.0
-        self.parser = self.parser_type(queue_size=self.queue_size, no_error=self.no_error, noted=self.status.note_error)
+        self.parser = Parser(queue_size=self.queue_size, no_error=self.no_error, noted=self.status.note_error)
         self.parser.commands = (*self._common(), *self.table())
         self.settings |= self._defaults
 
@@ -182,20 +183,20 @@ class VirtualInstrument:
         return set_
 
 
-def does(act: Callable[[], None]) -> Callable[[list[str]], None]:
+def does(act: Callable[[], Steps[None] | None]) -> Callable[[list[str]], Steps[None] | None]:
     """What a command without parameters does, for a row of a table."""
 
-    def set_(parameters: list[str]) -> None:
+    def set_(parameters: list[str]) -> Steps[None] | None:
         none(parameters)
-        act()
+        return act()
 
     return set_
 
 
-def answers(tell: Callable[[], str]) -> Callable[[list[str]], str]:
+def answers(tell: Callable[[], Steps[str] | str]) -> Callable[[list[str]], Steps[str] | str]:
     """What a query without parameters is answered with, for a row of a table."""
 
-    def get(parameters: list[str]) -> str:
+    def get(parameters: list[str]) -> Steps[str] | str:
         none(parameters)
         return tell()
 

@@ -14,8 +14,12 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING
 
+from instruments.virtual.steps import at_once
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+
+    from instruments.virtual.steps import Steps
 
 ERRORS = {
     -102: "Syntax error",
@@ -64,12 +68,13 @@ class Command:
     """One row of an instrument's table.
 
     pattern: the header as the manual prints it, ``[SOURce[1]:]FREQuency[:CW|:FIXed]``;
-    set, get: what a command or a query with this header does, given its parameters; None where there is none.
+    set, get: what a command or a query with this header does, given its parameters, at once or in steps; None where
+    there is none.
     """
 
     pattern: str
-    set: Callable[[list[str]], None] | None = None
-    get: Callable[[list[str]], str] | None = None
+    set: Callable[[list[str]], Steps[None] | None] | None = None
+    get: Callable[[list[str]], Steps[str] | str] | None = None
 
     @property
     def header(self) -> re.Pattern[str]:
@@ -115,36 +120,39 @@ class Parser:
 
     def run(self, message: str) -> str | None:
         """Execute one message (a line without its end); the answers of its queries joined with ``;``, or None."""
+        return at_once(self.steps(message))
+
+    def steps(self, message: str) -> Steps[str | None]:
+        """What run() does, in steps."""
         answers: list[str] = []
-        path = ""
+        length, path = 0, ""
         for unit in split_units(message):
             parts = _UNIT.fullmatch(unit)
             assert parts, "a unit begins with no blank"
             header, rest = parts.groups()
             full, path = _resolve(header, path)
             try:
-                answer = self._execute(full, split_parameters(rest))
+                answer = self._act(full)(split_parameters(rest))
+                if answer is not None and not isinstance(answer, str):
+                    answer = yield from answer
             except ScpiError as error:
                 self.report(error)
                 break
-            if answer is not None:
-                answers.append(answer)
-            if sum(map(len, answers)) > LONGEST_ANSWER:
+            if answer is None:
+                continue
+            answers.append(answer)
+            length += len(answer)
+            if length > LONGEST_ANSWER:
                 self.report(ScpiError(-430))
                 return None
         return ";".join(answers) if answers else None
 
-    def _execute(self, header: str, parameters: list[str]) -> str | None:
-        name = header.removesuffix("?").upper()
-        command = self._find(name)
-        if header.endswith("?"):
-            if command.get is None:
-                raise ScpiError(-113, header)
-            return command.get(parameters)
-        if command.set is None:
+    def _act(self, header: str) -> Callable[[list[str]], Steps[str] | Steps[None] | str | None]:
+        command = self._find(header.removesuffix("?").upper())
+        act = command.get if header.endswith("?") else command.set
+        if act is None:
             raise ScpiError(-113, header)
-        command.set(parameters)
-        return None
+        return act
 
     def _find(self, name: str) -> Command:
         if name not in self._known:
@@ -181,7 +189,7 @@ def split_units(message: str) -> Iterator[str]:
     >>> list(split_units('FREQ 40; DISP:TEXT "a;b"'))
     ['FREQ 40', 'DISP:TEXT "a;b"']
     """
-    return (unit for unit in _split(message, ";") if unit)
+    return filter(None, _split(message, ";"))
 
 
 def split_parameters(text: str) -> list[str]:
