@@ -21,7 +21,7 @@ from instruments.serial_link import SerialTransport, port_name
 from instruments.virtual.bus import Bus
 from instruments.virtual.device import VirtualInstrument, answers
 from instruments.virtual.faults import FAULTS, Fault
-from instruments.virtual.magnetometer import Virtual425
+from instruments.virtual.magnetometer_425 import Virtual425
 from instruments.virtual.scpi import Command
 from instruments.virtual.serial_line import LineSettings, benches, carried
 from levilab.clock import VirtualClock

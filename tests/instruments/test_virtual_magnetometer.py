@@ -13,7 +13,9 @@ from instruments.errors import NoAnswer
 from instruments.magnetometer import LakeShore425, LakeShore475
 from instruments.transport import VisaTransport
 from instruments.virtual.bus import Bus
-from instruments.virtual.magnetometer import Virtual425, Virtual475, field_text
+from instruments.virtual.magnetometer_425 import Virtual425
+from instruments.virtual.magnetometer_475 import Virtual475
+from instruments.virtual.magnetometer_numbers import field_text
 from levilab.clock import VirtualClock
 from pyvisa_levilab import library_for
 

@@ -1,0 +1,76 @@
+"""A Hall probe in its place, and how a gaussmeter looks at the field there: steady, r.m.s., peaks and frequency."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+#: An alternating field is looked at so long [s], so often.
+_WINDOW, _LOOKS = 0.2, 512
+#: A steady one so often, within the time constant of the filter.
+_STEADY_LOOKS = 16
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What stood at the probe.
+
+    instant: of the reading [s]; mode: as in RDGMODE; steady, rms, lowest, highest [T]; frequency [Hz];
+    noise: in units of the last digit.
+    """
+
+    instant: float
+    mode: int
+    steady: float
+    rms: float
+    lowest: float
+    highest: float
+    frequency: float
+    noise: float
+
+
+@dataclass(frozen=True)
+class HallProbe:
+    """A probe at its place.
+
+    flux_density: along its axis, at a time [s] → [T]; zero_error: what it shows without a field [T].
+    """
+
+    flux_density: Callable[[float], float]
+    zero_error: float
+
+    def look(self, instant: float, mode: int, time_constant: float, noise: float) -> Reading:
+        """A reading.  mode: as in RDGMODE; time_constant: of the filter for steady fields [s]; noise: see Reading."""
+        steady = self.steady(instant, time_constant)
+        if mode == 1:
+            return Reading(instant, mode, steady, 0.0, steady, steady, 0.0, noise)
+        step = _WINDOW / _LOOKS
+        field = self._sampled(instant - _WINDOW + step * np.arange(1, _LOOKS + 1))
+        rms, lowest, highest = float(field.std()), float(field.min()), float(field.max())
+        return Reading(instant, mode, steady, rms, lowest, highest, _frequency(field, step), noise)
+
+    def steady(self, instant: float, time_constant: float) -> float:
+        """The mean over the time constant, the probe's own zero error included [T]."""
+        step = time_constant / _STEADY_LOOKS
+        field = self._sampled(instant - step * np.arange(_STEADY_LOOKS)[::-1])
+        return float(field.mean()) + self.zero_error
+
+    def _sampled(self, times: NDArray[np.floating]) -> NDArray[np.float64]:
+        return np.array([self.flux_density(time) for time in np.maximum(times, 0.0).tolist()])
+
+
+def _frequency(field: NDArray[np.float64], step: float) -> float:
+    """Of an alternating field, by its rising crossings of the mean [Hz]; 0 if there are fewer than two."""
+    level = field - field.mean()
+    rising = np.flatnonzero((level[:-1] < 0) & (level[1:] >= 0))
+    if len(rising) < 2:
+        return 0.0
+    at = rising + level[rising] / (level[rising] - level[rising + 1])
+    return float((len(at) - 1) / (at[-1] - at[0]) / step)
