@@ -32,7 +32,7 @@ COIL_T_PER_V = 0.4e-3 / 5.0
 
 
 def _counter_53230a(world: World) -> VirtualInstrument:
-    from instruments.virtual.counter import Virtual53230A
+    from instruments.virtual.counter_53230a import Virtual53230A
 
     return Virtual53230A(world.clock, signal=world.light)
 

@@ -16,7 +16,7 @@ from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange
 from instruments.scpi import NOT_A_NUMBER
 from instruments.transport import VisaTransport
 from instruments.virtual.bus import Bus
-from instruments.virtual.counter import Virtual53230A
+from instruments.virtual.counter_53230a import Virtual53230A
 from instruments.virtual.counter_cnt91 import VirtualCNT91
 from levilab.clock import VirtualClock
 from pyvisa_levilab import library_for

@@ -8,7 +8,7 @@ import pytest
 import pyvisa
 
 from instruments.virtual.bus import Bus
-from instruments.virtual.counter import Virtual53230A
+from instruments.virtual.counter_53230a import Virtual53230A
 from instruments.virtual.counter_cnt91 import VirtualCNT91
 from instruments.virtual.servers.server import BenchServer
 from levilab.clock import VirtualClock, WallClock

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from wire import ask, cable, errors, received, send
 
-from instruments.virtual.counter import Virtual53230A, crossings
-from instruments.virtual.edges import RATE, EdgeFinder, Input
+from instruments.virtual.counter_53230a import Virtual53230A
+from instruments.virtual.edges import RATE, EdgeFinder, Input, crossings
 from levilab.clock import VirtualClock
 
 DARK, BRIGHT, DUTY = 0.1, 1.2, 0.03

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from wire import ask, cable, errors, received, send
 
-from instruments.virtual.counter import Virtual53230A
+from instruments.virtual.counter_53230a import Virtual53230A
 from instruments.virtual.device import VirtualInstrument, answers
 from instruments.virtual.framing import LONGEST_LINE
 from instruments.virtual.generator_33500b import Virtual33500B
