@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING, ClassVar
 
 from instruments.virtual.arbitrary import Refused, attribute, plain_name, samples
 from instruments.virtual.device import Clock, answers, does
-from instruments.virtual.generator_channel import MODES, Burst, Channel, Output, Waveform
+from instruments.virtual.generator_channel import Burst, Channel, Output
+from instruments.virtual.generator_couplings import MODES, settle
 from instruments.virtual.generator_rows import GeneratorRows
 from instruments.virtual.generator_tables import CHOICES, HZ, PLAIN, SWITCHES, S, V
 from instruments.virtual.scpi import Command, ScpiError, at_most_one, nr3, one
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from instruments.virtual.generator_family import Waveform
 
 __all__ = ["Burst", "Output", "VirtualGenerator"]
 
@@ -42,7 +45,7 @@ class VirtualGenerator(GeneratorRows):
         """Make the other settings fit, and tell the listener what stands at the terminals now."""
         prefix, _, plain = name.rpartition(":")
         channel = self.channels[int(prefix or 1) - 1]
-        channel.settle(plain)
+        settle(channel, plain)
         if channel.index == 1:
             self._tell()
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from instruments.virtual.arbitrary import Refused, plain_name
 from instruments.virtual.device import answers, does
 from instruments.virtual.generator import VirtualGenerator
-from instruments.virtual.generator_channel import Family, Waveform
+from instruments.virtual.generator_family import Family, Waveform
 from instruments.virtual.generator_tables import CHOICES_33500, HZ, PLAIN_33500, SWITCHES, S, V
 from instruments.virtual.scpi import Command, ScpiError, one
 

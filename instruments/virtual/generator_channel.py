@@ -1,10 +1,4 @@
-"""One output of a virtual function generator: its settings, and what they do to each other.
-
-Sources: Agilent/Keysight 33500 Series Operating and Service Guide (limits, couplings); Agilent 33220A User's Guide;
-the state after ``*RST`` as a public driver of the family lists it.  The real instrument does not refuse a number
-beyond its limits: it takes the limit and says so, −222 "value clipped to upper limit" (seen by the device tests of
-a public driver).  When a setting makes another one impossible the other one gives way, with −221.
-"""
+"""One output of a virtual function generator: its triggers, and what stands at its terminals."""
 
 from __future__ import annotations
 
@@ -12,23 +6,17 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from instruments.virtual.arbitrary import Memory, built_in
-from instruments.virtual.scpi import ScpiError, limit, number
+from instruments.virtual.generator_settings import INFINITE, ChannelSettings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, MutableMapping
 
+    import numpy as np
     from numpy.typing import NDArray
 
     from instruments.virtual.device import Value
-
-#: The generator's own resistance [Ω], its greatest voltage without a load [V], and SCPI's infinity.
-SOURCE_OHM, OPEN_V, INFINITE = 50.0, 10.0, 9.9e37
-
-#: Modes of which only one can be on.
-MODES = ("burst", "sweep", "am", "fm", "pm", "pwm", "fsk", "bpsk", "sum")
+    from instruments.virtual.generator_family import Family
+    from instruments.virtual.scpi import ScpiError
 
 
 @dataclass(frozen=True)
@@ -68,81 +56,8 @@ class Output:
         return replace(self, amplitude=factor * self.amplitude, offset=factor * self.offset)
 
 
-@dataclass(frozen=True)
-class Waveform:
-    """A waveform that a family can make.
-
-    word: as the manual prints it; top, bottom: of its frequency [Hz]; crest: peak to peak over r.m.s.
-    """
-
-    word: str
-    top: float
-    bottom: float = 1e-6
-    crest: float = 2.0
-    bursts: bool = True
-    sweeps: bool = True
-
-    @property
-    def short(self) -> str:
-        """What a query answers."""
-        return "".join(c for c in self.word if not c.islower())
-
-
-@dataclass(frozen=True)
-class Family:
-    """What the models of a family have in common.
-
-    least_vpp: smallest amplitude into 50 Ω [V]; shortest_pulse, shortest_edge, longest_edge [s]; longest_period: of
-    pulses [s]; edge_part: an edge is no longer than this part of the shorter half of a pulse; square: the limits of
-    the duty cycle [%] at a frequency [Hz]; most_cycles, longest_burst [s], burst_rest [s]: of bursts;
-    longest_delay: of a trigger [s]; longest_sweep [s]; arb: the word for arbitrary waveforms;
-    points: how many an arbitrary waveform may have; room: of the memory for them.
-    """
-
-    waveforms: tuple[Waveform, ...]
-    square: Callable[[float], tuple[float, float]]
-    arb: str
-    least_vpp: float
-    shortest_pulse: float
-    shortest_edge: float
-    longest_edge: float
-    first_edge: float
-    longest_period: float
-    most_cycles: float
-    longest_burst: float
-    burst_rest: float
-    longest_delay: float
-    longest_sweep: float
-    points: tuple[int, int]
-    room: int
-    edge_part: float = 0.625
-
-    def waveform(self, short: str) -> Waveform:
-        """The waveform with this short name."""
-        return next(waveform for waveform in self.waveforms if waveform.short == short)
-
-
-def quantity_of(text: str, units: tuple[str, ...]) -> tuple[float, str]:
-    """A number of any size and which of the units it was sent with.  Raises ScpiError.
-
-    >>> quantity_of("2 mVrms", ("", "VPP", "VRMS"))
-    (0.002, 'VRMS')
-    """
-    for unit in units:
-        try:
-            return number(text, low=-math.inf, high=math.inf, default=0, unit=unit), unit
-        except ScpiError as error:
-            if error.number != -131 or unit == units[-1]:
-                raise
-    raise ScpiError(-131)
-
-
-class Channel:
-    """The settings of one output.
-
-    settings: of the whole instrument, this channel's under their names with a prefix; report: puts an entry into
-    the error queue; now: the time [s].
-    """
+class Channel(ChannelSettings):
+    """One output.  now: the time [s]; the rest: see the base."""
 
     def __init__(
         self,
@@ -153,263 +68,10 @@ class Channel:
         report: Callable[[ScpiError], None],
         now: Callable[[], float],
     ) -> None:
-        self.family, self.index = family, index
-        self._settings, self._report, self._now = settings, report, now
-        self.prefix = "" if index == 1 else f"{index}:"
-        self.memory = Memory(family.room)
-        self.library = built_in()
+        super().__init__(family, settings, index=index, report=report)
+        self._now = now
         #: From when to when a triggered burst or sweep lasts [s].
         self.under_way = (-math.inf, -math.inf)
-
-    def __getitem__(self, name: str) -> Value:
-        return self._settings[self.prefix + name]
-
-    def __setitem__(self, name: str, value: Value) -> None:
-        self._settings[self.prefix + name] = value
-
-    def number(self, name: str) -> float:
-        """A setting that is a number."""
-        return float(self[name])
-
-    def conflict(self, text: str) -> None:
-        """Another setting had to give way; the command goes on."""
-        self._report(ScpiError(-221, text))
-
-    def clip(self, value: float, low: float, high: float) -> float:
-        """The number or the limit that it is beyond, which goes into the error queue."""
-        if low <= value <= high:
-            return value
-        self._report(ScpiError(-222, f"value clipped to {'upper' if value > high else 'lower'} limit"))
-        return high if value > high else low
-
-    def read(self, text: str, low: float, high: float, default: float, units: tuple[str, ...] = ("",)) -> float:
-        """A numeric parameter, at most at its limits.  Raises ScpiError."""
-        if text[:1].isalpha():
-            if text.upper() in {"INF", "INFINITY"} or text.upper() not in _WORDS:
-                raise ScpiError(-104, text[:20])
-            return limit(text, low=low, high=high, default=default)
-        value, _ = quantity_of(text, units)
-        return self.clip(value, low, high)
-
-    # --- frequency ---
-
-    @property
-    def waveform(self) -> Waveform:
-        """The waveform that is selected."""
-        return self.family.waveform(str(self["waveform"]))
-
-    @property
-    def sampled(self) -> bool:
-        """Whether the frequency is that of samples: the 33500's arbitrary waveforms."""
-        return self.waveform.short == "ARB"
-
-    @property
-    def points(self) -> int:
-        """Samples of the arbitrary waveform that is selected."""
-        return int(self.samples.size)
-
-    @property
-    def samples(self) -> NDArray[np.float64]:
-        """The arbitrary waveform that is selected, −1 to 1, shape (n,)."""
-        name = str(self["arb"])
-        held = self.memory.held.get(name)
-        return self.library[name.rpartition("\\")[2].removesuffix(".ARB")] if held is None else held
-
-    @property
-    def frequency(self) -> float:
-        """Of the waveform that is selected [Hz]."""
-        return self.number("arb_rate") / self.points if self.sampled else self.number("frequency")
-
-    @frequency.setter
-    def frequency(self, value: float) -> None:
-        if self.sampled:
-            self["arb_rate"] = value * self.points
-        else:
-            self["frequency"] = value
-
-    def frequency_limits(self) -> tuple[float, float]:
-        """Of the waveform that is selected [Hz]."""
-        top = self.waveform.top
-        return self.waveform.bottom, top / self.points if self.sampled else top
-
-    # --- voltages, as they are displayed: at the load that OUTPut:LOAD names ---
-
-    @property
-    def share(self) -> float:
-        """Of the open-circuit voltage at the load."""
-        load = self.number("load")
-        return 1.0 if load >= INFINITE else load / (load + SOURCE_OHM)
-
-    def levels(self) -> tuple[float, float]:
-        """The lowest and the highest voltage that there can be [V]."""
-        top = OPEN_V * self.share
-        if self["limits_on"]:
-            return max(-top, self.number("limit_low")), min(top, self.number("limit_high"))
-        return -top, top
-
-    def amplitude_limits(self) -> tuple[float, float]:
-        """Of the peak-to-peak voltage [V]."""
-        low, high = self.levels()
-        return 2 * self.family.least_vpp * self.share, high - low
-
-    def offset_limits(self) -> tuple[float, float]:
-        """Of the offset at the amplitude there is [V]; a DC voltage has no amplitude."""
-        low, high = self.levels()
-        half = 0.0 if self["waveform"] == "DC" else self.number("amplitude_vpp") / 2
-        return min(0.0, low + half), max(0.0, high - half)
-
-    def shown(self, vpp: float, unit: str) -> float:
-        """A peak-to-peak voltage [V] in this unit."""
-        if unit == "VPP":
-            return vpp
-        rms = vpp / self._crest()
-        return rms if unit == "VRMS" else 10 * math.log10(rms**2 / self.number("load") / 1e-3)
-
-    def meant(self, value: float, unit: str) -> float:
-        """A number in this unit as a peak-to-peak voltage [V]."""
-        if unit == "VPP":
-            return value
-        rms = value if unit == "VRMS" else math.sqrt(10 ** (min(value, 300.0) / 10) * 1e-3 * self.number("load"))
-        return rms * self._crest()
-
-    def _crest(self) -> float:
-        if self["waveform"] != self.family.arb:
-            return self.waveform.crest
-        return 2.0 / max(float(np.sqrt(np.mean(self.samples**2))), 1e-3)
-
-    def set_level(self, which: str, value: float) -> None:
-        """VOLTage:HIGH or :LOW: the other level stays, or gives way by the smallest step."""
-        low, high = self.level("low"), self.level("high")
-        step = max(1e-3, self.amplitude_limits()[0])
-        if which == "high":
-            high = value
-            if high - low < step * (1 - 1e-9):
-                low = high - step
-                self.conflict("low level changed due to high level")
-        else:
-            low = value
-            if high - low < step * (1 - 1e-9):
-                high = low + step
-                self.conflict("high level changed due to low level")
-        self["amplitude_vpp"], self["offset"] = round(high - low, 12), round((high + low) / 2, 12)
-
-    def level(self, which: str) -> float:
-        """The high or the low level [V]."""
-        half = self.number("amplitude_vpp") / 2
-        return round(self.number("offset") + (half if which == "high" else -half), 12)
-
-    def level_limits(self, which: str) -> tuple[float, float]:
-        """Of the high or the low level [V]."""
-        low, high = self.levels()
-        return (low + 1e-3, high) if which == "high" else (low, high - 1e-3)
-
-    def set_load(self, load: float) -> None:
-        """OUTPut:LOAD: what stands at the terminals stays, what is displayed changes."""
-        before = self.share
-        self["load"] = load
-        for name in ("amplitude_vpp", "offset"):
-            self[name] = float(f"{self.number(name) * self.share / before:.12g}")
-        if load >= INFINITE and self["voltage_unit"] == "DBM":
-            self["voltage_unit"] = "VPP"
-            self.conflict("amplitude units changed to Vpp due to high-Z load")
-
-    # --- what gives way to what ---
-
-    def settle(self, cause: str) -> None:
-        """Make the settings fit each other after one of them has changed."""
-        for rule in (
-            self._one_mode,
-            self._able,
-            self._in_band,
-            self._in_range,
-            self._square,
-            self._pulse,
-            self._bursts,
-        ):
-            rule(cause)
-
-    def _one_mode(self, cause: str) -> None:
-        if cause not in MODES or not self[cause]:
-            return
-        for mode in MODES:
-            if mode != cause and self._settings.get(self.prefix + mode):
-                self[mode] = False
-                self.conflict(f"turned off {mode} by selection of other mode or modulation")
-
-    def _able(self, cause: str) -> None:
-        for mode, able in (("burst", self.waveform.bursts), ("sweep", self.waveform.sweeps)):
-            if self[mode] and not able:
-                self[mode] = False
-                self.conflict(f"not able to {mode} this function")
-
-    def _in_band(self, cause: str) -> None:
-        low, high = self.frequency_limits()
-        if self.frequency > high * (1 + 1e-12):
-            self.frequency = high
-            self.conflict(f"frequency reduced for {_LONG[self.waveform.short]} function")
-        elif self.frequency < low:
-            self.frequency = low
-            self.conflict(f"frequency changed for {_LONG[self.waveform.short]} function")
-
-    def _in_range(self, cause: str) -> None:
-        least, most = self.amplitude_limits()
-        if not least * (1 - 1e-9) <= self.number("amplitude_vpp") <= most * (1 + 1e-9):
-            self["amplitude_vpp"] = min(max(self.number("amplitude_vpp"), least), most)
-            self.conflict("amplitude changed due to function")
-        low, high = self.offset_limits()
-        offset = self.number("offset")
-        if not low - 1e-9 <= offset <= high + 1e-9:
-            self["offset"] = min(max(offset, low), high)
-            self.conflict(
-                "offset changed on exit from dc function" if cause == "waveform" else "offset changed due to amplitude"
-            )
-
-    def _square(self, cause: str) -> None:
-        if self["waveform"] != "SQU":
-            return
-        low, high = self.family.square(self.number("frequency"))
-        if not low <= self.number("duty") <= high:
-            self["duty"] = min(max(self.number("duty"), low), high)
-            self.conflict("duty cycle changed due to frequency")
-
-    def pulse_limits(self) -> tuple[float, float]:
-        """Of the width of a pulse at the period there is [s]."""
-        least = max(self.family.shortest_pulse, self.family.shortest_edge / self.family.edge_part)
-        return least, 1 / self.number("frequency") - least
-
-    def _pulse(self, cause: str) -> None:
-        """Width and edges have to fit into the period, while pulses are what comes out."""
-        frequency = self.number("frequency")
-        if cause not in {"pulse_width", "pulse_duty"}:
-            if self["pulse_hold"] == "DCYC":
-                self["pulse_width"] = self.number("pulse_duty") / 100 / frequency
-            else:
-                self["pulse_duty"] = 100 * self.number("pulse_width") * frequency
-        if self["waveform"] != "PULS":
-            return
-        low, high = self.pulse_limits()
-        width = self.number("pulse_width")
-        if not low <= width <= high:
-            self.set_width(min(max(width, low), high))
-            self.conflict(f"pulse width {'decreased' if width > high else 'increased'} due to period")
-        edge = self.family.edge_part * min(self.number("pulse_width"), 1 / frequency - self.number("pulse_width"))
-        for name in ("pulse_leading", "pulse_trailing"):
-            if self.number(name) > edge * (1 + 1e-9):
-                self[name] = max(edge, self.family.shortest_edge)
-                self.conflict("edge time decreased due to pulse width")
-
-    def set_width(self, width: float) -> None:
-        """The width of pulses [s], and with it their duty cycle."""
-        self["pulse_width"], self["pulse_duty"] = width, 100 * width * self.number("frequency")
-
-    def _bursts(self, cause: str) -> None:
-        least = self.number("burst_cycles") / self.frequency + self.family.burst_rest
-        if self.repeats and self.number("burst_cycles") < INFINITE and self.number("burst_period") < least:
-            self["burst_period"] = min(least, self.family.longest_burst)
-            self.conflict("burst period increased to fit entire burst")
-            if least > self.family.longest_burst:
-                self["burst_cycles"] = max(1.0, math.floor(self.family.longest_burst * self.frequency))
-                self.conflict("burst count reduced to fit entire burst")
 
     # --- triggers ---
 
@@ -468,10 +130,3 @@ class Channel:
         cycles = self.number("burst_cycles")
         period = self.number("burst_period") if self.repeats else None
         return Burst(math.inf if cycles >= INFINITE or self["burst_mode"] == "GAT" else cycles, period)
-
-
-_WORDS = {"MIN", "MINIMUM", "MAX", "MAXIMUM", "DEF", "DEFAULT"}
-_LONG = {
-    "SIN": "sine", "SQU": "square", "TRI": "triangle", "RAMP": "ramp", "PULS": "pulse", "PRBS": "prbs", "NOIS": "noise",
-    "DC": "dc", "ARB": "user", "USER": "user",
-}  # fmt: skip

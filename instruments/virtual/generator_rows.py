@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
 from instruments.virtual.device import VirtualInstrument, answers, does
-from instruments.virtual.generator_channel import INFINITE, Family, quantity_of
+from instruments.virtual.generator_settings import INFINITE, quantity_of
 from instruments.virtual.generator_tables import HZ, PERCENT, PLAIN, S, V, fixed, short
 from instruments.virtual.scpi import Command, ScpiError, at_most_one, choice, limit, nr3, one
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from instruments.virtual.generator_channel import Channel
+    from instruments.virtual.generator_family import Family
     from instruments.virtual.generator_tables import Choice, Plain
 
 _LEVEL = "VOLTage[:LEVel][:IMMediate]"

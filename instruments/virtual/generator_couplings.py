@@ -1,0 +1,115 @@
+"""What the settings of one output of a generator do to each other: when they do not fit, the other one gives way.
+
+Sources: see generator_settings.py.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from instruments.virtual.generator_settings import INFINITE
+
+if TYPE_CHECKING:
+    from instruments.virtual.generator_channel import Channel
+
+#: Modes of which only one can be on.
+MODES = ("burst", "sweep", "am", "fm", "pm", "pwm", "fsk", "bpsk", "sum")
+
+#: Waveforms as the error queue names them.
+_LONG = {
+    "SIN": "sine", "SQU": "square", "TRI": "triangle", "RAMP": "ramp", "PULS": "pulse", "PRBS": "prbs", "NOIS": "noise",
+    "DC": "dc", "ARB": "user", "USER": "user",
+}  # fmt: skip
+
+
+def settle(channel: Channel, cause: str) -> None:
+    """Make the settings fit each other after one of them, the cause, has changed."""
+    _one_mode(channel, cause)
+    _able(channel)
+    _in_band(channel)
+    _in_range(channel, cause)
+    _square(channel)
+    _pulse(channel, cause)
+    _bursts(channel)
+
+
+def _one_mode(channel: Channel, cause: str) -> None:
+    if cause not in MODES or not channel[cause]:
+        return
+    for mode in MODES:
+        if mode != cause and channel.on(mode):
+            channel[mode] = False
+            channel.conflict(f"turned off {mode} by selection of other mode or modulation")
+
+
+def _able(channel: Channel) -> None:
+    for mode, able in (("burst", channel.waveform.bursts), ("sweep", channel.waveform.sweeps)):
+        if channel[mode] and not able:
+            channel[mode] = False
+            channel.conflict(f"not able to {mode} this function")
+
+
+def _in_band(channel: Channel) -> None:
+    low, high = channel.frequency_limits()
+    if channel.frequency > high * (1 + 1e-12):
+        channel.frequency = high
+        channel.conflict(f"frequency reduced for {_LONG[channel.waveform.short]} function")
+    elif channel.frequency < low:
+        channel.frequency = low
+        channel.conflict(f"frequency changed for {_LONG[channel.waveform.short]} function")
+
+
+def _in_range(channel: Channel, cause: str) -> None:
+    least, most = channel.amplitude_limits()
+    if not least * (1 - 1e-9) <= channel.number("amplitude_vpp") <= most * (1 + 1e-9):
+        channel["amplitude_vpp"] = min(max(channel.number("amplitude_vpp"), least), most)
+        channel.conflict("amplitude changed due to function")
+    low, high = channel.offset_limits()
+    offset = channel.number("offset")
+    if not low - 1e-9 <= offset <= high + 1e-9:
+        channel["offset"] = min(max(offset, low), high)
+        channel.conflict(
+            "offset changed on exit from dc function" if cause == "waveform" else "offset changed due to amplitude"
+        )
+
+
+def _square(channel: Channel) -> None:
+    if channel["waveform"] != "SQU":
+        return
+    low, high = channel.family.square(channel.number("frequency"))
+    if not low <= channel.number("duty") <= high:
+        channel["duty"] = min(max(channel.number("duty"), low), high)
+        channel.conflict("duty cycle changed due to frequency")
+
+
+def _pulse(channel: Channel, cause: str) -> None:
+    """Width and edges have to fit into the period, while pulses are what comes out."""
+    frequency = channel.number("frequency")
+    if cause not in {"pulse_width", "pulse_duty"}:
+        if channel["pulse_hold"] == "DCYC":
+            channel["pulse_width"] = channel.number("pulse_duty") / 100 / frequency
+        else:
+            channel["pulse_duty"] = 100 * channel.number("pulse_width") * frequency
+    if channel["waveform"] != "PULS":
+        return
+    low, high = channel.pulse_limits()
+    width = channel.number("pulse_width")
+    if not low <= width <= high:
+        channel.set_width(min(max(width, low), high))
+        channel.conflict(f"pulse width {'decreased' if width > high else 'increased'} due to period")
+    edge = channel.family.edge_part * min(channel.number("pulse_width"), 1 / frequency - channel.number("pulse_width"))
+    for name in ("pulse_leading", "pulse_trailing"):
+        if channel.number(name) > edge * (1 + 1e-9):
+            channel[name] = max(edge, channel.family.shortest_edge)
+            channel.conflict("edge time decreased due to pulse width")
+
+
+def _bursts(channel: Channel) -> None:
+    least = channel.number("burst_cycles") / channel.frequency + channel.family.burst_rest
+    if channel.repeats and channel.number("burst_cycles") < INFINITE and channel.number("burst_period") < least:
+        channel["burst_period"] = min(least, channel.family.longest_burst)
+        channel.conflict("burst period increased to fit entire burst")
+        if least > channel.family.longest_burst:
+            channel["burst_cycles"] = max(1.0, math.floor(channel.family.longest_burst * channel.frequency))
+            channel.conflict("burst count reduced to fit entire burst")
