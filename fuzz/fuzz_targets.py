@@ -26,6 +26,7 @@ from instruments.virtual.faults import LinkLost
 from instruments.virtual.framing import Framer, Overrun
 from instruments.virtual.servers import hislip, vxi11
 from instruments.virtual.servers.station import Disconnected, Station
+from instruments.virtual.servers.xdr import packed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -214,7 +215,7 @@ async def _vxi11(station: Station, stream: io.BytesIO) -> None:
     server = vxi11.Vxi11Server(station)
     clients = [Client(server._talk), Client(server._talk), Client(server._talk_abort)]
     for number, client in enumerate(clients[:2]):
-        await client.send(_call(number, vxi11.CORE, 10, vxi11.packed(0, 0, 0, b"inst0")))
+        await client.send(_call(number, vxi11.CORE, 10, packed(0, 0, 0, b"inst0")))
     serial = itertools.count()
     for what, data in _pieces(stream):
         client = clients[(what & 3) % 3]
@@ -228,7 +229,7 @@ async def _vxi11(station: Station, stream: io.BytesIO) -> None:
 
 
 def _call(number: int, program: int, procedure: int, parameters: bytes) -> bytes:
-    record = vxi11.packed(number, 0, 2, program, vxi11.PROGRAM_VERSION, procedure, 0, b"", 0, b"") + parameters
+    record = packed(number, 0, 2, program, vxi11.PROGRAM_VERSION, procedure, 0, b"", 0, b"") + parameters
     return struct.pack("!I", 1 << 31 | len(record)) + record
 
 
@@ -251,11 +252,10 @@ _HISLIP_SEEDS = (
     _piece(1, struct.pack("!BBI", 15, 0, 0) + (64).to_bytes(8)) + _piece(0, struct.pack("!BBI", 7, 0, 0) + b"APPL?\n"),
 )
 _VXI11_SEEDS = (
-    _piece(0, b"\x0b" + vxi11.packed(1, 100, 0, 8, b"*IDN?\n"))
-    + _piece(0, b"\x0c" + vxi11.packed(1, 99, 100, 0, 0, 0)),
-    _piece(0, b"\x12" + vxi11.packed(1, 0, 0)) + _piece(1, b"\x0b" + vxi11.packed(2, 9, 9, 9, b"*RST\n")),
-    _piece(0, b"\x0d" + vxi11.packed(1, 0, 0, 0)) + _piece(2, b"\x01" + vxi11.packed(1)) + _piece(0, b"\x17\0\0\0\1"),
-    *(_piece(0, bytes([procedure]) + vxi11.packed(1, 0, 0, 0, 0, 0)) for procedure in (14, 15, 16, 19, 20, 22, 25, 26)),
+    _piece(0, b"\x0b" + packed(1, 100, 0, 8, b"*IDN?\n")) + _piece(0, b"\x0c" + packed(1, 99, 100, 0, 0, 0)),
+    _piece(0, b"\x12" + packed(1, 0, 0)) + _piece(1, b"\x0b" + packed(2, 9, 9, 9, b"*RST\n")),
+    _piece(0, b"\x0d" + packed(1, 0, 0, 0)) + _piece(2, b"\x01" + packed(1)) + _piece(0, b"\x17\0\0\0\1"),
+    *(_piece(0, bytes([procedure]) + packed(1, 0, 0, 0, 0, 0)) for procedure in (14, 15, 16, 19, 20, 22, 25, 26)),
 )
 
 TARGETS: dict[str, Callable[[], Target]] = {
@@ -263,5 +263,5 @@ TARGETS: dict[str, Callable[[], Target]] = {
     "framer": lambda: Target(framer, (b"#13abc", b"#", b'"', b"'", b"\n", b",#216"), (b"\0DATA #12\n\n\nFR",)),
     "blocks": lambda: Target(blocks, (b"#13", b"#800000003", b"\r\n"), (b"#13a\nb\n", b"#800000003abc\r\n")),
     "hislip": lambda: Target(_server(_hislip), (b"HS", b"*IDN?\n"), _HISLIP_SEEDS),
-    "vxi11": lambda: Target(_server(_vxi11), (b"*IDN?\n", b"inst0", vxi11.packed(1)), _VXI11_SEEDS),
+    "vxi11": lambda: Target(_server(_vxi11), (b"*IDN?\n", b"inst0", packed(1)), _VXI11_SEEDS),
 }

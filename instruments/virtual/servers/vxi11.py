@@ -1,31 +1,32 @@
 """Instruments over VXI-11, which is remote procedure calls over TCP; no port mapper, the port is told instead.
 
-Source: VXI-11 revision 1.0, TCP/IP Instrument Protocol (section numbers below are its); ONC RPC version 2 (RFC 5531)
-with record marking; XDR (RFC 4506).  No interrupt channel: a client polls the status byte.
+Source: VXI-11 revision 1.0, TCP/IP Instrument Protocol (section numbers below are its).  No interrupt channel: a client
+polls the status byte.
 """
 
 from __future__ import annotations
 
-import asyncio
 import itertools
-import struct
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-from instruments.virtual.servers.station import CHUNK, MOST_CLIENTS, Disconnected, Link, Listener, first_of
+from instruments.virtual.servers.rpc import Program, serve
+from instruments.virtual.servers.station import CHUNK, MOST_CLIENTS, Link, Listener
+from instruments.virtual.servers.xdr import Reader, packed
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
+    import asyncio
+    from collections.abc import Mapping
 
+    from instruments.virtual.servers.rpc import Procedure
     from instruments.virtual.servers.station import Station
 
 #: Program numbers of the core and the abort channel (B.6, B.7); both are of version 1.
 CORE, ABORT, PROGRAM_VERSION = 0x0607AF, 0x0607B0, 1
 
-#: The longest data taken by one device_write [bytes], the longest record around it, and how many calls may wait for
-#: the one that is worked on.
-LONGEST, LONGEST_RECORD, MOST_CALLS = 1 << 20, (1 << 20) + 1024, 4
+#: The longest data taken by one device_write, and the longest record around it [bytes].
+LONGEST, LONGEST_RECORD = 1 << 20, (1 << 20) + 1024
 
 
 class Error(IntEnum):
@@ -60,153 +61,6 @@ class Reason(IntFlag):
     END = 4
 
 
-class Refused(IntEnum):
-    """A call that was understood, but not carried out (RFC 5531, accept_stat)."""
-
-    PROGRAM_UNAVAILABLE = 1
-    PROGRAM_MISMATCH = 2
-    PROCEDURE_UNAVAILABLE = 3
-    GARBAGE_ARGUMENTS = 4
-
-
-class Garbage(Exception):
-    """The bytes are not what they should be."""
-
-
-class Reader:
-    """XDR: whole numbers and strings of bytes, each filled up to four bytes."""
-
-    def __init__(self, data: bytes) -> None:
-        self._data, self._place = data, 0
-
-    def number(self) -> int:
-        """An unsigned whole number of 32 bits (a signed one is not negative here).  Raises Garbage."""
-        return int.from_bytes(self._bytes(4))
-
-    def numbers(self, count: int) -> tuple[int, ...]:
-        """So many of them."""
-        return tuple(self.number() for _ in range(count))
-
-    def opaque(self) -> bytes:
-        """A string of bytes."""
-        length = self.number()
-        data = self._bytes(length)
-        self._place += -length % 4
-        return data
-
-    def _bytes(self, count: int) -> bytes:
-        data = self._data[self._place : self._place + count]
-        if len(data) < count:
-            raise Garbage
-        self._place += count
-        return data
-
-
-def packed(*values: int | bytes) -> bytes:
-    r"""The other way round.
-
-    >>> packed(1, b"abc")
-    b'\x00\x00\x00\x01\x00\x00\x00\x03abc\x00'
-    """
-    return b"".join(
-        struct.pack("!I", value)
-        if isinstance(value, int)
-        else struct.pack("!I", len(value)) + value + b"\0" * (-len(value) % 4)
-        for value in values
-    )
-
-
-class Call(NamedTuple):
-    """A remote procedure call, up to its parameters."""
-
-    number: int
-    program: int
-    version: int
-    procedure: int
-    parameters: Reader
-
-
-def read_call(record: bytes) -> Call:
-    """The call in a record.  Raises Garbage."""
-    reader = Reader(record)
-    number, kind, rpc_version, program, version, procedure = reader.numbers(6)
-    if kind != 0 or rpc_version != 2:
-        raise Garbage
-    for _ in ("credentials", "verifier"):
-        reader.number()
-        reader.opaque()
-    return Call(number, program, version, procedure, reader)
-
-
-def reply(call: Call, results: bytes) -> bytes:
-    """The record that answers a call: accepted, no verifier, success."""
-    return packed(call.number, 1, 0, 0, b"", 0) + results
-
-
-def refusal(call: Call, why: Refused) -> bytes:
-    """The record that refuses one; a mismatch tells which versions there are."""
-    versions = (PROGRAM_VERSION, PROGRAM_VERSION) if why == Refused.PROGRAM_MISMATCH else ()
-    return packed(call.number, 1, 0, 0, b"", why, *versions)
-
-
-#: What a program does: the results of one of its procedures, or None if it has none with this number.
-Program = dict[int, "Callable[[Reader], Awaitable[bytes]]"]
-
-
-async def read_record(reader: asyncio.StreamReader) -> bytes:
-    """The next record, from its fragments (RFC 5531, 11).  Raises Disconnected when it is longer than any call."""
-    record = b""
-    while True:
-        head = int.from_bytes(await reader.readexactly(4))
-        length = head & 0x7FFFFFFF
-        if len(record) + length > LONGEST_RECORD:
-            raise Disconnected
-        record += await reader.readexactly(length)
-        if head >> 31:
-            return record
-
-
-async def serve_program(
-    number: int, program: Program, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
-) -> None:
-    """Carry out the calls of a connection one after the other, until the client goes away."""
-    calls: asyncio.Queue[bytes] = asyncio.Queue(MOST_CALLS)
-
-    async def receive() -> None:
-        while True:  # while a call is carried out, too: the client may go away
-            record = await read_record(reader)
-            if calls.full():
-                raise Disconnected
-            calls.put_nowait(record)
-
-    async def work() -> None:
-        while True:
-            answer = await _carried_out(number, program, await calls.get())
-            writer.write(struct.pack("!I", 1 << 31 | len(answer)) + answer)
-            await writer.drain()
-
-    await first_of(receive(), work())
-
-
-async def _carried_out(number: int, program: Program, record: bytes) -> bytes:
-    try:
-        call = read_call(record)
-    except Garbage:
-        raise Disconnected from None
-    if call.program != number:
-        return refusal(call, Refused.PROGRAM_UNAVAILABLE)
-    if call.version != PROGRAM_VERSION:
-        return refusal(call, Refused.PROGRAM_MISMATCH)
-    if call.procedure == 0:  # by convention: is anybody there?
-        return reply(call, b"")
-    if call.procedure not in program:
-        return refusal(call, Refused.PROCEDURE_UNAVAILABLE)
-    try:
-        return reply(call, await program[call.procedure](call.parameters))
-    except Garbage:
-        return refusal(call, Refused.GARBAGE_ARGUMENTS)
-
-
 @dataclass(eq=False)
 class OpenLink:
     """A link that a client has created.  aborted: what it waits for is to be given up."""
@@ -215,13 +69,8 @@ class OpenLink:
     aborted: bool = False
 
 
-class Generic(NamedTuple):
-    """The parameters that most calls begin with: link, flags, and how long to wait for a lock and for data [ms]."""
-
-    number: int
-    flags: int
-    lock_timeout: int
-    io_timeout: int
+def _program(number: int, procedures: Mapping[int, Procedure]) -> Program:
+    return Program(number, PROGRAM_VERSION, procedures, longest=LONGEST_RECORD)
 
 
 class Vxi11Server:
@@ -236,12 +85,12 @@ class Vxi11Server:
     async def _talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         connection = _Connection(self)
         try:
-            await serve_program(CORE, connection.program(), reader, writer)
+            await serve(_program(CORE, connection.procedures()), reader, writer)
         finally:
             connection.close()
 
     async def _talk_abort(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        await serve_program(ABORT, {1: self._device_abort}, reader, writer)
+        await serve(_program(ABORT, {1: self._device_abort}), reader, writer)
 
     async def _device_abort(self, parameters: Reader) -> bytes:
         """What the link waits for is given up (B.7.1)."""
@@ -282,7 +131,7 @@ class _Connection:
         for number in self._numbers:
             self._server.destroy(number)
 
-    def program(self) -> Program:
+    def procedures(self) -> Mapping[int, Procedure]:
         """The procedures of the core channel (B.6)."""
         return {
             10: self._create_link,
@@ -302,13 +151,13 @@ class _Connection:
             26: self._destroy_interrupt_channel,
         }
 
-    async def _free(self, call: Generic) -> tuple[Error, OpenLink | None]:
-        """The link of a call, once nobody else has the instrument locked (B.4.3)."""
-        if call.number not in self._numbers:
+    async def _free(self, number: int, flags: int, lock_timeout: int) -> tuple[Error, OpenLink | None]:
+        """The link of a call, once nobody else has the instrument locked (B.4.3).  lock_timeout [ms]."""
+        if number not in self._numbers:
             return Error.INVALID_LINK, None
-        found = self._server.link(call.number)
+        found = self._server.link(number)
         found.aborted = False
-        within = call.lock_timeout / 1000 if call.flags & Flag.WAIT_LOCK else 0.0
+        within = lock_timeout / 1000 if flags & Flag.WAIT_LOCK else 0.0
         if await found.link.turn(within, given_up=lambda: found.aborted):
             return Error.NONE, found
         return (Error.ABORT if found.aborted else Error.LOCKED_BY_ANOTHER), None
@@ -328,7 +177,7 @@ class _Connection:
         data = parameters.opaque()
         if len(data) > LONGEST:
             return packed(Error.PARAMETER, 0)
-        error, found = await self._free(Generic(number, flags, lock_timeout, io_timeout))
+        error, found = await self._free(number, flags, lock_timeout)
         if found is None:
             return packed(error, 0)
         end = bool(flags & Flag.END)
@@ -338,7 +187,7 @@ class _Connection:
 
     async def _device_read(self, parameters: Reader) -> bytes:
         number, count, io_timeout, lock_timeout, flags, character = parameters.numbers(6)
-        error, found = await self._free(Generic(number, flags, lock_timeout, io_timeout))
+        error, found = await self._free(number, flags, lock_timeout)
         if found is None:
             return packed(error, 0, b"")
         until = bytes([character & 0xFF]) if flags & Flag.TERMINATION_CHARACTER else b""
@@ -357,7 +206,9 @@ class _Connection:
         return await link.answered(within, given_up=lambda: found.aborted)
 
     async def _generic(self, parameters: Reader) -> tuple[Error, OpenLink | None]:
-        return await self._free(Generic(*parameters.numbers(4)))
+        """The parameters that most calls have: link, flags, and how long to wait for a lock and for data [ms]."""
+        number, flags, lock_timeout, _ = parameters.numbers(4)
+        return await self._free(number, flags, lock_timeout)
 
     async def _device_read_status_byte(self, parameters: Reader) -> bytes:
         error, found = await self._generic(parameters)
@@ -383,7 +234,7 @@ class _Connection:
 
     async def _device_lock(self, parameters: Reader) -> bytes:
         number, flags, lock_timeout = parameters.numbers(3)
-        error, found = await self._free(Generic(number, flags, lock_timeout, 0))
+        error, found = await self._free(number, flags, lock_timeout)
         if found and not await found.link.lock(None, 0.0):
             error = Error.LOCKED_BY_ANOTHER
         return packed(error)

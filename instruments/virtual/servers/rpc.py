@@ -1,0 +1,126 @@
+"""Remote procedure calls over TCP: ONC RPC version 2 with record marking (RFC 5531), no authentication."""
+
+from __future__ import annotations
+
+import asyncio
+import struct
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import TYPE_CHECKING, NamedTuple
+
+from instruments.virtual.servers.station import Disconnected, first_of
+from instruments.virtual.servers.xdr import Garbage, Reader, packed
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+#: How many calls may wait for the one that is worked on.
+MOST_CALLS = 4
+
+
+class Refused(IntEnum):
+    """A call that was understood, but not carried out (RFC 5531, accept_stat)."""
+
+    PROGRAM_UNAVAILABLE = 1
+    PROGRAM_MISMATCH = 2
+    PROCEDURE_UNAVAILABLE = 3
+    GARBAGE_ARGUMENTS = 4
+
+
+class Call(NamedTuple):
+    """A remote procedure call, up to its parameters."""
+
+    number: int
+    program: int
+    version: int
+    procedure: int
+    parameters: Reader
+
+
+def read_call(record: bytes) -> Call:
+    """The call in a record.  Raises Garbage."""
+    reader = Reader(record)
+    number, kind, rpc_version, program, version, procedure = reader.numbers(6)
+    if kind != 0 or rpc_version != 2:
+        raise Garbage
+    for _ in ("credentials", "verifier"):
+        reader.number()
+        reader.opaque()
+    return Call(number, program, version, procedure, reader)
+
+
+def reply(call: Call, results: bytes) -> bytes:
+    """The record that answers a call: accepted, no verifier, success."""
+    return packed(call.number, 1, 0, 0, b"", 0) + results
+
+
+def refusal(call: Call, why: Refused, *versions: int) -> bytes:
+    """The record that refuses one; a mismatch tells which versions there are, from the first to the last."""
+    return packed(call.number, 1, 0, 0, b"", why, *versions)
+
+
+#: The results of a procedure, given its parameters.
+Procedure = Callable[[Reader], Awaitable[bytes]]
+
+
+@dataclass(frozen=True)
+class Program:
+    """What can be called.  number, version: its own; procedures: by number; longest: a record may be [bytes]."""
+
+    number: int
+    version: int
+    procedures: Mapping[int, Procedure]
+    longest: int
+
+
+async def read_record(reader: asyncio.StreamReader, longest: int) -> bytes:
+    """The next record, from its fragments (RFC 5531, 11).  Raises Disconnected when it is longer than any call."""
+    record = b""
+    while True:
+        head = int.from_bytes(await reader.readexactly(4))
+        length = head & 0x7FFFFFFF
+        if len(record) + length > longest:
+            raise Disconnected
+        record += await reader.readexactly(length)
+        if head >> 31:
+            return record
+
+
+async def serve(program: Program, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    """Carry out the calls of a connection one after the other, until the client goes away."""
+    calls: asyncio.Queue[bytes] = asyncio.Queue(MOST_CALLS)
+
+    async def receive() -> None:
+        while True:  # while a call is carried out, too: the client may go away
+            record = await read_record(reader, program.longest)
+            if calls.full():
+                raise Disconnected
+            calls.put_nowait(record)
+
+    async def work() -> None:
+        while True:
+            answer = await _carried_out(program, await calls.get())
+            writer.write(struct.pack("!I", 1 << 31 | len(answer)) + answer)
+            await writer.drain()
+
+    await first_of(receive(), work())
+
+
+async def _carried_out(program: Program, record: bytes) -> bytes:
+    try:
+        call = read_call(record)
+    except Garbage:
+        raise Disconnected from None
+    if call.program != program.number:
+        return refusal(call, Refused.PROGRAM_UNAVAILABLE)
+    if call.version != program.version:
+        return refusal(call, Refused.PROGRAM_MISMATCH, program.version, program.version)
+    if call.procedure == 0:  # by convention: is anybody there?
+        return reply(call, b"")
+    if call.procedure not in program.procedures:
+        return refusal(call, Refused.PROCEDURE_UNAVAILABLE)
+    try:
+        return reply(call, await program.procedures[call.procedure](call.parameters))
+    except Garbage:
+        return refusal(call, Refused.GARBAGE_ARGUMENTS)
