@@ -25,6 +25,7 @@ from instruments.virtual.bus import Bus
 from instruments.virtual.faults import LinkLost
 from instruments.virtual.framing import Framer, Overrun
 from instruments.virtual.servers import hislip, vxi11
+from instruments.virtual.servers.hislip_messages import Message, Type
 from instruments.virtual.servers.station import Disconnected, Station
 from instruments.virtual.servers.xdr import packed
 
@@ -195,8 +196,8 @@ async def _hislip(station: Station, stream: io.BytesIO) -> None:
     for number in (1, 2):
         main, aside = Client(server._talk), Client(server._talk)
         clients += [main, aside]
-        await main.send(hislip.Message(hislip.Type.INITIALIZE, 0, 0x01000000, b"hislip0").packed())
-        await aside.send(hislip.Message(hislip.Type.ASYNC_INITIALIZE, 0, number).packed())
+        await main.send(Message(Type.INITIALIZE, 0, 0x01000000, b"hislip0").packed())
+        await aside.send(Message(Type.ASYNC_INITIALIZE, 0, number).packed())
     for what, data in _pieces(stream):
         client = clients[what & 3]
         if what & 4:
@@ -204,8 +205,8 @@ async def _hislip(station: Station, stream: io.BytesIO) -> None:
         else:
             kind, control, parameter = struct.unpack("!BBI", data[:6].ljust(6, b"\0"))
             # the high bits choose among the types that there are
-            kind = kind if what & 8 else [*hislip.Type][kind % len(hislip.Type)]
-            await client.send(hislip.Message(kind, control, parameter, data[6:]).packed())
+            kind = kind if what & 8 else [*Type][kind % len(Type)]
+            await client.send(Message(kind, control, parameter, data[6:]).packed())
     await _ended(clients)
     assert not server._clients
 

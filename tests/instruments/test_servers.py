@@ -21,7 +21,7 @@ from instruments.virtual.device import VirtualInstrument, answers
 from instruments.virtual.faults import Fault
 from instruments.virtual.scpi import Command
 from instruments.virtual.servers import station
-from instruments.virtual.servers.hislip import HEADER, LONGEST, Type
+from instruments.virtual.servers.hislip_messages import HEADER, LONGEST, Type
 from instruments.virtual.servers.serial_port import HAS_PSEUDO_TERMINALS
 from instruments.virtual.servers.server import BenchServer, Place
 from instruments.virtual.servers.socket_server import socket_listener
