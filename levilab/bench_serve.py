@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from instruments.virtual.servers.server import LOOPBACK, PORTS_PER_INSTRUMENT, Place, offered
 from levilab.clock import WallClock
 from levilab.errors import LevilabError
-from levilab.virtual_bench import MODELS, VIRTUAL, own_world, virtual_bus
+from levilab.virtual_bench import AGAIN_S, MODELS, VIRTUAL, own_world, scene_world, virtual_bus
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from instruments.virtual.bus import Bus
     from instruments.virtual.servers.server import Offer
+    from levilab.simulator.scene import Scene
 
 #: What asks a server to end: Ctrl-C, kill, a closed terminal, and on Windows Ctrl-Break.
 _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
@@ -42,13 +43,15 @@ class Service:
     """How the bench is to be offered.
 
     host: an address of this machine; port_base: the first port, None: free ones; speed: seconds of the bench per
-    second; models: by kind of instrument, where it is not the first one.
+    second; models: by kind of instrument, where it is not the first one; scene: of the top's full motion, None: it
+    only spins.
     """
 
     host: str = LOOPBACK
     port_base: int | None = None
     speed: float = 1.0
     models: dict[str, str] = field(default_factory=dict)
+    scene: Scene | None = None
 
 
 @dataclass(frozen=True)
@@ -74,19 +77,22 @@ def chosen_models(words: list[str]) -> dict[str, str]:
     return chosen
 
 
-def serve(service: Service, ready: Callable[[tuple[Served, ...]], None]) -> str:
+def serve(
+    service: Service, ready: Callable[[tuple[Served, ...]], None], tell: Callable[[str], None] = lambda _: None
+) -> str:
     """Offer the bench until a signal asks for the end; its name.
 
-    ready: called once, when all can be reached.  Raises CannotServe, WrongService.
+    ready: called once, when all can be reached; tell: is told what takes long before.  Raises CannotServe,
+    WrongService, SceneError.
     """
     with _asked_to_end() as end:
-        asyncio.run(_serve(service, ready, end))
+        bus = _bus(service, tell)
+        asyncio.run(_serve(service, bus, ready, end))
     assert end.by
     return end.by
 
 
-async def _serve(service: Service, ready: Callable[[tuple[Served, ...]], None], end: _End) -> None:
-    bus = _bus(service)
+async def _serve(service: Service, bus: Bus, ready: Callable[[tuple[Served, ...]], None], end: _End) -> None:
     place = _place(service, len(bus.instruments))
     async with contextlib.AsyncExitStack() as opened:
         try:
@@ -98,12 +104,18 @@ async def _serve(service: Service, ready: Callable[[tuple[Served, ...]], None], 
         await end.comes()
 
 
-def _bus(service: Service) -> Bus:
+def _bus(service: Service, tell: Callable[[str], None]) -> Bus:
+    clock = _clock(service)
+    if service.scene is None:
+        return virtual_bus(own_world(clock), service.models)
+    return virtual_bus(scene_world(service.scene, lambda: _clock(service), tell, again_s=AGAIN_S), service.models)
+
+
+def _clock(service: Service) -> WallClock:
     try:
-        clock = WallClock(speed=service.speed)
+        return WallClock(speed=service.speed)
     except ValueError as error:
         raise WrongService(f"--speed: {error}") from error
-    return virtual_bus(own_world(clock), service.models)
 
 
 def _place(service: Service, instruments: int) -> Place:

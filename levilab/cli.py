@@ -88,6 +88,14 @@ def acquire_spin(
         ),
     ] = None,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where the run folder is made.")] = Path("runs"),
+    scene: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SCENE",
+            help="With --mock: a top in full motion, such as spindown, or a scene's file.",
+            show_default="spin only",
+        ),
+    ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Makes a virtual run repeatable.")] = None,
     note: Annotated[str, typer.Option(help="Kept with the run.")] = "",
     realtime: Annotated[bool, typer.Option("--realtime", help="Keep the virtual bench to the wall clock.")] = False,
@@ -114,6 +122,8 @@ def acquire_spin(
         realtime=realtime,
         resume=resume,
         wire_log=wire_log,
+        scene=scene,
+        tell=lambda text: typer.echo(text, err=True),
     )
     run = acquire(order, to_stderr())
     readings = run.count()

@@ -114,6 +114,10 @@ def bench_serve(
         list[str] | None,
         typer.Option("--model", metavar="KIND=MODEL", help="Choose a model, as counter=CNT-91; repeatable."),
     ] = None,
+    scene: Annotated[
+        str | None,
+        typer.Option(metavar="SCENE", help="The top in full motion: a scene's name or file.", show_default="spin only"),
+    ] = None,
     host: Annotated[
         str, typer.Option(help="Address of this machine to listen at; 0.0.0.0: all of them.")
     ] = "127.0.0.1",
@@ -131,8 +135,14 @@ def bench_serve(
     """
     from levilab.bench_serve import Service, chosen_models, serve
 
-    service = Service(host, port_base, speed, chosen_models(models or []))
-    if serve(service, _tell_as_json if as_json else _tell) == "SIGINT":
+    moving = None
+    if scene is not None:
+        from levilab.simulator.scene import read_scene
+
+        moving = read_scene(scene)
+    service = Service(host, port_base, speed, chosen_models(models or []), moving)
+    told = serve(service, _tell_as_json if as_json else _tell, lambda text: typer.echo(text, err=True))
+    if told == "SIGINT":
         raise typer.Exit(EXIT_INTERRUPTED)
 
 

@@ -78,14 +78,14 @@ class ExperimentSettings(Settings):
 class SpinSettings(ExperimentSettings):
     """The spin-down: drive up to a frequency, switch off, read until the top falls.
 
-    reading_u_hz: standard uncertainty of one reading, where it is known; ramp_hz_per_s: no faster than the
-    drive can pull the top (about 0.25 Hz/s at 0.4 mT).
+    reading_u_hz: standard uncertainty of one reading, where it is known; ramp_hz_per_s: no faster than the drive can
+    pull the top; of the 0.4 Hz/s that 0.4 mT can, drag takes up to 0.17 and the swing about the drive most of the rest.
     """
 
     drive_frequency_hz: PositiveFloat = 40.0
     drive_amplitude_vpp: PositiveFloat = 10.0
     drive_waveform: Literal["SIN", "SQU", "TRI"] = "SIN"
-    ramp_hz_per_s: PositiveFloat = 0.2
+    ramp_hz_per_s: PositiveFloat = 0.05
     gate_s: PositiveFloat = 1.0
     trigger_level_v: float = 0.6
     reading_u_hz: PositiveFloat | None = None

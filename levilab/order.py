@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import secrets
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,14 +15,20 @@ from levilab.errors import LevilabError
 from levilab.record import Order
 from levilab.run import Run, find_run
 from levilab.simulator.world import SpinScene, SpinWorld, drawn
+from levilab.virtual_bench import scene_world
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from levilab.config import SpinSettings
+    from levilab.simulator.scene import Scene
 
 HOW = (
-    "acquired on the virtual bench: the drivers are the real ones, the instruments wire-level models, the top a "
-    "spin that decays by the {law}; drag and fall were drawn by the seed, and no real top was measured"
+    "acquired on the virtual bench: the drivers are the real ones, the instruments wire-level models, the top {top}, "
+    "and no real top was measured"
 )
+_SPIN_ONLY = "a spin that decays by the {law}; drag and fall were drawn by the seed"
+_IN_MOTION = "that of the scene {name}, simulated in full motion"
 
 
 class CannotResume(LevilabError):
@@ -44,12 +51,19 @@ def spin_order(
     realtime: bool,
     resume: Path | None,
     wire_log: bool,
+    scene: str | None = None,
+    tell: Callable[[str], None] = lambda _: None,
 ) -> Order:
-    """What `levilab acquire spin` is to do.  Raises ConfigError, CannotResume, ContradictoryOptions, DataError."""
+    """What `levilab acquire spin` is to do; tell: is told what takes long before it begins.
+
+    Raises ConfigError, CannotResume, ContradictoryOptions, DataError, SceneError.
+    """
     run = _resumable(find_run(resume, out)) if resume else None
     virtual = mock or bool(run and run.record.seed is not None)
     if seed is not None and (run or not mock):
         raise ContradictoryOptions("--seed goes with --mock, and not with --resume: a run keeps its seed")
+    if scene is not None and (run or not mock):
+        raise ContradictoryOptions("--scene goes with --mock, and not with --resume: a run keeps its scene")
     if realtime and not virtual:
         raise ContradictoryOptions("--realtime goes with --mock: a real bench always keeps to the wall clock")
     config = _as_it_was(run) if run else BenchConfig()
@@ -64,17 +78,37 @@ def spin_order(
             run.elapsed()  # before the bench is touched
         return Order("spin", config, out=out, note=note, wire_log=wire_log, resume=run)
     seed = run.record.seed if run else secrets.randbelow(1 << 31) if seed is None else seed
-    scene = drawn(seed or 0)
-    return Order(
-        "spin",
-        config.model_copy(update={"visa_library": "@levilab", "spin": _with_uncertainty(config.spin, scene)}),
-        out=out,
+    order = Order("spin", config, out=out, seed=seed, note=note, wire_log=wire_log, resume=run)
+    moving = _scene(scene, run)
+    if moving is None:
+        return _of_a_spin(order, drawn(seed or 0), realtime=realtime)
+    return replace(
+        order,
+        config=config.model_copy(update={"visa_library": "@levilab"}),
+        world=lambda: scene_world(moving, lambda: VirtualClock(realtime=realtime), tell, seed=seed or 0),
+        how=HOW.format(top=_IN_MOTION.format(name=moving.name)),
+        scene=moving.as_table(),
+    )
+
+
+def _scene(name: str | None, run: Run | None) -> Scene | None:
+    """The scene that was asked for, or that a run was begun with."""
+    begun = run.record.configuration.get("scene") if run else None
+    if name is None and begun is None:
+        return None
+    from levilab.simulator.scene import read_scene, scene_of
+
+    return scene_of(begun) if begun is not None else read_scene(str(name))
+
+
+def _of_a_spin(order: Order, scene: SpinScene, *, realtime: bool) -> Order:
+    """The order with a world in which the top only spins."""
+    spin = _with_uncertainty(order.config.spin, scene)
+    return replace(
+        order,
+        config=order.config.model_copy(update={"visa_library": "@levilab", "spin": spin}),
         world=lambda: SpinWorld(scene, VirtualClock(realtime=realtime)),
-        how=HOW.format(law=_law_in_words(scene)),
-        seed=seed,
-        note=note,
-        wire_log=wire_log,
-        resume=run,
+        how=HOW.format(top=_SPIN_ONLY.format(law=_law_in_words(scene))),
     )
 
 
@@ -91,8 +125,9 @@ def _law_in_words(scene: SpinScene) -> str:
 
 def _as_it_was(run: Run) -> BenchConfig:
     """The configuration that a run was begun with."""
+    bench = {key: value for key, value in run.record.configuration.items() if key != "scene"}
     try:
-        return BenchConfig.model_validate(run.record.configuration)
+        return BenchConfig.model_validate(bench)
     except ValidationError as error:
         raise ConfigError(f"{run.folder}/run.json: configuration: {in_one_line(error)}") from error
 

@@ -124,7 +124,7 @@ def _in_words(row: Row) -> str:
 class Order:
     """What is to be acquired.  world: what the virtual bench measures, None for the real one.
 
-    how: if anything is simulated, how, in words; resume: the run to go on with.
+    how: if anything is simulated, how, in words; scene: of the full motion, as a table; resume: the run to go on with.
     """
 
     experiment: str
@@ -132,6 +132,7 @@ class Order:
     out: Path = Path("runs")
     world: Callable[[], World] | None = None
     how: str | None = None
+    scene: dict[str, Any] | None = None
     seed: int | None = None
     note: str = ""
     wire_log: bool = False
@@ -266,7 +267,7 @@ def _record(order: Order) -> RunRecord:
         started_utc=utc_now(),
         command_line=sys.argv,
         channels=[vars(channel) for channel in experiment.channels(experiment.settings(order.config))],
-        configuration=config.model_dump(mode="json"),
+        configuration=config.model_dump(mode="json") | ({"scene": order.scene} if order.scene else {}),
         software=software_versions(),
         seed=order.seed,
         note=order.note,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import sys
 import time
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from levilab.compilation import telling_of_compilation
 from levilab.interruption import interrupted_afterwards
 from levilab.motion_lines import rate_for
 from levilab.motion_summary import as_document, summarise
@@ -117,32 +117,13 @@ def _simulated(
     message: Callable[[str], None],
     progress: Callable[[float], None] | None,
 ) -> Summary:
-    with _telling_of_compilation(message), interrupted_afterwards():
+    with telling_of_compilation(message), interrupted_afterwards():
         simulate(order.scene, min(_FIRST_S, order.duration), rate=None)
     begin = time.perf_counter()
     motion = simulate(
         order.scene, order.duration, tolerance=order.tolerance, rate=factor * order.rate, progress=progress
     )
     return summarise(motion, order.duration, order.rate, time.perf_counter() - begin)
-
-
-@contextlib.contextmanager
-def _telling_of_compilation(message: Callable[[str], None]) -> Iterator[None]:
-    """Say so when the kernel is compiled; one that lies on the disk is not."""
-    from numba.core.event import Event, Listener, install_listener
-
-    from levilab.simulator.splitting import advance
-
-    class Compilation(Listener):
-        def on_start(self, event: Event) -> None:
-            if event.data["dispatcher"] is advance:
-                message("compiling for this kind of scene: a few seconds, once")
-
-        def on_end(self, event: Event) -> None:
-            """Nothing to say."""
-
-    with install_listener("numba:compile", Compilation()):
-        yield
 
 
 # --- the run folder ---

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from instruments.virtual.device import VirtualInstrument
     from instruments.virtual.generator import Output
     from levilab.clock import Clock
+    from levilab.simulator.scene import Scene
     from levilab.simulator.world import World
 
 #: Where the virtual instruments are plugged in, and what they are unless other models are asked for.
@@ -134,6 +135,28 @@ def own_world(clock: Clock | None = None) -> World:
     from levilab.simulator.world import SpinScene, SpinWorld
 
     return SpinWorld(SpinScene(again_s=AGAIN_S), clock or VirtualClock())
+
+
+def scene_world(
+    scene: Scene,
+    clock: Callable[[], Clock],
+    tell: Callable[[str], None],
+    *,
+    again_s: float | None = None,
+    seed: int = 0,
+) -> World:
+    """The top of a scene in full motion.
+
+    clock: makes one, when all is ready; tell: is told when code must be compiled first; again_s: so long after a fall
+    the top is put back, None: it is not.  Raises SceneError for a scene without motion, SimulationError for one that
+    cannot be simulated.
+    """
+    from levilab.compilation import telling_of_compilation
+    from levilab.simulator.motion_world import MotionWorld, prepare
+
+    with telling_of_compilation(tell):
+        prepare(scene)
+    return MotionWorld(scene, clock(), again_s=again_s, seed=seed)
 
 
 def _maker(kind: str, model: str) -> Callable[[World], VirtualInstrument]:

@@ -81,6 +81,11 @@ class Coil:
         # the random bits repeat after 127 turns, all others after one
         return _Stretch(output, time, turns % 127.0)
 
+    def turns(self, time: float) -> float:
+        """How many turns the waveform has made at this time, without the phase that it is set to."""
+        now = self.history.at(time)
+        return now.turns + now.output.frequency * (time - now.origin)
+
     def field(self, times: Array) -> Array:
         """The field at these times, shape (n,) [T]."""
         field = np.empty_like(times)

@@ -1,13 +1,13 @@
 """The world that the virtual bench measures: one clock, one top, and the light it makes.
 
 Here the world is the spin alone: closed form between events, exact at any time asked, nothing integrated.
-What the instruments need of a world is the little protocol `World`; the full motion plugs in there.
+What the instruments need of a world is the little protocol `World`; `motion_world` has the whole motion.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from instruments.virtual.generator_voltage import fundamental
 from levilab.simulator.coil import Coil
 from levilab.simulator.history import History
+from levilab.simulator.optics import Tape
 from levilab.simulator.spin import DECAYS
 
 if TYPE_CHECKING:
@@ -57,10 +58,9 @@ class SpinScene:
     start_hz: the spin at time 0, given by hand; drag: a name in DECAYS, with its constants;
     fall_hz: spin at which the top falls; lock_torque: the greatest angular acceleration per tesla of drive
     [rad s⁻² T⁻¹], the dipole's transverse part over I₃, half of it because half of a field along one line
-    turns with the top; pulse_duty: FWHM of a light pulse in turns; jitter: scatter of a pulse's
-    place, in turns, 1σ (0.0212 makes 0.03 Hz of a reading over 1 s); dark, bright: voltage without and at
-    the tape [V]; noise: of the voltage, 1σ [V]; base_field_t: the base's field at the probe, which stands where the
-    top would float, 7.2 cm above the thesis's base; again_s: so long
+    turns with the top; tape: what the phototransistor sees; jitter: scatter of a pulse's
+    place, in turns, 1σ (0.0212 makes 0.03 Hz of a reading over 1 s); base_field_t: the base's field at the probe,
+    which stands where the top would float, 7.2 cm above the thesis's base; again_s: so long
     after a fall somebody has put the top back, None: nobody does [s].
     """
 
@@ -69,11 +69,8 @@ class SpinScene:
     constants: tuple[float, ...] = (2.34e-4,)
     fall_hz: float = 21.86
     lock_torque: float = 0.03 * 0.714 / 2 / 1.731314e-6
-    pulse_duty: float = 0.03
+    tape: Tape = field(default_factory=Tape)
     jitter: float = 0.03 / math.sqrt(2)
-    dark: float = 0.1
-    bright: float = 1.2
-    noise: float = 0.01
     base_field_t: float = BASE_FIELD
     again_s: float | None = None
     seed: int = 0
@@ -222,17 +219,11 @@ class SpinWorld:
     # --- what is seen ---
 
     def light(self, start: float, step: float, n: int) -> Array:
-        """The phototransistor's voltage: one Gaussian pulse a turn on the dark level; see :class:`World`."""
-        scene = self.scene
-        times = start + step * np.arange(n, dtype=np.float64)
-        spin, angle = self.motion(times)
+        """The phototransistor's voltage; see :class:`World`."""
+        spin, angle = self.motion(start + step * np.arange(n, dtype=np.float64))
         turns = angle / (2 * math.pi)
-        number = np.floor(turns)
-        place = turns - number - 0.5 - self._jitter[number.astype(np.int64) % self._jitter.size]
-        sigma = scene.pulse_duty / math.sqrt(8 * math.log(2))
-        pulse = np.exp(-0.5 * (place / sigma) ** 2) * (spin > 0)
-        noise = np.random.default_rng((scene.seed, round(start * 1e6))).standard_normal(n) * scene.noise
-        return np.asarray(scene.dark + (scene.bright - scene.dark) * pulse + noise)
+        late = self._jitter[np.floor(turns).astype(np.int64) % self._jitter.size]
+        return self.scene.tape.light(turns - late, spin > 0, start, self.scene.seed)
 
     def coil_field(self, start: float, step: float, n: int) -> Array:
         """The coil's field; see :class:`World`."""

@@ -69,6 +69,14 @@ def test_the_line_names_every_instrument_each_answers_and_sigterm_ends_it():
                 client.close()
 
 
+def test_a_top_in_full_motion_can_be_served():
+    with serving("--scene", "spindown", "--speed", "5") as (_, said):
+        names = said["instruments"]["counter"]["resources"]
+        with pyvisa.ResourceManager("@py").open_resource(names["hislip"], timeout=1000 * AT_MOST) as counter:
+            counter.write("INP1:COUP DC;:INP1:LEV:AUTO OFF;:INP1:LEV 0.6;:SENS:FREQ:GATE:TIME 1;:SYST:TIM 5")
+            assert 20 < float(counter.query("READ?")) < 31
+
+
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for one process")
 def test_ctrl_c_ends_it_in_the_middle_of_an_answer():
     with serving() as (process, said):
@@ -146,8 +154,8 @@ def test_a_port_that_is_taken_is_told_with_what_to_do():
 
 
 def test_people_see_a_table_of_names(monkeypatch):
-    def serve_and_end(service, ready):
-        return serve(service, lambda instruments: (ready(instruments), signal.raise_signal(signal.SIGINT)))
+    def serve_and_end(service, ready, tell):
+        return serve(service, lambda instruments: (ready(instruments), signal.raise_signal(signal.SIGINT)), tell)
 
     monkeypatch.setattr("levilab.bench_serve.serve", serve_and_end)
     shown = CliRunner().invoke(bench_app, ["serve"])

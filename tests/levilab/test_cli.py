@@ -155,6 +155,8 @@ def test_imperfect_data_are_analyzed_with_a_warning_and_without_nan(
         (["acquire", "spin"], "bench.toml"),
         (["acquire", "spin", "--bench", "other.toml"], "other.toml"),
         (["acquire", "spin", "--mock", "--resume", "nowhere"], "run.json"),
+        (["acquire", "spin", "--mock", "--scene", "spindwon"], "did you mean spindown?"),
+        (["bench", "serve", "--scene", "mine.toml"], "mine.toml: there is no such file"),
     ],
 )
 def test_what_is_not_there_is_named(levilab: Command, words: list[str], says: str) -> None:

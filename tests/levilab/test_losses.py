@@ -126,7 +126,7 @@ def test_an_instrument_that_another_program_keeps_ends_the_run_with_what_there_i
         acquired(tmp_path, monkeypatch, Fault("taken by another", question=r"READ\?", after=9))
     (run,) = [Run.load(path) for path in tmp_path.iterdir()]
     assert run.status == "failed"
-    assert len(run.readings().frame) == 7
+    assert len(run.readings().frame) == 6
     assert kinds(run).count("not reached") == 6
 
 

@@ -48,7 +48,7 @@ def refusal(*words, scene=None):
 
 
 def test_the_scenes_that_ship_are_known_by_name():
-    assert presets() == ["driven", "friction", "loose-washers", "tilted", "undriven"]
+    assert presets() == ["driven", "friction", "loose-washers", "spindown", "tilted", "undriven"]
 
 
 @pytest.mark.parametrize("name", presets())

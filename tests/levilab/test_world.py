@@ -16,6 +16,7 @@ from instruments.virtual.generator import Burst, Output
 from instruments.virtual.generator_voltage import fundamental, voltage
 from levilab import virtual_bench
 from levilab.clock import VirtualClock
+from levilab.simulator.optics import Tape
 from levilab.simulator.spin import DECAYS
 from levilab.simulator.world import KEPT_S, SpinScene, SpinWorld, drawn
 
@@ -23,7 +24,7 @@ TURN = 2 * math.pi
 #: Field of the drive at the top [T]: what 10 Vpp make on the virtual bench.
 FIELD = 0.4e-3
 #: No noise, no jitter: what is left is the motion.
-QUIET = SpinScene(noise=0.0, jitter=0.0)
+QUIET = SpinScene(tape=Tape(noise=0.0), jitter=0.0)
 #: Greatest acceleration of the drive [rad/s²], and the capture range of a pendulum, 2√α, as a frequency [Hz].
 HOLD = QUIET.lock_torque * FIELD
 CAPTURE = 2 * math.sqrt(HOLD) / TURN
@@ -191,8 +192,8 @@ def test_the_top_falls_at_its_lower_limit_and_stays_dark():
     # 137 rad/s for two microseconds, and the rounding of an angle of 2e4 rad
     assert angle(top, time + 1e-6) == pytest.approx(angle(top, time - 1e-6), abs=3e-4)
     before, after = top.light(time - 1.0, 1e-4, 9_000), top.light(time + 1e-6, 1e-4, 100_000)
-    assert before.max() == pytest.approx(QUIET.bright, abs=0.01)
-    assert np.all(after == QUIET.dark)
+    assert before.max() == pytest.approx(QUIET.tape.bright, abs=0.01)
+    assert np.all(after == QUIET.tape.dark)
 
 
 def test_no_drive_raises_a_top_that_has_fallen():
@@ -201,7 +202,7 @@ def test_no_drive_raises_a_top_that_has_fallen():
         drive(top, 200.0 + k, "SIN", 30.0 + k, FIELD)
     assert spin_hz(top, 210.0) == 0.0
     assert angle(top, 210.0) == angle(top, 200.0)
-    assert np.all(top.light(210.0, 1e-4, 10_000) == QUIET.dark)
+    assert np.all(top.light(210.0, 1e-4, 10_000) == QUIET.tape.dark)
 
 
 def test_a_held_top_does_not_fall():
@@ -212,7 +213,7 @@ def test_a_held_top_does_not_fall():
 
 def test_a_top_that_was_never_spun_up_is_dark_from_the_start():
     top = world(replace(QUIET, start_hz=20.0))
-    assert np.all(top.light(0.0, 1e-4, 10_000) == QUIET.dark)
+    assert np.all(top.light(0.0, 1e-4, 10_000) == QUIET.tape.dark)
 
 
 # --- the light ---
@@ -223,12 +224,12 @@ def test_light_is_one_pulse_a_turn_of_the_width_that_was_asked_for():
     drive(top, 0.0, "SIN", 30.0, FIELD)
     step = 1e-6
     light = top.light(0.0, step, 1_000_000)
-    half = (QUIET.dark + QUIET.bright) / 2
+    half = (QUIET.tape.dark + QUIET.tape.bright) / 2
     rises = np.flatnonzero((light[1:] >= half) & (light[:-1] < half))
     falls = np.flatnonzero((light[1:] < half) & (light[:-1] >= half))
     assert rises.size == falls.size == 30
     # both edges lie on the grid of samples: each to one step
-    np.testing.assert_allclose((falls - rises) * step, QUIET.pulse_duty / 30.0, atol=2 * step)
+    np.testing.assert_allclose((falls - rises) * step, QUIET.tape.width / 30.0, atol=2 * step)
     np.testing.assert_allclose(np.diff(rises) * step, 1 / 30.0, atol=2 * step)
 
 
@@ -258,10 +259,10 @@ def test_the_past_is_not_changed_by_what_the_drive_does_now():
 
 
 def test_the_noise_of_the_light_is_as_large_as_asked_for():
-    top = world(replace(QUIET, start_hz=20.0, noise=0.01))
+    top = world(replace(QUIET, start_hz=20.0, tape=Tape()))
     light = top.light(0.0, 5e-5, 40_000)
     # standard errors of mean and standard deviation: 1/√40 000 and 1/√80 000 of 0.01 V; four of them
-    assert light.mean() == pytest.approx(QUIET.dark, abs=4 * 0.01 / 200)
+    assert light.mean() == pytest.approx(QUIET.tape.dark, abs=4 * 0.01 / 200)
     assert light.std() == pytest.approx(0.01, rel=4 / 283)
 
 

@@ -1,0 +1,182 @@
+"""The motion of a top as far as somebody looks, under a drive that changes meanwhile; put back when it has fallen."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from levilab.simulator import top
+from levilab.simulator.errors import SimulationError
+from levilab.simulator.history import History
+from levilab.simulator.keys import SceneError
+from levilab.simulator.single import simulate
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from levilab.simulator.scene import Scene
+    from levilab.simulator.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+#: The motion is worked out so much at a time [s], to this error of place [m] and axis [rad] at the end of each piece,
+#: with so many states a second: between two of them a tape turns evenly to 1e-4 of a turn.
+PIECE_S, TOLERANCE, RATE = 1.0, 1e-7, 400.0
+
+#: Nothing moves in so short a time [s].
+_AT_ONCE = 1e-9
+
+#: A tape is seen at every turn, so the attitude is needed; an aligned moment has it with this transverse part, which is
+#: less than the rounding of the other.
+_HARDLY = 1e-17
+
+
+@dataclass(frozen=True)
+class _Up:
+    """A piece of a top's life.
+
+    scene: with the drive; state: where it begins, shape (18,); step: of the integration [s]; times [s] and turns of the
+    tape then, shape (n,).
+    """
+
+    scene: Scene
+    state: Array
+    step: float
+    times: Array
+    turns: Array
+
+    @property
+    def start(self) -> float:
+        """When it begins [s]."""
+        return float(self.state[top.TIME])
+
+
+@dataclass(frozen=True)
+class _Down:
+    """No top is up from this time on [s]."""
+
+    start: float
+
+
+class Flight:
+    """A top from time 0 on; before, and after it has fallen, there is none.
+
+    scene: its drive is left out, `change` tells of drives; again_s: so long after a fall the top is put back to where
+    the scene starts, None: it is not [s].  Raises SceneError for a scene without motion.
+    """
+
+    def __init__(self, scene: Scene, again_s: float | None = None) -> None:
+        if scene.observed != "motion":
+            raise SceneError(f"observed = {scene.observed}: a scene for the bench is expected to have motion")
+        transverse, axial = scene.top.moment_tilt
+        self._scene = scene.changed(
+            {"drive.waveform": "off", "drive.off_s": None, "top.moment_tilt": [transverse or _HARDLY, axial]}
+        )
+        self._again_s = again_s
+        self._pieces: History[_Up | _Down] = History(-math.inf, _Down(-math.inf))
+        self._step: float | None = None
+        # what comes next: a top in this state, or none until a new one is put there; and when [s]
+        self._state: Array | None = top.start_of(self._scene)
+        self._known = 0.0
+
+    def prepare(self) -> None:
+        """Have the simulator's code compiled, or brought from the disk, for whatever drive may come."""
+        for waveform in ("off", "sine", "square"):
+            simulate(self._scene.changed({"drive.waveform": waveform}), 1e-3, rate=None)
+
+    @property
+    def driven(self) -> bool:
+        """Whether there is a drive at last."""
+        return self._scene.drive.waveform != "off"
+
+    def change(self, time: float, drive: Mapping[str, Any]) -> None:
+        """From this time on the drive is this: keys of the scene's table; what was seen of later times is gone."""
+        self._look(time)
+        now = self._pieces.at(time)
+        if isinstance(now, _Up):
+            self._pieces.cut(time)
+            self._state, self._known = _later(now, time), time
+        else:
+            self._pieces.cut(math.nextafter(time, math.inf))
+            self._wait(now.start)
+        self._scene = self._scene.changed({f"drive.{key}": value for key, value in drive.items()})
+
+    def forget(self, before: float) -> None:
+        """Nobody will ask for times before this one [s]."""
+        self._pieces.forget(before)
+
+    def turns(self, times: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Turns of the tape past a fixed spot on the rim, and whether there is a top; shape (n,) each, as the times.
+
+        Whole turns are not counted on from one piece to the next.
+        """
+        self._look(float(times.max(initial=0.0)))
+        turns, up = np.zeros_like(times), np.zeros(times.shape, dtype=np.bool_)
+        for piece, part in self._pieces.pieces(times):
+            if isinstance(piece, _Up):
+                turns[part], up[part] = np.interp(times[part], piece.times, piece.turns), True
+        return turns, up
+
+    # --- as far as somebody looks ---
+
+    def _look(self, until: float) -> None:
+        while self._known <= until:
+            if self._state is None:
+                self._state = top.start_of(self._scene)
+                self._state[top.TIME] = self._known
+            self._live(self._state)
+
+    def _live(self, state: Array) -> None:
+        """The next piece of the life of a top in this state."""
+        begin = float(state[top.TIME])
+        try:
+            motion = self._motion(state)
+        except SimulationError:  # it has hit the base, where the field is infinite
+            self._fall(begin)
+            return
+        # of the states only the first is kept: a bench may run for hours
+        self._pieces.append(begin, _Up(self._scene, state, motion.accuracy.step, motion.time.copy(), _turns(motion)))
+        if motion.fell is not None:
+            self._fall(motion.fell.time)
+        else:
+            self._state, self._known = motion.states[-1].copy(), float(motion.time[-1])
+
+    def _motion(self, state: Array) -> Trajectory:
+        """A piece with the step of the last one, if that is good enough."""
+        options: dict[str, Any] = {"tolerance": TOLERANCE, "rate": RATE, "start": state}
+        if self._step is not None:
+            motion = simulate(self._scene, PIECE_S, step=self._step, **options)
+            if motion.accuracy.reached:
+                return motion
+        motion = simulate(self._scene, PIECE_S, **options)
+        self._step = motion.accuracy.step
+        return motion
+
+    def _fall(self, time: float) -> None:
+        self._pieces.append(time, _Down(time))
+        self._wait(time)
+
+    def _wait(self, fallen: float) -> None:
+        """Nothing happens until somebody puts the top back."""
+        self._state, self._known = None, math.inf if self._again_s is None else fallen + self._again_s
+
+
+def _later(piece: _Up, time: float) -> Array:
+    """The state within a piece at this time, shape (18,)."""
+    state = piece.state.copy()
+    if time - piece.start > _AT_ONCE:
+        motion = simulate(piece.scene, time - piece.start, step=piece.step, rate=None, start=state)
+        state = motion.states[-1].copy()
+    state[top.TIME] = time
+    return state
+
+
+def _turns(motion: Trajectory) -> Array:
+    """Turns of the tape past a spot that lies on the rim in the direction of x while the top stands on the axis."""
+    arm, place = motion.states[:, top.ARM], motion.position
+    spot = np.arctan2(-place[:, 1], motion.scene.top.magnet_radius_m - place[:, 0])
+    return np.asarray(np.unwrap(np.arctan2(arm[:, 1], arm[:, 0]) - spot) / (2 * np.pi))

@@ -1,0 +1,109 @@
+"""A world in full motion: the top of a scene, simulated as far as somebody looks, under the drive of the bench.
+
+The light is that of a tape which passes a fixed spot on the top's rim.  So the wobble of the top is seen in it: where
+it stands 1 mm aside, its tape comes a hundredth of a turn early or late.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from instruments.virtual.generator_voltage import fundamental
+from levilab.simulator import top
+from levilab.simulator.coil import Coil
+from levilab.simulator.fields import flux_density
+from levilab.simulator.flight import Flight
+from levilab.simulator.optics import Tape
+from levilab.simulator.world import KEPT_S
+
+if TYPE_CHECKING:
+    from instruments.virtual.generator_channel import Output
+    from levilab.clock import Clock
+    from levilab.simulator.scene import Scene
+
+Array = NDArray[np.float64]
+
+#: Where the magnetometer's probe stands: about where a top floats [m above the base].
+PROBE_M = 0.072
+
+#: A drive that is faster than this moves no top, but would make the steps short [Hz].
+_FASTEST_HZ = 1000.0
+
+#: Waveforms that the simulator has; of all others it takes the first harmonic.
+_SHAPES = {"SIN": "sine", "SQU": "square", "TRI": "triangle"}
+
+
+def prepare(scene: Scene) -> None:
+    """Have all code compiled, which takes some seconds the first time on a machine, before anybody waits for it.
+
+    Raises SceneError for a scene without motion, SimulationError for one that cannot be simulated.
+    """
+    Flight(scene).prepare()
+
+
+class MotionWorld:
+    """The top of a scene, and what instruments see of it; see :class:`levilab.simulator.world.World`.
+
+    The generator takes the place of the scene's drive, whose direction is the coil's; its offset moves nothing.
+    again_s: see Flight; seed: of the light's noise.  Raises SceneError for a scene without motion.
+
+    >>> from levilab.clock import VirtualClock
+    >>> from levilab.simulator import preset
+    >>> world = MotionWorld(preset("tilted"), VirtualClock())
+    >>> bright = world.light(0.0, 1e-4, 10_000) > 0.6
+    >>> int(np.sum(bright[1:] > bright[:-1]))  # turns in a second
+    30
+    """
+
+    def __init__(
+        self, scene: Scene, clock: Clock, *, tape: Tape | None = None, again_s: float | None = None, seed: int = 0
+    ) -> None:
+        self.clock = clock
+        self._tape, self._seed = tape or Tape(), seed
+        self._coil, self._flight = Coil(), Flight(scene, again_s)
+        self._told = 0.0  # the last time that a change was told for [s]
+        probe = np.array([[0.0, 0.0, PROBE_M]])
+        self._probe_t = float(flux_density(top.base_field(scene), probe)[0, 2])
+
+    def drive(self, time: float, output: Output) -> None:
+        """From this time on the coil's field is this; see World."""
+        horizon = self.clock.now() - KEPT_S
+        self._coil.history.forget(horizon)
+        self._flight.forget(horizon)
+        self._coil.change(time, output)
+        drive = self._drive(time, output)
+        if drive["waveform"] != "off" or self._flight.driven or time < self._told:
+            self._flight.change(time, drive)
+            self._told = time
+
+    def _drive(self, time: float, output: Output) -> dict[str, str | float]:
+        """The keys of a scene's drive that make this output."""
+        shape = "TRI" if (output.waveform, output.symmetry) == ("RAMP", 0.5) else output.waveform
+        whole = shape in _SHAPES and output.duty == 0.5 and output.burst is None
+        amplitude = output.amplitude if whole else fundamental(output)
+        if not (amplitude and 0 < output.frequency <= _FASTEST_HZ):
+            return {"waveform": "off"}
+        turns = self._coil.turns(time) - output.frequency * time + output.phase / 360 + 0.5 * output.inverted
+        return {
+            "waveform": _SHAPES[shape] if whole else "sine",
+            "amplitude_t": amplitude,
+            "frequency_hz": output.frequency,
+            "phase_rad": 2 * math.pi * (turns % 1.0),
+        }
+
+    def light(self, start: float, step: float, n: int) -> Array:
+        """The phototransistor's voltage; see World."""
+        turns, up = self._flight.turns(start + step * np.arange(n, dtype=np.float64))
+        return self._tape.light(turns, up, start, self._seed)
+
+    def coil_field(self, start: float, step: float, n: int) -> Array:
+        """The coil's field; see World."""
+        return self._coil.field(start + step * np.arange(n, dtype=np.float64))
+
+    def flux_density(self, time: float) -> float:
+        """The base's field where the probe stands; the coil's lies across it, and the top's is left out."""
+        return self._probe_t

@@ -1,0 +1,261 @@
+"""A world in full motion: what it shows is the simulator's motion, however and in whatever order one looks at it."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from instruments.virtual.generator import Burst, Output
+from instruments.virtual.generator_voltage import fundamental
+from levilab.clock import VirtualClock
+from levilab.simulator import SceneError, preset, simulate
+from levilab.simulator.flight import RATE, Flight
+from levilab.simulator.motion_world import MotionWorld
+from levilab.simulator.optics import Tape
+from levilab.simulator.world import BASE_FIELD, KEPT_S
+
+TURN = 2 * math.pi
+TILTED = preset("tilted")
+#: Falls after 0.4 s.
+FALLING = preset("undriven").changed({"start.spin_hz": 15.0})
+OFF = {"waveform": "off"}
+SINE = {"waveform": "sine", "amplitude_t": 4e-4, "frequency_hz": 30.0, "phase_rad": 0.3}
+#: A tape's place is interpolated to 1e-4 of a turn, and both ways have errors of 1e-7 rad at the end of a piece.
+CLOSE = 2e-4
+
+
+def apart(turns, others):
+    """How far turns are from each other, whole turns not counted."""
+    return np.abs((turns - others + 0.5) % 1.0 - 0.5)
+
+
+def expected_turns(motion):
+    """The tape's place from the motion, by another formula: the spot's direction in the top's frame."""
+    to_spot = np.array([motion.scene.top.magnet_radius_m, 0.0]) - motion.position[:, :2]
+    x, y = motion.states[:, 12], motion.states[:, 13]
+    along = x * to_spot[:, 0] + y * to_spot[:, 1]
+    across = to_spot[:, 0] * y - to_spot[:, 1] * x
+    return np.angle(along + 1j * across) / TURN
+
+
+# --- the flight ---
+
+
+def test_the_tape_turns_as_the_simulated_top_does():
+    motion = simulate(TILTED, 3.3, tolerance=1e-9, rate=317.0)
+    turns, up = Flight(TILTED).turns(motion.time)
+    assert up.all()
+    assert apart(turns, expected_turns(motion)).max() < CLOSE
+
+
+def test_the_wobble_of_the_top_is_seen_in_its_tape():
+    times = np.arange(0.0, 3.0, 1 / RATE)
+    turns, _ = Flight(TILTED).turns(times)
+    straight = np.polynomial.Polynomial.fit(times, np.unwrap(turns, period=1.0), 1)
+    left = np.unwrap(turns, period=1.0) - straight(times)
+    motion = simulate(TILTED, 3.0, rate=RATE)
+    aside = motion.position[:-1, 1] / TILTED.top.magnet_radius_m / TURN
+    # IC1 swings by 3 mm: three hundredths of a turn, of which y / radius is all but the second order
+    assert np.ptp(left) > 0.02
+    assert np.corrcoef(left, aside)[0, 1] > 0.98
+
+
+def test_an_aligned_top_has_a_tape_too():
+    scene = preset("friction")
+    times = np.linspace(0.0, 2.0, 1000)
+    turns = np.unwrap(Flight(scene).turns(times)[0], period=1.0)
+    spin = simulate(scene, 2.0, rate=100.0)
+    turned = np.trapezoid(spin.spin_hz, spin.time)
+    # beside the spin: the wobble, three hundredths of a turn
+    assert turns[-1] - turns[0] == pytest.approx(turned, abs=0.04)
+
+
+def test_a_drive_that_goes_off_is_the_simulators_drive_that_goes_off():
+    scene = preset("driven")
+    flight = Flight(scene)
+    drive = scene.drive
+    flight.change(
+        0.0,
+        {
+            "waveform": "sine",
+            "amplitude_t": drive.amplitude_t,
+            "frequency_hz": drive.frequency_hz,
+            "phase_rad": drive.phase_rad,
+        },
+    )
+    flight.turns(np.array([2.6]))  # somebody has looked farther already
+    flight.change(1.37, OFF)
+    motion = simulate(scene.changed({"drive.off_s": 1.37}), 3.0, tolerance=1e-9, rate=311.0)
+    turns, up = flight.turns(motion.time)
+    assert up.all()
+    assert apart(turns, expected_turns(motion)).max() < CLOSE
+    undisturbed, _ = Flight(scene).turns(motion.time)
+    assert apart(undisturbed, expected_turns(motion)).max() > 100 * CLOSE  # the drive was felt
+
+
+@pytest.mark.parametrize("looks", [[], [0.2], [1.9, 0.4, 5.0], [1.0, 1.0]])
+def test_what_is_seen_does_not_depend_on_who_has_looked_before(looks):
+    times = np.linspace(0.0, 4.0, 1000)
+    flight, other = Flight(TILTED), Flight(TILTED)
+    for time in looks:
+        flight.turns(np.array([time]))
+    for one in (flight, other):
+        one.change(1.0, SINE)
+        one.change(2.5, SINE | {"frequency_hz": 30.2})
+        one.change(2.5, OFF)
+    np.testing.assert_array_equal(flight.turns(times)[0], other.turns(times)[0])
+
+
+def test_a_top_that_falls_is_gone_at_the_moment_of_its_fall():
+    fell = simulate(FALLING, 5.0).fell
+    flight = Flight(FALLING)
+    times = fell.time + np.array([-1e-5, 1e-5, 1.0, 1e6])
+    assert flight.turns(times)[1].tolist() == [True, False, False, False]
+    flight.change(fell.time + 5.0, SINE)  # no drive raises it
+    assert not flight.turns(times + 10.0)[1].any()
+
+
+def test_a_top_that_is_put_back_begins_anew_whatever_the_drive_does_meanwhile():
+    fell = simulate(FALLING, 5.0).fell.time
+    flight = Flight(FALLING, again_s=2.0)
+    flight.change(fell + 1.0, SINE)
+    flight.change(fell + 1.5, OFF)
+    begins = fell + 2.0
+    assert flight.turns(np.array([begins - 1e-5, begins + 1e-5]))[1].tolist() == [False, True]
+    again = np.linspace(0.0, 0.9 * fell, 50)
+    assert apart(flight.turns(begins + again)[0], flight.turns(again)[0]).max() < CLOSE
+    # and again, as often as it falls
+    assert flight.turns(np.array([3 * begins + 0.1, 50 * begins + 0.1]))[1].all()
+
+
+def test_before_the_beginning_nobody_is_there():
+    turns, up = Flight(TILTED).turns(np.array([-1.0, -1e-9, 0.0]))
+    assert up.tolist() == [False, False, True]
+    assert turns[0] == 0.0
+
+
+def test_a_scene_without_motion_is_refused():
+    with pytest.raises(SceneError, match="observed = spin"):
+        Flight(preset("friction").changed({"observed": "spin"}))
+
+
+# --- the drive of the bench ---
+
+
+def world(scene=TILTED, **rest):
+    return MotionWorld(scene, VirtualClock(), **rest)
+
+
+def field_of(drive, times):
+    """The field that the scene's drive makes, written down from its definition."""
+    turns = drive["frequency_hz"] * times + drive["phase_rad"] / TURN
+    shapes = {
+        "sine": lambda: np.sin(TURN * turns),
+        "square": lambda: np.where(turns % 1.0 < 0.5, 1.0, -1.0),
+        "triangle": lambda: 2 / np.pi * np.arcsin(np.sin(TURN * turns)),
+    }
+    return drive["amplitude_t"] * shapes[drive["waveform"]]()
+
+
+@pytest.mark.parametrize(
+    "output",
+    [
+        Output("SIN", 30.0, 4e-4, 0.0),
+        Output("SIN", 30.0, 4e-4, 0.0, phase=70.0),
+        Output("SIN", 30.0, 4e-4, 0.0, inverted=True),
+        Output("SQU", 30.0, 4e-4, 0.0),
+        Output("SQU", 30.0, 4e-4, 0.0, phase=-20.0, inverted=True),
+        Output("TRI", 30.0, 4e-4, 0.0),
+        Output("RAMP", 30.0, 4e-4, 0.0, symmetry=0.5),
+    ],
+    ids=lambda output: f"{output.waveform} {output.phase:g}{' inverted' * output.inverted}",
+)
+def test_the_top_feels_the_field_that_the_scope_shows(output):
+    top = world()
+    felt = []
+    top._flight.change = lambda time, drive: felt.append((time, drive))
+    top.drive(1.234, output)
+    top.drive(2.345, replace(output, frequency=31.7))
+    for (start, drive), end in zip(felt, [2.345, 3.5], strict=True):
+        times = np.linspace(start, end, 999)[1:-1]
+        shown = np.array([top.coil_field(float(time), 0.0, 1)[0] for time in times])
+        off = np.abs(shown - field_of(drive, times)) > 1e-9
+        assert off.mean() < 0.005  # where a square wave jumps, rounding chooses the side
+
+
+@pytest.mark.parametrize(
+    "output",
+    [
+        Output("RAMP", 30.0, 4e-4, 0.0),
+        Output("SQU", 30.0, 4e-4, 0.0, duty=0.2),
+        Output("SIN", 30.0, 4e-4, 0.0, burst=Burst(1, 0.1)),
+    ],
+    ids=["ramp", "pulse", "burst"],
+)
+def test_of_other_waveforms_the_top_feels_the_first_harmonic(output):
+    drive = world()._drive(0.0, output)
+    assert (drive["waveform"], drive["frequency_hz"]) == ("sine", 30.0)
+    assert drive["amplitude_t"] == pytest.approx(fundamental(output))
+
+
+@pytest.mark.parametrize(
+    "output",
+    [
+        Output("SIN", 30.0, 0.0, 0.0),
+        Output("DC", 0.0, 0.0, 2e-4),
+        Output("NOIS", 30.0, 4e-4, 0.0),
+        Output("SIN", 2e6, 4e-4, 0.0),
+    ],
+    ids=["off", "constant", "noise", "too fast"],
+)
+def test_what_cannot_turn_a_top_is_no_drive(output):
+    top = world()
+    top.drive(0.5, output)
+    np.testing.assert_array_equal(top.light(0.0, 1e-3, 2000), world().light(0.0, 1e-3, 2000))
+
+
+def test_the_drive_takes_hold_of_the_top():
+    # a tenth of a hertz beside the spin: held, it turns with the drive, else it would lag by two turns
+    top = world(preset("driven").changed({"start.spin_hz": 29.9}), tape=Tape(noise=0.0))
+    top.drive(0.0, Output("SIN", 30.0, 4e-4, 0.0, phase=90.0))
+    bright = top.light(0.0, 2e-4, 100_000) > 0.65
+    assert int(np.sum(bright[1:] > bright[:-1])) == 600
+
+
+# --- what is seen ---
+
+
+def test_the_light_is_one_pulse_a_turn_and_dark_without_a_top():
+    top = world(tape=Tape(noise=0.0))
+    light = top.light(0.0, 1e-5, 100_000)
+    assert (light.min(), light.max()) == pytest.approx((0.1, 1.2), abs=0.01)
+    rises, falls = (np.flatnonzero(np.diff((light > 0.65).astype(int)) == sign) for sign in (1, -1))
+    assert len(rises) == 30
+    # 3 % of a turn; the wobble makes it 4 % longer or shorter
+    np.testing.assert_allclose((falls[1:-1] - rises[1:-1]) * 1e-5, 0.03 / 30.0, rtol=0.06)
+    assert np.all(top.light(-1.0, 1e-4, 1000) == 0.1)
+
+
+def test_the_noise_is_as_large_as_asked_for_and_another_with_another_seed():
+    fallen = world(FALLING, tape=Tape(noise=0.02), seed=1)
+    light = fallen.light(10.0, 1e-4, 40_000)
+    assert light.std() == pytest.approx(0.02, rel=4 / math.sqrt(2 * 40_000))
+    other = world(FALLING, tape=Tape(noise=0.02), seed=2).light(10.0, 1e-4, 40_000)
+    assert abs(np.corrcoef(light, other)[0, 1]) < 4 / math.sqrt(40_000)
+
+
+def test_the_probe_sees_the_field_of_the_scenes_base():
+    assert world().flux_density(0.0) == pytest.approx(BASE_FIELD, rel=1e-8)
+    twice = TILTED.changed({"base.strength_t_m": 2 * TILTED.base.strength_t_m})
+    assert world(twice).flux_density(5.0) == pytest.approx(2 * BASE_FIELD, rel=1e-8)
+
+
+def test_a_bench_that_runs_for_hours_lets_go_what_nobody_asks_for():
+    top = world(FALLING, again_s=60.0)
+    for hour in range(48):
+        top.clock.sleep(3600.0)
+        top.light(top.clock.now(), 1e-3, 10)
+        top.drive(top.clock.now(), Output("SIN", 30.0 + hour, 0.0, 0.0))
+    kept = len(top._flight._pieces)
+    assert kept < 2 * KEPT_S / 60 + 1100  # a life and a fall each minute, and a thousand that are not let go yet
