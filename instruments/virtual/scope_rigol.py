@@ -8,8 +8,6 @@ Assumed: what the error queue says when too much is asked for, the depth that AU
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from instruments.virtual.device import answers, does
 from instruments.virtual.scope_rigol_reading import MIDDLE, RigolReading
 from instruments.virtual.scope_setup import one_two_five
@@ -29,7 +27,6 @@ class VirtualDS1000Z(RigolReading):
     identity = "RIGOL TECHNOLOGIES,DS1054Z,DS1ZVIRTUAL,00.04.04.SP4"
     no_error = '0,"No error"'
     columns, lowest, keeps_old = 12, 0, True
-    transfer: ClassVar[float] = 1e6
 
     def spell(self, value: float) -> str:
         """As in the preamble that public drivers quote: 2.000000e-05."""

@@ -23,7 +23,7 @@ from instruments.oscilloscope_rigol import RigolDS1000Z
 from instruments.transport import VisaTransport
 from instruments.virtual.bus import Bus
 from instruments.virtual.faults import Fault
-from instruments.virtual.scope import AUTO_AFTER
+from instruments.virtual.scope_acquisition import AUTO_AFTER
 from instruments.virtual.scope_keysight import VirtualDSOX1000
 from instruments.virtual.scope_measure import MEASUREMENTS, Measured, measure
 from instruments.virtual.scope_record import PIECE, Edge
