@@ -42,7 +42,7 @@ class Limits:
         for name, value, low, high in rows if self != NO_LIMITS else ():
             if value is not None and not low <= value <= high:  # nan is in no range
                 allowed = f"up to {high:g}" if high < math.inf else f"from {low:g} on"
-                raise OutOfRange(address, name, value, f"{allowed} (limits.{name} in bench.toml)")
+                raise OutOfRange(address, name, value, f"{allowed} (limits.{name} in the bench file)")
 
 
 #: Of a generator by itself.
@@ -112,7 +112,7 @@ class _Load(Setting[float]):
 
     def __set__(self, instrument: ScpiInstrument, value: float) -> None:
         if cast("_Drive", instrument).limits != NO_LIMITS and not value >= INFINITY:
-            allowed = f"{INFINITY:g}: limits.drive_amplitude_vpp in bench.toml is that of the open terminals"
+            allowed = f"{INFINITY:g}: limits.drive_amplitude_vpp in the bench file is that of the open terminals"
             raise OutOfRange(instrument.transport.address, self.name, value, allowed)
         super().__set__(instrument, value)
 
@@ -124,7 +124,7 @@ class _Switch(Setting[bool]):
     def __set__(self, instrument: ScpiInstrument, value: bool) -> None:  # noqa: FBT001 - it is what is assigned
         drive = cast("_Drive", instrument)
         if value and drive.limits != NO_LIMITS and not drive.prepared_here:
-            allowed = "prepare() first: what stands there may be beyond limits.drive_amplitude_vpp in bench.toml"
+            allowed = "prepare() first: what stands there may be beyond limits.drive_amplitude_vpp in the bench file"
             raise OutOfRange(instrument.transport.address, self.name, value, allowed)
         super().__set__(instrument, value)
 

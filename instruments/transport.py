@@ -100,7 +100,7 @@ class VisaTransport:
         """
         self.address, self.timeout, self._line = address, timeout, dict(line or {})
         self._library, self._log = library, log
-        self._out_of_step = self._closed = False
+        self._out_of_step = self._closed = self._locked = False
         self._identities_due = 0  # answers to it that may still come
         self._stream = address.upper().endswith(_BARE_SOCKET) or address.upper().startswith("ASRL")
         self._resource = self._open()
@@ -255,9 +255,11 @@ class VisaTransport:
             self._resource.close()
         self._resource = self._open()
         self._out_of_step = False
+        if self._locked:
+            self.lock()
 
     def lock(self) -> None:
-        """Exclusive access until the link is closed; see :class:`Transport`."""
+        """Exclusive access until it is closed, over a link made anew, too; see :class:`Transport`."""
         import pyvisa
 
         try:
@@ -268,6 +270,7 @@ class VisaTransport:
             # interfaces without locks: bare sockets, serial lines, and what pyvisa-py does not lock
         except NotImplementedError:
             pass
+        self._locked = True
 
     def close(self) -> None:
         """Close the resource; closing twice does no harm."""

@@ -149,6 +149,7 @@ def open_bench(
                 settings = VIRTUAL[kind] if world else _described(config, kind)
                 instrument = opened(kind, settings, bench.clock, library=library, log=log)
                 links.callback(instrument.close)
+                instrument.transport.lock()  # while we measure nobody else turns its keys
                 if kind == "generator":
                     cast("Generator", instrument).limits = _coil_limits(config.limits)
                 instrument.identity()
@@ -182,5 +183,5 @@ def check_described(config: BenchConfig, kinds: tuple[str, ...]) -> None:
 def _described(config: BenchConfig, kind: str) -> InstrumentSettings:
     settings: InstrumentSettings | None = getattr(config, kind)
     if settings is None:
-        raise ConfigError(f"bench.toml describes no {kind}: add a table [{kind}] with model and address")
+        raise ConfigError(f"the bench file describes no {kind}: add a table [{kind}] with model and address")
     return settings

@@ -104,7 +104,7 @@ def check(config: BenchConfig, world: World | None = None) -> Iterator[Checked]:
     """
     kinds = [kind for kind in KINDS if world or getattr(config, kind)]
     if not kinds:
-        raise ConfigError("bench.toml describes no instrument: `levilab bench init` writes one from what answers")
+        raise ConfigError("the bench file describes no instrument: `levilab bench init` writes one from what answers")
     for kind in kinds:
         yield _checked(kind, config, world)
 

@@ -154,7 +154,7 @@ def _free_spin(session: Session) -> float:
     if spin is None:
         raise ExperimentFailed(
             f"the counter sees no light pulses at {_settings(session).trigger_level_v:g} V: is the top floating and "
-            "lit, and the trigger level between dark and bright (spin.trigger_level_v in bench.toml)?"
+            "lit, and the trigger level between dark and bright (spin.trigger_level_v in the bench file)?"
         )
     return spin
 

@@ -107,7 +107,7 @@ FORBIDDEN = [
 def test_no_setting_gets_around_the_limits_of_the_bench(driver, name, value, limit):
     with conversation(driver) as generator:  # nothing is sent
         generator.limits = LIMITS
-        with pytest.raises(OutOfRange, match=rf"limits\.{limit} in bench\.toml"):
+        with pytest.raises(OutOfRange, match=rf"limits\.{limit} in the bench file"):
             setattr(generator, name, value)
 
 

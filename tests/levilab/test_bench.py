@@ -3,8 +3,9 @@
 import time
 
 import pytest
+import pyvisa
 
-from instruments.errors import InstrumentError, NotConnected, OutOfRange, WrongInstrument
+from instruments.errors import InstrumentError, NotConnected, Occupied, OutOfRange, WrongInstrument
 from instruments.virtual.generator_33500b import Virtual33500B
 from levilab.bench import OutputMayBeOn, open_bench
 from levilab.clock import VirtualClock, WallClock
@@ -216,7 +217,7 @@ TIGHT = Limits(drive_amplitude_vpp=4.0, drive_offset_v=1.0, drive_frequency_hz=5
 )
 def test_the_generator_of_an_open_bench_keeps_to_its_limits_by_itself(world, name, value):
     with open_bench(BenchConfig(limits=TIGHT), KINDS, world=world) as bench:
-        with pytest.raises(OutOfRange, match=r"limits\.drive_\w+ in bench\.toml"):
+        with pytest.raises(OutOfRange, match=r"limits\.drive_\w+ in the bench file"):
             setattr(bench.generator, name, value)
         assert all(field == 0 for *_, field in world.coil)
 
@@ -261,7 +262,7 @@ def test_a_drive_beyond_the_limits_is_refused_by_name_and_nothing_is_sent(world,
         assert world.field == 0
         assert all(field == 0 for *_, field in world.coil)
     assert refusal.value.name == name
-    assert f"limits.{name} in bench.toml" in str(refusal.value)
+    assert f"limits.{name} in the bench file" in str(refusal.value)
 
 
 def test_a_drive_at_the_limits_is_allowed(world):
@@ -284,6 +285,30 @@ def test_a_described_bench_is_opened_at_its_addresses():
         assert "53230A" in bench.counter.identity()
         assert "33522B" in bench.generator.identity()
         assert isinstance(bench.clock, WallClock)
+
+
+@pytest.fixture
+def another_program():
+    """Another program's link to the counter of the described bench."""
+    with pyvisa.ResourceManager("realtime@levilab").open_resource(VIRTUAL["counter"].address, timeout=100) as other:
+        yield other
+
+
+def test_while_it_is_open_no_other_program_gets_in_not_even_after_a_link_was_made_anew(another_program):
+    with open_bench(described(**VIRTUAL), KINDS) as bench:
+        for _ in range(2):
+            with pytest.raises(pyvisa.VisaIOError) as refused:
+                another_program.write("SENS:FREQ:GATE:TIME 100")
+            assert refused.value.error_code == pyvisa.constants.StatusCode.error_resource_locked
+            bench.reopen("counter")
+    assert "53230A" in another_program.query("*IDN?")
+
+
+def test_an_instrument_that_another_program_has_locked_is_told_and_left_alone(another_program):
+    another_program.lock_excl()
+    with pytest.raises(Occupied, match="locked"), open_bench(described(**VIRTUAL), KINDS):
+        pass
+    assert another_program.query("SYST:ERR?").startswith("+0")
 
 
 def test_an_instrument_that_is_not_described_is_asked_for_by_name():
