@@ -14,10 +14,11 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING
 
+from instruments.virtual.program_message import read_unit, split_parameters, split_units
 from instruments.virtual.steps import at_once
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from instruments.virtual.steps import Steps
 
@@ -46,9 +47,6 @@ LONGEST_ANSWER = 1 << 26
 _MULTIPLIERS = {"": 1.0, "N": 1e-9, "U": 1e-6, "M": 1e-3, "K": 1e3, "MA": 1e6, "G": 1e9}
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*([a-zA-Z]*)")
 _CHANNEL_LIST = re.compile(r"\(@[\d,: !]*\)")
-#: White space is every control character and the space (IEEE 488.2, 7.4.1.2), and no other sign of Latin-1.
-_BLANK, _DIGITS = "".join(map(chr, range(0x21))), re.compile("[0-9]+")
-_UNIT = re.compile(r"([^\x00-\x20]+)[\x00-\x20]*(.*)", re.DOTALL)
 
 
 class ScpiError(Exception):
@@ -127,12 +125,9 @@ class Parser:
         answers: list[str] = []
         length, path = 0, ""
         for unit in split_units(message):
-            parts = _UNIT.fullmatch(unit)
-            assert parts, "a unit begins with no blank"
-            header, rest = parts.groups()
-            full, path = _resolve(header, path)
+            header, rest, path = read_unit(unit, path)
             try:
-                answer = self._act(full)(split_parameters(rest))
+                answer = self._act(header)(split_parameters(rest))
                 if answer is not None and not isinstance(answer, str):
                     answer = yield from answer
             except ScpiError as error:
@@ -173,67 +168,6 @@ class Parser:
     def next_error(self) -> str:
         """The oldest entry, removed, or that there is none."""
         return self.errors.popleft() if self.errors else self.no_error
-
-
-def _resolve(header: str, path: str) -> tuple[str, str]:
-    """The full header of a program message unit, and the path that the next one starts from."""
-    if header.startswith("*"):
-        return header, path
-    full = header[1:] if header.startswith(":") else path + header
-    return full, full.rpartition(":")[0] + ":" if ":" in full else ""
-
-
-def split_units(message: str) -> Iterator[str]:
-    """The units of a compound message: split at semicolons outside of quotes and blocks.
-
-    >>> list(split_units('FREQ 40; DISP:TEXT "a;b"'))
-    ['FREQ 40', 'DISP:TEXT "a;b"']
-    """
-    return filter(None, _split(message, ";"))
-
-
-def split_parameters(text: str) -> list[str]:
-    """The parameters of a unit: split at commas outside of quotes, parentheses and blocks.
-
-    >>> split_parameters("25, MAX, (@1,2)")
-    ['25', 'MAX', '(@1,2)']
-    >>> split_parameters("ARB1,#13,;,")
-    ['ARB1', '#13,;,']
-    """
-    return list(_split(text, ",")) if text.strip(_BLANK) else []
-
-
-_SPECIAL = re.compile(r"[\"'();,]|(?<![^\x00-\x20,])#[1-9]")
-
-
-def _split(text: str, separator: str) -> Iterator[str]:
-    """The pieces between separators, blanks taken away, but not those that are the bytes of a block."""
-    start = looked = block_end = depth = 0
-    while found := _SPECIAL.search(text, looked):
-        what, looked = found[0], found.end()
-        if what in {'"', "'"}:
-            closing = text.find(what, looked)
-            looked = closing + 1 if closing >= 0 else len(text)
-        elif what[0] == "#":
-            looked = block_end = _end_of_block(text, found.start())
-        elif what in "()":
-            depth = depth + 1 if what == "(" else max(0, depth - 1)
-        elif what == separator and not depth:
-            yield _piece(text, start, found.start(), block_end)
-            start = looked
-    yield _piece(text, start, len(text), block_end)
-
-
-def _piece(text: str, start: int, end: int, block_end: int) -> str:
-    kept = max(start, min(block_end, end))
-    return (text[start:kept] + text[kept:end].rstrip(_BLANK)).lstrip(_BLANK)
-
-
-def _end_of_block(text: str, head: int) -> int:
-    """Where a definite-length block ends whose # stands at head; just behind the # if it is none."""
-    data = head + 2 + int(text[head + 1])
-    length = text[head + 2 : data]
-    return min(len(text), data + int(length)) if _DIGITS.fullmatch(length) else head + 1
 
 
 def at_most_one(parameters: list[str]) -> str:

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from instruments.virtual.framing import LONGEST_LINE, Framer, Overrun
-from instruments.virtual.scpi import split_parameters, split_units
+from instruments.virtual.program_message import split_parameters, split_units
 
 
 def block(data):
