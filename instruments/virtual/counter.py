@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from instruments.scpi import INFINITY
+from instruments.virtual.counter_memory import Memory, statistics
 from instruments.virtual.counter_parameters import truth, without_channels
-from instruments.virtual.counting import Looks, Measurement, Memory, Run, Span, measurement, statistics
+from instruments.virtual.counting import Looks, Measurement, Span, measurement
 from instruments.virtual.device import answers, does
 from instruments.virtual.scpi import Command, ScpiError, at_most_one, limit, nr3, number, one
 from instruments.virtual.status import OPERATION_COMPLETE
@@ -21,6 +22,7 @@ from instruments.virtual.steps import at_once
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from instruments.virtual.counter_run import Run
     from instruments.virtual.device import Clock
     from instruments.virtual.edges import Array, Input, Signal
     from instruments.virtual.steps import Steps

@@ -10,7 +10,8 @@ from instruments.scpi import INFINITY
 from instruments.virtual.counter import DARK, Function, darkness
 from instruments.virtual.counter_53230a_readings import Readings53230A
 from instruments.virtual.counter_parameters import channels_of, without_channels
-from instruments.virtual.counting import Looks, Measurement, Run, Span
+from instruments.virtual.counter_run import Run
+from instruments.virtual.counting import Looks, Measurement, Span
 from instruments.virtual.device import answers, does
 from instruments.virtual.scpi import Command, ScpiError, number, one
 

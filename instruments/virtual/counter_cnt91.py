@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, ClassVar
 from instruments.virtual.counter import DARK, Function
 from instruments.virtual.counter_cnt91_readings import ReadingsCNT91
 from instruments.virtual.counter_parameters import channels_of, without_channels
-from instruments.virtual.counting import Looks, Measurement, Run, Span, Wish, first_edge
+from instruments.virtual.counter_run import Run
+from instruments.virtual.counting import Looks, Measurement, Span, Wish, first_edge
 from instruments.virtual.device import answers, does
 from instruments.virtual.scpi import Command, ScpiError, number, one
 

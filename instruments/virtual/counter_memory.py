@@ -1,0 +1,90 @@
+"""The memory of the virtual counters for their readings, and statistics of what it holds."""
+
+from __future__ import annotations
+
+import math
+from array import array
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from instruments.scpi import NOT_A_NUMBER
+
+if TYPE_CHECKING:
+    from instruments.virtual.counting import Reading
+    from instruments.virtual.edges import Array
+
+#: Readings that are kept; then the oldest is lost (53220A/53230A User's Guide: 1 000 000).
+CAPACITY = 1_000_000
+
+
+class Memory:
+    """Readings in the order in which they came; the oldest are lost when there are too many."""
+
+    def __init__(self) -> None:
+        self.lost = False
+        self.fetched = 0
+        self._values, self._stamps, self._done = array("d"), array("d"), array("d")
+
+    def add(self, reading: Reading) -> None:
+        """One more."""
+        for column, number in zip(self._columns, (reading.value, reading.stamp, reading.done), strict=True):
+            column.append(number)
+        if len(self._done) >= CAPACITY + CAPACITY // 8:
+            self.drop(len(self._done) - CAPACITY)
+            self.lost = True
+
+    @property
+    def _columns(self) -> tuple[array[float], array[float], array[float]]:
+        return self._values, self._stamps, self._done
+
+    def drop(self, count: int) -> None:
+        """Take the oldest away."""
+        for column in self._columns:
+            del column[:count]
+        self.fetched = max(0, self.fetched - count)
+
+    def there(self, now: float) -> int:
+        """How many there are by this time [s]."""
+        return int(np.searchsorted(np.frombuffer(self._done), now, "right")) if self._done else 0
+
+    def cut(self, now: float) -> None:
+        """What would have come later does not come."""
+        keep = self.there(now)
+        for column in self._columns:
+            del column[keep:]
+
+    @property
+    def held(self) -> int:
+        """How many there are, those included that come later."""
+        return len(self._done)
+
+    def done(self, back: int) -> float:
+        """When the last reading was there, or the one so many before it [s]; long ago if it is lost."""
+        return self._done[-1 - back] if back < len(self._done) else -math.inf
+
+    def part(self, start: int, stop: int) -> tuple[Array, Array]:
+        """Values and time stamps of some of them."""
+        return np.array(self._values[start:stop]), np.array(self._stamps[start:stop])
+
+
+def statistics(values: Array) -> dict[str, float]:
+    """Mean, standard deviation, extremes and Allan deviation of what was measured.
+
+    Without a reading everything is "not a number", as the instruments say it; one reading has no deviation.
+
+    >>> statistics(np.array([1.0, 3.0]))["sdev"]
+    1.4142135623730951
+    """
+    values = values[values < NOT_A_NUMBER]
+    if not values.size:
+        return dict.fromkeys(("mean", "sdev", "min", "max", "ptp", "adev"), NOT_A_NUMBER)
+    several = values.size > 1
+    return {
+        "mean": float(values.mean()),
+        "sdev": float(values.std(ddof=1)) if several else 0.0,
+        "min": float(values.min()),
+        "max": float(values.max()),
+        "ptp": float(np.ptp(values)),
+        "adev": float(np.sqrt(np.mean(np.diff(values) ** 2) / 2)) if several else 0.0,
+    }
