@@ -14,8 +14,9 @@ if TYPE_CHECKING:
 
 #: Methods that are drawn: colour, marker, line, name beside the line.
 LINES = {
-    "blanes-moan-6, lanes": ("#0072B2", "s", "-", "levilab, many at once"),
-    "blanes-moan-6": ("#0072B2", "o", "-", "levilab, order 6"),
+    "levitron-6, lanes": ("#0072B2", "s", "-", "levilab, many at once"),
+    "levitron-6": ("#0072B2", "o", "-", "levilab, order 6"),
+    "blanes-moan-6": ("#56B4E9", "s", "--", "levilab, Blanes and Moan's 6"),
     "kahan-li-8": ("#56B4E9", "o", "-", "levilab, order 8"),
     "blanes-moan-4": ("#56B4E9", "^", "--", "levilab, order 4"),
     "strang": ("#56B4E9", "v", ":", "levilab, order 2"),

@@ -11,6 +11,7 @@ import numpy as np
 
 from levilab.benchmark import motion
 from levilab.benchmark.peers import best_time
+from levilab.simulator.schemes import SCHEMES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -58,12 +59,13 @@ def peak() -> float:
 
 
 def rates(points: Iterable[Point]) -> dict[str, Rate]:
-    """One top, and one lane of many, at 14 stages a step; from the points of `blanes-moan-6` at 1000 steps."""
+    """One top, and one lane of many; from the points of `levitron-6` at 1000 steps."""
     best = peak()
     found = {"peak": Rate(0.0, best, 1.0)}
-    for name, method in (("one top", "blanes-moan-6"), ("a lane", "blanes-moan-6, lanes")):
+    stages = SCHEMES["levitron-6"].stages
+    for name, method in (("one top", "levitron-6"), ("a lane", "levitron-6, lanes")):
         for point in points:
             if point.method == method and point.setting == "1000 steps":
-                ns = motion.DURATION / point.speed / (1000 * 14) * 1e9
+                ns = motion.DURATION / point.speed / (1000 * stages) * 1e9
                 found[name] = Rate(ns, OPERATIONS / ns, OPERATIONS / ns / best)
     return found

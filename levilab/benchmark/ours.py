@@ -24,9 +24,10 @@ if TYPE_CHECKING:
 STEPS = {
     "strang": (2000, 8000, 32000),
     "suzuki-4": (500, 1000, 2000, 4000, 8000),
-    "blanes-moan-4": (350, 500, 700, 1000, 1400, 2000, 3000),
+    "blanes-moan-4": (350, 500, 700, 1000, 1400, 2000, 3000, 4500),
     "kahan-li-6": (500, 1000, 2000, 4000),
     "blanes-moan-6": (200, 250, 300, 350, 400, 500, 700, 1000, 1200, 1250, 1400, 2000, 2800),
+    "levitron-6": (120, 160, 200, 240, 280, 320, 400, 500, 640, 800, 900, 1000, 1200, 1400, 2000),
     "kahan-li-8": (350, 500, 700, 1000, 1400, 1700, 2000, 2400),
 }
 
@@ -51,7 +52,7 @@ def scalar(quick: bool) -> Iterator[Point]:  # noqa: FBT001
 def many(quick: bool) -> Iterator[Point]:  # noqa: FBT001
     """Four times as many tops as lanes, one core, fixed steps; the error of the first."""
     tops = 4 * LANES
-    for name in ("blanes-moan-6", "kahan-li-8"):
+    for name in ("levitron-6", "kahan-li-8"):
         ready = problem(name)
         numbers = np.tile(numbers_of(ready.model), (tops, 1))
         starts = np.tile(ready.start, (tops, 1))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 #: Estimated errors are about so many times the true ones: they are to bound them.
-CAUTION = 4.0
+CAUTION = 6.0
 
 
 def estimate(fine: Array, twice: Array, four: Array, order: int) -> Any:

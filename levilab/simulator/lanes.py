@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from levilab.simulator.compiled import PART_OPTIONS, kernel, part
 from levilab.simulator.motion import STATE_SIZE, Model, drift, kick
 from levilab.simulator.splitting import put, taken, tidied
+from levilab.simulator.vectors import plus
 
 Array = NDArray[np.float64]
 
@@ -140,7 +141,9 @@ def advance_many(  # noqa: C901
             done[j] += 1
             s = tidied(taken(block, LANES, j), begin[j] + (done[j] + first) * h[j])
             put(block, LANES, j, s)
-            inside = (s.r[2] > height) & (s.r[0] * s.r[0] + s.r[1] * s.r[1] < radius2)
+            # where the step ended: the first drift of the next one has been made already
+            x, y, z = plus(s.r, -first * h[j], s.v)
+            inside = (z > height) & (x * x + y * y < radius2)
             over[j] = (done[j] == goal[j]) | (not inside)
             ended += over[j]
         if ended > 0:

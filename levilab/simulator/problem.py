@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from levilab.simulator import escapes, top
 from levilab.simulator.braking import Flowing, LooseFlowing
 from levilab.simulator.errors import SimulationError
+from levilab.simulator.loads import Kinked
 from levilab.simulator.motion import STATE_SIZE
 from levilab.simulator.schemes import SCHEMES, Scheme
 from levilab.simulator.splitting import advance
@@ -64,10 +65,14 @@ class Problem:
 
 
 def scheme_for(name: str | None, model: Any) -> Scheme:
-    """The scheme of that name, or the best one for the model: drag that flows allows no Nyström composition."""
+    """The scheme of that name, or the best one for the model: drag that flows allows no Nyström composition.
+
+    Part of the error of `levitron-6` comes back at each stop, and a drive with corners has many (docs/speed.md).
+    """
     flows = isinstance(model.drag, Flowing | LooseFlowing)
     if name is None:
-        return SCHEMES["kahan-li-8" if flows else "blanes-moan-6"]
+        smooth = "blanes-moan-6" if isinstance(model.drive, Kinked) else "levitron-6"
+        return SCHEMES["kahan-li-8" if flows else smooth]
     if name not in SCHEMES:
         raise SimulationError(f"scheme {name!r}: expected one of {', '.join(SCHEMES)}")
     if flows and not SCHEMES[name].any_split:

@@ -28,6 +28,9 @@ Array = NDArray[np.float64]
 #: A chaotic motion has no step that is small enough: below this part of the longest step it is told instead.
 SMALLEST = 1 / 256
 
+#: Shorter steps in succession that did not halve the error: once is chance in the estimates, twice is chaos.
+MOST_IN_VAIN = 2
+
 #: Thirty years [s].
 LONGEST_S = 1e9
 
@@ -117,15 +120,19 @@ def _to_tolerance(problem: Problem, wanted: _Wanted, tolerance: float, step: flo
     longest = longest_step(problem.scene, problem.model, problem.start, problem.scheme)
     h = step or min(longest / 2, abs(wanted.duration) / 2)
     best: tuple[Run, Accuracy] | None = None
+    in_vain = 0
     while True:
         run = _run(problem, wanted, h)
         position, axis = _errors(problem, run, h)
         accuracy = Accuracy(position, axis, tolerance, problem.scheme.name, h, run.steps)
         worst = max(position, axis)
-        stuck = best is not None and worst > 0.5 * max(best[1].position, best[1].axis)
-        if best is None or not stuck:
-            best = run, accuracy
-        if step or accuracy.reached or stuck or h < longest * SMALLEST:
+        if best is None or worst <= 0.5 * max(best[1].position, best[1].axis):
+            best, in_vain = (run, accuracy), 0
+        else:
+            in_vain += 1
+        if accuracy.reached:
+            return run, accuracy
+        if step or in_vain == MOST_IN_VAIN or h < longest * SMALLEST:
             return best
         h *= min(max(0.9 * (tolerance / worst) ** (1 / problem.scheme.order), 0.1), 0.7)
 

@@ -15,9 +15,9 @@ from levilab.benchmark.work_precision import Comparison, as_document, best_speed
 from levilab.simulator.single import simulate
 
 POINTS = (
-    Point("blanes-moan-6", "400 steps", 1e-8, 40000.0),
-    Point("blanes-moan-6", "1200 steps", 1e-11, 14000.0),
-    Point("blanes-moan-6, lanes", "1200 steps", 1e-11, 100000.0),
+    Point("levitron-6", "400 steps", 1e-8, 40000.0),
+    Point("levitron-6", "1200 steps", 1e-11, 14000.0),
+    Point("levitron-6, lanes", "1200 steps", 1e-11, 100000.0),
     Point("heyoka", "tol 1e-6", 1e-9, 8000.0),
     Point("heyoka", "tol 1e-8", 1e-12, 4000.0),
     Point("heyoka batch", "tol 1e-8, 8 lanes", 1e-12, 30000.0),
@@ -29,18 +29,18 @@ def test_the_two_forms_of_the_equations_and_the_simulator_describe_one_motion():
     # 0.2 s: long enough for eight nutations, short enough for a few milliseconds
     vector = solve_ivp(motion.vector_rate, (0, 0.2), motion.vector_start(), "DOP853", rtol=1e-12, atol=1e-16)
     euler = solve_ivp(motion.euler_rate, (0, 0.2), motion.euler_start(), "DOP853", rtol=1e-12, atol=1e-14)
-    ours = simulate(problem("blanes-moan-6").scene, 0.2, tolerance=1e-11, rate=None)
+    ours = simulate(problem("levitron-6").scene, 0.2, tolerance=1e-11, rate=None)
     assert vector.y[:3, -1] == pytest.approx(ours.position[-1], abs=1e-11)
     assert euler.y[:3, -1] == pytest.approx(ours.position[-1], abs=1e-9)
 
 
 def test_the_reference_is_the_golden_end_of_the_first_start():
-    ours = simulate(problem("blanes-moan-6").scene, motion.DURATION, tolerance=1e-11, rate=None)
+    ours = simulate(problem("levitron-6").scene, motion.DURATION, tolerance=1e-11, rate=None)
     assert np.abs(ours.position[-1] - motion.REFERENCE).max() < 1e-13
 
 
 def test_a_speed_lies_on_the_line_between_two_settings():
-    own = [p for p in POINTS if p.method == "blanes-moan-6"]
+    own = [p for p in POINTS if p.method == "levitron-6"]
     assert best_speed(own, 1e-8) == 40000.0
     middle = best_speed(own, 10**-9.5)  # half-way between the logarithms of 1e-8 and 1e-11
     assert middle == pytest.approx(math.sqrt(40000 * 14000))
@@ -61,7 +61,7 @@ def test_the_table_and_the_document_tell_what_is_missing(capsys):
     print_comparison(found)
     shown = capsys.readouterr().out
     assert "pip install 'levilab[peers]'" in shown
-    assert "blanes-moan-6" in shown
+    assert "levitron-6" in shown
     document = as_document(found)
     assert document["missing"] == ["heyoka"]
     assert document["ratios"][3]["ratio"] is None

@@ -40,9 +40,15 @@ def test_errors_are_within_the_tolerance_and_bound_the_true_ones():
     many = simulate_many(UNDRIVEN, {"start.spin_hz": spins}, 5.0, tolerance=1e-8)
     fine = simulate_many(UNDRIVEN, {"start.spin_hz": spins}, 5.0, step=2e-4, errors=False)
     assert np.all(np.isnan(fine.position_error))
-    true = np.linalg.norm(many.position - fine.position, axis=-1)
-    assert np.mean(true <= many.position_error) >= 0.95
-    assert many.axis_error.max() < 1e-8
+    for error, values, true in (
+        (many.position_error, many.position, fine.position),
+        (many.axis_error, many.axis, fine.axis),
+    ):
+        found = np.linalg.norm(values - true, axis=-1)
+        assert found.max() < 1e-8
+        assert np.mean(found <= error) >= 0.95
+        # where the two coarser runs agree by chance the estimate is far too large, never too small
+        assert np.mean(error < 1e-8) >= 0.95
 
 
 FALLS = {

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from kinds import KINDS
 
+from levilab.benchmark.nystrom import residuals
 from levilab.simulator.scene import Scene
 from levilab.simulator.schemes import SCHEMES, Scheme
 from levilab.simulator.single import simulate
@@ -16,6 +17,7 @@ RATES = {
     "blanes-moan-4": (1200, 2400, 3600),  # its first term is so small that the next is seen at longer steps
     "kahan-li-6": (360, 720, 1440),
     "blanes-moan-6": (120, 240, 480),
+    "levitron-6": (120, 240, 360),
     "kahan-li-8": (240, 360, 480),
 }
 
@@ -45,6 +47,14 @@ def test_a_composition_is_symmetric_and_adds_up_to_one_step(scheme: Scheme):
     assert len(scheme.drifts) == scheme.stages + 1
     assert sum(scheme.drifts) == pytest.approx(1, abs=1e-15)
     assert sum(scheme.kicks) == pytest.approx(1, abs=1e-15)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
+def test_a_composition_meets_all_conditions_of_its_order_and_not_those_of_the_next(scheme: Scheme):
+    # Hairer, Nørsett, Wanner II.14: all trees of ÿ = f(y), so no term of the error is missed that one motion hides
+    drifts, kicks = np.array(scheme.drifts), np.array(scheme.kicks)
+    assert np.abs(residuals(drifts, kicks, scheme.order)).max() < 5e-15
+    assert np.abs(residuals(drifts, kicks, scheme.order + 1)).max() > 1e-7
 
 
 @pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
