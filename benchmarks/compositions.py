@@ -151,7 +151,11 @@ def main() -> None:
     parser.add_argument("--stages", type=int, default=10)
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--compare", action="store_true", help="only compare the two of the table, kind by kind")
     options = parser.parse_args()
+    if options.compare:
+        compare()
+        return
     tops, unseen, draw = cases(14, 1), cases(16, 2), np.random.default_rng(options.seed)
     told(SCHEMES["blanes-moan-6"], unseen)
     end, best = time.perf_counter() + 60 * options.minutes, np.inf
@@ -163,6 +167,28 @@ def main() -> None:
             told(scheme, unseen)
             print("   drifts", [f"{a:.17g}" for a in scheme.drifts[: halves(options.stages)[0]]])
             print("   kicks ", [f"{b:.17g}" for b in scheme.kicks[: halves(options.stages)[1]]], flush=True)
+
+
+#: Scenes in which the two are compared, with what is changed in them.
+KINDS = {
+    "undriven": {},
+    "tilted": {},
+    "driven": {},
+    "driven, triangle": {"drive.waveform": "triangle"},
+    "driven, square": {"drive.waveform": "square"},
+}
+
+
+def compare() -> None:
+    """How many times smaller the error of `levitron-6` is at the same stages a second."""
+    rates = (600.0, 1100.0, 2000.0, 4000.0)
+    print("error of blanes-moan-6 over that of levitron-6 at stages/s", *(f"{rate:6.0f}" for rate in rates))
+    for kind, changes in KINDS.items():
+        scene = preset(kind.partition(",")[0]).changed(changes)
+        problem = Problem(scene, top.model_of(scene), top.start_of(scene), SCHEMES["blanes-moan-6"])
+        one = Case(problem, after(replace(problem, scheme=SCHEMES["kahan-li-8"]), 9000))
+        both = [[one.error(SCHEMES[name], rate) for rate in rates] for name in ("blanes-moan-6", "levitron-6")]
+        print(f"{kind:58}", *(f"{old / new:6.2g}" for old, new in zip(*both, strict=True)))
 
 
 def told(scheme: Scheme, unseen: list[Case]) -> None:

@@ -20,7 +20,8 @@ class Occupied(NotConnected):
     """Another program holds the instrument."""
 
     def __init__(self, address: str) -> None:
-        super().__init__(address, "another program has locked the instrument: close it there first")
+        text = "another program has locked the instrument, or a lost link still has: end it, or wait"
+        super().__init__(address, text)
 
 
 class NoAnswer(InstrumentError):

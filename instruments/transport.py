@@ -41,8 +41,9 @@ _SHORT = 64
 #: What an instrument is asked for its name, and the answer: four fields, the maker's first.
 _WHO, _IDENTITY = "*IDN?", re.compile(rb"[A-Za-z][^,\n]*,[^,\n]*,[^,\n]*,[^\n]*\n?")
 
-#: VISA's numbers for: locked, busy.
+#: VISA's numbers for: locked, busy; and for: no such operation, not implemented.
 _HELD_BY_ANOTHER = {-1073807345, -1073807246}
+_HAS_NO_LOCKS = {-1073807257, -1073807231}
 
 
 class Transport(Protocol):
@@ -267,9 +268,13 @@ class VisaTransport:
         except pyvisa.VisaIOError as error:
             if error.error_code in _HELD_BY_ANOTHER:
                 raise Occupied(self.address) from error
-            # interfaces without locks: bare sockets, serial lines, and what pyvisa-py does not lock
+            # interfaces without locks are no trouble: bare sockets, serial lines, and what pyvisa-py does not lock
+            if error.error_code not in _HAS_NO_LOCKS:
+                raise NotConnected(self.address, f"it could not be locked ({error.description})") from error
         except NotImplementedError:
             pass
+        except (EOFError, OSError, RuntimeError, KeyError) as error:  # of pyvisa-py's VXI-11, when the link breaks
+            raise NotConnected(self.address, f"it could not be locked ({error!r})") from error
         self._locked = True
 
     def close(self) -> None:

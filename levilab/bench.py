@@ -117,7 +117,7 @@ class Bench:
 
 
 def _coil_limits(limits: Limits) -> CoilLimits:
-    """The limits of bench.toml as the generator's driver keeps them."""
+    """The limits of the bench file as the generator's driver keeps them."""
     return CoilLimits(**limits.model_dump())
 
 
@@ -149,7 +149,8 @@ def open_bench(
                 settings = VIRTUAL[kind] if world else _described(config, kind)
                 instrument = opened(kind, settings, bench.clock, library=library, log=log)
                 links.callback(instrument.close)
-                instrument.transport.lock()  # while we measure nobody else turns its keys
+                if kind != "generator":  # a drive whose link was lost must be switched off over another one
+                    instrument.transport.lock()  # while we measure nobody else turns its keys
                 if kind == "generator":
                     cast("Generator", instrument).limits = _coil_limits(config.limits)
                 instrument.identity()

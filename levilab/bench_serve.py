@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from instruments.virtual.servers.server import LOOPBACK, PORTS_PER_INSTRUMENT, Place, offered
+from instruments.virtual.servers.station import first_of
 from levilab.clock import WallClock
 from levilab.errors import LevilabError
 from levilab.virtual_bench import AGAIN_S, MODELS, VIRTUAL, own_world, scene_world, virtual_bus
@@ -20,9 +21,16 @@ if TYPE_CHECKING:
     from instruments.virtual.bus import Bus
     from instruments.virtual.servers.server import Offer
     from levilab.simulator.scene import Scene
+    from levilab.simulator.world import World
 
 #: What asks a server to end: Ctrl-C, kill, a closed terminal, and on Windows Ctrl-Break.
 _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
+
+#: A top in full motion is simulated some 700 times faster than it moves; half of the time and more is for the clients.
+FASTEST_MOTION = 200.0
+
+#: How often the world's motion is brought up to the clock [s], as the clock on the wall tells.
+_KEEP_UP_S = 0.2
 
 #: The greatest port there is.
 _LAST_PORT = 0xFFFF
@@ -86,13 +94,15 @@ def serve(
     WrongService, SceneError.
     """
     with _asked_to_end() as end:
-        bus = _bus(service, tell)
-        asyncio.run(_serve(service, bus, ready, end))
+        world = _world(service, tell)
+        if not end.by:
+            asyncio.run(_serve(service, world, ready, end))
     assert end.by
     return end.by
 
 
-async def _serve(service: Service, bus: Bus, ready: Callable[[tuple[Served, ...]], None], end: _End) -> None:
+async def _serve(service: Service, world: World, ready: Callable[[tuple[Served, ...]], None], end: _End) -> None:
+    bus = virtual_bus(world, service.models)
     place = _place(service, len(bus.instruments))
     async with contextlib.AsyncExitStack() as opened:
         try:
@@ -101,14 +111,24 @@ async def _serve(service: Service, bus: Bus, ready: Callable[[tuple[Served, ...]
             why = f"the bench cannot be offered at {service.host} ({error})"
             raise CannotServe(f"{why}: try another --host or --port-base") from error
         ready(tuple(_served(service, offer) for offer in offers))
-        await end.comes()
+        await first_of(end.comes(), _kept_up(bus, world))
 
 
-def _bus(service: Service, tell: Callable[[str], None]) -> Bus:
+async def _kept_up(bus: Bus, world: World) -> None:
+    """Let the motion follow the clock while nobody looks: the first who asks need not wait for hours of it."""
+    while True:
+        await asyncio.sleep(_KEEP_UP_S)
+        with bus.lock:
+            world.keep_up()
+
+
+def _world(service: Service, tell: Callable[[str], None]) -> World:
     clock = _clock(service)
     if service.scene is None:
-        return virtual_bus(own_world(clock), service.models)
-    return virtual_bus(scene_world(service.scene, lambda: _clock(service), tell, again_s=AGAIN_S), service.models)
+        return own_world(clock)
+    if service.speed > FASTEST_MOTION:
+        raise WrongService(f"--speed {service.speed:g}: with --scene up to {FASTEST_MOTION:g} is possible")
+    return scene_world(service.scene, lambda: _clock(service), tell, again_s=AGAIN_S)
 
 
 def _clock(service: Service) -> WallClock:

@@ -109,7 +109,9 @@ def _tell_checked(one: Checked) -> None:
 
 @bench_app.command("serve", epilog="Example: levilab bench serve --speed 10 --port-base 15000")
 def bench_serve(
-    speed: Annotated[float, typer.Option(metavar="X", help="Seconds of the bench per second on the wall.")] = 1.0,
+    speed: Annotated[
+        float, typer.Option(metavar="X", help="Seconds of the bench per second on the wall; with --scene up to 200.")
+    ] = 1.0,
     models: Annotated[
         list[str] | None,
         typer.Option("--model", metavar="KIND=MODEL", help="Choose a model, as counter=CNT-91; repeatable."),

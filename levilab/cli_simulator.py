@@ -19,7 +19,7 @@ EXIT_INTERRUPTED = 130
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else on standard output.")]
 Presets = Annotated[
-    str, typer.Argument(metavar="SCENE", help="undriven, friction, tilted, driven, loose-washers, or a TOML file.")
+    str, typer.Argument(metavar="SCENE", help="undriven, friction, tilted, driven, loose-washers, spindown, or a file.")
 ]
 Settings = Annotated[
     list[str] | None,

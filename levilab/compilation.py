@@ -17,8 +17,11 @@ def telling_of_compilation(message: Callable[[str], None]) -> Iterator[None]:
     from levilab.simulator.splitting import advance
 
     class Compilation(Listener):
+        told = False
+
         def on_start(self, event: Event) -> None:
-            if event.data["dispatcher"] is advance:
+            if event.data["dispatcher"] is advance and not self.told:
+                self.told = True
                 message("compiling for this kind of scene: a few seconds, once")
 
         def on_end(self, event: Event) -> None:

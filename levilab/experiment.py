@@ -66,12 +66,13 @@ class Experiment:
 # --- the spin-down -------------------------------------------------------------------------------------
 
 #: The drive goes up in steps; each makes a held top swing a little about it [s].
-_RAMP_STEP_S = 2.0
+_RAMP_STEP_S = 1.0
 #: A held top swings about the drive's frequency by what the drive can hold at most, 0.5 Hz at 0.4 mT [Hz].
 _HELD_WITHIN_HZ = 1.0
-#: Whether the drive takes hold depends on how the top happens to point when it comes on, one time in four it does not:
-#: by this time [s] a top that is not held has lost 1.5 Hz against the drive, and it is tried so often.
-_LOOK_AFTER_S, _TRIES = 10.0, 4
+#: Whether the drive takes hold depends on how the top happens to point when it comes on, and one time in four it does
+#: not.  So the top is looked at so often on the way [s] (one that is not held loses 0.1 Hz/s to the air), and tried
+#: again with the drive so many turns later: a reading ends with a pulse, so without that it would point as before.
+_LOOK_EVERY_S, _TURNS_LATER = 10.0, (0.0, 0.5, 0.25, 0.75)
 #: A free top does not speed up (5 % leave room for noise), nor lose more than half its spin in 100 s (air: 30 %).
 _HIGHEST_SHARE, _HALVING_S = 1.05, 100.0
 #: Two counts of one spin, seconds apart, agree this well (drag takes 0.3 %/s, noise is 0.1 %).
@@ -125,10 +126,11 @@ def _drive_up(session: Session) -> None:
     """Let the drive take hold of the top, and raise it.  Raises ExperimentFailed."""
     settings = _settings(session)
     seen = ""
-    for tries in range(1, _TRIES + 1):
-        spin = _free_spin(session)
+    for tries, later in enumerate(_TURNS_LATER, 1):
+        spin = _free_spin(session, seen)
         session.stop.check()  # nobody who asked for the end wants the drive on
         session.bench.check_limits(frequency_hz=spin, amplitude_vpp=settings.drive_amplitude_vpp)
+        session.wait(later / spin)
         session.event("drive on", f"drive on at the top's spin, {spin:.2f} Hz", frequency_hz=spin)
         session.bench.drive(
             waveform=settings.drive_waveform, frequency_hz=spin, amplitude_vpp=settings.drive_amplitude_vpp
@@ -138,19 +140,25 @@ def _drive_up(session: Session) -> None:
         except _NotHeld as lost:
             session.bench.outputs_off()
             seen = str(lost)
-            session.event("not held", f"try {tries} of {_TRIES}: the drive does not hold the top, {seen}")
+            session.event("not held", f"try {tries} of {len(_TURNS_LATER)}: the drive does not hold the top, {seen}")
         else:
             session.event("locked", f"the top follows the drive at {held:.2f} Hz", frequency_hz=held)
             return
-    raise ExperimentFailed(
+    raise _did_not_follow(settings, seen)
+
+
+def _did_not_follow(settings: SpinSettings, seen: str) -> ExperimentFailed:
+    return ExperimentFailed(
         f"the top did not follow the drive to {settings.drive_frequency_hz:g} Hz ({seen}): ramp slower "
         "(spin.ramp_hz_per_s) or drive harder (spin.drive_amplitude_vpp)"
     )
 
 
-def _free_spin(session: Session) -> float:
-    """The spin before the drive is on.  Raises ExperimentFailed where there is no light."""
+def _free_spin(session: Session, before: str) -> float:
+    """The spin before the drive is on.  before: what the last try ended with.  Raises ExperimentFailed in the dark."""
     spin = _spin_now(session)
+    if spin is None and before:
+        raise _did_not_follow(_settings(session), f"{before}; then it fell")
     if spin is None:
         raise ExperimentFailed(
             f"the counter sees no light pulses at {_settings(session).trigger_level_v:g} V: is the top floating and "
@@ -172,7 +180,7 @@ def _ramp(session: Session, start: float, settings: SpinSettings) -> float:
         session.bench.drive_at(drive)
         session.show.preparing(f"drive at {drive:.2f} Hz", k / steps)
         session.wait(_RAMP_STEP_S)
-        if k == round(_LOOK_AFTER_S / _RAMP_STEP_S):
+        if k % round(_LOOK_EVERY_S / _RAMP_STEP_S) == 0 and k < steps:
             _held_spin(session, drive)
     return _held_spin(session, target)
 

@@ -96,9 +96,15 @@ def _scene(name: str | None, run: Run | None) -> Scene | None:
     begun = run.record.configuration.get("scene") if run else None
     if name is None and begun is None:
         return None
-    from levilab.simulator.scene import read_scene, scene_of
+    from levilab.simulator.scene import SceneError, read_scene, scene_of
 
-    return scene_of(begun) if begun is not None else read_scene(str(name))
+    scene = scene_of(begun) if begun is not None else read_scene(str(name))
+    if scene.top.aligned:
+        raise SceneError(
+            f"scene {scene.name}: no drive can hold a top whose moment lies along its axis (top.moment_tilt.0 = 0): "
+            "take spindown, or give it a part across, such as top.moment_tilt = [0.03, 0.97]"
+        )
+    return scene
 
 
 def _of_a_spin(order: Order, scene: SpinScene, *, realtime: bool) -> Order:

@@ -161,7 +161,7 @@ def _fell(events: list[dict[str, Any]], fit: SpinDown) -> str:
     text = next((str(event["text"]) for event in reversed(events) if event["kind"] == FELL), None)
     if text is None:
         return ""
-    return f"{text}; last reading {fit.frequency[-1]:.2f} Hz at {fit.time[-1]:.1f} s"
+    return f"{text}; last reading that was fitted {fit.frequency[-1]:.2f} Hz at {fit.time[-1]:.1f} s"
 
 
 # --- with what -----------------------------------------------------------------------------------------

@@ -80,7 +80,7 @@ class Flight:
         self._pieces: History[_Up | _Down] = History(-math.inf, _Down(-math.inf))
         self._step: float | None = None
         # what comes next: a top in this state, or none until a new one is put there; and when [s]
-        self._state: Array | None = top.start_of(self._scene)
+        self._state: Array | None = self._begin(0.0)
         self._known = 0.0
 
     def prepare(self) -> None:
@@ -95,7 +95,8 @@ class Flight:
 
     def change(self, time: float, drive: Mapping[str, Any]) -> None:
         """From this time on the drive is this: keys of the scene's table; what was seen of later times is gone."""
-        self._look(time)
+        self.look(time)
+        self._step = None  # what another drive needs
         now = self._pieces.at(time)
         if isinstance(now, _Up):
             self._pieces.cut(time)
@@ -114,7 +115,7 @@ class Flight:
 
         Whole turns are not counted on from one piece to the next.
         """
-        self._look(float(times.max(initial=0.0)))
+        self.look(float(times.max(initial=0.0)))
         turns, up = np.zeros_like(times), np.zeros(times.shape, dtype=np.bool_)
         for piece, part in self._pieces.pieces(times):
             if isinstance(piece, _Up):
@@ -123,12 +124,18 @@ class Flight:
 
     # --- as far as somebody looks ---
 
-    def _look(self, until: float) -> None:
+    def look(self, until: float) -> None:
+        """Work the motion out up to this time [s]."""
         while self._known <= until:
             if self._state is None:
-                self._state = top.start_of(self._scene)
-                self._state[top.TIME] = self._known
+                self._state, self._step = self._begin(self._known), None
             self._live(self._state)
+
+    def _begin(self, time: float) -> Array:
+        """The state of a top that is put there at this time, shape (18,)."""
+        state = top.start_of(self._scene)
+        state[top.TIME] = time
+        return state
 
     def _live(self, state: Array) -> None:
         """The next piece of the life of a top in this state."""

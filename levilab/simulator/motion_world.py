@@ -49,7 +49,9 @@ class MotionWorld:
     """The top of a scene, and what instruments see of it; see :class:`levilab.simulator.world.World`.
 
     The generator takes the place of the scene's drive, whose direction is the coil's; its offset moves nothing.
-    again_s: see Flight; seed: of the light's noise.  Raises SceneError for a scene without motion.
+    again_s: see Flight; seed: of the light's noise, and of the place of the tape on the rim (0: where the transverse
+    part of the moment points): who switches a drive on after a pulse meets the moment there.  Raises SceneError for a
+    scene without motion.
 
     >>> from levilab.clock import VirtualClock
     >>> from levilab.simulator import preset
@@ -65,20 +67,30 @@ class MotionWorld:
         self.clock = clock
         self._tape, self._seed = tape or Tape(), seed
         self._coil, self._flight = Coil(), Flight(scene, again_s)
+        self._tape_at = float(np.random.default_rng(seed).uniform()) if seed else 0.0
         self._told = 0.0  # the last time that a change was told for [s]
         probe = np.array([[0.0, 0.0, PROBE_M]])
         self._probe_t = float(flux_density(top.base_field(scene), probe)[0, 2])
 
     def drive(self, time: float, output: Output) -> None:
         """From this time on the coil's field is this; see World."""
-        horizon = self.clock.now() - KEPT_S
-        self._coil.history.forget(horizon)
-        self._flight.forget(horizon)
+        self._forget()
+        time = max(time, 0.0)
         self._coil.change(time, output)
         drive = self._drive(time, output)
         if drive["waveform"] != "off" or self._flight.driven or time < self._told:
             self._flight.change(time, drive)
             self._told = time
+
+    def keep_up(self) -> None:
+        """Work the motion out up to now, so that nobody has to wait for hours of it."""
+        self._forget()
+        self._flight.look(self.clock.now())
+
+    def _forget(self) -> None:
+        horizon = self.clock.now() - KEPT_S
+        self._coil.history.forget(horizon)
+        self._flight.forget(horizon)
 
     def _drive(self, time: float, output: Output) -> dict[str, str | float]:
         """The keys of a scene's drive that make this output."""
@@ -97,8 +109,9 @@ class MotionWorld:
 
     def light(self, start: float, step: float, n: int) -> Array:
         """The phototransistor's voltage; see World."""
+        self._forget()
         turns, up = self._flight.turns(start + step * np.arange(n, dtype=np.float64))
-        return self._tape.light(turns, up, start, self._seed)
+        return self._tape.light(turns + self._tape_at, up, start, self._seed)
 
     def coil_field(self, start: float, step: float, n: int) -> Array:
         """The coil's field; see World."""

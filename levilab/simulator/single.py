@@ -100,6 +100,11 @@ def simulate(
     state = top.start_of(scene) if start is None else np.array(start, dtype=np.float64)
     if not np.all(np.isfinite(state)):
         raise SimulationError("the start has a value that is no number: 18 finite numbers are expected")
+    if start is None and min(escapes.margins(state, (scene.escape.radius_m, scene.escape.height_m)).values()) < 0:
+        raise SimulationError(
+            f"escape.height_m = {scene.escape.height_m}: the top starts at {state[top.R][2]:.4g} m, outside of the "
+            "limits of the escape, where it would be lost before it began"
+        )
     problem = Problem(scene, model, state, scheme_for(scheme, model))
     wanted = _Wanted(duration, rate, events, progress)
     run, accuracy = _to_tolerance(problem, wanted, tolerance, step)

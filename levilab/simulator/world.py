@@ -38,6 +38,9 @@ class World(Protocol):
 
     clock: Clock
 
+    def keep_up(self) -> None:
+        """Whatever takes long, do it up to now, before somebody asks; and forget what nobody asks for."""
+
     def light(self, start: float, step: float, n: int) -> Array:
         """The phototransistor's voltage at start + step·k, shape (n,) [V]."""
 
@@ -146,6 +149,10 @@ class SpinWorld:
         self._told, self._drive_spin, self._hold = time, 2 * math.pi * output.frequency, hold
         if not fallen:
             self._go_on(now)
+
+    def keep_up(self) -> None:
+        """Nothing takes long here; see :class:`World`."""
+        self._forget()
 
     def _forget(self) -> None:
         horizon = self.clock.now() - KEPT_S

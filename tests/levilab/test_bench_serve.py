@@ -69,12 +69,15 @@ def test_the_line_names_every_instrument_each_answers_and_sigterm_ends_it():
                 client.close()
 
 
-def test_a_top_in_full_motion_can_be_served():
-    with serving("--scene", "spindown", "--speed", "5") as (_, said):
+@pytest.mark.parametrize(("spin", "low", "high"), [(30.0, 28, 31), (15.0, 9e37, 1e38)], ids=["up", "fallen"])
+def test_a_top_in_full_motion_can_be_served(spin, low, high, tmp_path):
+    scene = tmp_path / "mine.toml"
+    scene.write_text(f"[start]\nspin_hz = {spin}\n", encoding="utf-8")  # one of 15 Hz falls at once
+    with serving("--scene", str(scene)) as (_, said):
         names = said["instruments"]["counter"]["resources"]
         with pyvisa.ResourceManager("@py").open_resource(names["hislip"], timeout=1000 * AT_MOST) as counter:
-            counter.write("INP1:COUP DC;:INP1:LEV:AUTO OFF;:INP1:LEV 0.6;:SENS:FREQ:GATE:TIME 1;:SYST:TIM 5")
-            assert 20 < float(counter.query("READ?")) < 31
+            counter.write("INP1:COUP DC;:INP1:LEV:AUTO OFF;:INP1:LEV 0.6;:SENS:FREQ:GATE:TIME 0.3;:SYST:TIM 0.6")
+            assert low < float(counter.query("READ?")) < high
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for one process")

@@ -50,7 +50,7 @@ def test_acquire_analyze_report_and_list_from_an_empty_folder(levilab: Command, 
 
 
 def test_json_is_one_document_and_nothing_else(levilab: Command) -> None:
-    acquired = json.loads(levilab("acquire", "spin", "--mock", "--seed", "2", "--json").stdout)
+    acquired = json.loads(levilab("acquire", "spin", "--mock", "--seed", "3", "--json").stdout)
     assert acquired["status"] == "finished"
     result = json.loads(levilab("analyze", "spindown", acquired["run"], "--json").stdout)
     assert result["best_model"] == "disc"

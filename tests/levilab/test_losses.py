@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from instruments.virtual.bus import Bus
     from levilab.run import Run
 
+#: Readings before the drive is off: the spin at first, every 10 s of the 201 on the way up, and at the end of it.
+BEFORE = 22
+
 
 class Silent:
     """Shows nothing."""
@@ -90,7 +93,7 @@ def test_a_fault_of_a_reading_is_told_and_the_run_goes_on(
     what: str, times: int, whole: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # two readings come before the drive is off
-    run = acquired(tmp_path, monkeypatch, Fault(what, question=r"READ\?", after=9, times=times))
+    run = acquired(tmp_path, monkeypatch, Fault(what, question=r"READ\?", after=BEFORE + 6, times=times))
     before, frame = whole.readings().frame, run.readings().frame
     assert run.status == "finished"
     assert kinds(run)[-1] == "fell"
@@ -109,7 +112,7 @@ def test_a_fault_of_a_reading_is_told_and_the_run_goes_on(
 def test_an_instrument_that_is_gone_for_a_while_is_tried_until_it_is_back(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run = acquired(tmp_path, monkeypatch, Fault("away for 5 s", question=r"READ\?", after=9))
+    run = acquired(tmp_path, monkeypatch, Fault("away for 5 s", question=r"READ\?", after=BEFORE + 6))
     tries = [event for event in run.events() if event["kind"] == "not reached"]
     assert len(tries) == 3  # at once, and 1 s and 3 s later; 7 s later it is back
     assert "try 3 of 6" in tries[-1]["text"]
@@ -123,7 +126,7 @@ def test_an_instrument_that_another_program_keeps_ends_the_run_with_what_there_i
     from levilab.run import Run
 
     with pytest.raises(InstrumentError, match="locked"):
-        acquired(tmp_path, monkeypatch, Fault("taken by another", question=r"READ\?", after=9))
+        acquired(tmp_path, monkeypatch, Fault("taken by another", question=r"READ\?", after=BEFORE + 6))
     (run,) = [Run.load(path) for path in tmp_path.iterdir()]
     assert run.status == "failed"
     assert len(run.readings().frame) == 6
@@ -136,7 +139,7 @@ def test_an_instrument_that_is_lost_again_and_again_is_given_up(
     from levilab.run import Run
 
     with pytest.raises(InstrumentError):
-        acquired(tmp_path, monkeypatch, Fault("disconnected", question=r"READ\?", after=9, times=1000))
+        acquired(tmp_path, monkeypatch, Fault("disconnected", question=r"READ\?", after=BEFORE + 6, times=1000))
     (run,) = [Run.load(path) for path in tmp_path.iterdir()]
     assert kinds(run).count("instrument lost") == MOST_LOSSES + 1
 
@@ -144,7 +147,7 @@ def test_an_instrument_that_is_lost_again_and_again_is_given_up(
 def test_settings_that_somebody_changed_are_told_by_name_and_set_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run = acquired(tmp_path, monkeypatch, Fault("reset", question=r"READ\?", after=9))
+    run = acquired(tmp_path, monkeypatch, Fault("reset", question=r"READ\?", after=BEFORE + 6))
     (lost,) = [event for event in run.events() if event["kind"] == "instrument lost"]
     assert "gate_s = 0.1 instead of 1.0" in lost["text"]
     assert run.record.instruments["counter"]["settings_end"]["gate_s"] == 1.0
@@ -198,7 +201,7 @@ def test_what_was_missed_is_not_caught_up_with(tmp_path: Path, monkeypatch: pyte
 
     def with_faults(*given: object) -> Bus:
         bus = virtual_bus(*given)  # type: ignore[arg-type]
-        bus.faults.append(Fault("away for 5 s", question=r"READ\?", after=9))
+        bus.faults.append(Fault("away for 5 s", question=r"READ\?", after=BEFORE + 6))
         return bus
 
     monkeypatch.setattr(benches, "virtual_bus", with_faults)

@@ -140,6 +140,18 @@ def test_a_scene_without_motion_is_refused():
         Flight(preset("friction").changed({"observed": "spin"}))
 
 
+def test_the_step_that_a_fast_drive_needs_goes_with_it():
+    flight = Flight(TILTED)
+    flight.look(2.0)
+    usual = flight._step
+    flight.change(3.0, SINE | {"frequency_hz": 900.0})
+    flight.look(5.0)
+    assert flight._step < usual / 2
+    flight.change(5.0, OFF)
+    flight.look(8.0)
+    assert flight._step == pytest.approx(usual, rel=0.3)
+
+
 # --- the drive of the bench ---
 
 
@@ -215,6 +227,13 @@ def test_what_cannot_turn_a_top_is_no_drive(output):
     np.testing.assert_array_equal(top.light(0.0, 1e-3, 2000), world().light(0.0, 1e-3, 2000))
 
 
+def test_a_drive_from_before_the_beginning_is_one_from_the_beginning():
+    early, other = world(), world()
+    early.drive(-1.0, Output("SIN", 30.0, 4e-4, 0.0))
+    other.drive(0.0, Output("SIN", 30.0, 4e-4, 0.0))
+    np.testing.assert_array_equal(early.light(0.0, 1e-3, 2000), other.light(0.0, 1e-3, 2000))
+
+
 def test_the_drive_takes_hold_of_the_top():
     # a tenth of a hertz beside the spin: held, it turns with the drive, else it would lag by two turns
     top = world(preset("driven").changed({"start.spin_hz": 29.9}), tape=Tape(noise=0.0))
@@ -237,6 +256,11 @@ def test_the_light_is_one_pulse_a_turn_and_dark_without_a_top():
     assert np.all(top.light(-1.0, 1e-4, 1000) == 0.1)
 
 
+def test_the_seed_chooses_where_on_the_rim_the_tape_is():
+    places = {int(np.argmax(world(seed=seed, tape=Tape(noise=0.0)).light(0.0, 1e-5, 3333))) for seed in (0, 1, 2)}
+    assert len(places) == 3
+
+
 def test_the_noise_is_as_large_as_asked_for_and_another_with_another_seed():
     fallen = world(FALLING, tape=Tape(noise=0.02), seed=1)
     light = fallen.light(10.0, 1e-4, 40_000)
@@ -251,11 +275,13 @@ def test_the_probe_sees_the_field_of_the_scenes_base():
     assert world(twice).flux_density(5.0) == pytest.approx(2 * BASE_FIELD, rel=1e-8)
 
 
-def test_a_bench_that_runs_for_hours_lets_go_what_nobody_asks_for():
+@pytest.mark.parametrize(
+    "look", [lambda top: top.light(top.clock.now(), 1e-3, 10), lambda top: top.keep_up()], ids=["light", "keep up"]
+)
+def test_a_bench_that_runs_for_hours_lets_go_what_nobody_asks_for(look):
     top = world(FALLING, again_s=60.0)
-    for hour in range(48):
+    for _ in range(48):
         top.clock.sleep(3600.0)
-        top.light(top.clock.now(), 1e-3, 10)
-        top.drive(top.clock.now(), Output("SIN", 30.0 + hour, 0.0, 0.0))
+        look(top)
     kept = len(top._flight._pieces)
     assert kept < 2 * KEPT_S / 60 + 1100  # a life and a fall each minute, and a thousand that are not let go yet

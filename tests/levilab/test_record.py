@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+#: Readings before the drive is off: the spin at first, every 10 s of the 201 on the way up, and at the end of it.
+BEFORE = 22
+
 
 class Silent:
     """Shows nothing, remembers what it was to show."""
@@ -147,7 +150,7 @@ def test_what_was_shown_is_what_stands_in_the_folder(tmp_path: Path) -> None:
 def test_the_wire_log_holds_every_byte(tmp_path: Path) -> None:
     run = acquire(mock(tmp_path, wire_log=True), Silent())
     log = (run.folder / "wire.log").read_text(encoding="utf-8")
-    assert log.count("> b'READ?\\n'") == len(run.readings().frame) + 3 + 2  # three before, two at the fall
+    assert log.count("> b'READ?\\n'") == len(run.readings().frame) + BEFORE + 2  # and two at the fall
     assert "> b'OUTP1 OFF\\n'" in log
 
 
@@ -164,7 +167,8 @@ def test_a_top_that_does_not_follow_the_drive_is_an_error(tmp_path: Path, output
     with pytest.raises(ExperimentFailed, match="did not follow"):
         acquire(in_world(tmp_path, SpinScene(), weak), Silent())
     (run,) = [Run.load(path) for path in tmp_path.iterdir()]
-    assert [event["kind"] for event in run.events()] == [*4 * ["drive on", "not held"], "failed"]
+    # once more and once more, until the top has fallen meanwhile
+    assert [event["kind"] for event in run.events()][:5] == [*2 * ["drive on", "not held"], "drive on"]
     assert True in outputs
     assert outputs[-1] is False
 
@@ -212,7 +216,7 @@ def test_ctrl_c_twice_breaks_through_an_exchange_and_outputs_are_off_all_the_sam
     assert outputs[-1] is False
 
 
-@pytest.mark.parametrize("when", range(0, 22, 3))
+@pytest.mark.parametrize("when", [0, 1, 2, 11, 20, 21, 22, 30, 39, 40])
 def test_an_exception_at_any_moment_leaves_outputs_off_and_the_readings_so_far(
     tmp_path: Path, outputs: list[bool], monkeypatch: pytest.MonkeyPatch, when: int
 ) -> None:
@@ -229,7 +233,7 @@ def test_an_exception_at_any_moment_leaves_outputs_off_and_the_readings_so_far(
         acquire(mock(tmp_path), Silent())
     (run,) = [Run.load(path) for path in tmp_path.iterdir()]
     assert run.status == "failed"
-    assert len(run.readings().frame) == max(0, when - 3)
+    assert len(run.readings().frame) == max(0, when - BEFORE)
     assert not outputs or outputs[-1] is False
     assert "no more of it" in run.events()[-1]["text"]
 
@@ -427,8 +431,8 @@ def test_a_spin_down_in_full_motion_has_the_drag_of_its_scene(tmp_path: Path) ->
     assert run.record.configuration["scene"] == preset("spindown").as_table()
     assert "full motion" in str(run.record.synthetic_how)
     disc = analyze_spindowns([run.folder], Options()).runs[0].fit("disc").parameters["c32"]
-    # 1.2 % less: towards its resonance at 22 Hz the wobble takes part of the energy
-    assert disc.value == pytest.approx(2.34e-4, rel=0.02)
+    # 1.2 % less than the scene's: towards its resonance at 22 Hz the wobble takes part of the energy
+    assert disc.value == pytest.approx(0.988 * 2.34e-4, rel=0.008)
 
 
 def test_a_run_in_full_motion_is_repeated_by_its_seed_and_resumed_in_its_scene(tmp_path: Path) -> None:
@@ -437,5 +441,5 @@ def test_a_run_in_full_motion_is_repeated_by_its_seed_and_resumed_in_its_scene(t
     assert half.status == "interrupted"
     run = acquire(mock(tmp_path, None, resume=half.folder), Silent())
     assert run.status == "finished"
-    np.testing.assert_array_equal(run.readings().frame.to_numpy()[:6], whole.to_numpy()[:6])
+    assert np.allclose(run.readings().frame["spin_frequency_hz"], whole["spin_frequency_hz"], rtol=0, atol=0.02)
     assert run.record.configuration["scene"]["name"] == "spindown"

@@ -288,6 +288,8 @@ class Listener:
                 self._connected(*await asyncio.open_connection(sock=connection))
             except OSError:  # gone already, or this process has too much open
                 await asyncio.sleep(_LOOK_AGAIN)
+            except Exception:
+                log.exception("a connection could not be taken; the others can")
 
     def _connected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if len(self._talks) >= self._most or not self._station.bus.reachable(self._station.device):
