@@ -321,6 +321,21 @@ def welcome(served, way):
     return False
 
 
+def test_a_connection_that_cannot_be_taken_does_not_keep_others_away(served, monkeypatch, caplog):
+    first = iter([RuntimeError("for once")])
+
+    def reachable(device):
+        for error in first:
+            raise error
+        return True
+
+    monkeypatch.setattr(served.server.bus, "reachable", reachable)
+    served.bare("socket")
+    other = served.open("socket")
+    assert other.query("*IDN?").strip() == Thing.identity
+    assert "could not be taken" in caplog.text
+
+
 @pytest.mark.parametrize("way", ["socket", "hislip", "vxi11"])
 def test_more_clients_than_there_may_be_are_sent_away_until_one_leaves(served, way):
     crowd = [served.bare(way) for _ in range(station.MOST_CLIENTS * (2 if way == "hislip" else 1))]

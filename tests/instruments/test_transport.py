@@ -3,9 +3,10 @@
 import itertools
 
 import pytest
+from pyvisa import VisaIOError
 from pyvisa.constants import StatusCode
 
-from instruments.errors import BadAnswer, NoAnswer, NotConnected
+from instruments.errors import BadAnswer, NoAnswer, NotConnected, Occupied
 from instruments.transport import VisaTransport
 from instruments.virtual.bus import Bus
 from instruments.virtual.device import VirtualInstrument, answers
@@ -233,3 +234,32 @@ def test_the_log_has_what_could_not_be_read_either(bus):
         (">", b"*IDN?\n"),
         ("<", IDENTITY.encode() + b"\n"),
     ]
+
+
+@pytest.mark.parametrize(
+    ("trouble", "error"),
+    [
+        (VisaIOError(StatusCode.error_nonsupported_operation), None),
+        (NotImplementedError(), None),
+        (VisaIOError(StatusCode.error_resource_locked), Occupied),
+        (VisaIOError(StatusCode.error_connection_lost), NotConnected),
+        (EOFError(), NotConnected),
+        (ConnectionResetError(), NotConnected),
+        (KeyError(8), NotConnected),
+    ],
+    ids=lambda one: getattr(one, "abbreviation", None) or (one.__name__ if isinstance(one, type) else repr(one)),
+)
+def test_a_link_without_locks_is_no_trouble_and_one_that_breaks_is(bus, monkeypatch, trouble, error):
+    transport = VisaTransport(ADDRESS, library=library_for(bus))
+
+    def broken(**_):
+        raise trouble
+
+    monkeypatch.setattr(transport._resource, "lock_excl", broken)
+    if error is None:
+        transport.lock()
+    else:
+        with pytest.raises(error) as told:
+            transport.lock()
+        assert type(told.value) is error
+    transport.close()

@@ -304,6 +304,15 @@ def test_while_it_is_open_no_other_program_gets_in_not_even_after_a_link_was_mad
     assert "53230A" in another_program.query("*IDN?")
 
 
+def test_the_generator_stays_open_to_whoever_must_switch_it_off():
+    with (
+        open_bench(described(**VIRTUAL), KINDS),
+        pyvisa.ResourceManager("realtime@levilab").open_resource(VIRTUAL["generator"].address, timeout=100) as other,
+    ):
+        other.write("OUTP1 OFF")
+        assert other.query("OUTP1?").strip() == "0"
+
+
 def test_an_instrument_that_another_program_has_locked_is_told_and_left_alone(another_program):
     another_program.lock_excl()
     with pytest.raises(Occupied, match="locked"), open_bench(described(**VIRTUAL), KINDS):

@@ -288,11 +288,14 @@ class Listener:
                 self._connected(*await asyncio.open_connection(sock=connection))
             except OSError:  # gone already, or this process has too much open
                 await asyncio.sleep(_LOOK_AGAIN)
-            except Exception:
-                log.exception("a connection could not be taken; the others can")
 
     def _connected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        if len(self._talks) >= self._most or not self._station.bus.reachable(self._station.device):
+        try:
+            welcome = len(self._talks) < self._most and self._station.bus.reachable(self._station.device)
+        except Exception:
+            log.exception("a connection could not be taken; the next ones can")
+            welcome = False
+        if not welcome:
             writer.transport.abort()
             return
         task = asyncio.ensure_future(self._conversation(reader, writer))
