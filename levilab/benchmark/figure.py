@@ -30,7 +30,7 @@ LINES = {
     "scipy BDF": ("#333333", "o", "-", "BDF in Euler angles"),
 }
 #: Lines that end at a larger error [cm] have their name there, not at the right.
-BESIDE = 2e-9
+BESIDE = 3e-9
 #: Errors that are drawn [cm].
 RANGE = (1e-1, 3e-12)
 
