@@ -139,7 +139,7 @@ def one_run() -> None:
 def a_million_readings() -> None:
     import pandas as pd
 
-    from levilab.formats import read_table
+    from levilab.formats.table import read_table
     from levilab.readings import spin_readings
 
     t = np.linspace(0, 190, 1_000_000)

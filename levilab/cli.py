@@ -176,7 +176,7 @@ def analyze_spindown(
 
 
 def _options(columns: str, reading_u: float | None, uncertainty: str, keep_outliers: bool) -> Options:
-    from levilab.formats import parse_columns
+    from levilab.formats.table import parse_columns
     from levilab.pipeline import Options
 
     if reading_u is not None and not 0 < reading_u < float("inf"):

@@ -12,7 +12,7 @@ from analysis.combine import Combined, combine
 from analysis.errors import AnalysisError
 from analysis.spindown import SpinDown, fit_spin_down
 from levilab.errors import DataError
-from levilab.formats import read_table
+from levilab.formats.table import read_table
 from levilab.readings import Readings, spin_readings
 from levilab.run import READINGS, RECORD, Run, find_run, find_runs
 

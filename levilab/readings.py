@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from levilab.columns import TableError
-from levilab.formats import FEWEST, Table
+from levilab.formats.columns import TableError
+from levilab.formats.table import FEWEST, Table
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from levilab.errors import DataError
 
 if TYPE_CHECKING:
-    from levilab.formats import Table
+    from levilab.formats.table import Table
 
 SCHEMA: Literal["levilab-run/1"] = "levilab-run/1"
 READINGS, STATES, EVENTS, RECORD, LOCK, WIRE, PACKAGE = (
@@ -96,7 +96,7 @@ class Run:
 
     def readings(self) -> Table:
         """The readings so far; a torn last line is left out, with a warning."""
-        from levilab.formats import read_run_readings
+        from levilab.formats.table import read_run_readings
 
         return read_run_readings(self.folder / READINGS)
 

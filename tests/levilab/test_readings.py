@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from levilab.columns import TableError
-from levilab.formats import read_run_readings, read_table
+from levilab.formats.columns import TableError
+from levilab.formats.table import read_run_readings, read_table
 from levilab.readings import spin_readings
 
 HEADER = "time_s,spin_frequency_hz,spin_frequency_u_hz\n"

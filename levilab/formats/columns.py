@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from levilab.errors import DataError
-from levilab.titles import CANONICAL, COMPANIONS, UNITS, Title, dimension, implied_unit, read_title, unit_factor
+from levilab.formats.titles import CANONICAL, COMPANIONS, UNITS, Title, dimension, implied_unit, read_title, unit_factor
 
 SHORTHANDS = {"t": "time_s", "f": "spin_frequency_hz", "u": "spin_frequency_u_hz"}
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-from levilab.titles import known_titles
+from levilab.formats.titles import known_titles
 
 COMMENTS = ("#", "%", "//")
 COMMENTS_UNLESS_SEMICOLON = (*COMMENTS, ";", "'")

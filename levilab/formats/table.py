@@ -1,6 +1,6 @@
 """Other people's files, and our own readings.csv, as one table in SI.
 
-A file is sniffed (`levilab.layout`), its titles are understood (`levilab.columns`), its rows read (`levilab.rows`).
+A file is sniffed (`layout`), its titles are understood (`columns`), its rows read (`rows`).
 """
 
 import re
@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from levilab.columns import SHORTHANDS, Column, TableError, choose_columns, listed, shown
-from levilab.dialect import Dialect
 from levilab.errors import LevilabError
-from levilab.layout import Layout, sniff
-from levilab.rows import Rows, read_rows
-from levilab.titles import CANONICAL, COMPANIONS
+from levilab.formats.columns import SHORTHANDS, Column, TableError, choose_columns, listed, shown
+from levilab.formats.dialect import Dialect
+from levilab.formats.layout import Layout, sniff
+from levilab.formats.rows import Rows, read_rows
+from levilab.formats.titles import CANONICAL, COMPANIONS
 
 if TYPE_CHECKING:
     import pandas as pd

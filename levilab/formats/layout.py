@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from levilab.columns import TableError, shown
-from levilab.dialect import Dialect, Line, content, filled, find_dialect, usual
-from levilab.titles import is_unit, known_titles
+from levilab.formats.columns import TableError, shown
+from levilab.formats.dialect import Dialect, Line, content, filled, find_dialect, usual
+from levilab.formats.titles import is_unit, known_titles
 
 HEAD = 65536  # bytes that the guess rests upon
 SAMPLE = 100  # lines, the last of the head: those are rows even below a long preamble

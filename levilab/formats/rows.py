@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from levilab.columns import Column, TableError, shown
-from levilab.dialect import MISSING
-from levilab.layout import Layout
+from levilab.formats.columns import Column, TableError, shown
+from levilab.formats.dialect import MISSING
+from levilab.formats.layout import Layout
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

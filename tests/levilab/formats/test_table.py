@@ -10,13 +10,13 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from levilab.columns import Column, TableError
-from levilab.dialect import Dialect
 from levilab.errors import DataError
-from levilab.formats import ColumnsError, parse_columns, read_run_readings, read_table
-from levilab.layout import Layout
-from levilab.rows import _read_at_once, _read_lines
-from levilab.titles import read_title, unit_factor
+from levilab.formats.columns import Column, TableError
+from levilab.formats.dialect import Dialect
+from levilab.formats.layout import Layout
+from levilab.formats.rows import _read_at_once, _read_lines
+from levilab.formats.table import ColumnsError, parse_columns, read_run_readings, read_table
+from levilab.formats.titles import read_title, unit_factor
 
 T, F, U = "time_s", "spin_frequency_hz", "spin_frequency_u_hz"
 PLAIN = {T: [0, 0.5, 1], F: [61.5, 61.25, 61]}
