@@ -18,8 +18,6 @@ from typing import TYPE_CHECKING
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
-import hostile
-
 from instruments.blocks import BrokenBlock, block_of, read_block
 from instruments.virtual.bus import Bus
 from instruments.virtual.faults import LinkLost
@@ -28,6 +26,7 @@ from instruments.virtual.servers import hislip, vxi11
 from instruments.virtual.servers.hislip_messages import Message, Type
 from instruments.virtual.servers.station import Disconnected, Station
 from instruments.virtual.servers.xdr import packed
+from support import hostile
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -7,11 +7,15 @@ import shlex
 import shutil
 import subprocess
 import sys
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
+from support.paths import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
 PAGES = [
     ROOT / "README.md",
     ROOT / "CHANGELOG.md",

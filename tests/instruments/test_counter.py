@@ -9,7 +9,6 @@ import math
 import numpy as np
 import pytest
 import pyvisa
-from conversation import CLEAR, NO_ERROR, SILENCE, accepted, conversation
 
 from instruments.counter import Keysight53230A, PendulumCNT91
 from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange
@@ -20,6 +19,7 @@ from instruments.virtual.counter_53230a import Virtual53230A
 from instruments.virtual.counter_cnt91 import VirtualCNT91
 from levilab.clock import VirtualClock
 from pyvisa_levilab import library_for
+from support.conversation import CLEAR, NO_ERROR, SILENCE, accepted, conversation
 
 
 def preparation(gate, level, timeout):

@@ -5,15 +5,14 @@ import itertools
 import math
 import tracemalloc
 
-import hostile
 import numpy as np
 import pytest
 import serial
-from fuzz_targets import TARGETS
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, rule, run_state_machine_as_test
 
+from fuzz_targets import TARGETS
 from instruments.counter import Keysight53230A, PendulumCNT91
 from instruments.errors import BadAnswer, InstrumentError
 from instruments.generator import Agilent33220A, Keysight33500B
@@ -28,6 +27,7 @@ from instruments.virtual.device import Answer
 from instruments.virtual.faults import FAULTS, LATE, Fault
 from instruments.virtual.serial_line import benches
 from pyvisa_levilab import library_for
+from support import hostile
 
 #: `make explore` draws forty times as many; a machine that is busy is no reason to fail.
 EXPLORING = settings.get_current_profile_name() == "explore"

@@ -4,7 +4,6 @@ Source: Keysight 33500 Series Operating and Service Guide; Agilent 33220A User's
 """
 
 import pytest
-from conversation import CLEAR, NO_ERROR, SILENCE, accepted, conversation
 
 from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange, WrongInstrument
 from instruments.generator import Agilent33220A, Keysight33500B, Limits
@@ -14,6 +13,7 @@ from instruments.virtual.generator_33220a import Virtual33220A
 from instruments.virtual.generator_33500b import Virtual33500B
 from levilab.clock import VirtualClock
 from pyvisa_levilab import library_for
+from support.conversation import CLEAR, NO_ERROR, SILENCE, accepted, conversation
 
 
 def test_the_signal_is_set_for_a_coil_from_a_clean_state_with_the_offset_gone_before_the_amplitude_comes():

@@ -6,10 +6,10 @@ Source: Lake Shore Model 425 User's Manual, chapter 6; Model 475 User's Manual, 
 import math
 
 import pytest
-from conversation import CLEAR, SILENCE, conversation
 
 from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange, WrongInstrument
 from instruments.magnetometer import LakeShore425, LakeShore475
+from support.conversation import CLEAR, SILENCE, conversation
 
 #: RDGMODE for steady fields: the 425 with its filter, the 475 with four digits.
 STEADY = {LakeShore425: "1,1,1", LakeShore475: "1,2,1,1,1"}

@@ -3,12 +3,12 @@
 import math
 
 import pytest
-from conversation import CLEAR, NO_ERROR, accepted, conversation
 
 from instruments.counter import Keysight53230A
 from instruments.errors import BadAnswer, CommandRefused, InstrumentError, OutOfRange, WrongInstrument
 from instruments.generator import Keysight33500B
 from instruments.scpi import ScpiInstrument, Setting, parse_reading
+from support.conversation import CLEAR, NO_ERROR, accepted, conversation
 
 #: Headers as in the programmer's references, numbers as the instruments print them (INSTRUMENTS: 15 digits, NR3).
 WIRE = [

@@ -10,7 +10,6 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from wire import ask, cable, errors, received, send
 
 from instruments.counter import PendulumCNT91
 from instruments.errors import OutOfRange
@@ -19,6 +18,7 @@ from instruments.virtual.bus import Bus
 from instruments.virtual.counter_cnt91 import VirtualCNT91
 from levilab.clock import VirtualClock
 from pyvisa_levilab import library_for
+from support.wire import ask, cable, errors, received, send
 
 FIXED_LEVEL = "INP:COUP DC;LEV 0.65"
 

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from wire import ask, cable, errors, received, send
 
 from instruments.virtual.arbitrary import samples
 from instruments.virtual.generator import Burst, Output
@@ -18,6 +17,7 @@ from instruments.virtual.generator_33220a import Virtual33220A
 from instruments.virtual.generator_33500b import Virtual33500B
 from instruments.virtual.scpi import ScpiError
 from levilab.clock import VirtualClock
+from support.wire import ask, cable, errors, received, send
 
 
 @pytest.fixture

@@ -7,7 +7,6 @@ import pyvisa
 from hypothesis import given
 from hypothesis import strategies as st
 from pyvisa.constants import Parity, StatusCode, StopBits
-from wire import ask, received, send
 
 from instruments.errors import NoAnswer
 from instruments.magnetometer import LakeShore425, LakeShore475
@@ -18,6 +17,7 @@ from instruments.virtual.magnetometer_475 import Virtual475
 from instruments.virtual.magnetometer_numbers import field_text
 from levilab.clock import VirtualClock
 from pyvisa_levilab import library_for
+from support.wire import ask, received, send
 
 PORT = "ASRL1::INSTR"
 EACH = pytest.mark.parametrize("kind", [Virtual425, Virtual475])

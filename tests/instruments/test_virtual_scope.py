@@ -13,7 +13,6 @@ import pytest
 import pyvisa
 from hypothesis import given
 from hypothesis import strategies as st
-from wire import ask, cable, errors, received, send
 
 import pyvisa_levilab
 from instruments.errors import BadAnswer, SettingsLost
@@ -30,6 +29,7 @@ from instruments.virtual.scope_record import PIECE, Edge
 from instruments.virtual.scope_rigol import VirtualDS1000Z
 from instruments.virtual.scope_setup import one_two_five
 from levilab.clock import VirtualClock
+from support.wire import ask, cable, errors, received, send
 
 DARK, BRIGHT, DUTY = 0.1, 1.2, 0.03
 

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
+from support.paths import SAMPLE_DATA
+
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-ROOT = Path(__file__).parents[2]
+    from pathlib import Path
 
 
 @pytest.fixture
 def sample_data() -> Path:
-    return ROOT / "sample_data"
+    return SAMPLE_DATA
 
 
 @pytest.fixture

@@ -9,7 +9,8 @@ import sys
 from typing import TYPE_CHECKING
 
 import pytest
-from tests_of_levilab import spin_down_csv
+
+from support.spin_downs import spin_down_csv
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
-from tests_of_levilab import spin_down_csv
 
 from levilab.figures import COLOURS, MOST_POINTS, STRAIGHT_LINES, as_svg, spindown_figure
 from levilab.pipeline import Options, SpinDownAnalysis, analyze_spindowns
+from support.spin_downs import spin_down_csv
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -1,15 +1,15 @@
 """Trajectories against heyoka's in extended precision (tests/golden); estimated errors against the true ones."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
+from support.paths import GOLDEN
 
-CASES = json.loads((Path(__file__).parents[1] / "golden/trajectories.json").read_text(encoding="utf-8"))
+CASES = json.loads((GOLDEN / "trajectories.json").read_text(encoding="utf-8"))
 NAMED = {case["name"]: case for case in CASES if case["name"] != "random"}
 RANDOM = [case for case in CASES if case["name"] == "random"]
 

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests_of_levilab import spin_down_csv
 
 from levilab.errors import DataError, LevilabError
 from levilab.pipeline import Options, analyze_spindowns
 from levilab.result import as_document, save_result
 from levilab.writing import CannotWrite
+from support.spin_downs import spin_down_csv
 
 #: The thesis's constants, as printed: C₁ [1/s], |C₂| [1/rad].
 PUBLISHED = (

@@ -9,11 +9,12 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
-from tests_of_levilab import spin_down_csv
 
 from levilab.errors import LevilabError
 from levilab.pipeline import Options, analyze_spindowns
 from levilab.report.page import render, write_report
+from support.paths import SAMPLE_DATA
+from support.spin_downs import spin_down_csv
 
 
 class Page(HTMLParser):
@@ -35,7 +36,7 @@ class Page(HTMLParser):
 
 @pytest.fixture(scope="module")
 def page() -> Page:
-    return Page(render(analyze_spindowns([Path(__file__).parents[2] / "sample_data"], Options())))
+    return Page(render(analyze_spindowns([SAMPLE_DATA], Options())))
 
 
 def test_nothing_is_fetched_when_the_report_is_opened(page: Page) -> None:

@@ -33,6 +33,7 @@ from levilab.simulator.scene import (
     with_settings,
 )
 from levilab.simulator.scene_parts import CONSTANTS
+from support.paths import DOCS
 
 SCENES = Path(levilab.simulator.__file__).parent / "scenes"
 
@@ -72,7 +73,7 @@ def test_undriven_is_the_default_and_its_file_names_every_key():
 
 
 def test_the_page_of_the_simulator_has_every_key_in_its_table():
-    page = Path(__file__).parents[2] / "docs" / "simulator.md"
+    page = DOCS / "simulator.md"
     rows = re.findall(r"^\| (`\w+`|none|) ?\| ([^|]*) \|", page.read_text(encoding="utf-8"), re.MULTILINE)
     found, table = [], ""
     for name, keys in rows:

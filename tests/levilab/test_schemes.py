@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from kinds import KINDS
 
 from levilab.benchmark.nystrom import residuals
 from levilab.simulator.scene import Scene
 from levilab.simulator.schemes import SCHEMES, Scheme
 from levilab.simulator.single import simulate
+from support.scenes import KINDS
 
 #: Steps [1/s] at which each scheme's error lies above rounding (1e-13) and its first term dominates; whole numbers
 #: of them fit into a quarter of the drive's period.

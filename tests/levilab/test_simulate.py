@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from kinds import KINDS
 
 from levilab.simulator import SceneError, SimulationError
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
+from support.scenes import KINDS
 
 UNDRIVEN, FRICTION, TILTED, DRIVEN = (preset(name) for name in ("undriven", "friction", "tilted", "driven"))
 EPS = np.finfo(float).eps

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from wire import ask, received, send
 
 from instruments.virtual.counter_53230a import Virtual53230A
 from instruments.virtual.generator import Burst, Output
@@ -19,6 +18,7 @@ from levilab.clock import VirtualClock
 from levilab.simulator.optics import Tape
 from levilab.simulator.spin import DECAYS
 from levilab.simulator.world import KEPT_S, SpinScene, SpinWorld, drawn
+from support.wire import ask, received, send
 
 TURN = 2 * math.pi
 #: Field of the drive at the top [T]: what 10 Vpp make on the virtual bench.

@@ -3,13 +3,14 @@
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
+from support.paths import DOCS
+
 pytest.importorskip("pymeasure")
 
-PAGE = Path(__file__).parents[2] / "docs/practise.md"
+PAGE = DOCS / "practise.md"
 SCRIPTS = re.findall(r"```python pymeasure\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
 #: PyMeasure says so of each driver that does not declare its dialect.
 ALLOWED = "ignore:It is not known whether this device support SCPI:FutureWarning"
