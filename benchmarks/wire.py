@@ -41,7 +41,7 @@ from instruments.virtual.scope_rigol import VirtualDS1000Z
 from instruments.virtual.servers.server import BenchServer
 from levilab.clock import VirtualClock
 from levilab.order import spin_order
-from levilab.progress import Show
+from levilab.present.progress import Show
 from levilab.record import acquire
 from levilab.simulator.world import SpinScene, SpinWorld
 from pyvisa_levilab import library_for

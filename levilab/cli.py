@@ -110,7 +110,7 @@ def acquire_spin(
     Ctrl-C ends the run after the reading under way; outputs go off and the run is kept.
     """
     from levilab.order import spin_order
-    from levilab.progress import to_stderr
+    from levilab.present.progress import to_stderr
     from levilab.record import acquire
 
     order = spin_order(

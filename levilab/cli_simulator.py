@@ -93,7 +93,7 @@ def _simulate(
     as_json: bool,
 ) -> None:
     from levilab.motion_summary import as_document, finite
-    from levilab.progress import Share
+    from levilab.present.progress import Share
     from levilab.simulation import SimulationOrder, carry_out
 
     order = SimulationOrder(scene, duration, tolerance, rate, out)
@@ -176,7 +176,7 @@ def _spans(spins: str | None, masses: str | None, *, survival: bool) -> tuple[Sp
 
 
 def _mapped(scene: Scene, spans: tuple[Span | None, Span | None], duration: float, out: Path) -> dict[str, object]:
-    from levilab.progress import Share
+    from levilab.present.progress import Share
     from levilab.stability_map import place_for_map, survival_map, write_map
 
     place_for_map(out)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rich.markup import escape
 
 from levilab.explain import LEAST_HZ, LEAST_M
-from levilab.tables import new_table, terminal
+from levilab.present.terminal import new_table, terminal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

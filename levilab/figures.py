@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
@@ -11,11 +10,11 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont, get_font
 
-from levilab.numbers import short_name
+from levilab.present.numbers import short_name
+from levilab.present.style import STYLE, row
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
@@ -46,19 +45,6 @@ MOST_POINTS, MOST_BARS, MEANS = 600, 200, 40
 #: A bar longer than the marker's radius, as part of the panel's height, is seen; outliers with their value written.
 _SEEN, _MOST_NAMED = 1 / 120, 6
 
-STYLE: Any = {
-    "font.size": 9,
-    "axes.titlesize": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.alpha": 0.25,
-    "legend.frameon": False,
-    "svg.fonttype": "path",
-    "svg.hashsalt": "levilab",
-    "axes.formatter.use_mathtext": True,
-}
-
 
 def spindown_figure(analysis: SpinDownAnalysis) -> Figure:
     """Readings and laws; residuals of every law; the straight lines one draws on paper, and what departs from them."""
@@ -73,28 +59,6 @@ def spindown_figure(analysis: SpinDownAnalysis) -> Figure:
             analysis,
         )
     return figure
-
-
-def save_png(figure: Figure, path: Path) -> None:
-    """Write a figure as a picture.  Raises OSError."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=150)
-    path.write_bytes(buffer.getvalue())
-
-
-def as_svg(figure: Figure) -> str:
-    """A figure as SVG text, the same bytes for the same results."""
-    buffer = io.StringIO()
-    with mpl.rc_context(STYLE):
-        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    return buffer.getvalue()
-
-
-def row(figure: Figure, bottom: float, height: float, n: int = 1, gap: float = 0.0) -> list[Axes]:
-    """Panels side by side.  Placed by hand: automatic layouts differ in the last bit from one drawing to the next."""
-    left, right = 0.085, 0.985
-    width = (right - left - (n - 1) * gap) / n
-    return [figure.add_axes((left + k * (width + gap), bottom, width, height)) for k in range(n)]
 
 
 # --- readings and laws ---------------------------------------------------------------------------------

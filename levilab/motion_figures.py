@@ -10,8 +10,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from levilab.figures import STYLE, row
 from levilab.motion_summary import changing_energy
+from levilab.present.style import STYLE, row
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from levilab.config import BenchConfig, ExperimentSettings
-    from levilab.progress import Show
+    from levilab.present.progress import Show
     from levilab.run import Status
     from levilab.simulator.world import World
 

@@ -32,7 +32,8 @@ _STATISTICS = (
 
 def save_result(analysis: SpinDownAnalysis, folder: Path) -> list[Path]:
     """Write result.json and the figure into a folder; returns the files.  Raises CannotWrite."""
-    from levilab.figures import save_png, spindown_figure
+    from levilab.figures import spindown_figure
+    from levilab.present.style import save_png
 
     text = json.dumps(as_document(analysis, folder), indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False)
     try:

@@ -150,8 +150,8 @@ def _record(order: SimulationOrder) -> RunRecord:
 
 
 def _write(summary: Summary, factor: int, writer: RunWriter) -> None:
-    from levilab.figures import save_png
     from levilab.motion_figures import motion_figure
+    from levilab.present.style import save_png
 
     rows = kept_rows(summary.motion, factor)
     writer.states(state_rows(summary.motion, rows))

@@ -10,7 +10,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from levilab.figures import STYLE
+from levilab.present.style import STYLE
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

@@ -154,7 +154,7 @@ def place_for_map(folder: Path) -> None:
 
 def write_map(found: Map, folder: Path) -> list[Path]:
     """survival.png and survival.csv (one row a top; 1: survived) into a folder."""
-    from levilab.figures import save_png
+    from levilab.present.style import save_png
     from levilab.stability_figure import map_figure
     from levilab.writing import replace_atomically
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
 
+from levilab.present.terminal import new_table, terminal
 from levilab.simulator.floating import advice, axial_field, lifting, symmetric
-from levilab.tables import new_table, terminal
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

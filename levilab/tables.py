@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import shutil
-import sys
 from dataclasses import replace
 from pathlib import PurePath
 from typing import TYPE_CHECKING
 
-from rich import box
-from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
-from levilab.numbers import AXES, SYMBOLS, in_words, plain, share, short_name, with_uncertainty, without_unit
+from levilab.present.numbers import AXES, SYMBOLS, in_words, plain, share, short_name, with_uncertainty, without_unit
+from levilab.present.terminal import new_table, terminal
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
+
+    from rich.table import Table
 
     from analysis.selection import Statistics
     from analysis.uncertainty import Estimate
@@ -27,27 +25,6 @@ if TYPE_CHECKING:
 
 #: Columns of a terminal from which on the list of runs shows notes.
 ROOM_FOR_NOTES = 110
-
-
-def terminal() -> Console:
-    """As wide as the terminal; into a pipe or file as wide as the tables need."""
-    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 160
-    return Console(width=max(width, 80), highlight=False)
-
-
-def new_table(title: str | None, *columns: str, numbers: Sequence[str] = ()) -> Table:
-    """An empty table; numbers: the columns that are aligned to the right."""
-    table = Table(
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        pad_edge=False,
-        title=title,
-        title_justify="left",
-        title_style="bold",
-    )
-    for column in columns:
-        table.add_column(column, justify="right" if column in numbers else "left", overflow="fold")
-    return table
 
 
 def print_spindown(analysis: SpinDownAnalysis) -> None:

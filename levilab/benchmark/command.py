@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rich.markup import escape
 
 from levilab.benchmark.work_precision import Comparison, as_document, compare
-from levilab.tables import new_table, terminal
+from levilab.present.terminal import new_table, terminal
 from levilab.writing import CannotWrite, replace_atomically
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def run_and_tell(*, quick: bool, out: Path | None, as_json: bool) -> None:
 
 def _write(found: Comparison, document: str, out: Path) -> None:
     from levilab.benchmark.figure import work_precision_figure
-    from levilab.figures import save_png
+    from levilab.present.style import save_png
 
     try:
         out.mkdir(parents=True, exist_ok=True)

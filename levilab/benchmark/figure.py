@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from levilab.figures import STYLE
+from levilab.present.style import STYLE
 
 if TYPE_CHECKING:
     from levilab.benchmark.work_precision import Comparison

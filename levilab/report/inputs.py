@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-from levilab.numbers import short_name
-from levilab.report.settings import setting_in_words, settings_in_words, value_in_words
+from levilab.present.numbers import short_name
+from levilab.present.words import setting_in_words, settings_in_words, value_in_words
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

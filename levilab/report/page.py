@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 
 from analysis.uncertainty import Estimate
 from levilab.errors import LevilabError
-from levilab.figures import as_svg, spindown_figure
-from levilab.numbers import AXES, SYMBOLS, in_words, plain, share, with_uncertainty, without_unit
+from levilab.figures import spindown_figure
 from levilab.pipeline import Options, SpinDownAnalysis, analyze_spindowns
+from levilab.present.numbers import AXES, SYMBOLS, in_words, plain, share, with_uncertainty, without_unit
+from levilab.present.style import as_svg
 from levilab.report.inputs import describe
 from levilab.run import utc_now
 from levilab.software import software_versions
