@@ -73,7 +73,7 @@ def _quoted(value: str) -> str:
 
 def refuse_to_overwrite(path: Path) -> None:
     """Raise WouldOverwrite if there is such a file, CannotWrite if there is no folder for it."""
-    from levilab.writing import CannotWrite
+    from levilab.files import CannotWrite
 
     if not path.parent.is_dir():
         raise CannotWrite(f"{path.parent} is no folder: give another name with --out")
@@ -83,7 +83,7 @@ def refuse_to_overwrite(path: Path) -> None:
 
 def write_bench(path: Path, text: str) -> None:
     """Write the file.  Raises CannotWrite."""
-    from levilab.writing import CannotWrite, replace_atomically
+    from levilab.files import CannotWrite, replace_atomically
 
     try:
         replace_atomically(path, text)

@@ -167,7 +167,7 @@ def stability(
 
 def _spans(spins: str | None, masses: str | None, *, survival: bool) -> tuple[Span | None, Span | None]:
     """What --spins and --masses ask for, checked before anything is computed."""
-    from levilab.simulator.errors import SimulationError
+    from levilab.errors import SimulationError
     from levilab.stability_map import span_of
 
     if (spins or masses) and not survival:

@@ -1,5 +1,7 @@
 """What goes wrong in ways that a person can mend: told in one line, never as a traceback."""
 
+from __future__ import annotations
+
 from typing import ClassVar
 
 
@@ -11,3 +13,7 @@ class LevilabError(Exception):
 
 class DataError(LevilabError):
     """A data file or run folder that cannot be used as it is."""
+
+
+class SimulationError(LevilabError):
+    """A simulation that cannot be carried out."""

@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING, Any
 from instruments.errors import InstrumentError
 from levilab.bench import Bench, check_described, open_bench
 from levilab.experiment import EXPERIMENTS, Experiment, ExperimentFailed, Missed, Row
+from levilab.files import CannotWrite
 from levilab.interruption import Interrupted, Stop, watching_for_interruption
 from levilab.run import Run, RunRecord, utc_now
 from levilab.software import software_versions
 from levilab.virtual_bench import VIRTUAL
-from levilab.writing import CannotWrite, RunWriter
+from levilab.writing import RunWriter
 
 if TYPE_CHECKING:
     from collections.abc import Callable

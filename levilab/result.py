@@ -8,9 +8,9 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from levilab.files import CannotWrite, replace_atomically
 from levilab.software import software_versions
 from levilab.tables import all_warnings
-from levilab.writing import CannotWrite, replace_atomically
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -155,7 +155,7 @@ def _is_alive(folder: Path) -> bool:
 
 
 def _read_record(path: Path) -> RunRecord:
-    from levilab.config import in_one_line
+    from levilab.settings import in_one_line
 
     rescue = f"its readings can still be analyzed: levilab analyze spindown {path.parent / READINGS}"
     try:

@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from levilab.compilation import telling_of_compilation
+from levilab.errors import SimulationError
+from levilab.files import CannotWrite
 from levilab.interruption import interrupted_afterwards
 from levilab.motion_lines import rate_for
 from levilab.motion_summary import as_document, summarise
 from levilab.run import STATES, RunRecord, utc_now
-from levilab.simulator.errors import SimulationError
 from levilab.simulator.single import LONGEST_S, simulate
 from levilab.software import software_versions
-from levilab.writing import CannotWrite, RunWriter
+from levilab.writing import RunWriter
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

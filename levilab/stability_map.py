@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from levilab.simulator.errors import SimulationError
+from levilab.errors import SimulationError
 from levilab.simulator.floating import axial_field, lifting, stability_of, survival, symmetric
 
 if TYPE_CHECKING:
@@ -139,7 +139,7 @@ def _window(scene: Scene) -> tuple[float, float]:
 
 def place_for_map(folder: Path) -> None:
     """Make the folder, before anything is simulated; a map that is there stays.  Raises CannotWrite."""
-    from levilab.writing import CannotWrite
+    from levilab.files import CannotWrite
 
     for path in (folder / TABLE, folder / PICTURE):
         if path.exists():
@@ -154,9 +154,9 @@ def place_for_map(folder: Path) -> None:
 
 def write_map(found: Map, folder: Path) -> list[Path]:
     """survival.png and survival.csv (one row a top; 1: survived) into a folder."""
+    from levilab.files import replace_atomically
     from levilab.present.style import save_png
     from levilab.stability_figure import map_figure
-    from levilab.writing import replace_atomically
 
     rows = ["mass_kg,spin_hz,survived"]
     for mass, alive in zip(found.masses, found.survived, strict=True):
@@ -171,6 +171,6 @@ def write_map(found: Map, folder: Path) -> list[Path]:
 
 
 def _cannot(folder: Path, error: OSError) -> Exception:
-    from levilab.writing import CannotWrite
+    from levilab.files import CannotWrite
 
     return CannotWrite(f"{folder}: the map cannot be written: {error.strerror}; give another folder with --out")

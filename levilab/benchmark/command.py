@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from rich.markup import escape
 
 from levilab.benchmark.work_precision import Comparison, as_document, compare
+from levilab.files import CannotWrite, replace_atomically
 from levilab.present.terminal import new_table, terminal
-from levilab.writing import CannotWrite, replace_atomically
 
 if TYPE_CHECKING:
     from pathlib import Path

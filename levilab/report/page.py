@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from analysis.uncertainty import Estimate
 from levilab.errors import LevilabError
 from levilab.figures import spindown_figure
+from levilab.files import CannotWrite, replace_atomically
 from levilab.pipeline import Options, SpinDownAnalysis, analyze_spindowns
 from levilab.present.numbers import AXES, SYMBOLS, in_words, plain, share, with_uncertainty, without_unit
 from levilab.present.style import as_svg
@@ -20,7 +21,6 @@ from levilab.report.inputs import describe
 from levilab.run import utc_now
 from levilab.software import software_versions
 from levilab.tables import all_warnings, law_constants
-from levilab.writing import CannotWrite, replace_atomically
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

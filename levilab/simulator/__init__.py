@@ -14,8 +14,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from levilab.errors import SimulationError
     from levilab.simulator.ensemble import Ensemble, simulate_many
-    from levilab.simulator.errors import SimulationError
     from levilab.simulator.scene import Scene, SceneError, preset, presets, read_scene, with_settings
     from levilab.simulator.single import simulate
     from levilab.simulator.trajectory import Accuracy, Event, Trajectory

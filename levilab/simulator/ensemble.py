@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from levilab.errors import SimulationError
 from levilab.simulator import falls, top
-from levilab.simulator.errors import SimulationError
 from levilab.simulator.estimate import estimate
 from levilab.simulator.keys import SceneError
 from levilab.simulator.lanes import LANES, advance_many, numbers_of

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from levilab.errors import SimulationError
 from levilab.simulator import top
-from levilab.simulator.errors import SimulationError
 from levilab.simulator.history import History
 from levilab.simulator.keys import SceneError
 from levilab.simulator.single import simulate

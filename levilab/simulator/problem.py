@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from levilab.errors import SimulationError
 from levilab.simulator import escapes, top
 from levilab.simulator.braking import Flowing, LooseFlowing
-from levilab.simulator.errors import SimulationError
 from levilab.simulator.loads import Kinked
 from levilab.simulator.motion import STATE_SIZE
 from levilab.simulator.schemes import SCHEMES, Scheme

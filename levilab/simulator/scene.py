@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from pydantic import NonNegativeFloat, ValidationError, model_validator
 
-from levilab.config import in_one_line
+from levilab.settings import in_one_line
 from levilab.simulator.keys import SceneError, Table, as_toml, nearest, parsed, set_key, shown
 from levilab.simulator.scene_parts import Base, Drag, Drive, Escape, Part, Start, Top, Washers
 

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, ConfigDict, Field, NonNegativeFloat, model_validator
 from pydantic_core import PydanticCustomError
 
-from levilab.config import Settings
+from levilab.settings import Settings
 
 FieldKind = Literal[
     "exact", "paraxial-2", "paraxial-4", "paraxial-6", "paraxial-8", "paraxial-10", "paraxial-12", "paraxial-14",

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from levilab.errors import SimulationError
 from levilab.simulator import escapes, top
-from levilab.simulator.errors import SimulationError
 from levilab.simulator.estimate import estimate
 from levilab.simulator.problem import Problem, end_at, mover, scheme_for, travelled
 from levilab.simulator.spin import DECAYS, since_infinity

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from levilab.simulator.errors import SimulationError
+from levilab.errors import SimulationError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -5,15 +5,15 @@ import json
 import numpy as np
 import pytest
 
+from levilab.errors import SimulationError
+from levilab.files import CannotWrite
 from levilab.simulator.ensemble import simulate_many
-from levilab.simulator.errors import SimulationError
 from levilab.simulator.floating import advice, axial_field, floating_height, stability_of, survival
 from levilab.simulator.scene import SceneError, preset
 from levilab.simulator.single import simulate
 from levilab.stability_figure import map_figure
 from levilab.stability_map import place_for_map, span_of, survival_map, write_map
 from levilab.stability_table import as_document, print_stability, remarks
-from levilab.writing import CannotWrite
 
 UNDRIVEN = preset("undriven")
 DISC = UNDRIVEN.changed({"base.field": "exact", "top.magnet": "disc"})

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from levilab.errors import DataError, LevilabError
+from levilab.files import CannotWrite
 from levilab.pipeline import Options, analyze_spindowns
 from levilab.result import as_document, save_result
-from levilab.writing import CannotWrite
 from support.spin_downs import spin_down_csv
 
 #: The thesis's constants, as printed: C₁ [1/s], |C₂| [1/rad].

@@ -17,11 +17,12 @@ from instruments.generator import Keysight33500B
 from levilab.clock import VirtualClock
 from levilab.config import BenchConfig, SpinSettings
 from levilab.experiment import ExperimentFailed
+from levilab.files import CannotWrite
 from levilab.order import spin_order
 from levilab.record import Order, acquire
 from levilab.run import Run
 from levilab.simulator.world import SpinScene, SpinWorld, drawn
-from levilab.writing import CannotWrite, RunWriter
+from levilab.writing import RunWriter
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from levilab.errors import DataError
+from levilab.files import CannotWrite, replace_atomically
 from levilab.listing import list_runs
 from levilab.run import Run, RunRecord, find_run, find_runs
-from levilab.writing import CannotWrite, RunWriter, replace_atomically
+from levilab.writing import RunWriter
 
 CHANNELS = [
     {"name": "time_s", "unit": "s", "source": "clock"},
