@@ -219,8 +219,7 @@ def runs(
     as_json: Json = False,
 ) -> None:
     """List runs: when, what, status, length."""
-    from levilab.listing import list_runs
-    from levilab.tables import print_runs
+    from levilab.runs.listing import list_runs, print_runs
 
     found = list_runs(folder)
     if as_json:

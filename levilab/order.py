@@ -13,7 +13,7 @@ from levilab.clock import VirtualClock
 from levilab.config import BenchConfig, ConfigError, read_bench, within_limits
 from levilab.errors import LevilabError
 from levilab.record import Order
-from levilab.run import Run, find_run
+from levilab.runs.run import Run, find_run
 from levilab.settings import in_one_line
 from levilab.simulator.world import SpinScene, SpinWorld, drawn
 from levilab.virtual_bench import scene_world

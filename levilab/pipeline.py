@@ -14,7 +14,7 @@ from analysis.spindown import SpinDown, fit_spin_down
 from levilab.errors import DataError
 from levilab.formats.table import read_table
 from levilab.readings import Readings, spin_readings
-from levilab.run import READINGS, RECORD, Run, find_run, find_runs
+from levilab.runs.run import READINGS, RECORD, Run, find_run, find_runs
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

@@ -17,17 +17,17 @@ from levilab.bench import Bench, check_described, open_bench
 from levilab.experiment import EXPERIMENTS, Experiment, ExperimentFailed, Missed, Row
 from levilab.files import CannotWrite
 from levilab.interruption import Interrupted, Stop, watching_for_interruption
-from levilab.run import Run, RunRecord, utc_now
+from levilab.runs.run import Run, RunRecord, utc_now
+from levilab.runs.writer import RunWriter
 from levilab.software import software_versions
 from levilab.virtual_bench import VIRTUAL
-from levilab.writing import RunWriter
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from levilab.config import BenchConfig, ExperimentSettings
     from levilab.present.progress import Show
-    from levilab.run import Status
+    from levilab.runs.run import Status
     from levilab.simulator.world import World
 
 #: So long is slept at a stretch before looking whether somebody asked for the end [s].

@@ -16,10 +16,10 @@ from levilab.files import CannotWrite
 from levilab.interruption import interrupted_afterwards
 from levilab.motion_lines import rate_for
 from levilab.motion_summary import as_document, summarise
-from levilab.run import STATES, RunRecord, utc_now
+from levilab.runs.run import STATES, RunRecord, utc_now
+from levilab.runs.writer import RunWriter
 from levilab.simulator.single import LONGEST_S, simulate
 from levilab.software import software_versions
-from levilab.writing import RunWriter
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 from rich.markup import escape
@@ -12,19 +11,13 @@ from levilab.present.numbers import AXES, SYMBOLS, in_words, plain, share, short
 from levilab.present.terminal import new_table, terminal
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
+    from collections.abc import Mapping
 
     from rich.table import Table
 
     from analysis.selection import Statistics
     from analysis.uncertainty import Estimate
-    from levilab.listing import Listed
     from levilab.pipeline import SpinDownAnalysis
-
-
-#: Columns of a terminal from which on the list of runs shows notes.
-ROOM_FOR_NOTES = 110
 
 
 def print_spindown(analysis: SpinDownAnalysis) -> None:
@@ -154,30 +147,3 @@ def _header(estimates: Mapping[str, Estimate]) -> str:
 
 def _first(estimates: Mapping[str, Estimate]) -> str:
     return without_unit(next(iter(estimates.values())))
-
-
-def print_runs(runs: Sequence[Listed], root: Path) -> None:
-    """The list of runs, and below it what is wrong with the broken ones."""
-    console = terminal()
-    if not runs:
-        console.print(f"no runs in {escape(str(root))}")
-        return
-    table = new_table(None, "when (UTC)", "run", "what", "status", "readings", "length", numbers=["readings", "length"])
-    if with_notes := console.width >= ROOM_FOR_NOTES:
-        table.add_column("note", no_wrap=True, overflow="ellipsis", max_width=console.width - 80)
-    for run in runs:
-        when = (run.started_utc or "—")[:16].replace("T", " ")
-        what = run.experiment + (f" {run.scene}" if run.scene else "") + (", synthetic" if run.synthetic else "")
-        what = escape(what)
-        cells = [when, escape(_below(run.path, root)), what, run.status, run.size, f"{run.length_s:.0f} s"]
-        table.add_row(*cells, *([escape(run.note)] if with_notes else []))
-    console.print(table)
-    for run in runs:
-        if run.problem:
-            console.print(f"[yellow]note:[/yellow] {escape(run.problem)}")
-
-
-def _below(path: str, root: Path) -> str:
-    """A run's path as seen from the folder that was searched."""
-    below = PurePath(path).relative_to(root)
-    return (below.parent / short_name(PurePath(path).name)).as_posix()

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from analysis.spindown import SpinDown
     from levilab.pipeline import Options, Source
-    from levilab.run import RunRecord
+    from levilab.runs.run import RunRecord
 
 #: Readings and events printed in the page; more stay in the run folder.  Readings stand in blocks side by side.
 MOST_READINGS, MOST_EVENTS, BLOCK = 200, 100, 10

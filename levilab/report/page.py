@@ -18,7 +18,7 @@ from levilab.pipeline import Options, SpinDownAnalysis, analyze_spindowns
 from levilab.present.numbers import AXES, SYMBOLS, in_words, plain, share, with_uncertainty, without_unit
 from levilab.present.style import as_svg
 from levilab.report.inputs import describe
-from levilab.run import utc_now
+from levilab.runs.run import utc_now
 from levilab.software import software_versions
 from levilab.tables import all_warnings, law_constants
 

@@ -51,7 +51,7 @@ class Accuracy:
 class Trajectory:
     """The motion of one top, in the base's frame: origin at the base's centre, z up its axis.
 
-    scene: what was simulated; states: shape (n, 18), see `levilab.simulator.motion.State`; energies [J], shape (n,);
+    scene: what was simulated; states: shape (n, 18), see `kernels.motion.State`; energies [J], shape (n,);
     fell: the escape that ended it, None if it stayed to the end; events: found on the way, in their order.
     """
 

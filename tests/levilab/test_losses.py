@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from instruments.virtual.bus import Bus
-    from levilab.run import Run
+    from levilab.runs.run import Run
 
 #: Readings before the drive is off: the spin at first, every 10 s of the 201 on the way up, and at the end of it.
 BEFORE = 22
@@ -123,7 +123,7 @@ def test_an_instrument_that_is_gone_for_a_while_is_tried_until_it_is_back(
 def test_an_instrument_that_another_program_keeps_ends_the_run_with_what_there_is(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from levilab.run import Run
+    from levilab.runs.run import Run
 
     with pytest.raises(InstrumentError, match="locked"):
         acquired(tmp_path, monkeypatch, Fault("taken by another", question=r"READ\?", after=BEFORE + 6))
@@ -136,7 +136,7 @@ def test_an_instrument_that_another_program_keeps_ends_the_run_with_what_there_i
 def test_an_instrument_that_is_lost_again_and_again_is_given_up(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from levilab.run import Run
+    from levilab.runs.run import Run
 
     with pytest.raises(InstrumentError):
         acquired(tmp_path, monkeypatch, Fault("disconnected", question=r"READ\?", after=BEFORE + 6, times=1000))

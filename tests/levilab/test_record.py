@@ -20,9 +20,9 @@ from levilab.experiment import ExperimentFailed
 from levilab.files import CannotWrite
 from levilab.order import spin_order
 from levilab.record import Order, acquire
-from levilab.run import Run
+from levilab.runs.run import Run
+from levilab.runs.writer import RunWriter
 from levilab.simulator.world import SpinScene, SpinWorld, drawn
-from levilab.writing import RunWriter
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -343,7 +343,7 @@ def test_a_full_disk_in_the_middle_leaves_outputs_off_and_the_shown_readings(
         def reading(self, text: str, elapsed: float, remaining: float) -> None:
             super().reading(text, elapsed, remaining)
             if len(self.readings) == 7:
-                monkeypatch.setattr("levilab.writing.os.fsync", full)
+                monkeypatch.setattr("levilab.runs.writer.os.fsync", full)
 
     def full(_: int) -> None:
         raise OSError(28, "No space left on device")

@@ -19,7 +19,7 @@ from levilab.motion_lines import lines_of, rate_for
 from levilab.motion_summary import as_document, summarise
 from levilab.motion_tables import print_motion
 from levilab.present.progress import Share
-from levilab.run import Run
+from levilab.runs.run import Run
 from levilab.simulation import COLUMNS, SimulationOrder, carry_out, kept_rows
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate

@@ -11,9 +11,9 @@ import pytest
 
 from levilab.errors import DataError
 from levilab.files import CannotWrite, replace_atomically
-from levilab.listing import list_runs
-from levilab.run import Run, RunRecord, find_run, find_runs
-from levilab.writing import RunWriter
+from levilab.runs.listing import list_runs
+from levilab.runs.run import Run, RunRecord, find_run, find_runs
+from levilab.runs.writer import RunWriter
 
 CHANNELS = [
     {"name": "time_s", "unit": "s", "source": "clock"},
@@ -127,7 +127,7 @@ def test_replacing_a_file_leaves_the_old_one_whole_when_writing_fails(
     def no_space(_: int) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("levilab.writing.os.fsync", no_space)
+    monkeypatch.setattr("levilab.runs.writer.os.fsync", no_space)
     with pytest.raises(OSError, match="No space"):
         replace_atomically(path, "new")
     assert path.read_text(encoding="utf-8") == "old"
@@ -145,7 +145,7 @@ def test_when_the_disk_is_full_every_earlier_reading_is_kept(
         def no_space(_: int) -> None:
             raise OSError(28, "No space left on device")
 
-        monkeypatch.setattr("levilab.writing.os.fsync", no_space)
+        monkeypatch.setattr("levilab.runs.writer.os.fsync", no_space)
         with pytest.raises(CannotWrite, match=r"77\.5,21\.5.*No space left on device.*earlier readings are kept"):
             writer.reading({"time_s": 77.5, "spin_frequency_hz": 21.5, "spin_frequency_u_hz": 0.03})
     run = Run.load(writer.folder)

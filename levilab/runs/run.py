@@ -1,6 +1,6 @@
 """The run folder as it lies on the disk: what its record says, loading it, finding it.
 
-It is written by `levilab.writing`.
+It is written by `levilab.runs.writer`.
 """
 
 from __future__ import annotations

@@ -17,13 +17,13 @@ from datetime import UTC, datetime
 from typing import IO, TYPE_CHECKING, Any, Self
 
 from levilab.files import CannotWrite, _sync_folder, replace_atomically
-from levilab.run import EVENTS, PACKAGE, READINGS, RECORD, STATES, WIRE, RunRecord, lock_of, utc_now
+from levilab.runs.run import EVENTS, PACKAGE, READINGS, RECORD, STATES, WIRE, RunRecord, lock_of, utc_now
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
     from pathlib import Path
 
-    from levilab.run import Run, Status
+    from levilab.runs.run import Run, Status
 
 
 class RunWriter:

@@ -16,8 +16,8 @@ from pathlib import Path
 
 import pytest
 
-from levilab.listing import list_runs
-from levilab.run import Run
+from levilab.runs.listing import list_runs
+from levilab.runs.run import Run
 
 SHOWN = re.compile(r"^ *(\d+\.\d\d) s +(\d+\.\d{4}) Hz")
 posix_only = pytest.mark.skipif(os.name != "posix", reason="Windows has neither these signals nor resource limits")
