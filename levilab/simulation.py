@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from levilab.compilation import telling_of_compilation
 from levilab.errors import SimulationError
 from levilab.files import CannotWrite
 from levilab.interruption import interrupted_afterwards
@@ -18,6 +17,7 @@ from levilab.motion_lines import rate_for
 from levilab.motion_summary import as_document, summarise
 from levilab.runs.run import STATES, RunRecord, utc_now
 from levilab.runs.writer import RunWriter
+from levilab.simulator.compilation import telling_of_compilation
 from levilab.simulator.single import LONGEST_S, simulate
 from levilab.software import software_versions
 

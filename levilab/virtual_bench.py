@@ -151,7 +151,7 @@ def scene_world(
     the top is put back, None: it is not.  Raises SceneError for a scene without motion, SimulationError for one that
     cannot be simulated.
     """
-    from levilab.compilation import telling_of_compilation
+    from levilab.simulator.compilation import telling_of_compilation
     from levilab.simulator.motion_world import MotionWorld, prepare
 
     with telling_of_compilation(tell):

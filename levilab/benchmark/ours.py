@@ -10,7 +10,7 @@ import numpy as np
 from levilab.benchmark import motion
 from levilab.benchmark.peers import Point, best_time, error_of
 from levilab.simulator import top
-from levilab.simulator.lanes import LANES, advance_many, numbers_of
+from levilab.simulator.kernels.lanes import LANES, advance_many, numbers_of
 from levilab.simulator.problem import Problem
 from levilab.simulator.scene import preset
 from levilab.simulator.schemes import SCHEMES

@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from levilab.errors import SimulationError
 from levilab.simulator import falls, top
 from levilab.simulator.estimate import estimate
+from levilab.simulator.kernels.lanes import LANES, advance_many, numbers_of
+from levilab.simulator.kernels.motion import STATE_SIZE
 from levilab.simulator.keys import SceneError
-from levilab.simulator.lanes import LANES, advance_many, numbers_of
-from levilab.simulator.motion import STATE_SIZE
 from levilab.simulator.problem import NOWHERE, Problem, end_at, scheme_for, travelled
 from levilab.simulator.schemes import SCHEMES
 from levilab.simulator.single import ROOM, check, simulate

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis import stability
-from levilab.simulator.fields import flux_density, flux_gradient, on_axis
+from levilab.simulator.kernels.fields import flux_density, flux_gradient, on_axis
 from levilab.simulator.keys import SceneError
 from levilab.simulator.top import base_field, disc_nodes
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from instruments.virtual.generator_voltage import fundamental
 from levilab.simulator import top
 from levilab.simulator.coil import Coil
-from levilab.simulator.fields import flux_density
 from levilab.simulator.flight import Flight
+from levilab.simulator.kernels.fields import flux_density
 from levilab.simulator.optics import Tape
 from levilab.simulator.world import KEPT_S
 

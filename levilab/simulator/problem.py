@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from levilab.errors import SimulationError
 from levilab.simulator import escapes, top
-from levilab.simulator.braking import Flowing, LooseFlowing
-from levilab.simulator.loads import Kinked
-from levilab.simulator.motion import STATE_SIZE
+from levilab.simulator.kernels.braking import Flowing, LooseFlowing
+from levilab.simulator.kernels.loads import Kinked
+from levilab.simulator.kernels.motion import STATE_SIZE
+from levilab.simulator.kernels.splitting import advance
 from levilab.simulator.schemes import SCHEMES, Scheme
-from levilab.simulator.splitting import advance
 from levilab.simulator.stops import every_step
 
 if TYPE_CHECKING:

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from levilab.simulator import braking, top
-from levilab.simulator.fields import flux_density
+from levilab.simulator import top
+from levilab.simulator.kernels import braking
+from levilab.simulator.kernels.fields import flux_density
 
 if TYPE_CHECKING:
-    from levilab.simulator.motion import Model
+    from levilab.simulator.kernels.motion import Model
     from levilab.simulator.scene import Scene
     from levilab.simulator.schemes import Scheme
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from levilab.simulator import braking
-from levilab.simulator.fields import field_of, flux_density
-from levilab.simulator.loads import Aligned, Disc, Kinked, Leaning, Sine, Tilted, Upright
-from levilab.simulator.motion import STATE_SIZE, Body, Loose, Model, Rigid
+from levilab.simulator.kernels import braking
+from levilab.simulator.kernels.fields import field_of, flux_density
+from levilab.simulator.kernels.loads import Aligned, Disc, Kinked, Leaning, Sine, Tilted, Upright
+from levilab.simulator.kernels.motion import STATE_SIZE, Body, Loose, Model, Rigid
 
 if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
@@ -45,7 +45,7 @@ def model_of(scene: Scene) -> Model:
 
 
 def base_field(scene: Scene, times: float = 1.0) -> Any:
-    """The field of the scene's base, one of the kinds of `levilab.simulator.fields`, times a factor."""
+    """The field of the scene's base, one of the kinds of `levilab.simulator.kernels.fields`, times a factor."""
     base = scene.base
     strength = base.strength_t_m * times
     return field_of(base.inner_radius_m, base.outer_radius_m, strength, base.field, base.thickness_m, base.origin_m)

@@ -7,8 +7,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from levilab.simulator.fields import FieldError, field_of, flux_density, flux_gradient, on_axis
-from levilab.simulator.ring import elliptic
+from levilab.simulator.kernels.fields import FieldError, field_of, flux_density, flux_gradient, on_axis
+from levilab.simulator.kernels.ring import elliptic
 
 A, B, RHO = 0.030, 0.055, 1.40e-3
 EXACT = field_of(A, B, RHO, "exact")
@@ -206,7 +206,7 @@ def test_the_series_converges_to_the_exact_field_by_the_distance_from_the_edges(
 
 
 def test_general_and_written_out_series_agree():
-    from levilab.simulator.paraxial import Paraxial, weights
+    from levilab.simulator.kernels.paraxial import Paraxial, weights
 
     general = Paraxial(*field_of(A, B, RHO, "paraxial-2"), weights(1))
     assert flux_density(general, PLACES) == pytest.approx(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from levilab.simulator import braking, vectors
+from levilab.simulator.kernels import braking, vectors
 from levilab.simulator.spin import DECAYS
 
 

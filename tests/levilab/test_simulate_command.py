@@ -379,7 +379,7 @@ def test_where_nothing_can_be_kept_code_is_compiled_anew_and_not_left_beside_the
         [sys.executable, "-c", program], env=os.environ | nowhere, capture_output=True, text=True, check=True
     )
     assert ended.stdout.strip() == "None"
-    program = "from levilab.simulator.splitting import advance; print(type(advance._cache).__name__)"
+    program = "from levilab.simulator.kernels.splitting import advance; print(type(advance._cache).__name__)"
     ended = subprocess.run(
         [sys.executable, "-c", program], env=os.environ | nowhere, capture_output=True, text=True, check=True
     )

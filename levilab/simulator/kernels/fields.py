@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from levilab.errors import LevilabError
-from levilab.simulator.compiled import by_type, kernel
-from levilab.simulator.paraxial import (
+from levilab.simulator.kernels.compiled import by_type, kernel
+from levilab.simulator.kernels.paraxial import (
     Paraxial,
     Paraxial2,
     ParaxialThick,
@@ -25,7 +25,7 @@ from levilab.simulator.paraxial import (
     to_second_power,
     weights,
 )
-from levilab.simulator.ring import Sheet, Thick, of_sheet, of_thick_ring
+from levilab.simulator.kernels.ring import Sheet, Thick, of_sheet, of_thick_ring
 
 Array = NDArray[np.float64]
 Field = Paraxial2 | Paraxial | ParaxialThick | Sheet | Thick

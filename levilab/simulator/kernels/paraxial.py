@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from levilab.simulator.compiled import part
+from levilab.simulator.kernels.compiled import part
 
 
 class Paraxial2(NamedTuple):

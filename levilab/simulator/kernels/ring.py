@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from levilab.simulator.compiled import part
-from levilab.simulator.paraxial import to_any_power
+from levilab.simulator.kernels.compiled import part
+from levilab.simulator.kernels.paraxial import to_any_power
 
 #: Steps of the arithmetic–geometric mean: each doubles the digits; enough for a distance of 1e-7 R from the loop.
 _STEPS = 7

@@ -9,10 +9,10 @@ from numba.core import types
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from levilab.simulator.compiled import PART_OPTIONS, kernel, part
-from levilab.simulator.motion import STATE_SIZE, Model, drift, kick
-from levilab.simulator.splitting import put, taken, tidied
-from levilab.simulator.vectors import plus
+from levilab.simulator.kernels.compiled import PART_OPTIONS, kernel, part
+from levilab.simulator.kernels.motion import STATE_SIZE, Model, drift, kick
+from levilab.simulator.kernels.splitting import put, taken, tidied
+from levilab.simulator.kernels.vectors import plus
 
 Array = NDArray[np.float64]
 

@@ -15,10 +15,10 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from levilab.simulator.braking import braked, ticked
-from levilab.simulator.compiled import by_type, part
-from levilab.simulator.loads import load, weighed
-from levilab.simulator.vectors import Vector, dot, plus, rotation, turned
+from levilab.simulator.kernels.braking import braked, ticked
+from levilab.simulator.kernels.compiled import by_type, part
+from levilab.simulator.kernels.loads import load, weighed
+from levilab.simulator.kernels.vectors import Vector, dot, plus, rotation, turned
 
 
 class State(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from levilab.simulator.compiled import part
+from levilab.simulator.kernels.compiled import part
 
 Vector = tuple[float, float, float]
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from levilab.simulator.compiled import by_type, part
-from levilab.simulator.vectors import dot, plus
+from levilab.simulator.kernels.compiled import by_type, part
+from levilab.simulator.kernels.vectors import dot, plus
 
 # --- the laws ---
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from levilab.simulator.compiled import kernel, part
-from levilab.simulator.motion import Model, State, drift, kick
+from levilab.simulator.kernels.compiled import kernel, part
+from levilab.simulator.kernels.motion import Model, State, drift, kick
 
 Array = NDArray[np.float64]
 

@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from levilab.simulator.compiled import by_type, part
-from levilab.simulator.fields import axial
-from levilab.simulator.paraxial import Paraxial, Paraxial2, ParaxialThick
-from levilab.simulator.ring import Sheet, Thick
-from levilab.simulator.vectors import Vector, cross, plus, sine_of_turns
+from levilab.simulator.kernels.compiled import by_type, part
+from levilab.simulator.kernels.fields import axial
+from levilab.simulator.kernels.paraxial import Paraxial, Paraxial2, ParaxialThick
+from levilab.simulator.kernels.ring import Sheet, Thick
+from levilab.simulator.kernels.vectors import Vector, cross, plus, sine_of_turns
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ def telling_of_compilation(message: Callable[[str], None]) -> Iterator[None]:
     """Say so when the kernel is compiled; one that lies on the disk is not."""
     from numba.core.event import Event, Listener, install_listener
 
-    from levilab.simulator.splitting import advance
+    from levilab.simulator.kernels.splitting import advance
 
     class Compilation(Listener):
         told = False
