@@ -43,7 +43,7 @@ from levilab.clock import VirtualClock
 from levilab.order import spin_order
 from levilab.present.progress import Show
 from levilab.record import acquire
-from levilab.simulator.world import SpinScene, SpinWorld
+from levilab.world.spin_world import SpinScene, SpinWorld
 from pyvisa_levilab import library_for
 
 if TYPE_CHECKING:

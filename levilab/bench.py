@@ -14,7 +14,7 @@ from instruments.generator import Limits as CoilLimits
 from levilab.clock import Clock, WallClock
 from levilab.config import BenchConfig, ConfigError, InstrumentSettings, Limits
 from levilab.drivers import driver_of, transport_to
-from levilab.virtual_bench import VIRTUAL, virtual_bus
+from levilab.world.bench import VIRTUAL, virtual_bus
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from instruments.generator import Generator
     from instruments.scpi import ScpiInstrument
     from instruments.transport import TrafficLog
-    from levilab.simulator.world import World
+    from levilab.world.spin_world import World
 
 
 class OutputMayBeOn(InstrumentError):

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from instruments.oscilloscope import Oscilloscope
     from instruments.scpi import ScpiInstrument
     from levilab.config import BenchConfig
-    from levilab.simulator.world import World
+    from levilab.world.spin_world import World
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def check(config: BenchConfig, world: World | None = None) -> Iterator[Checked]:
 
 
 def _checked(kind: str, config: BenchConfig, world: World | None) -> Checked:
-    from levilab.virtual_bench import VIRTUAL
+    from levilab.world.bench import VIRTUAL
 
     address = VIRTUAL[kind].address if world else getattr(config, kind).address
     seen: dict[str, Any] = {}

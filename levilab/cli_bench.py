@@ -10,7 +10,7 @@ import typer
 if TYPE_CHECKING:
     from levilab.bench_check import Checked
     from levilab.bench_search import Found
-    from levilab.bench_serve import Served
+    from levilab.world.serve import Served
 
 EXIT_INSTRUMENT, EXIT_INTERRUPTED = 3, 130
 
@@ -79,7 +79,7 @@ def bench_check(
     """
     from levilab.bench_check import check
     from levilab.config import BenchConfig, read_bench
-    from levilab.virtual_bench import own_world
+    from levilab.world.bench import own_world
 
     if mock and bench:
         raise typer.BadParameter("--mock checks the virtual bench, which no file describes", param_hint="--bench")
@@ -135,7 +135,7 @@ def bench_serve(
 
     Ctrl-C or SIGTERM ends it.  Nobody is asked for a password: at another host than 127.0.0.1 all can use it.
     """
-    from levilab.bench_serve import Service, chosen_models, serve
+    from levilab.world.serve import Service, chosen_models, serve
 
     moving = None
     if scene is not None:

@@ -15,8 +15,8 @@ from levilab.errors import LevilabError
 from levilab.record import Order
 from levilab.runs.run import Run, find_run
 from levilab.settings import in_one_line
-from levilab.simulator.world import SpinScene, SpinWorld, drawn
-from levilab.virtual_bench import scene_world
+from levilab.world.bench import scene_world
+from levilab.world.spin_world import SpinScene, SpinWorld, drawn
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -20,7 +20,7 @@ from levilab.interruption import Interrupted, Stop, watching_for_interruption
 from levilab.runs.run import Run, RunRecord, utc_now
 from levilab.runs.writer import RunWriter
 from levilab.software import software_versions
-from levilab.virtual_bench import VIRTUAL
+from levilab.world.bench import VIRTUAL
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from levilab.config import BenchConfig, ExperimentSettings
     from levilab.present.progress import Show
     from levilab.runs.run import Status
-    from levilab.simulator.world import World
+    from levilab.world.spin_world import World
 
 #: So long is slept at a stretch before looking whether somebody asked for the end [s].
 _NAP_S = 0.2

@@ -80,7 +80,7 @@ class LevilabVisaLibrary(VisaLibraryBase):
         """
         if self.bus is None:
             from levilab.clock import WallClock
-            from levilab.virtual_bench import own_world, virtual_bus
+            from levilab.world.bench import own_world, virtual_bus
 
             self.bus = virtual_bus(own_world(WallClock() if str(self.library_path) == REALTIME else None))
         return self.bus

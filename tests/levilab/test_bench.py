@@ -12,8 +12,8 @@ from levilab.clock import VirtualClock, WallClock
 from levilab.config import BenchConfig, ConfigError, InstrumentSettings, Limits, SpinSettings, read_bench, within_limits
 from levilab.errors import LevilabError
 from levilab.interruption import Interrupted
-from levilab.simulator.world import SpinScene, SpinWorld
-from levilab.virtual_bench import VIRTUAL
+from levilab.world.bench import VIRTUAL
+from levilab.world.spin_world import SpinScene, SpinWorld
 
 KINDS = ("counter", "generator")
 

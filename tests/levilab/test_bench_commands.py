@@ -10,7 +10,7 @@ from levilab.bench_file import NobodyFound, bench_text
 from levilab.bench_search import Found, asked, recognised, search
 from levilab.cli_bench import bench_init
 from levilab.config import BenchConfig, ConfigError, InstrumentSettings, Limits, SpinSettings, read_bench
-from levilab.virtual_bench import MODELS, VIRTUAL, own_world
+from levilab.world.bench import MODELS, VIRTUAL, own_world
 
 #: Answers to *IDN? as instruments give them.
 IDENTITIES = {

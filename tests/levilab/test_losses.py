@@ -13,7 +13,7 @@ from instruments.virtual.faults import FAULTS, Fault
 from levilab import bench as benches
 from levilab.order import spin_order
 from levilab.record import MOST_LOSSES, Order, acquire
-from levilab.virtual_bench import VIRTUAL, virtual_bus
+from levilab.world.bench import VIRTUAL, virtual_bus
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -22,7 +22,7 @@ from levilab.order import spin_order
 from levilab.record import Order, acquire
 from levilab.runs.run import Run
 from levilab.runs.writer import RunWriter
-from levilab.simulator.world import SpinScene, SpinWorld, drawn
+from levilab.world.spin_world import SpinScene, SpinWorld, drawn
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -391,7 +391,8 @@ def test_a_real_run_is_gone_on_with_by_the_time_on_the_wall(tmp_path: Path, monk
     """The way without a world: instruments from the configuration, and a top that has gone on since its time zero."""
     from datetime import UTC, datetime, timedelta
 
-    from levilab import bench, virtual_bench
+    from levilab import bench
+    from levilab.world import bench as virtual_bench
 
     class Impatient(Silent):
         def reading(self, text: str, elapsed: float, remaining: float) -> None:

@@ -12,7 +12,7 @@ import pyvisa
 
 from instruments.virtual.bus import Bus
 from instruments.virtual.servers.server import BenchServer
-from levilab.virtual_bench import plug_in_serial
+from levilab.world.bench import plug_in_serial
 from pyvisa_levilab import library_for
 
 if not find_spec("pymeasure"):

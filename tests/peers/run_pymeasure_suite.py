@@ -107,7 +107,7 @@ def reached(way: str | None, address: str):
         yield address
         return
     from instruments.virtual.servers.server import BenchServer
-    from levilab.virtual_bench import virtual_bus
+    from levilab.world.bench import virtual_bus
 
     os.environ["PYVISA_LIBRARY"] = "@py"
     with BenchServer(virtual_bus()) as server:

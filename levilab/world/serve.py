@@ -12,7 +12,7 @@ from instruments.virtual.servers.server import LOOPBACK, PORTS_PER_INSTRUMENT, P
 from instruments.virtual.servers.station import first_of
 from levilab.clock import WallClock
 from levilab.errors import LevilabError
-from levilab.virtual_bench import AGAIN_S, MODELS, VIRTUAL, own_world, scene_world, virtual_bus
+from levilab.world.bench import AGAIN_S, MODELS, VIRTUAL, own_world, scene_world, virtual_bus
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from instruments.virtual.bus import Bus
     from instruments.virtual.servers.server import Offer
     from levilab.simulator.scene import Scene
-    from levilab.simulator.world import World
+    from levilab.world.spin_world import World
 
 #: What asks a server to end: Ctrl-C, kill, a closed terminal, and on Windows Ctrl-Break.
 _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]

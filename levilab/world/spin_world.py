@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from instruments.virtual.generator_voltage import fundamental
-from levilab.simulator.coil import Coil
-from levilab.simulator.history import History
-from levilab.simulator.optics import Tape
 from levilab.simulator.spin import DECAYS
+from levilab.world.coil import Coil
+from levilab.world.light import Tape
+from levilab.world.timeline import History
 
 if TYPE_CHECKING:
     from instruments.virtual.generator_channel import Output

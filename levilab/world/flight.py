@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from levilab.errors import SimulationError
 from levilab.simulator import top
-from levilab.simulator.history import History
 from levilab.simulator.keys import SceneError
 from levilab.simulator.single import simulate
+from levilab.world.timeline import History
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -15,9 +15,9 @@ import pyvisa
 from typer.testing import CliRunner
 
 from instruments.virtual.servers.server import LOOPBACK
-from levilab.bench_serve import Service, WrongService, chosen_models, serve
 from levilab.cli_bench import bench_app
 from levilab.clock import WallClock
+from levilab.world.serve import Service, WrongService, chosen_models, serve
 
 #: How long something is waited for [s]; reached by a failure only.
 AT_MOST = 20.0
@@ -160,7 +160,7 @@ def test_people_see_a_table_of_names(monkeypatch):
     def serve_and_end(service, ready, tell):
         return serve(service, lambda instruments: (ready(instruments), signal.raise_signal(signal.SIGINT)), tell)
 
-    monkeypatch.setattr("levilab.bench_serve.serve", serve_and_end)
+    monkeypatch.setattr("levilab.world.serve.serve", serve_and_end)
     shown = CliRunner().invoke(bench_app, ["serve"])
     assert shown.exit_code == 130
     assert "counter 53230A" in shown.stdout

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from instruments.virtual.generator_voltage import fundamental
 from levilab.simulator import top
-from levilab.simulator.coil import Coil
-from levilab.simulator.flight import Flight
 from levilab.simulator.kernels.fields import flux_density
-from levilab.simulator.optics import Tape
-from levilab.simulator.world import KEPT_S
+from levilab.world.coil import Coil
+from levilab.world.flight import Flight
+from levilab.world.light import Tape
+from levilab.world.spin_world import KEPT_S
 
 if TYPE_CHECKING:
     from instruments.virtual.generator_channel import Output
@@ -46,7 +46,7 @@ def prepare(scene: Scene) -> None:
 
 
 class MotionWorld:
-    """The top of a scene, and what instruments see of it; see :class:`levilab.simulator.world.World`.
+    """The top of a scene, and what instruments see of it; see :class:`levilab.world.spin_world.World`.
 
     The generator takes the place of the scene's drive, whose direction is the coil's; its offset moves nothing.
     again_s: see Flight; seed: of the light's noise, and of the place of the tape on the rim (0: where the transverse

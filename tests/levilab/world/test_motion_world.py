@@ -10,10 +10,10 @@ from instruments.virtual.generator import Burst, Output
 from instruments.virtual.generator_voltage import fundamental
 from levilab.clock import VirtualClock
 from levilab.simulator import SceneError, preset, simulate
-from levilab.simulator.flight import RATE, Flight
-from levilab.simulator.motion_world import MotionWorld
-from levilab.simulator.optics import Tape
-from levilab.simulator.world import BASE_FIELD, KEPT_S
+from levilab.world.flight import RATE, Flight
+from levilab.world.light import Tape
+from levilab.world.motion_world import MotionWorld
+from levilab.world.spin_world import BASE_FIELD, KEPT_S
 
 TURN = 2 * math.pi
 TILTED = preset("tilted")

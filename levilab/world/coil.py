@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from instruments.virtual.generator_channel import Output
 from instruments.virtual.generator_voltage import voltage
-from levilab.simulator.history import History
+from levilab.world.timeline import History
 
 if TYPE_CHECKING:
     from instruments.virtual.generator_channel import Burst

@@ -13,11 +13,11 @@ from scipy.integrate import solve_ivp
 from instruments.virtual.counter_53230a import Virtual53230A
 from instruments.virtual.generator import Burst, Output
 from instruments.virtual.generator_voltage import fundamental, voltage
-from levilab import virtual_bench
 from levilab.clock import VirtualClock
-from levilab.simulator.optics import Tape
 from levilab.simulator.spin import DECAYS
-from levilab.simulator.world import KEPT_S, SpinScene, SpinWorld, drawn
+from levilab.world import bench as virtual_bench
+from levilab.world.light import Tape
+from levilab.world.spin_world import KEPT_S, SpinScene, SpinWorld, drawn
 from support.wire import ask, received, send
 
 TURN = 2 * math.pi

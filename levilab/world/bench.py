@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from instruments.virtual.generator import Output
     from levilab.clock import Clock
     from levilab.simulator.scene import Scene
-    from levilab.simulator.world import World
+    from levilab.world.spin_world import World
 
 #: Where the virtual instruments are plugged in, and what they are unless other models are asked for.
 VIRTUAL = {
@@ -132,7 +132,7 @@ AGAIN_S = 15.0
 
 def own_world(clock: Clock | None = None) -> World:
     """A top to practise with, put back whenever it falls.  clock: by default one that jumps."""
-    from levilab.simulator.world import SpinScene, SpinWorld
+    from levilab.world.spin_world import SpinScene, SpinWorld
 
     return SpinWorld(SpinScene(again_s=AGAIN_S), clock or VirtualClock())
 
@@ -152,7 +152,7 @@ def scene_world(
     cannot be simulated.
     """
     from levilab.simulator.compilation import telling_of_compilation
-    from levilab.simulator.motion_world import MotionWorld, prepare
+    from levilab.world.motion_world import MotionWorld, prepare
 
     with telling_of_compilation(tell):
         prepare(scene)

@@ -1,0 +1,1 @@
+"""What the virtual instruments see, and the virtual bench joined from it."""
