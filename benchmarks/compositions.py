@@ -17,10 +17,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from levilab.benchmark.nystrom import residuals
-from levilab.simulator import preset, top
+from levilab.simulator import preset
+from levilab.simulator.kernels.motion import R
+from levilab.simulator.model import model_of
+from levilab.simulator.order_conditions import residuals
 from levilab.simulator.problem import Problem, end_at
 from levilab.simulator.schemes import SCHEMES, Scheme
+from levilab.simulator.start import start_of
 from levilab.simulator.stops import stops_between
 
 DURATION = 5.0  # [s]
@@ -76,7 +79,7 @@ class Case:
         """Of the place at so many stages a second [m]."""
         steps = max(1, round(DURATION * rate / scheme.stages))
         end = after(replace(self.problem, scheme=scheme), steps)
-        return float(np.linalg.norm(end[top.R] - self.end[top.R]))
+        return float(np.linalg.norm(end[R] - self.end[R]))
 
 
 def after(problem: Problem, steps: int) -> np.ndarray:
@@ -98,7 +101,7 @@ def cases(count: int, seed: int) -> list[Case]:
                 "start.precession": str(draw.choice(["thesis", "none"])),
             }
         )
-        problem = Problem(scene, top.model_of(scene), top.start_of(scene), SCHEMES["blanes-moan-6"])
+        problem = Problem(scene, model_of(scene), start_of(scene), SCHEMES["blanes-moan-6"])
         end = after(problem, 6000)
         if np.hypot(*end[:2]) < 0.008 and abs(end[2] - 0.0725) < 0.004:
             found.append(Case(problem, end))
@@ -185,7 +188,7 @@ def compare() -> None:
     print("error of blanes-moan-6 over that of levitron-6 at stages/s", *(f"{rate:6.0f}" for rate in rates))
     for kind, changes in KINDS.items():
         scene = preset(kind.partition(",")[0]).changed(changes)
-        problem = Problem(scene, top.model_of(scene), top.start_of(scene), SCHEMES["blanes-moan-6"])
+        problem = Problem(scene, model_of(scene), start_of(scene), SCHEMES["blanes-moan-6"])
         one = Case(problem, after(replace(problem, scheme=SCHEMES["kahan-li-8"]), 9000))
         both = [[one.error(SCHEMES[name], rate) for rate in rates] for name in ("blanes-moan-6", "levitron-6")]
         print(f"{kind:58}", *(f"{old / new:6.2g}" for old, new in zip(*both, strict=True)))

@@ -12,7 +12,8 @@ import math
 
 import numpy as np
 
-from levilab.simulator import preset, simulate, top
+from levilab.simulator import preset, simulate
+from levilab.simulator.kernels.motion import TIME
 
 FROM_HZ, TO_HZ, FIELD_T = 30.0, 40.0, 4e-4
 STEP_S, HELD_WITHIN_HZ, ANGLES = 1.0, 1.5, 8
@@ -36,7 +37,7 @@ def lost_at(rate: float, turns: float) -> float | None:
         motion = simulate(driven, STEP_S, tolerance=1e-6, rate=500.0, start=state)
         if motion.fell is not None or np.abs(motion.spin_hz - drive).max() > HELD_WITHIN_HZ:
             return drive
-        state, time, turns = motion.states[-1], float(motion.states[-1, top.TIME]), turns + drive * STEP_S
+        state, time, turns = motion.states[-1], float(motion.states[-1, TIME]), turns + drive * STEP_S
     return None
 
 

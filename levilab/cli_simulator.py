@@ -150,7 +150,7 @@ def stability(
     chosen = _scene(scene, settings)
     spans = _spans(spins, masses, survival=survival)
 
-    from levilab.simulator.floating import stability_of
+    from levilab.simulator.equilibrium import stability_of
     from levilab.stability_table import as_document, print_stability
 
     found = stability_of(chosen)

@@ -142,7 +142,7 @@ def _expected(motion: Trajectory) -> dict[str, float]:
 def _modes(motion: Trajectory) -> dict[str, float]:
     """The modes of small motions about the mean height; none where they are not stable."""
     from analysis import stability
-    from levilab.simulator.floating import axial_field, symmetric
+    from levilab.simulator.equilibrium import axial_field, symmetric
 
     scene = motion.scene
     height, spin = float(np.mean(motion.position[:, 2])), float(motion.spin_hz[0])

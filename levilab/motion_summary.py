@@ -152,7 +152,7 @@ def _notes(motion: Trajectory, lines: AxisLines, rate: float) -> list[str]:
 
 def _cannot_float(scene: Scene) -> list[str]:
     """Why a top was lost that had no chance."""
-    from levilab.simulator.floating import advice, stability_of
+    from levilab.simulator.equilibrium import advice, stability_of
 
     found = stability_of(scene)
     return [] if found.floating else [advice(found)]

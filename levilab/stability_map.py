@@ -7,10 +7,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from levilab.errors import SimulationError
-from levilab.simulator.floating import axial_field, lifting, stability_of, survival, symmetric
+from levilab.simulator.equilibrium import (
+    axial_field,
+    lifting,
+    stability_of,
+    symmetric,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -174,3 +179,19 @@ def _cannot(folder: Path, error: OSError) -> Exception:
     from levilab.files import CannotWrite
 
     return CannotWrite(f"{folder}: the map cannot be written: {error.strerror}; give another folder with --out")
+
+
+def survival(
+    scene: Scene,
+    spins: ArrayLike,
+    masses: ArrayLike,
+    duration: float = 30.0,
+    progress: Callable[[float], None] | None = None,
+) -> NDArray[np.bool_]:
+    """Whether the top is still up after so long [s], for spins [Hz] and masses [kg]; shape (masses, spins)."""
+    from levilab.simulator.ensemble import simulate_many
+
+    values = {"start.spin_hz": np.asarray(spins)[None, :], "top.mass_kg": np.asarray(masses)[:, None]}
+    # from the given place: some of the masses of a map float nowhere
+    given = scene.changed({"start.place": "given"})
+    return simulate_many(given, values, duration, errors=False, tolerance=1e-6, progress=progress).survived

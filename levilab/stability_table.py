@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 from rich.markup import escape
 
 from levilab.present.terminal import new_table, terminal
-from levilab.simulator.floating import advice, axial_field, lifting, symmetric
+from levilab.simulator.equilibrium import advice, axial_field, lifting, symmetric
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from levilab.simulator.floating import Stability
+    from levilab.simulator.equilibrium import Stability
     from levilab.simulator.scene import Scene
 
 #: The master's thesis on the Levitron: its simulated limits of four starts, and what it measured.

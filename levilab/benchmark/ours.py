@@ -9,12 +9,13 @@ import numpy as np
 
 from levilab.benchmark import motion
 from levilab.benchmark.peers import Point, best_time, error_of
-from levilab.simulator import top
 from levilab.simulator.kernels.lanes import LANES, advance_many, numbers_of
+from levilab.simulator.model import model_of
 from levilab.simulator.problem import Problem
 from levilab.simulator.scene import preset
 from levilab.simulator.schemes import SCHEMES
 from levilab.simulator.single import simulate
+from levilab.simulator.start import start_of
 from levilab.simulator.stops import stops_between
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ STEPS = {
 def problem(name: str) -> Problem:
     """The scene `undriven` for a scheme."""
     scene = preset("undriven")
-    return Problem(scene, top.model_of(scene), top.start_of(scene), SCHEMES[name])
+    return Problem(scene, model_of(scene), start_of(scene), SCHEMES[name])
 
 
 def scalar(quick: bool) -> Iterator[Point]:  # noqa: FBT001

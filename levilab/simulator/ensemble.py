@@ -13,15 +13,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from levilab.errors import SimulationError
-from levilab.simulator import falls, top
-from levilab.simulator.estimate import estimate
+from levilab.simulator.accuracy import estimate, longest_step
+from levilab.simulator.escape import at_the_crossing, crossed_height, exit_speeds, within_limits
 from levilab.simulator.kernels.lanes import LANES, advance_many, numbers_of
-from levilab.simulator.kernels.motion import STATE_SIZE
+from levilab.simulator.kernels.motion import LOOSE, STATE_SIZE, TIME, L, N, R, V
 from levilab.simulator.keys import SceneError
+from levilab.simulator.model import model_of
 from levilab.simulator.problem import NOWHERE, Problem, end_at, scheme_for, travelled
 from levilab.simulator.schemes import SCHEMES
 from levilab.simulator.single import ROOM, check, simulate
-from levilab.simulator.steps import longest_step
+from levilab.simulator.start import start_of
 from levilab.simulator.stops import stops_between
 
 if TYPE_CHECKING:
@@ -60,20 +61,20 @@ class Ensemble:
     @property
     def position(self) -> Array:
         """Places at the end, shape (…, 3) [m]."""
-        return self.states[..., top.R]
+        return self.states[..., R]
 
     @property
     def axis(self) -> Array:
         """Axes at the end, shape (…, 3)."""
-        return self.states[..., top.N]
+        return self.states[..., N]
 
     @property
     def spin_hz(self) -> Array:
         """Spins ω₃/2π at the end [Hz]."""
-        along = np.sum(self.states[..., top.L] * self.states[..., top.N], axis=-1)
+        along = np.sum(self.states[..., L] * self.states[..., N], axis=-1)
         washers = self.values.get("washers.inertia_kg_m2", np.array(self.scene.washers.inertia_kg_m2))
         inertia = self.values.get("top.inertia_axial_kg_m2", np.array(self.scene.top.inertia_axial_kg_m2))
-        return np.asarray((along - self.states[..., top.LOOSE] * (washers > 0)) / (inertia - washers) / (2 * np.pi))
+        return np.asarray((along - self.states[..., LOOSE] * (washers > 0)) / (inertia - washers) / (2 * np.pi))
 
 
 def simulate_many(
@@ -129,7 +130,7 @@ def simulate_many(
         {key: np.array(v) for key, v in zip(keys, values, strict=False)},
         duration,
         ends.survived.reshape(shape),
-        ends.states[:, top.TIME].reshape(shape),
+        ends.states[:, TIME].reshape(shape),
         ends.states.reshape(*shape, STATE_SIZE),
         ends.position_error.reshape(shape),
         ends.axis_error.reshape(shape),
@@ -164,7 +165,7 @@ class _Top:
 
     @classmethod
     def of(cls, scene: Scene) -> _Top:
-        model, start = top.model_of(scene), top.start_of(scene)
+        model, start = model_of(scene), start_of(scene)
         problem = Problem(scene, model, start, scheme_for(None, model))
         kinked = model.drive is not None and (scene.drive.waveform != "sine" or scene.drive.off_s is not None)
         return cls(problem, longest_step(scene, model, start, problem.scheme), kinked)
@@ -237,21 +238,21 @@ def _advance(
     else:
         starts = np.array([one.problem.start for one in some])
         states, taken = _together(some, starts, duration / counts, counts, problem.escape)
-        survived = (taken == counts) & falls.inside(states, problem.escape)
+        survived = (taken == counts) & within_limits(states, problem.escape)
     if errors:
-        lasted = states[:, top.TIME]
+        lasted = states[:, TIME]
         # where a fall or a kink of the drive leaves no room for longer steps, half of them tell as much
         room = (lasted > ROOM * steps) & ~np.array([one.kinked for one in some])
         lengths = [np.where(room, times * steps, np.minimum(steps, lasted) / 2) for times in (2, 4)]
         twice = _coarse(some, lasted, lengths[0])
         four = _coarse(some, lasted, lengths[1]) if np.any(room) else twice
-        for error, columns in ((ends.position_error, top.R), (ends.axis_error, top.N)):
+        for error, columns in ((ends.position_error, R), (ends.axis_error, N)):
             error[part] = estimate(states[:, columns], twice[:, columns], four[:, columns], problem.scheme.order)
     late = np.flatnonzero(~survived)
     if late.size:
         if not some[0].kinked:
             fallen = [some[i] for i in late]
-            states[late] = falls.at_the_crossing(
+            states[late] = at_the_crossing(
                 states[late], (duration / counts)[late], problem.escape, lambda s, h: _in_one_step(fallen, s, h)
             )
         _add_uncertain_moment([some[i] for i in late], states[late], np.array(part)[late], ends)
@@ -260,11 +261,11 @@ def _advance(
 
 def _add_uncertain_moment(some: list[_Top], states: Array, where: NDArray[np.intp], ends: _Ends) -> None:
     """The moment of a fall is uncertain, too: the motion across the limit turns the place's error to time."""
-    height = falls.crossed_height(states, some[0].problem.escape)
-    time = ends.position_error[where] / falls.speeds(states, height)
+    height = crossed_height(states, some[0].problem.escape)
+    time = ends.position_error[where] / exit_speeds(states, height)
     inverse = np.array([one.problem.model.body.inverse_transverse for one in some])
-    ends.position_error[where] += time * np.linalg.norm(states[:, top.V], axis=1)
-    ends.axis_error[where] += time * inverse * np.linalg.norm(np.cross(states[:, top.L], states[:, top.N]), axis=1)
+    ends.position_error[where] += time * np.linalg.norm(states[:, V], axis=1)
+    ends.axis_error[where] += time * inverse * np.linalg.norm(np.cross(states[:, L], states[:, N]), axis=1)
 
 
 def _in_one_step(some: list[_Top], states: Array, times: Array) -> Array:
@@ -290,7 +291,7 @@ def _together(
     states, taken = np.empty_like(starts), np.zeros(len(some), dtype=np.int64)
     model, a, b = some[0].problem.model, np.array(scheme.drifts), np.array(scheme.kicks)
     advance_many(model, starts, numbers, steps, counts, a, b, escape, states, taken)
-    states[:, top.TIME] = starts[:, top.TIME] + steps * taken
+    states[:, TIME] = starts[:, TIME] + steps * taken
     return states, taken
 
 

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from levilab.errors import SimulationError
-from levilab.simulator import escapes, top
+from levilab.simulator.escape import locate_escape
 from levilab.simulator.kernels.braking import Flowing, LooseFlowing
 from levilab.simulator.kernels.loads import Kinked
-from levilab.simulator.kernels.motion import STATE_SIZE
+from levilab.simulator.kernels.motion import STATE_SIZE, TIME, R
 from levilab.simulator.kernels.splitting import advance
 from levilab.simulator.schemes import SCHEMES, Scheme
 from levilab.simulator.stops import every_step
@@ -130,20 +130,20 @@ def _escape(problem: Problem, state: Array, interval: Stops) -> tuple[Array, Eve
     after, through = problem.advanced(states[-1], single.part(at, at + 1), NOWHERE)
     if not (through and np.all(np.isfinite(after[-1]))):
         raise SimulationError(
-            f"the motion cannot be followed beyond {states[-1][top.TIME]:.6g} s, where its numbers leave their range; "
-            f"the last place was ({', '.join(f'{x:.4g}' for x in states[-1][top.R])}) m: "
+            f"the motion cannot be followed beyond {states[-1][TIME]:.6g} s, where its numbers leave their range; "
+            f"the last place was ({', '.join(f'{x:.4g}' for x in states[-1][R])}) m: "
             "start farther from the base's edges, or end at a greater escape.height_m"
         )
     moved = mover(problem, single.part(at, at + 1))
     length = float(single.times[at + 1] - single.times[at])
-    return after[-1], escapes.escaped(states[-1], length, moved, problem.escape)
+    return after[-1], locate_escape(states[-1], length, moved, problem.escape)
 
 
 def mover(problem: Problem, interval: Stops) -> Callable[[Array, float], Array]:
     """(state, time) → the state that much later, in one step, with the drive as it is in the interval."""
 
     def moved(state: Array, length: float) -> Array:
-        times = np.array([state[top.TIME], state[top.TIME] + length])
+        times = np.array([state[TIME], state[TIME] + length])
         return np.asarray(problem.advanced(state, replace(interval, times=times), NOWHERE)[0][-1])
 
     return moved

@@ -18,7 +18,7 @@ from pydantic import NonNegativeFloat, ValidationError, model_validator
 
 from levilab.settings import in_one_line
 from levilab.simulator.keys import SceneError, Table, as_toml, nearest, parsed, set_key, shown
-from levilab.simulator.scene_parts import Base, Drag, Drive, Escape, Part, Start, Top, Washers
+from levilab.simulator.parts import Base, Drag, Drive, Escape, Part, Start, Top, Washers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping

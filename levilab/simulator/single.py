@@ -11,11 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from levilab.errors import SimulationError
-from levilab.simulator import escapes, top
-from levilab.simulator.estimate import estimate
+from levilab.simulator.accuracy import estimate, longest_step
+from levilab.simulator.energy import energy
+from levilab.simulator.escape import exit_speed, locate_zero, margins
+from levilab.simulator.kernels.motion import CLOCK, TIME, L, N, R, V
+from levilab.simulator.model import model_of
 from levilab.simulator.problem import Problem, end_at, mover, scheme_for, travelled
 from levilab.simulator.spin import DECAYS, since_infinity
-from levilab.simulator.steps import longest_step
+from levilab.simulator.start import start_of
 from levilab.simulator.stops import every_step, kinks, stops_between
 from levilab.simulator.trajectory import Accuracy, Event, Trajectory
 
@@ -96,19 +99,19 @@ def simulate(
                 "take observed = motion"
             )
         return spin_alone(scene, duration, tolerance, rate)
-    model = top.model_of(scene)
-    state = top.start_of(scene) if start is None else np.array(start, dtype=np.float64)
+    model = model_of(scene)
+    state = start_of(scene) if start is None else np.array(start, dtype=np.float64)
     if not np.all(np.isfinite(state)):
         raise SimulationError("the start has a value that is no number: 18 finite numbers are expected")
-    if start is None and min(escapes.margins(state, (scene.escape.radius_m, scene.escape.height_m)).values()) < 0:
+    if start is None and min(margins(state, (scene.escape.radius_m, scene.escape.height_m)).values()) < 0:
         raise SimulationError(
-            f"escape.height_m = {scene.escape.height_m}: the top starts at {state[top.R][2]:.4g} m, outside of the "
+            f"escape.height_m = {scene.escape.height_m}: the top starts at {state[R][2]:.4g} m, outside of the "
             "limits of the escape, where it would be lost before it began"
         )
     problem = Problem(scene, model, state, scheme_for(scheme, model))
     wanted = _Wanted(duration, rate, events, progress)
     run, accuracy = _to_tolerance(problem, wanted, tolerance, step)
-    return Trajectory(scene, run.states, top.energy(scene, model, run.states), accuracy, run.fell, run.events)
+    return Trajectory(scene, run.states, energy(scene, model, run.states), accuracy, run.fell, run.events)
 
 
 def check(*, duration: float, tolerance: float, rate: float | None, step: float | None) -> None:
@@ -145,16 +148,16 @@ def _to_tolerance(problem: Problem, wanted: _Wanted, tolerance: float, step: flo
 def _errors(problem: Problem, run: Run, step: float) -> tuple[float, float]:
     """Estimated errors of the last state, place [m] and axis [rad]: from the same motion with longer steps."""
     end = run.states[-1]
-    twice, four = _others(problem, end[top.TIME], step)
+    twice, four = _others(problem, end[TIME], step)
     # rounding: a random walk of half a unit in the last place, twice for each stage
     floor = 2.2e-16 * math.sqrt(2 * run.steps * problem.scheme.stages)
-    position = estimate(end[top.R], twice[top.R], four[top.R], problem.scheme.order)
-    position += floor * float(np.linalg.norm(end[top.R]))
-    axis = floor + estimate(end[top.N], twice[top.N], four[top.N], problem.scheme.order)
+    position = estimate(end[R], twice[R], four[R], problem.scheme.order)
+    position += floor * float(np.linalg.norm(end[R]))
+    axis = floor + estimate(end[N], twice[N], four[N], problem.scheme.order)
     if run.fell is not None:  # the moment of the fall is uncertain, too: the motion across the limit turns it to time
-        late = position / escapes.speed(end, run.fell.name)
-        position += late * float(np.linalg.norm(end[top.V]))
-        axis += late * float(np.linalg.norm(np.cross(end[top.L], end[top.N]))) * problem.model.body.inverse_transverse
+        late = position / exit_speed(end, run.fell.name)
+        position += late * float(np.linalg.norm(end[V]))
+        axis += late * float(np.linalg.norm(np.cross(end[L], end[N]))) * problem.model.body.inverse_transverse
     return (position, axis) if math.isfinite(position + axis) else (math.inf, math.inf)
 
 
@@ -163,7 +166,7 @@ def _others(problem: Problem, until: float, step: float) -> tuple[Array, Array]:
 
     Where there is no room for them, because a fall or the next kink of the drive comes first, with half the steps.
     """
-    begin = float(problem.start[top.TIME])
+    begin = float(problem.start[TIME])
     lasted = abs(until - begin)
     pieces = 1 + kinks(problem.scene.drive, min(begin, until), max(begin, until)).size
     if lasted / pieces > ROOM * step:
@@ -174,7 +177,7 @@ def _others(problem: Problem, until: float, step: float) -> tuple[Array, Array]:
 
 def _with_steps(problem: Problem, until: float, step: float) -> Array:
     """The state at a time, with steps of that length and no escape."""
-    stops = stops_between(problem.start[top.TIME], until, step, problem.scene.drive)
+    stops = stops_between(problem.start[TIME], until, step, problem.scene.drive)
     return end_at(problem, stops)
 
 
@@ -182,7 +185,7 @@ def _with_steps(problem: Problem, until: float, step: float) -> Array:
 
 
 def _run(problem: Problem, wanted: _Wanted, step: float) -> Run:
-    begin = float(problem.start[top.TIME])
+    begin = float(problem.start[TIME])
     samples = _samples(begin, wanted.duration, wanted.rate)
     stops = stops_between(begin, begin + wanted.duration, step, problem.scene.drive, samples)
     if wanted.events:
@@ -191,7 +194,7 @@ def _run(problem: Problem, wanted: _Wanted, step: float) -> Run:
     if fell is not None:
         states = np.concatenate([states, fell.state[None]])
     found = _events(problem, states, stops, wanted.events) if wanted.events else ()
-    kept = states[_at(states[:, top.TIME], samples, abs(wanted.duration) * 1e-11)]
+    kept = states[_at(states[:, TIME], samples, abs(wanted.duration) * 1e-11)]
     return Run(kept, fell, found, steps)
 
 
@@ -214,7 +217,7 @@ def _events(problem: Problem, states: Array, stops: Stops, events: Watch) -> tup
 
     def on(function: Callable[[Trajectory], Array], rows: Array) -> Array:
         nothing = Accuracy(0, 0, 0, "", 0, 0)
-        energies = top.energy(problem.scene, problem.model, rows)
+        energies = energy(problem.scene, problem.model, rows)
         return np.asarray(function(Trajectory(problem.scene, rows, energies, nothing)), dtype=np.float64)
 
     found = []
@@ -222,9 +225,9 @@ def _events(problem: Problem, states: Array, stops: Stops, events: Watch) -> tup
         values = on(function, states)
         for i in np.flatnonzero(np.signbit(values[1:]) != np.signbit(values[:-1])):
             interval = stops.part(int(i), int(i) + 1)
-            length = float(states[i + 1, top.TIME] - states[i, top.TIME])
+            length = float(states[i + 1, TIME] - states[i, TIME])
             value = lambda state, function=function: float(on(function, state[None])[0])  # noqa: E731
-            found.append(escapes.located(name, states[i], length, mover(problem, interval), value))
+            found.append(locate_zero(name, states[i], length, mover(problem, interval), value))
     return tuple(sorted(found, key=lambda event: event.time))
 
 
@@ -233,11 +236,11 @@ def _events(problem: Problem, states: Array, stops: Stops, events: Watch) -> tup
 
 def spin_alone(scene: Scene, duration: float, tolerance: float, rate: float | None) -> Trajectory:
     """The spin in closed form; the top stays where it starts, and nothing is integrated."""
-    start = top.start_of(scene)
+    start = start_of(scene)
     times = np.concatenate([[0.0], _samples(0.0, duration, rate), [duration]])
     states = np.tile(start, (times.size, 1))
-    states[:, top.TIME] = times
-    spin = abs(start[top.CLOCK])
+    states[:, TIME] = times
+    spin = abs(start[CLOCK])
     if scene.drag.law != "none" and spin > 0 and any(scene.drag.constants):
         longest_ago = since_infinity(scene.drag.law, spin, scene.drag.constants)
         if -duration >= longest_ago:
@@ -246,7 +249,7 @@ def spin_alone(scene: Scene, duration: float, tolerance: float, rate: float | No
                 "a shorter way back is expected"
             )
         now = DECAYS[scene.drag.law].after(spin, times, *scene.drag.constants)
-        states[:, top.L] = start[top.L] * (now / spin)[:, None]
-        states[:, top.CLOCK] = np.copysign(now, start[top.CLOCK])
-    energies = top.energy(scene, top.model_of(scene), states)
+        states[:, L] = start[L] * (now / spin)[:, None]
+        states[:, CLOCK] = np.copysign(now, start[CLOCK])
+    energies = energy(scene, model_of(scene), states)
     return Trajectory(scene, states, energies, Accuracy(0.0, 0.0, tolerance, "closed form", duration, 0))

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from levilab.simulator import top
+from levilab.simulator.energy import spin_of
+from levilab.simulator.kernels.motion import LOOSE, TIME, L, N, R, V
 
 if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
@@ -65,27 +66,27 @@ class Trajectory:
     @property
     def time(self) -> Array:
         """Shape (n,) [s]; the last one is the end, or the moment of the fall."""
-        return self.states[:, top.TIME]
+        return self.states[:, TIME]
 
     @property
     def position(self) -> Array:
         """Place of the centre of mass, shape (n, 3) [m]."""
-        return self.states[:, top.R]
+        return self.states[:, R]
 
     @property
     def velocity(self) -> Array:
         """Shape (n, 3) [m/s]."""
-        return self.states[:, top.V]
+        return self.states[:, V]
 
     @property
     def axis(self) -> Array:
         """The top's axis, a unit vector, shape (n, 3)."""
-        return self.states[:, top.N]
+        return self.states[:, N]
 
     @property
     def angular_momentum(self) -> Array:
         """Shape (n, 3) [kg m²/s]."""
-        return self.states[:, top.L]
+        return self.states[:, L]
 
     @property
     def tilt(self) -> Array:
@@ -95,13 +96,13 @@ class Trajectory:
     @property
     def spin_hz(self) -> Array:
         """ω₃/2π, shape (n,) [Hz]; with loose washers that of the core, which carries the magnet."""
-        return top.spin_of(self.scene, self.states) / (2 * np.pi)
+        return spin_of(self.scene, self.states) / (2 * np.pi)
 
     @property
     def washer_spin_hz(self) -> Array:
         """Spin of the loose washers, shape (n,) [Hz]; that of the top where none are loose."""
         inertia = self.scene.washers.inertia_kg_m2
-        return self.states[:, top.LOOSE] / (2 * np.pi * inertia) if inertia else self.spin_hz
+        return self.states[:, LOOSE] / (2 * np.pi * inertia) if inertia else self.spin_hz
 
     @property
     def survived(self) -> bool:

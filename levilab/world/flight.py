@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from levilab.errors import SimulationError
-from levilab.simulator import top
+from levilab.simulator.kernels.motion import ARM, TIME
 from levilab.simulator.keys import SceneError
 from levilab.simulator.single import simulate
+from levilab.simulator.start import start_of
 from levilab.world.timeline import History
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ class _Up:
     @property
     def start(self) -> float:
         """When it begins [s]."""
-        return float(self.state[top.TIME])
+        return float(self.state[TIME])
 
 
 @dataclass(frozen=True)
@@ -133,13 +134,13 @@ class Flight:
 
     def _begin(self, time: float) -> Array:
         """The state of a top that is put there at this time, shape (18,)."""
-        state = top.start_of(self._scene)
-        state[top.TIME] = time
+        state = start_of(self._scene)
+        state[TIME] = time
         return state
 
     def _live(self, state: Array) -> None:
         """The next piece of the life of a top in this state."""
-        begin = float(state[top.TIME])
+        begin = float(state[TIME])
         try:
             motion = self._motion(state)
         except SimulationError:  # it has hit the base, where the field is infinite
@@ -178,12 +179,12 @@ def _later(piece: _Up, time: float) -> Array:
     if time - piece.start > _AT_ONCE:
         motion = simulate(piece.scene, time - piece.start, step=piece.step, rate=None, start=state)
         state = motion.states[-1].copy()
-    state[top.TIME] = time
+    state[TIME] = time
     return state
 
 
 def _turns(motion: Trajectory) -> Array:
     """Turns of the tape past a spot that lies on the rim in the direction of x while the top stands on the axis."""
-    arm, place = motion.states[:, top.ARM], motion.position
+    arm, place = motion.states[:, ARM], motion.position
     spot = np.arctan2(-place[:, 1], motion.scene.top.magnet_radius_m - place[:, 0])
     return np.asarray(np.unwrap(np.arctan2(arm[:, 1], arm[:, 0]) - spot) / (2 * np.pi))

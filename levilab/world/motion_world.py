@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from instruments.virtual.generator_voltage import fundamental
-from levilab.simulator import top
 from levilab.simulator.kernels.fields import flux_density
+from levilab.simulator.model import base_field
 from levilab.world.coil import Coil
 from levilab.world.flight import Flight
 from levilab.world.light import Tape
@@ -70,7 +70,7 @@ class MotionWorld:
         self._tape_at = float(np.random.default_rng(seed).uniform()) if seed else 0.0
         self._told = 0.0  # the last time that a change was told for [s]
         probe = np.array([[0.0, 0.0, PROBE_M]])
-        self._probe_t = float(flux_density(top.base_field(scene), probe)[0, 2])
+        self._probe_t = float(flux_density(base_field(scene), probe)[0, 2])
 
     def drive(self, time: float, output: Output) -> None:
         """From this time on the coil's field is this; see World."""

@@ -148,3 +148,10 @@ def kick(model: Model, s: State, k: float, level: float, slope: float) -> State:
     v = plus(weighed(body.gravity, s.v, k), k * body.inverse_mass, force)  # what is known first is added first
     momentum, loose = braked(model.drag, body, s, torque, k)
     return State(s.r, v, s.n, momentum, s.arm, s.clock, loose, s.t)
+
+
+#: Columns of a state: place, velocity, axis, angular momentum, arm, clock, loose washers, time.
+R, V, N, L, ARM = (slice(3 * i, 3 * i + 3) for i in range(5))
+
+
+CLOCK, LOOSE, TIME = 15, 16, 17

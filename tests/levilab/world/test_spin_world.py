@@ -529,7 +529,7 @@ def test_a_change_at_the_time_of_a_fall_or_of_a_burst_that_was_to_end_changes_no
 
 
 def test_the_magnetometer_sees_the_base_as_the_simulator_has_it():
-    from levilab.simulator.floating import axial_field
+    from levilab.simulator.equilibrium import axial_field
     from levilab.simulator.scene import preset
 
     there = axial_field(preset("undriven"))(np.array([0.072]))[0, 0]

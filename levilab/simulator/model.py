@@ -1,4 +1,4 @@
-"""From a scene to the numbers its kernels need: the model, the top's start, and what stays constant."""
+"""From a scene to the numbers that its kernels need."""
 
 from __future__ import annotations
 
@@ -9,21 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from levilab.simulator.kernels import braking
-from levilab.simulator.kernels.fields import field_of, flux_density
+from levilab.simulator.kernels.fields import field_of
 from levilab.simulator.kernels.loads import Aligned, Disc, Kinked, Leaning, Sine, Tilted, Upright
-from levilab.simulator.kernels.motion import STATE_SIZE, Body, Loose, Model, Rigid
+from levilab.simulator.kernels.motion import Body, Loose, Model, Rigid
 
 if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
 
 Array = NDArray[np.float64]
-
-#: Columns of a state: place, velocity, axis, angular momentum, arm, clock, loose washers, time.
-R, V, N, L, ARM = (slice(3 * i, 3 * i + 3) for i in range(5))
-CLOCK, LOOSE, TIME = 15, 16, 17
-
-
-# --- the model ---
 
 
 def model_of(scene: Scene) -> Model:
@@ -151,91 +144,4 @@ def _drive(scene: Scene) -> Any:
 # --- the start ---
 
 
-def start_of(scene: Scene) -> Array:
-    """The state at time 0 in the base's frame, shape (18,)."""
-    start = scene.start
-    place, velocity = np.array(start.position_m), np.array(start.velocity_m_s)
-    if start.place == "equilibrium":
-        from levilab.simulator.floating import floating_height
-
-        place, velocity = np.array([0.0, 0.0, floating_height(scene)]), np.zeros(3)
-    n = np.array([0.0, -math.sin(start.tilt_rad), math.cos(start.tilt_rad)])
-    spin = 2 * math.pi * start.spin_hz
-    transverse = np.array([0.0, 0.0, 1.0]) - n * math.cos(start.tilt_rad)
-    rate = _precession(scene, spin, place)
-    momentum = scene.top.inertia_axial_kg_m2 * spin * n + scene.top.inertia_transverse_kg_m2 * rate * transverse
-    arm = np.array([1.0, 0.0, 0.0])  # φ = ψ = 0: the node line, at right angles to the axis
-    state = np.empty(STATE_SIZE)
-    for part, vector in ((R, place), (V, velocity), (N, n), (L, momentum), (ARM, arm)):
-        state[part] = vector
-    state[CLOCK], state[LOOSE], state[TIME] = spin, scene.washers.inertia_kg_m2 * spin, 0.0
-    return state
-
-
-def _precession(scene: Scene, spin: float, place: Array) -> float:
-    """The azimuth's rate φ̇ [rad/s] at the start."""
-    start = scene.start
-    if start.precession == "thesis":  # φ̇ = ψ̇ and ω₃ = ψ̇ + φ̇ cos θ
-        return spin / (1 + math.cos(start.tilt_rad))
-    if start.precession == "none":
-        return 0.0
-    return steady_precession(scene, spin, place)
-
-
-def steady_precession(scene: Scene, spin: float, place: Array) -> float:
-    """The slow root of I₁ cosθ φ̇² − I₃ω₃ φ̇ + P = 0 [rad/s], P = −μB_z: precession without nutation.
-
-    Goldstein, Classical Mechanics, § 5.7, with the torque of the field in place of the weight's.  A top too
-    slow for a steady precession starts at the rate nearest to one.
-    """
-    top = scene.top
-    bz = float(flux_density(base_field(scene), place[None, :])[0, 2])
-    restoring = -top.moment_a_m2 * top.moment_tilt[1] * bz
-    a = top.inertia_transverse_kg_m2 * math.cos(scene.start.tilt_rad)
-    b = top.inertia_axial_kg_m2 * spin
-    root = math.copysign(math.sqrt(max(b * b - 4 * a * restoring, 0.0)), b)
-    return 2 * restoring / (b + root) if b + root else 0.0
-
-
 # --- what stays constant ---
-
-
-def energy(scene: Scene, model: Model, states: Array) -> Array:
-    """Energy [J] of states of shape (n, 18), without the drive's part; constant where there is no drag and no drive."""
-    s = np.atleast_2d(states)
-    momentum, axis = s[:, L], s[:, N]
-    along = np.einsum("ij,ij->i", momentum, axis)
-    across = np.einsum("ij,ij->i", momentum, momentum) - along**2
-    kinetic = np.einsum("ij,ij->i", s[:, V], s[:, V]) / (2 * model.body.inverse_mass)
-    turning = across * model.body.inverse_transverse / 2 + _spinning(scene, along, s[:, LOOSE])
-    weight = -(s[:, R] @ np.array(gravity(scene))) * scene.top.mass_kg
-    return np.asarray(kinetic + turning + weight + magnetic_energy(model, s))
-
-
-def _spinning(scene: Scene, along: Array, loose: Array) -> Array:
-    washers, axial = scene.washers.inertia_kg_m2, scene.top.inertia_axial_kg_m2
-    if washers == 0:
-        return np.asarray(along**2 / (2 * axial))
-    return np.asarray((along - loose) ** 2 / (2 * (axial - washers)) + loose**2 / (2 * washers))
-
-
-def magnetic_energy(model: Model, states: Array) -> Array:
-    """−M·B [J] in the base's field, shape (n,)."""
-    magnet, axis, arm = model.magnet, states[:, N], states[:, ARM]
-    direction = axis if isinstance(magnet, Aligned) else magnet.axial * axis + magnet.transverse * arm
-    if not isinstance(magnet, Disc):
-        return np.asarray(-np.einsum("ij,ij->i", direction, flux_density(model.field, states[:, R])))
-    third = np.cross(axis, arm)
-    total = np.zeros(len(states))
-    for e1, e2, e3, weight in magnet.nodes:
-        place = states[:, R] + e1 * arm + e2 * third + e3 * axis
-        total -= weight * np.einsum("ij,ij->i", direction, flux_density(model.field, place))
-    return total
-
-
-def spin_of(scene: Scene, states: Array) -> Array:
-    """ω₃ = L·n/I₃ of the states [rad/s]; with loose washers that of the core, which carries the magnet."""
-    s = np.atleast_2d(states)
-    along = np.einsum("ij,ij->i", s[:, L], s[:, N])
-    washers = scene.washers.inertia_kg_m2
-    return np.asarray((along - s[:, LOOSE] * (washers > 0)) / (scene.top.inertia_axial_kg_m2 - washers))

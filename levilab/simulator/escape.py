@@ -1,4 +1,4 @@
-"""Many falls at once: states that are up to a step outside of the limits, taken back to the moment they crossed."""
+"""Escapes: the moment at which a top leaves the limits, of one motion or of many, located within a step."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from levilab.simulator import top
+from levilab.simulator.kernels.motion import TIME, R, V
+from levilab.simulator.trajectory import Event
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -18,16 +19,16 @@ Array = NDArray[np.float64]
 _MOST = 60
 
 
-def inside(states: Array, escape: tuple[float, float]) -> NDArray[np.bool_]:
+def within_limits(states: Array, escape: tuple[float, float]) -> NDArray[np.bool_]:
     """Whether states, shape (n, 18), are within the escape's radius and above its height [m]."""
-    x, y, z = states[:, top.R].T
+    x, y, z = states[:, R].T
     return np.asarray((z > escape[1]) & (np.hypot(x, y) < escape[0]))
 
 
-def speeds(states: Array, across_height: NDArray[np.bool_]) -> Array:
+def exit_speeds(states: Array, across_height: NDArray[np.bool_]) -> Array:
     """How fast [m/s] states leave across the limit of height or else of radius, never below 1e-12, shape (n,)."""
-    x, y, _ = states[:, top.R].T
-    vx, vy, vz = states[:, top.V].T
+    x, y, _ = states[:, R].T
+    vx, vy, vz = states[:, V].T
     outwards = (x * vx + y * vy) / np.maximum(np.hypot(x, y), 1e-300)
     return np.asarray(np.maximum(np.abs(np.where(across_height, vz, outwards)), 1e-12))
 
@@ -39,7 +40,7 @@ def crossed_height(states: Array, escape: tuple[float, float]) -> NDArray[np.boo
 
 def _margins(states: Array, escape: tuple[float, float]) -> Array:
     """How far [m] inside of the height and of the radius, shape (2, n)."""
-    x, y, z = states[:, top.R].T
+    x, y, z = states[:, R].T
     return np.array([z - escape[1], escape[0] - np.hypot(x, y)])
 
 
@@ -64,13 +65,50 @@ def at_the_crossing(
             break
         time, states = better, moved(before, better)
     states = states.copy()
-    states[:, top.TIME] = before[:, top.TIME] + time
+    states[:, TIME] = before[:, TIME] + time
     return states
 
 
 def _signed(states: Array, height: NDArray[np.bool_]) -> Array:
     """How fast the margin shrinks [m/s]; 1e-300 where it does not, which sends Newton out of the bracket."""
-    x, y, _ = states[:, top.R].T
-    vx, vy, vz = states[:, top.V].T
+    x, y, _ = states[:, R].T
+    vx, vy, vz = states[:, V].T
     shrinking = np.where(height, -vz, (x * vx + y * vy) / np.maximum(np.hypot(x, y), 1e-300))
     return np.where(shrinking > 0, shrinking, 1e-300)
+
+
+def margins(state: Array, escape: tuple[float, float]) -> dict[str, float]:
+    """How far [m] a state is inside of either limit; negative outside."""
+    x, y, z = state[R]
+    return {"radius": escape[0] - float(np.hypot(x, y)), "height": float(z) - escape[1]}
+
+
+def exit_speed(state: Array, name: str) -> float:
+    """How fast [m/s] a state moves across the limit of that name; never quite 0."""
+    x, y, _ = state[R]
+    vx, vy, vz = state[V]
+    across = vz if name == "height" else (x * vx + y * vy) / max(float(np.hypot(x, y)), 1e-300)
+    return max(abs(float(across)), 1e-12)
+
+
+def locate_escape(
+    before: Array, length: float, moved: Callable[[Array, float], Array], escape: tuple[float, float]
+) -> Event:
+    """The escape within a step of this length [s] from a state; moved: (state, time) → state."""
+    after = moved(before, length)
+    name = min(margins(after, escape), key=lambda key: margins(after, escape)[key])
+    return locate_zero(name, before, length, moved, lambda state: margins(state, escape)[name])
+
+
+def locate_zero(
+    name: str, before: Array, length: float, moved: Callable[[Array, float], Array], value: Callable[[Array], float]
+) -> Event:
+    """The moment within a step at which a value passes through zero, to the last digits of the time."""
+    from scipy.optimize import brentq
+
+    if value(before) == 0:
+        return Event(name, float(before[TIME]), before)
+    # relative to the step: xtol below the rounding of the time itself
+    part = brentq(lambda part: value(moved(before, part * length)), 0.0, 1.0, xtol=1e-14, rtol=1e-14)
+    state = moved(before, float(part) * length)
+    return Event(name, float(state[TIME]), state)

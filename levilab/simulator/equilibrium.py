@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from analysis import stability
 from levilab.simulator.kernels.fields import flux_density, flux_gradient, on_axis
 from levilab.simulator.keys import SceneError
-from levilab.simulator.top import base_field, disc_nodes
+from levilab.simulator.model import base_field, disc_nodes
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -184,19 +184,3 @@ def advice(found: Stability) -> str:
     )
     asked = f".  Were grams meant?  {kilograms:g} g are top.mass_kg = {kilograms / 1000:g}"
     return said + (asked if kilograms > HEAVIEST_KG else "")
-
-
-def survival(
-    scene: Scene,
-    spins: ArrayLike,
-    masses: ArrayLike,
-    duration: float = 30.0,
-    progress: Callable[[float], None] | None = None,
-) -> NDArray[np.bool_]:
-    """Whether the top is still up after so long [s], for spins [Hz] and masses [kg]; shape (masses, spins)."""
-    from levilab.simulator.ensemble import simulate_many
-
-    values = {"start.spin_hz": np.asarray(spins)[None, :], "top.mass_kg": np.asarray(masses)[:, None]}
-    # from the given place: some of the masses of a map float nowhere
-    given = scene.changed({"start.place": "given"})
-    return simulate_many(given, values, duration, errors=False, tolerance=1e-6, progress=progress).survived

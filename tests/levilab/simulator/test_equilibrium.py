@@ -8,11 +8,11 @@ import pytest
 from levilab.errors import SimulationError
 from levilab.files import CannotWrite
 from levilab.simulator.ensemble import simulate_many
-from levilab.simulator.floating import advice, axial_field, floating_height, stability_of, survival
+from levilab.simulator.equilibrium import advice, axial_field, floating_height, stability_of
 from levilab.simulator.scene import SceneError, preset
 from levilab.simulator.single import simulate
 from levilab.stability_figure import map_figure
-from levilab.stability_map import place_for_map, span_of, survival_map, write_map
+from levilab.stability_map import place_for_map, span_of, survival, survival_map, write_map
 from levilab.stability_table import as_document, print_stability, remarks
 
 UNDRIVEN = preset("undriven")

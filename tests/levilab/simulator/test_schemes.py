@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from levilab.benchmark.nystrom import residuals
+from levilab.simulator.order_conditions import residuals
 from levilab.simulator.scene import Scene
 from levilab.simulator.schemes import SCHEMES, Scheme
 from levilab.simulator.single import simulate

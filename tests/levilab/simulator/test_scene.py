@@ -15,6 +15,7 @@ from pydantic import ValidationError
 import levilab.simulator
 from levilab.errors import LevilabError
 from levilab.simulator.keys import SYNONYMS, as_toml
+from levilab.simulator.parts import CONSTANTS
 from levilab.simulator.scene import (
     Base,
     Drag,
@@ -32,7 +33,6 @@ from levilab.simulator.scene import (
     scene_of,
     with_settings,
 )
-from levilab.simulator.scene_parts import CONSTANTS
 from support.paths import DOCS
 
 SCENES = Path(levilab.simulator.__file__).parent / "scenes"

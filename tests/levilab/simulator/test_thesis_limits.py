@@ -7,8 +7,8 @@ The thesis prints m = 25.5 g, which its own field cannot lift; 25.27 g gives its
 import numpy as np
 import pytest
 
-from levilab.simulator import top
 from levilab.simulator.ensemble import simulate_many
+from levilab.simulator.kernels.motion import ARM
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
 
@@ -87,7 +87,7 @@ def test_the_driven_top_stays_locked_for_five_minutes_with_its_line_at_the_drive
     motion = simulate(preset("driven"), 300.0, rate=200.0, tolerance=1e-6)
     assert motion.survived
     # the body's x axis, where the dipole leans to, follows the drive's field and never slips by a turn
-    arm = motion.states[:, top.ARM]
+    arm = motion.states[:, ARM]
     behind = np.unwrap(np.arctan2(arm[:, 1], arm[:, 0])) / (2 * np.pi) - 30.0 * motion.time
     assert np.ptp(behind) < 0.75
     # the spin hunts; its mean lies below ν_d, because a wobbling axis adds to the turn: (1 − cos θ) of each

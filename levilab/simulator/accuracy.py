@@ -1,4 +1,4 @@
-"""How long a step may be at most, before any error is looked at."""
+"""How long a step may be at most, and how good a result is."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from levilab.simulator import top
 from levilab.simulator.kernels import braking
 from levilab.simulator.kernels.fields import flux_density
+from levilab.simulator.kernels.motion import CLOCK, L, R
 
 if TYPE_CHECKING:
     from levilab.simulator.kernels.motion import Model
@@ -26,8 +26,8 @@ def longest_step(scene: Scene, model: Model, start: Array, scheme: Scheme) -> fl
     An angle of 1 rad in a drift, a slowing by 0.2 in a kick, half a period of the drive.  What a tumbling top can
     add to its angular momentum is allowed for: the field's torque turns it at about √(|μ|B/I₁).
     """
-    stiffness = float(np.linalg.norm(flux_density(model.field, start[None, top.R])))  # |μ|B [J]
-    turning = float(np.linalg.norm(start[top.L])) * model.body.inverse_transverse
+    stiffness = float(np.linalg.norm(flux_density(model.field, start[None, R])))  # |μ|B [J]
+    turning = float(np.linalg.norm(start[L])) * model.body.inverse_transverse
     turning += math.sqrt(stiffness * model.body.inverse_transverse)
     drift, kick = (float(np.max(np.abs(c))) for c in (scheme.drifts, scheme.kicks))
     limits = [1 / (drift * turning + 1e-300), 0.2 / (max(drift, kick) * _slowing(model.drag, start) + 1e-300)]
@@ -40,7 +40,7 @@ def _slowing(drag: Any, start: Array) -> float:
     """The greatest relative rate [1/s] at which drag or friction acts."""
     if drag is None:
         return 0.0
-    spin = abs(float(start[top.CLOCK]))
+    spin = abs(float(start[CLOCK]))
     if isinstance(drag, braking.LooseFlowing):
         friction = drag.coupling * (drag.inverse_washers + drag.inverse_core)
         return max(friction, _relative(drag.washers, spin), _relative(drag.core, spin))
@@ -55,3 +55,21 @@ def _relative(law: Any, spin: float) -> float:
     if isinstance(law, braking.LaminarDisc):
         return law.c * math.sqrt(spin)
     return float(law.c1 + law.c2 * spin)
+
+
+#: Estimated errors are about so many times the true ones: they are to bound them.
+CAUTION = 6.0
+
+
+def estimate(fine: Array, twice: Array, four: Array, order: int) -> Any:
+    """Estimated error of results at step h, from those at 2h and 4h; arrays of shape (…, 3), result (…).
+
+    From one doubling to the next the differences shrink by a factor q, and what is left of them is their sum,
+    about q times the last one.  Where the order p is seen q is 2^−p; where rounding or chaos rules they do not
+    shrink, and the estimate is as large as the difference.
+    """
+    last = np.linalg.norm(fine - twice, axis=-1)
+    before = np.linalg.norm(twice - four, axis=-1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        shrink = np.clip(np.nan_to_num(last / before, nan=1.0, posinf=1.0), 2.0**-order, 1.0)
+    return CAUTION * last * shrink

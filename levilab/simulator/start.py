@@ -1,0 +1,63 @@
+"""The state in which a scene begins."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from levilab.simulator.equilibrium import floating_height
+from levilab.simulator.kernels.fields import flux_density
+from levilab.simulator.kernels.motion import ARM, CLOCK, LOOSE, STATE_SIZE, TIME, L, N, R, V
+from levilab.simulator.model import (
+    Array,
+    base_field,
+)
+
+if TYPE_CHECKING:
+    from levilab.simulator.scene import Scene
+
+
+def start_of(scene: Scene) -> Array:
+    """The state at time 0 in the base's frame, shape (18,)."""
+    start = scene.start
+    place, velocity = np.array(start.position_m), np.array(start.velocity_m_s)
+    if start.place == "equilibrium":
+        place, velocity = np.array([0.0, 0.0, floating_height(scene)]), np.zeros(3)
+    n = np.array([0.0, -math.sin(start.tilt_rad), math.cos(start.tilt_rad)])
+    spin = 2 * math.pi * start.spin_hz
+    transverse = np.array([0.0, 0.0, 1.0]) - n * math.cos(start.tilt_rad)
+    rate = _precession(scene, spin, place)
+    momentum = scene.top.inertia_axial_kg_m2 * spin * n + scene.top.inertia_transverse_kg_m2 * rate * transverse
+    arm = np.array([1.0, 0.0, 0.0])  # φ = ψ = 0: the node line, at right angles to the axis
+    state = np.empty(STATE_SIZE)
+    for part, vector in ((R, place), (V, velocity), (N, n), (L, momentum), (ARM, arm)):
+        state[part] = vector
+    state[CLOCK], state[LOOSE], state[TIME] = spin, scene.washers.inertia_kg_m2 * spin, 0.0
+    return state
+
+
+def _precession(scene: Scene, spin: float, place: Array) -> float:
+    """The azimuth's rate φ̇ [rad/s] at the start."""
+    start = scene.start
+    if start.precession == "thesis":  # φ̇ = ψ̇ and ω₃ = ψ̇ + φ̇ cos θ
+        return spin / (1 + math.cos(start.tilt_rad))
+    if start.precession == "none":
+        return 0.0
+    return steady_precession(scene, spin, place)
+
+
+def steady_precession(scene: Scene, spin: float, place: Array) -> float:
+    """The slow root of I₁ cosθ φ̇² − I₃ω₃ φ̇ + P = 0 [rad/s], P = −μB_z: precession without nutation.
+
+    Goldstein, Classical Mechanics, § 5.7, with the torque of the field in place of the weight's.  A top too
+    slow for a steady precession starts at the rate nearest to one.
+    """
+    top = scene.top
+    bz = float(flux_density(base_field(scene), place[None, :])[0, 2])
+    restoring = -top.moment_a_m2 * top.moment_tilt[1] * bz
+    a = top.inertia_transverse_kg_m2 * math.cos(scene.start.tilt_rad)
+    b = top.inertia_axial_kg_m2 * spin
+    root = math.copysign(math.sqrt(max(b * b - 4 * a * restoring, 0.0)), b)
+    return 2 * restoring / (b + root) if b + root else 0.0
