@@ -11,7 +11,7 @@ import typer
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from levilab.explain import Effect
+    from levilab.motion.effects import Effect
     from levilab.simulator.scene import Scene
     from levilab.stability_map import Span
 
@@ -92,9 +92,9 @@ def _simulate(
     explain: bool,
     as_json: bool,
 ) -> None:
-    from levilab.motion_summary import as_document, finite
+    from levilab.motion.simulation import SimulationOrder, carry_out
+    from levilab.motion.summary import as_document, finite
     from levilab.present.progress import Share
-    from levilab.simulation import SimulationOrder, carry_out
 
     order = SimulationOrder(scene, duration, tolerance, rate, out)
     with _interruptible("nothing was written"), contextlib.closing(Share("simulating")) as share:
@@ -102,7 +102,7 @@ def _simulate(
     if done.folder:
         typer.echo(f"wrote {done.folder}", err=True)
     if not as_json:  # at once: what explains it takes longer
-        from levilab.motion_tables import print_motion
+        from levilab.motion.table import print_motion
 
         print_motion(done.summary)
     with _interruptible("the effects are not known"):
@@ -115,13 +115,13 @@ def _simulate(
         document |= {"effects": [finite(asdict(effect)) for effect in effects]} if explain else {}
         typer.echo(json.dumps(document, indent=2, allow_nan=False))
     elif explain:
-        from levilab.explain_table import print_effects
+        from levilab.motion.table import print_effects
 
         print_effects(effects)
 
 
 def _explained(scene: Scene, duration: float) -> tuple[Effect, ...]:
-    from levilab.explain import explain
+    from levilab.motion.effects import explain
 
     typer.echo("switching each effect on or off: some seconds, up to 15 where code must be compiled first", err=True)
     return explain(scene, duration)

@@ -13,8 +13,8 @@ import numpy as np
 from levilab.errors import SimulationError
 from levilab.files import CannotWrite
 from levilab.interruption import interrupted_afterwards
-from levilab.motion_lines import rate_for
-from levilab.motion_summary import as_document, summarise
+from levilab.motion.lines import rate_for
+from levilab.motion.summary import as_document, summarise
 from levilab.runs.run import STATES, RunRecord, utc_now
 from levilab.runs.writer import RunWriter
 from levilab.simulator.compilation import telling_of_compilation
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
-    from levilab.motion_summary import Summary
+    from levilab.motion.summary import Summary
     from levilab.simulator.scene import Scene
     from levilab.simulator.trajectory import Trajectory
 
@@ -151,7 +151,7 @@ def _record(order: SimulationOrder) -> RunRecord:
 
 
 def _write(summary: Summary, factor: int, writer: RunWriter) -> None:
-    from levilab.motion_figures import motion_figure
+    from levilab.motion.figure import motion_figure
     from levilab.present.style import save_png
 
     rows = kept_rows(summary.motion, factor)

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from levilab.explain import KINDS, explain, field_kinds
-from levilab.explain_table import print_effects
+from levilab.motion.effects import KINDS, explain, field_kinds
+from levilab.motion.table import print_effects
 from levilab.simulator.scene import SceneError, preset
 from levilab.simulator.single import simulate
 

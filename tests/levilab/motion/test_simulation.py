@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from levilab.motion_figures import motion_figure
-from levilab.motion_lines import lines_of, rate_for
-from levilab.motion_summary import as_document, summarise
-from levilab.motion_tables import print_motion
+from levilab.motion.figure import motion_figure
+from levilab.motion.lines import lines_of, rate_for
+from levilab.motion.simulation import COLUMNS, SimulationOrder, carry_out, kept_rows
+from levilab.motion.summary import as_document, summarise
+from levilab.motion.table import print_motion
 from levilab.present.progress import Share
 from levilab.runs.run import Run
-from levilab.simulation import COLUMNS, SimulationOrder, carry_out, kept_rows
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from levilab.motion_summary import Summary
+    from levilab.motion.summary import Summary
     from levilab.simulator.scene import Scene
 
     Command = Callable[..., subprocess.CompletedProcess[str]]

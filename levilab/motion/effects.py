@@ -17,7 +17,7 @@ import numpy as np
 from analysis import stability
 from analysis.lines import spectral_lines
 from levilab.errors import SimulationError
-from levilab.motion_lines import rate_for
+from levilab.motion.lines import rate_for
 from levilab.simulator.equilibrium import advice, axial_field, stability_of, symmetric
 from levilab.simulator.keys import SceneError
 from levilab.simulator.single import simulate

@@ -10,7 +10,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from levilab.motion_summary import changing_energy
+from levilab.motion.summary import changing_energy
 from levilab.present.style import STYLE, row
 
 if TYPE_CHECKING:
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from levilab.motion_lines import NamedLine
-    from levilab.motion_summary import Summary
+    from levilab.motion.lines import NamedLine
+    from levilab.motion.summary import Summary
 
     Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from levilab.motion_lines import LONGEST_S, AxisLines, lines_of, rate_for
+from levilab.motion.lines import LONGEST_S, AxisLines, lines_of, rate_for
 from levilab.simulator.scene import remarks
 
 if TYPE_CHECKING:

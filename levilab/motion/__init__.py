@@ -1,0 +1,1 @@
+"""One simulated motion: its run, lines, summary, effects, table and figure."""
