@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from levilab.motion.effects import Effect
     from levilab.simulator.scene import Scene
-    from levilab.stability_map import Span
+    from levilab.stability.map import Span
 
 EXIT_INTERRUPTED = 130
 
@@ -151,7 +151,7 @@ def stability(
     spans = _spans(spins, masses, survival=survival)
 
     from levilab.simulator.equilibrium import stability_of
-    from levilab.stability_table import as_document, print_stability
+    from levilab.stability.table import as_document, print_stability
 
     found = stability_of(chosen)
     document = as_document(found)
@@ -168,7 +168,7 @@ def stability(
 def _spans(spins: str | None, masses: str | None, *, survival: bool) -> tuple[Span | None, Span | None]:
     """What --spins and --masses ask for, checked before anything is computed."""
     from levilab.errors import SimulationError
-    from levilab.stability_map import span_of
+    from levilab.stability.map import span_of
 
     if (spins or masses) and not survival:
         raise SimulationError("--spins and --masses are those of a map: give --map, too")
@@ -177,7 +177,8 @@ def _spans(spins: str | None, masses: str | None, *, survival: bool) -> tuple[Sp
 
 def _mapped(scene: Scene, spans: tuple[Span | None, Span | None], duration: float, out: Path) -> dict[str, object]:
     from levilab.present.progress import Share
-    from levilab.stability_map import place_for_map, survival_map, write_map
+    from levilab.stability.map import survival_map
+    from levilab.stability.table import place_for_map, write_map
 
     place_for_map(out)
     with _interruptible("no map was written"), contextlib.closing(Share("simulating the map")) as share:

@@ -11,9 +11,9 @@ from levilab.simulator.ensemble import simulate_many
 from levilab.simulator.equilibrium import advice, axial_field, floating_height, stability_of
 from levilab.simulator.scene import SceneError, preset
 from levilab.simulator.single import simulate
-from levilab.stability_figure import map_figure
-from levilab.stability_map import place_for_map, span_of, survival, survival_map, write_map
-from levilab.stability_table import as_document, print_stability, remarks
+from levilab.stability.figure import map_figure
+from levilab.stability.map import span_of, survival, survival_map
+from levilab.stability.table import as_document, place_for_map, print_stability, remarks, write_map
 
 UNDRIVEN = preset("undriven")
 DISC = UNDRIVEN.changed({"base.field": "exact", "top.magnet": "disc"})

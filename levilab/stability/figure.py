@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-    from levilab.stability_map import Map
+    from levilab.stability.map import Map
 
 BLUE, GREY, ORANGE = "#0072B2", "#E6E6E6", "#D55E00"
 

@@ -19,13 +19,11 @@ from levilab.simulator.equilibrium import (
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from levilab.simulator.scene import Scene
 
 Array = NDArray[np.float64]
 
-TABLE, PICTURE = "survival.csv", "survival.png"
 
 #: Tops that a map may have: some minutes of 30 s each.
 MOST_TOPS = 250_000
@@ -140,45 +138,6 @@ def _check(spins: Span, masses: Span) -> None:
 def _window(scene: Scene) -> tuple[float, float]:
     floating = stability_of(scene).floating
     return floating.spins[0] if floating and floating.spins else (np.nan, np.nan)
-
-
-def place_for_map(folder: Path) -> None:
-    """Make the folder, before anything is simulated; a map that is there stays.  Raises CannotWrite."""
-    from levilab.files import CannotWrite
-
-    for path in (folder / TABLE, folder / PICTURE):
-        if path.exists():
-            raise CannotWrite(f"{path} is there already: give another folder with --out, or move it away")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / TABLE).touch()
-        (folder / TABLE).unlink()
-    except OSError as error:
-        raise _cannot(folder, error) from None
-
-
-def write_map(found: Map, folder: Path) -> list[Path]:
-    """survival.png and survival.csv (one row a top; 1: survived) into a folder."""
-    from levilab.files import replace_atomically
-    from levilab.present.style import save_png
-    from levilab.stability_figure import map_figure
-
-    rows = ["mass_kg,spin_hz,survived"]
-    for mass, alive in zip(found.masses, found.survived, strict=True):
-        rows += [f"{mass:.8g},{spin:.6g},{one:d}" for spin, one in zip(found.spins, alive, strict=True)]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        replace_atomically(folder / TABLE, "\n".join(rows) + "\n")
-        save_png(map_figure(found), folder / PICTURE)
-    except OSError as error:
-        raise _cannot(folder, error) from None
-    return [folder / TABLE, folder / PICTURE]
-
-
-def _cannot(folder: Path, error: OSError) -> Exception:
-    from levilab.files import CannotWrite
-
-    return CannotWrite(f"{folder}: the map cannot be written: {error.strerror}; give another folder with --out")
 
 
 def survival(

@@ -1,0 +1,1 @@
+"""Where a top floats: windows, maps, tables, figures."""
