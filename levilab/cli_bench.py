@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from levilab.bench_check import Checked
-    from levilab.bench_search import Found
+    from levilab.bench.check import Checked
+    from levilab.bench.discover import Found
     from levilab.world.serve import Served
 
 EXIT_INSTRUMENT, EXIT_INTERRUPTED = 3, 130
@@ -37,8 +37,7 @@ def bench_init(
     Only *IDN? is sent.  Instruments on the network are found by themselves where PyVISA can look for them (pip install
     psutil zeroconf); else name them with --address.
     """
-    from levilab.bench_file import NobodyFound, bench_text, refuse_to_overwrite, write_bench
-    from levilab.bench_search import search
+    from levilab.bench.discover import NobodyFound, bench_text, refuse_to_overwrite, search, write_bench
 
     if not force:
         refuse_to_overwrite(out)
@@ -77,8 +76,8 @@ def bench_check(
 
     The drive stays off.  Exit status 3 if one did not answer as it should.
     """
-    from levilab.bench_check import check
-    from levilab.config import BenchConfig, read_bench
+    from levilab.bench.check import check
+    from levilab.bench.config import BenchConfig, read_bench
     from levilab.world.bench import own_world
 
     if mock and bench:

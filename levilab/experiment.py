@@ -12,7 +12,7 @@ from levilab.errors import LevilabError
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from levilab.config import BenchConfig, ExperimentSettings, SpinSettings
+    from levilab.bench.config import BenchConfig, ExperimentSettings, SpinSettings
     from levilab.record import Session
 
 

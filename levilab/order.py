@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
+from levilab.bench.config import BenchConfig, ConfigError, read_bench, within_limits
 from levilab.clock import VirtualClock
-from levilab.config import BenchConfig, ConfigError, read_bench, within_limits
 from levilab.errors import LevilabError
 from levilab.record import Order
 from levilab.runs.run import Run, find_run
@@ -21,7 +21,7 @@ from levilab.world.spin_world import SpinScene, SpinWorld, drawn
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from levilab.config import SpinSettings
+    from levilab.bench.config import SpinSettings
     from levilab.simulator.scene import Scene
 
 HOW = (

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from instruments.errors import InstrumentError
-from levilab.bench import Bench, check_described, open_bench
+from levilab.bench.bench import Bench, check_described, open_bench
 from levilab.experiment import EXPERIMENTS, Experiment, ExperimentFailed, Missed, Row
 from levilab.files import CannotWrite
 from levilab.interruption import Interrupted, Stop, watching_for_interruption
@@ -25,7 +25,7 @@ from levilab.world.bench import VIRTUAL
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from levilab.config import BenchConfig, ExperimentSettings
+    from levilab.bench.config import BenchConfig, ExperimentSettings
     from levilab.present.progress import Show
     from levilab.runs.run import Status
     from levilab.world.spin_world import World

@@ -89,7 +89,7 @@ def test_links_between_the_pages_lead_somewhere(page: Path) -> None:
 
 
 def test_the_bench_of_the_page_is_a_valid_one(tmp_path: Path) -> None:
-    from levilab.config import read_bench
+    from levilab.bench.config import read_bench
 
     ((_, text),) = blocks("toml")
     path = tmp_path / "bench.toml"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from levilab.bench.config import ConfigError, InstrumentSettings
 from levilab.clock import VirtualClock
-from levilab.config import ConfigError, InstrumentSettings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

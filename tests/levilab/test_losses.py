@@ -10,7 +10,7 @@ import pytest
 
 from instruments.errors import InstrumentError
 from instruments.virtual.faults import FAULTS, Fault
-from levilab import bench as benches
+from levilab.bench import bench as benches
 from levilab.order import spin_order
 from levilab.record import MOST_LOSSES, Order, acquire
 from levilab.world.bench import VIRTUAL, virtual_bus

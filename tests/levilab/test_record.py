@@ -14,8 +14,8 @@ import pytest
 from instruments.counter import Keysight53230A
 from instruments.errors import InstrumentError, NoAnswer
 from instruments.generator import Keysight33500B
+from levilab.bench.config import BenchConfig, SpinSettings
 from levilab.clock import VirtualClock
-from levilab.config import BenchConfig, SpinSettings
 from levilab.experiment import ExperimentFailed
 from levilab.files import CannotWrite
 from levilab.order import spin_order
@@ -391,7 +391,7 @@ def test_a_real_run_is_gone_on_with_by_the_time_on_the_wall(tmp_path: Path, monk
     """The way without a world: instruments from the configuration, and a top that has gone on since its time zero."""
     from datetime import UTC, datetime, timedelta
 
-    from levilab import bench
+    from levilab.bench import bench
     from levilab.world import bench as virtual_bench
 
     class Impatient(Silent):

@@ -4,7 +4,7 @@ import pytest
 import serial
 
 from instruments.virtual import serial_line
-from levilab.config import ConfigError
+from levilab.bench.config import ConfigError
 from levilab.world.bench import MODELS, VIRTUAL, plug_in_serial, virtual_bus
 
 LINE = {"baudrate": 57600, "bytesize": 7, "parity": "O", "timeout": 1.0}

@@ -5,11 +5,10 @@ import re
 
 import pytest
 
-from levilab.bench_check import check
-from levilab.bench_file import NobodyFound, bench_text
-from levilab.bench_search import Found, asked, recognised, search
+from levilab.bench.check import check
+from levilab.bench.config import BenchConfig, ConfigError, InstrumentSettings, Limits, SpinSettings, read_bench
+from levilab.bench.discover import Found, NobodyFound, asked, bench_text, recognised, search
 from levilab.cli_bench import bench_init
-from levilab.config import BenchConfig, ConfigError, InstrumentSettings, Limits, SpinSettings, read_bench
 from levilab.world.bench import MODELS, VIRTUAL, own_world
 
 #: Answers to *IDN? as instruments give them.
@@ -117,7 +116,7 @@ def test_the_commands_find_write_and_check(levilab, tmp_path):
 
 def test_where_nobody_answers_no_file_is_written_but_one_to_fill_in_when_asked_for(monkeypatch, tmp_path, capsys):
     nobody = [Found("A::1", trouble="A::1: no answer")]
-    monkeypatch.setattr("levilab.bench_search.search", lambda *_: nobody)
+    monkeypatch.setattr("levilab.bench.discover.search", lambda *_: nobody)
     path = tmp_path / "bench.toml"
     with pytest.raises(NobodyFound, match="--address"):
         bench_init([], "@py", path, force=False, as_json=False)

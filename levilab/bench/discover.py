@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 from instruments.advice import one_line
 from instruments.errors import InstrumentError
-from levilab.config import InstrumentSettings
-from levilab.drivers import DRIVERS, driver_of, transport_to
+from levilab.bench.config import InstrumentSettings
+from levilab.bench.kinds import DRIVERS, driver_of, transport_to
+from levilab.errors import LevilabError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
+    from pathlib import Path
 
 #: How long one address is waited for [s]: who is there answers within some milliseconds.
 PATIENCE_S = 1.0
@@ -112,3 +114,81 @@ def recognised(identity: str) -> tuple[str, str] | None:
     ]
     # of several names for one driver the one that the instrument gives itself
     return min(fitting, key=lambda what: what[1].upper() not in field.upper(), default=None)
+
+
+#: What a kind is for, and an address as one of it may have.
+KINDS = {
+    "counter": ("counts the light pulses", "TCPIP0::192.168.1.20::5025::SOCKET"),
+    "generator": ("drives the coil", "USB0::0x0957::0x2807::MY52400001::INSTR"),
+    "oscilloscope": ("records the phototransistor", "TCPIP0::192.168.1.22::INSTR"),
+    "magnetometer": ("measures the base's field", "COM3"),
+}
+
+
+class WouldOverwrite(LevilabError):
+    """A file that is there already."""
+
+
+class NobodyFound(LevilabError):
+    """Nobody answered that there is a driver for."""
+
+    exit_code = 3
+
+    def __init__(self) -> None:
+        super().__init__(
+            "nobody answered that levilab has a driver for, so no file was written: is it on and connected?  Name it "
+            "with --address, or take --force for a file to fill in by hand"
+        )
+
+
+def bench_text(found: Sequence[Found], library: str) -> str:
+    """The text of a bench.toml: the first instrument of each kind, the others as comments."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(  # noqa: S701 - no HTML
+        loader=PackageLoader("levilab", "."),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    # TOML's strings are JSON's; jinja's own filter would escape signs of HTML
+    environment.policies["json.dumps_function"] = lambda value, **_: _quoted(value)
+    by_kind = {kind: [one for one in found if one.kind == kind] for kind in KINDS}
+    about = {
+        kind: {"what": what, "address": address, "model": next(iter(DRIVERS[kind])), "models": ", ".join(DRIVERS[kind])}
+        for kind, (what, address) in KINDS.items()
+    }
+    return environment.get_template("bench.toml.j2").render(
+        library=library,
+        kinds=about,
+        chosen={kind: ones[0] if ones else None for kind, ones in by_kind.items()},
+        others={kind: ones[1:] for kind, ones in by_kind.items()},
+        unknown=[one for one in found if one.identity and not one.kind],
+    )
+
+
+def _quoted(value: str) -> str:
+    import json
+
+    return json.dumps(value, ensure_ascii=False)
+
+
+def refuse_to_overwrite(path: Path) -> None:
+    """Raise WouldOverwrite if there is such a file, CannotWrite if there is no folder for it."""
+    from levilab.files import CannotWrite
+
+    if not path.parent.is_dir():
+        raise CannotWrite(f"{path.parent} is no folder: give another name with --out")
+    if path.exists():
+        raise WouldOverwrite(f"{path} is there already: give another name with --out, or --force to replace it")
+
+
+def write_bench(path: Path, text: str) -> None:
+    """Write the file.  Raises CannotWrite."""
+    from levilab.files import CannotWrite, replace_atomically
+
+    try:
+        replace_atomically(path, text)
+    except OSError as error:
+        raise CannotWrite(f"{path} cannot be written ({error.strerror}): give another name with --out") from error

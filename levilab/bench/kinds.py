@@ -5,12 +5,12 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from levilab.config import ConfigError
+from levilab.bench.config import ConfigError
 
 if TYPE_CHECKING:
     from instruments.scpi import ScpiInstrument
     from instruments.transport import TrafficLog, Transport
-    from levilab.config import InstrumentSettings
+    from levilab.bench.config import InstrumentSettings
 
 _COUNTERS, _GENERATORS = "instruments.counter", "instruments.generator"
 _RIGOL, _KEYSIGHT = "instruments.oscilloscope_rigol", "instruments.oscilloscope_keysight"

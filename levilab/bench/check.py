@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
 from instruments.errors import InstrumentError
-from levilab.bench import open_bench
-from levilab.bench_file import KINDS
-from levilab.config import ConfigError
+from levilab.bench.bench import open_bench
+from levilab.bench.config import ConfigError
+from levilab.bench.discover import KINDS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from instruments.magnetometer import Magnetometer
     from instruments.oscilloscope import Oscilloscope
     from instruments.scpi import ScpiInstrument
-    from levilab.config import BenchConfig
+    from levilab.bench.config import BenchConfig
     from levilab.world.spin_world import World
 
 

@@ -7,9 +7,17 @@ import pyvisa
 
 from instruments.errors import InstrumentError, NotConnected, Occupied, OutOfRange, WrongInstrument
 from instruments.virtual.generator_33500b import Virtual33500B
-from levilab.bench import OutputMayBeOn, open_bench
+from levilab.bench.bench import OutputMayBeOn, open_bench
+from levilab.bench.config import (
+    BenchConfig,
+    ConfigError,
+    InstrumentSettings,
+    Limits,
+    SpinSettings,
+    read_bench,
+    within_limits,
+)
 from levilab.clock import VirtualClock, WallClock
-from levilab.config import BenchConfig, ConfigError, InstrumentSettings, Limits, SpinSettings, read_bench, within_limits
 from levilab.errors import LevilabError
 from levilab.interruption import Interrupted
 from levilab.world.bench import VIRTUAL

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, cast
 
 from instruments.errors import InstrumentError, SettingsLost
 from instruments.generator import Limits as CoilLimits
+from levilab.bench.config import BenchConfig, ConfigError, InstrumentSettings, Limits
+from levilab.bench.kinds import driver_of, transport_to
 from levilab.clock import Clock, WallClock
-from levilab.config import BenchConfig, ConfigError, InstrumentSettings, Limits
-from levilab.drivers import driver_of, transport_to
 from levilab.world.bench import VIRTUAL, virtual_bus
 
 if TYPE_CHECKING:

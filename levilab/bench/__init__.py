@@ -1,0 +1,1 @@
+"""The laboratory's instruments: configured, discovered, opened, checked."""
