@@ -109,9 +109,9 @@ def acquire_spin(
 
     Ctrl-C ends the run after the reading under way; outputs go off and the run is kept.
     """
-    from levilab.order import spin_order
+    from levilab.acquisition.loop import acquire
+    from levilab.acquisition.request import spin_order
     from levilab.present.progress import to_stderr
-    from levilab.record import acquire
 
     order = spin_order(
         mock=mock,

@@ -146,7 +146,7 @@ def bench_text(found: Sequence[Found], library: str) -> str:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(  # noqa: S701 - no HTML
-        loader=PackageLoader("levilab", "."),
+        loader=PackageLoader("levilab.bench", "."),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

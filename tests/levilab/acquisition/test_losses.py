@@ -10,9 +10,10 @@ import pytest
 
 from instruments.errors import InstrumentError
 from instruments.virtual.faults import FAULTS, Fault
+from levilab.acquisition.loop import Order, acquire
+from levilab.acquisition.request import spin_order
+from levilab.acquisition.session import MOST_LOSSES
 from levilab.bench import bench as benches
-from levilab.order import spin_order
-from levilab.record import MOST_LOSSES, Order, acquire
 from levilab.world.bench import VIRTUAL, virtual_bus
 
 if TYPE_CHECKING:

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
+from levilab.acquisition.loop import Order
 from levilab.bench.config import BenchConfig, ConfigError, read_bench, within_limits
 from levilab.clock import VirtualClock
 from levilab.errors import LevilabError
-from levilab.record import Order
 from levilab.runs.run import Run, find_run
 from levilab.settings import in_one_line
 from levilab.world.bench import scene_world

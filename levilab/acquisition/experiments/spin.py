@@ -3,32 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import TYPE_CHECKING, cast
 
 from instruments.errors import InstrumentError, OutOfRange, SettingsLost
-from levilab.errors import LevilabError
+from levilab.acquisition.session import ExperimentFailed, Missed, Row
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from levilab.acquisition.session import Session
     from levilab.bench.config import BenchConfig, ExperimentSettings, SpinSettings
-    from levilab.record import Session
-
-
-class ExperimentFailed(LevilabError):
-    """The experiment cannot go on, for a reason that lies on the bench."""
-
-
-Row = dict[str, float | None]
-
-
-class Missed(StrEnum):
-    """Why there is no reading."""
-
-    DARK = "no light pulses"
-    LOST = "the instrument did not answer as it should"
-    UNSTEADY = "no two counts that agree with each other or with the last reading"
 
 
 @dataclass(frozen=True)

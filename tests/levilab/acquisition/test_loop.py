@@ -14,12 +14,12 @@ import pytest
 from instruments.counter import Keysight53230A
 from instruments.errors import InstrumentError, NoAnswer
 from instruments.generator import Keysight33500B
+from levilab.acquisition.loop import Order, acquire
+from levilab.acquisition.request import spin_order
+from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import BenchConfig, SpinSettings
 from levilab.clock import VirtualClock
-from levilab.experiment import ExperimentFailed
 from levilab.files import CannotWrite
-from levilab.order import spin_order
-from levilab.record import Order, acquire
 from levilab.runs.run import Run
 from levilab.runs.writer import RunWriter
 from levilab.world.spin_world import SpinScene, SpinWorld, drawn
