@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from analysis.lawfit import Uncertainty as Kind
     from levilab.errors import LevilabError
-    from levilab.pipeline import Options
+    from levilab.pipelines.sources import Options
 
 app = typer.Typer(
     name="levilab",
@@ -153,9 +153,9 @@ def analyze_spindown(
     as_json: Json = False,
 ) -> None:
     """Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude."""
-    from levilab.pipeline import analyze_spindowns
-    from levilab.result import as_document, save_result
-    from levilab.tables import print_spindown
+    from levilab.pipelines.spindown.analysis import analyze_spindowns
+    from levilab.pipelines.spindown.document import as_document, save_result
+    from levilab.pipelines.spindown.table import print_spindown
 
     analysis = analyze_spindowns(paths, _options(columns, reading_u, uncertainty.value, keep_outliers))
     failure: LevilabError | None = None
@@ -177,7 +177,7 @@ def analyze_spindown(
 
 def _options(columns: str, reading_u: float | None, uncertainty: str, keep_outliers: bool) -> Options:
     from levilab.formats.table import parse_columns
-    from levilab.pipeline import Options
+    from levilab.pipelines.sources import Options
 
     if reading_u is not None and not 0 < reading_u < float("inf"):
         raise typer.BadParameter(

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from analysis.spindown import SpinDown
-    from levilab.pipeline import Options, Source
+    from levilab.pipelines.sources import Options, Source
     from levilab.runs.run import RunRecord
 
 #: Readings and events printed in the page; more stay in the run folder.  Readings stand in blocks side by side.

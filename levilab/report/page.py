@@ -12,15 +12,16 @@ from typing import TYPE_CHECKING
 
 from analysis.uncertainty import Estimate
 from levilab.errors import LevilabError
-from levilab.figures import spindown_figure
 from levilab.files import CannotWrite, replace_atomically
-from levilab.pipeline import Options, SpinDownAnalysis, analyze_spindowns
+from levilab.pipelines.sources import Options
+from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
+from levilab.pipelines.spindown.figure import spindown_figure
+from levilab.pipelines.spindown.table import all_warnings, law_constants
 from levilab.present.numbers import AXES, SYMBOLS, in_words, plain, share, with_uncertainty, without_unit
 from levilab.present.style import as_svg
 from levilab.report.inputs import describe
 from levilab.runs.run import utc_now
 from levilab.software import software_versions
-from levilab.tables import all_warnings, law_constants
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

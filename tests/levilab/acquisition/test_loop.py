@@ -422,7 +422,8 @@ def test_a_real_run_is_gone_on_with_by_the_time_on_the_wall(tmp_path: Path, monk
 
 
 def test_a_spin_down_in_full_motion_has_the_drag_of_its_scene(tmp_path: Path) -> None:
-    from levilab.pipeline import Options, analyze_spindowns
+    from levilab.pipelines.sources import Options
+    from levilab.pipelines.spindown.analysis import analyze_spindowns
     from levilab.simulator import preset
 
     run = acquire(mock(tmp_path, scene="spindown"), Silent())

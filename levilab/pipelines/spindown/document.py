@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from levilab.files import CannotWrite, replace_atomically
+from levilab.pipelines.spindown.table import all_warnings
 from levilab.software import software_versions
-from levilab.tables import all_warnings
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from analysis.lawfit import LawFit
     from analysis.selection import Statistics
     from analysis.uncertainty import Estimate
-    from levilab.pipeline import Source, SpinDownAnalysis
+    from levilab.pipelines.sources import Source
+    from levilab.pipelines.spindown.analysis import SpinDownAnalysis
 
 SCHEMA = "levilab-result/1"
 RESULT, FIGURE = "result.json", "spindown.png"
@@ -32,7 +33,7 @@ _STATISTICS = (
 
 def save_result(analysis: SpinDownAnalysis, folder: Path) -> list[Path]:
     """Write result.json and the figure into a folder; returns the files.  Raises CannotWrite."""
-    from levilab.figures import spindown_figure
+    from levilab.pipelines.spindown.figure import spindown_figure
     from levilab.present.style import save_png
 
     text = json.dumps(as_document(analysis, folder), indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False)

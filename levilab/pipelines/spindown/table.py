@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from analysis.selection import Statistics
     from analysis.uncertainty import Estimate
-    from levilab.pipeline import SpinDownAnalysis
+    from levilab.pipelines.spindown.analysis import SpinDownAnalysis
 
 
 def print_spindown(analysis: SpinDownAnalysis) -> None:

@@ -5,19 +5,16 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from analysis.combine import Combined, combine
-from analysis.errors import AnalysisError
-from analysis.spindown import SpinDown, fit_spin_down
 from levilab.errors import DataError
 from levilab.formats.table import read_table
-from levilab.readings import Readings, spin_readings
-from levilab.runs.run import READINGS, RECORD, Run, find_run, find_runs
+from levilab.pipelines.readings import Readings, spin_readings
+from levilab.runs.run import READINGS, RECORD, Run, find_runs
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
 
     from analysis.lawfit import Uncertainty
 
@@ -62,70 +59,6 @@ class Source:
     def synthetic(self) -> bool:
         """Whether any of it is known to be simulated or made up."""
         return bool(self.run and self.run.record.synthetic)
-
-
-@dataclass(frozen=True)
-class SpinDownAnalysis:
-    """Spin-downs, each by itself and together.
-
-    runs: one per source; home: the folder that the result belongs to; warnings: about the inputs.
-    """
-
-    sources: tuple[Source, ...]
-    runs: tuple[SpinDown, ...]
-    combined: Combined
-    options: Options
-    home: Path
-    warnings: tuple[str, ...]
-
-
-def analyze_spindowns(paths: Sequence[Path], options: Options) -> SpinDownAnalysis:
-    """Fit the drag laws to every spin-down found at the paths.
-
-    Raises DataError for what cannot be used; the text names the file.
-    """
-    paths = [find_run(path) for path in paths]
-    sources, warnings = collect(paths, "spindown", options)
-    runs = tuple(_fit(source, options) for source in sources)
-    told = (*warnings, *_about_inputs(sources, options))
-    return SpinDownAnalysis(sources, runs, combine(runs), options, _home(paths, sources), told)
-
-
-def _fit(source: Source, options: Options) -> SpinDown:
-    readings = source.readings
-    try:
-        return fit_spin_down(
-            readings.time,
-            readings.frequency,
-            readings.u if options.reading_u is None else options.reading_u,
-            uncertainty=options.uncertainty,
-            bootstrap_samples=options.bootstrap_samples,
-            seed=options.seed,
-            keep_outliers=options.keep_outliers,
-        )
-    except AnalysisError as error:
-        raise DataError(f"{source.data}: {error}") from error
-
-
-def _home(paths: Sequence[Path], sources: Sequence[Source]) -> Path:
-    """Beside the run or the file; of several runs the folder that was searched for them, else the present one."""
-    if len(sources) == 1:
-        return sources[0].path if sources[0].run else sources[0].path.parent
-    return paths[0] if len(paths) == 1 else Path()
-
-
-def _about_inputs(sources: Sequence[Source], options: Options) -> Iterable[str]:
-    synthetic = sum(source.synthetic for source in sources)
-    if 0 < synthetic < len(sources):
-        yield (
-            f"{synthetic} of {len(sources)} inputs are SYNTHETIC, the others are not known to be: "
-            "a mean over both says nothing about a real top"
-        )
-    given = [source.name for source in sources if source.readings.u is not None]
-    if options.reading_u is not None and given:
-        yield f"--reading-u {options.reading_u:g} Hz takes the place of the uncertainties in {', '.join(given)}"
-    if options.columns and all(source.run for source in sources):
-        yield "--columns is for data files; there is none among the inputs"
 
 
 # --- finding the inputs --------------------------------------------------------------------------------

@@ -11,8 +11,9 @@ import pytest
 
 from levilab.errors import DataError, LevilabError
 from levilab.files import CannotWrite
-from levilab.pipeline import Options, analyze_spindowns
-from levilab.result import as_document, save_result
+from levilab.pipelines.sources import Options
+from levilab.pipelines.spindown.analysis import analyze_spindowns
+from levilab.pipelines.spindown.document import as_document, save_result
 from support.spin_downs import spin_down_csv
 
 #: The thesis's constants, as printed: C₁ [1/s], |C₂| [1/rad].

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from levilab.errors import LevilabError
-from levilab.pipeline import Options, analyze_spindowns
+from levilab.pipelines.sources import Options
+from levilab.pipelines.spindown.analysis import analyze_spindowns
 from levilab.report.page import render, write_report
 from support.paths import SAMPLE_DATA
 from support.spin_downs import spin_down_csv

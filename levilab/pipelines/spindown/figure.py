@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from levilab.pipeline import SpinDownAnalysis
+    from levilab.pipelines.spindown.analysis import SpinDownAnalysis
 
     Array = NDArray[np.float64]
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
-from levilab.figures import COLOURS, MOST_POINTS, STRAIGHT_LINES, spindown_figure
-from levilab.pipeline import Options, SpinDownAnalysis, analyze_spindowns
+from levilab.pipelines.sources import Options
+from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
+from levilab.pipelines.spindown.figure import COLOURS, MOST_POINTS, STRAIGHT_LINES, spindown_figure
 from levilab.present.style import as_svg
 from support.spin_downs import spin_down_csv
 
