@@ -8,7 +8,7 @@ import pytest
 from levilab.bench.check import check
 from levilab.bench.config import BenchConfig, ConfigError, InstrumentSettings, Limits, SpinSettings, read_bench
 from levilab.bench.discover import Found, NobodyFound, asked, bench_text, recognised, search
-from levilab.cli_bench import bench_init
+from levilab.cli.bench import bench_init
 from levilab.world.bench import MODELS, VIRTUAL, own_world
 
 #: Answers to *IDN? as instruments give them.

@@ -25,7 +25,7 @@ posix_only = pytest.mark.skipif(os.name != "posix", reason="Windows has neither 
 
 def start(out: Path, *, before: str = "") -> subprocess.Popen[str]:
     """A levilab process; `before` is Python that it runs first."""
-    program = f"{before}\nimport sys\nsys.argv[0] = 'levilab'\nfrom levilab.cli import main\nmain()"
+    program = f"{before}\nimport sys\nsys.argv[0] = 'levilab'\nfrom levilab.cli.main import main\nmain()"
     return subprocess.Popen(
         [sys.executable, "-c", program, "acquire", "spin", "--mock", "--seed", "7", "--out", str(out)],
         stderr=subprocess.PIPE,

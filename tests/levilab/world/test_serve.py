@@ -15,7 +15,7 @@ import pyvisa
 from typer.testing import CliRunner
 
 from instruments.virtual.servers.server import LOOPBACK
-from levilab.cli_bench import bench_app
+from levilab.cli.bench import bench_app
 from levilab.clock import WallClock
 from levilab.world.serve import Service, WrongService, chosen_models, serve
 

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Annotated, NoReturn, cast
 
 import typer
 
-from levilab import cli_bench, cli_simulator
-from levilab.cli_simulator import EXIT_INTERRUPTED, Json
+from levilab.cli import bench as cli_bench
+from levilab.cli import simulate as cli_simulator
+from levilab.cli.simulate import EXIT_INTERRUPTED, Json
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -302,7 +302,7 @@ HEAVY = {"numpy", "scipy", "pandas", "matplotlib", "lmfit", "pyvisa", "jinja2", 
 )
 def test_nothing_heavy_is_imported_where_it_is_not_used(tmp_path: Path, words: list[str], allowed: set[str]) -> None:
     program = (
-        f"import sys\nsys.argv = ['levilab', *{words!r}]\nfrom levilab.cli import main\n"
+        f"import sys\nsys.argv = ['levilab', *{words!r}]\nfrom levilab.cli.main import main\n"
         "try:\n    main()\nexcept SystemExit:\n    pass\n"
         f"print('HEAVY', *sorted({HEAVY!r} & set(sys.modules)))"
     )

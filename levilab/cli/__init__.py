@@ -1,0 +1,1 @@
+"""The commands: translate, call, print."""
