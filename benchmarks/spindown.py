@@ -25,8 +25,8 @@ import lmfit
 import numpy as np
 from scipy.optimize import curve_fit, least_squares
 
-from analysis.drag import LAWS, spin
-from analysis.spindown import fit_spin_down
+from analysis.spindown.drag import LAWS, spin
+from analysis.spindown.fit import fit_spin_down
 
 if TYPE_CHECKING:
     from collections.abc import Callable

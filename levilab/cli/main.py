@@ -18,7 +18,7 @@ from levilab.cli.simulate import EXIT_INTERRUPTED, Json
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from analysis.lawfit import Uncertainty as Kind
+    from analysis.spindown.lawfit import Uncertainty as Kind
     from levilab.errors import LevilabError
     from levilab.pipelines.sources import Options
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from analysis.lawfit import Uncertainty
+    from analysis.spindown.lawfit import Uncertainty
 
 #: Analysis: the experiments whose runs suit it.
 SUITS = {"spindown": frozenset({"spin"})}

@@ -12,7 +12,7 @@ from levilab.present.words import setting_in_words, settings_in_words, value_in_
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from analysis.spindown import SpinDown
+    from analysis.spindown.fit import SpinDown
     from levilab.pipelines.sources import Options, Source
     from levilab.runs.run import RunRecord
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from analysis.combine import Mean
+    from analysis.spindown.combine import Mean
 
 
 class UnknownFormat(LevilabError):

@@ -7,7 +7,7 @@ Where only the spin is observed nothing has to be integrated: with an aligned di
     angle turned meanwhile        ∫ ω dω/g(ω)
 
 so a law is a row of three functions, and the laws share no algebra with the ones that are fitted in
-`analysis.drag`.  Spins in rad/s, angles in rad, times in s.
+`analysis.spindown.drag`.  Spins in rad/s, angles in rad, times in s.
 """
 
 from __future__ import annotations

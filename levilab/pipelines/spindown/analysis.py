@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from analysis.combine import Combined, combine
 from analysis.errors import AnalysisError
-from analysis.spindown import SpinDown, fit_spin_down
+from analysis.spindown.combine import Combined, combine
+from analysis.spindown.fit import SpinDown, fit_spin_down
 from levilab.errors import DataError
 from levilab.pipelines.sources import (
     Options,

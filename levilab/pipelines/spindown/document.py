@@ -15,8 +15,8 @@ from levilab.software import software_versions
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from analysis.lawfit import LawFit
-    from analysis.selection import Statistics
+    from analysis.spindown.lawfit import LawFit
+    from analysis.spindown.selection import Statistics
     from analysis.uncertainty import Estimate
     from levilab.pipelines.sources import Source
     from levilab.pipelines.spindown.analysis import SpinDownAnalysis

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-    from analysis.selection import Statistics
+    from analysis.spindown.selection import Statistics
     from analysis.uncertainty import Estimate
     from levilab.pipelines.spindown.analysis import SpinDownAnalysis
 

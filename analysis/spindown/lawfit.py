@@ -7,11 +7,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.drag import LAWS, DragLaw
-from analysis.leastsquares import profile, solve
-from analysis.readings import Readings
+from analysis.least_squares import profile, solve
 from analysis.residuals import durbin_watson, runs_test_p
-from analysis.selection import Statistics, statistics
+from analysis.spindown.drag import LAWS, DragLaw
+from analysis.spindown.readings import Readings
+from analysis.spindown.selection import Statistics, statistics
 from analysis.uncertainty import Curvature, Estimate, bootstrap, curvature, propagate
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ class LawFit:
     """One drag law fitted to one run.
 
     Attributes:
-        name: of the law, a key of `analysis.drag.LAWS`.
+        name: of the law, a key of `analysis.spindown.drag.LAWS`.
         parameters: start_frequency [Hz] (spin at `start_time`), then the constants of the law.
         covariance: of the parameters, in that order, shape (p, p); None where undefined.
         statistics: how well it fits.
@@ -35,7 +35,7 @@ class LawFit:
         linearised: the constant by an unweighted straight line, where the law has one.
         warnings: what to know before using the numbers.
         start_time: time of the first reading [s].
-        solution: the same parameters as fitted, dimensionless (see `analysis.drag`).
+        solution: the same parameters as fitted, dimensionless (see `analysis.spindown.drag`).
         reference: their units, spin frequency [Hz] and time [s].
     """
 

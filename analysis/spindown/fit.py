@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.drag import LAWS
 from analysis.errors import UnknownName
-from analysis.lawfit import ROUNDING, UNCERTAINTIES, LawFit, Solution, Uncertainty, fit_law, solution
-from analysis.readings import Readings, checked
 from analysis.residuals import gross_errors, studentised
-from analysis.selection import NO_FIT, Statistics, weigh
+from analysis.spindown.drag import LAWS
+from analysis.spindown.lawfit import ROUNDING, UNCERTAINTIES, LawFit, Solution, Uncertainty, fit_law, solution
+from analysis.spindown.readings import Readings, checked
+from analysis.spindown.selection import NO_FIT, Statistics, weigh
+from analysis.spindown.verdict import Verdict, verdict
 from analysis.uncertainty import Estimate
-from analysis.verdict import Verdict, verdict
 
 __all__ = ["Estimate", "LawFit", "SpinDown", "Statistics", "Verdict", "fit_spin_down"]
 
@@ -71,18 +71,18 @@ def fit_spin_down(
         spin_frequency: shape (n,), above 0 [Hz].
         u: standard uncertainty of the readings [Hz], one or shape (n,). None: unknown, then all readings count
             alike and the scatter about each law stands for it.
-        laws: names from `analysis.drag.LAWS`.
+        laws: names from `analysis.spindown.drag.LAWS`.
         uncertainty: "covariance"; or also an interval for each parameter, by "profile" (likelihood) or "bootstrap".
         bootstrap_samples: how many.
         seed: of the bootstrap.
         keep_outliers: fit gross outliers too, instead of leaving them out. Both ways a warning names them.
 
     Raises:
-        AnalysisError: readings or names that cannot be used, see `analysis.readings.checked` and `UnknownName`.
+        AnalysisError: readings or names that cannot be used, see `readings.checked` and `UnknownName`.
 
     Source: thesis §4 and PHYSICS.md §5 for the laws and the straight lines; Bates & Watts (1988) §2 for the fit.
 
-    >>> from analysis.drag import spin
+    >>> from analysis.spindown.drag import spin
     >>> t = np.arange(0, 200, 10)
     >>> run = fit_spin_down(t, spin("disc", t, 40.0, 2.34e-4), u=0.03)
     >>> run.best, round(run.fit("disc").parameters["c32"].value, 9)

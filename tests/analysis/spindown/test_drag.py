@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from analysis.drag import LAWS, spin
+from analysis.spindown.drag import LAWS, spin
 
 CONSTANTS = {
     "stokes": (3.18e-3,),

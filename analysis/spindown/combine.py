@@ -10,14 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.drag import LAWS
 from analysis.errors import NothingToCombine
-from analysis.lawfit import ROUNDING, LawFit
 from analysis.residuals import durbin_watson, runs_test_p
-from analysis.selection import NO_FIT, Statistics, statistics, weigh
-from analysis.spindown import SpinDown, comparison_warnings
+from analysis.spindown.drag import LAWS
+from analysis.spindown.fit import SpinDown, comparison_warnings
+from analysis.spindown.lawfit import ROUNDING, LawFit
+from analysis.spindown.selection import NO_FIT, Statistics, statistics, weigh
+from analysis.spindown.verdict import Verdict, verdict
 from analysis.uncertainty import Estimate
-from analysis.verdict import Verdict, verdict
 
 Array = NDArray[np.float64]
 

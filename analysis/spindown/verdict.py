@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import floor, log10
 
-from analysis.selection import Statistics, deviance, variance_factor
+from analysis.spindown.selection import Statistics, deviance, variance_factor
 from analysis.uncertainty import Estimate
 
 EXCLUDED, TIED = 10.0, 4.0  # differences of AICc, Burnham & Anderson (2002) §2.6

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from analysis.combine import combine, mean
-from analysis.drag import LAWS, spin
 from analysis.errors import NothingToCombine
 from analysis.residuals import durbin_watson, runs_test_p
-from analysis.spindown import Estimate, fit_spin_down
+from analysis.spindown.combine import combine, mean
+from analysis.spindown.drag import LAWS, spin
+from analysis.spindown.fit import Estimate, fit_spin_down
 
 T = np.arange(0, 200, 10.0)
 THESIS = (2.365e-4, 2.309e-4, 2.289e-4, 2.397e-4)  # C₃⸝₂ of the four runs, PHYSICS.md §5

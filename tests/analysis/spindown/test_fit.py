@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from scipy.stats import linregress
 from scipy.stats import t as student
 
-from analysis.drag import LAWS, spin
 from analysis.errors import (
     AnalysisError,
     NoSpinDown,
@@ -22,7 +21,8 @@ from analysis.errors import (
     TooFewReadings,
     UnknownName,
 )
-from analysis.spindown import fit_spin_down
+from analysis.spindown.drag import LAWS, spin
+from analysis.spindown.fit import fit_spin_down
 
 T = np.arange(0, 200, 10.0)
 SIGMA = 0.03  # [Hz], the noise of PHYSICS.md §5

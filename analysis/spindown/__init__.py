@@ -1,0 +1,1 @@
+"""Drag laws from spin-downs."""
