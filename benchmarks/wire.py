@@ -33,15 +33,15 @@ from unittest import mock
 
 import pyvisa
 
+from instruments.clock import VirtualClock
+from instruments.links.visa import VisaTransport
 from instruments.oscilloscope_rigol import RigolDS1000Z
-from instruments.transport import VisaTransport
 from instruments.virtual.bus import Bus
 from instruments.virtual.generator_33500b import Virtual33500B
 from instruments.virtual.scope_rigol import VirtualDS1000Z
 from instruments.virtual.servers.server import BenchServer
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import spin_order
-from levilab.clock import VirtualClock
 from levilab.present.progress import Show
 from levilab.world.spin_world import SpinScene, SpinWorld
 from pyvisa_levilab import library_for

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
-from instruments.blocks import BrokenBlock, block_of, read_block
+from instruments.ieee488 import BrokenBlock, block_of, read_block
 from instruments.virtual.bus import Bus
 from instruments.virtual.faults import LinkLost
 from instruments.virtual.framing import Framer, Overrun

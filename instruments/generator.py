@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Protocol, cast
 
 from instruments.errors import BadAnswer, CommandRefused, OutOfRange
-from instruments.scpi import INFINITY, ScpiInstrument, Setting
+from instruments.ieee488 import INFINITY
+from instruments.scpi import ScpiInstrument, Setting
 
 if TYPE_CHECKING:
-    from instruments.transport import Transport
+    from instruments.links.transport import Transport
 
 #: The highest voltage of either family without a load [V]: offset and half of peak to peak together.
 OPEN_V = 10.0

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from instruments.links.transport import Transport
     from instruments.oscilloscope_setup import Value
-    from instruments.transport import Transport
 
 #: Between two questions whether the record is complete [s].
 _POLL = 0.02

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 from instruments.scpi import ScpiInstrument, Setting
 
 if TYPE_CHECKING:
-    from instruments.transport import Transport
+    from instruments.links.transport import Transport
 
     Value = bool | float | str
 

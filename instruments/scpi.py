@@ -12,16 +12,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar, cast, overload
 
 from instruments.errors import BadAnswer, CommandRefused, OutOfRange, WrongInstrument
+from instruments.ieee488 import INFINITY, NOT_A_NUMBER
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from instruments.transport import Transport
+    from instruments.links.transport import Transport
 
 T = TypeVar("T", bound=bool | float | str)
 
-#: What SCPI instruments send when there is no reading, and for infinity (SCPI-1999, vol. 1, 7.2.1).
-NOT_A_NUMBER, INFINITY = 9.91e37, 9.9e37
 
 #: Error queues hold 20 to 32 entries; more questions than that mean that the instrument never says "none".
 _LONGEST_ERROR_QUEUE = 64

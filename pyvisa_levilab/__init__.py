@@ -79,7 +79,7 @@ class LevilabVisaLibrary(VisaLibraryBase):
         Asked for as "realtime@levilab" it keeps to the wall clock: for programs that sleep between their questions.
         """
         if self.bus is None:
-            from levilab.clock import WallClock
+            from instruments.clock import WallClock
             from levilab.world.bench import own_world, virtual_bus
 
             self.bus = virtual_bus(own_world(WallClock() if str(self.library_path) == REALTIME else None))

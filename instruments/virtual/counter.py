@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from instruments.scpi import INFINITY
+from instruments.ieee488 import INFINITY
 from instruments.virtual.counter_memory import Memory, statistics
 from instruments.virtual.counter_parameters import truth, without_channels
 from instruments.virtual.counting import Looks, Measurement, Span, measurement

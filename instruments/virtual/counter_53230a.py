@@ -6,7 +6,7 @@ import math
 import re
 from typing import TYPE_CHECKING, ClassVar
 
-from instruments.scpi import INFINITY
+from instruments.ieee488 import INFINITY
 from instruments.virtual.counter import DARK, Function, darkness
 from instruments.virtual.counter_53230a_readings import Readings53230A
 from instruments.virtual.counter_parameters import channels_of, without_channels

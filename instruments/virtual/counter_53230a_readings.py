@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from instruments.scpi import NOT_A_NUMBER
+from instruments.ieee488 import NOT_A_NUMBER
 from instruments.virtual.counter_53230a_settings import Settings53230A
 from instruments.virtual.counter_parameters import block, without_channels
 from instruments.virtual.device import answers, does

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from instruments.scpi import INFINITY
+from instruments.ieee488 import INFINITY
 from instruments.virtual.counter import VirtualCounter
 from instruments.virtual.device import answers, does
 from instruments.virtual.edges import Input

@@ -6,7 +6,7 @@ import math
 import struct
 from typing import TYPE_CHECKING
 
-from instruments.scpi import NOT_A_NUMBER
+from instruments.ieee488 import NOT_A_NUMBER
 from instruments.virtual.counter import darkness
 from instruments.virtual.counter_cnt91_settings import SettingsCNT91, number_text
 from instruments.virtual.counter_parameters import block, without_channels

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from instruments.scpi import INFINITY
+from instruments.ieee488 import INFINITY
 from instruments.virtual.counter import VirtualCounter
 from instruments.virtual.device import answers, does
 from instruments.virtual.edges import Input

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from instruments.scpi import NOT_A_NUMBER
+from instruments.ieee488 import NOT_A_NUMBER
 
 if TYPE_CHECKING:
     from instruments.virtual.counting import Reading

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 
-from instruments.scpi import NOT_A_NUMBER
+from instruments.ieee488 import NOT_A_NUMBER
 from instruments.virtual.edges import Edge, EdgeFinder, Input, Signal
 
 

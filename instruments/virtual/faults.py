@@ -10,7 +10,7 @@ import re
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from instruments.scpi import NOT_A_NUMBER
+from instruments.ieee488 import NOT_A_NUMBER
 from instruments.virtual.scpi import ScpiError, nr3
 from instruments.virtual.status import POWER_ON
 

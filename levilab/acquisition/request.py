@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
+from instruments.clock import VirtualClock
 from levilab.acquisition.loop import Order
 from levilab.bench.config import BenchConfig, ConfigError, read_bench, within_limits
-from levilab.clock import VirtualClock
 from levilab.errors import LevilabError
 from levilab.runs.run import Run, find_run
 from levilab.settings import in_one_line

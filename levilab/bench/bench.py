@@ -9,11 +9,11 @@ import contextlib
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, cast
 
+from instruments.clock import Clock, WallClock
 from instruments.errors import InstrumentError, SettingsLost
 from instruments.generator import Limits as CoilLimits
 from levilab.bench.config import BenchConfig, ConfigError, InstrumentSettings, Limits
 from levilab.bench.kinds import driver_of, transport_to
-from levilab.clock import Clock, WallClock
 from levilab.world.bench import VIRTUAL, virtual_bus
 
 if TYPE_CHECKING:
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
     from instruments.counter import Counter
     from instruments.generator import Generator
+    from instruments.links.visa import TrafficLog
     from instruments.scpi import ScpiInstrument
-    from instruments.transport import TrafficLog
     from levilab.world.spin_world import World
 
 

@@ -6,8 +6,8 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from instruments.advice import one_line
 from instruments.errors import InstrumentError
+from instruments.links.advice import one_line
 from levilab.bench.config import InstrumentSettings
 from levilab.bench.kinds import DRIVERS, driver_of, transport_to
 from levilab.errors import LevilabError
@@ -38,7 +38,7 @@ class Found:
 
 def listed(library: str) -> tuple[str, ...]:
     """The addresses that a PyVISA library finds by itself.  Raises NotConnected."""
-    from instruments.transport import addresses
+    from instruments.links.visa import addresses
 
     return addresses(library)
 

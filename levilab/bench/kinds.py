@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 from levilab.bench.config import ConfigError
 
 if TYPE_CHECKING:
+    from instruments.links.transport import Transport
+    from instruments.links.visa import TrafficLog
     from instruments.scpi import ScpiInstrument
-    from instruments.transport import TrafficLog, Transport
     from levilab.bench.config import InstrumentSettings
 
 _COUNTERS, _GENERATORS = "instruments.counter", "instruments.generator"
@@ -57,8 +58,8 @@ def transport_to(
     kind: str, settings: InstrumentSettings, *, library: Any = "@py", log: TrafficLog | None = None
 ) -> Transport:
     """An open link: pyserial's where the address is a port or its URL, else PyVISA's.  Raises NotConnected."""
-    from instruments.serial_link import SerialTransport
-    from instruments.transport import VisaTransport
+    from instruments.links.serial_port import SerialTransport
+    from instruments.links.visa import VisaTransport
 
     line = dict(getattr(driver_of(kind, settings.model), "SERIAL", {})) | settings.line
     serial_name = settings.address.upper().startswith("ASRL") and library == "@py"

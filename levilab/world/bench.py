@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from instruments.clock import VirtualClock
 from levilab.bench.config import ConfigError, InstrumentSettings
-from levilab.clock import VirtualClock
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -13,10 +13,10 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from instruments.clock import Clock
     from instruments.virtual.bus import Bus
     from instruments.virtual.device import VirtualInstrument
     from instruments.virtual.generator import Output
-    from levilab.clock import Clock
     from levilab.simulator.scene import Scene
     from levilab.world.spin_world import World
 

@@ -21,8 +21,8 @@ from levilab.world.light import Tape
 from levilab.world.spin_world import KEPT_S
 
 if TYPE_CHECKING:
+    from instruments.clock import Clock
     from instruments.virtual.generator_channel import Output
-    from levilab.clock import Clock
     from levilab.simulator.scene import Scene
 
 Array = NDArray[np.float64]
@@ -53,7 +53,7 @@ class MotionWorld:
     part of the moment points): who switches a drive on after a pulse meets the moment there.  Raises SceneError for a
     scene without motion.
 
-    >>> from levilab.clock import VirtualClock
+    >>> from instruments.clock import VirtualClock
     >>> from levilab.simulator import preset
     >>> world = MotionWorld(preset("tilted"), VirtualClock())
     >>> bright = world.light(0.0, 1e-4, 10_000) > 0.6

@@ -8,9 +8,9 @@ import signal
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from instruments.clock import WallClock
 from instruments.virtual.servers.server import LOOPBACK, PORTS_PER_INSTRUMENT, Place, offered
 from instruments.virtual.servers.station import first_of
-from levilab.clock import WallClock
 from levilab.errors import LevilabError
 from levilab.world.bench import AGAIN_S, MODELS, VIRTUAL, own_world, scene_world, virtual_bus
 

@@ -20,8 +20,8 @@ from levilab.world.light import Tape
 from levilab.world.timeline import History
 
 if TYPE_CHECKING:
+    from instruments.clock import Clock
     from instruments.virtual.generator_channel import Output
-    from levilab.clock import Clock
 
 Array = NDArray[np.float64]
 

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 import pyvisa
 
+from instruments.clock import VirtualClock
 from instruments.counter import Keysight53230A, PendulumCNT91
 from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange
-from instruments.scpi import NOT_A_NUMBER
-from instruments.transport import VisaTransport
+from instruments.ieee488 import NOT_A_NUMBER
+from instruments.links.visa import VisaTransport
 from instruments.virtual.bus import Bus
 from instruments.virtual.counter_53230a import Virtual53230A
 from instruments.virtual.counter_cnt91 import VirtualCNT91
-from levilab.clock import VirtualClock
 from pyvisa_levilab import library_for
 from support.conversation import CLEAR, NO_ERROR, SILENCE, accepted, conversation
 

@@ -16,12 +16,12 @@ from fuzz_targets import TARGETS
 from instruments.counter import Keysight53230A, PendulumCNT91
 from instruments.errors import BadAnswer, InstrumentError
 from instruments.generator import Agilent33220A, Keysight33500B
+from instruments.links.serial_port import SerialTransport
+from instruments.links.visa import VisaTransport
 from instruments.magnetometer import LakeShore425, LakeShore475
 from instruments.oscilloscope import Trace
 from instruments.oscilloscope_keysight import KeysightDSOX
 from instruments.oscilloscope_rigol import RigolDS1000Z
-from instruments.serial_link import SerialTransport
-from instruments.transport import VisaTransport
 from instruments.virtual.bus import MOST_ANSWERS, Bus
 from instruments.virtual.device import Answer
 from instruments.virtual.faults import FAULTS, LATE, Fault

@@ -5,13 +5,13 @@ Source: Keysight 33500 Series Operating and Service Guide; Agilent 33220A User's
 
 import pytest
 
+from instruments.clock import VirtualClock
 from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange, WrongInstrument
 from instruments.generator import Agilent33220A, Keysight33500B, Limits
-from instruments.transport import VisaTransport
+from instruments.links.visa import VisaTransport
 from instruments.virtual.bus import Bus
 from instruments.virtual.generator_33220a import Virtual33220A
 from instruments.virtual.generator_33500b import Virtual33500B
-from levilab.clock import VirtualClock
 from pyvisa_levilab import library_for
 from support.conversation import CLEAR, NO_ERROR, SILENCE, accepted, conversation
 

@@ -6,11 +6,11 @@ Sources: MSO1000Z/DS1000Z Programming Guide, InfiniiVision X-Series Programmer's
 import numpy as np
 import pytest
 
+from instruments.clock import VirtualClock
 from instruments.errors import BadAnswer, CommandRefused, InstrumentError, NoAnswer, OutOfRange, WrongInstrument
 from instruments.oscilloscope import NeverTriggered, NothingAcquired
 from instruments.oscilloscope_keysight import KeysightDSOX
 from instruments.oscilloscope_rigol import RigolDS1000Z
-from levilab.clock import VirtualClock
 from support.conversation import CLEAR, NO_ERROR, SILENCE, Script, accepted
 
 RIGOL = "RIGOL TECHNOLOGIES,DS1054Z,DS1ZA171812345,00.04.04.SP4"

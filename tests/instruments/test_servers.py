@@ -16,6 +16,7 @@ from pyvisa_py.protocols import hislip as pyvisa_hislip
 from pyvisa_py.protocols import vxi11 as pyvisa_vxi11
 from pyvisa_py.tcpip import Vxi11CoreClient
 
+from instruments.clock import VirtualClock, WallClock
 from instruments.virtual.bus import Bus
 from instruments.virtual.device import VirtualInstrument, answers
 from instruments.virtual.faults import Fault
@@ -26,7 +27,6 @@ from instruments.virtual.servers.serial_port import HAS_PSEUDO_TERMINALS
 from instruments.virtual.servers.server import BenchServer, Place
 from instruments.virtual.servers.socket_server import socket_listener
 from instruments.virtual.servers.station import Station
-from levilab.clock import VirtualClock, WallClock
 
 #: What is waited for at most [s], reached by a failure only; and a time-out that is meant to be reached [ms].
 AT_MOST, SHORT = 5.0, 20

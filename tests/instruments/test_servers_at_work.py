@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import pyvisa
 
+from instruments.clock import VirtualClock, WallClock
 from instruments.virtual.bus import Bus
 from instruments.virtual.counter_53230a import Virtual53230A
 from instruments.virtual.counter_cnt91 import VirtualCNT91
 from instruments.virtual.servers.server import BenchServer
-from levilab.clock import VirtualClock, WallClock
 
 #: What is waited for at most [s], reached by a failure only; and how soon another client has its answer [s].
 AT_MOST, SOON = 20.0, 0.3

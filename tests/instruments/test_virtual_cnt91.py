@@ -11,12 +11,12 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from instruments.clock import VirtualClock
 from instruments.counter import PendulumCNT91
 from instruments.errors import OutOfRange
-from instruments.transport import VisaTransport
+from instruments.links.visa import VisaTransport
 from instruments.virtual.bus import Bus
 from instruments.virtual.counter_cnt91 import VirtualCNT91
-from levilab.clock import VirtualClock
 from pyvisa_levilab import library_for
 from support.wire import ask, cable, errors, received, send
 

@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from instruments.clock import VirtualClock
 from instruments.virtual.arbitrary import samples
 from instruments.virtual.generator import Burst, Output
 from instruments.virtual.generator_33220a import Virtual33220A
 from instruments.virtual.generator_33500b import Virtual33500B
 from instruments.virtual.scpi import ScpiError
-from levilab.clock import VirtualClock
 from support.wire import ask, cable, errors, received, send
 
 

@@ -8,14 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pyvisa.constants import Parity, StatusCode, StopBits
 
+from instruments.clock import VirtualClock
 from instruments.errors import NoAnswer
+from instruments.links.visa import VisaTransport
 from instruments.magnetometer import LakeShore425, LakeShore475
-from instruments.transport import VisaTransport
 from instruments.virtual.bus import Bus
 from instruments.virtual.magnetometer_425 import Virtual425
 from instruments.virtual.magnetometer_475 import Virtual475
 from instruments.virtual.magnetometer_numbers import field_text
-from levilab.clock import VirtualClock
 from pyvisa_levilab import library_for
 from support.wire import ask, received, send
 

@@ -15,11 +15,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import pyvisa_levilab
+from instruments.clock import VirtualClock
 from instruments.errors import BadAnswer, SettingsLost
+from instruments.links.visa import VisaTransport
 from instruments.oscilloscope import NeverTriggered, NothingAcquired
 from instruments.oscilloscope_keysight import KeysightDSOX
 from instruments.oscilloscope_rigol import RigolDS1000Z
-from instruments.transport import VisaTransport
 from instruments.virtual.bus import Bus
 from instruments.virtual.faults import Fault
 from instruments.virtual.scope_acquisition import AUTO_AFTER
@@ -28,7 +29,6 @@ from instruments.virtual.scope_measure import MEASUREMENTS, Measured, measure
 from instruments.virtual.scope_record import PIECE, Edge
 from instruments.virtual.scope_rigol import VirtualDS1000Z
 from instruments.virtual.scope_setup import one_two_five
-from levilab.clock import VirtualClock
 from support.wire import ask, cable, errors, received, send
 
 DARK, BRIGHT, DUTY = 0.1, 1.2, 0.03

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from instruments.clock import VirtualClock
 from instruments.virtual.counter_cnt91 import VirtualCNT91
-from levilab.clock import VirtualClock
 
 pytest.importorskip("pymeasure")
 

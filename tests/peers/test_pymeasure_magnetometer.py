@@ -6,8 +6,8 @@ pytest.importorskip("pymeasure")
 
 from pymeasure.instruments.lakeshore import LakeShore425
 
+from instruments.clock import VirtualClock
 from instruments.virtual.magnetometer_425 import Virtual425
-from levilab.clock import VirtualClock
 
 pytestmark = pytest.mark.parametrize("way", ["@levilab", "socket", "pyserial"])
 

@@ -7,8 +7,8 @@ pytest.importorskip("pymeasure")
 
 from pymeasure.instruments.keysight import KeysightDSOX1102G
 
+from instruments.clock import VirtualClock
 from instruments.virtual.scope_keysight import VirtualDSOX1000
-from levilab.clock import VirtualClock
 
 
 def square(start, step, n):

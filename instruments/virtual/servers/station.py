@@ -15,7 +15,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from instruments.scpi import INFINITY
+from instruments.ieee488 import INFINITY
 from instruments.virtual.faults import LinkLost
 from instruments.virtual.scpi import ScpiError
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from instruments.clock import VirtualClock
 from instruments.counter import Keysight53230A
 from instruments.errors import InstrumentError, NoAnswer
 from instruments.generator import Keysight33500B
@@ -18,7 +19,6 @@ from levilab.acquisition.loop import Order, acquire
 from levilab.acquisition.request import spin_order
 from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import BenchConfig, SpinSettings
-from levilab.clock import VirtualClock
 from levilab.files import CannotWrite
 from levilab.runs.run import Run
 from levilab.runs.writer import RunWriter

@@ -5,6 +5,7 @@ import time
 import pytest
 import pyvisa
 
+from instruments.clock import VirtualClock, WallClock
 from instruments.errors import InstrumentError, NotConnected, Occupied, OutOfRange, WrongInstrument
 from instruments.virtual.generator_33500b import Virtual33500B
 from levilab.bench.bench import OutputMayBeOn, open_bench
@@ -17,7 +18,6 @@ from levilab.bench.config import (
     read_bench,
     within_limits,
 )
-from levilab.clock import VirtualClock, WallClock
 from levilab.errors import LevilabError
 from levilab.interruption import Interrupted
 from levilab.world.bench import VIRTUAL

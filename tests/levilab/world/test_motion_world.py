@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from instruments.clock import VirtualClock
 from instruments.virtual.generator import Burst, Output
 from instruments.virtual.generator_voltage import fundamental
-from levilab.clock import VirtualClock
 from levilab.simulator import SceneError, preset, simulate
 from levilab.world.flight import RATE, Flight
 from levilab.world.light import Tape

@@ -14,9 +14,9 @@ import pytest
 import pyvisa
 from typer.testing import CliRunner
 
+from instruments.clock import WallClock
 from instruments.virtual.servers.server import LOOPBACK
 from levilab.cli.bench import bench_app
-from levilab.clock import WallClock
 from levilab.world.serve import Service, WrongService, chosen_models, serve
 
 #: How long something is waited for [s]; reached by a failure only.

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from instruments.clock import VirtualClock
 from instruments.virtual.counter_53230a import Virtual53230A
 from instruments.virtual.generator import Burst, Output
 from instruments.virtual.generator_voltage import fundamental, voltage
-from levilab.clock import VirtualClock
 from levilab.simulator.spin import DECAYS
 from levilab.world import bench as virtual_bench
 from levilab.world.light import Tape

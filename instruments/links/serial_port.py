@@ -1,4 +1,4 @@
-"""The way to an instrument on a serial port: pyserial behind the protocol of :mod:`instruments.transport`.
+"""The way to an instrument on a serial port: pyserial behind the protocol of :mod:`instruments.links.visa`.
 
 The only module that imports pyserial.
 """
@@ -13,13 +13,13 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from instruments.blocks import BrokenBlock, read_block
 from instruments.errors import BadAnswer, InstrumentError, NotConnected, Occupied, OutOfRange, SilentLine
+from instruments.ieee488 import BrokenBlock, read_block
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from instruments.transport import TrafficLog
+    from instruments.links.visa import TrafficLog
 
 #: pyserial's letters for what bench.toml says in words.
 PARITIES = {"none": "N", "odd": "O", "even": "E", "mark": "M", "space": "S"}
@@ -102,14 +102,14 @@ class SerialTransport:
     # --- messages ---
 
     def write(self, message: str) -> None:
-        """Send one message; see :class:`instruments.transport.Transport`."""
+        """Send one message; see :class:`instruments.links.visa.Transport`."""
         with self._told_as_ours(message, self.timeout):
             if self._out_of_step:
                 self._resynchronise()
             self._send(message)
 
     def query(self, message: str, *, patience: float = 0.0) -> str:
-        """Ask; see :class:`instruments.transport.Transport`."""
+        """Ask; see :class:`instruments.links.visa.Transport`."""
         self.write(message)
         within = self.timeout + patience
         with self._told_as_ours(message, within):
@@ -118,7 +118,7 @@ class SerialTransport:
         return line.decode("ascii").strip()
 
     def query_block(self, message: str, *, patience: float = 0.0) -> bytes:
-        """Ask for a block; see :class:`instruments.transport.Transport`.
+        """Ask for a block; see :class:`instruments.links.visa.Transport`.
 
         A block may take longer than the time-out, but not be silent for so long.
         """
@@ -206,7 +206,7 @@ class SerialTransport:
         self._out_of_step = False
 
     def reopen(self) -> None:
-        """Open the port anew; see :class:`instruments.transport.Transport`."""
+        """Open the port anew; see :class:`instruments.links.visa.Transport`."""
         self.close()
         self._port = self._open()
         self._out_of_step = True  # the instrument was not told, and may still be answering

@@ -13,11 +13,11 @@ import socket
 import time
 import warnings
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
-from instruments.advice import advice, one_line
-from instruments.blocks import BrokenBlock, block_of, read_block
 from instruments.errors import BadAnswer, NoAnswer, NotConnected, Occupied, SilentLine
+from instruments.ieee488 import BrokenBlock, block_of, read_block
+from instruments.links.advice import advice, one_line
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -44,41 +44,6 @@ _WHO, _IDENTITY = "*IDN?", re.compile(rb"[A-Za-z][^,\n]*,[^,\n]*,[^,\n]*,[^\n]*\
 #: VISA's numbers for: locked, busy; and for: no such operation, not implemented.
 _HELD_BY_ANOTHER = {-1073807345, -1073807246}
 _HAS_NO_LOCKS = {-1073807257, -1073807231}
-
-
-class Transport(Protocol):
-    """Messages to and from one instrument.  timeout: how long an answer is waited for [s]."""
-
-    address: str
-    timeout: float
-
-    def write(self, message: str) -> None:
-        """Send one message."""
-
-    def query(self, message: str, *, patience: float = 0.0) -> str:
-        """Send a question and return the answer without its line end.
-
-        patience: how long the instrument works on this answer before it can send it [s]; added to the
-        timeout.  Raises NoAnswer when nothing came in time.
-        """
-
-    def query_block(self, message: str, *, patience: float = 0.0) -> bytes:
-        """Send a question and return the bytes of the definite-length block that answers it (IEEE 488.2, 8.7.9).
-
-        Raises NoAnswer as query does, BadAnswer when it is no block or one that breaks off.
-        """
-
-    def clear(self) -> None:
-        """Drop whatever is under way in either direction."""
-
-    def reopen(self) -> None:
-        """Give the link up and make it anew.  Raises NotConnected."""
-
-    def lock(self) -> None:
-        """Keep other programs from the instrument, where the interface can.  Raises Occupied if one has it."""
-
-    def close(self) -> None:
-        """Give the instrument back."""
 
 
 class VisaTransport:

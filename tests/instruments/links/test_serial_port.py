@@ -15,16 +15,16 @@ import serial.tools.list_ports  # before a test changes what platform this is
 from hypothesis import given
 from hypothesis import strategies as st
 
+from instruments.clock import VirtualClock
 from instruments.errors import BadAnswer, InstrumentError, NoAnswer, NotConnected, Occupied, OutOfRange
+from instruments.links.serial_port import SerialTransport, port_name
 from instruments.magnetometer import LakeShore425
-from instruments.serial_link import SerialTransport, port_name
 from instruments.virtual.bus import Bus
 from instruments.virtual.device import VirtualInstrument, answers
 from instruments.virtual.faults import FAULTS, Fault
 from instruments.virtual.magnetometer_425 import Virtual425
 from instruments.virtual.scpi import Command
 from instruments.virtual.serial_line import LineSettings, benches, carried
-from levilab.clock import VirtualClock
 
 METER = "levilab://magnetometer"
 SLOW = "levilab://slow"

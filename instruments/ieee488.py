@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+
 #: No instrument of a bench sends more at once [bytes]; a head that says so is noise on the line.
 LONGEST_BLOCK = 1 << 28
 
@@ -75,3 +76,7 @@ def _size(head: bytes, digits: bytes) -> int:
     if size > LONGEST_BLOCK:
         raise BrokenBlock(f"{(head + digits).decode()}, which announces {size} bytes")
     return size
+
+
+#: What SCPI instruments send when there is no reading, and for infinity (SCPI-1999, vol. 1, 7.2.1).
+NOT_A_NUMBER, INFINITY = 9.91e37, 9.9e37

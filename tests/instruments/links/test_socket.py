@@ -8,7 +8,7 @@ import threading
 import pytest
 
 from instruments.errors import NoAnswer, NotConnected
-from instruments.transport import VisaTransport
+from instruments.links.visa import VisaTransport
 
 #: How long a test waits for its own server before it fails [s]; reached by a failure only.
 AT_MOST = 5.0

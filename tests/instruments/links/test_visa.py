@@ -6,12 +6,12 @@ import pytest
 from pyvisa import VisaIOError
 from pyvisa.constants import StatusCode
 
+from instruments.clock import VirtualClock
 from instruments.errors import BadAnswer, NoAnswer, NotConnected, Occupied
-from instruments.transport import VisaTransport
+from instruments.links.visa import VisaTransport
 from instruments.virtual.bus import Bus
 from instruments.virtual.device import VirtualInstrument, answers
 from instruments.virtual.scpi import Command
-from levilab.clock import VirtualClock
 from pyvisa_levilab import LevilabVisaLibrary, library_for
 
 ADDRESS = "TCPIP0::slow.levilab::inst0::INSTR"

@@ -4,15 +4,15 @@ import contextlib
 
 import pytest
 
+from instruments.clock import VirtualClock, WallClock
 from instruments.errors import BadAnswer, CommandRefused, InstrumentError, NoAnswer, NotConnected
+from instruments.links.visa import VisaTransport
 from instruments.scpi import ScpiInstrument, Setting
-from instruments.transport import VisaTransport
 from instruments.virtual.bus import Bus
 from instruments.virtual.device import VirtualInstrument, answers
 from instruments.virtual.faults import AWAY, FAULTS, LATE, Fault
 from instruments.virtual.scpi import Command
 from instruments.virtual.servers.server import BenchServer
-from levilab.clock import VirtualClock, WallClock
 from pyvisa_levilab import library_for
 
 MESSAGES, STREAM = "TCPIP0::box.levilab::inst0::INSTR", "TCPIP0::box.levilab::5025::SOCKET"

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from instruments.blocks import BrokenBlock, block_of, read_block
+from instruments.ieee488 import BrokenBlock, block_of, read_block
 
 #: How instruments write the same block: the length with more digits than it needs, with one line end or another.
 ENDS = st.sampled_from([b"\n", b"\r\n"])

@@ -1,0 +1,1 @@
+"""The links between a driver and its instrument: messages over a port of bytes."""

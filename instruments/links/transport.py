@@ -1,0 +1,40 @@
+"""What a driver needs of a link, whatever it is made of."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+
+class Transport(Protocol):
+    """Messages to and from one instrument.  timeout: how long an answer is waited for [s]."""
+
+    address: str
+    timeout: float
+
+    def write(self, message: str) -> None:
+        """Send one message."""
+
+    def query(self, message: str, *, patience: float = 0.0) -> str:
+        """Send a question and return the answer without its line end.
+
+        patience: how long the instrument works on this answer before it can send it [s]; added to the
+        timeout.  Raises NoAnswer when nothing came in time.
+        """
+
+    def query_block(self, message: str, *, patience: float = 0.0) -> bytes:
+        """Send a question and return the bytes of the definite-length block that answers it (IEEE 488.2, 8.7.9).
+
+        Raises NoAnswer as query does, BadAnswer when it is no block or one that breaks off.
+        """
+
+    def clear(self) -> None:
+        """Drop whatever is under way in either direction."""
+
+    def reopen(self) -> None:
+        """Give the link up and make it anew.  Raises NotConnected."""
+
+    def lock(self) -> None:
+        """Keep other programs from the instrument, where the interface can.  Raises Occupied if one has it."""
+
+    def close(self) -> None:
+        """Give the instrument back."""
