@@ -34,8 +34,8 @@ from unittest import mock
 import pyvisa
 
 from instruments.clock import VirtualClock
+from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.links.visa import VisaTransport
-from instruments.oscilloscope_rigol import RigolDS1000Z
 from instruments.virtual.bus import Bus
 from instruments.virtual.generator_33500b import Virtual33500B
 from instruments.virtual.scope_rigol import VirtualDS1000Z

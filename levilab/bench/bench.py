@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, cast
 
 from instruments.clock import Clock, WallClock
+from instruments.drivers.generator import Limits as CoilLimits
 from instruments.errors import InstrumentError, SettingsLost
-from instruments.generator import Limits as CoilLimits
 from levilab.bench.config import BenchConfig, ConfigError, InstrumentSettings, Limits
 from levilab.bench.kinds import driver_of, transport_to
 from levilab.world.bench import VIRTUAL, virtual_bus
@@ -19,10 +19,10 @@ from levilab.world.bench import VIRTUAL, virtual_bus
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from instruments.counter import Counter
-    from instruments.generator import Generator
+    from instruments.drivers.counter import Counter
+    from instruments.drivers.generator import Generator
+    from instruments.drivers.scpi import ScpiInstrument
     from instruments.links.visa import TrafficLog
-    from instruments.scpi import ScpiInstrument
     from levilab.world.spin_world import World
 
 

@@ -14,11 +14,11 @@ from levilab.bench.discover import KINDS
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from instruments.counter import Counter
-    from instruments.generator import Generator
-    from instruments.magnetometer import Magnetometer
-    from instruments.oscilloscope import Oscilloscope
-    from instruments.scpi import ScpiInstrument
+    from instruments.drivers.counter import Counter
+    from instruments.drivers.generator import Generator
+    from instruments.drivers.magnetometer import Magnetometer
+    from instruments.drivers.oscilloscope import Oscilloscope
+    from instruments.drivers.scpi import ScpiInstrument
     from levilab.bench.config import BenchConfig
     from levilab.world.spin_world import World
 

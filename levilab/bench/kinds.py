@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 from levilab.bench.config import ConfigError
 
 if TYPE_CHECKING:
+    from instruments.drivers.scpi import ScpiInstrument
     from instruments.links.transport import Transport
     from instruments.links.visa import TrafficLog
-    from instruments.scpi import ScpiInstrument
     from levilab.bench.config import InstrumentSettings
 
-_COUNTERS, _GENERATORS = "instruments.counter", "instruments.generator"
-_RIGOL, _KEYSIGHT = "instruments.oscilloscope_rigol", "instruments.oscilloscope_keysight"
-_MAGNETOMETERS = "instruments.magnetometer"
+_COUNTERS, _GENERATORS = "instruments.drivers.counter", "instruments.drivers.generator"
+_RIGOL, _KEYSIGHT = "instruments.drivers.oscilloscope.rigol_ds1000z", "instruments.drivers.oscilloscope.keysight_dsox"
+_MAGNETOMETERS = "instruments.drivers.magnetometer"
 
 #: Kind → model as one writes it in bench.toml → module and class of its driver.
 DRIVERS: dict[str, dict[str, tuple[str, str]]] = {

@@ -13,15 +13,18 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, rule, run_state_machine_as_test
 
 from fuzz_targets import TARGETS
-from instruments.counter import Keysight53230A, PendulumCNT91
+from instruments.drivers.counter.keysight_53230a import Keysight53230A
+from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
+from instruments.drivers.generator.agilent_33220a import Agilent33220A
+from instruments.drivers.generator.keysight_33500b import Keysight33500B
+from instruments.drivers.magnetometer.lakeshore_425 import LakeShore425
+from instruments.drivers.magnetometer.lakeshore_475 import LakeShore475
+from instruments.drivers.oscilloscope import Trace
+from instruments.drivers.oscilloscope.keysight_dsox import KeysightDSOX
+from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.errors import BadAnswer, InstrumentError
-from instruments.generator import Agilent33220A, Keysight33500B
 from instruments.links.serial_port import SerialTransport
 from instruments.links.visa import VisaTransport
-from instruments.magnetometer import LakeShore425, LakeShore475
-from instruments.oscilloscope import Trace
-from instruments.oscilloscope_keysight import KeysightDSOX
-from instruments.oscilloscope_rigol import RigolDS1000Z
 from instruments.virtual.bus import MOST_ANSWERS, Bus
 from instruments.virtual.device import Answer
 from instruments.virtual.faults import FAULTS, LATE, Fault

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
-from instruments.counter import PendulumCNT91
+from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
 from instruments.errors import OutOfRange
 from instruments.links.visa import VisaTransport
 from instruments.virtual.bus import Bus

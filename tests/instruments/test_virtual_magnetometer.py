@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 from pyvisa.constants import Parity, StatusCode, StopBits
 
 from instruments.clock import VirtualClock
+from instruments.drivers.magnetometer.lakeshore_425 import LakeShore425
+from instruments.drivers.magnetometer.lakeshore_475 import LakeShore475
 from instruments.errors import NoAnswer
 from instruments.links.visa import VisaTransport
-from instruments.magnetometer import LakeShore425, LakeShore475
 from instruments.virtual.bus import Bus
 from instruments.virtual.magnetometer_425 import Virtual425
 from instruments.virtual.magnetometer_475 import Virtual475

@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 
 import pyvisa_levilab
 from instruments.clock import VirtualClock
+from instruments.drivers.oscilloscope import NeverTriggered, NothingAcquired
+from instruments.drivers.oscilloscope.keysight_dsox import KeysightDSOX
+from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.errors import BadAnswer, SettingsLost
 from instruments.links.visa import VisaTransport
-from instruments.oscilloscope import NeverTriggered, NothingAcquired
-from instruments.oscilloscope_keysight import KeysightDSOX
-from instruments.oscilloscope_rigol import RigolDS1000Z
 from instruments.virtual.bus import Bus
 from instruments.virtual.faults import Fault
 from instruments.virtual.scope_acquisition import AUTO_AFTER

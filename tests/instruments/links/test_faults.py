@@ -5,9 +5,9 @@ import contextlib
 import pytest
 
 from instruments.clock import VirtualClock, WallClock
+from instruments.drivers.scpi import ScpiInstrument, Setting
 from instruments.errors import BadAnswer, CommandRefused, InstrumentError, NoAnswer, NotConnected
 from instruments.links.visa import VisaTransport
-from instruments.scpi import ScpiInstrument, Setting
 from instruments.virtual.bus import Bus
 from instruments.virtual.device import VirtualInstrument, answers
 from instruments.virtual.faults import AWAY, FAULTS, LATE, Fault

@@ -16,9 +16,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from instruments.clock import VirtualClock
+from instruments.drivers.magnetometer.lakeshore_425 import LakeShore425
 from instruments.errors import BadAnswer, InstrumentError, NoAnswer, NotConnected, Occupied, OutOfRange
 from instruments.links.serial_port import SerialTransport, port_name
-from instruments.magnetometer import LakeShore425
 from instruments.virtual.bus import Bus
 from instruments.virtual.device import VirtualInstrument, answers
 from instruments.virtual.faults import FAULTS, Fault

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
-from instruments.counter import Keysight53230A
+from instruments.drivers.counter.keysight_53230a import Keysight53230A
+from instruments.drivers.generator.keysight_33500b import Keysight33500B
 from instruments.errors import InstrumentError, NoAnswer
-from instruments.generator import Keysight33500B
 from levilab.acquisition.loop import Order, acquire
 from levilab.acquisition.request import spin_order
 from levilab.acquisition.session import ExperimentFailed

@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from instruments.counter import Keysight53230A
+from instruments.drivers.counter.keysight_53230a import Keysight53230A
+from instruments.drivers.generator.keysight_33500b import Keysight33500B
+from instruments.drivers.scpi import ScpiInstrument, Setting, parse_reading
 from instruments.errors import BadAnswer, CommandRefused, InstrumentError, OutOfRange, WrongInstrument
-from instruments.generator import Keysight33500B
-from instruments.scpi import ScpiInstrument, Setting, parse_reading
 from support.conversation import CLEAR, NO_ERROR, accepted, conversation
 
 #: Headers as in the programmer's references, numbers as the instruments print them (INSTRUMENTS: 15 digits, NR3).

@@ -7,8 +7,9 @@ import math
 
 import pytest
 
+from instruments.drivers.magnetometer.lakeshore_425 import LakeShore425
+from instruments.drivers.magnetometer.lakeshore_475 import LakeShore475
 from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange, WrongInstrument
-from instruments.magnetometer import LakeShore425, LakeShore475
 from support.conversation import CLEAR, SILENCE, conversation
 
 #: RDGMODE for steady fields: the 425 with its filter, the 475 with four digits.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
-from instruments.scpi import ScpiInstrument, Setting
+from instruments.drivers.scpi import ScpiInstrument, Setting
 
 if TYPE_CHECKING:
     from instruments.links.transport import Transport
@@ -20,7 +20,7 @@ SLOPES = {"rising": "POS", "falling": "NEG"}
 
 @dataclass(frozen=True)
 class Setup:
-    """What prepare() was asked for; see :class:`instruments.oscilloscope.Oscilloscope`."""
+    """What prepare() was asked for; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
 
     channels: tuple[int, ...]
     duration_s: float

@@ -1,54 +1,30 @@
-"""Hall magnetometers: a flux density, whatever the model.
-
-Facts and their sources stand with each driver.
-"""
+"""What Lake Shore's gaussmeters have in common."""
 
 from __future__ import annotations
 
 import math
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar
 
-from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange
-from instruments.scpi import ScpiInstrument, Setting
+from instruments.drivers.magnetometer import _INVALID_PROBE, _NO_PROBE, _OVERLOAD
+from instruments.drivers.scpi import ScpiInstrument, Setting
+from instruments.errors import BadAnswer, CommandRefused, OutOfRange
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+
 #: One of each unit in tesla.  A Hall probe sees B; oersted and A/m are B/μ₀ in air.
 _UNITS_T = {"GAUSS": 1e-4, "TESLA": 1.0, "OERSTED": 1e-4, "A/M": 4e-7 * math.pi}
 
-#: Bits of the answer to OPST?.
-_NO_PROBE, _OVERLOAD, _INVALID_PROBE, _ZERO_DONE = 1, 2, 16, 128
 
 #: No probe of the family measures more.
 _STRONGEST_T = 35.1
 
+
 #: TYPE? less 40, or less 50 with a cable that the user has programmed.
 _PROBES = ("HSE", "HST", "UHS")
-
-
-class Magnetometer(Protocol):
-    """What every magnetometer offers."""
-
-    def identity(self) -> str:
-        """Maker, model, serial number, firmware."""
-
-    def settings(self) -> dict[str, bool | float | str]:
-        """Its settings as they stand."""
-
-    def prepare(self, *, range_t: float | None) -> None:
-        """Measure steady flux density up to this [T]; None: the instrument chooses its range."""
-
-    def flux_density(self) -> float | None:
-        """One reading along the probe's axis [T]; None when it is beyond the range."""
-
-    def zero(self) -> None:
-        """Take the present flux density for zero: with the probe in its zero-gauss chamber, and only there."""
-
-    def close(self) -> None:
-        """Give the instrument back."""
 
 
 @dataclass(eq=False)
@@ -181,60 +157,6 @@ class LakeShoreGaussmeter(ScpiInstrument):
             if not re.fullmatch("[0-9]{1,9}", answer):
                 raise BadAnswer(self.transport.address, question, answer, "a whole number")
         return int(answer)
-
-
-class LakeShore425(LakeShoreGaussmeter):
-    """Lake Shore 425, at its USB socket, which is a serial port to the computer.
-
-    Sources: Model 425 User's Manual, pages 50 (at most 30 messages a second, 30 ms after each) and 52 to 57
-    (commands); Lake Shore's own Python driver (57600 baud, 7 data bits, odd parity); the socs agent of the Simons
-    Observatory (bits of OPST?); PyMeasure (ranges).
-    """
-
-    MODELS: ClassVar[str] = "MODEL425"
-    SERIAL: ClassVar = {"baud_rate": 57600, "data_bits": 7, "parity": "odd", "stop_bits": 1, "pause": 0.03}
-    RANGES_T: ClassVar = {
-        "HSE": (3.5e-3, 35e-3, 0.35, 3.5),
-        "HST": (35e-3, 0.35, 3.5, 35.0),
-        "UHS": (35e-6, 350e-6, 3.5e-3),
-    }
-    _STEADY = "1,1,1"  # with the filter
-
-    #: Zeroing is over after some seconds; more questions than this mean that it never will be.
-    _LONGEST_ZEROING = 600
-
-    def zero(self) -> None:
-        """Zero the probe and wait for the bit that says that it is done; see :class:`Magnetometer`."""
-        self.transport.write("ZPROBE")
-        for _ in range(self._LONGEST_ZEROING):
-            if self._ask("OPST?") & _ZERO_DONE:
-                return
-        raise NoAnswer(self.transport.address, "ZPROBE", self._LONGEST_ZEROING * self.SERIAL["pause"])
-
-
-class LakeShore475(LakeShoreGaussmeter):
-    """Lake Shore 455 and 475, at RS-232 or GPIB.
-
-    Sources: Model 475 User's Manual, chapter 6, in part (``*OPC?`` is held until what was begun is finished); public
-    drivers of the 455 and 475 after their manuals (RS-232: 7 data bits, odd parity, 9600 baud or what is set at the
-    front panel, at most 20 messages a second; ranges by probe; OPST?).
-    """
-
-    MODELS: ClassVar[str] = "MODEL4[57]5"
-    SERIAL: ClassVar = {"baud_rate": 9600, "data_bits": 7, "parity": "odd", "stop_bits": 1, "pause": 0.05}
-    RANGES_T: ClassVar = {
-        "HSE": (350e-6, 3.5e-3, 35e-3, 0.35, 3.5),
-        "HST": (3.5e-3, 35e-3, 0.35, 3.5, 35.0),
-        "UHS": (3.5e-6, 35e-6, 350e-6, 3.5e-3),
-    }
-    _STEADY = "1,2,1,1,1"  # four digits: 10 Hz
-
-    #: How long zeroing may take [s].
-    _LONGEST_ZEROING = 20.0
-
-    def zero(self) -> None:
-        """Zero the probe and wait until the instrument says that it is done; see :class:`Magnetometer`."""
-        self.transport.query("ZPROBE;*OPC?", patience=self._LONGEST_ZEROING)
 
 
 def _number(address: str, answer: str) -> float:

@@ -11,7 +11,8 @@ import pytest
 import pyvisa
 
 from instruments.clock import VirtualClock
-from instruments.counter import Keysight53230A, PendulumCNT91
+from instruments.drivers.counter.keysight_53230a import Keysight53230A
+from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
 from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange
 from instruments.ieee488 import NOT_A_NUMBER
 from instruments.links.visa import VisaTransport

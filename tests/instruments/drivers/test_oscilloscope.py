@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
+from instruments.drivers.oscilloscope import NeverTriggered, NothingAcquired
+from instruments.drivers.oscilloscope.keysight_dsox import KeysightDSOX
+from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.errors import BadAnswer, CommandRefused, InstrumentError, NoAnswer, OutOfRange, WrongInstrument
-from instruments.oscilloscope import NeverTriggered, NothingAcquired
-from instruments.oscilloscope_keysight import KeysightDSOX
-from instruments.oscilloscope_rigol import RigolDS1000Z
 from support.conversation import CLEAR, NO_ERROR, SILENCE, Script, accepted
 
 RIGOL = "RIGOL TECHNOLOGIES,DS1054Z,DS1ZA171812345,00.04.04.SP4"

@@ -6,8 +6,10 @@ Source: Keysight 33500 Series Operating and Service Guide; Agilent 33220A User's
 import pytest
 
 from instruments.clock import VirtualClock
+from instruments.drivers.generator import Limits
+from instruments.drivers.generator.agilent_33220a import Agilent33220A
+from instruments.drivers.generator.keysight_33500b import Keysight33500B
 from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange, WrongInstrument
-from instruments.generator import Agilent33220A, Keysight33500B, Limits
 from instruments.links.visa import VisaTransport
 from instruments.virtual.bus import Bus
 from instruments.virtual.generator_33220a import Virtual33220A

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
+from instruments.drivers.oscilloscope import Preamble
+from instruments.drivers.oscilloscope.scope import Scope
+from instruments.drivers.oscilloscope.setup import SLOPES, Channel, Setup
+from instruments.drivers.scpi import Setting
 from instruments.errors import OutOfRange
-from instruments.oscilloscope import Preamble
-from instruments.oscilloscope_base import Scope
-from instruments.oscilloscope_setup import SLOPES, Channel, Setup
-from instruments.scpi import Setting
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from instruments.oscilloscope_setup import Value
+    from instruments.drivers.oscilloscope.setup import Value
 
 
 class _KeysightChannel(Channel):

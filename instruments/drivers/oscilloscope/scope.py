@@ -13,18 +13,18 @@ from typing import TYPE_CHECKING, ClassVar, NoReturn
 
 import numpy as np
 
+from instruments.drivers.oscilloscope import Clock, NeverTriggered, NothingAcquired, Preamble, Trace, WallClock
+from instruments.drivers.oscilloscope.setup import Channel, Setup, is_still
+from instruments.drivers.scpi import ScpiInstrument, Setting
 from instruments.errors import BadAnswer, InstrumentError, NoAnswer, OutOfRange, SettingsLost
-from instruments.oscilloscope import Clock, NeverTriggered, NothingAcquired, Preamble, Trace, WallClock
-from instruments.oscilloscope_setup import Channel, Setup, is_still
-from instruments.scpi import ScpiInstrument, Setting
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
+    from instruments.drivers.oscilloscope.setup import Value
     from instruments.links.transport import Transport
-    from instruments.oscilloscope_setup import Value
 
 #: Between two questions whether the record is complete [s].
 _POLL = 0.02
@@ -63,7 +63,7 @@ class Scope(ScpiInstrument):
         self._wanted: dict[ScpiInstrument, dict[str, Value]] = {}
 
     def identity(self) -> str:
-        """The answer to ``*IDN?``; see :class:`instruments.oscilloscope.Oscilloscope`."""
+        """The answer to ``*IDN?``; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
         answer = super().identity()
         model = answer.split(",")[1] if "," in answer else answer
         self._inputs = self._number_of_inputs(model)
@@ -106,7 +106,7 @@ class Scope(ScpiInstrument):
         trigger_source: int = 1,
         sweep: str = "normal",
     ) -> None:
-        """Set the scope up; see :class:`instruments.oscilloscope.Oscilloscope`."""
+        """Set the scope up; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
         setup = Setup(
             tuple(channels),
             duration_s,
@@ -236,12 +236,12 @@ class Scope(ScpiInstrument):
     # --- acquiring ---
 
     def off(self) -> None:
-        """Acquire no more; see :class:`instruments.oscilloscope.Oscilloscope`."""
+        """Acquire no more; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
         self.forget_errors()
         self.command(":STOP")
 
     def acquire(self, *, timeout_s: float) -> None:
-        """Take one record; see :class:`instruments.oscilloscope.Oscilloscope`."""
+        """Take one record; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
         self._acquired = False
         try:
             self._start()
@@ -273,7 +273,7 @@ class Scope(ScpiInstrument):
     # --- reading ---
 
     def trace(self, channel: int) -> Trace:
-        """The record of one channel; see :class:`instruments.oscilloscope.Oscilloscope`."""
+        """The record of one channel; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
         self._check_readable(channel)
         with self._blaming_changes():
             preamble = self.preamble(channel)
@@ -287,7 +287,7 @@ class Scope(ScpiInstrument):
         return Trace(codes, *scaling, channel, *self.CODES)
 
     def blocks(self, channel: int) -> Iterator[NDArray[np.uint8]]:
-        """The codes of one channel, piece by piece; see :class:`instruments.oscilloscope.Oscilloscope`."""
+        """The codes of one channel, piece by piece; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
         self._check_readable(channel)
         self._check_kept()
         with self._blaming_changes():

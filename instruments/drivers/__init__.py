@@ -1,0 +1,1 @@
+"""The drivers: the near end of the wire."""

@@ -1,0 +1,37 @@
+"""Frequency counters: a frequency with a gate and a trigger level, whatever the model.
+
+Facts and their sources stand with each driver, and in docs/instruments/counter.md.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+class Counter(Protocol):
+    """What every counter offers."""
+
+    def identity(self) -> str:
+        """Maker, model, serial number, firmware."""
+
+    def settings(self) -> dict[str, bool | float | str]:
+        """Its settings as they stand."""
+
+    def prepare(self, *, gate_s: float, trigger_level_v: float) -> None:
+        """Measure frequency at input 1, rising edges, over a gate [s], at a fixed trigger level [V]."""
+
+    def frequency(self) -> float | None:
+        """One reading [Hz]; None when no signal crossed the trigger level.  Takes the gate time and more."""
+
+    def readings(self, count: int) -> NDArray[np.float64]:
+        """So many readings one after the other, shape (count,) [Hz], NaN where there was none.
+
+        Raises OutOfRange if the memory of the counter does not hold so many.
+        """
+
+    def close(self) -> None:
+        """Give the instrument back."""

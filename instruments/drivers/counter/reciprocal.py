@@ -1,0 +1,76 @@
+"""What reciprocal counters have in common."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from instruments.drivers.scpi import ScpiInstrument, parse_reading
+from instruments.errors import BadAnswer, InstrumentError, NoAnswer, OutOfRange
+
+#: Readings that are fetched with one question: an answer of 25 kB, seconds apart at most.
+_AT_ONCE = 1000
+
+
+#: Readings that are waited for with one question: so long, at most [s].  VISA waits for 49 days and no longer.
+_LONGEST_WAIT = 30 * 86400.0
+
+
+class _ReciprocalCounter(ScpiInstrument):
+    """What the drivers share: how long to wait for an answer, and what to do when none comes.
+
+    most: readings that the memory holds.
+    """
+
+    MOST: ClassVar[int] = 1_000_000
+
+    #: How long the counter may work on one reading [s]; prepare() sets it.
+    _patience = 3.0
+    #: Whether it says so itself when there is no signal; prepare() sets it up to do so.
+    _gives_up = False
+
+    def frequency(self) -> float | None:
+        """One reading [Hz], or None; see :class:`Counter`.  Raises CommandRefused if an error was waiting."""
+        answer = self._ask("READ?", self._patience)
+        with self.resynchronised():
+            return None if answer is None else self._parse(answer)
+
+    def _parse(self, answer: str) -> float | None:
+        return parse_reading(self.transport.address, "READ?", answer)
+
+    def _ask(self, question: str, patience: float) -> str | None:
+        """Read the error queue, then the data; None when a counter that may wait for ever never answers.
+
+        One that was told to give up says so itself: then silence is a fault of the link, and no sign of a dark signal.
+        """
+        self.raise_errors(question)
+        try:
+            return self.transport.query(question, patience=patience)
+        except NoAnswer as silence:
+            try:
+                self._give_up()
+            except InstrumentError:
+                raise silence from None
+            if self._gives_up:
+                raise
+            return None
+
+    def _give_up(self) -> None:
+        """Stop a measurement that does not end, and let the link tell if it is dead."""
+        self.transport.clear()
+        self.forget_errors()  # a query cut off leaves −410 behind
+        self.command("ABOR")
+
+    def _check_count(self, count: int) -> None:
+        if not 1 <= count <= self.MOST:
+            raise OutOfRange(self.transport.address, "count", count, f"1 to {self.MOST}")
+
+    def _split(self, question: str, answer: str, expected: int) -> list[float]:
+        """The numbers of a list, NaN where there was no reading.  Raises BadAnswer if they are not so many."""
+        words = answer.split(",")
+        if len(words) != expected:
+            shown = answer if len(answer) < 80 else f"{answer[:80]}…"
+            raise BadAnswer(self.transport.address, question, shown, f"{expected} numbers, not {len(words)}")
+        found = (parse_reading(self.transport.address, question, word or "nan") for word in words)
+        return [np.nan if value is None else value for value in found]

@@ -1,0 +1,82 @@
+"""Function generators: the drive.  Waveform, frequency, amplitude, offset, output, whatever the model."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+from instruments.errors import OutOfRange
+
+#: The highest voltage of either family without a load [V]: offset and half of peak to peak together.
+OPEN_V = 10.0
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the coil stands.  More is refused before anything is sent, never clipped.
+
+    drive_amplitude_vpp, drive_offset_v: largest; drive_frequency_hz, drive_lowest_hz: the range.  The names are those
+    in bench.toml.  Without a word there is no limit beside the instrument's own.
+    """
+
+    drive_amplitude_vpp: float = math.inf
+    drive_offset_v: float = math.inf
+    drive_frequency_hz: float = math.inf
+    drive_lowest_hz: float = -math.inf
+
+    def check(
+        self, address: str, *, frequency_hz: float | None = None, amplitude_vpp: float = 0.0, offset_v: float = 0.0
+    ) -> None:
+        """Raise OutOfRange if this signal is more than they allow.  frequency_hz: None where there is none."""
+        rows = (
+            ("drive_amplitude_vpp", amplitude_vpp, 0.0, self.drive_amplitude_vpp),
+            ("drive_offset_v", abs(offset_v), 0.0, self.drive_offset_v),
+            ("drive_frequency_hz", frequency_hz, -math.inf, self.drive_frequency_hz),
+            ("drive_lowest_hz", frequency_hz, self.drive_lowest_hz, math.inf),
+        )
+        for name, value, low, high in rows if self != NO_LIMITS else ():
+            if value is not None and not low <= value <= high:  # nan is in no range
+                allowed = f"up to {high:g}" if high < math.inf else f"from {low:g} on"
+                raise OutOfRange(address, name, value, f"{allowed} (limits.{name} in the bench file)")
+
+
+#: Of a generator by itself.
+NO_LIMITS = Limits()
+
+
+def check_peak(address: str, amplitude_vpp: float, offset_v: float) -> None:
+    """Raise OutOfRange for a signal that the terminals cannot give: the instrument would clip it."""
+    peak = abs(offset_v) + amplitude_vpp / 2
+    if not peak <= OPEN_V:
+        raise OutOfRange(address, "|offset| + Vpp/2", peak, f"up to {OPEN_V:g} V")
+
+
+class Generator(Protocol):
+    """What every generator offers.
+
+    waveform: a short word; frequency [Hz]; amplitude, peak to peak, and offset of the open terminals [V]; output:
+    whether the signal is on the terminals; limits: what the coil stands.
+    """
+
+    waveform: str
+    frequency: float
+    amplitude: float
+    offset: float
+    output: bool
+    limits: Limits
+
+    def identity(self) -> str:
+        """Maker, model, serial number, firmware."""
+
+    def settings(self) -> dict[str, bool | float | str]:
+        """Its settings as they stand."""
+
+    def prepare(self, *, waveform: str, frequency_hz: float, amplitude_vpp: float, offset_v: float = 0.0) -> None:
+        """Set the signal; the output is off afterwards.  Raises OutOfRange beyond the limits, with nothing sent."""
+
+    def off(self) -> None:
+        """Switch all outputs off, and see that they are."""
+
+    def close(self) -> None:
+        """Give the instrument back."""

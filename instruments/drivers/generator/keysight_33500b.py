@@ -1,0 +1,48 @@
+"""The driver of Keysight's 33500B series."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from instruments.drivers.generator.drive import _amplitude, _Drive, _frequency, _Load, _offset, _Switch
+from instruments.drivers.scpi import Setting
+from instruments.ieee488 import INFINITY
+
+if TYPE_CHECKING:
+    from instruments.links.transport import Transport
+
+
+class Keysight33500B(_Drive):
+    """Agilent/Keysight 33500B series (they identify as 33509B to 33522B, or 33500-33522A).
+
+    Source: Keysight 33500 Series Operating and Service Guide.  The coil is no 50 Ω load: with the load set
+    to INFinity the amplitude on the display is the voltage at the coil's series resistor.
+    """
+
+    MODELS: ClassVar[str] = r"335\d\d[AB]"
+    OUTPUT: ClassVar[str] = "OUTP1"
+    #: Those of the series that have a second channel, which nothing here drives.
+    TWO_CHANNELS: ClassVar[frozenset[str]] = frozenset({"33510B", "33512B", "33520B", "33522A", "33522B"})
+
+    waveform = Setting("FUNC", str, choices=("SIN", "SQU", "TRI", "RAMP"))
+    frequency = _frequency(30e6)
+    amplitude = _amplitude(2e-3)
+    offset = _offset()
+    load = _Load("OUTP1:LOAD", float, unit="ohm", low=1.0, high=INFINITY)
+    output = _Switch("OUTP1", bool)
+
+    def __init__(self, transport: Transport) -> None:
+        super().__init__(transport)
+        self._model = ""
+
+    def identity(self) -> str:
+        """As every instrument; it says how many channels there are."""
+        answer = super().identity()
+        self._model = answer.split(",")[1].strip().upper() if "," in answer else answer.upper()
+        return answer
+
+    def outputs(self) -> tuple[str, ...]:
+        """How the headers of all its outputs begin; it is asked who it is where nobody has asked yet."""
+        if not self._model:
+            self.identity()
+        return ("OUTP1", "OUTP2") if self._model in self.TWO_CHANNELS else ("OUTP1",)

@@ -1,0 +1,33 @@
+"""Hall magnetometers: a flux density, whatever the model.
+
+Facts and their sources stand with each driver.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+#: Bits of the answer to OPST?.
+_NO_PROBE, _OVERLOAD, _INVALID_PROBE, _ZERO_DONE = 1, 2, 16, 128
+
+
+class Magnetometer(Protocol):
+    """What every magnetometer offers."""
+
+    def identity(self) -> str:
+        """Maker, model, serial number, firmware."""
+
+    def settings(self) -> dict[str, bool | float | str]:
+        """Its settings as they stand."""
+
+    def prepare(self, *, range_t: float | None) -> None:
+        """Measure steady flux density up to this [T]; None: the instrument chooses its range."""
+
+    def flux_density(self) -> float | None:
+        """One reading along the probe's axis [T]; None when it is beyond the range."""
+
+    def zero(self) -> None:
+        """Take the present flux density for zero: with the probe in its zero-gauss chamber, and only there."""
+
+    def close(self) -> None:
+        """Give the instrument back."""
