@@ -29,14 +29,14 @@ def replace_atomically(path: Path, text: str) -> None:
             file.flush()
             os.fsync(file.fileno())
         _replace(part, path)
-        _sync_folder(path.parent)
+        sync_folder(path.parent)
     except BaseException:
         with contextlib.suppress(OSError):
             part.unlink(missing_ok=True)
         raise
 
 
-def _sync_folder(folder: Path) -> None:
+def sync_folder(folder: Path) -> None:
     """A new name is on the disk only with its folder; Windows keeps names without being asked."""
     if os.name != "posix":
         return

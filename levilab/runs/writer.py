@@ -16,7 +16,7 @@ import shutil
 from datetime import UTC, datetime
 from typing import IO, TYPE_CHECKING, Any, Self
 
-from levilab.files import CannotWrite, _sync_folder, replace_atomically
+from levilab.files import CannotWrite, replace_atomically, sync_folder
 from levilab.runs.run import EVENTS, PACKAGE, READINGS, RECORD, STATES, WIRE, RunRecord, lock_of, utc_now
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class RunWriter:
             writer._lock.acquire(blocking=False)
             writer._append(table, writer._header())
             replace_atomically(writer.folder / RECORD, record.as_json())
-            _sync_folder(out)
+            sync_folder(out)
         return writer
 
     @classmethod

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from instruments.drivers.counter.reciprocal import _AT_ONCE, _ReciprocalCounter
+from instruments.drivers.counter.reciprocal import READINGS_AT_ONCE, ReciprocalCounter
 from instruments.drivers.scpi import Setting
 from instruments.errors import InstrumentError
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-class Keysight53230A(_ReciprocalCounter):
+class Keysight53230A(ReciprocalCounter):
     """Keysight 53220A / 53230A universal counter (and their Agilent ancestors).
 
     Source: Keysight 53220A/53230A Programmer's Reference.  Two points decide whether a spin is counted right:
@@ -66,7 +66,7 @@ class Keysight53230A(_ReciprocalCounter):
         try:
             self.command("INIT")
             while len(found) < count:
-                part = min(_AT_ONCE, count - len(found))
+                part = min(READINGS_AT_ONCE, count - len(found))
                 question = f"DATA:REM? {part},WAIT"
                 answer = self._ask(question, part * self._patience)
                 if answer is None:

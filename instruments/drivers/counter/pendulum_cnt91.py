@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from instruments.drivers.counter.reciprocal import _AT_ONCE, _LONGEST_WAIT, _ReciprocalCounter
+from instruments.drivers.counter.reciprocal import LONGEST_WAIT_S, READINGS_AT_ONCE, ReciprocalCounter
 from instruments.drivers.scpi import Setting, parse_reading
 from instruments.errors import InstrumentError, OutOfRange
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-class PendulumCNT91(_ReciprocalCounter):
+class PendulumCNT91(ReciprocalCounter):
     """Pendulum CNT-90 and CNT-91, sold by Tektronix as FCA3000 and FCA3100 series.
 
     Sources: CNT-90 series Programmer's Handbook (4031 600 90201); PyMeasure's CNT91, QMI's Tektronix_FCA3000 and
@@ -74,7 +74,7 @@ class PendulumCNT91(_ReciprocalCounter):
 
     def _check_count(self, count: int) -> None:
         super()._check_count(count)
-        most = int(_LONGEST_WAIT / self._patience)
+        most = int(LONGEST_WAIT_S / self._patience)
         if count > most:
             allowed = f"1 to {most} with this gate: they are waited for together, 30 days at most"
             raise OutOfRange(self.transport.address, "count", count, allowed)
@@ -105,7 +105,7 @@ class PendulumCNT91(_ReciprocalCounter):
             self.command("INIT")
             complete = self._ask("*OPC?", count * self._patience)
             while complete and len(found) < count * columns:
-                part = min(_AT_ONCE, count - len(found) // columns)
+                part = min(READINGS_AT_ONCE, count - len(found) // columns)
                 question = f"FETC:ARR? {part}"
                 answer = self._ask(question, self._patience)
                 if answer is None:

@@ -10,14 +10,14 @@ from instruments.drivers.scpi import ScpiInstrument, parse_reading
 from instruments.errors import BadAnswer, InstrumentError, NoAnswer, OutOfRange
 
 #: Readings that are fetched with one question: an answer of 25 kB, seconds apart at most.
-_AT_ONCE = 1000
+READINGS_AT_ONCE = 1000
 
 
 #: Readings that are waited for with one question: so long, at most [s].  VISA waits for 49 days and no longer.
-_LONGEST_WAIT = 30 * 86400.0
+LONGEST_WAIT_S = 30 * 86400.0
 
 
-class _ReciprocalCounter(ScpiInstrument):
+class ReciprocalCounter(ScpiInstrument):
     """What the drivers share: how long to wait for an answer, and what to do when none comes.
 
     most: readings that the memory holds.

@@ -4,12 +4,19 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from instruments.drivers.generator.drive import _amplitude, _Drive, _frequency, _Load, _offset, _Switch
+from instruments.drivers.generator.drive import (
+    DriveGenerator,
+    LoadSetting,
+    OutputSwitch,
+    amplitude_setting,
+    frequency_setting,
+    offset_setting,
+)
 from instruments.drivers.scpi import Setting
 from instruments.ieee488 import INFINITY
 
 
-class Agilent33220A(_Drive):
+class Agilent33220A(DriveGenerator):
     """Agilent 33220A: one channel, 20 MHz, an older dialect.
 
     Source: Agilent 33220A User's Guide, chapter 4; public drivers of the model.  It has no triangle of its own: that
@@ -21,11 +28,11 @@ class Agilent33220A(_Drive):
 
     waveform = Setting("FUNC", str, choices=("SIN", "SQU", "RAMP"))
     symmetry = Setting("FUNC:RAMP:SYMM", float, unit="percent", low=0.0, high=100.0)
-    frequency = _frequency(20e6)
-    amplitude = _amplitude(20e-3)
-    offset = _offset()
-    load = _Load("OUTP:LOAD", float, unit="ohm", low=1.0, high=INFINITY)
-    output = _Switch("OUTP", bool)
+    frequency = frequency_setting(20e6)
+    amplitude = amplitude_setting(20e-3)
+    offset = offset_setting()
+    load = LoadSetting("OUTP:LOAD", float, unit="ohm", low=1.0, high=INFINITY)
+    output = OutputSwitch("OUTP", bool)
 
     def _shape(self, waveform: str) -> None:
         triangle = waveform.upper() == "TRI"

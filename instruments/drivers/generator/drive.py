@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(eq=False)
-class _Limited(Setting[float]):
+class LimitedSetting(Setting[float]):
     """A setting that the coil may stand less of than the instrument can do.
 
     quantity: its name to :meth:`Limits.check`; partner: the setting that shares the voltage of the terminals with it.
@@ -26,7 +26,7 @@ class _Limited(Setting[float]):
 
     def __set__(self, instrument: ScpiInstrument, value: float) -> None:
         address = instrument.transport.address
-        cast("_Drive", instrument).limits.check(address, **{self.quantity: value})
+        cast("DriveGenerator", instrument).limits.check(address, **{self.quantity: value})
         self._check(address, value)
         if self.partner in instrument.set_to:
             both = {self.quantity: value, self.partner: cast("float", instrument.set_to[self.partner])}
@@ -35,43 +35,46 @@ class _Limited(Setting[float]):
 
 
 @dataclass(eq=False)
-class _Load(Setting[float]):
+class LoadSetting(Setting[float]):
     """The load that the display is for.  Where the coil has limits they are those of the open terminals."""
 
     def __set__(self, instrument: ScpiInstrument, value: float) -> None:
-        if cast("_Drive", instrument).limits != NO_LIMITS and not value >= INFINITY:
+        if cast("DriveGenerator", instrument).limits != NO_LIMITS and not value >= INFINITY:
             allowed = f"{INFINITY:g}: limits.drive_amplitude_vpp in the bench file is that of the open terminals"
             raise OutOfRange(instrument.transport.address, self.name, value, allowed)
         super().__set__(instrument, value)
 
 
 @dataclass(eq=False)
-class _Switch(Setting[bool]):
+class OutputSwitch(Setting[bool]):
     """The output.  Where the coil has limits, nothing goes on that was not set under them."""
 
     def __set__(self, instrument: ScpiInstrument, value: bool) -> None:  # noqa: FBT001 - it is what is assigned
-        drive = cast("_Drive", instrument)
+        drive = cast("DriveGenerator", instrument)
         if value and drive.limits != NO_LIMITS and not drive.prepared_here:
             allowed = "prepare() first: what stands there may be beyond limits.drive_amplitude_vpp in the bench file"
             raise OutOfRange(instrument.transport.address, self.name, value, allowed)
         super().__set__(instrument, value)
 
 
-def _frequency(high: float) -> _Limited:
-    return _Limited("FREQ", float, unit="Hz", low=1e-6, high=high, quantity="frequency_hz")
+def frequency_setting(high: float) -> LimitedSetting:
+    """The frequency of the output, up to the highest of the family [Hz]."""
+    return LimitedSetting("FREQ", float, unit="Hz", low=1e-6, high=high, quantity="frequency_hz")
 
 
-def _amplitude(low: float) -> _Limited:
-    return _Limited("VOLT", float, unit="Vpp", low=low, high=20.0, quantity="amplitude_vpp", partner="offset_v")
+def amplitude_setting(low: float) -> LimitedSetting:
+    """The amplitude of the output, from the lowest of the family on [V, peak to peak]."""
+    return LimitedSetting("VOLT", float, unit="Vpp", low=low, high=20.0, quantity="amplitude_vpp", partner="offset_v")
 
 
-def _offset() -> _Limited:
-    return _Limited(
+def offset_setting() -> LimitedSetting:
+    """The offset of the output [V]."""
+    return LimitedSetting(
         "VOLT:OFFS", float, unit="V", low=-OPEN_V, high=OPEN_V, quantity="offset_v", partner="amplitude_vpp"
     )
 
 
-class _Drive(ScpiInstrument):
+class DriveGenerator(ScpiInstrument):
     """What both families do with their settings.  OUTPUT: how the headers of the output begin."""
 
     OUTPUT: ClassVar[str]

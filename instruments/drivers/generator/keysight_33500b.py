@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
-from instruments.drivers.generator.drive import _amplitude, _Drive, _frequency, _Load, _offset, _Switch
+from instruments.drivers.generator.drive import (
+    DriveGenerator,
+    LoadSetting,
+    OutputSwitch,
+    amplitude_setting,
+    frequency_setting,
+    offset_setting,
+)
 from instruments.drivers.scpi import Setting
 from instruments.ieee488 import INFINITY
 
@@ -12,7 +19,7 @@ if TYPE_CHECKING:
     from instruments.links.transport import Transport
 
 
-class Keysight33500B(_Drive):
+class Keysight33500B(DriveGenerator):
     """Agilent/Keysight 33500B series (they identify as 33509B to 33522B, or 33500-33522A).
 
     Source: Keysight 33500 Series Operating and Service Guide.  The coil is no 50 Ω load: with the load set
@@ -25,11 +32,11 @@ class Keysight33500B(_Drive):
     TWO_CHANNELS: ClassVar[frozenset[str]] = frozenset({"33510B", "33512B", "33520B", "33522A", "33522B"})
 
     waveform = Setting("FUNC", str, choices=("SIN", "SQU", "TRI", "RAMP"))
-    frequency = _frequency(30e6)
-    amplitude = _amplitude(2e-3)
-    offset = _offset()
-    load = _Load("OUTP1:LOAD", float, unit="ohm", low=1.0, high=INFINITY)
-    output = _Switch("OUTP1", bool)
+    frequency = frequency_setting(30e6)
+    amplitude = amplitude_setting(2e-3)
+    offset = offset_setting()
+    load = LoadSetting("OUTP1:LOAD", float, unit="ohm", low=1.0, high=INFINITY)
+    output = OutputSwitch("OUTP1", bool)
 
     def __init__(self, transport: Transport) -> None:
         super().__init__(transport)

@@ -7,9 +7,6 @@ from __future__ import annotations
 
 from typing import Protocol
 
-#: Bits of the answer to OPST?.
-_NO_PROBE, _OVERLOAD, _INVALID_PROBE, _ZERO_DONE = 1, 2, 16, 128
-
 
 class Magnetometer(Protocol):
     """What every magnetometer offers."""

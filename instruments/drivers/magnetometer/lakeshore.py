@@ -7,7 +7,6 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from instruments.drivers.magnetometer import _INVALID_PROBE, _NO_PROBE, _OVERLOAD
 from instruments.drivers.scpi import ScpiInstrument, Setting
 from instruments.errors import BadAnswer, CommandRefused, OutOfRange
 
@@ -172,3 +171,7 @@ def _numbers(text: str) -> list[float] | None:
         return [float(part) for part in text.split(",")]
     except ValueError:
         return None
+
+
+#: Bits of the answer to OPST?.
+_NO_PROBE, _OVERLOAD, _INVALID_PROBE, ZERO_DONE = 1, 2, 16, 128

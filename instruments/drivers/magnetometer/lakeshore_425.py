@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from instruments.drivers.magnetometer import _ZERO_DONE
 from instruments.drivers.magnetometer.lakeshore import (
+    ZERO_DONE,
     LakeShoreGaussmeter,
 )
 from instruments.errors import NoAnswer
@@ -35,6 +35,6 @@ class LakeShore425(LakeShoreGaussmeter):
         """Zero the probe and wait for the bit that says that it is done; see :class:`Magnetometer`."""
         self.transport.write("ZPROBE")
         for _ in range(self._LONGEST_ZEROING):
-            if self._ask("OPST?") & _ZERO_DONE:
+            if self._ask("OPST?") & ZERO_DONE:
                 return
         raise NoAnswer(self.transport.address, "ZPROBE", self._LONGEST_ZEROING * self.SERIAL["pause"])
