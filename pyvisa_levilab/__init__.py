@@ -17,8 +17,9 @@ from pyvisa.highlevel import VisaLibraryBase
 from pyvisa.util import LibraryPath
 
 from instruments.virtual.bus import Session
+from instruments.virtual.core.line import LineSettings
 from instruments.virtual.faults import LinkLost
-from instruments.virtual.serial_line import LineSettings, SerialLine
+from instruments.virtual.serial_line import SerialLine
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from instruments.virtual.scpi import ScpiError
+from instruments.virtual.core.parser import ScpiError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

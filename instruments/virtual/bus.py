@@ -10,18 +10,18 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from instruments.ieee488 import INFINITY
+from instruments.virtual.core.device import SteppedInstrument
+from instruments.virtual.core.message import Framer, Overrun
+from instruments.virtual.core.parser import LONGEST_ANSWER, ScpiError
+from instruments.virtual.core.steps import Work, at_once
 from instruments.virtual.faults import LinkLost
-from instruments.virtual.framing import Framer, Overrun
-from instruments.virtual.scpi import LONGEST_ANSWER, ScpiError
-from instruments.virtual.stepped_instrument import SteppedInstrument
-from instruments.virtual.steps import Work, at_once
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from instruments.virtual.device import Answer, VirtualInstrument
+    from instruments.virtual.core.device import Answer, VirtualInstrument
+    from instruments.virtual.core.steps import Steps
     from instruments.virtual.faults import Fault
-    from instruments.virtual.steps import Steps
 
 
 _NOTHING = memoryview(b"")

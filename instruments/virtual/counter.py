@@ -10,22 +10,22 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from instruments.ieee488 import INFINITY
+from instruments.virtual.core.device import SteppedInstrument, answers, does
+from instruments.virtual.core.parameters import at_most_one, limit, nr3, number, one
+from instruments.virtual.core.parser import Command, ScpiError
+from instruments.virtual.core.status import OPERATION_COMPLETE
+from instruments.virtual.core.steps import at_once
 from instruments.virtual.counter_memory import Memory, statistics
 from instruments.virtual.counter_parameters import truth, without_channels
 from instruments.virtual.counting import Looks, Measurement, Span, measurement
-from instruments.virtual.device import answers, does
-from instruments.virtual.scpi import Command, ScpiError, at_most_one, limit, nr3, number, one
-from instruments.virtual.status import OPERATION_COMPLETE
-from instruments.virtual.stepped_instrument import SteppedInstrument
-from instruments.virtual.steps import at_once
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from instruments.virtual.core.device import Clock
+    from instruments.virtual.core.steps import Steps
     from instruments.virtual.counter_run import Run
-    from instruments.virtual.device import Clock
     from instruments.virtual.edges import Array, Input, Signal
-    from instruments.virtual.steps import Steps
 
 #: An answer that never comes is ready then [s].
 NEVER = INFINITY

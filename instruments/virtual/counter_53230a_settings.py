@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from instruments.ieee488 import INFINITY
+from instruments.virtual.core.device import answers, does
+from instruments.virtual.core.parameters import at_most_one, limit, none, nr3, number, one
+from instruments.virtual.core.parser import Command, ScpiError
 from instruments.virtual.counter import VirtualCounter
-from instruments.virtual.device import answers, does
 from instruments.virtual.edges import Input
-from instruments.virtual.scpi import Command, ScpiError, at_most_one, limit, none, nr3, number, one
 
 #: Schmitt trigger of the input [V] (53230A data sheet: 20 mV, 40 mV typical); ten times that in the 50 V range,
 #: and about twice with noise rejection.

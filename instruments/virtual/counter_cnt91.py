@@ -6,18 +6,19 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar
 
+from instruments.virtual.core.device import answers, does
+from instruments.virtual.core.parameters import number, one
+from instruments.virtual.core.parser import Command, ScpiError
 from instruments.virtual.counter import DARK, Function
 from instruments.virtual.counter_cnt91_readings import ReadingsCNT91
 from instruments.virtual.counter_parameters import channels_of, without_channels
 from instruments.virtual.counter_run import Run
 from instruments.virtual.counting import Looks, Measurement, Span, Wish, first_edge
-from instruments.virtual.device import answers, does
-from instruments.virtual.scpi import Command, ScpiError, number, one
 
 if TYPE_CHECKING:
     from collections.abc import Generator
 
-    from instruments.virtual.steps import Steps
+    from instruments.virtual.core.steps import Steps
 
 #: From the end of a measurement to the beginning of the next, but for back-to-back ones [s] (handbook, 8-72: 4 µs
 #: and more; the calibration of the interpolators is 400 µs, estimated).

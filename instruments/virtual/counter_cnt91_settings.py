@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from instruments.ieee488 import INFINITY
+from instruments.virtual.core.device import answers, does
+from instruments.virtual.core.parameters import at_most_one, choice, limit, none, number, one
+from instruments.virtual.core.parser import Command
 from instruments.virtual.counter import VirtualCounter
-from instruments.virtual.device import answers, does
 from instruments.virtual.edges import Input
-from instruments.virtual.scpi import Command, at_most_one, choice, limit, none, number, one
 
 if TYPE_CHECKING:
     from collections.abc import Callable

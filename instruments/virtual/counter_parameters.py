@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from instruments.virtual.scpi import ScpiError
+from instruments.virtual.core.parser import ScpiError
 
 _CHANNELS = re.compile(r"\(@\s*([\d,\s]+)\)")
 _BRACKETED = re.compile(r"\(\s*([^@()]*)\)")

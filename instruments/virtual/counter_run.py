@@ -14,8 +14,8 @@ from instruments.virtual.counter_memory import Memory
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from instruments.virtual.core.steps import Steps
     from instruments.virtual.counting import Looks, Measurement, Reading
-    from instruments.virtual.steps import Steps
 
 #: A message may make a model look so far ahead [s]; an answer that is further away does not come.  Three hours are
 #: ten readings with the longest gate there is.

@@ -11,14 +11,15 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from instruments.ieee488 import NOT_A_NUMBER
-from instruments.virtual.scpi import ScpiError, nr3
-from instruments.virtual.status import POWER_ON
+from instruments.virtual.core.parameters import nr3
+from instruments.virtual.core.parser import ScpiError
+from instruments.virtual.core.status import POWER_ON
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from instruments.virtual.bus import Session
-    from instruments.virtual.device import Answer
+    from instruments.virtual.core.device import Answer
 
     Act = Callable[[Session, Answer], Answer | None]
 

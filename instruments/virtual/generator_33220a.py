@@ -7,10 +7,11 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from instruments.virtual.arbitrary import Refused, plain_name
-from instruments.virtual.device import answers, does
+from instruments.virtual.core.device import answers, does
+from instruments.virtual.core.parameters import at_most_one, one
+from instruments.virtual.core.parser import Command, ScpiError
 from instruments.virtual.generator import VirtualGenerator
 from instruments.virtual.generator_family import Family, Waveform
-from instruments.virtual.scpi import Command, ScpiError, at_most_one, one
 
 if TYPE_CHECKING:
     from instruments.virtual.generator_channel import Channel

@@ -7,11 +7,12 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from instruments.virtual.arbitrary import Refused, plain_name
-from instruments.virtual.device import answers, does
+from instruments.virtual.core.device import answers, does
+from instruments.virtual.core.parameters import one
+from instruments.virtual.core.parser import Command, ScpiError
 from instruments.virtual.generator import VirtualGenerator
 from instruments.virtual.generator_family import Family, Waveform
 from instruments.virtual.generator_tables import CHOICES_33500, HZ, PLAIN_33500, SWITCHES, S, V
-from instruments.virtual.scpi import Command, ScpiError, one
 
 if TYPE_CHECKING:
     from instruments.virtual.generator_channel import Channel

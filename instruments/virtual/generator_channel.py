@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from instruments.virtual.device import Value
+    from instruments.virtual.core.device import Value
+    from instruments.virtual.core.parser import ScpiError
     from instruments.virtual.generator_family import Family
-    from instruments.virtual.scpi import ScpiError
 
 
 @dataclass(frozen=True)

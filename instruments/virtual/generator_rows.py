@@ -6,10 +6,11 @@ import math
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
-from instruments.virtual.device import VirtualInstrument, answers, does
+from instruments.virtual.core.device import VirtualInstrument, answers, does
+from instruments.virtual.core.parameters import at_most_one, choice, limit, nr3, one
+from instruments.virtual.core.parser import Command, ScpiError
 from instruments.virtual.generator_settings import INFINITE, quantity_of
 from instruments.virtual.generator_tables import HZ, PERCENT, PLAIN, S, V, fixed, short
-from instruments.virtual.scpi import Command, ScpiError, at_most_one, choice, limit, nr3, one
 
 if TYPE_CHECKING:
     from collections.abc import Callable

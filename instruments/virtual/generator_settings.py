@@ -14,14 +14,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from instruments.virtual.arbitrary import Memory, built_in
-from instruments.virtual.scpi import ScpiError, limit, number
+from instruments.virtual.core.parameters import limit, number
+from instruments.virtual.core.parser import ScpiError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, MutableMapping
 
     from numpy.typing import NDArray
 
-    from instruments.virtual.device import Value
+    from instruments.virtual.core.device import Value
     from instruments.virtual.generator_family import Family, Waveform
 
 #: The generator's own resistance [Ω], its greatest voltage without a load [V], and SCPI's infinity.

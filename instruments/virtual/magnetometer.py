@@ -15,15 +15,16 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from instruments.virtual.device import Answer, Clock, VirtualInstrument, answers, does
+from instruments.virtual.core.device import Answer, Clock, VirtualInstrument, answers, does
+from instruments.virtual.core.parameters import number
+from instruments.virtual.core.parser import Command, ScpiError
 from instruments.virtual.hall_probe import HallProbe, Reading
 from instruments.virtual.magnetometer_numbers import Number, field_text
-from instruments.virtual.scpi import Command, ScpiError, number
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from instruments.virtual.serial_line import LineSettings
+    from instruments.virtual.core.line import LineSettings
 
 _MU0 = 4e-7 * math.pi
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from instruments.virtual.device import answers
+from instruments.virtual.core.device import answers
+from instruments.virtual.core.line import LineSettings
+from instruments.virtual.core.parser import Command
 from instruments.virtual.magnetometer import VirtualGaussmeter
 from instruments.virtual.magnetometer_numbers import Number, field_text
-from instruments.virtual.scpi import Command
-from instruments.virtual.serial_line import LineSettings
 
 
 class Virtual425(VirtualGaussmeter):

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
-from instruments.virtual.device import Clock, answers, does
+from instruments.virtual.core.device import Clock, answers, does
+from instruments.virtual.core.line import LineSettings
+from instruments.virtual.core.parameters import none
+from instruments.virtual.core.parser import Command
 from instruments.virtual.magnetometer import VirtualGaussmeter
 from instruments.virtual.magnetometer_numbers import Number, field_text
-from instruments.virtual.scpi import Command, none
-from instruments.virtual.serial_line import LineSettings
 
 if TYPE_CHECKING:
     from instruments.virtual.hall_probe import Reading

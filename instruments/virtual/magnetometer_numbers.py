@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from instruments.virtual.scpi import ScpiError, number
+from instruments.virtual.core.parameters import number
+from instruments.virtual.core.parser import ScpiError
 
 
 @dataclass(frozen=True)

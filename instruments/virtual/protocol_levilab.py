@@ -16,8 +16,9 @@ from urllib.parse import parse_qs, urlsplit
 import serial
 from serial.serialutil import PortNotOpenError, SerialBase, SerialException
 
+from instruments.virtual.core.line import LineSettings
 from instruments.virtual.faults import LinkLost
-from instruments.virtual.serial_line import LineSettings, SerialLine, benches
+from instruments.virtual.serial_line import SerialLine, benches
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -15,14 +15,15 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from instruments.virtual.core.parameters import choice
+from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.scope_record import COARSEST, Edge, Input, Record, open_input
 from instruments.virtual.scope_setup import ScopeSetup
-from instruments.virtual.scpi import ScpiError, choice
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from instruments.virtual.device import Clock
+    from instruments.virtual.core.device import Clock
     from instruments.virtual.scope_record import Signal
 
 #: Below the level by this part of a division the trigger is armed again.

@@ -11,14 +11,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from instruments.virtual.device import answers, does
+from instruments.virtual.core.device import answers, does
+from instruments.virtual.core.parameters import choice
+from instruments.virtual.core.parser import Command, ScpiError
 from instruments.virtual.scope_keysight_reading import EMPTY_SOURCES, MIDDLE, KeysightReading
-from instruments.virtual.scpi import Command, ScpiError, choice
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from instruments.virtual.device import Clock
+    from instruments.virtual.core.device import Clock
     from instruments.virtual.scope_record import Signal
 
 #: Points of the memory; the fastest rate [1/s].

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from instruments.virtual.device import answers, does
+from instruments.virtual.core.device import answers, does
+from instruments.virtual.core.parameters import choice, number, one
+from instruments.virtual.core.parser import Command, ScpiError
 from instruments.virtual.scope import VirtualOscilloscope
 from instruments.virtual.scope_screen import bmp8, bmp24, draw, grey, png
 from instruments.virtual.scope_setup import block_content
-from instruments.virtual.scpi import Command, ScpiError, choice, number, one
 
 if TYPE_CHECKING:
     from collections.abc import Callable

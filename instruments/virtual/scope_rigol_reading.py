@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from instruments.virtual.device import answers
+from instruments.virtual.core.device import answers
+from instruments.virtual.core.parameters import boolean, choice, one
+from instruments.virtual.core.parser import Command, ScpiError
 from instruments.virtual.scope import VirtualOscilloscope
 from instruments.virtual.scope_screen import bmp8, bmp24, draw, grey, png
 from instruments.virtual.scope_setup import block_content
-from instruments.virtual.scpi import Command, ScpiError, boolean, choice, one
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -6,13 +6,14 @@ import math
 import re
 from typing import TYPE_CHECKING
 
-from instruments.virtual.device import Value, VirtualInstrument, answers
-from instruments.virtual.scpi import Command, ScpiError, at_most_one, limit, number, one
+from instruments.virtual.core.device import Value, VirtualInstrument, answers
+from instruments.virtual.core.parameters import at_most_one, limit, number, one
+from instruments.virtual.core.parser import Command, ScpiError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from instruments.virtual.device import Clock
+    from instruments.virtual.core.device import Clock
 
 #: What would end a string or a message.
 _NOT_IN_LABELS = dict.fromkeys(map(ord, "\"';\n"))

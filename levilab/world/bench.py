@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from instruments.clock import Clock
     from instruments.virtual.bus import Bus
-    from instruments.virtual.device import VirtualInstrument
+    from instruments.virtual.core.device import VirtualInstrument
     from instruments.virtual.generator import Output
     from levilab.simulator.scene import Scene
     from levilab.world.spin_world import World

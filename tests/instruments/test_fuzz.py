@@ -26,7 +26,7 @@ from instruments.errors import BadAnswer, InstrumentError
 from instruments.links.serial_port import SerialTransport
 from instruments.links.visa import VisaTransport
 from instruments.virtual.bus import MOST_ANSWERS, Bus
-from instruments.virtual.device import Answer
+from instruments.virtual.core.device import Answer
 from instruments.virtual.faults import FAULTS, LATE, Fault
 from instruments.virtual.serial_line import benches
 from pyvisa_levilab import library_for

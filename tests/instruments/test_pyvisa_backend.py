@@ -11,9 +11,9 @@ from pyvisa.constants import StatusCode
 
 from instruments.clock import VirtualClock
 from instruments.virtual.bus import Bus
-from instruments.virtual.device import VirtualInstrument, answers
+from instruments.virtual.core.device import VirtualInstrument, answers
+from instruments.virtual.core.parser import Command
 from instruments.virtual.faults import Fault
-from instruments.virtual.scpi import Command
 from pyvisa_levilab import LevilabVisaLibrary, library_for
 
 COUNTER = "TCPIP0::counter.levilab::inst0::INSTR"

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from instruments.clock import VirtualClock
 from instruments.virtual.arbitrary import samples
+from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.generator import Burst, Output
 from instruments.virtual.generator_33220a import Virtual33220A
 from instruments.virtual.generator_33500b import Virtual33500B
-from instruments.virtual.scpi import ScpiError
 from support.wire import ask, cable, errors, received, send
 
 

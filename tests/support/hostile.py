@@ -12,8 +12,8 @@ import numpy as np
 
 from instruments.clock import VirtualClock
 from instruments.virtual.bus import Session
-from instruments.virtual.framing import LONGEST_LINE
-from instruments.virtual.scpi import LONGEST_ANSWER
+from instruments.virtual.core.message import LONGEST_LINE
+from instruments.virtual.core.parser import LONGEST_ANSWER
 from levilab.world.bench import MODELS
 
 #: One message may make a model look at so many samples: three channels for three hours at 20 kHz (see `counting`).

@@ -16,14 +16,14 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from instruments.ieee488 import INFINITY
+from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.faults import LinkLost
-from instruments.virtual.scpi import ScpiError
 
 if TYPE_CHECKING:
     from collections.abc import Coroutine, Iterator
 
     from instruments.virtual.bus import Bus, Session
-    from instruments.virtual.device import VirtualInstrument
+    from instruments.virtual.core.device import VirtualInstrument
 
 log = logging.getLogger(__name__)
 

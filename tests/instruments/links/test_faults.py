@@ -9,9 +9,9 @@ from instruments.drivers.scpi import ScpiInstrument, Setting
 from instruments.errors import BadAnswer, CommandRefused, InstrumentError, NoAnswer, NotConnected
 from instruments.links.visa import VisaTransport
 from instruments.virtual.bus import Bus
-from instruments.virtual.device import VirtualInstrument, answers
+from instruments.virtual.core.device import VirtualInstrument, answers
+from instruments.virtual.core.parser import Command
 from instruments.virtual.faults import AWAY, FAULTS, LATE, Fault
-from instruments.virtual.scpi import Command
 from instruments.virtual.servers.server import BenchServer
 from pyvisa_levilab import library_for
 

@@ -20,11 +20,12 @@ from instruments.drivers.magnetometer.lakeshore_425 import LakeShore425
 from instruments.errors import BadAnswer, InstrumentError, NoAnswer, NotConnected, Occupied, OutOfRange
 from instruments.links.serial_port import SerialTransport, port_name
 from instruments.virtual.bus import Bus
-from instruments.virtual.device import VirtualInstrument, answers
+from instruments.virtual.core.device import VirtualInstrument, answers
+from instruments.virtual.core.line import LineSettings, carried
+from instruments.virtual.core.parser import Command
 from instruments.virtual.faults import FAULTS, Fault
 from instruments.virtual.magnetometer_425 import Virtual425
-from instruments.virtual.scpi import Command
-from instruments.virtual.serial_line import LineSettings, benches, carried
+from instruments.virtual.serial_line import benches
 
 METER = "levilab://magnetometer"
 SLOW = "levilab://slow"

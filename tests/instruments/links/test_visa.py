@@ -10,8 +10,8 @@ from instruments.clock import VirtualClock
 from instruments.errors import BadAnswer, NoAnswer, NotConnected, Occupied
 from instruments.links.visa import VisaTransport
 from instruments.virtual.bus import Bus
-from instruments.virtual.device import VirtualInstrument, answers
-from instruments.virtual.scpi import Command
+from instruments.virtual.core.device import VirtualInstrument, answers
+from instruments.virtual.core.parser import Command
 from pyvisa_levilab import LevilabVisaLibrary, library_for
 
 ADDRESS = "TCPIP0::slow.levilab::inst0::INSTR"

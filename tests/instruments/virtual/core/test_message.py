@@ -3,8 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from instruments.virtual.framing import LONGEST_LINE, Framer, Overrun
-from instruments.virtual.program_message import split_parameters, split_units
+from instruments.virtual.core.message import LONGEST_LINE, Framer, Overrun, split_parameters, split_units
 
 
 def block(data):

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from instruments.clock import VirtualClock
+from instruments.virtual.core.device import VirtualInstrument, answers
+from instruments.virtual.core.message import LONGEST_LINE
+from instruments.virtual.core.parser import Command
 from instruments.virtual.counter_53230a import Virtual53230A
-from instruments.virtual.device import VirtualInstrument, answers
-from instruments.virtual.framing import LONGEST_LINE
 from instruments.virtual.generator_33500b import Virtual33500B
-from instruments.virtual.scpi import Command
 from support.wire import ask, cable, errors, received, send
 
 NO_ERROR = '+0,"No error"'

@@ -14,13 +14,13 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING
 
-from instruments.virtual.program_message import read_unit, split_parameters, split_units
-from instruments.virtual.steps import at_once
+from instruments.virtual.core.message import read_unit, split_parameters, split_units
+from instruments.virtual.core.steps import at_once
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from instruments.virtual.steps import Steps
+    from instruments.virtual.core.steps import Steps
 
 ERRORS = {
     -102: "Syntax error",
@@ -43,10 +43,6 @@ ERRORS = {
 
 #: More than this in answer to one message fits into no output buffer (IEEE 488.2, 6.3.1.7) [bytes].
 LONGEST_ANSWER = 1 << 26
-
-_MULTIPLIERS = {"": 1.0, "N": 1e-9, "U": 1e-6, "M": 1e-3, "K": 1e3, "MA": 1e6, "G": 1e9}
-_NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*([a-zA-Z]*)")
-_CHANNEL_LIST = re.compile(r"\(@[\d,: !]*\)")
 
 
 class ScpiError(Exception):
@@ -168,106 +164,3 @@ class Parser:
     def next_error(self) -> str:
         """The oldest entry, removed, or that there is none."""
         return self.errors.popleft() if self.errors else self.no_error
-
-
-def at_most_one(parameters: list[str]) -> str:
-    """The only parameter or "", a channel list aside.  Raises ScpiError if there are more."""
-    plain = [parameter for parameter in parameters if not _CHANNEL_LIST.fullmatch(parameter)]
-    if len(plain) > 1:
-        raise ScpiError(-108)
-    return plain[0] if plain else ""
-
-
-def one(parameters: list[str]) -> str:
-    """The only parameter, a channel list aside.  Raises ScpiError if there is none or another."""
-    only = at_most_one(parameters)
-    if not only:
-        raise ScpiError(-109)
-    return only
-
-
-def none(parameters: list[str]) -> None:
-    """Nothing but a channel list.  Raises ScpiError."""
-    if at_most_one(parameters):
-        raise ScpiError(-108)
-
-
-def _limits(low: float, high: float, default: float) -> dict[str, float]:
-    return {"MIN": low, "MINIMUM": low, "MAX": high, "MAXIMUM": high, "DEF": default, "DEFAULT": default}
-
-
-def limit(text: str, *, low: float, high: float, default: float) -> float:
-    """What a query may ask beside the setting itself: ``MIN``, ``MAX`` or ``DEF``.  Raises ScpiError.
-
-    >>> limit("max", low=0, high=1e6, default=0)
-    1000000.0
-    """
-    words = _limits(low, high, default)
-    if text.upper() not in words:
-        raise ScpiError(-224, text[:20])
-    return words[text.upper()]
-
-
-def number(text: str, *, low: float, high: float, default: float, unit: str = "") -> float:
-    """A numeric parameter: ``25``, ``1 kHz``, ``MIN``, ``MAX``, ``DEF``, ``INF``.  Raises ScpiError.
-
-    >>> number("1.5 kHz", low=0, high=1e6, default=0, unit="HZ")
-    1500.0
-    """
-    words = _limits(low, high, default) | ({"INF": 9.9e37, "INFINITY": 9.9e37} if high >= 9.9e37 else {})
-    if text.upper() in words:
-        return words[text.upper()]
-    match = _NUMBER.fullmatch(text)
-    if not match:
-        raise ScpiError(-104, text[:20])
-    value = float(match[1]) * _multiplier(match[2].upper(), unit)
-    if not low <= value <= high:
-        raise ScpiError(-222)
-    return value
-
-
-def _multiplier(suffix: str, unit: str) -> float:
-    if not suffix:
-        return 1.0
-    prefix = suffix.removesuffix(unit)
-    if not unit or not suffix.endswith(unit) or prefix not in _MULTIPLIERS:
-        raise ScpiError(-131, suffix[:20])
-    # SCPI 7.1: with Hz and ohm a leading M means mega, elsewhere milli
-    return 1e6 if prefix == "M" and unit in {"HZ", "OHM"} else _MULTIPLIERS[prefix]
-
-
-def choice(text: str, words: tuple[str, ...]) -> str:
-    """One of the words, given in short or long form; the short form of it.  Raises ScpiError.
-
-    >>> choice("square", ("SINusoid", "SQUare"))
-    'SQU'
-    """
-    for word in words:
-        short = re.sub("[a-z]", "", word)
-        if text.upper() in {short, word.upper()}:
-            return short
-    raise ScpiError(-224, text[:20])
-
-
-def boolean(text: str) -> bool:
-    """ON, OFF, 1 or 0, however the number is written.  Raises ScpiError.
-
-    >>> boolean("on"), boolean("1.0"), boolean("0")
-    (True, True, False)
-    """
-    words = {"ON": True, "OFF": False}
-    if text.upper() in words:
-        return words[text.upper()]
-    number = _NUMBER.fullmatch(text)
-    if not number or number[2] or float(number[1]) not in {0.0, 1.0}:
-        raise ScpiError(-224, text[:20])
-    return float(number[1]) == 1.0
-
-
-def nr3(value: float) -> str:
-    """A number as these instruments print it: fifteen digits, and room for one more.
-
-    >>> nr3(23.456789), nr3(9.9e37)  # a sixteenth digit would make 9.899999999999999 of it
-    ('+2.345678900000000E+01', '+9.900000000000000E+37')
-    """
-    return f"{value:+.14E}".replace("E", "0E")

@@ -5,24 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
-from instruments.virtual.scpi import (
-    Command,
-    Parser,
-    at_most_one,
-    boolean,
-    choice,
-    limit,
-    none,
-    nr3,
-    number,
-    one,
-)
-from instruments.virtual.status import OPERATION_COMPLETE, Status
+from instruments.virtual.core.parameters import at_most_one, boolean, choice, limit, none, nr3, number, one
+from instruments.virtual.core.parser import Command, Parser
+from instruments.virtual.core.status import OPERATION_COMPLETE, Status
+from instruments.virtual.core.steps import Work, at_once
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from instruments.virtual.steps import Steps
+    from instruments.virtual.core.steps import Steps
 
 Value = float | str | bool
 
@@ -201,3 +192,50 @@ def answers(tell: Callable[[], Steps[str] | str]) -> Callable[[list[str]], Steps
         return tell()
 
     return get
+
+
+class SteppedInstrument(VirtualInstrument):
+    """An instrument whose answers may take long to be worked out: it does that in steps."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._work: Work[Answer | None] | None = None
+        super().__init__(clock)
+
+    def execute(self, message: str) -> Answer | None:
+        """See the base."""
+        return at_once(self.steps(message))
+
+    def steps(self, message: str) -> Steps[Answer | None]:
+        """What execute() does, in steps; a message that is worked on already comes first."""
+        if self._work and self.cut_off_by(message):
+            self._work.give_up()
+        while self._work and self._work.step():
+            yield
+        work = self._work = Work(self._answered(message))
+        try:
+            while work.step():
+                yield
+        finally:
+            work.give_up()
+        if work.error:
+            raise work.error
+        return work.result
+
+    def _answered(self, message: str) -> Steps[Answer | None]:
+        yield from self.catch_up()
+        self._begin_message()
+        return self._answer((yield from self.parser.steps(message)))
+
+    def abandon(self) -> None:
+        """See the base."""
+        if self._work:
+            self._work.give_up()
+        super().abandon()
+
+    def cut_off_by(self, message: str) -> bool:
+        """Whether this message ends the work on the one before it."""
+        return False
+
+    def catch_up(self) -> Steps[None]:
+        """Work out what has gone on while nobody asked."""
+        yield from ()

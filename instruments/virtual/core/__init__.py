@@ -1,0 +1,1 @@
+"""What every virtual instrument is: messages, parser, parameters, device, status."""
