@@ -33,13 +33,13 @@ COIL_T_PER_V = 0.4e-3 / 5.0
 
 
 def _counter_53230a(world: World) -> VirtualInstrument:
-    from instruments.virtual.counter_53230a import Virtual53230A
+    from instruments.virtual.counter.keysight_53230a import Virtual53230A
 
     return Virtual53230A(world.clock, signal=world.light)
 
 
 def _counter_cnt91(world: World) -> VirtualInstrument:
-    from instruments.virtual.counter_cnt91 import VirtualCNT91
+    from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
 
     return VirtualCNT91(world.clock, signal=world.light)
 

@@ -9,8 +9,8 @@ import pyvisa
 
 from instruments.clock import VirtualClock, WallClock
 from instruments.virtual.bus import Bus
-from instruments.virtual.counter_53230a import Virtual53230A
-from instruments.virtual.counter_cnt91 import VirtualCNT91
+from instruments.virtual.counter.keysight_53230a import Virtual53230A
+from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
 from instruments.virtual.servers.server import BenchServer
 
 #: What is waited for at most [s], reached by a failure only; and how soon another client has its answer [s].

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
-from instruments.virtual.counter_cnt91 import VirtualCNT91
+from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
 
 pytest.importorskip("pymeasure")
 

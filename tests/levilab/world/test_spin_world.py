@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from instruments.clock import VirtualClock
-from instruments.virtual.counter_53230a import Virtual53230A
+from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.generator import Burst, Output
 from instruments.virtual.generator_voltage import fundamental, voltage
 from levilab.simulator.spin import DECAYS

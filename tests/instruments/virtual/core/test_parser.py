@@ -11,7 +11,7 @@ from instruments.clock import VirtualClock
 from instruments.virtual.core.device import VirtualInstrument, answers
 from instruments.virtual.core.message import LONGEST_LINE
 from instruments.virtual.core.parser import Command
-from instruments.virtual.counter_53230a import Virtual53230A
+from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.generator_33500b import Virtual33500B
 from support.wire import ask, cable, errors, received, send
 

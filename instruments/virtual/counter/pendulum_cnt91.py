@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, ClassVar
 from instruments.virtual.core.device import answers, does
 from instruments.virtual.core.parameters import number, one
 from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.counter import DARK, Function
-from instruments.virtual.counter_cnt91_readings import ReadingsCNT91
-from instruments.virtual.counter_parameters import channels_of, without_channels
-from instruments.virtual.counter_run import Run
-from instruments.virtual.counting import Looks, Measurement, Span, Wish, first_edge
+from instruments.virtual.counter.counter import DARK, Function
+from instruments.virtual.counter.measurements import Looks, Measurement, Span, Wish, first_edge
+from instruments.virtual.counter.parameters import channels_of, without_channels
+from instruments.virtual.counter.pendulum_cnt91_readings import ReadingsCNT91
+from instruments.virtual.counter.run import Run
 
 if TYPE_CHECKING:
     from collections.abc import Generator

@@ -10,7 +10,7 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 
 from instruments.ieee488 import NOT_A_NUMBER
-from instruments.virtual.edges import Edge, EdgeFinder, Input, Signal
+from instruments.virtual.counter.edges import Edge, EdgeFinder, Input, Signal
 
 
 @dataclass(frozen=True)

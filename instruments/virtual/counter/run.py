@@ -9,13 +9,13 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from instruments.virtual.counter_memory import Memory
+from instruments.virtual.counter.memory import Memory
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from instruments.virtual.core.steps import Steps
-    from instruments.virtual.counting import Looks, Measurement, Reading
+    from instruments.virtual.counter.measurements import Looks, Measurement, Reading
 
 #: A message may make a model look so far ahead [s]; an answer that is further away does not come.  Three hours are
 #: ten readings with the longest gate there is.

@@ -10,14 +10,14 @@ from instruments.ieee488 import NOT_A_NUMBER
 from instruments.virtual.core.device import answers
 from instruments.virtual.core.parameters import number
 from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.counter import darkness
-from instruments.virtual.counter_cnt91_settings import SettingsCNT91, number_text
-from instruments.virtual.counter_parameters import block, without_channels
+from instruments.virtual.counter.counter import darkness
+from instruments.virtual.counter.parameters import block, without_channels
+from instruments.virtual.counter.pendulum_cnt91_settings import SettingsCNT91, number_text
 
 if TYPE_CHECKING:
     from instruments.virtual.core.device import Clock
     from instruments.virtual.core.steps import Steps
-    from instruments.virtual.edges import Array, Signal
+    from instruments.virtual.counter.edges import Array, Signal
 
 #: Most readings that one FETCh:ARRay? brings (handbook, 8-39).
 _MOST = 10_000

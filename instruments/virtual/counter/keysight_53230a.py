@@ -10,16 +10,16 @@ from instruments.ieee488 import INFINITY
 from instruments.virtual.core.device import answers, does
 from instruments.virtual.core.parameters import number, one
 from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.counter import DARK, Function, darkness
-from instruments.virtual.counter_53230a_readings import Readings53230A
-from instruments.virtual.counter_parameters import channels_of, without_channels
-from instruments.virtual.counter_run import Run
-from instruments.virtual.counting import Looks, Measurement, Span
+from instruments.virtual.counter.counter import DARK, Function, darkness
+from instruments.virtual.counter.keysight_53230a_readings import Readings53230A
+from instruments.virtual.counter.measurements import Looks, Measurement, Span
+from instruments.virtual.counter.parameters import channels_of, without_channels
+from instruments.virtual.counter.run import Run
 
 if TYPE_CHECKING:
     from instruments.virtual.core.device import Clock
     from instruments.virtual.core.steps import Steps
-    from instruments.virtual.edges import Signal
+    from instruments.virtual.counter.edges import Signal
 
 #: From the end of a measurement to the beginning of the next, but for gap-free ones [s] (estimated).
 _DEAD = 1e-3

@@ -9,12 +9,12 @@ from instruments.ieee488 import NOT_A_NUMBER
 from instruments.virtual.core.device import answers, does
 from instruments.virtual.core.parameters import at_most_one, choice, nr3, number
 from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.counter_53230a_settings import Settings53230A
-from instruments.virtual.counter_parameters import block, without_channels
+from instruments.virtual.counter.keysight_53230a_settings import Settings53230A
+from instruments.virtual.counter.parameters import block, without_channels
 
 if TYPE_CHECKING:
     from instruments.virtual.core.steps import Steps
-    from instruments.virtual.edges import Array
+    from instruments.virtual.counter.edges import Array
 
 
 class Readings53230A(Settings53230A):

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from instruments.clock import VirtualClock
-from instruments.virtual.counter_53230a import Virtual53230A
-from instruments.virtual.edges import RATE, EdgeFinder, Input, crossings
+from instruments.virtual.counter.edges import RATE, EdgeFinder, Input, crossings
+from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from support.wire import ask, cable, errors, received, send
 
 DARK, BRIGHT, DUTY = 0.1, 1.2, 0.03

@@ -8,8 +8,8 @@ from instruments.ieee488 import INFINITY
 from instruments.virtual.core.device import answers, does
 from instruments.virtual.core.parameters import at_most_one, limit, none, nr3, number, one
 from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.counter import VirtualCounter
-from instruments.virtual.edges import Input
+from instruments.virtual.counter.counter import VirtualCounter
+from instruments.virtual.counter.edges import Input
 
 #: Schmitt trigger of the input [V] (53230A data sheet: 20 mV, 40 mV typical); ten times that in the 50 V range,
 #: and about twice with noise rejection.

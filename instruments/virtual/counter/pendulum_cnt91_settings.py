@@ -8,8 +8,8 @@ from instruments.ieee488 import INFINITY
 from instruments.virtual.core.device import answers, does
 from instruments.virtual.core.parameters import at_most_one, choice, limit, none, number, one
 from instruments.virtual.core.parser import Command
-from instruments.virtual.counter import VirtualCounter
-from instruments.virtual.edges import Input
+from instruments.virtual.counter.counter import VirtualCounter
+from instruments.virtual.counter.edges import Input
 
 if TYPE_CHECKING:
     from collections.abc import Callable

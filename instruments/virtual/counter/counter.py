@@ -15,17 +15,17 @@ from instruments.virtual.core.parameters import at_most_one, limit, nr3, number,
 from instruments.virtual.core.parser import Command, ScpiError
 from instruments.virtual.core.status import OPERATION_COMPLETE
 from instruments.virtual.core.steps import at_once
-from instruments.virtual.counter_memory import Memory, statistics
-from instruments.virtual.counter_parameters import truth, without_channels
-from instruments.virtual.counting import Looks, Measurement, Span, measurement
+from instruments.virtual.counter.measurements import Looks, Measurement, Span, measurement
+from instruments.virtual.counter.memory import Memory, statistics
+from instruments.virtual.counter.parameters import truth, without_channels
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from instruments.virtual.core.device import Clock
     from instruments.virtual.core.steps import Steps
-    from instruments.virtual.counter_run import Run
-    from instruments.virtual.edges import Array, Input, Signal
+    from instruments.virtual.counter.edges import Array, Input, Signal
+    from instruments.virtual.counter.run import Run
 
 #: An answer that never comes is ready then [s].
 NEVER = INFINITY

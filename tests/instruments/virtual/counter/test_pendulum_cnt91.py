@@ -16,7 +16,7 @@ from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
 from instruments.errors import OutOfRange
 from instruments.links.visa import VisaTransport
 from instruments.virtual.bus import Bus
-from instruments.virtual.counter_cnt91 import VirtualCNT91
+from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
 from pyvisa_levilab import library_for
 from support.wire import ask, cable, errors, received, send
 
