@@ -37,7 +37,7 @@ from instruments.clock import VirtualClock
 from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.links.visa import VisaTransport
 from instruments.virtual.bus import Bus
-from instruments.virtual.generator_33500b import Virtual33500B
+from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from instruments.virtual.scope_rigol import VirtualDS1000Z
 from instruments.virtual.servers.server import BenchServer
 from levilab.acquisition.loop import acquire

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from instruments.clock import Clock
     from instruments.virtual.bus import Bus
     from instruments.virtual.core.device import VirtualInstrument
-    from instruments.virtual.generator import Output
+    from instruments.virtual.generator.generator import Output
     from levilab.simulator.scene import Scene
     from levilab.world.spin_world import World
 
@@ -50,13 +50,13 @@ def _coil_of(world: World) -> Callable[[float, Output], None]:
 
 
 def _generator_33500b(world: World) -> VirtualInstrument:
-    from instruments.virtual.generator_33500b import Virtual33500B
+    from instruments.virtual.generator.keysight_33500b import Virtual33500B
 
     return Virtual33500B(world.clock, listener=_coil_of(world))
 
 
 def _generator_33220a(world: World) -> VirtualInstrument:
-    from instruments.virtual.generator_33220a import Virtual33220A
+    from instruments.virtual.generator.agilent_33220a import Virtual33220A
 
     return Virtual33220A(world.clock, listener=_coil_of(world))
 

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from instruments.virtual.generator_channel import Output
-from instruments.virtual.generator_voltage import voltage
+from instruments.virtual.generator.channel import Output
+from instruments.virtual.generator.voltage import voltage
 from levilab.world.timeline import History
 
 if TYPE_CHECKING:
-    from instruments.virtual.generator_channel import Burst
+    from instruments.virtual.generator.channel import Burst
 
 Array = NDArray[np.float64]
 

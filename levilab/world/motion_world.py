@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from instruments.virtual.generator_voltage import fundamental
+from instruments.virtual.generator.voltage import fundamental
 from levilab.simulator.kernels.fields import flux_density
 from levilab.simulator.model import base_field
 from levilab.world.coil import Coil
@@ -22,7 +22,7 @@ from levilab.world.spin_world import KEPT_S
 
 if TYPE_CHECKING:
     from instruments.clock import Clock
-    from instruments.virtual.generator_channel import Output
+    from instruments.virtual.generator.channel import Output
     from levilab.simulator.scene import Scene
 
 Array = NDArray[np.float64]

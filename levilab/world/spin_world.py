@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from instruments.virtual.generator_voltage import fundamental
+from instruments.virtual.generator.voltage import fundamental
 from levilab.simulator.spin import DECAYS
 from levilab.world.coil import Coil
 from levilab.world.light import Tape
@@ -21,7 +21,7 @@ from levilab.world.timeline import History
 
 if TYPE_CHECKING:
     from instruments.clock import Clock
-    from instruments.virtual.generator_channel import Output
+    from instruments.virtual.generator.channel import Output
 
 Array = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ pytest.importorskip("pymeasure")
 from pymeasure.instruments.agilent import Agilent33220A, Agilent33500
 
 from instruments.clock import VirtualClock
-from instruments.virtual.generator_33220a import Virtual33220A
-from instruments.virtual.generator_33500b import Virtual33500B
+from instruments.virtual.generator.agilent_33220a import Virtual33220A
+from instruments.virtual.generator.keysight_33500b import Virtual33500B
 
 #: PyMeasure's class and the instrument that it is for.
 NEWER, OLDER = (Agilent33500, Virtual33500B), (Agilent33220A, Virtual33220A)

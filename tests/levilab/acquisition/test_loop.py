@@ -77,8 +77,8 @@ def in_world(out: Path, scene: SpinScene, settings: SpinSettings | None = None) 
 def outputs(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     """What the generator's output was set to, in order."""
     seen: list[bool] = []
-    listener = "instruments.virtual.generator_33500b.Virtual33500B.changed"
-    from instruments.virtual.generator_33500b import Virtual33500B
+    listener = "instruments.virtual.generator.keysight_33500b.Virtual33500B.changed"
+    from instruments.virtual.generator.keysight_33500b import Virtual33500B
 
     changed = Virtual33500B.changed
 
@@ -315,7 +315,7 @@ def test_the_time_of_a_reading_is_the_middle_of_its_gate(tmp_path: Path) -> None
 
 
 def test_errors_that_an_earlier_program_left_are_not_ours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from instruments.virtual.generator_33500b import Virtual33500B
+    from instruments.virtual.generator.keysight_33500b import Virtual33500B
 
     init = Virtual33500B.__init__
 

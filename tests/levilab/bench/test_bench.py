@@ -7,7 +7,7 @@ import pyvisa
 
 from instruments.clock import VirtualClock, WallClock
 from instruments.errors import InstrumentError, NotConnected, Occupied, OutOfRange, WrongInstrument
-from instruments.virtual.generator_33500b import Virtual33500B
+from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from levilab.bench.bench import OutputMayBeOn, open_bench
 from levilab.bench.config import (
     BenchConfig,
@@ -65,7 +65,7 @@ def faulty(monkeypatch):
     """The virtual bench with a generator whose faults a test can switch on."""
     monkeypatch.setattr(Faulty, "silent", 0)
     monkeypatch.setattr(Faulty, "stuck", False)
-    monkeypatch.setattr("instruments.virtual.generator_33500b.Virtual33500B", Faulty)
+    monkeypatch.setattr("instruments.virtual.generator.keysight_33500b.Virtual33500B", Faulty)
     return Faulty
 
 
@@ -208,7 +208,7 @@ def test_the_second_output_is_off_as_soon_as_the_bench_is_open_and_when_it_is_le
             self.settings |= {"output": True, "2:output": True}
             made.append(self)
 
-    monkeypatch.setattr("instruments.virtual.generator_33500b.Virtual33500B", LeftOn)
+    monkeypatch.setattr("instruments.virtual.generator.keysight_33500b.Virtual33500B", LeftOn)
     with open_bench(BenchConfig(), KINDS, world=world):
         assert (made[0].settings["output"], made[0].settings["2:output"]) == (False, False)
         made[0].settings["2:output"] = True

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
-from instruments.virtual.generator import Burst, Output
-from instruments.virtual.generator_voltage import fundamental
+from instruments.virtual.generator.generator import Burst, Output
+from instruments.virtual.generator.voltage import fundamental
 from levilab.simulator import SceneError, preset, simulate
 from levilab.world.flight import RATE, Flight
 from levilab.world.light import Tape

@@ -12,7 +12,7 @@ from instruments.virtual.core.device import VirtualInstrument, answers
 from instruments.virtual.core.message import LONGEST_LINE
 from instruments.virtual.core.parser import Command
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
-from instruments.virtual.generator_33500b import Virtual33500B
+from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from support.wire import ask, cable, errors, received, send
 
 NO_ERROR = '+0,"No error"'

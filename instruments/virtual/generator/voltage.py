@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from instruments.virtual.generator_channel import Output
+    from instruments.virtual.generator.channel import Output
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ _NOISE_PEAK = 3.3
 def voltage(output: Output, turns: Array, times: Array) -> Array:
     """Volts at the terminals where the waveform has made so many turns, shape (n,); times [s]: of noise.
 
-    >>> from instruments.virtual.generator_channel import Output
+    >>> from instruments.virtual.generator.channel import Output
     >>> voltage(Output("SQU", 1.0, 2.0, 0.5, duty=0.25), np.array([0.2, 0.3]), np.zeros(2)).tolist()
     [2.5, -1.5]
     """

@@ -6,16 +6,16 @@ import math
 from functools import partial
 from typing import TYPE_CHECKING
 
-from instruments.virtual.arbitrary import Refused, plain_name
 from instruments.virtual.core.device import answers, does
 from instruments.virtual.core.parameters import one
 from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.generator import VirtualGenerator
-from instruments.virtual.generator_family import Family, Waveform
-from instruments.virtual.generator_tables import CHOICES_33500, HZ, PLAIN_33500, SWITCHES, S, V
+from instruments.virtual.generator.arbitrary import Refused, plain_name
+from instruments.virtual.generator.family import Family, Waveform
+from instruments.virtual.generator.generator import VirtualGenerator
+from instruments.virtual.generator.tables import CHOICES_33500, HZ, PLAIN_33500, SWITCHES, S, V
 
 if TYPE_CHECKING:
-    from instruments.virtual.generator_channel import Channel
+    from instruments.virtual.generator.channel import Channel
 
 
 def _square_33500(frequency: float) -> tuple[float, float]:

@@ -6,19 +6,19 @@ import math
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
-from instruments.virtual.arbitrary import Refused, attribute, plain_name, samples
 from instruments.virtual.core.device import Clock, answers, does
 from instruments.virtual.core.parameters import at_most_one, nr3, one
 from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.generator_channel import Burst, Channel, Output
-from instruments.virtual.generator_couplings import MODES, settle
-from instruments.virtual.generator_rows import GeneratorRows
-from instruments.virtual.generator_tables import CHOICES, HZ, PLAIN, SWITCHES, S, V
+from instruments.virtual.generator.arbitrary import Refused, attribute, plain_name, samples
+from instruments.virtual.generator.channel import Burst, Channel, Output
+from instruments.virtual.generator.couplings import MODES, settle
+from instruments.virtual.generator.rows import GeneratorRows
+from instruments.virtual.generator.tables import CHOICES, HZ, PLAIN, SWITCHES, S, V
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from instruments.virtual.generator_family import Waveform
+    from instruments.virtual.generator.family import Waveform
 
 __all__ = ["Burst", "Output", "VirtualGenerator"]
 

@@ -12,11 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from instruments.clock import VirtualClock
-from instruments.virtual.arbitrary import samples
 from instruments.virtual.core.parser import ScpiError
-from instruments.virtual.generator import Burst, Output
-from instruments.virtual.generator_33220a import Virtual33220A
-from instruments.virtual.generator_33500b import Virtual33500B
+from instruments.virtual.generator.agilent_33220a import Virtual33220A
+from instruments.virtual.generator.arbitrary import samples
+from instruments.virtual.generator.generator import Burst, Output
+from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from support.wire import ask, cable, errors, received, send
 
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from instruments.virtual.generator_settings import INFINITE
+from instruments.virtual.generator.settings import INFINITE
 
 if TYPE_CHECKING:
-    from instruments.virtual.generator_channel import Channel
+    from instruments.virtual.generator.channel import Channel
 
 #: Modes of which only one can be on.
 MODES = ("burst", "sweep", "am", "fm", "pm", "pwm", "fsk", "bpsk", "sum")

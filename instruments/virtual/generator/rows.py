@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, ClassVar
 from instruments.virtual.core.device import VirtualInstrument, answers, does
 from instruments.virtual.core.parameters import at_most_one, choice, limit, nr3, one
 from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.generator_settings import INFINITE, quantity_of
-from instruments.virtual.generator_tables import HZ, PERCENT, PLAIN, S, V, fixed, short
+from instruments.virtual.generator.settings import INFINITE, quantity_of
+from instruments.virtual.generator.tables import HZ, PERCENT, PLAIN, S, V, fixed, short
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from instruments.virtual.generator_channel import Channel
-    from instruments.virtual.generator_family import Family
-    from instruments.virtual.generator_tables import Choice, Plain
+    from instruments.virtual.generator.channel import Channel
+    from instruments.virtual.generator.family import Family
+    from instruments.virtual.generator.tables import Choice, Plain
 
 _LEVEL = "VOLTage[:LEVel][:IMMediate]"
 

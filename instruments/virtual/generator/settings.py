@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from instruments.virtual.arbitrary import Memory, built_in
 from instruments.virtual.core.parameters import limit, number
 from instruments.virtual.core.parser import ScpiError
+from instruments.virtual.generator.arbitrary import Memory, built_in
 
 if TYPE_CHECKING:
     from collections.abc import Callable, MutableMapping
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from instruments.virtual.core.device import Value
-    from instruments.virtual.generator_family import Family, Waveform
+    from instruments.virtual.generator.family import Family, Waveform
 
 #: The generator's own resistance [Ω], its greatest voltage without a load [V], and SCPI's infinity.
 SOURCE_OHM, OPEN_V, INFINITE = 50.0, 10.0, 9.9e37

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from instruments.virtual.generator_settings import INFINITE, ChannelSettings
+from instruments.virtual.generator.settings import INFINITE, ChannelSettings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, MutableMapping
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from instruments.virtual.core.device import Value
     from instruments.virtual.core.parser import ScpiError
-    from instruments.virtual.generator_family import Family
+    from instruments.virtual.generator.family import Family
 
 
 @dataclass(frozen=True)

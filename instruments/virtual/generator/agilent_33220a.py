@@ -6,15 +6,15 @@ import math
 from functools import partial
 from typing import TYPE_CHECKING
 
-from instruments.virtual.arbitrary import Refused, plain_name
 from instruments.virtual.core.device import answers, does
 from instruments.virtual.core.parameters import at_most_one, one
 from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.generator import VirtualGenerator
-from instruments.virtual.generator_family import Family, Waveform
+from instruments.virtual.generator.arbitrary import Refused, plain_name
+from instruments.virtual.generator.family import Family, Waveform
+from instruments.virtual.generator.generator import VirtualGenerator
 
 if TYPE_CHECKING:
-    from instruments.virtual.generator_channel import Channel
+    from instruments.virtual.generator.channel import Channel
 
 #: The waveforms that it is made with; 64 K points in each of the others.
 _BUILT_IN = ("EXP_RISE", "EXP_FALL", "NEG_RAMP", "SINC", "CARDIAC")
