@@ -79,13 +79,13 @@ def _scope_dsox1000(world: World) -> VirtualInstrument:
 
 
 def _magnetometer_425(world: World) -> VirtualInstrument:
-    from instruments.virtual.magnetometer_425 import Virtual425
+    from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
 
     return Virtual425(world.clock, flux_density=world.flux_density)
 
 
 def _magnetometer_475(world: World) -> VirtualInstrument:
-    from instruments.virtual.magnetometer_475 import Virtual475
+    from instruments.virtual.magnetometer.lakeshore_475 import Virtual475
 
     return Virtual475(world.clock, flux_density=world.flux_density)
 

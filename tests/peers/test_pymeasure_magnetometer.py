@@ -7,7 +7,7 @@ pytest.importorskip("pymeasure")
 from pymeasure.instruments.lakeshore import LakeShore425
 
 from instruments.clock import VirtualClock
-from instruments.virtual.magnetometer_425 import Virtual425
+from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
 
 pytestmark = pytest.mark.parametrize("way", ["@levilab", "socket", "pyserial"])
 

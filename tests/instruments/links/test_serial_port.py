@@ -24,7 +24,7 @@ from instruments.virtual.core.device import VirtualInstrument, answers
 from instruments.virtual.core.line import LineSettings, carried
 from instruments.virtual.core.parser import Command
 from instruments.virtual.faults import FAULTS, Fault
-from instruments.virtual.magnetometer_425 import Virtual425
+from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
 from instruments.virtual.serial_line import benches
 
 METER = "levilab://magnetometer"

@@ -9,11 +9,11 @@ from instruments.virtual.core.device import Clock, answers, does
 from instruments.virtual.core.line import LineSettings
 from instruments.virtual.core.parameters import none
 from instruments.virtual.core.parser import Command
-from instruments.virtual.magnetometer import VirtualGaussmeter
-from instruments.virtual.magnetometer_numbers import Number, field_text
+from instruments.virtual.magnetometer.gaussmeter import VirtualGaussmeter
+from instruments.virtual.magnetometer.numbers import Number, field_text
 
 if TYPE_CHECKING:
-    from instruments.virtual.hall_probe import Reading
+    from instruments.virtual.magnetometer.hall_probe import Reading
 
 
 class Virtual475(VirtualGaussmeter):

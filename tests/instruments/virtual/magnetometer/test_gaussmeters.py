@@ -14,9 +14,9 @@ from instruments.drivers.magnetometer.lakeshore_475 import LakeShore475
 from instruments.errors import NoAnswer
 from instruments.links.visa import VisaTransport
 from instruments.virtual.bus import Bus
-from instruments.virtual.magnetometer_425 import Virtual425
-from instruments.virtual.magnetometer_475 import Virtual475
-from instruments.virtual.magnetometer_numbers import field_text
+from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
+from instruments.virtual.magnetometer.lakeshore_475 import Virtual475
+from instruments.virtual.magnetometer.numbers import field_text
 from pyvisa_levilab import library_for
 from support.wire import ask, received, send
 

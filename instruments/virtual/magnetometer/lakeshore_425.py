@@ -7,8 +7,8 @@ from typing import ClassVar
 from instruments.virtual.core.device import answers
 from instruments.virtual.core.line import LineSettings
 from instruments.virtual.core.parser import Command
-from instruments.virtual.magnetometer import VirtualGaussmeter
-from instruments.virtual.magnetometer_numbers import Number, field_text
+from instruments.virtual.magnetometer.gaussmeter import VirtualGaussmeter
+from instruments.virtual.magnetometer.numbers import Number, field_text
 
 
 class Virtual425(VirtualGaussmeter):

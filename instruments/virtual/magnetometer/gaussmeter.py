@@ -18,8 +18,8 @@ import numpy as np
 from instruments.virtual.core.device import Answer, Clock, VirtualInstrument, answers, does
 from instruments.virtual.core.parameters import number
 from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.hall_probe import HallProbe, Reading
-from instruments.virtual.magnetometer_numbers import Number, field_text
+from instruments.virtual.magnetometer.hall_probe import HallProbe, Reading
+from instruments.virtual.magnetometer.numbers import Number, field_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
