@@ -38,7 +38,7 @@ from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.links.visa import VisaTransport
 from instruments.virtual.bus import Bus
 from instruments.virtual.generator.keysight_33500b import Virtual33500B
-from instruments.virtual.scope_rigol import VirtualDS1000Z
+from instruments.virtual.oscilloscope.rigol_ds1000z import VirtualDS1000Z
 from instruments.virtual.servers.server import BenchServer
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import spin_order

@@ -67,13 +67,13 @@ def _signals(world: World) -> dict[int, Callable[[float, float, int], NDArray[np
 
 
 def _scope_ds1000z(world: World) -> VirtualInstrument:
-    from instruments.virtual.scope_rigol import VirtualDS1000Z
+    from instruments.virtual.oscilloscope.rigol_ds1000z import VirtualDS1000Z
 
     return VirtualDS1000Z(world.clock, signals=_signals(world))
 
 
 def _scope_dsox1000(world: World) -> VirtualInstrument:
-    from instruments.virtual.scope_keysight import VirtualDSOX1000
+    from instruments.virtual.oscilloscope.keysight_dsox1000 import VirtualDSOX1000
 
     return VirtualDSOX1000(world.clock, signals=_signals(world))
 

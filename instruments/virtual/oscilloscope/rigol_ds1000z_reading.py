@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 from instruments.virtual.core.device import answers
 from instruments.virtual.core.parameters import boolean, choice, one
 from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.scope import VirtualOscilloscope
-from instruments.virtual.scope_screen import bmp8, bmp24, draw, grey, png
-from instruments.virtual.scope_setup import block_content
+from instruments.virtual.oscilloscope.scope import VirtualOscilloscope
+from instruments.virtual.oscilloscope.screenshot import bmp8, bmp24, draw, grey, png
+from instruments.virtual.oscilloscope.setup import block_content
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from instruments.virtual.scope_record import Codes, Record
+    from instruments.virtual.oscilloscope.record import Codes, Record
 
 #: The code in the middle of the screen, and how many points a trace on the screen has.
 MIDDLE, _ON_SCREEN = 127, 1200

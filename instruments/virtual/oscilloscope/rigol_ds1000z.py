@@ -11,8 +11,8 @@ from __future__ import annotations
 from instruments.virtual.core.device import answers, does
 from instruments.virtual.core.parameters import number, one
 from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.scope_rigol_reading import MIDDLE, RigolReading
-from instruments.virtual.scope_setup import one_two_five
+from instruments.virtual.oscilloscope.rigol_ds1000z_reading import MIDDLE, RigolReading
+from instruments.virtual.oscilloscope.setup import one_two_five
 
 #: Points of the record for one channel shown; half of it for two, a quarter for more.
 _DEPTHS = (12_000, 120_000, 1_200_000, 12_000_000, 24_000_000)

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 from instruments.virtual.core.device import answers, does
 from instruments.virtual.core.parameters import choice
 from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.scope_keysight_reading import EMPTY_SOURCES, MIDDLE, KeysightReading
+from instruments.virtual.oscilloscope.keysight_dsox1000_reading import EMPTY_SOURCES, MIDDLE, KeysightReading
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from instruments.virtual.core.device import Clock
-    from instruments.virtual.scope_record import Signal
+    from instruments.virtual.oscilloscope.record import Signal
 
 #: Points of the memory; the fastest rate [1/s].
 _MEMORY, _FASTEST = 1_000_000, 2e9

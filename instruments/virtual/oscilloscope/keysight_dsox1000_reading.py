@@ -10,14 +10,14 @@ import numpy as np
 from instruments.virtual.core.device import answers, does
 from instruments.virtual.core.parameters import choice, number, one
 from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.scope import VirtualOscilloscope
-from instruments.virtual.scope_screen import bmp8, bmp24, draw, grey, png
-from instruments.virtual.scope_setup import block_content
+from instruments.virtual.oscilloscope.scope import VirtualOscilloscope
+from instruments.virtual.oscilloscope.screenshot import bmp8, bmp24, draw, grey, png
+from instruments.virtual.oscilloscope.setup import block_content
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from instruments.virtual.scope_record import Record
+    from instruments.virtual.oscilloscope.record import Record
 
 #: The code in the middle of the screen, and how many points a record for the screen has.
 MIDDLE, _FOR_SCREEN = 128, 62_500

@@ -17,14 +17,14 @@ import numpy as np
 
 from instruments.virtual.core.parameters import choice
 from instruments.virtual.core.parser import ScpiError
-from instruments.virtual.scope_record import COARSEST, Edge, Input, Record, open_input
-from instruments.virtual.scope_setup import ScopeSetup
+from instruments.virtual.oscilloscope.record import COARSEST, Edge, Input, Record, open_input
+from instruments.virtual.oscilloscope.setup import ScopeSetup
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from instruments.virtual.core.device import Clock
-    from instruments.virtual.scope_record import Signal
+    from instruments.virtual.oscilloscope.record import Signal
 
 #: Below the level by this part of a division the trigger is armed again.
 _HYSTERESIS = 0.3

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from instruments.virtual.scope_acquisition import ScopeAcquisition
-from instruments.virtual.scope_measure import Measured, edges, measure
-from instruments.virtual.scope_record import COARSEST, open_input
-from instruments.virtual.scope_setup import one_two_five
+from instruments.virtual.oscilloscope.acquisition import ScopeAcquisition
+from instruments.virtual.oscilloscope.measure import Measured, edges, measure
+from instruments.virtual.oscilloscope.record import COARSEST, open_input
+from instruments.virtual.oscilloscope.setup import one_two_five
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -23,12 +23,12 @@ from instruments.errors import BadAnswer, SettingsLost
 from instruments.links.visa import VisaTransport
 from instruments.virtual.bus import Bus
 from instruments.virtual.faults import Fault
-from instruments.virtual.scope_acquisition import AUTO_AFTER
-from instruments.virtual.scope_keysight import VirtualDSOX1000
-from instruments.virtual.scope_measure import MEASUREMENTS, Measured, measure
-from instruments.virtual.scope_record import PIECE, Edge
-from instruments.virtual.scope_rigol import VirtualDS1000Z
-from instruments.virtual.scope_setup import one_two_five
+from instruments.virtual.oscilloscope.acquisition import AUTO_AFTER
+from instruments.virtual.oscilloscope.keysight_dsox1000 import VirtualDSOX1000
+from instruments.virtual.oscilloscope.measure import MEASUREMENTS, Measured, measure
+from instruments.virtual.oscilloscope.record import PIECE, Edge
+from instruments.virtual.oscilloscope.rigol_ds1000z import VirtualDS1000Z
+from instruments.virtual.oscilloscope.setup import one_two_five
 from support.wire import ask, cable, errors, received, send
 
 DARK, BRIGHT, DUTY = 0.1, 1.2, 0.03
