@@ -36,7 +36,8 @@ import pyvisa
 from instruments.clock import VirtualClock
 from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bus import Bus
+from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from instruments.virtual.oscilloscope.rigol_ds1000z import VirtualDS1000Z
 from instruments.virtual.servers.server import BenchServer
@@ -44,7 +45,6 @@ from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import spin_order
 from levilab.present.progress import Show
 from levilab.world.spin_world import SpinScene, SpinWorld
-from pyvisa_levilab import library_for
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
 from instruments.ieee488 import BrokenBlock, block_of, read_block
-from instruments.virtual.bus import Bus
+from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.session import LinkLost
 from instruments.virtual.core.message import Framer, Overrun
-from instruments.virtual.faults import LinkLost
 from instruments.virtual.servers import hislip, vxi11
 from instruments.virtual.servers.hislip_messages import Message, Type
 from instruments.virtual.servers.station import Disconnected, Station

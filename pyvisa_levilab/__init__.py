@@ -1,290 +1,31 @@
 """PyVISA finds the virtual bench here: ``pyvisa.ResourceManager("@levilab")``.
 
-The backend is the few lines between PyVISA's library calls and :class:`instruments.virtual.bus.Bus`.
-Time-outs cost virtual time only; ``"realtime@levilab"`` keeps to the wall clock.
+The library is `instruments.virtual.bench.visa_library`; asked for by its name it stands for a bench with a top of its
+own.  Time-outs cost virtual time only; ``"realtime@levilab"`` keeps to the wall clock.
 """
 
 from __future__ import annotations
 
-import fnmatch
-import itertools
-import math
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING
 
-from pyvisa import constants, rname
-from pyvisa.constants import EventAttribute, ResourceAttribute, StatusCode
-from pyvisa.highlevel import VisaLibraryBase
-from pyvisa.util import LibraryPath
-
-from instruments.virtual.bus import Session
-from instruments.virtual.core.line import LineSettings
-from instruments.virtual.faults import LinkLost
-from instruments.virtual.serial_line import SerialLine
+from instruments.clock import WallClock
+from instruments.virtual.bench.visa_library import LevilabVisaLibrary
+from levilab.world.bench import own_world, virtual_bus
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from instruments.virtual.bench.bus import Bus
 
-    from pyvisa.highlevel import ResourceInfo
-    from pyvisa.typing import VISARMSession, VISASession
-
-    from instruments.virtual.bus import Bus
-
-T = TypeVar("T")
-Link = Session | SerialLine
-Attributes = dict[int, Any]
-
-_numbers = itertools.count(1)
-
-#: What stands before the @ for a bench that is never faster than the wall clock.
+#: What stands before the @ for a bench that is never faster than the wall clock, for programs that sleep between
+#: their questions.
 REALTIME = "realtime"
 
-#: What a VISA session says of itself before anything was set (VPP-4.3, 3.2 and 5.1).
-_DEFAULT_ATTRIBUTES: dict[int, Any] = {
-    ResourceAttribute.timeout_value: 2000,
-    ResourceAttribute.termchar: ord("\n"),
-    ResourceAttribute.termchar_enabled: False,
-    ResourceAttribute.send_end_enabled: True,
-    ResourceAttribute.resource_lock_state: constants.AccessModes.no_lock,
-}
 
-#: The same for a serial line (VPP-4.3, 5.1.2): 9600 baud, 8N1.
-_SERIAL_ATTRIBUTES: dict[int, Any] = {
-    ResourceAttribute.asrl_baud_rate: 9600,
-    ResourceAttribute.asrl_data_bits: 8,
-    ResourceAttribute.asrl_parity: constants.Parity.none,
-    ResourceAttribute.asrl_stop_bits: constants.StopBits.one,
-    ResourceAttribute.asrl_flow_control: constants.ControlFlow.none,
-    ResourceAttribute.asrl_end_in: constants.SerialTermination.termination_char,
-    ResourceAttribute.asrl_end_out: constants.SerialTermination.none,
-}
+class PracticeBench(LevilabVisaLibrary):
+    """The library that PyVISA makes of a name such as ``"@levilab"``: a fresh bench with a top of its own."""
+
+    def default_bench(self) -> Bus:
+        """A top to practise with behind all four instruments."""
+        return virtual_bus(own_world(WallClock() if str(self.library_path) == REALTIME else None))
 
 
-class LevilabVisaLibrary(VisaLibraryBase):
-    """A PyVISA library whose only resources are the instruments of one virtual bench."""
-
-    bus: Bus | None
-    _sessions: dict[int, tuple[Link, Attributes]]
-
-    @staticmethod
-    def get_library_paths() -> Iterable[LibraryPath]:
-        """One name: there is nothing to look for on disk."""
-        return (LibraryPath("levilab"),)
-
-    def _init(self) -> None:
-        self.bus = None
-        self._sessions = {}
-
-    def _bench(self) -> Bus:
-        """The bench given, or a fresh one with its own top when a program just asked for "@levilab".
-
-        Asked for as "realtime@levilab" it keeps to the wall clock: for programs that sleep between their questions.
-        """
-        if self.bus is None:
-            from instruments.clock import WallClock
-            from levilab.world.bench import own_world, virtual_bus
-
-            self.bus = virtual_bus(own_world(WallClock() if str(self.library_path) == REALTIME else None))
-        return self.bus
-
-    def open_default_resource_manager(self) -> tuple[VISARMSession, StatusCode]:
-        """ViOpenDefaultRM."""
-        return cast("VISARMSession", next(_numbers)), self.handle_return_value(None, StatusCode.success)
-
-    def list_resources(self, session: VISARMSession, query: str = "?*::INSTR") -> tuple[str, ...]:
-        """ViFindRsrc; the query's ``?*`` is ``*`` here."""
-        pattern = query.upper().replace("?*", "*")
-        return tuple(name for name in self._bench().instruments if fnmatch.fnmatch(name.upper(), pattern))
-
-    def parse_resource_extended(self, session: VISARMSession, resource_name: str) -> tuple[ResourceInfo, StatusCode]:
-        """ViParseRsrcEx; resource names know no case (VPP-4.3, 4.3.1), pyvisa's parser knows INSTR only."""
-        return super().parse_resource_extended(session, resource_name.upper())
-
-    def open(
-        self,
-        session: VISARMSession,
-        resource_name: str,
-        access_mode: constants.AccessModes = constants.AccessModes.no_lock,
-        open_timeout: int | None = constants.VI_TMO_IMMEDIATE,
-    ) -> tuple[VISASession, StatusCode]:
-        """ViOpen."""
-        session_with_it = self._bench().open(self._as_plugged_in(resource_name))
-        if session_with_it is None:
-            return cast("VISASession", 0), self.handle_return_value(None, StatusCode.error_resource_not_found)
-        parsed = rname.parse_resource_name(resource_name.upper())
-        serial = parsed.interface_type_const == constants.InterfaceType.asrl
-        attributes = (
-            _DEFAULT_ATTRIBUTES
-            | (_SERIAL_ATTRIBUTES if serial else {})
-            | {
-                ResourceAttribute.resource_name: resource_name,
-                ResourceAttribute.resource_class: parsed.resource_class,
-                ResourceAttribute.interface_type: parsed.interface_type_const,
-            }
-        )
-        link = SerialLine(session_with_it, _line_settings(attributes)) if serial else session_with_it
-        if access_mode == constants.AccessModes.exclusive_lock and not link.hold.take(link, None):
-            return cast("VISASession", 0), self.handle_return_value(None, StatusCode.error_resource_locked)
-        attributes[ResourceAttribute.resource_lock_state] = access_mode
-        number = cast("VISASession", next(_numbers))
-        self._sessions[number] = (link, attributes)
-        return number, self.handle_return_value(number, StatusCode.success)
-
-    def _as_plugged_in(self, resource_name: str) -> str:
-        """The bench's own spelling of a name: PyVISA fills in what is left out (USB's interface, boards)."""
-        wanted = _canonical(resource_name)
-        return next((name for name in self._bench().instruments if _canonical(name) == wanted), resource_name)
-
-    def close(self, session: Any) -> StatusCode:
-        """ViClose."""
-        link, _ = self._sessions.pop(session, (None, {}))
-        if link:
-            link.close()
-        return self.handle_return_value(session, StatusCode.success)
-
-    def _let(
-        self, session: VISASession, act: Callable[[Link, Attributes], tuple[T, StatusCode]], otherwise: T
-    ) -> tuple[T, StatusCode]:
-        """What an act on a session's link gives; otherwise where another program holds it, or the link is lost."""
-        link, attributes = self._sessions[session]
-        try:
-            if link.hold.keeps_out(link):
-                result, status = otherwise, StatusCode.error_resource_locked
-            else:
-                result, status = act(link, attributes)
-        except LinkLost:
-            result, status = otherwise, StatusCode.error_connection_lost
-        return result, self.handle_return_value(session, status)
-
-    def write(self, session: VISASession, data: bytes) -> tuple[int, StatusCode]:
-        """ViWrite."""
-
-        def act(link: Link, attributes: Attributes) -> tuple[int, StatusCode]:
-            link.write(bytes(data), end=bool(attributes[ResourceAttribute.send_end_enabled]))
-            return len(data), StatusCode.success
-
-        return self._let(session, act, 0)
-
-    def read(self, session: VISASession, count: int) -> tuple[bytes, StatusCode]:
-        """ViRead: up to the end of the answer, the termination character if that is on, or so many bytes."""
-
-        def act(link: Link, attributes: Attributes) -> tuple[bytes, StatusCode]:
-            timeout = _seconds(attributes[ResourceAttribute.timeout_value])
-            return _read(link, count, timeout, _termchar(attributes))
-
-        return self._let(session, act, b"")
-
-    def clear(self, session: VISASession) -> StatusCode:
-        """ViClear."""
-        return self._let(session, lambda link, _: (link.clear(), StatusCode.success), None)[1]
-
-    def flush(self, session: VISASession, mask: constants.BufferOperation) -> StatusCode:
-        """ViFlush: what was received and not read is dropped."""
-        return self._let(session, lambda link, _: (link.discard(), StatusCode.success), None)[1]
-
-    def read_stb(self, session: VISASession) -> tuple[int, StatusCode]:
-        """ViReadSTB."""
-        return self._let(session, lambda link, _: (link.status_byte(), StatusCode.success), 0)
-
-    def assert_trigger(self, session: VISASession, protocol: constants.TriggerProtocol) -> StatusCode:
-        """ViAssertTrigger."""
-        return self._let(session, lambda link, _: (link.trigger(), StatusCode.success), None)[1]
-
-    # --- locks ---
-
-    def lock(
-        self, session: VISASession, lock_type: constants.Lock, timeout: int, requested_key: str | None = None
-    ) -> tuple[str, StatusCode]:
-        """ViLock; a shared lock with the same key lets its holders through."""
-        link, attributes = self._sessions[session]
-        key = requested_key or f"levilab-{next(_numbers)}"
-        if not link.hold.take(link, key if lock_type == constants.Lock.shared else None):
-            return "", self.handle_return_value(session, StatusCode.error_resource_locked)
-        shared = lock_type == constants.Lock.shared
-        attributes[ResourceAttribute.resource_lock_state] = (
-            constants.AccessModes.shared_lock if shared else constants.AccessModes.exclusive_lock
-        )
-        return key if shared else "", self.handle_return_value(session, StatusCode.success)
-
-    def unlock(self, session: VISASession) -> StatusCode:
-        """ViUnlock."""
-        link, attributes = self._sessions[session]
-        link.hold.let_go(link)
-        attributes[ResourceAttribute.resource_lock_state] = constants.AccessModes.no_lock
-        return self.handle_return_value(session, StatusCode.success)
-
-    def get_attribute(self, session: Any, attribute: ResourceAttribute | EventAttribute) -> tuple[Any, StatusCode]:
-        """ViGetAttribute."""
-        _, attributes = self._sessions[session]
-        if attribute not in attributes:
-            return None, self.handle_return_value(session, StatusCode.error_nonsupported_attribute)
-        return attributes[attribute], self.handle_return_value(session, StatusCode.success)
-
-    def set_attribute(self, session: VISASession, attribute: ResourceAttribute, attribute_state: Any) -> StatusCode:
-        """ViSetAttribute."""
-        link, attributes = self._sessions[session]
-        attributes[attribute] = attribute_state
-        if isinstance(link, SerialLine):
-            link.settings = _line_settings(attributes)
-        return self.handle_return_value(session, StatusCode.success)
-
-    def disable_event(self, session: VISASession, event_type: Any, mechanism: Any) -> StatusCode:
-        """ViDisableEvent: there are no events."""
-        return self.handle_return_value(session, StatusCode.success)
-
-    def discard_events(self, session: VISASession, event_type: Any, mechanism: Any) -> StatusCode:
-        """ViDiscardEvents: there are no events."""
-        return self.handle_return_value(session, StatusCode.success)
-
-
-def _canonical(resource_name: str) -> str:
-    try:
-        return rname.to_canonical_name(resource_name.upper()).upper()
-    except rname.InvalidResourceName:
-        return resource_name.upper()
-
-
-def _read(link: Link, count: int, timeout: float, termchar: bytes) -> tuple[bytes, StatusCode]:
-    """Bytes as they come, until there is enough of them, the answer ends, or nothing more comes in time."""
-    data = b""
-    while len(data) < count:
-        got = link.read(count - len(data), timeout, until=termchar)
-        if got is None:
-            return data, StatusCode.error_timeout
-        data += got[0]
-        if termchar and data.endswith(termchar):
-            return data, StatusCode.success_termination_character_read
-        if got[1]:
-            return data, StatusCode.success
-    return data, StatusCode.success_max_count_read
-
-
-def _seconds(timeout: int) -> float:
-    """VISA's milliseconds; its largest number stands for ever."""
-    return math.inf if timeout == constants.VI_TMO_INFINITE else timeout / 1000
-
-
-def _line_settings(attributes: Attributes) -> LineSettings:
-    """The program's end of a serial line; VISA counts stop bits in tenths and parities from none to space."""
-    return LineSettings(
-        int(attributes[ResourceAttribute.asrl_baud_rate]),
-        int(attributes[ResourceAttribute.asrl_data_bits]),
-        "NOEMS"[int(attributes[ResourceAttribute.asrl_parity])],
-        int(attributes[ResourceAttribute.asrl_stop_bits]) / 10,
-    )
-
-
-def _termchar(attributes: Attributes) -> bytes:
-    """What ends a read, or nothing.  A serial line ends one there by itself (VPP-4.3, VI_ATTR_ASRL_END_IN)."""
-    serial = attributes.get(ResourceAttribute.asrl_end_in) == constants.SerialTermination.termination_char
-    wanted = attributes[ResourceAttribute.termchar_enabled] or serial
-    return bytes([attributes[ResourceAttribute.termchar]]) if wanted else b""
-
-
-def library_for(bus: Bus) -> LevilabVisaLibrary:
-    """A library of its own for this bench, to hand to ``pyvisa.ResourceManager``."""
-    library = LevilabVisaLibrary(f"levilab-{next(_numbers)}")
-    library.bus = bus
-    return library
-
-
-WRAPPER_CLASS = LevilabVisaLibrary
+WRAPPER_CLASS = PracticeBench

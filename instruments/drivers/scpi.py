@@ -20,12 +20,8 @@ if TYPE_CHECKING:
     from instruments.links.transport import Transport
 
 T = TypeVar("T", bound=bool | float | str)
-
-
 #: Error queues hold 20 to 32 entries; more questions than that mean that the instrument never says "none".
 _LONGEST_ERROR_QUEUE = 64
-
-
 #: An answer's text as a value.  Instruments quote some words, and print switches as 0 or 1.
 _FROM_WIRE: dict[type, Callable[[str], Any]] = {
     float: lambda answer: _setting_of(float(answer)),

@@ -21,12 +21,8 @@ if TYPE_CHECKING:
 
 #: So long is slept at a stretch before looking whether somebody asked for the end [s].
 _NAP_S = 0.2
-
-
 #: Pauses [s] before the tries to reach an instrument again, half a minute in all.
 REOPENING_S = (0.0, 1.0, 2.0, 4.0, 8.0, 16.0)
-
-
 #: An instrument that is lost so many times in a row, with no reading in between, is broken.
 MOST_LOSSES = 5
 

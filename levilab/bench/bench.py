@@ -139,7 +139,7 @@ def open_bench(
     # whoever measures waits on the wall's clock: a bench whose clock jumps would stand still meanwhile
     library: Any = "realtime@levilab" if config.visa_library == "@levilab" else config.visa_library
     if world:
-        from pyvisa_levilab import library_for
+        from instruments.virtual.bench.visa_library import library_for
 
         library = library_for(virtual_bus(world))
     bench = Bench(world.clock if world else WallClock(), config.limits)

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
 
 Array = NDArray[np.float64]
-
-
 #: Tops that a map may have: some minutes of 30 s each.
 MOST_TOPS = 250_000
 #: A top outside of the window can take this long to be lost [s].

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from instruments.clock import Clock
-    from instruments.virtual.bus import Bus
+    from instruments.virtual.bench.bus import Bus
     from instruments.virtual.core.device import VirtualInstrument
     from instruments.virtual.generator.generator import Output
     from levilab.simulator.scene import Scene
@@ -105,7 +105,7 @@ def virtual_bus(world: World | None = None, models: Mapping[str, str] | None = N
     world: by default a top of its own, on a virtual clock; models: kind → model, for those that are to be others than
     in VIRTUAL.  Raises ConfigError for one that there is not.
     """
-    from instruments.virtual.bus import Bus
+    from instruments.virtual.bench.bus import Bus
 
     world = world or own_world()
     chosen = {kind: settings.model for kind, settings in VIRTUAL.items()} | dict(models or {})
@@ -119,7 +119,7 @@ def plug_in_serial(bus: Bus | None = None) -> Bus:
     From then on ``serial.serial_for_url("levilab://magnetometer")`` is its magnetometer, and for pyvisa-py
     ``ASRLlevilab://magnetometer::INSTR``.  bus: by default a fresh bench with a top of its own.
     """
-    from instruments.virtual.protocol_levilab import plug_in
+    from instruments.virtual.bench.protocol_levilab import plug_in
 
     bus = bus or virtual_bus()
     plug_in(lambda: bus)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from types import FrameType
 
-    from instruments.virtual.bus import Bus
+    from instruments.virtual.bench.bus import Bus
     from instruments.virtual.servers.server import Offer
     from levilab.simulator.scene import Scene
     from levilab.world.spin_world import World

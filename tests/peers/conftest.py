@@ -10,10 +10,10 @@ from importlib.util import find_spec
 import pytest
 import pyvisa
 
-from instruments.virtual.bus import Bus
+from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.servers.server import BenchServer
 from levilab.world.bench import plug_in_serial
-from pyvisa_levilab import library_for
 
 if not find_spec("pymeasure"):
     collect_ignore_glob = ["*"]

@@ -11,7 +11,7 @@ import sys
 import numpy as np
 
 from instruments.clock import VirtualClock
-from instruments.virtual.bus import Session
+from instruments.virtual.bench.session import Session
 from instruments.virtual.core.message import LONGEST_LINE
 from instruments.virtual.core.parser import LONGEST_ANSWER
 from levilab.world.bench import MODELS

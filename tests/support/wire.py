@@ -2,7 +2,7 @@
 
 from weakref import WeakKeyDictionary
 
-from instruments.virtual.bus import Session
+from instruments.virtual.bench.session import Session
 
 _cables = WeakKeyDictionary()
 

@@ -11,8 +11,6 @@ from instruments.errors import BadAnswer, InstrumentError, NoAnswer, OutOfRange
 
 #: Readings that are fetched with one question: an answer of 25 kB, seconds apart at most.
 READINGS_AT_ONCE = 1000
-
-
 #: Readings that are waited for with one question: so long, at most [s].  VISA waits for 49 days and no longer.
 LONGEST_WAIT_S = 30 * 86400.0
 

@@ -16,12 +16,8 @@ if TYPE_CHECKING:
 
 #: One of each unit in tesla.  A Hall probe sees B; oersted and A/m are B/μ₀ in air.
 _UNITS_T = {"GAUSS": 1e-4, "TESLA": 1.0, "OERSTED": 1e-4, "A/M": 4e-7 * math.pi}
-
-
 #: No probe of the family measures more.
 _STRONGEST_T = 35.1
-
-
 #: TYPE? less 40, or less 50 with a cable that the user has programmed.
 _PROBES = ("HSE", "HST", "UHS")
 

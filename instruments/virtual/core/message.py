@@ -86,8 +86,6 @@ def _end_of_block(text: str, head: int) -> int:
 
 #: A line longer than this is dropped, and a block that says that it is longer is no block [bytes].
 LONGEST_LINE, LONGEST_BLOCK = 1 << 22, 1 << 26
-
-
 #: What decides: the end of a line, a quote, or a block's head where a parameter can begin.
 _SPECIAL_BYTE = re.compile(rb"[\n\"']|(?<=[\x00-\x20,])#[1-9]")
 _LINE_END = re.compile(rb"\n")

@@ -7,11 +7,7 @@ import re
 from instruments.virtual.core.parser import ScpiError
 
 _MULTIPLIERS = {"": 1.0, "N": 1e-9, "U": 1e-6, "M": 1e-3, "K": 1e3, "MA": 1e6, "G": 1e9}
-
-
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*([a-zA-Z]*)")
-
-
 _CHANNEL_LIST = re.compile(r"\(@[\d,: !]*\)")
 
 

@@ -10,7 +10,7 @@ import contextlib
 import os
 from typing import TYPE_CHECKING
 
-from instruments.virtual.faults import LinkLost
+from instruments.virtual.bench.session import LinkLost
 from instruments.virtual.servers.socket_server import converse
 from instruments.virtual.servers.station import log
 

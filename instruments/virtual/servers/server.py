@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Iterator
     from types import TracebackType
 
-    from instruments.virtual.bus import Bus
+    from instruments.virtual.bench.bus import Bus
 
 LOOPBACK = "127.0.0.1"
 

@@ -16,13 +16,14 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from instruments.ieee488 import INFINITY
+from instruments.virtual.bench.session import LinkLost
 from instruments.virtual.core.parser import ScpiError
-from instruments.virtual.faults import LinkLost
 
 if TYPE_CHECKING:
     from collections.abc import Coroutine, Iterator
 
-    from instruments.virtual.bus import Bus, Session
+    from instruments.virtual.bench.bus import Bus
+    from instruments.virtual.bench.session import Session
     from instruments.virtual.core.device import VirtualInstrument
 
 log = logging.getLogger(__name__)
@@ -68,7 +69,7 @@ class Station:
 class Link:
     """One client's link to an instrument; whatever is done with it raises LinkLost when a fault has cut it.
 
-    session: see :class:`instruments.virtual.bus.Session`; to be used from the event loop only.
+    session: see :class:`instruments.virtual.bench.bus.Session`; to be used from the event loop only.
     """
 
     def __init__(self, station: Station, *, stream: bool = False) -> None:

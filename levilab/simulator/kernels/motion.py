@@ -152,6 +152,4 @@ def kick(model: Model, s: State, k: float, level: float, slope: float) -> State:
 
 #: Columns of a state: place, velocity, axis, angular momentum, arm, clock, loose washers, time.
 R, V, N, L, ARM = (slice(3 * i, 3 * i + 3) for i in range(5))
-
-
 CLOCK, LOOSE, TIME = 15, 16, 17

@@ -16,10 +16,10 @@ from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
 from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange
 from instruments.ieee488 import NOT_A_NUMBER
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bus import Bus
+from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
-from pyvisa_levilab import library_for
 from support.conversation import CLEAR, NO_ERROR, SILENCE, accepted, conversation
 
 

@@ -11,10 +11,10 @@ from instruments.drivers.generator.agilent_33220a import Agilent33220A
 from instruments.drivers.generator.keysight_33500b import Keysight33500B
 from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange, WrongInstrument
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bus import Bus
+from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.generator.agilent_33220a import Virtual33220A
 from instruments.virtual.generator.keysight_33500b import Virtual33500B
-from pyvisa_levilab import library_for
 from support.conversation import CLEAR, NO_ERROR, SILENCE, accepted, conversation
 
 

@@ -8,12 +8,12 @@ from instruments.clock import VirtualClock, WallClock
 from instruments.drivers.scpi import ScpiInstrument, Setting
 from instruments.errors import BadAnswer, CommandRefused, InstrumentError, NoAnswer, NotConnected
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bus import Bus
+from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.faults import AWAY, FAULTS, LATE, Fault
+from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.core.device import VirtualInstrument, answers
 from instruments.virtual.core.parser import Command
-from instruments.virtual.faults import AWAY, FAULTS, LATE, Fault
 from instruments.virtual.servers.server import BenchServer
-from pyvisa_levilab import library_for
 
 MESSAGES, STREAM = "TCPIP0::box.levilab::inst0::INSTR", "TCPIP0::box.levilab::5025::SOCKET"
 DATA = bytes(range(256)) * 3

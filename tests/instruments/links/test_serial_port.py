@@ -19,13 +19,13 @@ from instruments.clock import VirtualClock
 from instruments.drivers.magnetometer.lakeshore_425 import LakeShore425
 from instruments.errors import BadAnswer, InstrumentError, NoAnswer, NotConnected, Occupied, OutOfRange
 from instruments.links.serial_port import SerialTransport, port_name
-from instruments.virtual.bus import Bus
+from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.faults import FAULTS, Fault
+from instruments.virtual.bench.serial_line import benches
 from instruments.virtual.core.device import VirtualInstrument, answers
 from instruments.virtual.core.line import LineSettings, carried
 from instruments.virtual.core.parser import Command
-from instruments.virtual.faults import FAULTS, Fault
 from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
-from instruments.virtual.serial_line import benches
 
 METER = "levilab://magnetometer"
 SLOW = "levilab://slow"
@@ -72,7 +72,9 @@ def bus(clock, monkeypatch):
             "GPIB0::1::INSTR": Slow(clock),
         }
     )
-    monkeypatch.setattr(serial, "protocol_handler_packages", [*serial.protocol_handler_packages, "instruments.virtual"])
+    monkeypatch.setattr(
+        serial, "protocol_handler_packages", [*serial.protocol_handler_packages, "instruments.virtual.bench"]
+    )
     monkeypatch.setitem(benches, "", lambda: bus)
     return bus
 

@@ -9,10 +9,10 @@ from pyvisa.constants import StatusCode
 from instruments.clock import VirtualClock
 from instruments.errors import BadAnswer, NoAnswer, NotConnected, Occupied
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bus import Bus
+from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.visa_library import LevilabVisaLibrary, library_for
 from instruments.virtual.core.device import VirtualInstrument, answers
 from instruments.virtual.core.parser import Command
-from pyvisa_levilab import LevilabVisaLibrary, library_for
 
 ADDRESS = "TCPIP0::slow.levilab::inst0::INSTR"
 SOCKET = "TCPIP0::slow.levilab::5025::SOCKET"

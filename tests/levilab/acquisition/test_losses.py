@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from instruments.errors import InstrumentError
-from instruments.virtual.faults import FAULTS, Fault
+from instruments.virtual.bench.faults import FAULTS, Fault
 from levilab.acquisition.loop import Order, acquire
 from levilab.acquisition.request import spin_order
 from levilab.acquisition.session import MOST_LOSSES
@@ -19,7 +19,7 @@ from levilab.world.bench import VIRTUAL, virtual_bus
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from instruments.virtual.bus import Bus
+    from instruments.virtual.bench.bus import Bus
     from levilab.runs.run import Run
 
 #: Readings before the drive is off: the spin at first, every 10 s of the 201 on the way up, and at the end of it.

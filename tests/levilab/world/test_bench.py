@@ -3,7 +3,7 @@
 import pytest
 import serial
 
-from instruments.virtual import serial_line
+from instruments.virtual.bench import serial_line
 from levilab.bench.config import ConfigError
 from levilab.world.bench import MODELS, VIRTUAL, plug_in_serial, virtual_bus
 
@@ -38,7 +38,7 @@ def test_the_bench_given_is_the_one_that_pyserial_finds_however_often_it_is_plug
     plug_in_serial()
     bus = virtual_bus()
     assert plug_in_serial(bus) is bus
-    assert pyserial.protocol_handler_packages.count("instruments.virtual") == 1
+    assert pyserial.protocol_handler_packages.count("instruments.virtual.bench") == 1
     before = bus.instruments[VIRTUAL["magnetometer"].address].clock.now()
     who_is_at("levilab://magnetometer")
     assert bus.instruments[VIRTUAL["magnetometer"].address].clock.now() > before

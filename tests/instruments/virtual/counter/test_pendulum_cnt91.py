@@ -15,9 +15,9 @@ from instruments.clock import VirtualClock
 from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
 from instruments.errors import OutOfRange
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bus import Bus
+from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
-from pyvisa_levilab import library_for
 from support.wire import ask, cable, errors, received, send
 
 FIXED_LEVEL = "INP:COUP DC;LEV 0.65"

@@ -13,11 +13,11 @@ from instruments.drivers.magnetometer.lakeshore_425 import LakeShore425
 from instruments.drivers.magnetometer.lakeshore_475 import LakeShore475
 from instruments.errors import NoAnswer
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bus import Bus
+from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
 from instruments.virtual.magnetometer.lakeshore_475 import Virtual475
 from instruments.virtual.magnetometer.numbers import field_text
-from pyvisa_levilab import library_for
 from support.wire import ask, received, send
 
 PORT = "ASRL1::INSTR"

@@ -14,15 +14,15 @@ import pyvisa
 from hypothesis import given
 from hypothesis import strategies as st
 
-import pyvisa_levilab
 from instruments.clock import VirtualClock
 from instruments.drivers.oscilloscope import NeverTriggered, NothingAcquired
 from instruments.drivers.oscilloscope.keysight_dsox import KeysightDSOX
 from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.errors import BadAnswer, SettingsLost
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bus import Bus
-from instruments.virtual.faults import Fault
+from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.faults import Fault
+from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.oscilloscope.acquisition import AUTO_AFTER
 from instruments.virtual.oscilloscope.keysight_dsox1000 import VirtualDSOX1000
 from instruments.virtual.oscilloscope.measure import MEASUREMENTS, Measured, measure
@@ -677,7 +677,7 @@ def bench(make, signal):
     clock = VirtualClock()
     name = "TCPIP0::scope.levilab::inst0::INSTR"
     device = make(clock, signals={1: signal})
-    library = pyvisa_levilab.library_for(Bus({name: device}))
+    library = library_for(Bus({name: device}))
     return device, VisaTransport(name, library=library), clock
 
 
@@ -764,7 +764,7 @@ def test_24_million_points_stream_through_the_memory_of_a_few_pieces():
 def test_pyvisa_reads_the_block_as_of_any_scope():
     device, transport, _ = bench(VirtualDSOX1000, constant(0.2))
     transport.close()
-    manager = pyvisa.ResourceManager(pyvisa_levilab.library_for(Bus({"GPIB0::7::INSTR": device})))
+    manager = pyvisa.ResourceManager(library_for(Bus({"GPIB0::7::INSTR": device})))
     scope = manager.open_resource("GPIB0::7::INSTR")
     scope.write(":WAV:FORM WORD;UNS 1;POIN 1000")
     codes = scope.query_binary_values(":WAV:DATA?", datatype="H", is_big_endian=True, container=np.array)
@@ -781,7 +781,7 @@ def prepared(driver, make, address="TCPIP0::scope.levilab::inst0::INSTR"):
     clock = VirtualClock()
     device = make(clock, signals={1: pulses})
     bus = Bus({address: device})
-    scope = driver(VisaTransport(address, library=pyvisa_levilab.library_for(bus)), clock=clock)
+    scope = driver(VisaTransport(address, library=library_for(bus)), clock=clock)
     scope.prepare(**PULSES, trigger_level_v=0.65)
     yield device, scope, bus
     scope.close()

@@ -10,11 +10,11 @@ import pyvisa
 from pyvisa.constants import StatusCode
 
 from instruments.clock import VirtualClock
-from instruments.virtual.bus import Bus
+from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.faults import Fault
+from instruments.virtual.bench.visa_library import LevilabVisaLibrary, library_for
 from instruments.virtual.core.device import VirtualInstrument, answers
 from instruments.virtual.core.parser import Command
-from instruments.virtual.faults import Fault
-from pyvisa_levilab import LevilabVisaLibrary, library_for
 
 COUNTER = "TCPIP0::counter.levilab::inst0::INSTR"
 GENERATOR = "TCPIP0::generator.levilab::inst0::INSTR"

@@ -8,7 +8,7 @@ import pytest
 import pyvisa
 
 from instruments.clock import VirtualClock, WallClock
-from instruments.virtual.bus import Bus
+from instruments.virtual.bench.bus import Bus
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
 from instruments.virtual.servers.server import BenchServer
@@ -153,7 +153,7 @@ def test_the_status_byte_is_told_while_a_question_is_worked_on(served, way):
     ids=["53230A", "CNT-91"],
 )
 def test_in_slices_the_same_is_measured_as_at_once(way, model, messages, monkeypatch):
-    monkeypatch.setattr("instruments.virtual.bus.SLICE", 0.0)  # a slice is one step
+    monkeypatch.setattr("instruments.virtual.bench.bus.SLICE", 0.0)  # a slice is one step
     alone = Bus({COUNTER: model(VirtualClock(), signal=pulses)}).open(COUNTER)
     for message in messages:
         alone.write(message.encode())

@@ -17,10 +17,10 @@ from pyvisa_py.protocols import vxi11 as pyvisa_vxi11
 from pyvisa_py.tcpip import Vxi11CoreClient
 
 from instruments.clock import VirtualClock, WallClock
-from instruments.virtual.bus import Bus
+from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.faults import Fault
 from instruments.virtual.core.device import VirtualInstrument, answers
 from instruments.virtual.core.parser import Command
-from instruments.virtual.faults import Fault
 from instruments.virtual.servers import station
 from instruments.virtual.servers.hislip_messages import HEADER, LONGEST, Type
 from instruments.virtual.servers.serial_port import HAS_PSEUDO_TERMINALS

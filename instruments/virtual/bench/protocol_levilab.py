@@ -1,7 +1,7 @@
 """pyserial finds the virtual instruments here: ``serial.serial_for_url("levilab://magnetometer")``.
 
 For that, :func:`plug_in` names this package to pyserial, and the bench that the URL means, which then stands in
-:data:`instruments.virtual.serial_line.benches`.  pyvisa-py takes the same URL as
+:data:`instruments.virtual.bench.serial_line.benches`.  pyvisa-py takes the same URL as
 ``ASRLlevilab://magnetometer::INSTR``.
 """
 
@@ -16,14 +16,15 @@ from urllib.parse import parse_qs, urlsplit
 import serial
 from serial.serialutil import PortNotOpenError, SerialBase, SerialException
 
+from instruments.virtual.bench.serial_line import SerialLine, benches
+from instruments.virtual.bench.session import LinkLost
 from instruments.virtual.core.line import LineSettings
-from instruments.virtual.faults import LinkLost
-from instruments.virtual.serial_line import SerialLine, benches
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from instruments.virtual.bus import Bus, Session
+    from instruments.virtual.bench.bus import Bus
+    from instruments.virtual.bench.session import Session
 
 #: Where pyserial looks for the module of a URL's scheme: the package that this one is in.
 _PACKAGE = __name__.rpartition(".")[0]

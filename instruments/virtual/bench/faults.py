@@ -18,14 +18,10 @@ from instruments.virtual.core.status import POWER_ON
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from instruments.virtual.bus import Session
+    from instruments.virtual.bench.session import Session
     from instruments.virtual.core.device import Answer
 
     Act = Callable[[Session, Answer], Answer | None]
-
-
-class LinkLost(Exception):
-    """The connection is gone; only opening another one helps."""
 
 
 @dataclass

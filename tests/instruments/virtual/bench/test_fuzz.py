@@ -25,11 +25,12 @@ from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.errors import BadAnswer, InstrumentError
 from instruments.links.serial_port import SerialTransport
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bus import MOST_ANSWERS, Bus
+from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.faults import FAULTS, LATE, Fault
+from instruments.virtual.bench.serial_line import benches
+from instruments.virtual.bench.session import MOST_ANSWERS
+from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.core.device import Answer
-from instruments.virtual.faults import FAULTS, LATE, Fault
-from instruments.virtual.serial_line import benches
-from pyvisa_levilab import library_for
 from support import hostile
 
 #: `make explore` draws forty times as many; a machine that is busy is no reason to fail.
@@ -364,7 +365,7 @@ _bench_numbers = itertools.count()
 @pytest.fixture(autouse=True)
 def our_handler(monkeypatch):
     """pyserial knows the URLs of the virtual bench."""
-    monkeypatch.setattr(serial, "protocol_handler_packages", ["instruments.virtual"])
+    monkeypatch.setattr(serial, "protocol_handler_packages", ["instruments.virtual.bench"])
 
 
 class Pair:

@@ -1,0 +1,1 @@
+"""The virtual bench: instruments behind addresses, sessions, locks, faults, serial lines."""
