@@ -19,7 +19,7 @@ from instruments.ieee488 import BrokenBlock, read_block
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from instruments.links.visa import TrafficLog
+    from instruments.links.transport import TrafficLog
 
 #: pyserial's letters for what bench.toml says in words.
 PARITIES = {"none": "N", "odd": "O", "even": "E", "mark": "M", "space": "S"}

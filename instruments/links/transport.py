@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 
@@ -38,3 +39,7 @@ class Transport(Protocol):
 
     def close(self) -> None:
         """Give the instrument back."""
+
+
+#: Called with the address, ">" or "<", and the bytes that were sent or received.
+TrafficLog = Callable[[str, str, bytes], None]

@@ -12,7 +12,6 @@ import select
 import socket
 import time
 import warnings
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from instruments.errors import BadAnswer, NoAnswer, NotConnected, Occupied, SilentLine
@@ -25,8 +24,8 @@ if TYPE_CHECKING:
     from pyvisa.highlevel import VisaLibraryBase
     from pyvisa.resources import MessageBasedResource
 
-#: Called with the address, ">" or "<", and the bytes that were sent or received.
-TrafficLog = Callable[[str, str, bytes], None]
+    from instruments.links.transport import TrafficLog
+
 
 #: PyVISA's own reading of a resource name that is a bare TCP connection: only reopening empties its pipe.
 _BARE_SOCKET = "::SOCKET"

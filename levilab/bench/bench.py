@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from instruments.drivers.counter import Counter
     from instruments.drivers.generator import Generator
     from instruments.drivers.scpi import ScpiInstrument
-    from instruments.links.visa import TrafficLog
+    from instruments.links.transport import TrafficLog
     from levilab.world.spin_world import World
 
 

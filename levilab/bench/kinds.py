@@ -2,65 +2,53 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from instruments.drivers.counter.keysight_53230a import Keysight53230A
+from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
+from instruments.drivers.generator.agilent_33220a import Agilent33220A
+from instruments.drivers.generator.keysight_33500b import Keysight33500B
+from instruments.drivers.magnetometer.lakeshore_425 import LakeShore425
+from instruments.drivers.magnetometer.lakeshore_475 import LakeShore475
+from instruments.drivers.oscilloscope.keysight_dsox import KeysightDSOX
+from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
+from instruments.links.serial_port import SerialTransport
+from instruments.links.visa import VisaTransport
 from levilab.bench.config import ConfigError
 
 if TYPE_CHECKING:
     from instruments.drivers.scpi import ScpiInstrument
-    from instruments.links.transport import Transport
-    from instruments.links.visa import TrafficLog
+    from instruments.links.transport import TrafficLog, Transport
     from levilab.bench.config import InstrumentSettings
 
-_COUNTERS, _GENERATORS = "instruments.drivers.counter", "instruments.drivers.generator"
-_RIGOL, _KEYSIGHT = "instruments.drivers.oscilloscope.rigol_ds1000z", "instruments.drivers.oscilloscope.keysight_dsox"
-_MAGNETOMETERS = "instruments.drivers.magnetometer"
-
-#: Kind → model as one writes it in bench.toml → module and class of its driver.
-DRIVERS: dict[str, dict[str, tuple[str, str]]] = {
+#: Kind → model as one writes it in bench.toml → its driver.
+DRIVERS: dict[str, dict[str, type[ScpiInstrument]]] = {
     "counter": {
-        "53220A": (_COUNTERS, "Keysight53230A"),
-        "53230A": (_COUNTERS, "Keysight53230A"),
-        "CNT-91": (_COUNTERS, "PendulumCNT91"),
-        "FCA3000": (_COUNTERS, "PendulumCNT91"),
-        "FCA3100": (_COUNTERS, "PendulumCNT91"),
+        "53220A": Keysight53230A,
+        "53230A": Keysight53230A,
+        "CNT-91": PendulumCNT91,
+        "FCA3000": PendulumCNT91,
+        "FCA3100": PendulumCNT91,
     },
-    "generator": {
-        "33500B": (_GENERATORS, "Keysight33500B"),
-        "33220A": (_GENERATORS, "Agilent33220A"),
-    },
-    "oscilloscope": {
-        "DS1000Z": (_RIGOL, "RigolDS1000Z"),
-        "DSOX1000": (_KEYSIGHT, "KeysightDSOX"),
-        "DSOX2000": (_KEYSIGHT, "KeysightDSOX"),
-    },
-    "magnetometer": {
-        "425": (_MAGNETOMETERS, "LakeShore425"),
-        "455": (_MAGNETOMETERS, "LakeShore475"),
-        "475": (_MAGNETOMETERS, "LakeShore475"),
-    },
+    "generator": {"33500B": Keysight33500B, "33220A": Agilent33220A},
+    "oscilloscope": {"DS1000Z": RigolDS1000Z, "DSOX1000": KeysightDSOX, "DSOX2000": KeysightDSOX},
+    "magnetometer": {"425": LakeShore425, "455": LakeShore475, "475": LakeShore475},
 }
 
 
 def driver_of(kind: str, model: str) -> type[ScpiInstrument]:
     """The driver's class.  Raises ConfigError for a model that has none."""
-    models = {name.upper(): place for name, place in DRIVERS[kind].items()}
+    models = {name.upper(): driver for name, driver in DRIVERS[kind].items()}
     if model.upper() not in models:
         known = ", ".join(DRIVERS[kind])
         raise ConfigError(f"{kind}.model = {model!r} is unknown, known are {known}")
-    module, name = models[model.upper()]
-    driver: type[ScpiInstrument] = getattr(import_module(module), name)
-    return driver
+    return models[model.upper()]
 
 
 def transport_to(
     kind: str, settings: InstrumentSettings, *, library: Any = "@py", log: TrafficLog | None = None
 ) -> Transport:
     """An open link: pyserial's where the address is a port or its URL, else PyVISA's.  Raises NotConnected."""
-    from instruments.links.serial_port import SerialTransport
-    from instruments.links.visa import VisaTransport
-
     line = dict(getattr(driver_of(kind, settings.model), "SERIAL", {})) | settings.line
     serial_name = settings.address.upper().startswith("ASRL") and library == "@py"
     if "::" not in settings.address or serial_name:

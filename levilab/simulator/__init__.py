@@ -13,8 +13,9 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from levilab.errors import SimulationError
+
 if TYPE_CHECKING:
-    from levilab.errors import SimulationError
     from levilab.simulator.ensemble import Ensemble, simulate_many
     from levilab.simulator.scene import Scene, SceneError, preset, presets, read_scene, with_settings
     from levilab.simulator.single import simulate
@@ -29,7 +30,6 @@ _HOME = {
     "presets": "scene",
     "read_scene": "scene",
     "with_settings": "scene",
-    "SimulationError": "errors",
     "simulate": "single",
     "Accuracy": "trajectory",
     "Event": "trajectory",

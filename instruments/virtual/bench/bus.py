@@ -6,45 +6,13 @@ import threading
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from instruments.virtual.bench.session import Session
+from instruments.virtual.bench.session import Hold, Session
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from instruments.virtual.bench.faults import Fault
     from instruments.virtual.core.device import VirtualInstrument
-
-
-@dataclass
-class Hold:
-    """Who keeps the others from an instrument: one, or all that know the key.
-
-    >>> hold = Hold()
-    >>> hold.take("me", None), hold.take("you", None)
-    (True, False)
-    >>> hold.let_go("me")
-    >>> hold.take("you", "key"), hold.take("me", "key")
-    (True, True)
-    """
-
-    holders: list[object] = field(default_factory=list)
-    key: str | None = None
-
-    def take(self, who: object, key: str | None) -> bool:
-        """Whether it is theirs now.  key: to share it with, None to share it with nobody."""
-        others = [holder for holder in self.holders if holder is not who]
-        if others and (key is None or key != self.key):
-            return False
-        self.holders, self.key = [*others, who], key
-        return True
-
-    def let_go(self, who: object) -> None:
-        """Give it up; it is no error not to have it."""
-        self.holders = [holder for holder in self.holders if holder is not who]
-
-    def keeps_out(self, who: object) -> bool:
-        """Whether somebody else has it."""
-        return bool(self.holders) and all(holder is not who for holder in self.holders)
 
 
 @dataclass
@@ -77,4 +45,4 @@ class Bus:
     def session(self, device: VirtualInstrument, *, stream: bool) -> Session:
         """A link to one of the instruments."""
         hold = self._holds.setdefault(id(device), Hold())
-        return Session(device, stream=stream, lock=self.lock, hold=hold, bus=self)
+        return Session(device, stream=stream, lock=self.lock, hold=hold, faults=self.faults, away=self.away)

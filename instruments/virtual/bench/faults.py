@@ -74,8 +74,7 @@ def _disconnected(session: Session, answer: Answer) -> Answer:
 
 
 def _away(session: Session, answer: Answer) -> Answer:
-    if session.bus:
-        session.bus.away[id(session.device)] = session.device.clock.now() + AWAY
+    session.away[id(session.device)] = session.device.clock.now() + AWAY
     return _disconnected(session, answer)
 
 

@@ -14,8 +14,8 @@ from instruments.virtual.core.line import LineSettings, carried
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from instruments.virtual.bench.bus import Bus, Hold
-    from instruments.virtual.bench.session import Session
+    from instruments.virtual.bench.bus import Bus
+    from instruments.virtual.bench.session import Hold, Session
 
 #: Where the URL handler finds the benches: by the name in ``levilab://instrument?bench=name``, "" when there is none.
 benches: dict[str, Callable[[], Bus]] = {}

@@ -7,27 +7,71 @@ import threading
 import time
 from collections import deque
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from instruments.ieee488 import INFINITY
-from instruments.virtual.bench.bus import Bus, Hold
 from instruments.virtual.core.device import SteppedInstrument
 from instruments.virtual.core.message import Framer, Overrun
 from instruments.virtual.core.parser import LONGEST_ANSWER, ScpiError
 from instruments.virtual.core.steps import Work, at_once
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from instruments.virtual.core.device import Answer, VirtualInstrument
     from instruments.virtual.core.steps import Steps
-
 
 _NOTHING = memoryview(b"")
 #: Answers that wait to be read, at most.
 MOST_ANSWERS = 1000
 #: How long an instrument works in one slice [s], as the clock on the wall tells.
 SLICE = 0.01
+
+
+class LinkLost(Exception):
+    """The connection is gone; only opening another one helps."""
+
+
+@dataclass
+class Hold:
+    """Who keeps the others from an instrument: one, or all that know the key.
+
+    >>> hold = Hold()
+    >>> hold.take("me", None), hold.take("you", None)
+    (True, False)
+    >>> hold.let_go("me")
+    >>> hold.take("you", "key"), hold.take("me", "key")
+    (True, True)
+    """
+
+    holders: list[object] = field(default_factory=list)
+    key: str | None = None
+
+    def take(self, who: object, key: str | None) -> bool:
+        """Whether it is theirs now.  key: to share it with, None to share it with nobody."""
+        others = [holder for holder in self.holders if holder is not who]
+        if others and (key is None or key != self.key):
+            return False
+        self.holders, self.key = [*others, who], key
+        return True
+
+    def let_go(self, who: object) -> None:
+        """Give it up; it is no error not to have it."""
+        self.holders = [holder for holder in self.holders if holder is not who]
+
+    def keeps_out(self, who: object) -> bool:
+        """Whether somebody else has it."""
+        return bool(self.holders) and all(holder is not who for holder in self.holders)
+
+
+class AnswerFault(Protocol):
+    """What goes wrong with an answer on its way, as `faults.Fault`."""
+
+    def strikes(self, message: str) -> bool:
+        """Whether it strikes the answer to this message."""
+
+    def act(self, session: Session, answer: Answer) -> Answer | None:
+        """What becomes of the answer."""
 
 
 @dataclass(eq=False)
@@ -38,13 +82,16 @@ class Session:
     each other.  Else the interface marks the end of a message (GPIB, USBTMC, VXI-11, HiSLIP), and a question that is
     sent before the last answer was read interrupts that one (IEEE 488.2, 6.3.2.3).  Every method raises LinkLost when
     the link is gone.
+
+    lock, hold, faults, away: what all links of a bench share, see `bus.Bus`.
     """
 
     device: VirtualInstrument
     stream: bool = False
     lock: threading.RLock = field(default_factory=threading.RLock)
     hold: Hold = field(default_factory=Hold)
-    bus: Bus | None = None
+    faults: Sequence[AnswerFault] = ()
+    away: dict[int, float] = field(default_factory=dict)
     chunk: int = 1 << 30  # bytes that are given at once, at most
     lost_after: int | None = None  # bytes until the link is lost
     _framer: Framer = field(init=False)
@@ -115,7 +162,7 @@ class Session:
             self._rest = _NOTHING
         self._asked = True
         answer = yield from self._answer(message)
-        for fault in self.bus.faults if self.bus else ():
+        for fault in self.faults:
             if answer is not None and fault.strikes(message):
                 answer = fault.act(self, answer)
         self._drop_what_is_abandoned()
@@ -231,7 +278,3 @@ class Session:
             ready = self.ready()
             there = ready is not None and ready <= self.device.clock.now()
             return self.device.status_byte(message_available=there)
-
-
-class LinkLost(Exception):
-    """The connection is gone; only opening another one helps."""

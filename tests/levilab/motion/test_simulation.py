@@ -374,7 +374,7 @@ def test_where_nothing_can_be_kept_code_is_compiled_anew_and_not_left_beside_the
     # numba's own other place is beside its source, where it would not notice that another file has changed
     (tmp_path / "file").write_text("no folder", encoding="utf-8")
     nowhere = {name: str(tmp_path / "file" / "cache") for name in ("XDG_CACHE_HOME", "LOCALAPPDATA", "HOME")}
-    program = "from levilab.simulator import compiled; print(compiled._folder())"
+    program = "from levilab.simulator.kernels import compiled; print(compiled._folder())"
     ended = subprocess.run(
         [sys.executable, "-c", program], env=os.environ | nowhere, capture_output=True, text=True, check=True
     )

@@ -153,7 +153,7 @@ def test_the_status_byte_is_told_while_a_question_is_worked_on(served, way):
     ids=["53230A", "CNT-91"],
 )
 def test_in_slices_the_same_is_measured_as_at_once(way, model, messages, monkeypatch):
-    monkeypatch.setattr("instruments.virtual.bench.bus.SLICE", 0.0)  # a slice is one step
+    monkeypatch.setattr("instruments.virtual.bench.session.SLICE", 0.0)  # a slice is one step
     alone = Bus({COUNTER: model(VirtualClock(), signal=pulses)}).open(COUNTER)
     for message in messages:
         alone.write(message.encode())
