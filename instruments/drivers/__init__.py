@@ -1,1 +1,43 @@
 """The drivers: the near end of the wire."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from instruments.clock import Clock
+    from instruments.links.transport import Transport
+
+Value = bool | float | str
+
+
+class Instrument(Protocol):
+    """What every driver offers.
+
+    MODELS: what the model field of ``*IDN?`` matches, whole (regular expression); SERIAL: how the instrument's serial
+    line is set when it leaves the factory, empty for one without.
+    """
+
+    MODELS: ClassVar[str]
+    SERIAL: ClassVar[Mapping[str, Any]]
+    transport: Transport
+
+    def __init__(self, transport: Transport, *, clock: Clock | None = None) -> None:
+        """Drive the instrument at this link.  clock: of the bench, for what is waited for; by default the wall's."""
+
+    def identity(self) -> str:
+        """Maker, model, serial number, firmware.  Raises WrongInstrument when another model answers."""
+
+    def settings(self) -> dict[str, Value]:
+        """Its settings as they stand, unit at the end of the name."""
+
+    def unlike(self, now: dict[str, Value]) -> dict[str, tuple[object, object]]:
+        """Settings that stand in the instrument otherwise than they were set: name → (as set, now)."""
+
+    def forget_errors(self) -> None:
+        """Empty the error queue."""
+
+    def close(self) -> None:
+        """Give the instrument back."""

@@ -11,12 +11,14 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar, cast, overload
 
+from instruments.clock import WallClock
 from instruments.errors import BadAnswer, CommandRefused, OutOfRange, WrongInstrument
 from instruments.ieee488 import INFINITY, NOT_A_NUMBER
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
+    from instruments.clock import Clock
     from instruments.links.transport import Transport
 
 T = TypeVar("T", bound=bool | float | str)
@@ -44,9 +46,13 @@ class ScpiInstrument:
     """
 
     MODELS: ClassVar[str] = ".*"
+    #: How its serial line is set when it leaves the factory; empty: it has none.
+    SERIAL: ClassVar[Mapping[str, Any]] = {}
 
-    def __init__(self, transport: Transport) -> None:
+    def __init__(self, transport: Transport, *, clock: Clock | None = None) -> None:
+        """Drive the instrument at this link.  clock: of the bench, for what is waited for; by default the wall's."""
         self.transport = transport
+        self.clock: Clock = clock or WallClock()
         #: What was set last of each declared setting, since the last reset.
         self.set_to: dict[str, bool | float | str] = {}
 

@@ -7,19 +7,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
+from instruments.drivers import Instrument
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
 
-class Counter(Protocol):
+class Counter(Instrument, Protocol):
     """What every counter offers."""
-
-    def identity(self) -> str:
-        """Maker, model, serial number, firmware."""
-
-    def settings(self) -> dict[str, bool | float | str]:
-        """Its settings as they stand."""
 
     def prepare(self, *, gate_s: float, trigger_level_v: float) -> None:
         """Measure frequency at input 1, rising edges, over a gate [s], at a fixed trigger level [V]."""
@@ -32,6 +28,3 @@ class Counter(Protocol):
 
         Raises OutOfRange if the memory of the counter does not hold so many.
         """
-
-    def close(self) -> None:
-        """Give the instrument back."""

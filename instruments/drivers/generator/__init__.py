@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
+from instruments.drivers import Instrument
 from instruments.errors import OutOfRange
 
 #: The highest voltage of either family without a load [V]: offset and half of peak to peak together.
@@ -52,7 +53,7 @@ def check_peak(address: str, amplitude_vpp: float, offset_v: float) -> None:
         raise OutOfRange(address, "|offset| + Vpp/2", peak, f"up to {OPEN_V:g} V")
 
 
-class Generator(Protocol):
+class Generator(Instrument, Protocol):
     """What every generator offers.
 
     waveform: a short word; frequency [Hz]; amplitude, peak to peak, and offset of the open terminals [V]; output:
@@ -66,17 +67,8 @@ class Generator(Protocol):
     output: bool
     limits: Limits
 
-    def identity(self) -> str:
-        """Maker, model, serial number, firmware."""
-
-    def settings(self) -> dict[str, bool | float | str]:
-        """Its settings as they stand."""
-
     def prepare(self, *, waveform: str, frequency_hz: float, amplitude_vpp: float, offset_v: float = 0.0) -> None:
         """Set the signal; the output is off afterwards.  Raises OutOfRange beyond the limits, with nothing sent."""
 
     def off(self) -> None:
         """Switch all outputs off, and see that they are."""
-
-    def close(self) -> None:
-        """Give the instrument back."""

@@ -11,6 +11,7 @@ from instruments.errors import BadAnswer, CommandRefused, OutOfRange
 from instruments.ieee488 import INFINITY
 
 if TYPE_CHECKING:
+    from instruments.clock import Clock
     from instruments.links.transport import Transport
 
 
@@ -85,8 +86,8 @@ class DriveGenerator(ScpiInstrument):
     offset: Setting[float]
     output: Setting[bool]
 
-    def __init__(self, transport: Transport) -> None:
-        super().__init__(transport)
+    def __init__(self, transport: Transport, *, clock: Clock | None = None) -> None:
+        super().__init__(transport, clock=clock)
         #: What the coil stands.
         self.limits = NO_LIMITS
         #: Whether the signal that is set is one of :meth:`prepare`.

@@ -16,6 +16,7 @@ from instruments.drivers.scpi import Setting
 from instruments.ieee488 import INFINITY
 
 if TYPE_CHECKING:
+    from instruments.clock import Clock
     from instruments.links.transport import Transport
 
 
@@ -38,8 +39,8 @@ class Keysight33500B(DriveGenerator):
     load = LoadSetting("OUTP1:LOAD", float, unit="ohm", low=1.0, high=INFINITY)
     output = OutputSwitch("OUTP1", bool)
 
-    def __init__(self, transport: Transport) -> None:
-        super().__init__(transport)
+    def __init__(self, transport: Transport, *, clock: Clock | None = None) -> None:
+        super().__init__(transport, clock=clock)
         self._model = ""
 
     def identity(self) -> str:

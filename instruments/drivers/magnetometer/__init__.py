@@ -7,15 +7,11 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from instruments.drivers import Instrument
 
-class Magnetometer(Protocol):
+
+class Magnetometer(Instrument, Protocol):
     """What every magnetometer offers."""
-
-    def identity(self) -> str:
-        """Maker, model, serial number, firmware."""
-
-    def settings(self) -> dict[str, bool | float | str]:
-        """Its settings as they stand."""
 
     def prepare(self, *, range_t: float | None) -> None:
         """Measure steady flux density up to this [T]; None: the instrument chooses its range."""
@@ -25,6 +21,3 @@ class Magnetometer(Protocol):
 
     def zero(self) -> None:
         """Take the present flux density for zero: with the probe in its zero-gauss chamber, and only there."""
-
-    def close(self) -> None:
-        """Give the instrument back."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from instruments.drivers.scpi import ScpiInstrument, Setting
 from instruments.errors import BadAnswer, CommandRefused, OutOfRange
@@ -50,7 +50,6 @@ class LakeShoreGaussmeter(ScpiInstrument):
     """
 
     #: What SerialTransport must be told; pause: between two exchanges [s].
-    SERIAL: ClassVar[Mapping[str, Any]]
     #: Greatest flux density of each range [T], by probe, lowest first.
     RANGES_T: ClassVar[Mapping[str, tuple[float, ...]]]
     #: RDGMODE for steady fields.

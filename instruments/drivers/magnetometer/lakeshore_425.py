@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from instruments.drivers.magnetometer.lakeshore import (
     ZERO_DONE,
     LakeShoreGaussmeter,
 )
 from instruments.errors import NoAnswer
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 
 class LakeShore425(LakeShoreGaussmeter):
@@ -20,7 +23,13 @@ class LakeShore425(LakeShoreGaussmeter):
     """
 
     MODELS: ClassVar[str] = "MODEL425"
-    SERIAL: ClassVar = {"baud_rate": 57600, "data_bits": 7, "parity": "odd", "stop_bits": 1, "pause": 0.03}
+    SERIAL: ClassVar[Mapping[str, Any]] = {
+        "baud_rate": 57600,
+        "data_bits": 7,
+        "parity": "odd",
+        "stop_bits": 1,
+        "pause": 0.03,
+    }
     RANGES_T: ClassVar = {
         "HSE": (3.5e-3, 35e-3, 0.35, 3.5),
         "HST": (35e-3, 0.35, 3.5, 35.0),

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from instruments.drivers.magnetometer.lakeshore import (
     LakeShoreGaussmeter,
 )
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 
 class LakeShore475(LakeShoreGaussmeter):
@@ -18,7 +21,13 @@ class LakeShore475(LakeShoreGaussmeter):
     """
 
     MODELS: ClassVar[str] = "MODEL4[57]5"
-    SERIAL: ClassVar = {"baud_rate": 9600, "data_bits": 7, "parity": "odd", "stop_bits": 1, "pause": 0.05}
+    SERIAL: ClassVar[Mapping[str, Any]] = {
+        "baud_rate": 9600,
+        "data_bits": 7,
+        "parity": "odd",
+        "stop_bits": 1,
+        "pause": 0.05,
+    }
     RANGES_T: ClassVar = {
         "HSE": (350e-6, 3.5e-3, 35e-3, 0.35, 3.5),
         "HST": (3.5e-3, 35e-3, 0.35, 3.5, 35.0),

@@ -7,12 +7,12 @@ oscilloscope_rigol.py and oscilloscope_keysight.py.
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from instruments.drivers import Instrument
 from instruments.errors import InstrumentError
 
 if TYPE_CHECKING:
@@ -22,28 +22,6 @@ if TYPE_CHECKING:
 
 #: No scope of these families has a longer record; a preamble that says so was misheard.
 _MOST_POINTS = 100_000_000
-
-
-class Clock(Protocol):
-    """The time that passes while a trigger is waited for: the wall's, or the bench's own."""
-
-    def now(self) -> float:
-        """The time [s]."""
-
-    def sleep(self, duration: float) -> None:
-        """Let time pass [s]."""
-
-
-class WallClock:
-    """The wall clock."""
-
-    def now(self) -> float:
-        """Seconds since some start; see :class:`Clock`."""
-        return time.monotonic()
-
-    def sleep(self, duration: float) -> None:
-        """Wait so long [s]."""
-        time.sleep(duration)
 
 
 class NeverTriggered(InstrumentError):
@@ -115,14 +93,8 @@ class Preamble:
         return 1 <= self.points <= _MOST_POINTS and self.dt_s > 0 and all(map(math.isfinite, numbers))
 
 
-class Oscilloscope(Protocol):
+class Oscilloscope(Instrument, Protocol):
     """What every oscilloscope offers."""
-
-    def identity(self) -> str:
-        """Maker, model, serial number, firmware."""
-
-    def settings(self) -> dict[str, bool | float | str]:
-        """Its settings as they stand."""
 
     def prepare(
         self,
@@ -170,6 +142,3 @@ class Oscilloscope(Protocol):
 
     def off(self) -> None:
         """Acquire no more."""
-
-    def close(self) -> None:
-        """Give the instrument back."""

@@ -90,14 +90,14 @@ class RigolDS1000Z(Scope):
 
     def _start(self) -> None:
         self.command(":SING")
-        self._started, self._seen, self._forced = self._clock.now(), False, False
+        self._started, self._seen, self._forced = self.clock.now(), False, False
         self._forces = self._setup is not None and self._setup.sweep == "auto"
 
     def _complete(self) -> bool:
         status = self.transport.query(":TRIG:STAT?")
         if status not in {"TD", "WAIT", "RUN", "AUTO", "STOP"}:
             self._misheard(":TRIG:STAT?", status, "TD, WAIT, RUN, AUTO or STOP")
-        waited = self._clock.now() - self._started
+        waited = self.clock.now() - self._started
         if status == "STOP":
             return self._seen or waited >= self._SETTLED
         self._seen = True

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, ClassVar, NoReturn
 
 import numpy as np
 
-from instruments.drivers.oscilloscope import Clock, NeverTriggered, NothingAcquired, Preamble, Trace, WallClock
+from instruments.drivers.oscilloscope import NeverTriggered, NothingAcquired, Preamble, Trace
 from instruments.drivers.oscilloscope.setup import Channel, Setup, is_still
 from instruments.drivers.scpi import ScpiInstrument, Setting
 from instruments.errors import BadAnswer, InstrumentError, NoAnswer, OutOfRange, SettingsLost
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from instruments.clock import Clock
     from instruments.drivers.oscilloscope.setup import Value
     from instruments.links.transport import Transport
 
@@ -55,8 +56,7 @@ class Scope(ScpiInstrument):
 
     def __init__(self, transport: Transport, *, clock: Clock | None = None) -> None:
         """Drive the scope.  clock: the one its trigger is waited for with; by default the wall's."""
-        super().__init__(transport)
-        self._clock: Clock = clock or WallClock()
+        super().__init__(transport, clock=clock)
         self._acquired = False
         self._duration = 0.0
         self._setup: Setup | None = None
@@ -256,13 +256,13 @@ class Scope(ScpiInstrument):
 
     def _wait(self, timeout: float) -> None:
         """Wait until the record is complete.  Raises NeverTriggered, SettingsLost."""
-        deadline = self._clock.now() + self._duration + timeout
+        deadline = self.clock.now() + self._duration + timeout
         while not self._complete():
-            if self._clock.now() >= deadline:
+            if self.clock.now() >= deadline:
                 self._check_kept()
                 level, source = self.trigger_level, self.trigger_source
                 raise NeverTriggered(self.transport.address, level_v=level, source=source, waited_s=timeout)
-            self._clock.sleep(_POLL)
+            self.clock.sleep(_POLL)
 
     def _start(self) -> None:
         raise NotImplementedError
