@@ -17,12 +17,14 @@ from datetime import UTC, datetime
 from typing import IO, TYPE_CHECKING, Any, Self
 
 from levilab.files import CannotWrite, replace_atomically, sync_folder
+from levilab.runs import traces
 from levilab.runs.run import EVENTS, PACKAGE, READINGS, RECORD, STATES, WIRE, RunRecord, lock_of, utc_now
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
     from pathlib import Path
 
+    from instruments.drivers.oscilloscope import Trace
     from levilab.runs.run import Run, Status
 
 
@@ -116,6 +118,14 @@ class RunWriter:
             for line in lines:
                 self._append(STATES, line, sync=False)
             os.fsync(self._files[STATES].fileno())
+
+    def trace(self, time_s: float, trace: Trace, channel: str) -> int:
+        """Keep an oscilloscope's record; returns its number.  Raises CannotWrite."""
+        number = len(list((self.folder / traces.FOLDER).glob("*.npy"))) + 1
+        with _told(f"write the record {number}", self.folder):
+            line = traces.save_codes(self.folder, number, time_s, trace, channel)
+            self._append(traces.INDEX, line)
+        return number
 
     def event(self, time_s: float | None, kind: str, text: str, **data: Any) -> None:
         """Append a line to events.jsonl."""

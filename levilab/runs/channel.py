@@ -1,0 +1,14 @@
+"""What a run measures: the columns of its readings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A column of readings.csv.  unit: "" for a pure number; source: where it comes from, in words."""
+
+    name: str
+    unit: str
+    source: str
