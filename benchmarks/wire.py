@@ -42,9 +42,10 @@ from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from instruments.virtual.oscilloscope.rigol_ds1000z import VirtualDS1000Z
 from instruments.virtual.servers.server import BenchServer
 from levilab.acquisition.loop import acquire
-from levilab.acquisition.request import spin_order
+from levilab.acquisition.request import Options, request_for
 from levilab.present.progress import Show
-from levilab.world.spin_world import SpinScene, SpinWorld
+from levilab.world.bench import virtual_wiring
+from levilab.world.spin_world import SpinScene, SpinWorld, drawn
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -374,16 +375,13 @@ def acquisition(rounds: int) -> dict[str, float]:
 
 def _acquired() -> dict[str, float]:
     with tempfile.TemporaryDirectory() as folder, ExitStack() as patched:
-        order = spin_order(
-            mock=True, bench=None, out=Path(folder), seed=1, note="", realtime=False, resume=None, wire_log=False
-        )
-        assert order.world
-        world: Any = order.world()
+        request = request_for("spin", Options(mock=True, out=Path(folder), seed=1))
+        world: Any = SpinWorld(drawn(1), VirtualClock())
         light = world.light = Stopwatch(world.light)
         disk = Stopwatch(os.fsync)
         patched.enter_context(mock.patch("os.fsync", disk))
         start = time.perf_counter()
-        run = acquire(replace(order, world=lambda: world), mock.Mock(spec=Show))
+        run = acquire(replace(request, wiring=lambda: virtual_wiring(world)), mock.Mock(spec=Show))
         total, readings = time.perf_counter() - start, run.count()
     rest = total - light.seconds - disk.seconds
     return {

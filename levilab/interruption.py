@@ -37,6 +37,7 @@ class Stop:
     def __init__(self) -> None:
         self.by: str | None = None
         self._shielded = False
+        self._at_once = False
 
     def check(self) -> None:
         """Raise Interrupted if somebody asked."""
@@ -47,10 +48,20 @@ class Stop:
         """From here on nothing breaks through: the outputs are going off."""
         self._shielded = True
 
+    @contextlib.contextmanager
+    def at_once(self) -> Iterator[None]:
+        """Here already the first signal breaks through: what waits for a person need not end well."""
+        self.check()
+        self._at_once = True
+        try:
+            yield
+        finally:
+            self._at_once = False
+
     def __call__(self, number: int, frame: FrameType | None) -> None:
         """The signal handler."""
         second, self.by = self.by is not None, signal.Signals(number).name
-        if second and not self._shielded:
+        if (second or self._at_once) and not self._shielded:
             self._shielded = True
             raise Interrupted(self.by)
 

@@ -89,11 +89,12 @@ def test_links_between_the_pages_lead_somewhere(page: Path) -> None:
 
 
 def test_the_bench_of_the_page_is_a_valid_one(tmp_path: Path) -> None:
+    from levilab.acquisition.table import Configuration, settings_of
     from levilab.bench.config import read_bench
 
     ((_, text),) = blocks("toml")
     path = tmp_path / "bench.toml"
     path.write_text(text, encoding="utf-8")
-    bench = read_bench(path)
+    bench = read_bench(path, Configuration)
     assert bench.counter
-    assert bench.spin.reading_u_hz == 0.03
+    assert settings_of(bench, "spin").reading_u_hz == 0.03

@@ -1,27 +1,31 @@
-"""From the words of a command line to what is to be acquired."""
+"""From what a person asks for to what is to be acquired: the one place where a mock differs from hardware."""
 
 from __future__ import annotations
 
 import secrets
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
 from instruments.clock import VirtualClock
-from levilab.acquisition.loop import Order
-from levilab.bench.config import BenchConfig, ConfigError, read_bench, within_limits
+from levilab.acquisition.experiment import CounterSettings
+from levilab.acquisition.loop import AcquisitionRequest
+from levilab.acquisition.session import ask_no_person
+from levilab.acquisition.table import EXPERIMENTS, Configuration, settings_of, with_settings
+from levilab.bench.config import BenchConfig, ConfigError, read_bench
+from levilab.bench.wiring import described_wiring
 from levilab.errors import LevilabError
 from levilab.runs.run import Run, find_run
 from levilab.settings import in_one_line
-from levilab.world.bench import scene_world
+from levilab.simulator.scene import SceneError, read_scene, scene_of
+from levilab.world.bench import VIRTUAL, scene_world, virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld, drawn
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from levilab.bench.config import SpinSettings
     from levilab.simulator.scene import Scene
 
 HOW = (
@@ -42,87 +46,143 @@ class ContradictoryOptions(LevilabError):
     exit_code = 2
 
 
-def spin_order(
-    *,
-    mock: bool,
-    bench: Path | None,
-    out: Path,
-    seed: int | None,
-    note: str,
-    realtime: bool,
-    resume: Path | None,
-    wire_log: bool,
-    scene: str | None = None,
-    tell: Callable[[str], None] = lambda _: None,
-) -> Order:
-    """What `levilab acquire spin` is to do; tell: is told what takes long before it begins.
+@dataclass(frozen=True)
+class Options:
+    """How an experiment is to be carried out.
 
-    Raises ConfigError, CannotResume, ContradictoryOptions, DataError, SceneError.
+    Attributes:
+        mock: on the virtual bench.
+        bench: the bench file; by default bench.toml; with mock only its settings count.
+        out: the folder in which the run folder is made.
+        seed: makes a virtual run repeatable.
+        scene: with mock, the name or file of a scene in full motion; by default the top only spins.
+        note: kept with the run.
+        realtime: keeps the virtual bench to the wall clock.
+        resume: the run to go on with.
+        wire_log: keeps all bytes on the wire.
+        person: asks the person at a real bench a question, and returns the answer.
+        tell: called with a line about what takes long before it begins.
     """
-    run = _resumable(find_run(resume, out)) if resume else None
-    virtual = mock or bool(run and run.record.seed is not None)
-    if seed is not None and (run or not mock):
-        raise ContradictoryOptions("--seed goes with --mock, and not with --resume: a run keeps its seed")
-    if scene is not None and (run or not mock):
-        raise ContradictoryOptions("--scene goes with --mock, and not with --resume: a run keeps its scene")
-    if realtime and not virtual:
+
+    mock: bool = False
+    bench: Path | None = None
+    out: Path = Path("runs")
+    seed: int | None = None
+    scene: str | None = None
+    note: str = ""
+    realtime: bool = False
+    resume: Path | None = None
+    wire_log: bool = False
+    person: Callable[[str], str] = ask_no_person
+    tell: Callable[[str], None] = lambda _: None
+
+
+def request_for(experiment: str, options: Options) -> AcquisitionRequest:
+    """What is to be acquired.  Raises ConfigError, CannotResume, ContradictoryOptions, DataError, SceneError."""
+    run = _resumable(find_run(options.resume, options.out), experiment) if options.resume else None
+    virtual = options.mock or bool(run and run.record.seed is not None)
+    _check_options(options, run, virtual=virtual)
+    config = _configuration(options, run, virtual=virtual)
+    settings_of(config, experiment).check(experiment, config.limits)
+    request = AcquisitionRequest(
+        experiment,
+        config,
+        lambda: described_wiring(config),
+        out=options.out,
+        note=options.note,
+        wire_log=options.wire_log,
+        resume=run,
+        person=options.person,
+    )
+    if virtual:
+        return _on_the_virtual_bench(request, options)
+    wiring = described_wiring(config)
+    for kind in EXPERIMENTS[experiment].instruments:
+        wiring.described(kind)
+    if run:
+        run.elapsed()  # raises before the bench is touched
+    return request
+
+
+def _check_options(options: Options, run: Run | None, *, virtual: bool) -> None:
+    for name in ("seed", "scene"):
+        if getattr(options, name) is not None and (run or not options.mock):
+            raise ContradictoryOptions(f"--{name} goes with --mock, and not with --resume: a run keeps its {name}")
+    if options.realtime and not virtual:
         raise ContradictoryOptions("--realtime goes with --mock: a real bench always keeps to the wall clock")
-    config = _as_it_was(run) if run else BenchConfig()
-    if bench or not virtual:
-        described = read_bench(bench or Path("bench.toml"))
-        # a run is gone on with as it was begun; only where the instruments are may have changed
-        addresses = {kind: getattr(described, kind) for kind in ("visa_library", "counter", "generator", "limits")}
-        config = config.model_copy(update=addresses) if run else described
-    within_limits(config)
-    if not virtual:
-        if run:
-            run.elapsed()  # before the bench is touched
-        return Order("spin", config, out=out, note=note, wire_log=wire_log, resume=run)
-    seed = run.record.seed if run else secrets.randbelow(1 << 31) if seed is None else seed
-    order = Order("spin", config, out=out, seed=seed, note=note, wire_log=wire_log, resume=run)
-    moving = _scene(scene, run)
-    if moving is None:
-        return _of_a_spin(order, drawn(seed or 0), realtime=realtime)
-    return replace(
-        order,
-        config=config.model_copy(update={"visa_library": "@levilab"}),
-        world=lambda: scene_world(moving, lambda: VirtualClock(realtime=realtime), tell, seed=seed or 0),
-        how=HOW.format(top=_IN_MOTION.format(name=moving.name)),
-        scene=moving.as_table(),
-    )
 
 
-def _scene(name: str | None, run: Run | None) -> Scene | None:
-    """The scene that was asked for, or that a run was begun with."""
-    begun = run.record.configuration.get("scene") if run else None
-    if name is None and begun is None:
-        return None
-    from levilab.simulator.scene import SceneError, read_scene, scene_of
+def _configuration(options: Options, run: Run | None, *, virtual: bool) -> BenchConfig:
+    """What the bench file says; a run is resumed as it was begun, only where the instruments are may have changed."""
+    config = _as_it_was(run) if run else Configuration()
+    if options.bench or not virtual:
+        described = read_bench(options.bench or Path("bench.toml"), Configuration)
+        places = {kind: getattr(described, kind) for kind in ("visa_library", "limits", *VIRTUAL)}
+        config = config.model_copy(update=places) if run else described
+    return config
 
-    scene = scene_of(begun) if begun is not None else read_scene(str(name))
-    if scene.top.aligned:
-        raise SceneError(
-            f"scene {scene.name}: no drive can hold a top whose moment lies along its axis (top.moment_tilt.0 = 0): "
-            "take spindown, or give it a part across, such as top.moment_tilt = [0.03, 0.97]"
+
+def _as_it_was(run: Run) -> BenchConfig:
+    """The configuration that a run was begun with."""
+    bench = {key: value for key, value in run.record.configuration.items() if key != "scene"}
+    try:
+        return Configuration.model_validate(bench)
+    except ValidationError as error:
+        raise ConfigError(f"{run.folder}/run.json: configuration: {in_one_line(error)}") from error
+
+
+def _resumable(folder: Path, experiment: str) -> Run:
+    run = Run.load(folder)
+    if run.record.experiment != experiment:
+        raise CannotResume(
+            f"{folder}: holds a {run.record.experiment} run, levilab acquire {experiment} resumes {experiment} runs"
         )
-    return scene
+    if run.status in {"running", "finished"}:
+        raise CannotResume(f"{folder}: is {run.status}, only an interrupted or failed run can be resumed")
+    if run.record.time_zero_utc is None or not run.count():
+        raise CannotResume(f"{folder}: ended before its first reading, there is nothing to go on with: start anew")
+    return run
 
 
-def _of_a_spin(order: Order, scene: SpinScene, *, realtime: bool) -> Order:
-    """The order with a world in which the top only spins."""
-    spin = _with_uncertainty(order.config.spin, scene)
+# --- the virtual bench ---
+
+
+def _on_the_virtual_bench(request: AcquisitionRequest, options: Options) -> AcquisitionRequest:
+    """The request with the wiring of a virtual bench, whose top spins only or moves as a scene's."""
+    run = request.resume
+    seed = run.record.seed if run else options.seed
+    seed = secrets.randbelow(1 << 31) if seed is None else seed
+    config = request.config.model_copy(update={"visa_library": "@levilab", **VIRTUAL})
+    request = replace(request, seed=seed, config=config)
+    scene = _scene(options.scene, run)
+
+    def clock() -> VirtualClock:
+        return VirtualClock(realtime=options.realtime)
+
+    if scene is None:
+        return _with_a_spinning_top(request, drawn(seed), clock)
     return replace(
-        order,
-        config=order.config.model_copy(update={"visa_library": "@levilab", "spin": spin}),
-        world=lambda: SpinWorld(scene, VirtualClock(realtime=realtime)),
-        how=HOW.format(top=_SPIN_ONLY.format(law=_law_in_words(scene))),
+        request,
+        wiring=lambda: virtual_wiring(scene_world(scene, clock, options.tell, seed=seed), config.limits),
+        synthetic_how=HOW.format(top=_IN_MOTION.format(name=scene.name)),
+        scene=scene.as_table(),
     )
 
 
-def _with_uncertainty(settings: SpinSettings, scene: SpinScene) -> SpinSettings:
-    """The scene's jitter is what one pulse scatters by: a reading over a gate T scatters by √2 jitter/T."""
-    u = settings.reading_u_hz or round(2**0.5 * scene.jitter / settings.gate_s, 6)
-    return settings.model_copy(update={"reading_u_hz": u})
+def _with_a_spinning_top(
+    request: AcquisitionRequest, scene: SpinScene, clock: Callable[[], VirtualClock]
+) -> AcquisitionRequest:
+    """A world in which the top only spins; what one pulse scatters by is known there."""
+    config = request.config
+    settings: Any = settings_of(config, request.experiment)
+    if isinstance(settings, CounterSettings):
+        config = with_settings(config, request.experiment, settings.with_jitter(scene.jitter))
+    return replace(
+        request,
+        config=config,
+        wiring=lambda: virtual_wiring(SpinWorld(scene, clock()), config.limits),
+        synthetic_how=HOW.format(top=_SPIN_ONLY.format(law=_law_in_words(scene))),
+    )
 
 
 def _law_in_words(scene: SpinScene) -> str:
@@ -130,21 +190,15 @@ def _law_in_words(scene: SpinScene) -> str:
     return f"{scene.drag} law with {constants} (SI), falling at {scene.fall_hz:.2f} Hz"
 
 
-def _as_it_was(run: Run) -> BenchConfig:
-    """The configuration that a run was begun with."""
-    bench = {key: value for key, value in run.record.configuration.items() if key != "scene"}
-    try:
-        return BenchConfig.model_validate(bench)
-    except ValidationError as error:
-        raise ConfigError(f"{run.folder}/run.json: configuration: {in_one_line(error)}") from error
-
-
-def _resumable(folder: Path) -> Run:
-    run = Run.load(folder)
-    if run.record.experiment != "spin":
-        raise CannotResume(f"{folder}: holds a {run.record.experiment} run, levilab acquire spin resumes spin runs")
-    if run.status in {"running", "finished"}:
-        raise CannotResume(f"{folder}: is {run.status}, only an interrupted or failed run can be resumed")
-    if run.record.time_zero_utc is None or not run.count():
-        raise CannotResume(f"{folder}: ended before its first reading, there is nothing to go on with: start anew")
-    return run
+def _scene(name: str | None, run: Run | None) -> Scene | None:
+    """The scene that was asked for, or that a run was begun with."""
+    begun = run.record.configuration.get("scene") if run else None
+    if name is None and begun is None:
+        return None
+    scene = scene_of(begun) if begun is not None else read_scene(str(name))
+    if scene.top.aligned:
+        raise SceneError(
+            f"scene {scene.name}: no drive can hold a top whose moment lies along its axis (top.moment_tilt.0 = 0): "
+            "take spindown, or give it a part across, such as top.moment_tilt = [0.03, 0.97]"
+        )
+    return scene

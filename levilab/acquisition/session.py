@@ -1,61 +1,100 @@
-"""An acquisition under way: what the steps of an experiment act on."""
+"""An acquisition under way: what the steps of every experiment act on."""
 
 from __future__ import annotations
 
+import contextlib
+import math
 from dataclasses import dataclass, field
-from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from instruments.errors import InstrumentError
+from instruments.errors import InstrumentError, SettingsLost
 from levilab.errors import LevilabError
+from levilab.runs.run import utc_now
+from levilab.settings import Settings
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
+    from instruments.drivers.oscilloscope import Trace
     from levilab.bench.bench import Bench
-    from levilab.bench.config import ExperimentSettings
     from levilab.interruption import Stop
     from levilab.present.progress import Show
+    from levilab.runs.channel import Channel
+    from levilab.runs.run import Run
     from levilab.runs.writer import RunWriter
 
+S = TypeVar("S", bound=Settings)
 
-#: So long is slept at a stretch before looking whether somebody asked for the end [s].
+#: Longest sleep between two checks for Ctrl-C [s].
 _NAP_S = 0.2
 #: Pauses [s] before the tries to reach an instrument again, half a minute in all.
 REOPENING_S = (0.0, 1.0, 2.0, 4.0, 8.0, 16.0)
 #: An instrument that is lost so many times in a row, with no reading in between, is broken.
 MOST_LOSSES = 5
 
+#: A reading: channel → value.  A value that is not known has no key.
+Row = dict[str, float]
+
+
+class ExperimentFailed(LevilabError):
+    """The experiment cannot go on, for a reason that lies on the bench."""
+
+
+@dataclass(frozen=True)
+class Earlier:
+    """The run that is resumed.  replay: its world is virtual, and is brought to where the run left it."""
+
+    run: Run
+    rows: list[Row]
+    replay: bool
+
+
+def ask_no_person(question: str) -> str:  # noqa: ARG001 - as a person is asked
+    """The answer where no person is at the bench: none."""
+    return ""
+
 
 @dataclass
-class Session:
-    """An acquisition under way: what the steps of an experiment act on.
+class Session(Generic[S]):
+    """An acquisition under way.
 
-    zero: bench time of time_s = 0 [s], None before it is reached;
-    replaying: while a virtual top is brought to where a resumed run left it; that is no event of the run;
-    asked: when the last reading was asked for [s];
-    rows: the readings so far; missed: why there was none at the last times asked, empty after a reading;
-    losses: how often an instrument was lost since the last reading.
+    Attributes:
+        bench: the open instruments.
+        settings: of the experiment.
+        channels: the columns of the readings.
+        writer: the run folder.
+        show: what the person at the bench sees.
+        stop: whether the end was asked for.
+        person: asks the person at the bench a question, and returns the answer.
+        earlier: the run that is resumed, if one is.
+        rows: the readings so far, those of the resumed run included.
+        zero: bench time of time_s = 0 [s], None before it is reached.
+        asked: when the last reading was asked for [s].
     """
 
     bench: Bench
-    settings: ExperimentSettings
+    settings: S
+    channels: tuple[Channel, ...]
     writer: RunWriter
     show: Show
     stop: Stop
-    zero: float | None = None
-    replaying: bool = False
-    asked: float = 0.0
+    person: Callable[[str], str] = ask_no_person
+    earlier: Earlier | None = None
     rows: list[Row] = field(default_factory=list)
-    missed: list[Missed] = field(default_factory=list)
-    losses: int = 0
+    zero: float | None = None
+    asked: float = 0.0
+    _replaying: bool = False
+    _losses: int = 0  # since the last reading
+    _lost: bool = False  # since the last reading was asked for
+
+    # --- time ---
 
     def now(self) -> float:
         """Seconds since time zero."""
         return self.bench.clock.now() - (self.zero or 0.0)
 
     def wait(self, duration: float) -> None:
-        """Let bench time pass [s].  Raises Interrupted if somebody asks for the end."""
+        """Let bench time pass [s].  Raises Interrupted if the end was asked for."""
         end = self.bench.clock.now() + duration
         while True:
             self.stop.check()
@@ -64,62 +103,127 @@ class Session:
                 return
             self.bench.clock.sleep(min(left, _NAP_S))
 
+    def begin(self, start: Callable[[], None]) -> None:
+        """Bring the top to where reading begins: that moment is time zero.
+
+        A resumed run is taken up where it was left, without starting again: a real top has gone on meanwhile; the one
+        of a virtual bench is started once more, which is no event of the run, and left alone up to the last reading.
+        """
+        if self.earlier is None:
+            start()
+            self.zero = self.bench.clock.now()
+            self.writer.update(time_zero_utc=utc_now())
+            return
+        if self.earlier.replay:
+            with self._replay():
+                start()
+            self.zero = self.bench.clock.now()
+            self.wait(self.rows[-1]["time_s"])
+        else:
+            self.zero = self.bench.clock.now() - self.earlier.run.elapsed()
+        count = len(self.rows)
+        self.event("resumed", f"resumed after {count} reading{'s' * (count != 1)}, without driving again")
+
+    @contextlib.contextmanager
+    def _replay(self) -> Iterator[None]:
+        self._replaying = True
+        try:
+            yield
+        finally:
+            self._replaying = False
+
+    def readings_every(self, interval_s: float, longest_s: float) -> Iterator[float]:
+        """Wait for each multiple of the interval after time zero, and yield the time at which it came [s].
+
+        Ends after longest_s.  What passes while a lost instrument is reached again is left out, not caught up with.
+        """
+        k = int(self.now() // interval_s) + 1 if self.rows else 0
+        while True:
+            self.wait(k * interval_s - self.now())
+            self.asked, self._lost = self.now(), False
+            yield self.asked
+            k = max(k + 1, math.ceil(self.now() / interval_s)) if self._lost else k + 1
+            if self.now() > longest_s:
+                name = self.writer.record.experiment
+                self.event("longest", f"{longest_s:g} s are over ({name}.longest_s)")
+                return
+
+    # --- what the person sees, and what is written down ---
+
     def event(self, kind: str, text: str, **data: Any) -> None:
         """Write down and show what happened."""
-        if self.replaying:
+        if self._replaying:
             return
         self.writer.event(None if self.zero is None else self.now(), kind, text, **data)
         self.show.message(text)
 
-    def find_again(self, kind: str, error: InstrumentError, set_up: Callable[[Session], None]) -> None:
+    def progress(self, text: str, share: float) -> None:
+        """Show how far the bench is on the way to the first reading.  share: from 0 to 1."""
+        if not self._replaying:
+            self.show.preparing(text, share)
+
+    def ask(self, question: str) -> str:
+        """Let the person at the bench do or answer something.  Both stand in the events.
+
+        Returns the answer, empty where nothing but Enter was typed or no person is at the bench.  The first Ctrl-C
+        ends the wait.
+        """
+        self.event("asked the person", question)
+        with self.stop.at_once():
+            answer = self.person(question).strip()
+        if answer:
+            self.event("answered", answer)
+        return answer
+
+    def keep(self, row: Row, time_left_s: float) -> None:
+        """Write a reading down, then show it: what was shown is on the disk.
+
+        time_left_s: expected until the end.  Raises ExperimentFailed if its time does not come after the last one's.
+        """
+        if self.rows and not row["time_s"] > self.rows[-1]["time_s"]:
+            raise ExperimentFailed(f"the clock went back: {row['time_s']} s after {self.rows[-1]['time_s']} s")
+        self.writer.reading(row)
+        self.rows.append(row)
+        self._losses = 0
+        self.show.reading(self._in_words(row), row["time_s"], time_left_s)
+
+    def keep_trace(self, trace: Trace, channel: str) -> int:
+        """Write an oscilloscope's record down, raw.  channel: what it shows.  Returns its number in the run."""
+        return self.writer.trace(self.now(), trace, channel)
+
+    def _in_words(self, row: Row) -> str:
+        """The values of a reading without their uncertainties, as they stand in a line."""
+        texts = [f"{row['time_s']:8.2f} s"]
+        for channel in self.channels:
+            if channel.name in row and channel.name != "time_s" and "_u_" not in channel.name:
+                value = row[channel.name]
+                texts.append(f"{value:9.4f} Hz" if channel.unit == "Hz" else f"{value:11.6g} {channel.unit}")
+        return "  ".join(texts)
+
+    # --- instruments that lose their link, or their settings ---
+
+    def check_settings(self, kind: str) -> None:
+        """Raise SettingsLost where an instrument no longer has the settings that it was given."""
+        if changed := self.bench.changed_settings(kind):
+            raise SettingsLost(self.bench.address(kind), changed)
+
+    def reconnect(self, kind: str, error: InstrumentError, set_up: Callable[[], None]) -> None:
         """An instrument failed in the middle of a run: reach it again and set it up anew, or give up.
 
         Raises the error that began it after the last of the tries in REOPENING_S, or where it is lost again and again.
         """
-        self.losses += 1
+        self._losses, self._lost = self._losses + 1, True
         self.event("instrument lost", f"{kind}: {error}")
-        if self.losses > MOST_LOSSES:
+        if self._losses > MOST_LOSSES:
             raise error
         for tries, pause in enumerate(REOPENING_S, 1):
             self.wait(pause)
             try:
                 self.bench.reopen(kind)
-                set_up(self)
+                set_up()
             except InstrumentError as again:
                 self.event("not reached", f"{kind}, try {tries} of {len(REOPENING_S)}: {again}")
             else:
                 self.event("found again", f"{kind} answers again and is set up as before")
                 return
         raise error
-
-    def keep(self, row: Row, remaining: float) -> None:
-        """Write a reading down, then show it: what was shown is on the disk.
-
-        Raises ExperimentFailed if its time does not come after the last one's.
-        """
-        if self.rows and not float(row["time_s"] or 0.0) > float(self.rows[-1]["time_s"] or 0.0):
-            raise ExperimentFailed(f"the clock went back: {row['time_s']} s after {self.rows[-1]['time_s']} s")
-        self.writer.reading(row)
-        self.rows.append(row)
-        self.missed.clear()
-        self.losses = 0
-        self.show.reading(_in_words(row), float(row["time_s"] or 0.0), remaining)
-
-
-def _in_words(row: Row) -> str:
-    return f"{row['time_s']:8.2f} s  {row['spin_frequency_hz']:9.4f} Hz"
-
-
-class ExperimentFailed(LevilabError):
-    """The experiment cannot go on, for a reason that lies on the bench."""
-
-
-Row = dict[str, float | None]
-
-
-class Missed(StrEnum):
-    """Why there is no reading."""
-
-    DARK = "no light pulses"
-    LOST = "the instrument did not answer as it should"
-    UNSTEADY = "no two counts that agree with each other or with the last reading"

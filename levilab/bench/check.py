@@ -4,23 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 from instruments.errors import InstrumentError
-from levilab.bench.bench import open_bench
+from levilab.bench.bench import Bench, open_bench
 from levilab.bench.config import ConfigError
-from levilab.bench.discover import KINDS
+from levilab.bench.kinds import KINDS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from instruments.drivers.counter import Counter
-    from instruments.drivers.generator import Generator
-    from instruments.drivers.magnetometer import Magnetometer
-    from instruments.drivers.oscilloscope import Oscilloscope
-    from instruments.drivers.scpi import ScpiInstrument
-    from levilab.bench.config import BenchConfig
-    from levilab.world.spin_world import World
+    from levilab.bench.wiring import Wiring
 
 
 @dataclass(frozen=True)
@@ -43,32 +37,39 @@ class Checked:
     trouble: str = ""
 
 
+@dataclass(frozen=True)
+class Light:
+    """How the light of the phototransistor is looked at: a gate [s], and a trigger level [V]."""
+
+    gate_s: float = 1.0
+    trigger_level_v: float = 0.6
+
+
 #: In words, the value, its unit.
 Reading = tuple[str, float | None, str]
 
 
-def _count(instrument: ScpiInstrument, config: BenchConfig) -> Reading:
-    counter = cast("Counter", instrument)
-    counter.prepare(gate_s=min(config.spin.gate_s, 1.0), trigger_level_v=config.spin.trigger_level_v)
-    spin = counter.frequency()
-    if spin is None:
-        return f"no pulses at {config.spin.trigger_level_v:g} V: a top that does not spin, or no light", None, "Hz"
-    return f"{spin:.4f} Hz at {config.spin.trigger_level_v:g} V", spin, "Hz"
+def _check_counter(bench: Bench, light: Light) -> Reading:
+    bench.counter.prepare(gate_s=min(light.gate_s, 1.0), trigger_level_v=light.trigger_level_v)
+    frequency = bench.counter.frequency()
+    level = f"{light.trigger_level_v:g} V"
+    if frequency is None:
+        return f"no pulses at {level}: a top that does not spin, or no light", None, "Hz"
+    return f"{frequency:.4f} Hz at {level}", frequency, "Hz"
 
 
-def _generated(instrument: ScpiInstrument, _: BenchConfig) -> Reading:
-    generator = cast("Generator", instrument)
-    frequency = generator.frequency
+def _check_generator(bench: Bench, _: Light) -> Reading:
+    frequency = bench.generator.frequency
     return f"output off, set to {frequency:g} Hz", frequency, "Hz"
 
 
-def _seen(instrument: ScpiInstrument, config: BenchConfig) -> Reading:
-    scope = cast("Oscilloscope", instrument)
+def _check_oscilloscope(bench: Bench, light: Light) -> Reading:
+    scope = bench.oscilloscope
     scope.prepare(
         duration_s=0.1,
         points=1000,
         volts_per_division=0.5,
-        trigger_level_v=config.spin.trigger_level_v,
+        trigger_level_v=light.trigger_level_v,
         sweep="auto",
     )
     scope.acquire(timeout_s=5.0)
@@ -79,46 +80,42 @@ def _seen(instrument: ScpiInstrument, config: BenchConfig) -> Reading:
     return f"channel 1 between {low:.2f} and {high:.2f} V in 0.1 s", high - low, "V"
 
 
-def _felt(instrument: ScpiInstrument, _: BenchConfig) -> Reading:
-    meter = cast("Magnetometer", instrument)
-    meter.prepare(range_t=None)
-    flux_density = meter.flux_density()
+def _check_magnetometer(bench: Bench, _: Light) -> Reading:
+    bench.magnetometer.prepare(range_t=None)
+    flux_density = bench.magnetometer.flux_density()
     if flux_density is None:
         return "more than its range", None, "T"
     return f"{1e3 * flux_density:.4g} mT", flux_density, "T"
 
 
 #: What one reading of a kind is.
-READINGS: dict[str, Callable[[ScpiInstrument, BenchConfig], Reading]] = {
-    "counter": _count,
-    "generator": _generated,
-    "oscilloscope": _seen,
-    "magnetometer": _felt,
+READINGS: dict[str, Callable[[Bench, Light], Reading]] = {
+    "counter": _check_counter,
+    "generator": _check_generator,
+    "oscilloscope": _check_oscilloscope,
+    "magnetometer": _check_magnetometer,
 }
 
 
-def check(config: BenchConfig, world: World | None = None) -> Iterator[Checked]:
-    """Each instrument that is described, one after the other; of a world all kinds.
+def check(wiring: Wiring, light: Light) -> Iterator[Checked]:
+    """Each instrument of a bench, one after the other.
 
     The generator's output is off afterwards.  Raises ConfigError where nothing is described.
     """
-    kinds = [kind for kind in KINDS if world or getattr(config, kind)]
+    kinds = [kind for kind in KINDS if kind in wiring.instruments]
     if not kinds:
         raise ConfigError("the bench file describes no instrument: `levilab bench init` writes one from what answers")
     for kind in kinds:
-        yield _checked(kind, config, world)
+        yield _checked(kind, wiring, light)
 
 
-def _checked(kind: str, config: BenchConfig, world: World | None) -> Checked:
-    from levilab.world.bench import VIRTUAL
-
-    address = VIRTUAL[kind].address if world else getattr(config, kind).address
+def _checked(kind: str, wiring: Wiring, light: Light) -> Checked:
+    address = wiring.instruments[kind].address
     seen: dict[str, Any] = {}
     try:
-        with open_bench(config, (kind,), world=world) as bench:
-            instrument = bench.instruments[kind]
-            seen = _identity(instrument.identity())
-            reading, value, unit = READINGS[kind](instrument, config)
+        with open_bench(wiring, (kind,)) as bench:
+            seen = _identity(bench.instruments[kind].identity())
+            reading, value, unit = READINGS[kind](bench, light)
     except (InstrumentError, ConfigError) as error:
         return Checked(kind, address, **seen, trouble=str(error).removeprefix(f"{address}: "))
     return Checked(kind, address, **seen, reading=reading, value=_finite(value), unit=unit)

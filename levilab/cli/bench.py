@@ -37,7 +37,8 @@ def bench_init(
     Only *IDN? is sent.  Instruments on the network are found by themselves where PyVISA can look for them (pip install
     psutil zeroconf); else name them with --address.
     """
-    from levilab.bench.discover import NobodyFound, bench_text, refuse_to_overwrite, search, write_bench
+    from levilab.bench.discover import search
+    from levilab.bench.template import NobodyFound, bench_text, refuse_to_overwrite, write_bench
 
     if not force:
         refuse_to_overwrite(out)
@@ -76,15 +77,19 @@ def bench_check(
 
     The drive stays off.  Exit status 3 if one did not answer as it should.
     """
-    from levilab.bench.check import check
-    from levilab.bench.config import BenchConfig, read_bench
-    from levilab.world.bench import own_world
+    from levilab.acquisition.table import Configuration, counter_settings
+    from levilab.bench.check import Light, check
+    from levilab.bench.config import read_bench
+    from levilab.bench.wiring import described_wiring
+    from levilab.world.bench import own_world, virtual_wiring
 
     if mock and bench:
         raise typer.BadParameter("--mock checks the virtual bench, which no file describes", param_hint="--bench")
-    config = BenchConfig() if mock else read_bench(bench or Path("bench.toml"))
+    config = Configuration() if mock else read_bench(bench or Path("bench.toml"), Configuration)
+    wiring = virtual_wiring(own_world()) if mock else described_wiring(config)
+    counting = counter_settings(config)
     checked = []
-    for one in check(config, own_world() if mock else None):
+    for one in check(wiring, Light(counting.gate_s, counting.trigger_level_v)):
         checked.append(one)
         if not as_json:
             _tell_checked(one)

@@ -111,10 +111,10 @@ def acquire_spin(
     Ctrl-C ends the run after the reading under way; outputs go off and the run is kept.
     """
     from levilab.acquisition.loop import acquire
-    from levilab.acquisition.request import spin_order
+    from levilab.acquisition.request import Options, request_for
     from levilab.present.progress import to_stderr
 
-    order = spin_order(
+    options = Options(
         mock=mock,
         bench=bench,
         out=out,
@@ -125,8 +125,9 @@ def acquire_spin(
         wire_log=wire_log,
         scene=scene,
         tell=lambda text: typer.echo(text, err=True),
+        person=lambda question: typer.prompt(question, default="", show_default=False, prompt_suffix=" ", err=True),
     )
-    run = acquire(order, to_stderr())
+    run = acquire(request_for("spin", options), to_stderr())
     readings = run.count()
     if as_json:
         import json

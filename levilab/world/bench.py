@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from instruments.clock import VirtualClock
-from levilab.bench.config import ConfigError, InstrumentSettings
+from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.protocol_levilab import plug_in
+from instruments.virtual.bench.visa_library import library_for
+from instruments.virtual.core.device import VirtualInstrument
+from instruments.virtual.counter.keysight_53230a import Virtual53230A
+from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
+from instruments.virtual.generator.agilent_33220a import Virtual33220A
+from instruments.virtual.generator.keysight_33500b import Virtual33500B
+from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
+from instruments.virtual.magnetometer.lakeshore_475 import Virtual475
+from instruments.virtual.oscilloscope.keysight_dsox1000 import VirtualDSOX1000
+from instruments.virtual.oscilloscope.rigol_ds1000z import VirtualDS1000Z
+from levilab.bench.config import ConfigError, InstrumentSettings, Limits
+from levilab.bench.wiring import Wiring
+from levilab.world.spin_world import SpinScene, SpinWorld
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    import numpy as np
-    from numpy.typing import NDArray
+    from collections.abc import Mapping
 
     from instruments.clock import Clock
-    from instruments.virtual.bench.bus import Bus
-    from instruments.virtual.core.device import VirtualInstrument
-    from instruments.virtual.generator.generator import Output
     from levilab.simulator.scene import Scene
-    from levilab.world.spin_world import World
+    from levilab.world.spin_world import Array, World
 
 #: Where the virtual instruments are plugged in, and what they are unless other models are asked for.
 VIRTUAL = {
@@ -32,70 +41,41 @@ VIRTUAL = {
 COIL_T_PER_V = 0.4e-3 / 5.0
 
 
-def _counter_53230a(world: World) -> VirtualInstrument:
-    from instruments.virtual.counter.keysight_53230a import Virtual53230A
-
-    return Virtual53230A(world.clock, signal=world.light)
+#: What makes a virtual instrument in a world.
+Maker = Callable[["World"], VirtualInstrument]
 
 
-def _counter_cnt91(world: World) -> VirtualInstrument:
-    from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
-
-    return VirtualCNT91(world.clock, signal=world.light)
-
-
-def _coil_of(world: World) -> Callable[[float, Output], None]:
-    """What a generator does to the world."""
-    return lambda time, output: world.drive(time, output.times(COIL_T_PER_V))
+def at_the_light(model: Callable[..., VirtualInstrument]) -> Maker:
+    """A counter: its input 1 is connected to the phototransistor."""
+    return lambda world: model(world.clock, signal=world.light)
 
 
-def _generator_33500b(world: World) -> VirtualInstrument:
-    from instruments.virtual.generator.keysight_33500b import Virtual33500B
-
-    return Virtual33500B(world.clock, listener=_coil_of(world))
-
-
-def _generator_33220a(world: World) -> VirtualInstrument:
-    from instruments.virtual.generator.agilent_33220a import Virtual33220A
-
-    return Virtual33220A(world.clock, listener=_coil_of(world))
+def at_the_coil(model: Callable[..., VirtualInstrument]) -> Maker:
+    """A generator: its output is connected to the coil."""
+    return lambda world: model(world.clock, listener=lambda time, output: world.drive(time, output.times(COIL_T_PER_V)))
 
 
-def _signals(world: World) -> dict[int, Callable[[float, float, int], NDArray[np.float64]]]:
-    """What the oscilloscope is connected to: the phototransistor, and the generator's output."""
+def scope_signals(world: World) -> dict[int, Callable[[float, float, int], Array]]:
+    """What an oscilloscope is connected to: channel 1 to the phototransistor, channel 2 to the generator's output."""
     return {1: world.light, 2: lambda start, step, n: world.coil_field(start, step, n) / COIL_T_PER_V}
 
 
-def _scope_ds1000z(world: World) -> VirtualInstrument:
-    from instruments.virtual.oscilloscope.rigol_ds1000z import VirtualDS1000Z
-
-    return VirtualDS1000Z(world.clock, signals=_signals(world))
-
-
-def _scope_dsox1000(world: World) -> VirtualInstrument:
-    from instruments.virtual.oscilloscope.keysight_dsox1000 import VirtualDSOX1000
-
-    return VirtualDSOX1000(world.clock, signals=_signals(world))
+def at_light_and_coil(model: Callable[..., VirtualInstrument]) -> Maker:
+    """An oscilloscope."""
+    return lambda world: model(world.clock, signals=scope_signals(world))
 
 
-def _magnetometer_425(world: World) -> VirtualInstrument:
-    from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
-
-    return Virtual425(world.clock, flux_density=world.flux_density)
-
-
-def _magnetometer_475(world: World) -> VirtualInstrument:
-    from instruments.virtual.magnetometer.lakeshore_475 import Virtual475
-
-    return Virtual475(world.clock, flux_density=world.flux_density)
+def in_the_field(model: Callable[..., VirtualInstrument]) -> Maker:
+    """A gaussmeter: its probe is at the place of the top."""
+    return lambda world: model(world.clock, flux_density=world.flux_density)
 
 
-#: Kind → model → what makes it, in a world.
-MODELS: dict[str, dict[str, Callable[[World], VirtualInstrument]]] = {
-    "counter": {"53230A": _counter_53230a, "CNT-91": _counter_cnt91},
-    "generator": {"33500B": _generator_33500b, "33220A": _generator_33220a},
-    "oscilloscope": {"DS1000Z": _scope_ds1000z, "DSOX1000": _scope_dsox1000},
-    "magnetometer": {"425": _magnetometer_425, "475": _magnetometer_475},
+#: Kind → model → what makes it.
+MODELS: dict[str, dict[str, Maker]] = {
+    "counter": {"53230A": at_the_light(Virtual53230A), "CNT-91": at_the_light(VirtualCNT91)},
+    "generator": {"33500B": at_the_coil(Virtual33500B), "33220A": at_the_coil(Virtual33220A)},
+    "oscilloscope": {"DS1000Z": at_light_and_coil(VirtualDS1000Z), "DSOX1000": at_light_and_coil(VirtualDSOX1000)},
+    "magnetometer": {"425": in_the_field(Virtual425), "475": in_the_field(Virtual475)},
 }
 
 
@@ -105,12 +85,15 @@ def virtual_bus(world: World | None = None, models: Mapping[str, str] | None = N
     world: by default a top of its own, on a virtual clock; models: kind → model, for those that are to be others than
     in VIRTUAL.  Raises ConfigError for one that there is not.
     """
-    from instruments.virtual.bench.bus import Bus
-
     world = world or own_world()
     chosen = {kind: settings.model for kind, settings in VIRTUAL.items()} | dict(models or {})
     instruments = {kind: _maker(kind, model)(world) for kind, model in chosen.items()}
     return Bus({VIRTUAL[kind].address: instrument for kind, instrument in instruments.items()})
+
+
+def virtual_wiring(world: World, limits: Limits | None = None) -> Wiring:
+    """The wiring of a virtual bench that measures this world.  limits: by default those of a bench file without any."""
+    return Wiring(VIRTUAL, limits or Limits(), library_for(virtual_bus(world)), world.clock)
 
 
 def plug_in_serial(bus: Bus | None = None) -> Bus:
@@ -119,8 +102,6 @@ def plug_in_serial(bus: Bus | None = None) -> Bus:
     From then on ``serial.serial_for_url("levilab://magnetometer")`` is its magnetometer, and for pyvisa-py
     ``ASRLlevilab://magnetometer::INSTR``.  bus: by default a fresh bench with a top of its own.
     """
-    from instruments.virtual.bench.protocol_levilab import plug_in
-
     bus = bus or virtual_bus()
     plug_in(lambda: bus)
     return bus
@@ -132,8 +113,6 @@ AGAIN_S = 15.0
 
 def own_world(clock: Clock | None = None) -> World:
     """A top to practise with, put back whenever it falls.  clock: by default one that jumps."""
-    from levilab.world.spin_world import SpinScene, SpinWorld
-
     return SpinWorld(SpinScene(again_s=AGAIN_S), clock or VirtualClock())
 
 
@@ -151,7 +130,7 @@ def scene_world(
     the top is put back, None: it is not.  Raises SceneError for a scene without motion, SimulationError for one that
     cannot be simulated.
     """
-    from levilab.simulator.compilation import telling_of_compilation
+    from levilab.simulator.compilation import telling_of_compilation  # the compiler takes a moment to load
     from levilab.world.motion_world import MotionWorld, prepare
 
     with telling_of_compilation(tell):

@@ -1,1 +1,1 @@
-"""The experiments, a file each."""
+"""The experiments, a file each.  `levilab.acquisition.table` lists them."""

@@ -10,36 +10,18 @@ import pytest
 
 from instruments.errors import InstrumentError
 from instruments.virtual.bench.faults import FAULTS, Fault
-from levilab.acquisition.loop import Order, acquire
-from levilab.acquisition.request import spin_order
+from levilab.acquisition.loop import acquire
 from levilab.acquisition.session import MOST_LOSSES
-from levilab.bench import bench as benches
+from levilab.acquisition.table import settings_of, with_settings
+from levilab.world import bench as benches
 from levilab.world.bench import VIRTUAL, virtual_bus
+from support.acquisitions import BEFORE, Silent, mock
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from instruments.virtual.bench.bus import Bus
     from levilab.runs.run import Run
-
-#: Readings before the drive is off: the spin at first, every 10 s of the 201 on the way up, and at the end of it.
-BEFORE = 22
-
-
-class Silent:
-    """Shows nothing."""
-
-    def preparing(self, text: str, fraction: float) -> None: ...
-
-    def reading(self, text: str, elapsed: float, remaining: float) -> None: ...
-
-    def message(self, text: str) -> None: ...
-
-    def close(self) -> None: ...
-
-
-def mock(out: Path) -> Order:
-    return spin_order(mock=True, out=out, seed=1, bench=None, note="", realtime=False, resume=None, wire_log=False)
 
 
 def acquired(folder: Path, monkeypatch: pytest.MonkeyPatch, *faults: Fault) -> Run:
@@ -198,7 +180,7 @@ def test_a_generator_that_fails_on_the_way_up_is_off_and_the_way_is_gone_again(
 
 def test_what_was_missed_is_not_caught_up_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     order = mock(tmp_path)
-    often = order.config.spin.model_copy(update={"interval_s": 2.0})
+    often = settings_of(order.config, "spin").model_copy(update={"interval_s": 2.0})
 
     def with_faults(*given: object) -> Bus:
         bus = virtual_bus(*given)  # type: ignore[arg-type]
@@ -206,7 +188,7 @@ def test_what_was_missed_is_not_caught_up_with(tmp_path: Path, monkeypatch: pyte
         return bus
 
     monkeypatch.setattr(benches, "virtual_bus", with_faults)
-    changed = replace(order, config=order.config.model_copy(update={"spin": often}))
+    changed = replace(order, config=with_settings(order.config, "spin", often))
     gaps = np.diff(acquire(changed, Silent()).readings().frame["time_s"])
     assert gaps.max() > 5
     assert gaps.min() > 1.9

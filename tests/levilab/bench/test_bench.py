@@ -8,19 +8,20 @@ import pyvisa
 from instruments.clock import VirtualClock, WallClock
 from instruments.errors import InstrumentError, NotConnected, Occupied, OutOfRange, WrongInstrument
 from instruments.virtual.generator.keysight_33500b import Virtual33500B
+from levilab.acquisition.experiments.spin import SpinSettings
+from levilab.acquisition.table import Configuration, settings_of
 from levilab.bench.bench import OutputMayBeOn, open_bench
 from levilab.bench.config import (
     BenchConfig,
     ConfigError,
     InstrumentSettings,
     Limits,
-    SpinSettings,
     read_bench,
-    within_limits,
 )
+from levilab.bench.wiring import described_wiring
 from levilab.errors import LevilabError
 from levilab.interruption import Interrupted
-from levilab.world.bench import VIRTUAL
+from levilab.world.bench import MODELS, VIRTUAL, at_the_coil, virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld
 
 KINDS = ("counter", "generator")
@@ -65,17 +66,18 @@ def faulty(monkeypatch):
     """The virtual bench with a generator whose faults a test can switch on."""
     monkeypatch.setattr(Faulty, "silent", 0)
     monkeypatch.setattr(Faulty, "stuck", False)
-    monkeypatch.setattr("instruments.virtual.generator.keysight_33500b.Virtual33500B", Faulty)
+    monkeypatch.setitem(MODELS["generator"], "33500B", at_the_coil(Faulty))
     return Faulty
 
 
-def drive(bench):
-    bench.drive(waveform="SIN", frequency_hz=30.0, amplitude_vpp=10.0)
+def drive(bench, **changes):
+    bench.generator.prepare(**{"waveform": "SIN", "frequency_hz": 30.0, "amplitude_vpp": 10.0} | changes)
+    bench.generator.output = True
 
 
 def drive_and(world, end):
     """The bench, opened, driving, and left by what `end` does; the world keeps it to look at."""
-    with open_bench(BenchConfig(), KINDS, world=world) as bench:
+    with open_bench(virtual_wiring(world), KINDS) as bench:
         world.bench = bench
         drive(bench)
         end()
@@ -92,7 +94,7 @@ def assert_closed(bench):
 
 
 def test_drive_and_light_are_joined_by_one_world(world):
-    with open_bench(BenchConfig(), KINDS, world=world) as bench:
+    with open_bench(virtual_wiring(world), KINDS) as bench:
         bench.counter.prepare(gate_s=1.0, trigger_level_v=0.6)
         drive(bench)
         assert bench.clock is world.clock
@@ -131,7 +133,7 @@ def test_switching_off_is_tried_a_second_time(world, faulty):
 
 
 def test_an_error_of_any_kind_in_the_first_try_does_not_keep_the_drive_on(world, monkeypatch):
-    with open_bench(BenchConfig(), KINDS, world=world) as bench:
+    with open_bench(virtual_wiring(world), KINDS) as bench:
         drive(bench)
         switch_off, tries = bench.generator.off, []
 
@@ -177,13 +179,13 @@ def test_an_output_that_does_not_go_off_is_told(world, faulty):
 
 def test_a_generator_that_never_answered_is_silent_rather_than_perhaps_on(world, faulty):
     faulty.silent = 1000
-    with pytest.raises(InstrumentError, match="no answer") as silence, open_bench(BenchConfig(), KINDS, world=world):
+    with pytest.raises(InstrumentError, match="no answer") as silence, open_bench(virtual_wiring(world), KINDS):
         pass
     assert not isinstance(silence.value, OutputMayBeOn)
 
 
 def test_a_bench_without_a_drive_needs_nothing_switched_off(world):
-    with open_bench(BenchConfig(), ("counter",), world=world) as bench:
+    with open_bench(virtual_wiring(world), ("counter",)) as bench:
         assert set(bench.instruments) == {"counter"}
         bench.outputs_off()
     assert world.coil == []
@@ -191,7 +193,7 @@ def test_a_bench_without_a_drive_needs_nothing_switched_off(world):
 
 def test_the_wire_log_reaches_every_instrument(world):
     traffic = []
-    with open_bench(BenchConfig(), KINDS, world=world, log=lambda *line: traffic.append(line)):
+    with open_bench(virtual_wiring(world), KINDS, log=lambda *line: traffic.append(line)):
         pass
     assert {address for address, *_ in traffic} == {VIRTUAL[kind].address for kind in KINDS}
     assert (VIRTUAL["generator"].address, ">", b"OUTP1 OFF\n") in traffic
@@ -208,8 +210,8 @@ def test_the_second_output_is_off_as_soon_as_the_bench_is_open_and_when_it_is_le
             self.settings |= {"output": True, "2:output": True}
             made.append(self)
 
-    monkeypatch.setattr("instruments.virtual.generator.keysight_33500b.Virtual33500B", LeftOn)
-    with open_bench(BenchConfig(), KINDS, world=world):
+    monkeypatch.setitem(MODELS["generator"], "33500B", at_the_coil(LeftOn))
+    with open_bench(virtual_wiring(world), KINDS):
         assert (made[0].settings["output"], made[0].settings["2:output"]) == (False, False)
         made[0].settings["2:output"] = True
     assert made[0].settings["2:output"] is False
@@ -224,34 +226,34 @@ TIGHT = Limits(drive_amplitude_vpp=4.0, drive_offset_v=1.0, drive_frequency_hz=5
     ("name", "value"), [("amplitude", 4.1), ("offset", 1.1), ("frequency", 51.0), ("load", 50.0), ("output", True)]
 )
 def test_the_generator_of_an_open_bench_keeps_to_its_limits_by_itself(world, name, value):
-    with open_bench(BenchConfig(limits=TIGHT), KINDS, world=world) as bench:
+    with open_bench(virtual_wiring(world, TIGHT), KINDS) as bench:
         with pytest.raises(OutOfRange, match=r"limits\.drive_\w+ in the bench file"):
             setattr(bench.generator, name, value)
         assert all(field == 0 for *_, field in world.coil)
 
 
 def test_a_drive_with_an_offset_is_put_on_the_coil(world):
-    with open_bench(BenchConfig(limits=TIGHT), KINDS, world=world) as bench:
-        bench.drive(waveform="SQU", frequency_hz=30.0, amplitude_vpp=4.0, offset_v=-1.0)
+    with open_bench(virtual_wiring(world, TIGHT), KINDS) as bench:
+        drive(bench, waveform="SQU", amplitude_vpp=4.0, offset_v=-1.0)
         assert (bench.generator.amplitude, bench.generator.offset, bench.generator.output) == (4.0, -1.0, True)
 
 
 @pytest.mark.parametrize(
     ("limits", "says"),
     [
-        (Limits(drive_lowest_hz=41.0), r"= 40 is less than this bench stands, limits\.drive_lowest_hz = 41"),
-        (Limits(drive_frequency_hz=39.0), r"= 40 is more than this bench stands, limits\.drive_frequency_hz = 39"),
-        (Limits(drive_amplitude_vpp=9.0), r"= 10 is more than this bench stands, limits\.drive_amplitude_vpp = 9"),
+        (Limits(drive_lowest_hz=41.0), r"= 40 is less than this bench allows, limits\.drive_lowest_hz = 41"),
+        (Limits(drive_frequency_hz=39.0), r"= 40 is more than this bench allows, limits\.drive_frequency_hz = 39"),
+        (Limits(drive_amplitude_vpp=9.0), r"= 10 is more than this bench allows, limits\.drive_amplitude_vpp = 9"),
     ],
 )
 def test_a_spin_down_that_the_bench_does_not_stand_is_refused_beforehand(limits, says):
     with pytest.raises(ConfigError, match=says):
-        within_limits(BenchConfig(limits=limits))
-    assert within_limits(BenchConfig()) == BenchConfig()
+        SpinSettings().check("spin", limits)
+    SpinSettings().check("spin", Limits())
 
 
 @pytest.mark.parametrize(
-    ("drive", "name"),
+    ("signal", "name"),
     [
         ({"frequency_hz": 30.0, "amplitude_vpp": 4.01}, "drive_amplitude_vpp"),
         ({"frequency_hz": 50.1, "amplitude_vpp": 4.0}, "drive_frequency_hz"),
@@ -262,11 +264,10 @@ def test_a_spin_down_that_the_bench_does_not_stand_is_refused_beforehand(limits,
         ({"frequency_hz": 4.9, "amplitude_vpp": 4.0}, "drive_lowest_hz"),
     ],
 )
-def test_a_drive_beyond_the_limits_is_refused_by_name_and_nothing_is_sent(world, drive, name):
-    config = BenchConfig(limits=TIGHT)
-    with open_bench(config, KINDS, world=world) as bench:
+def test_a_drive_beyond_the_limits_is_refused_by_name_and_nothing_is_sent(world, signal, name):
+    with open_bench(virtual_wiring(world, TIGHT), KINDS) as bench:
         with pytest.raises(OutOfRange) as refusal:
-            bench.drive(waveform="SIN", **drive)
+            drive(bench, **signal)
         assert world.field == 0
         assert all(field == 0 for *_, field in world.coil)
     assert refusal.value.name == name
@@ -274,9 +275,9 @@ def test_a_drive_beyond_the_limits_is_refused_by_name_and_nothing_is_sent(world,
 
 
 def test_a_drive_at_the_limits_is_allowed(world):
-    config = BenchConfig(limits=Limits(drive_amplitude_vpp=4.0, drive_frequency_hz=50.0))
-    with open_bench(config, KINDS, world=world) as bench:
-        bench.drive(waveform="SIN", frequency_hz=50.0, amplitude_vpp=4.0)
+    limits = Limits(drive_amplitude_vpp=4.0, drive_frequency_hz=50.0)
+    with open_bench(virtual_wiring(world, limits), KINDS) as bench:
+        drive(bench, frequency_hz=50.0, amplitude_vpp=4.0)
         assert world.coil[-1] == ("SIN", 50.0, pytest.approx(4.0 / 2 * 0.08e-3))  # 0.08 mT/V
 
 
@@ -285,7 +286,7 @@ def test_a_drive_at_the_limits_is_allowed(world):
 
 def described(**instruments):
     """A bench as bench.toml describes it, its addresses leading to the virtual one."""
-    return BenchConfig(visa_library="@levilab", **instruments)
+    return described_wiring(BenchConfig(visa_library="@levilab", **instruments))
 
 
 def test_a_described_bench_is_opened_at_its_addresses():
@@ -393,15 +394,15 @@ gate_s = 2
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
 def test_a_bench_is_read_with_or_without_a_byte_order_mark(tmp_path, encoding):
-    config = read_bench(written(tmp_path, BENCH.lstrip(), encoding))
+    config = read_bench(written(tmp_path, BENCH.lstrip(), encoding), Configuration)
     assert config.counter == InstrumentSettings(model="53230A", address="TCPIP0::192.0.2.7::5025::SOCKET")
     assert config.generator is None
     assert config.limits == Limits(drive_amplitude_vpp=5.0)
-    assert config.spin == SpinSettings(gate_s=2.0)
+    assert settings_of(config, "spin") == SpinSettings(gate_s=2.0)
 
 
 def test_an_empty_description_is_a_bench_without_instruments(tmp_path):
-    assert read_bench(written(tmp_path, "")) == BenchConfig()
+    assert read_bench(written(tmp_path, ""), Configuration) == Configuration()
 
 
 @pytest.mark.parametrize(
@@ -424,7 +425,7 @@ def test_an_empty_description_is_a_bench_without_instruments(tmp_path):
 def test_what_is_wrong_with_a_description_is_told_in_one_line_with_its_path(tmp_path, text, says):
     path = written(tmp_path, text)
     with pytest.raises(ConfigError) as wrong:
-        read_bench(path)
+        read_bench(path, Configuration)
     message = str(wrong.value)
     assert message.startswith(f"{path}: ")
     assert says in message
@@ -436,12 +437,12 @@ def test_a_description_that_is_no_text_is_told(tmp_path):
     path = tmp_path / "bench.toml"
     path.write_bytes(b"\xff\xfe[\x00s\x00")  # UTF-16, as an editor may save it
     with pytest.raises(ConfigError, match="not readable as TOML"):
-        read_bench(path)
+        read_bench(path, Configuration)
 
 
 def test_a_description_that_is_missing_is_told_with_what_to_do(tmp_path):
-    with pytest.raises(ConfigError, match=r"no such file.*--mock"):
-        read_bench(tmp_path / "bench.toml")
+    with pytest.raises(ConfigError, match=r"no such file.*virtual bench"):
+        read_bench(tmp_path / "bench.toml", Configuration)
 
 
 def test_a_description_does_not_change_once_it_is_read():
@@ -459,4 +460,4 @@ def test_a_virtual_bench_that_is_described_keeps_to_the_wall_clock_as_whoever_me
 
 def test_a_gate_must_fit_into_the_interval(tmp_path):
     with pytest.raises(ConfigError, match=r"gate_s = 12 must be shorter than interval_s = 10"):
-        read_bench(written(tmp_path, "[spin]\ngate_s = 12\ninterval_s = 10\n"))
+        read_bench(written(tmp_path, "[spin]\ngate_s = 12\ninterval_s = 10\n"), Configuration)

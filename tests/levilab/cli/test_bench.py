@@ -5,11 +5,15 @@ import re
 
 import pytest
 
-from levilab.bench.check import check
-from levilab.bench.config import BenchConfig, ConfigError, InstrumentSettings, Limits, SpinSettings, read_bench
-from levilab.bench.discover import Found, NobodyFound, asked, bench_text, recognised, search
+from levilab.acquisition.experiments.spin import SpinSettings
+from levilab.acquisition.table import Configuration, settings_of
+from levilab.bench.check import Light, check
+from levilab.bench.config import ConfigError, InstrumentSettings, Limits, read_bench
+from levilab.bench.discover import Found, driver_for_identity, identify, search
+from levilab.bench.template import NobodyFound, bench_text
+from levilab.bench.wiring import described_wiring
 from levilab.cli.bench import bench_init
-from levilab.world.bench import MODELS, VIRTUAL, own_world
+from levilab.world.bench import MODELS, VIRTUAL, own_world, virtual_wiring
 
 #: Answers to *IDN? as instruments give them.
 IDENTITIES = {
@@ -31,11 +35,11 @@ IDENTITIES = {
 
 
 @pytest.mark.parametrize("identity", IDENTITIES)
-def test_an_instrument_is_recognised_by_its_answer(identity):
-    assert recognised(identity) == IDENTITIES[identity]
+def test_an_instrument_is_driver_for_identity_by_its_answer(identity):
+    assert driver_for_identity(identity) == IDENTITIES[identity]
 
 
-def test_everybody_who_is_listed_or_named_is_asked():
+def test_everybody_who_is_listed_or_named_is_identify():
     told = []
     found = search("@levilab", ["TCPIP0::nobody::inst0::INSTR"], told.append)
     assert [one.address for one in found] == ["TCPIP0::nobody::inst0::INSTR", *(s.address for s in VIRTUAL.values())]
@@ -45,7 +49,7 @@ def test_everybody_who_is_listed_or_named_is_asked():
 
 
 def test_a_serial_port_is_asked_at_every_speed_that_a_driver_knows():
-    found = asked(VIRTUAL["magnetometer"].address, "@levilab")
+    found = identify(VIRTUAL["magnetometer"].address, "@levilab")
     assert found.identity.startswith("LSCI,MODEL425")
     assert found.line["parity"] == "odd"
 
@@ -53,12 +57,14 @@ def test_a_serial_port_is_asked_at_every_speed_that_a_driver_knows():
 def test_what_was_found_becomes_a_bench_that_can_be_read_and_checked(tmp_path):
     path = tmp_path / "bench.toml"
     path.write_text(bench_text(search("@levilab", [], lambda _: None), "@levilab"), encoding="utf-8")
-    config = read_bench(path)
+    config = read_bench(path, Configuration)
     assert {kind: getattr(config, kind).model for kind in VIRTUAL} == {k: s.model for k, s in VIRTUAL.items()}
     # what is written beside the instruments are the defaults
     assert config.limits == Limits()
-    assert config.spin == SpinSettings()
-    assert [(one.kind, one.trouble) for one in check(config)] == [(kind, "") for kind in VIRTUAL]
+    assert settings_of(config, "spin") == SpinSettings()
+    assert [(one.kind, one.trouble) for one in check(described_wiring(config), Light())] == [
+        (kind, "") for kind in VIRTUAL
+    ]
 
 
 def test_kinds_that_were_not_found_stand_there_as_comments_and_others_are_told(tmp_path):
@@ -72,7 +78,7 @@ def test_kinds_that_were_not_found_stand_there_as_comments_and_others_are_told(t
     ]
     text = bench_text(found, "@py")
     path.write_text(text, encoding="utf-8")
-    config = read_bench(path)
+    config = read_bench(path, Configuration)
     assert config.counter == InstrumentSettings(model="53230A", address="A::1")
     assert config.generator is config.magnetometer is config.oscilloscope is None
     assert '# also found: model = "53220A", address = "A::2"' in text
@@ -83,7 +89,7 @@ def test_kinds_that_were_not_found_stand_there_as_comments_and_others_are_told(t
 
 
 def test_a_check_reads_each_kind_and_leaves_the_output_off():
-    seen = {one.kind: one for one in check(BenchConfig(), own_world())}
+    seen = {one.kind: one for one in check(virtual_wiring(own_world()), Light())}
     assert all(not one.trouble for one in seen.values())
     assert seen["counter"].value == pytest.approx(30, abs=0.2)  # the virtual top spins at 30 Hz
     assert seen["oscilloscope"].value == pytest.approx(1.1, abs=0.1)  # between dark, 0.1 V, and the tape, 1.2 V
@@ -93,9 +99,9 @@ def test_a_check_reads_each_kind_and_leaves_the_output_off():
 
 
 @pytest.mark.parametrize(("kind", "model"), [(kind, model) for kind, models in MODELS.items() for model in models])
-def test_every_virtual_model_is_recognised_by_what_it_says_of_itself(kind, model):
+def test_every_virtual_model_is_driver_for_identity_by_what_it_says_of_itself(kind, model):
     device = MODELS[kind][model](own_world())
-    assert recognised(device.identity) == (kind, model)
+    assert driver_for_identity(device.identity) == (kind, model)
     assert "VIRTUAL" in device.identity  # so that a run with it is known as synthetic
 
 
@@ -123,21 +129,21 @@ def test_where_nobody_answers_no_file_is_written_but_one_to_fill_in_when_asked_f
     assert not path.exists()
     assert "no answer" in capsys.readouterr().out
     bench_init([], "@py", path, force=True, as_json=False)
-    assert read_bench(path).counter is None
+    assert read_bench(path, Configuration).counter is None
 
 
 def test_signs_that_no_file_can_hold_are_no_part_of_a_name(tmp_path):
     path = tmp_path / "bench.toml"
     odd = [Found("A::1", 'ma"ker,B#1,\\,"""')]
     path.write_text(bench_text(odd, "@py"), encoding="utf-8")
-    assert read_bench(path).counter is None
+    assert read_bench(path, Configuration).counter is None
 
 
 def test_a_wrong_key_is_told_before_the_one_that_it_was_to_be(tmp_path):
     path = tmp_path / "bench.toml"
     path.write_text('[counter]\nmodell = "53230A"\naddress = "A::1"\n', encoding="utf-8")
     with pytest.raises(ConfigError, match=r"counter\.modell is no key known here"):
-        read_bench(path)
+        read_bench(path, Configuration)
 
 
 def test_no_library_and_no_bench_are_told(levilab, tmp_path):

@@ -435,7 +435,7 @@ SQUARE = "FUNC SQU;FREQ 1;VOLT 4;"
 def second_channel(top, at):
     """Volts at times [s] after now, where nothing jumps."""
     now = top.clock.now()
-    look = virtual_bench._signals(top)[2]
+    look = virtual_bench.scope_signals(top)[2]
     return [float(look(now + t, 1e-3, 1)[0]) for t in at]
 
 

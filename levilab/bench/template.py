@@ -1,0 +1,84 @@
+"""A commented bench.toml from what was found."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+from levilab.bench.kinds import KINDS
+from levilab.errors import LevilabError
+from levilab.files import CannotWrite, replace_atomically
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from levilab.bench.discover import Found
+
+
+class WouldOverwrite(LevilabError):
+    """A file that is there already."""
+
+
+class NobodyFound(LevilabError):
+    """Nobody answered that there is a driver for."""
+
+    exit_code = 3
+
+    def __init__(self) -> None:
+        super().__init__(
+            "nobody answered that levilab has a driver for, so no file was written: is it on and connected?  Name it "
+            "with --address, or take --force for a file to fill in by hand"
+        )
+
+
+def bench_text(found: Sequence[Found], library: str) -> str:
+    """The text of a bench.toml: the first instrument of each kind, the others as comments."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(  # noqa: S701 - no HTML
+        loader=PackageLoader("levilab.bench", "."),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    # TOML's strings are JSON's; jinja's own filter would escape signs of HTML
+    environment.policies["json.dumps_function"] = lambda value, **_: _quoted(value)
+    by_kind = {kind: [one for one in found if one.kind == kind] for kind in KINDS}
+    about = {
+        kind.name: {
+            "what": kind.purpose,
+            "address": kind.example,
+            "model": next(iter(kind.drivers)),
+            "models": ", ".join(kind.drivers),
+        }
+        for kind in KINDS.values()
+    }
+    return environment.get_template("bench.toml.j2").render(
+        library=library,
+        kinds=about,
+        chosen={kind: ones[0] if ones else None for kind, ones in by_kind.items()},
+        others={kind: ones[1:] for kind, ones in by_kind.items()},
+        unknown=[one for one in found if one.identity and not one.kind],
+    )
+
+
+def _quoted(value: str) -> str:
+    return json.dumps(value, ensure_ascii=False)
+
+
+def refuse_to_overwrite(path: Path) -> None:
+    """Raise WouldOverwrite if there is such a file, CannotWrite if there is no folder for it."""
+    if not path.parent.is_dir():
+        raise CannotWrite(f"{path.parent} is no folder: give another name with --out")
+    if path.exists():
+        raise WouldOverwrite(f"{path} is there already: give another name with --out, or --force to replace it")
+
+
+def write_bench(path: Path, text: str) -> None:
+    """Write the file.  Raises CannotWrite."""
+    try:
+        replace_atomically(path, text)
+    except OSError as error:
+        raise CannotWrite(f"{path} cannot be written ({error.strerror}): give another name with --out") from error

@@ -1,0 +1,44 @@
+"""How a program reaches the instruments of a bench: the one thing in which a virtual bench and a real one differ."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from instruments.clock import Clock, WallClock
+from levilab.bench.config import ConfigError, InstrumentSettings, Limits
+from levilab.bench.kinds import KINDS
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from levilab.bench.config import BenchConfig
+
+
+@dataclass(frozen=True)
+class Wiring:
+    """Where the instruments are and what leads to them.
+
+    instruments: kind → model and address, for those that the bench has; limits: what the coil stands; library:
+    PyVISA's, or a virtual one; clock: of the bench.
+    """
+
+    instruments: Mapping[str, InstrumentSettings]
+    limits: Limits
+    library: Any
+    clock: Clock
+
+    def described(self, kind: str) -> InstrumentSettings:
+        """What is known of an instrument.  Raises ConfigError where nothing is, or its model has no driver."""
+        if kind not in self.instruments:
+            raise ConfigError(f"the bench file describes no {kind}: add a table [{kind}] with model and address")
+        settings = self.instruments[kind]
+        KINDS[kind].driver(settings.model)
+        return settings
+
+
+def described_wiring(config: BenchConfig) -> Wiring:
+    """The wiring of the bench that a bench file describes."""
+    # a measurement waits by the wall clock, so a virtual bench that jumps from answer to answer would stand still
+    library = "realtime@levilab" if config.visa_library == "@levilab" else config.visa_library
+    return Wiring(config.instruments(), config.limits, library, WallClock())

@@ -1,0 +1,73 @@
+"""Acquisitions on the virtual bench, as tests make them."""
+
+from __future__ import annotations
+
+import signal
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from instruments.clock import VirtualClock
+from levilab.acquisition.experiments.spin import SpinSettings
+from levilab.acquisition.loop import AcquisitionRequest
+from levilab.acquisition.request import Options, request_for
+from levilab.acquisition.table import Configuration, with_settings
+from levilab.world.bench import virtual_wiring
+from levilab.world.spin_world import SpinScene, SpinWorld
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from levilab.world.spin_world import World
+
+#: Counts before the drive is off: the spin at first, every 10 s of the 201 on the way up, and at the end of it.
+BEFORE = 22
+
+
+class Silent:
+    """Shows nothing, remembers what it was to show."""
+
+    def __init__(self) -> None:
+        self.readings: list[str] = []
+        self.messages: list[str] = []
+        self.left: list[float] = []
+
+    def preparing(self, text: str, fraction: float) -> None: ...
+
+    def reading(self, text: str, elapsed: float, remaining: float) -> None:
+        self.readings.append(text)
+        self.left.append(remaining)
+
+    def message(self, text: str) -> None:
+        self.messages.append(text)
+
+    def close(self) -> None: ...
+
+
+class Impatient(Silent):
+    """Presses Ctrl-C, or sends another signal, after so many readings."""
+
+    def __init__(self, most: int, number: signal.Signals = signal.SIGINT) -> None:
+        super().__init__()
+        self.most, self.number = most, number
+
+    def reading(self, text: str, elapsed: float, remaining: float) -> None:
+        super().reading(text, elapsed, remaining)
+        if len(self.readings) == self.most:
+            signal.raise_signal(self.number)
+
+
+def mock(out: Path, seed: int | None = 1, **changes: Any) -> AcquisitionRequest:
+    """A spin-down on the virtual bench, as the command line asks for it."""
+    return request_for("spin", Options(mock=True, out=out, seed=seed, **changes))
+
+
+def in_world(request: AcquisitionRequest, world: World) -> AcquisitionRequest:
+    """The same at the virtual bench of this world."""
+    return replace(request, wiring=lambda: virtual_wiring(world, request.config.limits))
+
+
+def of_scene(out: Path, scene: SpinScene, settings: SpinSettings | None = None) -> AcquisitionRequest:
+    """A spin-down of a top that only spins."""
+    config = with_settings(Configuration(), "spin", settings or SpinSettings())
+    request = AcquisitionRequest("spin", config, wiring=NotImplemented, out=out, synthetic_how="a test")
+    return in_world(request, SpinWorld(scene, VirtualClock()))
