@@ -17,3 +17,7 @@ class DataError(LevilabError):
 
 class SimulationError(LevilabError):
     """A simulation that cannot be carried out."""
+
+
+class LeftRange(SimulationError):
+    """A motion that cannot be followed on because its numbers leave their range, as at the base's edges."""

@@ -17,7 +17,7 @@ from levilab.formats.columns import SHORTHANDS, Column, TableError, choose_colum
 from levilab.formats.dialect import Dialect
 from levilab.formats.layout import Layout, sniff
 from levilab.formats.rows import Rows, read_rows
-from levilab.formats.titles import CANONICAL, COMPANIONS
+from levilab.formats.titles import CANONICAL, COMPANIONS, companion
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -98,10 +98,14 @@ def read_table(
     )
 
 
-def read_run_readings(path: Path) -> Table:
+def read_run_readings(path: Path, channels: Collection[str] = ()) -> Table:
     """Read the readings.csv of a run folder, which may still be being written.
 
     A last line without its line end is torn and left out, with a warning. No rows, or no header yet, are no error.
+
+    Args:
+        path: the file.
+        channels: columns that the run declares, beside the canonical ones.
 
     Raises:
         TableError: it cannot be read, its header is not ours, or a line is damaged.
@@ -111,7 +115,8 @@ def read_run_readings(path: Path) -> Table:
             first = stream.readline(LONGEST_HEADER)
         title = first.decode("utf-8-sig", errors="replace")
         header = tuple(title.removesuffix("\n").removesuffix("\r").split(",")) if title.endswith("\n") else ()
-        chosen = tuple(Column(n, header.index(n), n, 1) for n in CANONICAL if n in header)
+        known = dict.fromkeys((*channels, *CANONICAL))
+        chosen = tuple(Column(n, header.index(n), n, 1) for n in known if n in header)
         if header and not (chosen and "".join(header).isprintable()):
             raise TableError(path, f"'{shown(title.strip())}' is no header of a run, as time_s,… is", line=1)
         layout = Layout("utf-8-sig", Dialect(",", "."), header, 1, (), 2, len(first), len(header))
@@ -206,9 +211,10 @@ def _table(
     numbers = dict(zip(chosen, rows.values, strict=False))
     # The comparison is false for NaN, too.
     present = {column: np.abs(values) < NO_READING for column, values in numbers.items()}
-    quantity = [p for c, p in present.items() if c.name not in COMPANIONS]
+    companions = {companion(column.name) for column in chosen} | COMPANIONS.keys()
+    quantity = [p for c, p in present.items() if c.name not in companions]
     read = np.logical_and.reduce(quantity) if quantity else np.ones(rows.lines.size, bool)
-    for column, missing in [(c, read & ~p) for c, p in present.items() if c.name in COMPANIONS]:
+    for column, missing in [(c, read & ~p) for c, p in present.items() if c.name in companions]:
         if missing.any():  # better no uncertainties than readings lost for want of them
             del present[column]
             told.append(

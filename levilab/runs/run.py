@@ -15,9 +15,13 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from levilab.errors import DataError
+from levilab.formats.table import read_run_readings
+from levilab.runs.traces import load_traces
+from levilab.settings import in_one_line
 
 if TYPE_CHECKING:
     from levilab.formats.table import Table
+    from levilab.runs.traces import StoredTrace
 
 SCHEMA: Literal["levilab-run/1"] = "levilab-run/1"
 READINGS, STATES, EVENTS, RECORD, LOCK, WIRE, PACKAGE = (
@@ -95,10 +99,13 @@ class Run:
         return cls(folder, record, record.status if alive else "interrupted")
 
     def readings(self) -> Table:
-        """The readings so far; a torn last line is left out, with a warning."""
-        from levilab.formats.table import read_run_readings
+        """The readings so far, every declared channel; a torn last line is left out, with a warning."""
+        declared = [channel["name"] for channel in self.record.channels if "name" in channel]
+        return read_run_readings(self.folder / READINGS, declared)
 
-        return read_run_readings(self.folder / READINGS)
+    def traces(self) -> list[StoredTrace]:
+        """The oscilloscope's records so far.  Raises DataError for one that is damaged."""
+        return load_traces(self.folder)
 
     def count(self) -> int:
         """How many readings there are; a run of another kind, without readings.csv, has none."""
@@ -155,8 +162,6 @@ def _is_alive(folder: Path) -> bool:
 
 
 def _read_record(path: Path) -> RunRecord:
-    from levilab.settings import in_one_line
-
     rescue = f"its readings can still be analyzed: levilab analyze spindown {path.parent / READINGS}"
     try:
         data = json.loads(path.read_text(encoding="utf-8"))

@@ -204,11 +204,12 @@ def _datapackage(folder: Path, record: RunRecord) -> str:
         for channel in record.channels
     ]
     resources: list[dict[str, Any]] = []
-    for name in (READINGS, STATES, EVENTS, WIRE):
+    records = sorted(path.relative_to(folder).as_posix() for path in (folder / traces.FOLDER).glob("*.npy"))
+    for name in (READINGS, STATES, EVENTS, WIRE, traces.INDEX, *records):
         path = folder / name
         if path.exists():
             data = path.read_bytes()
-            about = {"path": name, "name": name.replace(".", "-"), "bytes": len(data)}
+            about = {"path": name, "name": name.replace(".", "-").replace("/", "-"), "bytes": len(data)}
             about["hash"] = "sha256:" + hashlib.sha256(data).hexdigest()
             resources.append(about | ({"schema": {"fields": fields}} if name in {READINGS, STATES} else {}))
     package = {

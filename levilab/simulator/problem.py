@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from levilab.errors import SimulationError
+from levilab.errors import LeftRange, SimulationError
 from levilab.simulator.escape import locate_escape
 from levilab.simulator.kernels.braking import Flowing, LooseFlowing
 from levilab.simulator.kernels.loads import Kinked
@@ -129,7 +129,7 @@ def _escape(problem: Problem, state: Array, interval: Stops) -> tuple[Array, Eve
     at = len(states) - 1
     after, through = problem.advanced(states[-1], single.part(at, at + 1), NOWHERE)
     if not (through and np.all(np.isfinite(after[-1]))):
-        raise SimulationError(
+        raise LeftRange(
             f"the motion cannot be followed beyond {states[-1][TIME]:.6g} s, where its numbers leave their range; "
             f"the last place was ({', '.join(f'{x:.4g}' for x in states[-1][R])}) m: "
             "start farther from the base's edges, or end at a greater escape.height_m"

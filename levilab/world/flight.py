@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from levilab.errors import SimulationError
+from levilab.errors import LeftRange
 from levilab.simulator.kernels.motion import ARM, TIME
 from levilab.simulator.keys import SceneError
 from levilab.simulator.single import simulate
@@ -143,7 +143,7 @@ class Flight:
         begin = float(state[TIME])
         try:
             motion = self._motion(state)
-        except SimulationError:  # it has hit the base, where the field is infinite
+        except LeftRange:  # it has hit the base, where the field is infinite
             self._fall(begin)
             return
         # of the states only the first is kept: a bench may run for hours

@@ -9,6 +9,7 @@ import pytest
 from instruments.clock import VirtualClock
 from instruments.virtual.generator.generator import Burst, Output
 from instruments.virtual.generator.voltage import fundamental
+from levilab.errors import LeftRange, SimulationError
 from levilab.simulator import SceneError, preset, simulate
 from levilab.world.flight import RATE, Flight
 from levilab.world.light import Tape
@@ -285,3 +286,23 @@ def test_a_bench_that_runs_for_hours_lets_go_what_nobody_asks_for(look):
         look(top)
     kept = len(top._flight._pieces)
     assert kept < 2 * KEPT_S / 60 + 1100  # a life and a fall each minute, and a thousand that are not let go yet
+
+
+def test_a_top_that_cannot_be_simulated_is_an_error_and_no_fall(monkeypatch):
+    def too_many_steps(*_, **__):
+        raise SimulationError("1e+12 steps would be needed")
+
+    flight = Flight(TILTED)
+    monkeypatch.setattr("levilab.world.flight.simulate", too_many_steps)
+    with pytest.raises(SimulationError, match="steps"):
+        flight.turns(np.array([0.5]))
+
+
+def test_a_top_whose_numbers_leave_their_range_has_hit_the_base(monkeypatch):
+    def hits(*_, **__):
+        raise LeftRange("the motion cannot be followed beyond 0.1 s")
+
+    flight = Flight(TILTED)
+    monkeypatch.setattr("levilab.world.flight.simulate", hits)
+    _, up = flight.turns(np.array([0.5]))
+    assert not up.any()

@@ -1,0 +1,214 @@
+"""What a session offers to every experiment, shown by one that is no spin-down: a scan with a person at the bench."""
+
+from __future__ import annotations
+
+import dataclasses
+import signal
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from pydantic import Field, create_model
+
+from instruments.clock import VirtualClock
+from levilab.acquisition.experiment import Experiment, ExperimentSettings
+from levilab.acquisition.loop import AcquisitionRequest, acquire
+from levilab.acquisition.session import ExperimentFailed, Session
+from levilab.acquisition.table import EXPERIMENTS
+from levilab.bench.config import BenchConfig
+from levilab.errors import DataError
+from levilab.runs.channel import Channel
+from levilab.runs.run import Run
+from levilab.world.bench import virtual_wiring
+from levilab.world.spin_world import BASE_FIELD, SpinScene, SpinWorld
+from support.acquisitions import Silent
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+
+class ScanSettings(ExperimentSettings):
+    """Heights at which the field is measured [m]."""
+
+    heights_m: tuple[float, ...] = (0.05, 0.06, 0.07)
+
+
+CHANNELS = (
+    Channel("time_s", "s", "bench clock"),
+    Channel("height_m", "m", "as the person at the bench says"),
+    Channel("flux_density_t", "T", "gaussmeter on the axis"),
+    Channel("light_v", "V", "mean of an oscilloscope's record"),
+)
+
+
+def scan(session: Session[ScanSettings]) -> None:
+    """At each height: the person moves the probe, then a field, a record, and a reading of both."""
+    bench = session.bench
+    bench.magnetometer.prepare(range_t=None)
+    bench.oscilloscope.prepare(duration_s=0.1, points=1000, volts_per_division=0.5, trigger_level_v=0.6, sweep="auto")
+    session.begin(lambda: session.progress("probe in its chamber", 1.0))
+    for k, height in enumerate(session.settings.heights_m):
+        session.ask(f"Move the probe to {100 * height:g} cm.")
+        flux_density = bench.magnetometer.flux_density()
+        assert flux_density is not None
+        bench.oscilloscope.acquire(timeout_s=5.0)
+        record = bench.oscilloscope.trace(1)
+        session.keep_trace(record, "phototransistor")
+        row = {"time_s": session.now(), "height_m": height, "flux_density_t": flux_density}
+        row["light_v"] = float(np.nanmean(record.volts))
+        session.keep(row, time_left_s=2.0 * (len(session.settings.heights_m) - k - 1))
+
+
+SCAN = Experiment(
+    name="scan",
+    about="flux density against height",
+    instruments=("magnetometer", "oscilloscope"),
+    settings=ScanSettings,
+    channels=lambda _: CHANNELS,
+    run=scan,
+)
+SCAN_TABLES: type[BenchConfig] = create_model(
+    "ScanTables", __base__=BenchConfig, scan=(ScanSettings, Field(default_factory=ScanSettings))
+)
+
+
+@pytest.fixture
+def request_of_a_scan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AcquisitionRequest:
+    monkeypatch.setitem(EXPERIMENTS, "scan", SCAN)
+    world = SpinWorld(SpinScene(), VirtualClock())
+    return AcquisitionRequest(
+        "scan", SCAN_TABLES(), lambda: virtual_wiring(world), out=tmp_path, synthetic_how="a test"
+    )
+
+
+def test_an_experiment_of_another_shape_writes_what_it_declares(request_of_a_scan: AcquisitionRequest) -> None:
+    run = acquire(request_of_a_scan, Silent())
+    assert run.status == "finished"
+    assert sorted(run.record.instruments) == ["magnetometer", "oscilloscope"]
+    frame = run.readings().frame
+    assert list(frame) == [channel.name for channel in CHANNELS]  # light_v is a name of this experiment alone
+    assert frame["height_m"].tolist() == [0.05, 0.06, 0.07]
+    assert frame["flux_density_t"].to_numpy() == pytest.approx(BASE_FIELD, rel=1e-3)
+    assert frame["light_v"].between(0.0, 1.3).all()
+
+
+def test_a_reading_is_shown_with_its_units_and_the_time_left(request_of_a_scan: AcquisitionRequest) -> None:
+    show = Silent()
+    acquire(request_of_a_scan, show)
+    assert show.left == [4.0, 2.0, 0.0]
+    assert [text.split()[3::2] for text in show.readings] == [["m", "T", "V"]] * 3
+
+
+def test_records_are_kept_raw_and_come_back_in_volts(request_of_a_scan: AcquisitionRequest) -> None:
+    run = acquire(request_of_a_scan, Silent())
+    stored = run.traces()
+    assert [one.number for one in stored] == [1, 2, 3]
+    assert {one.channel for one in stored} == {"phototransistor"}
+    light = run.readings().column("light_v")
+    for one, mean in zip(stored, light, strict=True):
+        assert one.trace.codes.dtype == np.uint8
+        assert np.nanmean(one.trace.volts) == pytest.approx(mean, rel=1e-12)
+
+
+def test_codes_that_were_changed_afterwards_are_refused(request_of_a_scan: AcquisitionRequest) -> None:
+    run = acquire(request_of_a_scan, Silent())
+    codes = run.folder / "traces/000002.npy"
+    codes.write_bytes(codes.read_bytes()[:-1] + b"\x00")
+    with pytest.raises(DataError, match=r"000002\.npy: is not what was recorded"):
+        run.traces()
+
+
+def test_the_person_is_asked_and_the_answer_is_kept(request_of_a_scan: AcquisitionRequest) -> None:
+    answers = iter(["", " at 6.1 cm, the stand slips ", ""])
+    asked: list[str] = []
+
+    def person(question: str) -> str:
+        asked.append(question)
+        return next(answers)
+
+    run = acquire(dataclasses.replace(request_of_a_scan, person=person), Silent())
+    assert asked[0] == "Move the probe to 5 cm."
+    happened = [(event["kind"], event["text"]) for event in run.events()]
+    assert happened.count(("asked the person", "Move the probe to 6 cm.")) == 1
+    assert ("answered", "at 6.1 cm, the stand slips") in happened
+
+
+def test_the_first_ctrl_c_ends_a_question(request_of_a_scan: AcquisitionRequest) -> None:
+    def leaves(_: str) -> str:
+        signal.raise_signal(signal.SIGINT)
+        pytest.fail("the signal did not break through")
+
+    run = acquire(dataclasses.replace(request_of_a_scan, person=leaves), Silent())
+    assert run.status == "interrupted"
+
+
+def test_a_clock_that_goes_back_is_no_reading(
+    request_of_a_scan: AcquisitionRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    times = iter([5.0, 5.0, 5.0, 4.0, 4.0, 4.0])
+    monkeypatch.setattr(Session, "now", lambda _: next(times, 4.0))
+    with pytest.raises(ExperimentFailed, match="the clock went back"):
+        acquire(request_of_a_scan, Silent())
+
+
+# --- readings at an interval ---
+
+
+def session_at(seconds: float, waited: list[float], step: Callable[[], None]) -> Session[Any]:
+    """A session whose waits are noted, and whose clock goes on by what a reading takes [s]."""
+
+    class Noting(Session[Any]):
+        clock = seconds
+
+        def now(self) -> float:
+            return self.clock
+
+        def wait(self, duration: float) -> None:
+            waited.append(duration)
+            self.clock += max(duration, 0.0)
+            step()
+
+        def event(self, kind: str, text: str, **data: Any) -> None:
+            waited.append(-1.0)
+
+    session: Any = Noting.__new__(Noting)
+    session.rows, session._lost, session.zero = [], False, 0.0
+    session.writer = type("Writer", (), {"record": type("Record", (), {"experiment": "scan"})})
+    return session
+
+
+def test_readings_come_at_whole_multiples_of_the_interval_until_the_longest_time() -> None:
+    session: Any = session_at(0.0, [], lambda: None)
+    seen = []
+    for time in session.readings_every(10.0, 35.0):
+        seen.append(time)
+        session.clock += 1.0
+    assert seen == [0.0, 10.0, 20.0, 30.0, 40.0]
+
+
+def test_readings_missed_while_an_instrument_was_lost_are_not_caught_up_with() -> None:
+    session: Any = session_at(0.0, [], lambda: None)
+    seen = []
+    for time in session.readings_every(10.0, 60.0):
+        seen.append(time)
+        session._lost = time == 10.0
+        session.clock += 25.0 if time == 10.0 else 1.0
+    assert seen == [0.0, 10.0, 40.0, 50.0, 60.0]
+
+
+def test_a_reading_that_takes_too_long_is_followed_at_once_by_the_next() -> None:
+    session: Any = session_at(0.0, [], lambda: None)
+    seen = []
+    for time in session.readings_every(10.0, 45.0):
+        seen.append(time)
+        session.clock += 25.0 if time == 10.0 else 1.0
+    assert seen == [0.0, 10.0, 35.0, 36.0, 40.0, 50.0]
+
+
+def test_the_run_that_is_listed_has_its_traces_described(request_of_a_scan: AcquisitionRequest) -> None:
+    run = acquire(request_of_a_scan, Silent())
+    package = (run.folder / "datapackage.json").read_text(encoding="utf-8")
+    assert "traces/000003.npy" in package
+    assert "traces.jsonl" in package
+    assert Run.load(run.folder).count() == 3
