@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from instruments.virtual.core.device import Answer, Clock, VirtualInstrument, answers, does
+from instruments.virtual.core.device import VirtualInstrument, answers, does
 from instruments.virtual.core.parameters import number
 from instruments.virtual.core.parser import Command, ScpiError
 from instruments.virtual.magnetometer.hall_probe import HallProbe, Reading
@@ -24,7 +24,9 @@ from instruments.virtual.magnetometer.numbers import Number, field_text
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from instruments.virtual.core.device import Answer, Clock
     from instruments.virtual.core.line import LineSettings
+    from instruments.virtual.core.steps import Steps
 
 _MU0 = 4e-7 * math.pi
 
@@ -86,14 +88,14 @@ class VirtualGaussmeter(VirtualInstrument):
 
     # --- messages ---
 
-    def execute(self, message: str) -> Answer | None:
+    def steps(self, message: str) -> Steps[Answer | None]:
         """Run one message; ``?`` alone asks the last question again."""
         message = _UNPRINTABLE.sub(" ", message).strip()
         if message == "?":
             message = self._last_question
         elif "?" in message:
             self._last_question = message
-        return super().execute(message)
+        return super().steps(message)
 
     def _common(self) -> tuple[Command, ...]:
         return (Command("*IDN", get=answers(lambda: self.identity)), Command("*RST", set=does(self.reset)))
