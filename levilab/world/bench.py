@@ -73,7 +73,7 @@ def _scope_ds1000z(world: World) -> VirtualInstrument:
 
 
 def _scope_dsox1000(world: World) -> VirtualInstrument:
-    from instruments.virtual.oscilloscope.keysight_dsox1000 import VirtualDSOX1000
+    from instruments.virtual.oscilloscope.keysight_dsox import VirtualDSOX1000
 
     return VirtualDSOX1000(world.clock, signals=_signals(world))
 

@@ -24,11 +24,11 @@ from instruments.virtual.bench.bus import Bus
 from instruments.virtual.bench.faults import Fault
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.oscilloscope.acquisition import AUTO_AFTER
-from instruments.virtual.oscilloscope.keysight_dsox1000 import VirtualDSOX1000
+from instruments.virtual.oscilloscope.keysight_dsox import VirtualDSOX1000
 from instruments.virtual.oscilloscope.measure import MEASUREMENTS, Measured, measure
 from instruments.virtual.oscilloscope.record import PIECE, Edge
 from instruments.virtual.oscilloscope.rigol_ds1000z import VirtualDS1000Z
-from instruments.virtual.oscilloscope.setup import one_two_five
+from instruments.virtual.oscilloscope.scope import one_two_five
 from support.wire import ask, cable, errors, received, send
 
 DARK, BRIGHT, DUTY = 0.1, 1.2, 0.03
@@ -188,7 +188,7 @@ def test_an_edge_of_either_slope_is_found_first_come_first_served():
 def test_the_part_before_the_trigger_is_filled_first():
     device = rigol(ramp, *RIGOL_READY, "CHAN1:OFFS 0", ":TRIG:EDGE:LEV 0", ":TIM:SCAL 0.1", ":SING")
     assert ask(device, ":TRIG:STAT?") == "RUN"
-    armed = device._armed
+    armed = device.acquisition.armed
     device.clock.sleep(2.0)
     assert device.record().trigger >= armed + 0.6
 
