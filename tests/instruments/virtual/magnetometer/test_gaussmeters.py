@@ -15,9 +15,9 @@ from instruments.errors import NoAnswer
 from instruments.links.visa import VisaTransport
 from instruments.virtual.bench.bus import Bus
 from instruments.virtual.bench.visa_library import library_for
+from instruments.virtual.magnetometer.lakeshore import field_text
 from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
 from instruments.virtual.magnetometer.lakeshore_475 import Virtual475
-from instruments.virtual.magnetometer.numbers import field_text
 from support.wire import ask, received, send
 
 PORT = "ASRL1::INSTR"
