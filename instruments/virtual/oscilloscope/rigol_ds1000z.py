@@ -3,7 +3,8 @@
 Sources: MSO1000Z/DS1000Z Programming Guide as public drivers quote it (ds1054z by P. Klaus; PyMeasure's DS1000Z
 driver).  From there: 25 codes per division, code 127 in the middle, 12 divisions, the limits of a block, the
 preamble's form, ASCII data with a block's head too.
-Assumed: what the error queue says when too much is asked for, the depth that AUTO takes.
+Assumed: what the error queue says when too much is asked for, the depth that AUTO takes.  The delayed sweep keeps its
+numbers within the limits of the guide, and is not drawn.
 """
 
 from __future__ import annotations
@@ -162,7 +163,31 @@ class VirtualDS1000Z(VirtualOscilloscope):
             self.whole("ACQuire:AVERages", "averages", 2.0, low=2, high=1024),
             Command("ACQuire:SRATe", get=answers(lambda: self.spell(self.full_scale()[0]))),
             self._depth(),
+            # behind all that the sample rate depends on, so that a setup can be restored row by row
+            self.quantity(
+                "TIMebase:DELay:SCALe",
+                "zoom_scale",
+                5e-7,
+                unit="S",
+                limits=self._zoom_scales,
+                rounded=one_two_five,
+            ),
+            self.quantity("TIMebase:DELay:OFFSet", "zoom_offset", 0.0, unit="S", limits=self._zoom_offsets),
         )
+
+    def _zoom_scales(self) -> tuple[float, float]:
+        """The delayed sweep: no coarser than the main one, no finer than a fortieth of 50 sample intervals."""
+        return one_two_five(50 / self.full_scale()[0] / 40, up=True), self.value("time_scale")
+
+    def _zoom_offsets(self) -> tuple[float, float]:
+        """The delayed sweep: all of it within the main one."""
+        reach = 6 * (self.value("time_scale") - self.value("zoom_scale"))
+        return self.value("time_offset") - reach, self.value("time_offset") + reach
+
+    def _keep_zoom_within(self) -> None:
+        for name, limits in (("zoom_scale", self._zoom_scales), ("zoom_offset", self._zoom_offsets)):
+            low, high = limits()
+            self.settings[name] = min(max(self.value(name), low), high)
 
     def _depth(self) -> Command:
         self._defaults["depth"] = "AUTO"
@@ -213,9 +238,15 @@ class VirtualDS1000Z(VirtualOscilloscope):
 
     def adjusted(self, name: str, before: float) -> None:
         """A sweep of SINGle waits for one record, the others go on."""
+        self._keep_zoom_within()
         super().adjusted(name, before)
         if name == "trigger_sweep" and self.acquisition.armed is not None:
             self.acquisition.arm(self.now, once=self.settings[name] == "SING")
+
+    def autoscale(self) -> None:
+        """See the base; the delayed sweep follows the main one."""
+        super().autoscale()
+        self._keep_zoom_within()
 
     def run(self) -> None:
         """``:RUN`` after a single record goes on with normal sweep, as the key does."""
