@@ -16,7 +16,7 @@ from instruments.virtual.generator.agilent_33220a import Virtual33220A
 from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
 from instruments.virtual.magnetometer.lakeshore_475 import Virtual475
-from instruments.virtual.oscilloscope.keysight_dsox1000 import VirtualDSOX1000
+from instruments.virtual.oscilloscope.keysight_dsox import VirtualDSOX1000
 from instruments.virtual.oscilloscope.rigol_ds1000z import VirtualDS1000Z
 from levilab.bench.config import ConfigError, InstrumentSettings, Limits
 from levilab.bench.wiring import Wiring

@@ -8,7 +8,7 @@ pytest.importorskip("pymeasure")
 from pymeasure.instruments.keysight import KeysightDSOX1102G
 
 from instruments.clock import VirtualClock
-from instruments.virtual.oscilloscope.keysight_dsox1000 import VirtualDSOX1000
+from instruments.virtual.oscilloscope.keysight_dsox import VirtualDSOX1000
 
 
 def square(start, step, n):

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 from instruments.ieee488 import INFINITY
-from instruments.virtual.core.device import SteppedInstrument
 from instruments.virtual.core.message import Framer, Overrun
 from instruments.virtual.core.parser import LONGEST_ANSWER, ScpiError
 from instruments.virtual.core.steps import Work, at_once
@@ -118,7 +117,7 @@ class Session:
 
     def catch_up(self) -> Iterator[None]:
         """What has gone on in the instrument while nobody asked, in slices."""
-        return self._sliced(self.device.catch_up()) if isinstance(self.device, SteppedInstrument) else iter(())
+        return self._sliced(self.device.catch_up())
 
     def _sliced(self, steps: Steps[None]) -> Iterator[None]:
         work = Work(steps)
@@ -161,7 +160,7 @@ class Session:
             self._answers.clear()
             self._rest = _NOTHING
         self._asked = True
-        answer = yield from self._answer(message)
+        answer = yield from self.device.steps(message)
         for fault in self.faults:
             if answer is not None and fault.strikes(message):
                 answer = fault.act(self, answer)
@@ -170,14 +169,9 @@ class Session:
             self._answers.append(answer)
             self._keep_within_bounds()
 
-    def _answer(self, message: str) -> Steps[Answer | None]:
-        if isinstance(self.device, SteppedInstrument):
-            return (yield from self.device.steps(message))
-        return self.device.execute(message)
-
     def cut_off_by(self, data: bytes) -> bool:
         """Whether these bytes end what the instrument works on."""
-        return isinstance(self.device, SteppedInstrument) and self.device.cut_off_by(data.decode("latin-1"))
+        return self.device.cut_off_by(data.decode("latin-1"))
 
     def _keep_within_bounds(self) -> None:
         """Who asks on and on and never reads gets nothing of it (IEEE 488.2, 6.3.1.7)."""

@@ -1,4 +1,7 @@
-"""What every virtual instrument is: bytes in, bytes out after the time that the real one would take."""
+"""What every virtual instrument is: bytes in, bytes out after the time that the real one would take.
+
+An answer may take long to be worked out, so an instrument works on a message in steps; see `steps`.
+"""
 
 from __future__ import annotations
 
@@ -62,14 +65,43 @@ class VirtualInstrument:
         self.status = Status()
         self.epoch = 0
         self._ready = 0.0
+        self._work: Work[Answer | None] | None = None
         self.parser = Parser(queue_size=self.queue_size, no_error=self.no_error, noted=self.status.note_error)
         self.parser.commands = (*self._common(), *self.table())
         self.settings |= self._defaults
 
     def execute(self, message: str) -> Answer | None:
         """Run one message, a line without its end; the answers of its queries, if it has any."""
+        return at_once(self.steps(message))
+
+    def steps(self, message: str) -> Steps[Answer | None]:
+        """Do what execute() does, in steps; a message that the instrument still works on comes first."""
+        if self._work and self.cut_off_by(message):
+            self._work.give_up()
+        while self._work and self._work.step():
+            yield
+        work = self._work = Work(self._answered(message))
+        try:
+            while work.step():
+                yield
+        finally:
+            work.give_up()
+        if work.error:
+            raise work.error
+        return work.result
+
+    def _answered(self, message: str) -> Steps[Answer | None]:
+        yield from self.catch_up()
         self._begin_message()
-        return self._answer(self.parser.run(message))
+        return self._answer((yield from self.parser.steps(message)))
+
+    def cut_off_by(self, message: str) -> bool:
+        """Whether this message ends the work on the one before it."""
+        return False
+
+    def catch_up(self) -> Steps[None]:
+        """Work out what has happened in the instrument since the last message."""
+        yield from ()
 
     def _begin_message(self) -> None:
         self._ready = max(self._ready, self.clock.now()) + self.pace
@@ -81,6 +113,8 @@ class VirtualInstrument:
 
     def abandon(self) -> None:
         """What is under way is given up, and what has not been read yet is lost."""
+        if self._work:
+            self._work.give_up()
         self.epoch += 1
         self._ready = self.clock.now()
 
@@ -192,50 +226,3 @@ def answers(tell: Callable[[], Steps[str] | str]) -> Callable[[list[str]], Steps
         return tell()
 
     return get
-
-
-class SteppedInstrument(VirtualInstrument):
-    """An instrument whose answers may take long to be worked out: it does that in steps."""
-
-    def __init__(self, clock: Clock) -> None:
-        self._work: Work[Answer | None] | None = None
-        super().__init__(clock)
-
-    def execute(self, message: str) -> Answer | None:
-        """See the base."""
-        return at_once(self.steps(message))
-
-    def steps(self, message: str) -> Steps[Answer | None]:
-        """What execute() does, in steps; a message that is worked on already comes first."""
-        if self._work and self.cut_off_by(message):
-            self._work.give_up()
-        while self._work and self._work.step():
-            yield
-        work = self._work = Work(self._answered(message))
-        try:
-            while work.step():
-                yield
-        finally:
-            work.give_up()
-        if work.error:
-            raise work.error
-        return work.result
-
-    def _answered(self, message: str) -> Steps[Answer | None]:
-        yield from self.catch_up()
-        self._begin_message()
-        return self._answer((yield from self.parser.steps(message)))
-
-    def abandon(self) -> None:
-        """See the base."""
-        if self._work:
-            self._work.give_up()
-        super().abandon()
-
-    def cut_off_by(self, message: str) -> bool:
-        """Whether this message ends the work on the one before it."""
-        return False
-
-    def catch_up(self) -> Steps[None]:
-        """Work out what has gone on while nobody asked."""
-        yield from ()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from instruments.ieee488 import INFINITY
-from instruments.virtual.core.device import SteppedInstrument, answers, does
+from instruments.virtual.core.device import VirtualInstrument, answers, does
 from instruments.virtual.core.parameters import at_most_one, limit, nr3, number, one
 from instruments.virtual.core.parser import Command, ScpiError
 from instruments.virtual.core.status import OPERATION_COMPLETE
@@ -53,7 +53,7 @@ class Function:
     kind: str = ""
 
 
-class VirtualCounter(SteppedInstrument):
+class VirtualCounter(VirtualInstrument):
     """What both counters are: two inputs, one run at a time, and a memory for its readings.
 
     signal, second: the voltages at the inputs 1 and 2.

@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import math
+import struct
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar
 
+from instruments.ieee488 import INFINITY, NOT_A_NUMBER
 from instruments.virtual.core.device import answers, does
-from instruments.virtual.core.parameters import number, one
+from instruments.virtual.core.parameters import at_most_one, choice, limit, none, number, one
 from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.counter.counter import DARK, Function
+from instruments.virtual.counter.counter import DARK, Function, VirtualCounter, darkness
+from instruments.virtual.counter.edges import Input
 from instruments.virtual.counter.measurements import Looks, Measurement, Span, Wish, first_edge
-from instruments.virtual.counter.parameters import channels_of, without_channels
-from instruments.virtual.counter.pendulum_cnt91_readings import ReadingsCNT91
+from instruments.virtual.counter.parameters import block, channels_of, without_channels
 from instruments.virtual.counter.run import Run
 
 if TYPE_CHECKING:
-    from collections.abc import Generator
+    from collections.abc import Callable, Generator
 
+    from instruments.virtual.core.device import Clock
     from instruments.virtual.core.steps import Steps
+    from instruments.virtual.counter.edges import Array, Signal
 
 #: From the end of a measurement to the beginning of the next, but for back-to-back ones [s] (handbook, 8-72: 4 µs
 #: and more; the calibration of the interpolators is 400 µs, estimated).
@@ -26,6 +30,23 @@ _DEAD, _CALIBRATION = 8e-6, 4e-4
 #: Settings that a measurement under way does not feel.
 _HARMLESS = {"format", "byte_order", "stamps", "most", "display", "average_type"}
 _BACK_TO_BACK = {"FREQ:BTB", "PER:BTB"}
+#: Schmitt trigger at a fixed level [V] (CNT-90 series data sheet: sensitivity 15 mV r.m.s.); ten times that behind
+#: the attenuator.
+_HYSTERESIS = 0.04
+#: Automatic level: the signal must repeat this often [Hz] (user manual of the series, 3: 100 Hz unless changed in its
+#: menu), and for frequency the trigger fires at 70 % and is armed at 30 % of peak to peak (handbook, 8-49).
+_SLOWEST, _UPPER, _LOWER = 100.0, 0.7, 0.3
+#: Most readings that one FETCh:ARRay? brings (handbook, 8-39).
+_MOST = 10_000
+
+
+def number_text(value: float) -> str:
+    """A number as this instrument prints it: fourteen digits.
+
+    >>> number_text(2e-8), number_text(9.91e37)
+    ('+2.0000000000000E-08', '+9.9100000000000E+37')
+    """
+    return f"{value:+.13E}"
 
 
 @dataclass
@@ -44,7 +65,7 @@ class _Pacing:
         return max(self._origin + self._ticks * self.aperture - opened, 0.0)
 
 
-class VirtualCNT91(ReadingsCNT91):
+class VirtualCNT91(VirtualCounter):
     """Pendulum CNT-91, sold as Tektronix FCA3100 as well.
 
     signal, second: the voltages at the inputs A and B; native: what has no result is answered with an empty line or
@@ -69,6 +90,10 @@ class VirtualCNT91(ReadingsCNT91):
         "PDUT": Function("PDUTycycle"),
         "NDUT": Function("NDUTycycle"),
     }
+
+    def __init__(self, clock: Clock, *, signal: Signal, second: Signal = darkness, native: bool = False) -> None:
+        self._native = native
+        super().__init__(clock, signal=signal, second=second)
 
     def table(self) -> tuple[Command, ...]:
         """Its commands; sources: see the class."""
@@ -202,3 +227,257 @@ class VirtualCNT91(ReadingsCNT91):
         """When the arming input has its edge."""
         edge = yield from first_edge(looks.finder(channel, begin), begin, math.inf)
         return edge.time if edge else begin
+
+    # --- settings ---
+
+    def _input(self, channel: int, suffix: str) -> tuple[Command, ...]:
+        head, name = f"INPut{suffix}:", str(channel)
+        return (
+            self.word(head + "COUPling", "coupling" + name, ("AC", "DC"), "AC"),
+            self._number(head + "IMPedance", "impedance" + name, low=50, high=1e6, default=1e6, unit="OHM"),
+            self.integer(head + "ATTenuation", "attenuation" + name, low=1, high=10, default=1),
+            self.toggle(head + "FILTer[:LPASs][:STATe]", "filter" + name),
+            self.toggle(head + "FILTer:DIGital", "digital_filter" + name),
+            self._number(head + "FILTer:DIGital:FREQuency", "cutoff" + name, low=1, high=5e7, default=1e5, unit="HZ"),
+            self.word(head + "SLOPe", "slope" + name, ("POSitive", "NEGative"), "POS"),
+            self.automatic(head + "LEVel:AUTO", channel),
+            self.level(head + "LEVel", channel, lambda: 5.0 * self._attenuation(channel), number_text),
+            self._number(head + "LEVel:RELative", "relative" + name, low=0, high=100, default=70),
+        )
+
+    def _arming(self) -> tuple[Command, ...]:
+        start = "ARM[:SEQuence[1]][:STARt][:LAYer[1]]:"
+        sources = ("IMMediate", "BUS", "EXT1", "EXT2", "EXT4")
+        return (
+            self._count(start + "COUNt", "armings"),
+            self.word(start + "SOURce", "arming", sources, "IMM"),
+            self.word(start + "SLOPe", "arming_slope", ("POSitive", "NEGative"), "POS"),
+            self._number(start + "DELay", "arming_delay", low=0, high=2, default=0, unit="S"),
+            self.word("ARM[:SEQuence[1]][:STARt]:LAYer2:SOURce", "bus_arming", ("IMMediate", "BUS"), "IMM"),
+            Command("ARM[:SEQuence[1]][:STARt]:LAYer2[:IMMediate]", set=does(self.trigger)),
+            self.word("ARM:STOP:SOURce", "stop_arming", (*sources, "TIMer"), "IMM"),
+            self._count("TRIGger[:STARt]:COUNt", "triggers"),
+            self.word("TRIGger[:STARt]:SOURce", "trigger_source", ("IMMediate", "TIMer"), "IMM"),
+            self._number("TRIGger[:STARt]:TIMer", "trigger_timer", low=2e-6, high=500, default=0.02, unit="S"),
+        )
+
+    def _system(self) -> tuple[Command, ...]:
+        return (
+            self.toggle("SYSTem:TOUT[:STATe]", "timeout_on"),
+            self._number("SYSTem:TOUT:TIME", "timeout", low=0.01, high=1000, default=0.1, unit="S"),
+            self.toggle("SYSTem:SDETect", "signal_detection"),
+            self.toggle("SYSTem:TALKonly", "talk_only"),
+            Command("SYSTem:PRESet", set=does(self.reset)),
+            Command("STATus:OPERation:CONDition", get=answers(lambda: str(0 if self.idle(self._ready) else 16))),
+            Command("STATus:OPERation[:EVENt]", get=answers(lambda: "0")),
+            Command("STATus:QUEStionable[:EVENt]", get=answers(lambda: "0")),
+            Command("STATus:QUEStionable:CONDition", get=answers(lambda: "0")),
+            Command("STATus:PRESet", set=none),
+            self.toggle("DISPlay:ENABle", "display", default=True),
+            self.toggle("CALibration:INTerpolator:AUTO", "calibrating", default=True),
+            Command("AUTO", set=self._auto_set),
+            Command("*OPT", get=answers(lambda: "0")),
+        )
+
+    def _number(self, pattern: str, name: str, *, low: float, high: float, default: float, unit: str = "") -> Command:
+        """A row for a number, printed as this instrument does."""
+        self._defaults[name] = default
+
+        def ask(parameters: list[str]) -> str:
+            asked = at_most_one(parameters)
+            return number_text(limit(asked, low=low, high=high, default=default) if asked else self._value(name))
+
+        read: Callable[[str], float] = lambda text: number(text, low=low, high=high, default=default, unit=unit)  # noqa: E731
+        return Command(pattern, self._setter(name, read), ask)
+
+    def _count(self, pattern: str, name: str) -> Command:
+        """A row for a count that may be endless."""
+        row = self.integer(pattern, name, low=1, high=2**31 - 1, default=1)
+        plain = row.set
+
+        def set_(parameters: list[str]) -> None:
+            if [word.upper() for word in parameters] in (["INF"], ["INFINITY"]):
+                self.settings[name] = INFINITY
+                self.changed(name)
+            elif plain:
+                plain(parameters)
+
+        return Command(pattern, set_, row.get)
+
+    @staticmethod
+    def spell_integer(value: float) -> str:
+        """No plus sign, and infinity as a number."""
+        return number_text(value) if value >= INFINITY else str(round(value))
+
+    def _value(self, name: str) -> float:
+        return float(self.settings[name])
+
+    # --- inputs ---
+
+    def _auto_set(self, parameters: list[str]) -> None:
+        """AUTO ONCE, the AUTOSET key: levels are found by the counter."""
+        choice(one(parameters), ("ONCE", "PRESet"))
+        self.settings |= {"automatic1": True, "automatic2": True}
+
+    def _attenuation(self, channel: int) -> float:
+        return self._value(f"attenuation{channel}")
+
+    def entry(self, channel: int, *, falling: bool) -> Input:
+        """See the base.  Back to back, and for times, an automatic level is one level with a narrow hysteresis."""
+        wide = self._function in {"FREQ", "PER"}
+        return Input(
+            level=None if self.settings[f"automatic{channel}"] else self._value(f"level{channel}"),
+            hysteresis=_HYSTERESIS * self._attenuation(channel),
+            window=1 / _SLOWEST,
+            upper=_UPPER if wide else 0.5,
+            lower=_LOWER if wide else 0.5,
+            alternating=self.settings[f"coupling{channel}"] == "AC",
+            falling=falling,
+        )
+
+    # --- results ---
+
+    def _fetching(self) -> tuple[Command, ...]:
+        return (
+            Command("FETCh[:SCALar]", get=answers(lambda: self._fetch(1))),
+            Command("FETCh:ARRay", get=self._fetch_array),
+            Command("READ[:SCALar]", get=answers(self._read)),
+            Command("READ:ARRay", get=self._read_array),
+            Command("CALCulate:DATA", get=answers(lambda: self._fetch(-1))),
+        )
+
+    def _formatting(self) -> tuple[Command, ...]:
+        return (
+            self.word("FORMat[:DATA]", "format", ("ASCii", "REAL", "PACKed"), "ASC"),
+            self.word("FORMat:BORDer", "byte_order", ("NORMal", "SWAPped"), "NORM"),
+            self.toggle("FORMat:TINFormation", "stamps"),
+            self.integer("FORMat:SMAX", "most", low=4, high=_MOST, default=_MOST),
+        )
+
+    def _calculation(self) -> tuple[Command, ...]:
+        head = "CALCulate:AVERage:"
+        words = ("MEAN", "SDEViation", "MINimum", "MAXimum", "ADEViation")
+        return (
+            self.toggle("CALCulate:STATe", "mathematics"),
+            self.toggle("CALCulate:AVERage[:STATe]", "averaging"),
+            self.integer(head + "COUNt", "averaged", low=2, high=2e9, default=100),
+            Command(head + "COUNt:CURRent", get=answers(lambda: str(self.there()))),
+            self.word(head + "TYPE", "average_type", (*words, "MINMax"), "MEAN"),
+            Command(head + "ALL", get=answers(self._all_statistics)),
+        )
+
+    # --- series ---
+
+    def _wanted(self) -> float:
+        """Results of one INITiate."""
+        if self.settings["averaging"]:
+            return self._value("averaged")
+        return self._value("armings") * self._value("triggers")
+
+    def _read(self) -> Steps[str]:
+        """READ? is ABORt, INITiate and FETCh?."""
+        self._restart()
+        return (yield from self._fetch(1))
+
+    def _read_array(self, parameters: list[str]) -> Steps[str]:
+        count = self._size(parameters)
+        if count > self._wanted():
+            raise ScpiError(-221)
+        self._restart()
+        most = count if math.isfinite(count) else min(self._wanted(), self._value("most"))
+        return (yield from self._fetch(int(most)))
+
+    def _restart(self) -> None:
+        self._stop()
+        self.settings["continuous"] = False
+        self._initiate()
+
+    def _size(self, parameters: list[str]) -> float:
+        words = without_channels(parameters)
+        if len(words) != 1:
+            raise ScpiError(-108 if words else -109)
+        if words[0].upper() in {"MAX", "MAXIMUM"}:
+            return math.inf
+        return float(round(number(words[0], low=-_MOST, high=_MOST, default=1)))
+
+    def _fetch_array(self, parameters: list[str]) -> Steps[str]:
+        count = self._size(parameters)
+        if not count:
+            raise ScpiError(-222)
+        if math.isfinite(count):
+            return (yield from self._fetch(int(count)))
+        there = self.there()
+        fresh = there - self._memory.fetched
+        if not fresh and not self.idle(self._ready):
+            raise ScpiError(-230)
+        if not fresh:  # all were fetched: it begins again with the first one
+            self._memory.fetched, fresh = 0, there
+        return (yield from self._fetch(int(min(fresh, self._value("most"))), size_known=False))
+
+    def _fetch(self, count: int, *, size_known: bool = True) -> Steps[str]:
+        """So many results, from where the last fetch ended; a negative number: the last ones, the place is kept."""
+        if self._run is None and not self._memory.held:
+            raise ScpiError(-230)
+        if self.settings["averaging"]:
+            return (yield from self._fetch_statistic())
+        if count < 0:
+            there = self.there()
+            if there < -count and not (yield from self._wait_until(-count)):
+                return ""
+            there = self.there()
+            return self._spell(*self._memory.part(there + count, there))
+        if self._memory.fetched >= self._memory.held and self.idle(self._ready):
+            self._memory.fetched = 0
+        start = self._memory.fetched
+        if not (yield from self._wait_until(start + count)):
+            return ""
+        self._memory.fetched = start + count
+        return self._spell(*self._memory.part(start, start + count), size_known=size_known)
+
+    def _wait_until(self, held: int) -> Steps[bool]:
+        """Wait until the memory holds so many.  Raises ScpiError if it never will."""
+        gone = self._run.taken - self._memory.held if self._run else 0
+        if held > self._memory.held and (self._run is None or gone + held > self._run.wanted):
+            raise ScpiError(-230)
+        return (yield from self.wait_for(gone + held))
+
+    def _fetch_statistic(self) -> Steps[str]:
+        """With statistics on, what is fetched is their result."""
+        if not (yield from self.wait_for()):
+            return ""
+        name = {"MEAN": "mean", "SDEV": "sdev", "MIN": "min", "MAX": "max", "ADEV": "adev", "MINM": "min"}
+        return number_text(self.statistics()[name[str(self.settings["average_type"])]])
+
+    def _all_statistics(self) -> Steps[str]:
+        """Mean, standard deviation, least, greatest, peak to peak."""
+        yield from self.wait_for()
+        found = self.statistics()
+        return ",".join(number_text(found[name]) for name in ("mean", "sdev", "min", "max", "ptp"))
+
+    # --- formats ---
+
+    def _spell(self, values: Array, stamps: Array, *, size_known: bool = True) -> str:
+        """Results in the format that is set (handbook, 8-36 and 8-39).
+
+        REAL is a block of eight bytes for each number, PACKed one block for all, time stamps in it as whole
+        picoseconds; and if the size was not told, its length has six digits.
+        """
+        kind, order = self.settings["format"], "<" if self.settings["byte_order"] == "SWAP" else ">"
+        pairs = [(float(value), float(stamp)) for value, stamp in zip(values, stamps, strict=True)]
+        stamped = bool(self.settings["stamps"])
+        numbers = [number for pair in pairs for number in pair[: 1 + stamped]]
+        if kind == "ASC":
+            return ",".join(self._missing(value) for value in numbers)
+        missing = math.nan if self._native else NOT_A_NUMBER
+        if kind == "REAL":
+            reals = (missing if value == NOT_A_NUMBER else value for value in numbers)
+            return ",".join(block(struct.pack(order + "d", value)) for value in reals)
+        data = b"".join(
+            struct.pack(order + "d", missing if value == NOT_A_NUMBER else value)
+            + (struct.pack(order + "q", round(stamp * 1e12)) if stamped else b"")
+            for value, stamp in pairs
+        )
+        return block(data) if size_known else f"#6{len(data):06d}" + data.decode("latin-1")
+
+    def _missing(self, value: float) -> str:
+        return "" if self._native and value == NOT_A_NUMBER else number_text(value)

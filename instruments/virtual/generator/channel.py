@@ -1,4 +1,10 @@
-"""One output of a virtual function generator: its triggers, and what stands at its terminals."""
+"""One output of a virtual function generator: its settings, their limits, its triggers, and what it puts out.
+
+Sources: Agilent/Keysight 33500 Series Operating and Service Guide (limits, couplings); Agilent 33220A User's Guide;
+the state after ``*RST`` as a public driver of the family lists it.  The real instrument does not refuse a number
+beyond its limits: it takes the limit and says so, −222 "value clipped to upper limit" (seen by the device tests of
+a public driver).  When a setting makes another one impossible the other one gives way, with −221.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +12,38 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from instruments.virtual.generator.settings import INFINITE, ChannelSettings
+import numpy as np
+
+from instruments.virtual.core.parameters import limit, number
+from instruments.virtual.core.parser import ScpiError
+from instruments.virtual.generator.arbitrary import Memory, built_in
 
 if TYPE_CHECKING:
     from collections.abc import Callable, MutableMapping
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from instruments.virtual.core.device import Value
-    from instruments.virtual.core.parser import ScpiError
-    from instruments.virtual.generator.family import Family
+    from instruments.virtual.generator.family import Family, Waveform
+
+#: The generator's own resistance [Ω], its greatest voltage without a load [V], and SCPI's infinity.
+SOURCE_OHM, OPEN_V, INFINITE = 50.0, 10.0, 9.9e37
+_WORDS = {"MIN", "MINIMUM", "MAX", "MAXIMUM", "DEF", "DEFAULT"}
+
+
+def quantity_of(text: str, units: tuple[str, ...]) -> tuple[float, str]:
+    """A number of any size and which of the units it was sent with.  Raises ScpiError.
+
+    >>> quantity_of("2 mVrms", ("", "VPP", "VRMS"))
+    (0.002, 'VRMS')
+    """
+    for unit in units:
+        try:
+            return number(text, low=-math.inf, high=math.inf, default=0, unit=unit), unit
+        except ScpiError as error:
+            if error.number != -131 or unit == units[-1]:
+                raise
+    raise ScpiError(-131)
 
 
 @dataclass(frozen=True)
@@ -56,8 +83,12 @@ class Output:
         return replace(self, amplitude=factor * self.amplitude, offset=factor * self.offset)
 
 
-class Channel(ChannelSettings):
-    """One output.  now: the time [s]; the rest: see the base."""
+class Channel:
+    """One output.
+
+    settings: of the whole instrument, this channel's under their names with a prefix; report: puts an entry into
+    the error queue; now: the time [s].
+    """
 
     def __init__(
         self,
@@ -68,10 +99,181 @@ class Channel(ChannelSettings):
         report: Callable[[ScpiError], None],
         now: Callable[[], float],
     ) -> None:
-        super().__init__(family, settings, index=index, report=report)
+        self.family, self.index = family, index
+        self._settings, self._report = settings, report
+        self.prefix = "" if index == 1 else f"{index}:"
+        self.memory = Memory(family.room)
+        self.library = built_in()
         self._now = now
         #: From when to when a triggered burst or sweep lasts [s].
         self.under_way = (-math.inf, -math.inf)
+
+    def __getitem__(self, name: str) -> Value:
+        return self._settings[self.prefix + name]
+
+    def __setitem__(self, name: str, value: Value) -> None:
+        self._settings[self.prefix + name] = value
+
+    def number(self, name: str) -> float:
+        """A setting that is a number."""
+        return float(self[name])
+
+    def on(self, mode: str) -> bool:
+        """Whether a mode is on; not every family has every mode."""
+        return bool(self._settings.get(self.prefix + mode))
+
+    def conflict(self, text: str) -> None:
+        """Another setting had to give way; the command goes on."""
+        self._report(ScpiError(-221, text))
+
+    def clip(self, value: float, low: float, high: float) -> float:
+        """The number or the limit that it is beyond, which goes into the error queue."""
+        if low <= value <= high:
+            return value
+        self._report(ScpiError(-222, f"value clipped to {'upper' if value > high else 'lower'} limit"))
+        return high if value > high else low
+
+    def read(self, text: str, low: float, high: float, default: float, units: tuple[str, ...] = ("",)) -> float:
+        """A numeric parameter, at most at its limits.  Raises ScpiError."""
+        if text[:1].isalpha():
+            if text.upper() in {"INF", "INFINITY"} or text.upper() not in _WORDS:
+                raise ScpiError(-104, text[:20])
+            return limit(text, low=low, high=high, default=default)
+        value, _ = quantity_of(text, units)
+        return self.clip(value, low, high)
+
+    # --- frequency ---
+
+    @property
+    def waveform(self) -> Waveform:
+        """The waveform that is selected."""
+        return self.family.waveform(str(self["waveform"]))
+
+    @property
+    def sampled(self) -> bool:
+        """Whether the frequency is that of samples: the 33500's arbitrary waveforms."""
+        return self.waveform.short == "ARB"
+
+    @property
+    def points(self) -> int:
+        """Samples of the arbitrary waveform that is selected."""
+        return int(self.samples.size)
+
+    @property
+    def samples(self) -> NDArray[np.float64]:
+        """The arbitrary waveform that is selected, −1 to 1, shape (n,)."""
+        name = str(self["arb"])
+        held = self.memory.held.get(name)
+        return self.library[name.rpartition("\\")[2].removesuffix(".ARB")] if held is None else held
+
+    @property
+    def frequency(self) -> float:
+        """Of the waveform that is selected [Hz]."""
+        return self.number("arb_rate") / self.points if self.sampled else self.number("frequency")
+
+    @frequency.setter
+    def frequency(self, value: float) -> None:
+        if self.sampled:
+            self["arb_rate"] = value * self.points
+        else:
+            self["frequency"] = value
+
+    def frequency_limits(self) -> tuple[float, float]:
+        """Of the waveform that is selected [Hz]."""
+        top = self.waveform.top
+        return self.waveform.bottom, top / self.points if self.sampled else top
+
+    # --- voltages, as they are displayed: at the load that OUTPut:LOAD names ---
+
+    @property
+    def share(self) -> float:
+        """Of the open-circuit voltage at the load."""
+        load = self.number("load")
+        return 1.0 if load >= INFINITE else load / (load + SOURCE_OHM)
+
+    def levels(self) -> tuple[float, float]:
+        """The lowest and the highest voltage that there can be [V]."""
+        top = OPEN_V * self.share
+        if self["limits_on"]:
+            return max(-top, self.number("limit_low")), min(top, self.number("limit_high"))
+        return -top, top
+
+    def amplitude_limits(self) -> tuple[float, float]:
+        """Of the peak-to-peak voltage [V]."""
+        low, high = self.levels()
+        return 2 * self.family.least_vpp * self.share, high - low
+
+    def offset_limits(self) -> tuple[float, float]:
+        """Of the offset at the amplitude there is [V]; a DC voltage has no amplitude."""
+        low, high = self.levels()
+        half = 0.0 if self["waveform"] == "DC" else self.number("amplitude_vpp") / 2
+        return min(0.0, low + half), max(0.0, high - half)
+
+    def shown(self, vpp: float, unit: str) -> float:
+        """A peak-to-peak voltage [V] in this unit."""
+        if unit == "VPP":
+            return vpp
+        rms = vpp / self._crest()
+        return rms if unit == "VRMS" else 10 * math.log10(rms**2 / self.number("load") / 1e-3)
+
+    def meant(self, value: float, unit: str) -> float:
+        """A number in this unit as a peak-to-peak voltage [V]."""
+        if unit == "VPP":
+            return value
+        rms = value if unit == "VRMS" else math.sqrt(10 ** (min(value, 300.0) / 10) * 1e-3 * self.number("load"))
+        return rms * self._crest()
+
+    def _crest(self) -> float:
+        if self["waveform"] != self.family.arb:
+            return self.waveform.crest
+        return 2.0 / max(float(np.sqrt(np.mean(self.samples**2))), 1e-3)
+
+    def set_level(self, which: str, value: float) -> None:
+        """VOLTage:HIGH or :LOW: the other level stays, or gives way by the smallest step."""
+        low, high = self.level("low"), self.level("high")
+        step = max(1e-3, self.amplitude_limits()[0])
+        if which == "high":
+            high = value
+            if high - low < step * (1 - 1e-9):
+                low = high - step
+                self.conflict("low level changed due to high level")
+        else:
+            low = value
+            if high - low < step * (1 - 1e-9):
+                high = low + step
+                self.conflict("high level changed due to low level")
+        self["amplitude_vpp"], self["offset"] = round(high - low, 12), round((high + low) / 2, 12)
+
+    def level(self, which: str) -> float:
+        """The high or the low level [V]."""
+        half = self.number("amplitude_vpp") / 2
+        return round(self.number("offset") + (half if which == "high" else -half), 12)
+
+    def level_limits(self, which: str) -> tuple[float, float]:
+        """Of the high or the low level [V]."""
+        low, high = self.levels()
+        return (low + 1e-3, high) if which == "high" else (low, high - 1e-3)
+
+    def set_load(self, load: float) -> None:
+        """OUTPut:LOAD: what stands at the terminals stays, what is displayed changes."""
+        before = self.share
+        self["load"] = load
+        for name in ("amplitude_vpp", "offset"):
+            self[name] = float(f"{self.number(name) * self.share / before:.12g}")
+        if load >= INFINITE and self["voltage_unit"] == "DBM":
+            self["voltage_unit"] = "VPP"
+            self.conflict("amplitude units changed to Vpp due to high-Z load")
+
+    # --- pulses ---
+
+    def pulse_limits(self) -> tuple[float, float]:
+        """Of the width of a pulse at the period there is [s]."""
+        least = max(self.family.shortest_pulse, self.family.shortest_edge / self.family.edge_part)
+        return least, 1 / self.number("frequency") - least
+
+    def set_width(self, width: float) -> None:
+        """The width of pulses [s], and with it their duty cycle."""
+        self["pulse_width"], self["pulse_duty"] = width, 100 * width * self.number("frequency")
 
     # --- triggers ---
 

@@ -1,6 +1,6 @@
 """What the settings of one output of a generator do to each other: when they do not fit, the other one gives way.
 
-Sources: see generator_settings.py.
+Sources: see channel.py.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from instruments.virtual.generator.settings import INFINITE
+from instruments.virtual.generator.channel import INFINITE
 
 if TYPE_CHECKING:
     from instruments.virtual.generator.channel import Channel

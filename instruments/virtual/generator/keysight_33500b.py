@@ -10,12 +10,49 @@ from instruments.virtual.core.device import answers, does
 from instruments.virtual.core.parameters import one
 from instruments.virtual.core.parser import Command, ScpiError
 from instruments.virtual.generator.arbitrary import Refused, plain_name
-from instruments.virtual.generator.family import Family, Waveform
+from instruments.virtual.generator.family import (
+    CHOICES,
+    DEG,
+    HZ,
+    INNER,
+    PERCENT,
+    PLAIN,
+    SWITCHES,
+    Choice,
+    Family,
+    Plain,
+    S,
+    V,
+    Waveform,
+)
 from instruments.virtual.generator.generator import VirtualGenerator
-from instruments.virtual.generator.tables import CHOICES_33500, HZ, PLAIN_33500, SWITCHES, S, V
 
 if TYPE_CHECKING:
     from instruments.virtual.generator.channel import Channel
+
+#: Settings on which nothing else depends, beyond those of both families; see family.py.
+_PLAIN: tuple[Plain, ...] = (
+    ("FUNCtion:NOISe:BANDwidth", "noise_bandwidth", 1e-3, 30e6, 1e5, HZ),
+    ("FUNCtion:PRBS:TRANsition[:BOTH]", "prbs_edge", 8.4e-9, 1e-6, 8.4e-9, S),
+    ("MARKer:CYCle", "marker_cycle", 2, 100e6, 2, ("",)),
+    ("BPSK[:PHASe]", "bpsk_phase", 0, 360, 180, DEG),
+    ("BPSK:INTernal:RATE", "bpsk_rate", 1e-3, 1e6, 10, HZ),
+    ("LIST:DWELl", "list_dwell", 1e-6, 3600, 1, S),
+    ("MARKer:POINt", "marker_point", 4, 1e6, 10, ("",)),
+    ("PHASe:ARBitrary", "arb_phase", -360, 360, 0, DEG),
+    ("PHASe:MODulation", "modulation_phase", -360, 360, 0, DEG),
+    ("PWM:DEViation:DCYCle", "pwm_duty", 0, 100, 1, PERCENT),
+    ("SUM:AMPLitude", "sum_amplitude", 0, 100, 0.1, PERCENT),
+    ("SUM:INTernal:FREQuency", "sum_frequency", 1e-6, 30e6, 100, HZ),
+)
+_CHOICES: tuple[Choice, ...] = (
+    ("FUNCtion:ARBitrary:FILTer", "arb_filter", ("NORMal", "STEP", "OFF"), "STEP"),
+    ("FUNCtion:ARBitrary:ADVance", "arb_advance", ("TRIGger", "SRATe"), "SRAT"),
+    ("FUNCtion:PRBS:DATA", "prbs_data", ("PN7", "PN9", "PN11", "PN15", "PN20", "PN23"), "PN7"),
+    ("BPSK:SOURce", "bpsk_source", ("INTernal", "EXTernal"), "INT"),
+    ("SUM:SOURce", "sum_source", ("INTernal", "EXTernal", "CH1", "CH2"), "INT"),
+    ("SUM:INTernal:FUNCtion", "sum_function", INNER, "SIN"),
+)
 
 
 def _square_33500(frequency: float) -> tuple[float, float]:
@@ -37,7 +74,6 @@ class Virtual33500B(VirtualGenerator):
     identity = "Agilent Technologies,33522B,VIRTUAL,4.00-levilab"
     outputs = 2
     trigger_sources = ("IMMediate", "EXTernal", "TIMer", "BUS")
-    modes = (*SWITCHES, "BPSK", "SUM")
     family = Family(
         waveforms=(
             Waveform("SINusoid", 30e6, crest=2 * math.sqrt(2)),
@@ -65,6 +101,9 @@ class Virtual33500B(VirtualGenerator):
         longest_sweep=250e3,
         points=(8, 1_000_000),
         room=1_000_000,
+        plain=(*PLAIN, *_PLAIN),
+        choices=(*CHOICES, *_CHOICES),
+        modes=(*SWITCHES, "BPSK", "SUM"),
     )
 
     def arbitrary_rows(self, channel: Channel) -> tuple[Command, ...]:
@@ -112,7 +151,6 @@ class Virtual33500B(VirtualGenerator):
                 put=lambda value: channel.__setitem__("amplitude_vpp", value),
             ),
             self.quantity(channel, source + "FUNCtion:PRBS:BRATe", "prbs_rate", lambda: (1e-3, 50e6), 1e3, units=HZ),
-            *self.plain_rows(channel, PLAIN_33500, CHOICES_33500),
             *self._memory_rows(channel, source + "DATA"),
             Command("[SOURce[1|2]:]PHASe:SYNChronize", set=does(lambda: None)),
             Command(f"INITiate[{channel.index}][:IMMediate][:ALL]", set=does(lambda: None)),

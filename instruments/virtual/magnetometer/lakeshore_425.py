@@ -1,4 +1,4 @@
-"""A virtual Lake Shore 425.  Sources: see magnetometer.py."""
+"""A virtual Lake Shore 425.  Sources: see lakeshore.py."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from typing import ClassVar
 from instruments.virtual.core.device import answers
 from instruments.virtual.core.line import LineSettings
 from instruments.virtual.core.parser import Command
-from instruments.virtual.magnetometer.gaussmeter import VirtualGaussmeter
-from instruments.virtual.magnetometer.numbers import Number, field_text
+from instruments.virtual.magnetometer.lakeshore import Number, VirtualGaussmeter, field_text
 
 
 class Virtual425(VirtualGaussmeter):

@@ -1,4 +1,4 @@
-"""A virtual Lake Shore 475 or 455.  Sources: see magnetometer.py."""
+"""A virtual Lake Shore 475 or 455.  Sources: see lakeshore.py."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from instruments.virtual.core.device import Clock, answers, does
 from instruments.virtual.core.line import LineSettings
 from instruments.virtual.core.parameters import none
 from instruments.virtual.core.parser import Command
-from instruments.virtual.magnetometer.gaussmeter import VirtualGaussmeter
-from instruments.virtual.magnetometer.numbers import Number, field_text
+from instruments.virtual.magnetometer.lakeshore import Number, VirtualGaussmeter, field_text
 
 if TYPE_CHECKING:
     from instruments.virtual.magnetometer.hall_probe import Reading

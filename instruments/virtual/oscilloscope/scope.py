@@ -1,46 +1,395 @@
-"""What the virtual oscilloscopes tell of their record: the trace on the screen, measurements, blocks; and autoscale."""
+"""What the virtual oscilloscopes have in common: their setup, and what they tell of their record.
+
+Acquiring is a matter of its own, see acquisition.py; the record is in record.py.
+"""
 
 from __future__ import annotations
 
+import math
+import re
+from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from instruments.virtual.oscilloscope.acquisition import ScopeAcquisition
+from instruments.virtual.core.device import Value, VirtualInstrument, answers
+from instruments.virtual.core.parameters import at_most_one, choice, limit, number, one
+from instruments.virtual.core.parser import Command, ScpiError
+from instruments.virtual.oscilloscope.acquisition import LOOK_AHEAD, Acquisition, Plan
 from instruments.virtual.oscilloscope.measure import Measured, edges, measure
-from instruments.virtual.oscilloscope.record import COARSEST, open_input
-from instruments.virtual.oscilloscope.setup import one_two_five
+from instruments.virtual.oscilloscope.record import COARSEST, Edge, Input, Record, open_input
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
     from numpy.typing import NDArray
 
+    from instruments.virtual.core.device import Clock
+    from instruments.virtual.oscilloscope.record import Signal
 
-class VirtualOscilloscope(ScopeAcquisition):
-    """A digital oscilloscope of eight bits; a subclass gives the commands and how codes and records are scaled."""
+#: Below the level by this part of a division the trigger is armed again.
+_HYSTERESIS = 0.3
+#: How the words of the trigger slope are meant.
+_SLOPES: dict[str, tuple[float, ...]] = {
+    "POS": (1.0,),
+    "NEG": (-1.0,),
+    "RFAL": (1.0, -1.0),
+    "EITH": (1.0, -1.0),
+    "ALT": (1.0, -1.0),
+}
+#: What would end a string or a message.
+_NOT_IN_LABELS = dict.fromkeys(map(ord, "\"';\n"))
+
+
+class VirtualOscilloscope(VirtualInstrument):
+    """A digital oscilloscope of eight bits; a subclass gives the commands and how codes and records are scaled.
+
+    signals: the voltage at each input, by channel; an input without one is open, 0 V.
+
+    Each row of a setting that is part of the setup is remembered with its header, to keep and restore it.
+    """
 
     #: Divisions of the screen from left to right.
     columns: ClassVar[int]
-    #: Bytes per second of a long answer (assumed).
+    #: What a code cannot go beyond.
+    lowest: ClassVar[int]
+    highest: ClassVar[int] = 255
+    #: Whether the old record can be read until a single one is complete.
+    keeps_old: ClassVar[bool] = False
+    #: Bytes per second of a long answer (assumed), and digits of the length in a block's head.
     transfer: ClassVar[float] = 1e6
+    digits: ClassVar[int]
     #: What a measurement is answered with that the trace does not show.
     no_measurement: ClassVar[float] = 9.9e37
+
+    def __init__(
+        self, clock: Clock, *, signals: Mapping[int, Signal], channels: int = 4, identity: str | None = None
+    ) -> None:
+        self.channels = range(1, channels + 1)
+        self._signals = signals
+        self.identity = identity or self.identity
+        self.acquisition = Acquisition(self._plan, keeps_old=self.keeps_old)
+        self._headers: dict[str, str] = {}
+        self._restoring = False
+        super().__init__(clock)
+        self.run()
+
+    # --- what a subclass says of its numbers and its scaling ---
+
+    def spell(self, value: float) -> str:
+        """A number as this maker prints it."""
+        raise NotImplementedError
+
+    def full_scale(self) -> tuple[float, int]:
+        """Samples per second and points of the record that would be taken now."""
+        raise NotImplementedError
+
+    def screen(self) -> tuple[float, float]:
+        """Where the screen begins [s from the trigger] and how long it is [s]."""
+        raise NotImplementedError
+
+    def scaling(self, channel: int) -> tuple[float, int]:
+        """Volts per code and the code of 0 V, which may lie beyond the converter."""
+        raise NotImplementedError
+
+    def window(self, channel: int) -> tuple[float, float]:
+        """The code in the middle of the screen, and how many codes it is high."""
+        raise NotImplementedError
+
+    def fit(self, channel: int, middle: float, division: float) -> None:
+        """Show this voltage in the middle of the screen, with so many volts per division."""
+        raise NotImplementedError
+
+    # --- rows of settings ---
+
+    def quantity(
+        self,
+        pattern: str,
+        name: str,
+        default: float,
+        *,
+        unit: str = "",
+        limits: Callable[[], tuple[float, float]],
+        rounded: Callable[[float], float] = lambda value: value,
+        spell: Callable[[float], str] | None = None,
+    ) -> Command:
+        """A row for a number whose limits depend on other settings.  rounded: to what the instrument can do."""
+        self._defaults[name] = default
+        self._remember(pattern, name)
+
+        def set_(parameters: list[str]) -> None:
+            if len(parameters) > 2:  # a second one, as the source of a level, changes nothing here
+                raise ScpiError(-108)
+            low, high = limits()
+            value = number(one(parameters[:1]), low=low, high=high, default=default, unit=unit)
+            before, self.settings[name] = self.settings[name], rounded(value)
+            self.adjusted(name, float(before))
+
+        def ask(parameters: list[str]) -> str:
+            asked = at_most_one(parameters[:1])
+            low, high = limits()
+            bound = asked.upper() in {"MIN", "MAX", "DEF", "MINIMUM", "MAXIMUM", "DEFAULT"}
+            value = limit(asked, low=low, high=high, default=default) if bound else float(self.settings[name])
+            return (spell or self.spell)(value)
+
+        return Command(pattern, set_, ask)
+
+    def whole(self, pattern: str, name: str, default: float, *, low: float, high: float, sign: str = "") -> Command:
+        """A row for a whole number.  sign: "+" where the maker prints it."""
+        return self.quantity(
+            pattern,
+            name,
+            default,
+            limits=lambda: (low, high),
+            rounded=lambda value: float(round(value)),
+            spell=lambda value: f"{value:{sign}.0f}",
+        )
+
+    def percent(self, pattern: str, name: str) -> Command:
+        """A row for a percentage, 50 % at first."""
+        return self.whole(pattern, name, 50.0, low=0, high=100)
+
+    def full_range(
+        self, pattern: str, name: str, *, divisions: int, limits: Callable[[], tuple[float, float, float]], unit: str
+    ) -> Command:
+        """A row for a scale times all its divisions.  limits: lowest, highest, default."""
+
+        def set_(parameters: list[str]) -> None:
+            low, high, default = limits()
+            self.settings[name] = number(one(parameters), low=low, high=high, default=default, unit=unit) / divisions
+            self.changed(name)
+
+        return Command(pattern, set_, answers(lambda: self.spell(divisions * self.value(name))))
+
+    def word(self, pattern: str, name: str, words: tuple[str, ...], default: str) -> Command:
+        """A row for one word of several, as everywhere; it is part of the setup."""
+        self._remember(pattern, name)
+        return super().word(pattern, name, words, default)
+
+    def switch(self, pattern: str, name: str, *, default: bool = False) -> Command:
+        """A row for ON or OFF, as everywhere; it is part of the setup."""
+        self._remember(pattern, name)
+        return super().switch(pattern, name, default=default)
+
+    def text(self, pattern: str, name: str, default: str, *, longest: int) -> Command:
+        """A row for a string in quotes, cut to its greatest length, in capitals."""
+        self._defaults[name] = default
+        self._remember(pattern, name)
+
+        def set_(parameters: list[str]) -> None:
+            given = one(parameters)
+            if len(given) < 2 or given[0] not in "\"'" or given[-1] != given[0]:
+                raise ScpiError(-104)
+            self.settings[name] = given[1:-1].translate(_NOT_IN_LABELS)[:longest].upper()
+
+        return Command(pattern, set_, answers(lambda: f'"{self.settings[name]}"'))
+
+    def _remember(self, pattern: str, name: str) -> None:
+        short = re.sub(r"\[[^\]]*\]", "", pattern)
+        self._headers[name] = ":" + re.sub("[a-z]", "", short)
+
+    def value(self, name: str) -> float:
+        """A setting that is a number."""
+        return float(self.settings[name])
+
+    def division(self, channel: int) -> float:
+        """Volts per division."""
+        return self.value(f"chan{channel}_scale")
 
     def shown(self) -> list[int]:
         """The channels that are on."""
         return [n for n in self.channels if self.settings[f"chan{n}_display"]]
 
-    def half_level(self) -> None:
-        """The trigger level half way between the lowest and the highest voltage on the screen."""
-        source = str(self.settings["trigger_source"])
-        if source.startswith("CHAN"):
-            trace = self.on_screen(int(source[4:]))
-            self.settings["trigger_level"] = float(trace.volts.max() + trace.volts.min()) / 2
-            self.changed("trigger_level")
+    def channel_of(self, text: str) -> int:
+        """The channel of ``CHAN1`` or ``CHANnel1``.  Raises ScpiError."""
+        words = tuple(f"CHANnel{n}" for n in self.channels)
+        return int(choice(text, words)[4:])
 
-    def block(self, data: bytes, *, digits: int) -> str:
+    # --- when a setting changes ---
+
+    def changed(self, name: str) -> None:
+        """A setting has changed: what runs begins anew."""
+        self.adjusted(name, 0.0)
+
+    def adjusted(self, name: str, before: float) -> None:
+        """A number has changed from what it was before."""
+        if name.endswith("_probe") and before:
+            self._follow_probe(name.removesuffix("_probe"), float(self.settings[name]) / before)
+        if not name.startswith("wav"):
+            self.acquisition.arm_again(self.now)
+
+    def _follow_probe(self, channel: str, ratio: float) -> None:
+        """With another probe the same volts at the input are other volts at its tip: scale and offset go with it."""
+        for what in ("scale", "offset"):
+            self.settings[f"{channel}_{what}"] = ratio * float(self.settings[f"{channel}_{what}"])
+        if self.settings["trigger_source"] == channel.upper():
+            self.settings["trigger_level"] = ratio * float(self.settings["trigger_level"])
+
+    def reset(self) -> None:
+        """The state after ``*RST``: it runs."""
+        self.acquisition.blocked = False
+        super().reset()
+        self.run()
+
+    # --- the setup as a whole ---
+
+    def setup(self) -> bytes:
+        """All settings, as messages that restore them."""
+        return "\n".join(f"{header} {self._spelled(name)}" for name, header in self._headers.items()).encode("latin-1")
+
+    def _spelled(self, name: str) -> str:
+        value: Value = self.settings[name]
+        if isinstance(value, bool):
+            return str(int(value))
+        if isinstance(value, float):
+            return f"{value:.15G}"
+        return f'"{value}"' if name.endswith("_label") else value
+
+    def restore(self, setup: str) -> None:
+        """Settings from messages; a setup that is none leaves what it had already set.  Raises ScpiError."""
+        if self._restoring:
+            raise ScpiError(-224)
+        known = set(self._headers.values())
+        self._restoring = True
+        try:
+            for line in setup.split("\n"):
+                header = line.partition(" ")[0]
+                if header not in known:
+                    raise ScpiError(-224)
+                self.parser.run(line.partition(";")[0])
+        finally:
+            self._restoring = False
+
+    def presets(self) -> tuple[Command, ...]:
+        """Setups as blocks and in ten places."""
+        kept: dict[int, str] = {}
+
+        def place(parameters: list[str]) -> int:
+            return int(number(one(parameters), low=0, high=9, default=0))
+
+        def keep(parameters: list[str]) -> None:
+            kept[place(parameters)] = self.setup().decode("latin-1")
+
+        def recall(parameters: list[str]) -> None:
+            where = place(parameters)
+            if where in kept:
+                self.restore(kept[where])
+
+        return (Command("*SAV", set=keep), Command("*RCL", set=recall))
+
+    # --- acquiring ---
+
+    @property
+    def now(self) -> float:
+        """When the message under way is worked on [s]."""
+        now = self.clock.now()
+        return max(self._ready, now) if math.isfinite(self._ready) else now
+
+    def _plan(self, armed: float) -> Plan:
+        """What is acquired from this time on [s]."""
+        rate, points = self.full_scale()
+        start, length = self.screen()
+        record = Record(
+            trigger=armed,
+            forced=False,
+            rate=rate,
+            points=points,
+            # a record longer than the screen goes beyond it by as much on both sides
+            origin=start - (points / rate - length) / 2,
+            screen=(start, length),
+            inputs={n: self._input(n, armed) for n in self.channels},
+        )
+        return Plan(record, partial(self._search, record), automatic=self.settings["trigger_sweep"] == "AUTO")
+
+    def _input(self, channel: int, start: float) -> Input:
+        signal = self._signals.get(channel, open_input)
+        coupling = self.settings[f"chan{channel}_coupling"]
+        if coupling == "GND":
+            signal = open_input
+        mean = 0.0
+        if coupling == "AC":
+            begin = max(0.0, start - 0.5)
+            mean = float(np.mean(signal(begin, COARSEST, round(1 / COARSEST))))
+        factor = self.value(f"chan{channel}_probe") * (-1.0 if self.settings[f"chan{channel}_invert"] else 1.0)
+        volts_per_code, zero = self.scaling(channel)
+        return Input(signal, factor, mean, volts_per_code, zero, self.lowest, self.highest)
+
+    def _search(self, record: Record, start: float) -> Edge | None:
+        """A search for the trigger of this record from a time on [s], or None if the source never triggers."""
+        source = str(self.settings["trigger_source"])
+        if not source.startswith("CHAN"):
+            return None
+        channel = int(source[4:])
+        step = max(min(COARSEST, record.points / record.rate / 1000), 1 / record.rate)
+        return Edge(
+            volts=record.inputs[channel].volts,
+            level=self.value("trigger_level"),
+            hysteresis=_HYSTERESIS * self.division(channel),
+            slopes=_SLOPES[str(self.settings["trigger_slope"])],
+            step=step,
+            fine=0.01 / record.rate,
+            position=start,
+        )
+
+    def run(self) -> None:
+        """Begin to acquire, over and over."""
+        self.acquisition.arm(self.now, once=False)
+
+    def single(self) -> None:
+        """Begin to acquire one record."""
+        self.acquisition.single(self.now)
+
+    def stop(self) -> None:
+        """Acquire no more."""
+        self.acquisition.stop(self.now)
+
+    def force(self) -> None:
+        """Take a record without waiting for an edge."""
+        self.acquisition.force(self.now)
+
+    def trigger(self) -> None:
+        """``*TRG``."""
+        self.force()
+
+    def running(self) -> bool:
+        """Whether the scope acquires or waits for a trigger."""
+        return self.acquisition.running(self.now)
+
+    def digitize(self) -> None:
+        """Acquire one record; what comes next has to wait for it, for ever if there is no trigger."""
+        self.single()
+        record = self.acquisition.first(self.now + LOOK_AHEAD)
+        if record is None:
+            self.acquisition.block()
+            self.busy_until(math.inf)
+            return
+        self.busy_until(record.done)
+        self.acquisition.settle(record, self.now)
+
+    def abandon(self) -> None:
+        """A device clear: what is under way is given up, an acquisition that blocks included."""
+        super().abandon()
+        self.acquisition.unblock()
+
+    def record(self) -> Record:
+        """The latest record; the answer waits for it if one is under way.  Raises ScpiError if there is none."""
+        acquisition = self.acquisition
+        acquisition.follow(self.now)
+        if acquisition.latest is None and acquisition.runs_freely:
+            under_way = acquisition.first(self.now + LOOK_AHEAD)
+            if under_way is not None:
+                self.busy_until(under_way.done)
+                acquisition.settle(under_way, self.now)
+        if acquisition.latest is None:
+            raise ScpiError(-230)
+        return acquisition.latest
+
+    # --- what the record shows ---
+
+    def block(self, data: bytes) -> str:
         """A definite-length block as text, and the time that it takes."""
         self.busy_until(self._ready + len(data) / self.transfer)
-        return f"#{digits}{len(data):0{digits}d}" + data.decode("latin-1")
+        return f"#{self.digits}{len(data):0{self.digits}d}" + data.decode("latin-1")
 
     def on_screen(self, channel: int, points: int = 50_000) -> Measured:
         """The trace on the screen, from its codes.  Raises ScpiError if there is none."""
@@ -68,9 +417,15 @@ class VirtualOscilloscope(ScopeAcquisition):
             heights[n] = 0.5 + (codes.astype(np.float64) - middle) / span
         return heights
 
-    def window(self, channel: int) -> tuple[float, float]:
-        """The code in the middle of the screen, and how many codes it is high."""
-        raise NotImplementedError
+    # --- settings from the signal ---
+
+    def half_level(self) -> None:
+        """The trigger level half way between the lowest and the highest voltage on the screen."""
+        source = str(self.settings["trigger_source"])
+        if source.startswith("CHAN"):
+            trace = self.on_screen(int(source[4:]))
+            self.settings["trigger_level"] = float(trace.volts.max() + trace.volts.min()) / 2
+            self.changed("trigger_level")
 
     def autoscale(self) -> None:
         """Scale, offset, time base and level to fit what stands at the inputs."""
@@ -91,6 +446,26 @@ class VirtualOscilloscope(ScopeAcquisition):
         self.settings |= {"time_offset": 0.0, "trigger_sweep": "AUTO"}
         self.run()
 
-    def fit(self, channel: int, middle: float, division: float) -> None:
-        """Show this voltage in the middle of the screen, with so many volts per division."""
-        raise NotImplementedError
+
+def block_content(text: str) -> str:
+    """The content of a definite-length block that was sent as a parameter.  Raises ScpiError."""
+    if len(text) < 2 or text[0] != "#" or not "1" <= text[1] <= "9":
+        raise ScpiError(-104)
+    begin = 2 + int(text[1])
+    digits = text[2:begin]
+    if not digits.isascii() or not digits.isdigit() or len(text) - begin != int(digits):
+        raise ScpiError(-104)
+    return text[begin:]
+
+
+def one_two_five(value: float, *, up: bool = False) -> float:
+    """The number of the series 1, 2, 5, 10 … nearest to a positive one, or the next that is not less.
+
+    >>> one_two_five(3e-3), one_two_five(4e-3), one_two_five(2.1, up=True), one_two_five(0.2, up=True)
+    (0.002, 0.005, 5.0, 0.2)
+    """
+    decade = math.floor(math.log10(value))
+    series = [float(f"{m}e{decade}") for m in (1, 2, 5, 10, 20)]
+    if up:
+        return next(s for s in series if s >= value * (1 - 1e-9))
+    return min(series, key=lambda s: abs(s - value))

@@ -134,12 +134,12 @@ def test_a_late_identity_is_not_taken_for_the_one_that_was_asked_for_to_resynchr
 
 def test_an_instrument_that_was_off_is_found_when_it_is_on(bus, clock):
     device = bus.instruments["ASRLslow::INSTR"]
-    execute, device.execute = device.execute, lambda _: None
+    steps, device.steps = device.steps, lambda _: iter(())
     with contextlib.closing(SerialTransport(SLOW)) as transport:
         for _ in range(3):
             with pytest.raises(NoAnswer):
                 transport.query("*IDN?")
-        device.execute = execute
+        device.steps = steps
         assert transport.query("LIST?") == "1,2,1,1,1"
         before = clock.now()
         transport.query("LIST?")

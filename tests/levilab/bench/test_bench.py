@@ -48,8 +48,8 @@ class Faulty(Virtual33500B):
 
     silent, stuck = 0, False
 
-    def execute(self, message):
-        answer = super().execute(message.replace("OUTP1 OFF", "*WAI") if Faulty.stuck else message)
+    def steps(self, message):
+        answer = yield from super().steps(message.replace("OUTP1 OFF", "*WAI") if Faulty.stuck else message)
         if answer and Faulty.silent:
             Faulty.silent -= 1
             return None

@@ -210,8 +210,8 @@ class Liar:
     def __getattr__(self, name):
         return getattr(self._device, name)
 
-    def execute(self, message):
-        answer = self._device.execute(message)
+    def steps(self, message):
+        answer = yield from self._device.steps(message)
         if "?" not in message or not self.replies or (reply := self.replies.pop(0)) is None:
             return answer
         data, delay, complete = reply

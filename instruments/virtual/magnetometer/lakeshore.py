@@ -11,20 +11,22 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from instruments.virtual.core.device import Answer, Clock, VirtualInstrument, answers, does
+from instruments.virtual.core.device import VirtualInstrument, answers, does
 from instruments.virtual.core.parameters import number
 from instruments.virtual.core.parser import Command, ScpiError
 from instruments.virtual.magnetometer.hall_probe import HallProbe, Reading
-from instruments.virtual.magnetometer.numbers import Number, field_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from instruments.virtual.core.device import Answer, Clock
     from instruments.virtual.core.line import LineSettings
+    from instruments.virtual.core.steps import Steps
 
 _MU0 = 4e-7 * math.pi
 
@@ -46,6 +48,42 @@ _UNPRINTABLE = re.compile(r"[^ -~]")
 
 #: Noise of a reading, standard deviation, in units of the last digit (assumed).
 _NOISE = 0.5
+
+
+@dataclass(frozen=True)
+class Number:
+    """One of the numbers behind a header.  whole: printed as n, else as ±nnn.nnnE±nn."""
+
+    name: str
+    low: float
+    high: float
+    default: float
+    whole: bool = True
+
+    def read(self, text: str) -> float:
+        """The parameter.  Raises ScpiError."""
+        value = number(text, low=self.low, high=self.high, default=self.default)
+        if self.whole and value != int(value):
+            raise ScpiError(-224, text[:20])
+        return value
+
+    def spell(self, value: float) -> str:
+        """The number as the instrument prints it."""
+        return f"{int(value)}" if self.whole else field_text(value)
+
+
+def field_text(value: float) -> str:
+    """A number as these instruments print it, ±nnn.nnnE±nn.
+
+    >>> field_text(12.3456), field_text(-3.5e-5), field_text(0.0)
+    ('+123.456E-01', '-350.000E-07', '+000.000E+00')
+    """
+    if not value:
+        return "+000.000E+00"
+    exponent = math.floor(math.log10(abs(value))) - 2
+    if round(abs(value) / 10.0**exponent, 3) >= 1000:
+        exponent += 1
+    return f"{value / 10.0**exponent:+08.3f}E{exponent:+03d}"
 
 
 class VirtualGaussmeter(VirtualInstrument):
@@ -86,14 +124,14 @@ class VirtualGaussmeter(VirtualInstrument):
 
     # --- messages ---
 
-    def execute(self, message: str) -> Answer | None:
+    def steps(self, message: str) -> Steps[Answer | None]:
         """Run one message; ``?`` alone asks the last question again."""
         message = _UNPRINTABLE.sub(" ", message).strip()
         if message == "?":
             message = self._last_question
         elif "?" in message:
             self._last_question = message
-        return super().execute(message)
+        return super().steps(message)
 
     def _common(self) -> tuple[Command, ...]:
         return (Command("*IDN", get=answers(lambda: self.identity)), Command("*RST", set=does(self.reset)))

@@ -1,0 +1,251 @@
+"""The drivers of the oscilloscopes at the virtual ones."""
+
+import contextlib
+import json
+import tracemalloc
+
+import numpy as np
+import pytest
+import pyvisa
+
+from instruments.clock import VirtualClock
+from instruments.drivers.oscilloscope import NeverTriggered, NothingAcquired
+from instruments.drivers.oscilloscope.keysight_dsox import KeysightDSOX
+from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
+from instruments.errors import BadAnswer, SettingsLost
+from instruments.links.visa import VisaTransport
+from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.faults import Fault
+from instruments.virtual.bench.visa_library import library_for
+from instruments.virtual.oscilloscope.keysight_dsox import VirtualDSOX1000
+from instruments.virtual.oscilloscope.record import PIECE
+from instruments.virtual.oscilloscope.rigol_ds1000z import VirtualDS1000Z
+from support.scopes import cheap, constant, pulses
+
+
+def bench(make, signal):
+    clock = VirtualClock()
+    name = "TCPIP0::scope.levilab::inst0::INSTR"
+    device = make(clock, signals={1: signal})
+    library = library_for(Bus({name: device}))
+    return device, VisaTransport(name, library=library), clock
+
+
+BOTH = pytest.mark.parametrize(
+    ("driver", "make"), [(RigolDS1000Z, VirtualDS1000Z), (KeysightDSOX, VirtualDSOX1000)], ids=["rigol", "keysight"]
+)
+PULSES = {"duration_s": 0.1, "points": 10_000, "volts_per_division": 0.2, "offset_v": 0.6}
+
+
+@BOTH
+@pytest.mark.parametrize("slope", ["rising", "falling", "either"])
+def test_the_driver_sees_the_pulse_where_and_as_it_was(driver, make, slope):
+    device, transport, clock = bench(make, pulses)
+    scope = driver(transport, clock=clock)
+    scope.prepare(**PULSES, trigger_level_v=0.65, trigger_slope=slope)
+    scope.acquire(timeout_s=1.0)
+    trace = scope.trace(1)
+    true = pulses(device.record().trigger + trace.t0_s, trace.dt_s, trace.codes.size)
+    # half a code, and the digits of the preamble
+    assert np.abs(trace.volts - true).max() <= 0.5 * trace.volts_per_code + 1e-5
+    assert trace.codes.size >= 10_000
+    assert trace.codes.size * trace.dt_s >= 0.1 * (1 - 1e-9)
+    middle = round(-trace.t0_s / trace.dt_s)
+    assert abs(trace.volts[middle] - 0.65) <= 2 * trace.volts_per_code
+    np.testing.assert_array_equal(np.concatenate(list(scope.blocks(1))), trace.codes)
+    transport.close()
+
+
+@BOTH
+def test_the_driver_says_when_the_scope_never_triggers(driver, make):
+    device, transport, clock = bench(make, pulses)
+    scope = driver(transport, clock=clock)
+    scope.prepare(**PULSES, trigger_level_v=1.25)
+    before = clock.now()
+    with pytest.raises(NeverTriggered, match=r"1\.25 V on CHAN1"):
+        scope.acquire(timeout_s=5.0)
+    assert clock.now() - before == pytest.approx(5.1, abs=0.3)
+    assert not device.running()
+    scope.prepare(**PULSES, trigger_level_v=0.65)  # and goes on
+    scope.acquire(timeout_s=1.0)
+    transport.close()
+
+
+@BOTH
+def test_with_sweep_auto_the_driver_shows_what_there_is(driver, make):
+    _, transport, clock = bench(make, constant(0.5))
+    scope = driver(transport, clock=clock)
+    scope.prepare(**PULSES, trigger_level_v=1.25, sweep="auto")
+    scope.acquire(timeout_s=1.0)
+    assert scope.trace(1).volts == pytest.approx(0.5, abs=0.005)
+    transport.close()
+
+
+@BOTH
+def test_the_settings_are_told_with_their_units(driver, make):
+    _, transport, clock = bench(make, pulses)
+    scope = driver(transport, clock=clock)
+    scope.prepare(**PULSES, trigger_level_v=0.65)
+    settings = scope.settings()
+    assert settings["trigger_level_v"] == pytest.approx(0.65)
+    assert settings["channel1_scale_v"] == pytest.approx(0.2)
+    assert settings["channel1_probe_factor"] == 1.0
+    json.dumps(settings)
+    transport.close()
+
+
+def test_24_million_points_stream_through_the_memory_of_a_few_pieces():
+    _, transport, clock = bench(VirtualDS1000Z, cheap)
+    scope = RigolDS1000Z(transport, clock=clock)
+    scope.prepare(**PULSES | {"points": 24_000_000}, trigger_level_v=0.65)
+    scope.acquire(timeout_s=1.0)
+    tracemalloc.start()
+    try:
+        sizes = [piece.size for piece in scope.blocks(1)]
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert sizes == [250_000] * 96
+    # of a piece: volts, scaled volts, their codes in floating point, and the bytes on their way
+    assert peak < 60 * PIECE
+    transport.close()
+
+
+def test_pyvisa_reads_the_block_as_of_any_scope():
+    device, transport, _ = bench(VirtualDSOX1000, constant(0.2))
+    transport.close()
+    manager = pyvisa.ResourceManager(library_for(Bus({"GPIB0::7::INSTR": device})))
+    scope = manager.open_resource("GPIB0::7::INSTR")
+    scope.write(":WAV:FORM WORD;UNS 1;POIN 1000")
+    codes = scope.query_binary_values(":WAV:DATA?", datatype="H", is_big_endian=True, container=np.array)
+    assert codes.size == 1000
+    scope.close()
+
+
+# --- a scope that is changed under way ---
+
+
+@contextlib.contextmanager
+def prepared(driver, make, address="TCPIP0::scope.levilab::inst0::INSTR"):
+    """A scope that waits for pulses at 0.65 V, its driver, and the bus for faults."""
+    clock = VirtualClock()
+    device = make(clock, signals={1: pulses})
+    bus = Bus({address: device})
+    scope = driver(VisaTransport(address, library=library_for(bus)), clock=clock)
+    scope.prepare(**PULSES, trigger_level_v=0.65)
+    yield device, scope, bus
+    scope.close()
+
+
+def read(scope, how):
+    scope.acquire(timeout_s=1.0)
+    return scope.trace(1).codes if how == "trace" else np.concatenate(list(scope.blocks(1)))
+
+
+READING = pytest.mark.parametrize("how", ["trace", "blocks"])
+
+
+@BOTH
+@READING
+def test_a_reset_after_the_preparation_gives_no_trace(driver, make, how):
+    with prepared(driver, make) as (device, scope, _):
+        device.reset()
+        with pytest.raises(SettingsLost, match=r"probe_factor = 10\.0 instead of 1\.0") as lost:
+            read(scope, how)
+        assert {"channel1_scale_v", "channel1_offset_v", "trigger_level_v"} <= set(lost.value.changed)
+        with pytest.raises(NothingAcquired):
+            scope.trace(1)
+        scope.prepare(**PULSES, trigger_level_v=0.65)
+        assert read(scope, how).size >= 10_000
+
+
+@BOTH
+@READING
+@pytest.mark.parametrize(
+    "question", [r":TRIG:STAT\?|:OPER:COND\?|:AER\?", r":WAV:PRE\?", r":WAV:DATA\?", r"SYST:ERR\?"]
+)
+@pytest.mark.parametrize("after", [0, 1, 3])
+def test_a_reset_at_any_time_gives_no_trace(driver, make, how, question, after):
+    with prepared(driver, make) as (_, scope, bus):
+        bus.faults.append(fault := Fault("reset", question=question, after=after))
+        with contextlib.suppress(SettingsLost):
+            read(scope, how)
+            assert fault.seen <= after  # it was not asked so often
+
+
+@BOTH
+def test_a_reset_during_the_preparation_is_told_by_it(driver, make):
+    with prepared(driver, make) as (_, scope, bus):
+        bus.faults.append(Fault("reset", question=r"SYST:ERR\?", after=10))
+        with pytest.raises(SettingsLost):
+            scope.prepare(**PULSES, trigger_level_v=0.65)
+
+
+@BOTH
+@pytest.mark.parametrize(
+    ("setting", "value", "name"),
+    [
+        ("chan1_probe", 10.0, "channel1_probe_factor"),
+        ("chan1_scale", 0.5, "channel1_scale_v"),
+        ("chan1_offset", 0.0, "channel1_offset_v"),
+        ("chan1_coupling", "AC", "channel1_coupling"),
+        ("chan1_invert", True, "channel1_inverted"),
+        ("chan1_display", False, "channel1_display"),
+        ("time_scale", 0.001, None),
+        ("time_offset", 0.03, None),
+        ("time_mode", "ROLL", "time_mode"),
+        ("trigger_level", 1.3, "trigger_level_v"),
+        ("trigger_source", "CHAN2", "trigger_source"),
+        ("trigger_slope", "NEG", "trigger_slope"),
+        ("trigger_sweep", "AUTO", "sweep"),
+    ],
+)
+def test_a_key_of_the_front_panel_is_told_instead_of_a_trace_or_of_a_dark_signal(driver, make, setting, value, name):
+    with prepared(driver, make) as (device, scope, _):
+        start = scope._start
+
+        def start_and_be_changed():
+            start()
+            device.settings[setting] = value
+            device.changed(setting)  # what was begun begins anew
+
+        scope._start = start_and_be_changed
+        with pytest.raises(SettingsLost) as lost:
+            read(scope, "trace")
+        assert len(lost.value.changed) == 1
+        assert name is None or name in lost.value.changed
+
+
+@BOTH
+def test_what_is_rounded_is_not_changed(driver, make):
+    with prepared(driver, make) as (device, scope, _):
+        device.settings |= {"chan1_offset": 1.005 * device.settings["chan1_offset"], "trigger_level": 0.66}
+        assert read(scope, "trace").size >= 10_000
+
+
+@BOTH
+@pytest.mark.parametrize("address", ["TCPIP0::scope.levilab::inst0::INSTR", "TCPIP0::scope.levilab::5025::SOCKET"])
+@pytest.mark.parametrize("question", [r":WAV:PRE\?", r":TRIG:STAT\?|:OPER:COND\?"])
+def test_after_an_answer_that_makes_no_sense_the_link_is_in_step_and_the_scope_stopped(driver, make, address, question):
+    with prepared(driver, make, address) as (device, scope, bus):
+        bus.faults.append(Fault("garbage before", question=question))
+        with pytest.raises(BadAnswer):
+            read(scope, "trace")
+        assert not scope.transport._out_of_step
+        assert not device.running()
+        assert scope.identity().startswith(device.identity)
+        assert read(scope, "trace").size >= 10_000
+
+
+@BOTH
+def test_an_interruption_stops_the_scope(driver, make):
+    with prepared(driver, make) as (device, scope, _):
+
+        def interrupted(_):
+            raise KeyboardInterrupt
+
+        scope.clock.sleep, sleep = interrupted, scope.clock.sleep
+        with pytest.raises(KeyboardInterrupt):
+            scope.acquire(timeout_s=1.0)
+        scope.clock.sleep = sleep
+        assert not device.running()

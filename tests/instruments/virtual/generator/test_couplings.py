@@ -1,0 +1,101 @@
+"""Whatever is set at a virtual generator, its settings fit each other.
+
+Source: Agilent/Keysight 33500 Series Operating and Service Guide, unless a test names another.
+"""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from instruments.clock import VirtualClock
+from instruments.virtual.generator.agilent_33220a import Virtual33220A
+from instruments.virtual.generator.keysight_33500b import Virtual33500B
+from support.wire import ask, cable, send
+
+HEADERS = (
+    *(
+        "FREQ",
+        "FUNC",
+        "VOLT",
+        "VOLT:OFFS",
+        "VOLT:HIGH",
+        "VOLT:LOW",
+        "VOLT:UNIT",
+        "OUTP",
+        "OUTP:LOAD",
+        "PHAS",
+        "APPL:SIN",
+    ),
+    *("FUNC:PULS:WIDT", "FUNC:PULS:DCYC", "FUNC:PULS:TRAN", "FUNC:PULS:HOLD", "FUNC:PULS:PER", "FUNC:SQU:DCYC"),
+    *("BURS:STAT", "BURS:NCYC", "BURS:INT:PER", "BURS:MODE", "TRIG:SOUR", "SWE:STAT", "*TRG", "*RST", "FUNC:ARB:SRAT"),
+    *(
+        "VOLT:LIM:STAT",
+        "VOLT:LIM:HIGH",
+        "VOLT:LIM:LOW",
+        "DATA:ARB A,",
+        "DATA VOLATILE,",
+        "FUNC:ARB",
+        "FUNC:USER",
+        "ABOR",
+    ),
+    *("APPL:DC", "UNIT:ANGL", "FUNC:ARB:FREQ", "TRIG:DEL", "DATA:ARB:DAC B,#216"),
+)
+WORDS = (
+    *(
+        "SIN",
+        "SQU",
+        "PULS",
+        "RAMP",
+        "DC",
+        "NOIS",
+        "PRBS",
+        "ARB",
+        "USER",
+        "MIN",
+        "MAX",
+        "DEF",
+        "INF",
+        "ON",
+        "OFF",
+        "DBM",
+        "VRMS",
+    ),
+    *(
+        "VPP",
+        "BUS",
+        "IMM",
+        "GAT",
+        "TRIG",
+        "DCYC",
+        "WIDT",
+        "0",
+        "1",
+        "-5",
+        "1e-9",
+        "4.7",
+        "1e6",
+        "3e7",
+        "9.9e37",
+        "1e999",
+    ),
+    *("A", "VOLATILE", "0,0,0,0,0,0,0,1", "1 MHZ,20,-3", "2 DBM", "-300 DBM", "RAD", "abcdefghijklmnop"),
+)
+
+
+@settings(deadline=None, max_examples=60)
+@given(commands=st.lists(st.tuples(st.sampled_from(HEADERS), st.sampled_from(WORDS)), max_size=30))
+def test_whatever_is_set_the_settings_fit_each_other(commands):
+    for kind in (Virtual33500B, Virtual33220A):
+        device = kind(VirtualClock(), listener=lambda *_: None)
+        for header, word in commands:
+            send(device, f"{header} {word}\n".encode())
+        channel = device.channels[0]
+        low, high = channel.levels()
+        half = 0.0 if channel["waveform"] == "DC" else channel.number("amplitude_vpp") / 2
+        if low < high:  # voltage limits that leave no room are nobody's
+            assert channel.number("offset") + half <= high + 1e-6 or half >= (high - low) / 2 - 1e-6
+        assert all(np.isfinite(value) for value in device.settings.values() if isinstance(value, float))
+        slowest, fastest = channel.frequency_limits()
+        assert slowest * (1 - 1e-9) <= channel.frequency <= fastest * (1 + 1e-9)
+        cable(device).clear()
+        assert ask(device, "*CLS;*IDN?") == device.identity

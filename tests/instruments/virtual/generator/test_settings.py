@@ -1,0 +1,92 @@
+"""What a virtual generator only keeps, and its state after a reset.
+
+Source: Agilent/Keysight 33500 Series Operating and Service Guide, unless a test names another.
+"""
+
+import pytest
+
+from instruments.clock import VirtualClock
+from instruments.virtual.generator.keysight_33500b import Virtual33500B
+from support.wire import ask, errors, send
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        *("OUTP:SYNC OFF", "OUTP:TRIG ON", "OUTP:TRIG:SLOP NEG", "OUTP:POL INV", "TRIG:SLOP NEG", "SWE:SPAC LOG"),
+        *("BURS:MODE GAT", "BURS:GATE:POL INV", "FORM:BORD SWAP", "UNIT:ANGL RAD", "SYST:BEEP:STAT OFF", "DISP OFF"),
+        *("AM:SOUR EXT", "FM:INT:FUNC SQU", "VOLT:RANG:AUTO OFF", "SYST:COMM:RLST REM"),
+    ],
+)
+def test_a_word_or_a_switch_is_kept(either, message):
+    header, _, word = message.partition(" ")
+    assert ask(either, f"{message};:{header}?") == {"ON": "1", "OFF": "0"}.get(word, word)
+    assert errors(either) == []
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        *("OUTP1:SYNC:SOUR CH2", "OUTP2:SYNC:MODE CARR", "TRIG2:SOUR TIM", "SOUR2:FUNC:ARB:FILT NORM"),
+        *("FUNC:ARB:ADV TRIG", "FUNC:PRBS:DATA PN9", "SOUR2:SUM:SOUR EXT", "INIT2:CONT OFF", "OUTP2:MODE GAT"),
+    ],
+)
+def test_a_word_or_a_switch_of_the_newer_one_is_kept(generator, message):
+    header, _, word = message.partition(" ")
+    assert ask(generator, f"{message};:{header}?") == {"ON": "1", "OFF": "0"}.get(word, word)
+    assert errors(generator) == []
+
+
+#: The state after *RST as a public driver of the family lists it (without the edges, which are the 33600's there).
+AFTER_RESET = """\
+SOUR1:AM:DEPT +1.000000000000000E+02|SOUR1:AM:DSSC 0|SOUR1:AM:INT:FREQ +1.000000000000000E+02|SOUR1:AM:INT:FUNC SIN
+SOUR1:BPSK:INT:RATE +1.000000000000000E+01|SOUR1:BPSK:PHAS +1.800000000000000E+02|SOUR1:BPSK:STAT 0
+SOUR1:BURS:GATE:POL NORM|SOUR1:BURS:INT:PER +1.000000000000000E-02|SOUR1:BURS:MODE TRIG
+SOUR1:BURS:NCYC +1.000000000000000E+00|SOUR1:BURS:STAT 0|DISP 1|FORM:BORD NORM|INIT1:CONT 1
+OUTP1:LOAD +5.000000000000000E+01|OUTP1:MODE NORM|OUTP1:POL NORM|OUTP1:SYNC:MODE NORM|OUTP1:SYNC:POL NORM|OUTP:SYNC 1
+OUTP:SYNC:SOUR CH1|OUTP:TRIG 0|OUTP:TRIG:SLOP POS|OUTP:TRIG:SOUR CH1|OUTP 0|ROSC:SOUR INT|ROSC:SOUR:AUTO ON
+SOUR1:FM:DEV +1.000000000000000E+02|SOUR1:FM:INT:FREQ +1.000000000000000E+01|SOUR1:FREQ +1.000000000000000E+03
+SOUR1:FREQ:CENT +5.500000000000000E+02|SOUR1:FREQ:MODE CW|SOUR1:FREQ:SPAN +9.000000000000000E+02
+SOUR1:FREQ:STAR +1.000000000000000E+02|SOUR1:FREQ:STOP +1.000000000000000E+03|SOUR1:FSK:FREQ +1.000000000000000E+02
+SOUR1:FSK:INT:RATE +1.000000000000000E+01|SOUR1:FUNC SIN|SOUR1:FUNC:ARB "INT:\\BUILTIN\\EXP_RISE.ARB"
+SOUR1:FUNC:ARB:ADV SRAT|SOUR1:FUNC:ARB:FILT STEP|SOUR1:FUNC:ARB:FREQ +1.600000000000000E+02
+SOUR1:FUNC:ARB:PER +6.250000000000000E-03|SOUR1:FUNC:ARB:PTP +1.000000000000000E-01
+SOUR1:FUNC:ARB:SRAT +4.000000000000000E+04|SOUR1:FUNC:NOIS:BAND +1.000000000000000E+05
+SOUR1:FUNC:PRBS:BRAT +1.000000000000000E+03|SOUR1:FUNC:PRBS:DATA PN7|SOUR1:FUNC:PULS:HOLD WIDT
+SOUR1:FUNC:PULS:PER +1.000000000000000E-03|SOUR1:FUNC:PULS:WIDT +1.000000000000000E-04
+SOUR1:FUNC:RAMP:SYMM +1.000000000000000E+02|SOUR1:FUNC:SQU:DCYC +5.000000000000000E+01
+SOUR1:FUNC:SQU:PER +1.000000000000000E-03|SOUR1:LIST:DWEL +1.000000000000000E+00
+SOUR1:LIST:FREQ +1.00000000E+002,+1.00000000E+003,+5.50000000E+002|SOUR1:MARK:CYC +2.000000000000000E+00
+SOUR1:MARK:FREQ +5.000000000000000E+02|SOUR1:PM:DEV +1.800000000000000E+02|SOUR1:PWM:DEV +1.000000000000000E-05
+SOUR1:PWM:DEV:DCYC +1.000000000000000E+00|SOUR1:SUM:AMPL +1.000000000000000E-01|SOUR1:SWE:HTIM +0.000000000000000E+00
+SOUR1:SWE:RTIM +0.000000000000000E+00|SOUR1:SWE:SPAC LIN|SOUR1:SWE:STAT 0|SOUR1:SWE:TIME +1.000000000000000E+00
+SOUR1:VOLT:HIGH +5.000000000000000E-02|SOUR1:VOLT:LOW -5.000000000000000E-02
+SOUR1:VOLT:LIM:HIGH +5.000000000000000E+00|SOUR1:VOLT:LIM:LOW -5.000000000000000E+00|SOUR1:VOLT:LIM:STAT 0
+SOUR1:VOLT:RANG:AUTO 1|SOUR1:VOLT:UNIT VPP|TRIG1:COUN +1.000000000000000E+00|TRIG1:DEL +0.000000000000000E+00
+TRIG1:LEV +3.300000000000000E+00|TRIG1:SLOP POS|TRIG1:SOUR IMM|TRIG1:TIM +1.000000000000000E+00|UNIT:ANGL DEG"""
+
+
+def test_the_state_after_reset_is_that_of_the_family(generator):
+    for entry in AFTER_RESET.replace("\n", "|").split("|"):
+        header, _, value = entry.partition(" ")
+        assert ask(generator, header + "?") == value
+        send(generator, entry.encode() + b"\n")
+    assert errors(generator) == []
+    assert dict(generator.settings) == Virtual33500B(VirtualClock()).settings | {"list": "100.0,1000.0,550.0"}
+
+
+def test_a_text_is_displayed_until_it_is_cleared(either):
+    assert ask(either, "DISP:TEXT 'coil on; do not touch';:DISP:TEXT?") == '"coil on; do not touch"'
+    assert ask(either, "DISP:TEXT:CLE;:DISP:TEXT?") == '""'
+
+
+def test_the_channels_can_be_brought_into_phase(generator):
+    send(generator, b"PHAS:SYNC\nSOUR2:PHAS:SYNC\nPHAS:REF\n")
+    assert errors(generator) == []
+
+
+def test_reset_leaves_no_entry_and_what_stood_before(either):
+    send(either, b"FUNC PULS;FREQ 1 MHZ;VOLT 10;:OUTP:LOAD INF;:BURS:STAT ON\n*CLS\n*RST\n")
+    assert errors(either) == []
+    state = dict(either.settings)
+    assert state == type(either)(VirtualClock()).settings

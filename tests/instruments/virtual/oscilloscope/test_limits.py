@@ -1,0 +1,50 @@
+"""What the virtual oscilloscopes refuse, and what they round."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from instruments.virtual.oscilloscope.scope import one_two_five
+from support.scopes import constant, keysight, pulses, rigol
+from support.wire import ask, cable, errors, received, send
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        ":TIM:SCAL 100",
+        "CHAN1:PROB 1;SCAL 20",
+        "CHAN5:SCAL 1",
+        ":TRIG:EDGE:LEV 1e6",
+        ":TRIG:EDGE:SOUR CHAN9",
+        ":ACQ:MDEP 13000",
+        ":WAV:FORM FLOAT",
+        ":MEAS:ITEM? NOTHING,CHAN1",
+        ":MEAS:ITEM? VPP,CHAN9",
+        ":MEAS:ITEM?",
+        ":DISP:DATA? ON,OFF,PNG,1",
+    ],
+)
+def test_what_is_wrong_has_no_answer_but_an_entry_in_the_queue(message):
+    device = rigol(pulses)
+    send(device, message.encode() + b"\n")
+    assert received(device, 1.0) is None
+    assert len(errors(device)) == 1
+
+
+@given(messages=st.lists(st.text(st.sampled_from(":CHANTIMWAVSEDIGORUPQL?1 ;,.#-"), max_size=30), max_size=5))
+def test_no_message_makes_a_scope_hang_or_crash(messages):
+    for device in (rigol(constant(0.0)), keysight(constant(0.0))):
+        for message in messages:
+            send(device, message.encode() + b"\n")
+            received(device, 0.1)
+        cable(device).clear()
+        assert ask(device, "*IDN?") is not None
+
+
+@given(value=st.floats(1e-9, 1e9))
+def test_the_series_of_scales_goes_up_and_has_only_1_2_and_5(value):
+    up, near = one_two_five(value, up=True), one_two_five(value)
+    assert value * (1 - 1e-8) <= up <= 2.5000001 * value
+    assert near in {up, one_two_five(up / 2.4999, up=True), one_two_five(up / 2.0001, up=True)} or near < up
+    assert f"{up:.0e}"[0] in "125"
