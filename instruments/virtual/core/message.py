@@ -10,8 +10,12 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from instruments.virtual.core.steps import at_once
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from instruments.virtual.core.steps import Steps
 
 #: White space is every control character and the space (IEEE 488.2, 7.4.1.2), and no other sign of Latin-1.
 _BLANK, _DIGITS = "".join(map(chr, range(0x21))), re.compile("[0-9]+")
@@ -19,13 +23,19 @@ _UNIT = re.compile(r"([^\x00-\x20]+)[\x00-\x20]*(.*)", re.DOTALL)
 _SPECIAL = re.compile(r"[\"'();,]|(?<![^\x00-\x20,])#[1-9]")
 
 
-def split_units(message: str) -> Iterator[str]:
+#: Signs that are looked at, or units that hold nothing, between two places where the work may be interrupted.
+_AT_A_STRETCH = 1000
+
+
+def split_units(message: str) -> Iterator[str | None]:
     """The units of a compound message: split at semicolons outside of quotes and blocks.
+
+    Yields None now and then in a message of many signs: there the work may be interrupted.
 
     >>> list(split_units('FREQ 40; DISP:TEXT "a;b"'))
     ['FREQ 40', 'DISP:TEXT "a;b"']
     """
-    return filter(None, _split(message, ";"))
+    return (unit for unit in _split(message, ";") if unit != "")
 
 
 def read_unit(unit: str, path: str) -> tuple[str, str, str]:
@@ -51,14 +61,31 @@ def split_parameters(text: str) -> list[str]:
     >>> split_parameters("ARB1,#13,;,")
     ['ARB1', '#13,;,']
     """
-    return list(_split(text, ",")) if text.strip(_BLANK) else []
+    return at_once(split_parameters_in_steps(text))
 
 
-def _split(text: str, separator: str) -> Iterator[str]:
-    """The pieces between separators, blanks taken away, but not those that are the bytes of a block."""
-    start = looked = block_end = depth = 0
+def split_parameters_in_steps(text: str) -> Steps[list[str]]:
+    """Do what split_parameters() does, in steps."""
+    parameters: list[str] = []
+    for parameter in _split(text, ",") if text.strip(_BLANK) else ():
+        if parameter is None:
+            yield
+        else:
+            parameters.append(parameter)
+    return parameters
+
+
+def _split(text: str, separator: str) -> Iterator[str | None]:
+    """The pieces between separators, blanks taken away, but not those that are the bytes of a block.
+
+    Yields None after every so many signs, where the work may be interrupted.
+    """
+    start = looked = block_end = depth = seen = 0
     while found := _SPECIAL.search(text, looked):
         what, looked = found[0], found.end()
+        seen += 1
+        if seen % _AT_A_STRETCH == 0:
+            yield None
         if what in {'"', "'"}:
             closing = text.find(what, looked)
             looked = closing + 1 if closing >= 0 else len(text)

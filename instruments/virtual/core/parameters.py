@@ -7,8 +7,12 @@ import re
 from instruments.virtual.core.parser import ScpiError
 
 _MULTIPLIERS = {"": 1.0, "N": 1e-9, "U": 1e-6, "M": 1e-3, "K": 1e3, "MA": 1e6, "G": 1e9}
-_NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*([a-zA-Z]*)")
+#: A mantissa and an exponent, then a unit.  No digit can be matched in two ways (\d+\.?\d* could): a long line of them
+#: that is no number in the end takes a time proportional to its length, not to its square.
+_NUMBER = re.compile(r"([+-]?(?:\d+(?:\.\d*)?|\.\d+))([eE][+-]?\d{1,3})?\s*([a-zA-Z]*)")
 _CHANNEL_LIST = re.compile(r"\(@[\d,: !]*\)")
+#: Digits of a mantissa, leading zeros not counted (IEEE 488.2, 7.7.2.4.1).
+MOST_DIGITS = 255
 
 
 def at_most_one(parameters: list[str]) -> str:
@@ -61,10 +65,18 @@ def number(text: str, *, low: float, high: float, default: float, unit: str = ""
     match = _NUMBER.fullmatch(text)
     if not match:
         raise ScpiError(-104, text[:20])
-    value = float(match[1]) * _multiplier(match[2].upper(), unit)
+    value = _value(match) * _multiplier(match[3].upper(), unit)
     if not low <= value <= high:
         raise ScpiError(-222)
     return value
+
+
+def _value(match: re.Match[str]) -> float:
+    """The number without its unit.  Raises ScpiError if it has too many digits."""
+    mantissa, exponent = match[1], match[2] or ""
+    if len(mantissa) > MOST_DIGITS and len(mantissa.lstrip("+-0.").replace(".", "")) > MOST_DIGITS:
+        raise ScpiError(-124)
+    return float(mantissa + exponent)
 
 
 def _multiplier(suffix: str, unit: str) -> float:
@@ -100,9 +112,9 @@ def boolean(text: str) -> bool:
     if text.upper() in words:
         return words[text.upper()]
     number = _NUMBER.fullmatch(text)
-    if not number or number[2] or float(number[1]) not in {0.0, 1.0}:
+    if not number or number[3] or (value := _value(number)) not in {0.0, 1.0}:
         raise ScpiError(-224, text[:20])
-    return float(number[1]) == 1.0
+    return value == 1.0
 
 
 def nr3(value: float) -> str:

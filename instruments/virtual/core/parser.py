@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING
 
-from instruments.virtual.core.message import read_unit, split_parameters, split_units
+from instruments.virtual.core.message import read_unit, split_parameters_in_steps, split_units
 from instruments.virtual.core.steps import at_once
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ ERRORS = {
     -108: "Parameter not allowed",
     -109: "Missing parameter",
     -113: "Undefined header",
+    -124: "Too many digits",
     -131: "Invalid suffix",
     -222: "Data out of range",
     -224: "Illegal parameter value",
@@ -117,13 +118,16 @@ class Parser:
         return at_once(self.steps(message))
 
     def steps(self, message: str) -> Steps[str | None]:
-        """What run() does, in steps."""
+        """Do what run() does, in steps: a message may be interrupted after each of its units."""
         answers: list[str] = []
         length, path = 0, ""
         for unit in split_units(message):
+            yield
+            if unit is None:
+                continue
             header, rest, path = read_unit(unit, path)
             try:
-                answer = self._act(header)(split_parameters(rest))
+                answer = self._act(header)((yield from split_parameters_in_steps(rest)))
                 if answer is not None and not isinstance(answer, str):
                     answer = yield from answer
             except ScpiError as error:
