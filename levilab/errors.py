@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 
 class LevilabError(Exception):
     """A known failure. The text says what was seen, what was expected and what to do.
@@ -11,8 +9,6 @@ class LevilabError(Exception):
     A quantity that the caller can set stands in the text between backquotes, by the name of the function's argument:
     "free space, or choose another place with `out`". The command line writes it as its option, ``--out``.
     """
-
-    exit_code: ClassVar[int] = 1
 
 
 class UsageError(LevilabError):
@@ -28,8 +24,6 @@ class UsageError(LevilabError):
         text: what is wrong with it, what was expected, what to do; other quantities stand between backquotes.
         value: what was given, as text; None where it does not matter.
     """
-
-    exit_code: ClassVar[int] = 2
 
     def __init__(self, name: str, text: str, *, value: object = None) -> None:
         self.name, self.text = name, text

@@ -167,7 +167,7 @@ def test_what_is_not_there_is_named(levilab: Command, words: list[str], says: st
 
 
 def test_a_pdf_is_refused_before_anything_is_read(levilab: Command, sample_data: Path) -> None:
-    assert "HTML" in levilab("report", sample_data, "-o", "report.pdf", check=1).stderr
+    assert "HTML" in levilab("report", sample_data, "-o", "report.pdf", check=2).stderr
 
 
 @pytest.mark.parametrize(
