@@ -2,17 +2,41 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 
 class LevilabError(Exception):
-    """A known failure. The text says what was seen, what was expected and what to do."""
+    """A known failure. The text says what was seen, what was expected and what to do.
 
-    exit_code: ClassVar[int] = 1
+    A quantity that the caller can set stands in the text between backquotes, by the name of the function's argument:
+    "free space, or choose another place with `out`". The command line writes it as its option, ``--out``.
+    """
+
+
+class UsageError(LevilabError):
+    """A setting that the caller gave wrongly. The command line ends with the exit status of wrong usage.
+
+    >>> print(UsageError("duration", "a number above 0 is expected", value=-1))
+    duration = -1: a number above 0 is expected
+    >>> print(UsageError("seed", "goes with `mock` alone"))
+    seed: goes with `mock` alone
+
+    Attributes:
+        name: the quantity, as the function's argument is called: ``duration``.
+        text: what is wrong with it, what was expected, what to do; other quantities stand between backquotes.
+        value: what was given, as text; None where it does not matter.
+    """
+
+    def __init__(self, name: str, text: str, *, value: object = None) -> None:
+        self.name, self.text = name, text
+        self.value = None if value is None else _shown(value)
+        super().__init__(f"{name}: {text}" if self.value is None else f"{name} = {self.value}: {text}")
 
 
 class DataError(LevilabError):
     """A data file or run folder that cannot be used as it is."""
+
+
+class NoInstrument(LevilabError):
+    """No instrument answered that there is a driver for."""
 
 
 class SimulationError(LevilabError):
@@ -21,3 +45,9 @@ class SimulationError(LevilabError):
 
 class LeftRange(SimulationError):
     """A motion that cannot be followed on because its numbers leave their range, as at the base's edges."""
+
+
+def _shown(value: object) -> str:
+    """A number as one writes it, anything else as it was given, cut where it is long."""
+    text = f"{value:g}" if isinstance(value, float) else str(value)
+    return text if len(text) <= 60 else f"{text[:59]}…"

@@ -16,7 +16,7 @@ from levilab.acquisition.session import ask_no_person
 from levilab.acquisition.table import EXPERIMENTS, Configuration, settings_of, with_settings
 from levilab.bench.config import BenchConfig, ConfigError, read_bench
 from levilab.bench.wiring import described_wiring
-from levilab.errors import LevilabError
+from levilab.errors import LevilabError, UsageError
 from levilab.runs.run import Run, find_run
 from levilab.settings import in_one_line
 from levilab.simulator.scene import SceneError, read_scene, scene_of
@@ -38,12 +38,6 @@ _IN_MOTION = "that of the scene {name}, simulated in full motion"
 
 class CannotResume(LevilabError):
     """This run cannot be gone on with."""
-
-
-class ContradictoryOptions(LevilabError):
-    """Options that do not go together; wrong usage."""
-
-    exit_code = 2
 
 
 @dataclass(frozen=True)
@@ -78,7 +72,7 @@ class Options:
 
 
 def request_for(experiment: str, options: Options) -> AcquisitionRequest:
-    """What is to be acquired.  Raises ConfigError, CannotResume, ContradictoryOptions, DataError, SceneError."""
+    """What is to be acquired.  Raises ConfigError, CannotResume, UsageError, DataError, SceneError."""
     run = _resumable(find_run(options.resume, options.out), experiment) if options.resume else None
     virtual = options.mock or bool(run and run.record.seed is not None)
     _check_options(options, run, virtual=virtual)
@@ -107,9 +101,9 @@ def request_for(experiment: str, options: Options) -> AcquisitionRequest:
 def _check_options(options: Options, run: Run | None, *, virtual: bool) -> None:
     for name in ("seed", "scene"):
         if getattr(options, name) is not None and (run or not options.mock):
-            raise ContradictoryOptions(f"--{name} goes with --mock, and not with --resume: a run keeps its {name}")
+            raise UsageError(name, f"goes with `mock`, and not with `resume`: a run keeps its {name}")
     if options.realtime and not virtual:
-        raise ContradictoryOptions("--realtime goes with --mock: a real bench always keeps to the wall clock")
+        raise UsageError("realtime", "goes with `mock`: a real bench always keeps to the wall clock")
 
 
 def _configuration(options: Options, run: Run | None, *, virtual: bool) -> BenchConfig:

@@ -91,8 +91,7 @@ def read_bench(path: Path, tables: type[C]) -> C:
         table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise ConfigError(
-            f"{path}: there is no such file: describe your bench in it (docs/bench.md),"
-            " or take the virtual bench (mock)"
+            f"{path}: there is no such file: describe your bench in it (docs/bench.md), or try `mock`"
         ) from None
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror}): a TOML file is expected") from error

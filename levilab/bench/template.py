@@ -20,18 +20,6 @@ class WouldOverwrite(LevilabError):
     """A file that is there already."""
 
 
-class NobodyFound(LevilabError):
-    """Nobody answered that there is a driver for."""
-
-    exit_code = 3
-
-    def __init__(self) -> None:
-        super().__init__(
-            "nobody answered that levilab has a driver for, so no file was written: is it on and connected?  Name it "
-            "with --address, or take --force for a file to fill in by hand"
-        )
-
-
 def bench_text(found: Sequence[Found], library: str) -> str:
     """The text of a bench.toml: the first instrument of each kind, the others as comments."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -71,9 +59,9 @@ def _quoted(value: str) -> str:
 def refuse_to_overwrite(path: Path) -> None:
     """Raise WouldOverwrite if there is such a file, CannotWrite if there is no folder for it."""
     if not path.parent.is_dir():
-        raise CannotWrite(f"{path.parent} is no folder: give another name with --out")
+        raise CannotWrite(f"{path.parent} is no folder: give another name with `out`")
     if path.exists():
-        raise WouldOverwrite(f"{path} is there already: give another name with --out, or --force to replace it")
+        raise WouldOverwrite(f"{path} is there already: give another name with `out`, or `force` to replace it")
 
 
 def write_bench(path: Path, text: str) -> None:
@@ -81,4 +69,4 @@ def write_bench(path: Path, text: str) -> None:
     try:
         replace_atomically(path, text)
     except OSError as error:
-        raise CannotWrite(f"{path} cannot be written ({error.strerror}): give another name with --out") from error
+        raise CannotWrite(f"{path} cannot be written ({error.strerror}): give another name with `out`") from error

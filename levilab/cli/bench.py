@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from levilab.cli import exit_codes
+from levilab.cli.options import Json
+from levilab.cli.output import message, print_json
+from levilab.errors import NoInstrument, UsageError
+
 if TYPE_CHECKING:
     from levilab.bench.check import Checked
     from levilab.bench.discover import Found
     from levilab.world.serve import Served
-
-EXIT_INSTRUMENT, EXIT_INTERRUPTED = 3, 130
 
 bench_app = typer.Typer(no_args_is_help=True, help="The instruments: what answers, and a virtual bench to practise.")
 
@@ -30,7 +33,7 @@ def bench_init(
     force: Annotated[
         bool, typer.Option("--force", help="Replace the file if it is there; write one to fill in if nobody answers.")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print what was found as one JSON document.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Ask everybody on the buses who they are, and write a commented bench.toml with those that have a driver.
 
@@ -38,22 +41,24 @@ def bench_init(
     psutil zeroconf); else name them with --address.
     """
     from levilab.bench.discover import search
-    from levilab.bench.template import NobodyFound, bench_text, refuse_to_overwrite, write_bench
+    from levilab.bench.template import bench_text, refuse_to_overwrite, write_bench
 
     if not force:
         refuse_to_overwrite(out)
-    found = search(library, addresses or [], lambda text: typer.echo(text, err=True))
+    found = search(library, addresses or [], message)
     if as_json:
-        import json
         from dataclasses import asdict
 
-        typer.echo(json.dumps({"found": [asdict(one) for one in found], "file": str(out)}))
+        print_json({"found": [asdict(one) for one in found], "file": str(out)}, indent=None)
     else:
         _tell_found(found)
     if not any(one.kind for one in found) and not force:
-        raise NobodyFound
+        raise NoInstrument(
+            "no instrument answered that levilab has a driver for, so no file was written: is it on and connected?  Name "
+            "it with `addresses`, or take `force` for a file to fill in by hand"
+        )
     write_bench(out, bench_text(found, library))
-    typer.echo(f"wrote {out}: look it over, then try it with `levilab bench check`", err=True)
+    message(f"wrote {out}: look it over, then try it with `levilab bench check`")
 
 
 def _tell_found(found: list[Found]) -> None:
@@ -71,7 +76,7 @@ def bench_check(
         Path | None, typer.Option(metavar="FILE", help="Describes the bench.", show_default="bench.toml")
     ] = None,
     mock: Annotated[bool, typer.Option("--mock", help="Check the virtual bench.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Connect to each instrument of the bench: who it is, one reading, what failed and what to try.
 
@@ -84,7 +89,7 @@ def bench_check(
     from levilab.world.bench import own_world, virtual_wiring
 
     if mock and bench:
-        raise typer.BadParameter("--mock checks the virtual bench, which no file describes", param_hint="--bench")
+        raise UsageError("bench", "does not go with `mock`, the virtual bench, which no file describes")
     config = Configuration() if mock else read_bench(bench or Path("bench.toml"), Configuration)
     wiring = virtual_wiring(own_world()) if mock else described_wiring(config)
     counting = counter_settings(config)
@@ -94,12 +99,11 @@ def bench_check(
         if not as_json:
             _tell_checked(one)
     if as_json:
-        import json
         from dataclasses import asdict
 
-        typer.echo(json.dumps({"instruments": [asdict(one) for one in checked]}))
+        print_json({"instruments": [asdict(one) for one in checked]}, indent=None)
     if any(one.trouble for one in checked):
-        raise typer.Exit(EXIT_INSTRUMENT)
+        raise typer.Exit(exit_codes.INSTRUMENT)
 
 
 def _tell_checked(one: Checked) -> None:
@@ -147,16 +151,14 @@ def bench_serve(
 
         moving = read_scene(scene)
     service = Service(host, port_base, speed, chosen_models(models or []), moving)
-    told = serve(service, _tell_as_json if as_json else _tell, lambda text: typer.echo(text, err=True))
+    told = serve(service, _tell_as_json if as_json else _tell, message)
     if told == "SIGINT":
-        raise typer.Exit(EXIT_INTERRUPTED)
+        raise typer.Exit(exit_codes.INTERRUPTED)
 
 
 def _tell_as_json(instruments: tuple[Served, ...]) -> None:
-    import json
-
     offers = {served.kind: {"model": served.model, "resources": served.resources} for served in instruments}
-    typer.echo(json.dumps({"ready": True, "instruments": offers}))
+    print_json({"ready": True, "instruments": offers}, indent=None)
 
 
 #: What must be said beside a resource name.
@@ -170,4 +172,4 @@ def _tell(instruments: tuple[Served, ...]) -> None:
         for way, name in served.resources.items():
             hint = _HINTS.get(way)
             typer.echo(f"  {way:7} {name:{width}}  ({hint})" if hint else f"  {way:7} {name}")
-    typer.echo("Ctrl-C ends the bench", err=True)
+    message("Ctrl-C ends the bench")

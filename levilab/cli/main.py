@@ -1,26 +1,20 @@
-"""The commands: translate, call, print.  Heavy imports happen inside the commands that need them."""
+"""The application and its console script.  Heavy imports happen inside the commands that need them."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import sys
-from enum import StrEnum
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn, cast
+from typing import Annotated, NoReturn
 
 import typer
 
-from levilab.cli import bench as cli_bench
-from levilab.cli import simulate as cli_simulator
-from levilab.cli.simulate import EXIT_INTERRUPTED, Json
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from analysis.spindown.lawfit import Uncertainty as Kind
-    from levilab.errors import LevilabError
-    from levilab.pipelines.sources import Options
+from levilab.cli import exit_codes, report, simulate
+from levilab.cli.acquire import acquire_app
+from levilab.cli.analyze import analyze_app
+from levilab.cli.bench import bench_app
+from levilab.cli.options import in_options
+from levilab.cli.output import message
 
 app = typer.Typer(
     name="levilab",
@@ -30,35 +24,11 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-acquire_app = typer.Typer(no_args_is_help=True, help="Run an experiment on the bench and write a run folder.")
-analyze_app = typer.Typer(no_args_is_help=True, help="Analyze runs or data files.")
 app.add_typer(acquire_app, name="acquire")
 app.add_typer(analyze_app, name="analyze")
-app.add_typer(cli_bench.bench_app, name="bench")
-
-EXIT_FAILED, EXIT_INSTRUMENT = 1, 3
-
-Columns = Annotated[
-    str,
-    typer.Option(
-        metavar="NAME=COLUMN,…",
-        help="Columns of your file: t=Zeit,f=Kanal2 or t=1,f=3; with a unit in brackets: 'f=Drehzahl \\[rpm]'.",
-    ),
-]
-ReadingU = Annotated[
-    float | None,
-    typer.Option(metavar="HZ", help="Standard uncertainty of every reading; goes before what the data say."),
-]
-KeepOutliers = Annotated[bool, typer.Option("--keep-outliers", help="Fit readings that look like miscounts, too.")]
-Paths = Annotated[list[Path], typer.Argument(metavar="PATH…", help="Run folders, data files, or folders to search.")]
-
-
-class Uncertainty(StrEnum):
-    """How the uncertainties of the fitted constants are found."""
-
-    COVARIANCE = "covariance"
-    PROFILE = "profile"
-    BOOTSTRAP = "bootstrap"
+app.add_typer(bench_app, name="bench")
+report.add_to(app)
+simulate.add_to(app)
 
 
 def _print_version(asked: bool) -> None:
@@ -79,189 +49,33 @@ def levilab(
     """The lab application for experiments on the Levitron: acquire, analyze, report."""
 
 
-@acquire_app.command("spin", epilog="Example: levilab acquire spin --mock --note 'first try'")
-def acquire_spin(
-    mock: Annotated[bool, typer.Option("--mock", help="Use the virtual bench; needs no hardware.")] = False,
-    bench: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Describes the bench; with --mock only its settings count.", show_default="bench.toml"
-        ),
-    ] = None,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Where the run folder is made.")] = Path("runs"),
-    scene: Annotated[
-        str | None,
-        typer.Option(
-            metavar="SCENE",
-            help="With --mock: a top in full motion, such as spindown, or a scene's file.",
-            show_default="spin only",
-        ),
-    ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Makes a virtual run repeatable.")] = None,
-    note: Annotated[str, typer.Option(help="Kept with the run.")] = "",
-    realtime: Annotated[bool, typer.Option("--realtime", help="Keep the virtual bench to the wall clock.")] = False,
-    resume: Annotated[
-        Path | None, typer.Option(metavar="RUN", help="Go on with an interrupted run: read on, without driving again.")
-    ] = None,
-    wire_log: Annotated[bool, typer.Option("--wire-log", help="Keep all bytes sent and received.")] = False,
-    as_json: Json = False,
-) -> None:
-    """Spin-down: drive the top up, switch the drive off, count its spin until it falls.
-
-    Ctrl-C ends the run after the reading under way; outputs go off and the run is kept.
-    """
-    from levilab.acquisition.loop import acquire
-    from levilab.acquisition.request import Options, request_for
-    from levilab.present.progress import to_stderr
-
-    options = Options(
-        mock=mock,
-        bench=bench,
-        out=out,
-        seed=seed,
-        note=note,
-        realtime=realtime,
-        resume=resume,
-        wire_log=wire_log,
-        scene=scene,
-        tell=lambda text: typer.echo(text, err=True),
-        person=lambda question: typer.prompt(question, default="", show_default=False, prompt_suffix=" ", err=True),
-    )
-    run = acquire(request_for("spin", options), to_stderr())
-    readings = run.count()
-    if as_json:
-        import json
-
-        typer.echo(json.dumps({"run": str(run.folder), "status": run.status, "readings": readings}))
-    else:
-        typer.echo(f"{run.status}: {readings} reading{'s' * (readings != 1)} in {run.folder}")
-    if run.status == "interrupted":
-        if readings:
-            typer.echo(f"go on with it: levilab acquire spin --resume {run.folder}", err=True)
-        raise typer.Exit(EXIT_INTERRUPTED)
-
-
-@analyze_app.command("spindown", epilog="Example: levilab analyze spindown sample_data/")
-def analyze_spindown(
-    paths: Paths,
-    columns: Columns = "",
-    reading_u: ReadingU = None,
-    uncertainty: Annotated[
-        Uncertainty, typer.Option(help="profile and bootstrap add 68 % intervals, and take longer.")
-    ] = Uncertainty.COVARIANCE,
-    keep_outliers: KeepOutliers = False,
-    save: Annotated[bool, typer.Option(help="Write result.json and figures beside the run.")] = True,
-    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write them there instead.")] = None,
-    as_json: Json = False,
-) -> None:
-    """Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude."""
-    from levilab.pipelines.spindown.analysis import analyze_spindowns
-    from levilab.pipelines.spindown.document import as_document, save_result
-    from levilab.pipelines.spindown.table import print_spindown
-
-    analysis = analyze_spindowns(paths, _options(columns, reading_u, uncertainty.value, keep_outliers))
-    failure: LevilabError | None = None
-    written: list[Path] = []
-    if save:  # first: a reader that goes away must not cost the result
-        failure, written = _tried(lambda: save_result(analysis, out or analysis.home))
-    if as_json:
-        import json
-
-        document = as_document(analysis, out or analysis.home)
-        typer.echo(json.dumps(document, indent=2, sort_keys=True, allow_nan=False))
-    else:
-        print_spindown(analysis)
-    for path in written:
-        typer.echo(f"wrote {path}", err=True)
-    if failure:
-        raise failure
-
-
-def _options(columns: str, reading_u: float | None, uncertainty: str, keep_outliers: bool) -> Options:
-    from levilab.formats.table import parse_columns
-    from levilab.pipelines.sources import Options
-
-    if reading_u is not None and not 0 < reading_u < float("inf"):
-        raise typer.BadParameter(
-            f"{reading_u:g} Hz; a standard uncertainty above 0 is expected", param_hint="--reading-u"
-        )
-    return Options(parse_columns(columns), reading_u, cast("Kind", uncertainty), keep_outliers)
-
-
-def _tried(save: Callable[[], list[Path]]) -> tuple[LevilabError | None, list[Path]]:
-    """What kept the result from being written, or the files; what was found is shown either way."""
-    from levilab.errors import LevilabError
-
-    try:
-        return None, save()
-    except LevilabError as error:
-        return error, []
-
-
-@app.command(epilog="Example: levilab report sample_data/ -o report.html")
-def report(
-    paths: Paths,
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE.html", help="The file to write.")] = Path(
-        "report.html"
-    ),
-    columns: Columns = "",
-    reading_u: ReadingU = None,
-    keep_outliers: KeepOutliers = False,
-) -> None:
-    """Report runs in one self-contained file: what was measured, with what, figures, numbers, warnings."""
-    from levilab.report.page import write_report
-
-    options = _options(columns, reading_u, "covariance", keep_outliers)
-    typer.echo(f"the report is in {write_report(paths, output, options)}")
-
-
-@app.command(epilog="Example: levilab runs runs/")
-def runs(
-    folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="The folder to search.")] = Path("runs"),
-    as_json: Json = False,
-) -> None:
-    """List runs: when, what, status, length."""
-    from levilab.runs.listing import list_runs, print_runs
-
-    found = list_runs(folder)
-    if as_json:
-        import json
-
-        typer.echo(json.dumps([vars(run) for run in found], indent=2))
-    else:
-        print_runs(found, folder)
-
-
-cli_simulator.add_to(app)
-
-
 def main() -> None:
     """The console script: known failures become one line and an exit status, everything else stays loud."""
-    _never_fail_to_print()
+    _replace_unencodable()
     try:
         app()
-    except BrokenPipeError:  # whoever read our output went away: nothing is left to say, and nobody to say it to
-        _mute()
-        sys.exit(EXIT_FAILED)
+    except BrokenPipeError:  # the reader closed the pipe
+        _silence_output()
+        sys.exit(exit_codes.FAILED)
     except Exception as error:  # noqa: BLE001 - sorted by kind below
-        _tell(error)
+        _exit_with(error)
 
 
-def _tell(error: Exception) -> NoReturn:
-    from analysis.errors import AnalysisError
-    from instruments.errors import InstrumentError
-    from levilab.errors import LevilabError
-
-    codes = ((LevilabError, getattr(error, "exit_code", EXIT_FAILED)), (InstrumentError, EXIT_INSTRUMENT))
-    for kind, code in (*codes, (AnalysisError, EXIT_FAILED), (OSError, EXIT_FAILED)):
-        if isinstance(error, kind):
-            with contextlib.suppress(OSError):
-                typer.echo("levilab: " + " ".join(str(error).split()), err=True)
-            sys.exit(code)
-    raise error
+def _exit_with(error: Exception) -> NoReturn:
+    status = exit_codes.exit_status(error)
+    if status is None:
+        raise error
+    with contextlib.suppress(OSError):
+        message("levilab: " + _in_one_line(in_options(error, app)))
+    sys.exit(status)
 
 
-def _mute() -> None:
+def _in_one_line(text: str) -> str:
+    """Without line ends, and without what would steer the terminal: a file's name may hold it."""
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in " ".join(text.split()))
+
+
+def _silence_output() -> None:
     """Python flushes its streams when it ends; into a broken pipe it would complain."""
     with open(os.devnull, "w", encoding="utf-8") as nowhere:  # noqa: PTH123 - a descriptor is needed
         for stream in (sys.stdout, sys.stderr):
@@ -269,7 +83,7 @@ def _mute() -> None:
                 os.dup2(nowhere.fileno(), stream.fileno())
 
 
-def _never_fail_to_print() -> None:
+def _replace_unencodable() -> None:
     """Consoles and pipes of Windows may use code pages without ν and ω: those are shown as question marks there."""
     for stream in (sys.stdout, sys.stderr):
         reconfigure = getattr(stream, "reconfigure", None)

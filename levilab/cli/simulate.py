@@ -8,6 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from levilab.cli import exit_codes
+from levilab.cli.options import Json, Presets, Settings
+from levilab.cli.output import message, print_json
+from levilab.errors import UsageError
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -15,16 +20,6 @@ if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
     from levilab.stability.map import Span
 
-EXIT_INTERRUPTED = 130
-
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else on standard output.")]
-Presets = Annotated[
-    str, typer.Argument(metavar="SCENE", help="undriven, friction, tilted, driven, loose-washers, spindown, or a file.")
-]
-Settings = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change a key of the scene, as top.mass_kg=0.025; repeatable."),
-]
 benchmark_app = typer.Typer(no_args_is_help=True, help="Speed against error, with other programs beside.")
 
 
@@ -38,10 +33,14 @@ def add_to(app: typer.Typer) -> None:
 
 
 def _scene(name: str, settings: list[str] | None) -> Scene:
-    """A wrong name or key is told before anything heavy is loaded."""
-    from levilab.simulator.scene import read_scene, with_settings
+    """The scene with the changes; a wrong name or key raises before anything heavy is loaded."""
+    from levilab.simulator.scene import SceneError, read_scene, with_settings
 
-    return with_settings(read_scene(name), settings or [])
+    scene = read_scene(name)
+    try:
+        return with_settings(scene, settings or [])
+    except SceneError as error:
+        raise UsageError("settings", str(error)) from error
 
 
 def simulate(
@@ -69,7 +68,33 @@ def simulate(
 
     The first run for a kind of scene compiles for 4 to 7 s.  Ctrl-C ends it, and nothing is written then.
     """
-    _simulate(_scene(scene, settings), duration, tolerance, rate, out, explain=explain, as_json=as_json)
+    chosen = _scene(scene, settings)
+
+    from levilab.motion.simulation import SimulationOrder, carry_out
+    from levilab.motion.summary import as_document, finite
+    from levilab.present.progress import Share
+
+    order = SimulationOrder(chosen, duration, tolerance, rate, out)
+    with _interruptible("nothing was written"), contextlib.closing(Share("simulating")) as share:
+        done = carry_out(order, message, share)
+    if done.folder:
+        message(f"wrote {done.folder}")
+    if not as_json:  # at once: what explains it takes longer
+        from levilab.motion.table import print_motion
+
+        print_motion(done.summary)
+    with _interruptible("the effects are not known"):
+        effects = _explained(chosen, duration) if explain else ()
+    if as_json:
+        from dataclasses import asdict
+
+        document = as_document(done.summary) | {"run": str(done.folder) if done.folder else None}
+        document |= {"effects": [finite(asdict(effect)) for effect in effects]} if explain else {}
+        print_json(document)
+    elif explain:
+        from levilab.motion.table import print_effects
+
+        print_effects(effects)
 
 
 @contextlib.contextmanager
@@ -78,52 +103,14 @@ def _interruptible(what_is_left: str) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        typer.echo(f"levilab: interrupted, {what_is_left}", err=True)
-        raise typer.Exit(EXIT_INTERRUPTED) from None
-
-
-def _simulate(
-    scene: Scene,
-    duration: float,
-    tolerance: float,
-    rate: float,
-    out: Path | None,
-    *,
-    explain: bool,
-    as_json: bool,
-) -> None:
-    from levilab.motion.simulation import SimulationOrder, carry_out
-    from levilab.motion.summary import as_document, finite
-    from levilab.present.progress import Share
-
-    order = SimulationOrder(scene, duration, tolerance, rate, out)
-    with _interruptible("nothing was written"), contextlib.closing(Share("simulating")) as share:
-        done = carry_out(order, lambda text: typer.echo(text, err=True), share)
-    if done.folder:
-        typer.echo(f"wrote {done.folder}", err=True)
-    if not as_json:  # at once: what explains it takes longer
-        from levilab.motion.table import print_motion
-
-        print_motion(done.summary)
-    with _interruptible("the effects are not known"):
-        effects = _explained(scene, duration) if explain else ()
-    if as_json:
-        import json
-        from dataclasses import asdict
-
-        document = as_document(done.summary) | {"run": str(done.folder) if done.folder else None}
-        document |= {"effects": [finite(asdict(effect)) for effect in effects]} if explain else {}
-        typer.echo(json.dumps(document, indent=2, allow_nan=False))
-    elif explain:
-        from levilab.motion.table import print_effects
-
-        print_effects(effects)
+        message(f"levilab: interrupted, {what_is_left}")
+        raise typer.Exit(exit_codes.INTERRUPTED) from None
 
 
 def _explained(scene: Scene, duration: float) -> tuple[Effect, ...]:
     from levilab.motion.effects import explain
 
-    typer.echo("switching each effect on or off: some seconds, up to 15 where code must be compiled first", err=True)
+    message("switching each effect on or off: some seconds, up to 15 where code must be compiled first")
     return explain(scene, duration)
 
 
@@ -140,7 +127,10 @@ def stability(
         str | None,
         typer.Option(metavar="LOW:HIGH:STEP", help="Masses of the map in kg, unless given 61 around those that float."),
     ] = None,
-    duration: Annotated[float, typer.Option(metavar="S", help="How long a top of the map has to stay up.")] = 30.0,
+    duration: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="How long a top of the map has to stay up.", show_default="30"),
+    ] = None,
     out: Annotated[
         Path, typer.Option(metavar="DIR", help="Where the map is written: survival.png and survival.csv.")
     ] = Path(),
@@ -148,7 +138,14 @@ def stability(
 ) -> None:
     """Where the top floats: heights, masses and spins, from the field and the theory of small motions."""
     chosen = _scene(scene, settings)
-    spans = _spans(spins, masses, survival=survival)
+    of_map = {"spins": spins, "masses": masses, "duration": duration}
+    if not survival and (without := [name for name, given in of_map.items() if given is not None]):
+        raise UsageError(without[0], "it is of a map: give `survival`, too")
+
+    from levilab.stability.map import check_duration
+
+    spans = _span("spins", spins), _span("masses", masses)
+    stay = check_duration(30.0 if duration is None else duration)
 
     from levilab.simulator.equilibrium import stability_of
     from levilab.stability.table import as_document, print_stability
@@ -158,21 +155,15 @@ def stability(
     if not as_json:
         print_stability(found)
     if survival:
-        document["map"] = _mapped(chosen, spans, duration, out)
+        document["map"] = _mapped(chosen, spans, stay, out)
     if as_json:
-        import json
-
-        typer.echo(json.dumps(document, indent=2, allow_nan=False))
+        print_json(document)
 
 
-def _spans(spins: str | None, masses: str | None, *, survival: bool) -> tuple[Span | None, Span | None]:
-    """What --spins and --masses ask for, checked before anything is computed."""
-    from levilab.errors import SimulationError
+def _span(name: str, text: str | None) -> Span | None:
     from levilab.stability.map import span_of
 
-    if (spins or masses) and not survival:
-        raise SimulationError("--spins and --masses are those of a map: give --map, too")
-    return span_of("--spins", spins) if spins else None, span_of("--masses", masses) if masses else None
+    return None if text is None else span_of(name, text)
 
 
 def _mapped(scene: Scene, spans: tuple[Span | None, Span | None], duration: float, out: Path) -> dict[str, object]:
@@ -184,9 +175,9 @@ def _mapped(scene: Scene, spans: tuple[Span | None, Span | None], duration: floa
     with _interruptible("no map was written"), contextlib.closing(Share("simulating the map")) as share:
         found = survival_map(scene, *spans, duration=duration, progress=share)
     for path in write_map(found, out):
-        typer.echo(f"wrote {path}", err=True)
+        message(f"wrote {path}")
     for note in found.notes:
-        typer.echo(f"note: {note}", err=True)
+        message(f"note: {note}")
     return {
         "duration_s": found.duration,
         "spin_step_hz": found.spin_step,

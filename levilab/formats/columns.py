@@ -96,7 +96,7 @@ def _wanted_columns(
     for key, title in wanted.items():
         name = SHORTHANDS.get(key, key)
         if name not in CANONICAL:
-            raise TableError(path, f"--columns cannot set '{shown(key)}'; it sets t, f, u or {', '.join(CANONICAL)}")
+            raise TableError(path, f"`columns` cannot set '{shown(key)}'; it sets t, f, u or {', '.join(CANONICAL)}")
         index = _find(header, title.strip())
         if index is None and (with_unit := re.fullmatch(r"(.+?)\s*\[([^\[\]]+)\]\s*", title)):
             index = _find(header, with_unit[1].strip())
@@ -104,10 +104,10 @@ def _wanted_columns(
         if index is None:
             raise TableError(
                 path,
-                f"has no column '{shown(title)}'; it has {listed(header)}: correct --columns {key}=NAME or NUMBER",
+                f"has no column '{shown(title)}'; it has {listed(header)}: correct `columns` = {key}=NAME or NUMBER",
             )
         if index in chosen.values():
-            raise TableError(path, f"--columns names column '{shown(title)}' twice; each column holds one quantity")
+            raise TableError(path, f"`columns` names column '{shown(title)}' twice; each column holds one quantity")
         chosen[name] = index
     return chosen, stated
 
@@ -115,7 +115,7 @@ def _wanted_columns(
 def _stated_unit(path: Path, name: str, unit: str) -> str:
     kind = dimension(name)
     if unit_factor(unit, kind) is None:
-        raise TableError(path, f"--columns: '{shown(unit)}' is no unit of {kind}; known are {', '.join(UNITS[kind])}")
+        raise TableError(path, f"`columns`: '{shown(unit)}' is no unit of {kind}; known are {', '.join(UNITS[kind])}")
     return unit
 
 
@@ -139,7 +139,7 @@ def _only_one(path: Path, header: Sequence[str], name: str, indices: list[int]) 
     numbers = " or ".join(f"{key}={index + 1}" for index in indices)
     raise TableError(
         path,
-        f"columns {listed(header[i] for i in indices)} could each be {name}; say which: --columns {numbers}",
+        f"columns {listed(header[i] for i in indices)} could each be {name}; say which: `columns` = {numbers}",
     )
 
 

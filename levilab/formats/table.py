@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from levilab.errors import LevilabError
+from levilab.errors import UsageError
 from levilab.formats.columns import SHORTHANDS, Column, TableError, choose_columns, listed, shown
 from levilab.formats.dialect import Dialect
 from levilab.formats.layout import Layout, sniff
@@ -52,7 +52,7 @@ class Table:
         if name not in self.frame.columns:
             key = next((short for short, long in SHORTHANDS.items() if long == name), name)
             raise TableError(
-                self.path, f"no column is known to be {name}; it has {listed(self.header)}: say --columns {key}=NAME"
+                self.path, f"no column is known to be {name}; it has {listed(self.header)}: say `columns` = {key}=NAME"
             )
         values: NDArray[np.float64] = self.frame[name].to_numpy(dtype=np.float64)
         return values
@@ -82,7 +82,7 @@ def read_table(
             known = "time_s, spin_frequency_hz, t, f [Hz], rpm …"
             raise TableError(
                 path,
-                f"no title is known ({known}) among {listed(header)}: say --columns t=NAME,f=NAME",
+                f"no title is known ({known}) among {listed(header)}: say `columns` = t=NAME,f=NAME",
                 line=layout.header_line or layout.first_line,
             )
         rows = read_rows(path, layout, chosen)
@@ -125,14 +125,12 @@ def read_run_readings(path: Path, channels: Collection[str] = ()) -> Table:
     return _table(path, header, chosen, rows, ())
 
 
-class ColumnsError(LevilabError):
-    """`--columns` cannot be understood; wrong usage."""
-
-    exit_code = 2
+class ColumnsError(UsageError):
+    """`columns` cannot be understood."""
 
 
 def parse_columns(text: str) -> dict[str, str]:
-    """What `--columns` says, as `read_table` takes it; titles may hold commas and equals signs.
+    """What `columns` says, as `read_table` takes it; titles may hold commas and equals signs.
 
     >>> parse_columns("t=Zeit, s,f=3")
     {'t': 'Zeit, s', 'f': '3'}
@@ -143,12 +141,12 @@ def parse_columns(text: str) -> dict[str, str]:
     parts = [part.partition("=") for part in re.split(r",(?=\s*[a-z_]+\s*=)", text) if text.strip()]
     found = {name.strip(): title.strip() for name, _, title in parts}
     if len(found) < len(parts) or not all(name and title for name, title in found.items()):
-        raise ColumnsError(
-            f"--columns '{shown(text)}': NAME=COLUMN,NAME=COLUMN is expected, each NAME once, as t=Zeit,f=3"
-        )
+        expected = "NAME=COLUMN,NAME=COLUMN is expected, each NAME once, as t=Zeit,f=3"
+        raise ColumnsError("columns", expected, value=f"'{shown(text)}'")
     unknown = [name for name in found if name not in {*SHORTHANDS, *CANONICAL}]
     if unknown:
-        raise ColumnsError(f"--columns: '{shown(unknown[0])}' is no quantity known here; t, f and u are, as t=Zeit,f=3")
+        what = f"'{shown(unknown[0])}' is no quantity known here; t, f and u are, as t=Zeit,f=3"
+        raise ColumnsError("columns", what)
     return found
 
 
@@ -189,12 +187,12 @@ def _titles(
     if layout.header_line:
         raise TableError(
             path,
-            f"is no header for the {layout.width} columns below: correct it, or say --columns t=1,f=2",
+            f"is no header for the {layout.width} columns below: correct it, or say `columns` = t=1,f=2",
             line=layout.header_line,
         )
     if layout.width > len(TITLES_WITHOUT_HEADER):
         raise TableError(
-            path, f"{layout.width} columns and no header; add one, or say --columns t=1,f=2", line=layout.first_line
+            path, f"{layout.width} columns and no header; add one, or say `columns` = t=1,f=2", line=layout.first_line
         )
     guess = dict(zip(TITLES_WITHOUT_HEADER, numbers, strict=False))
     return numbers, guess, [f"{shown(str(path), 200)}: no header; the columns are taken as {', '.join(guess)}"]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from levilab.errors import SimulationError
+from levilab.errors import UsageError
 from levilab.files import CannotWrite
 from levilab.interruption import interrupted_afterwards
 from levilab.motion.lines import rate_for
@@ -82,7 +82,8 @@ def carry_out(
 ) -> Simulation:
     """Simulate, look at the motion, and write it down; what does not come to its end leaves nothing behind.
 
-    message: is told what takes a moment; progress: the share that is done.  Raises SimulationError, CannotWrite.
+    message: is told what takes a moment; progress: the share that is done.  Raises UsageError, SimulationError,
+    CannotWrite.
     """
     factor = _samples_per_state(order)
     if order.out is None:
@@ -101,12 +102,14 @@ def _samples_per_state(order: SimulationOrder) -> int:
     """Samples for each state that is kept: the spectrum needs more of them than a file does.  Checks the numbers."""
     for name, value in (("duration", order.duration), ("tolerance", order.tolerance), ("rate", order.rate)):
         if not 0 < value <= LONGEST_S:
-            raise SimulationError(f"--{name} {value:g}: a number above 0 and up to {LONGEST_S:.0e} is expected")
+            raise UsageError(name, f"a number above 0 and up to {LONGEST_S:.0e} is expected", value=value)
     states = order.duration * order.rate
     if states > MOST_STATES:
-        raise SimulationError(
-            f"--duration {order.duration:g} with --rate {order.rate:g} are {states:.2g} states, at most {MOST_STATES} "
-            f"are kept: take --rate {MOST_STATES / order.duration:.2g} or less"
+        raise UsageError(
+            "duration",
+            f"with `rate` = {order.rate:g} these are {states:.2g} states, at most {MOST_STATES} are kept: "
+            f"take `rate` = {MOST_STATES / order.duration:.2g} or less",
+            value=order.duration,
         )
     wanted = math.ceil(rate_for(order.scene) / order.rate)
     return max(min(wanted, int(MOST_STATES / states)), 1)
@@ -163,7 +166,7 @@ def _write(summary: Summary, factor: int, writer: RunWriter) -> None:
     except OSError as error:
         raise CannotWrite(
             f"could not write {FIGURE} in {writer.folder} ({error.strerror or error}): "
-            "free space, or choose another place with --out"
+            "free space, or choose another place with `out`"
         ) from error
     writer.finish("finished", simulation=as_document(summary) | {"states": len(rows)})
 

@@ -125,7 +125,7 @@ def _why_no_lines(motion: Trajectory, lines: AxisLines) -> str:
         return f"{states} states in {end:.3g} s are too few to tell them by"
     if motion.fell is not None:
         return f"the top was up for {end:.3g} s only, which is too short; 2 s would be enough"
-    return f"{end:.3g} s are too short; 2 s are enough, and with 10 s the resolution is 0.2 Hz (--duration 10)"
+    return f"{end:.3g} s are too short; 2 s are enough, and with a duration of 10 s the resolution is 0.2 Hz"
 
 
 def _notes(motion: Trajectory, lines: AxisLines, rate: float) -> list[str]:
@@ -138,7 +138,8 @@ def _notes(motion: Trajectory, lines: AxisLines, rate: float) -> list[str]:
     if highest > rate / 2:
         notes.append(
             f"{rate:g} states per second are less than twice the highest line, {highest:.3g} Hz: the lines here come "
-            f"from more of them, but states.csv would show it elsewhere; take --rate {math.ceil(3 * highest / 10) * 10}"
+            "from more of them, but states.csv would show it elsewhere; "
+            f"take a rate of {math.ceil(3 * highest / 10) * 10}"
         )
     if not lines.lines and motion.scene.observed == "motion":
         notes.append(f"no lines of the axis: {_why_no_lines(motion, lines)}")

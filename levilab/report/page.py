@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from analysis.uncertainty import Estimate
-from levilab.errors import LevilabError
+from levilab.errors import UsageError
 from levilab.files import CannotWrite, replace_atomically
 from levilab.pipelines.sources import Options
 from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
@@ -30,16 +30,15 @@ if TYPE_CHECKING:
     from analysis.spindown.combine import Mean
 
 
-class UnknownFormat(LevilabError):
+class UnknownFormat(UsageError):
     """A report in a format that is not written."""
 
 
 def write_report(paths: Sequence[Path], output: Path, options: Options | None = None) -> Path:
     """Analyze what lies at the paths and report it.  Raises DataError, UnknownFormat, CannotWrite."""
     if output.suffix.lower() not in {".html", ".htm"}:
-        raise UnknownFormat(
-            f"{output}: reports are written as HTML, name the file report.html; a browser prints it to PDF"
-        )
+        expected = "reports are written as HTML, name the file report.html; a browser prints it to PDF"
+        raise UnknownFormat("output", expected, value=output)
     page = render(analyze_spindowns(paths, options or Options()))
     try:
         output.parent.mkdir(parents=True, exist_ok=True)

@@ -193,7 +193,7 @@ def _told(what: str, where: Path, safe: str = "all earlier readings are kept: ")
     except OSError as error:
         reason = error.strerror or str(error)
         raise CannotWrite(
-            f"could not {what} in {where} ({reason}); {safe}free space, or choose another place with --out"
+            f"could not {what} in {where} ({reason}); {safe}free space, or choose another place with `out`"
         ) from error
 
 

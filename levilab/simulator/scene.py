@@ -245,7 +245,7 @@ def scene_of(table: Mapping[str, Any]) -> Scene:
 
 
 def with_settings(scene: Scene, settings: Iterable[str]) -> Scene:
-    """The scene with the changes of --set KEY=VALUE, all of them made before it is checked.  Raises SceneError.
+    """The scene with changes, each KEY=VALUE, all of them made before it is checked.  Raises SceneError.
 
     >>> with_settings(preset("friction"), ["top.mass_kg=0.0255", "drag.law=newton"]).drag.constants
     (1.727e-05,)

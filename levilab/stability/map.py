@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from levilab.errors import SimulationError
+from levilab.errors import UsageError
 from levilab.simulator.equilibrium import (
     axial_field,
     lifting,
@@ -59,26 +59,33 @@ class Map:
         if self.duration >= SHORT_S:
             return ()
         reason = f"{self.duration:g} s are short: tops outside of the window may only last a while"
-        return (f"{reason}; take --duration {SHORT_S:g} or more",)
+        return (f"{reason}; take a duration of {SHORT_S:g} s or more",)
 
 
-def span_of(option: str, text: str) -> Span:
-    """LOW:HIGH:STEP as the first, the last and how many.  Raises SimulationError.
+def span_of(name: str, text: str) -> Span:
+    """LOW:HIGH:STEP as the first, the last and how many; name: of the quantity.  Raises UsageError.
 
-    >>> span_of("--spins", "20:30:0.5")
+    >>> span_of("spins", "20:30:0.5")
     (20.0, 30.0, 21)
     """
     expected = "LOW:HIGH:STEP is expected, such as 20:30:0.5"
     try:
         low, high, step = map(float, text.split(":"))
     except ValueError:
-        raise SimulationError(f"{option} {text}: {expected}") from None
+        raise UsageError(name, expected, value=text) from None
     if not (all(map(math.isfinite, (low, high, step))) and step > 0 and high >= low + step):
-        raise SimulationError(f"{option} {text}: {expected}, with HIGH at least one STEP above LOW")
+        raise UsageError(name, f"{expected}, with HIGH at least one STEP above LOW", value=text)
     steps = (high - low) / step * (1 + 1e-9)  # rounding must not lose the last one
     if steps > MOST_TOPS:
-        raise SimulationError(f"{option} {text}: at most {MOST_TOPS} values are possible, take a longer STEP")
+        raise UsageError(name, f"at most {MOST_TOPS} values are possible, take a longer STEP", value=text)
     return low, low + math.floor(steps) * step, math.floor(steps) + 1
+
+
+def check_duration(duration: float) -> float:
+    """How long a top of a map has to stay up [s].  Raises UsageError."""
+    if not 0 < duration < math.inf:
+        raise UsageError("duration", "a number of seconds above 0 is expected", value=duration)
+    return duration
 
 
 def survival_map(
@@ -91,7 +98,7 @@ def survival_map(
     """Whether the scene's top survives, over spins [Hz] and masses [kg], each (first, last, how many).
 
     Where none are given: 18 to 90 Hz, and from a little below to a little above the masses that float.
-    Raises SimulationError for more tops than a map may have, or masses that are not above 0.
+    Raises UsageError for more tops than a map may have, or masses that are not above 0.
     """
     floating = _floating(scene)
     spins, masses = spins or USUAL_SPINS, masses or _usual_masses(scene, floating)
@@ -125,11 +132,12 @@ def _usual_masses(scene: Scene, floating: tuple[tuple[float, float], ...]) -> Sp
 
 def _check(spins: Span, masses: Span) -> None:
     if masses[0] <= 0:
-        raise SimulationError(f"--masses from {masses[0]:g} kg: masses above 0 are expected")
+        raise UsageError("masses", "masses above 0 are expected", value=f"from {masses[0]:g} kg")
     if (tops := spins[2] * masses[2]) > MOST_TOPS:
-        raise SimulationError(
+        raise UsageError(
+            "masses",
             f"{spins[2]} spins and {masses[2]} masses are {tops} tops, at most {MOST_TOPS} are possible: "
-            "take longer steps in --spins or --masses"
+            "take longer steps in `spins` or `masses`",
         )
 
 

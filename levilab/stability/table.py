@@ -183,7 +183,7 @@ def place_for_map(folder: Path) -> None:
 
     for path in (folder / TABLE, folder / PICTURE):
         if path.exists():
-            raise CannotWrite(f"{path} is there already: give another folder with --out, or move it away")
+            raise CannotWrite(f"{path} is there already: give another folder with `out`, or move it away")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / TABLE).touch()
@@ -213,4 +213,4 @@ def write_map(found: Map, folder: Path) -> list[Path]:
 def _cannot(folder: Path, error: OSError) -> Exception:
     from levilab.files import CannotWrite
 
-    return CannotWrite(f"{folder}: the map cannot be written: {error.strerror}; give another folder with --out")
+    return CannotWrite(f"{folder}: the map cannot be written: {error.strerror}; give another folder with `out`")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from instruments.clock import WallClock
 from instruments.virtual.servers.server import LOOPBACK, PORTS_PER_INSTRUMENT, Place, offered
 from instruments.virtual.servers.station import first_of
-from levilab.errors import LevilabError
+from levilab.errors import LevilabError, UsageError
 from levilab.world.bench import AGAIN_S, MODELS, VIRTUAL, own_world, scene_world, virtual_bus
 
 if TYPE_CHECKING:
@@ -40,12 +40,6 @@ class CannotServe(LevilabError):
     """The bench cannot be offered there."""
 
 
-class WrongService(LevilabError):
-    """What was asked for does not exist; wrong usage."""
-
-    exit_code = 2
-
-
 @dataclass(frozen=True)
 class Service:
     """How the bench is to be offered.
@@ -72,15 +66,15 @@ class Served:
 
 
 def chosen_models(words: list[str]) -> dict[str, str]:
-    """What ``counter=CNT-91`` and its like say, by kind.  Raises WrongService."""
+    """What ``counter=CNT-91`` and its like say, by kind.  Raises UsageError."""
     chosen = {}
     for word in words:
         kind, _, model = word.partition("=")
         if kind not in MODELS:
-            raise WrongService(f"--model {word}: {kind!r} is no kind of instrument, known are {', '.join(MODELS)}")
+            raise UsageError("models", f"{kind!r} is no kind of instrument, known are {', '.join(MODELS)}", value=word)
         known = {name.upper(): name for name in MODELS[kind]}
         if model.upper() not in known:
-            raise WrongService(f"--model {word}: no such {kind}, known are {', '.join(known.values())}")
+            raise UsageError("models", f"no such {kind}, known are {', '.join(known.values())}", value=word)
         chosen[kind] = known[model.upper()]
     return chosen
 
@@ -91,7 +85,7 @@ def serve(
     """Offer the bench until a signal asks for the end; its name.
 
     ready: called once, when all can be reached; tell: is told what takes long before.  Raises CannotServe,
-    WrongService, SceneError.
+    UsageError, SceneError.
     """
     with _asked_to_end() as end:
         world = _world(service, tell)
@@ -109,7 +103,7 @@ async def _serve(service: Service, world: World, ready: Callable[[tuple[Served, 
             offers = await opened.enter_async_context(offered(bus, place))
         except OSError as error:
             why = f"the bench cannot be offered at {service.host} ({error})"
-            raise CannotServe(f"{why}: try another --host or --port-base") from error
+            raise CannotServe(f"{why}: try another `host` or `port_base`") from error
         ready(tuple(_served(service, offer) for offer in offers))
         await first_of(end.comes(), _kept_up(bus, world))
 
@@ -127,7 +121,7 @@ def _world(service: Service, tell: Callable[[str], None]) -> World:
     if service.scene is None:
         return own_world(clock)
     if service.speed > FASTEST_MOTION:
-        raise WrongService(f"--speed {service.speed:g}: with --scene up to {FASTEST_MOTION:g} is possible")
+        raise UsageError("speed", f"with `scene` up to {FASTEST_MOTION:g} is possible", value=service.speed)
     return scene_world(service.scene, lambda: _clock(service), tell, again_s=AGAIN_S)
 
 
@@ -135,15 +129,15 @@ def _clock(service: Service) -> WallClock:
     try:
         return WallClock(speed=service.speed)
     except ValueError as error:
-        raise WrongService(f"--speed: {error}") from error
+        raise UsageError("speed", "a number above 0 is expected", value=service.speed) from error
 
 
 def _place(service: Service, instruments: int) -> Place:
     if ":" in service.host:  # a resource name is cut at its colons
-        raise WrongService(f"--host {service.host}: IPv6 has no place in VISA resource names, give an IPv4 address")
+        raise UsageError("host", "IPv6 has no place in VISA resource names, give an IPv4 address", value=service.host)
     last = (service.port_base or 0) + PORTS_PER_INSTRUMENT * instruments - 1
     if last > _LAST_PORT:
-        raise WrongService(f"--port-base {service.port_base}: the ports end at {_LAST_PORT}, {last} would be needed")
+        raise UsageError("port_base", f"the ports end at {_LAST_PORT}, {last} would be needed", value=service.port_base)
     return Place(service.host, service.port_base)
 
 

@@ -441,7 +441,7 @@ def test_a_description_that_is_no_text_is_told(tmp_path):
 
 
 def test_a_description_that_is_missing_is_told_with_what_to_do(tmp_path):
-    with pytest.raises(ConfigError, match=r"no such file.*virtual bench"):
+    with pytest.raises(ConfigError, match=r"no such file.*`mock`"):
         read_bench(tmp_path / "bench.toml", Configuration)
 
 

@@ -10,9 +10,10 @@ from levilab.acquisition.table import Configuration, settings_of
 from levilab.bench.check import Light, check
 from levilab.bench.config import ConfigError, InstrumentSettings, Limits, read_bench
 from levilab.bench.discover import Found, driver_for_identity, identify, search
-from levilab.bench.template import NobodyFound, bench_text
+from levilab.bench.template import bench_text
 from levilab.bench.wiring import described_wiring
 from levilab.cli.bench import bench_init
+from levilab.errors import NoInstrument
 from levilab.world.bench import MODELS, VIRTUAL, own_world, virtual_wiring
 
 #: Answers to *IDN? as instruments give them.
@@ -124,7 +125,7 @@ def test_where_nobody_answers_no_file_is_written_but_one_to_fill_in_when_asked_f
     nobody = [Found("A::1", trouble="A::1: no answer")]
     monkeypatch.setattr("levilab.bench.discover.search", lambda *_: nobody)
     path = tmp_path / "bench.toml"
-    with pytest.raises(NobodyFound, match="--address"):
+    with pytest.raises(NoInstrument, match="`addresses`"):
         bench_init([], "@py", path, force=False, as_json=False)
     assert not path.exists()
     assert "no answer" in capsys.readouterr().out

@@ -167,7 +167,7 @@ def test_what_is_not_there_is_named(levilab: Command, words: list[str], says: st
 
 
 def test_a_pdf_is_refused_before_anything_is_read(levilab: Command, sample_data: Path) -> None:
-    assert "HTML" in levilab("report", sample_data, "-o", "report.pdf", check=1).stderr
+    assert "HTML" in levilab("report", sample_data, "-o", "report.pdf", check=2).stderr
 
 
 @pytest.mark.parametrize(
@@ -245,7 +245,7 @@ def test_the_bench_file_sets_the_experiment_of_the_virtual_bench_too(levilab: Co
 def test_a_drive_beyond_the_limits_is_refused_before_anything_is_touched(levilab: Command, tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text("[limits]\ndrive_amplitude_vpp = 4.0\n", encoding="utf-8")
     refused = levilab("acquire", "spin", "--mock", "--bench", "mine.toml", check=1)
-    assert "spin.drive_amplitude_vpp = 10 is more than this bench stands" in refused.stderr
+    assert "spin.drive_amplitude_vpp = 10 is more than this bench allows" in refused.stderr
     assert not (tmp_path / "runs").exists()
 
 

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from levilab.errors import SimulationError
+from levilab.errors import UsageError
 from levilab.files import CannotWrite
 from levilab.simulator.ensemble import simulate_many
 from levilab.simulator.equilibrium import advice, axial_field, floating_height, stability_of
@@ -129,9 +129,9 @@ def test_a_map_of_spins_the_other_way_round_has_its_edges_there():
 
 
 def test_spans_are_read_and_what_is_none_is_told():
-    assert span_of("--spins", "20:23:0.5") == (20.0, 23.0, 7)
-    assert span_of("--spins", "-30:-20:4") == (-30.0, -22.0, 3)
-    low, high, count = span_of("--masses", "0.0245:0.0256:0.0001")
+    assert span_of("spins", "20:23:0.5") == (20.0, 23.0, 7)
+    assert span_of("spins", "-30:-20:4") == (-30.0, -22.0, 3)
+    low, high, count = span_of("masses", "0.0245:0.0256:0.0001")
     assert (low, high, count) == (0.0245, pytest.approx(0.0256, rel=1e-12), 12)
 
 
@@ -139,22 +139,22 @@ def test_spans_are_read_and_what_is_none_is_told():
     "text", ["20", "20:30", "20:30:x", "30:20:1", "20:30:0", "20:30:-1", "20:20:1", "0:inf:1", "0:nan:1"]
 )
 def test_a_span_that_is_none_is_refused_with_what_one_looks_like(text):
-    with pytest.raises(SimulationError, match=r"--spins .*: LOW:HIGH:STEP is expected, such as 20:30:0\.5"):
-        span_of("--spins", text)
+    with pytest.raises(UsageError, match=r"spins = .*: LOW:HIGH:STEP is expected, such as 20:30:0\.5"):
+        span_of("spins", text)
 
 
 def test_a_map_of_too_many_tops_or_of_no_masses_is_refused():
-    with pytest.raises(SimulationError, match="at most 250000 values"):
-        span_of("--spins", "0:1:1e-9")
-    with pytest.raises(SimulationError, match="1000 spins and 1000 masses are 1000000 tops"):
+    with pytest.raises(UsageError, match="at most 250000 values"):
+        span_of("spins", "0:1:1e-9")
+    with pytest.raises(UsageError, match="1000 spins and 1000 masses are 1000000 tops"):
         survival_map(UNDRIVEN, spins=(20.0, 30.0, 1000), masses=(0.0250, 0.0254, 1000))
-    with pytest.raises(SimulationError, match="--masses from 0 kg: masses above 0"):
+    with pytest.raises(UsageError, match="masses = from 0 kg: masses above 0"):
         survival_map(UNDRIVEN, masses=(0.0, 0.03, 2))
 
 
 def test_the_command_maps_the_spins_and_masses_that_it_is_given(levilab, tmp_path):
     words = ["stability", "undriven", "--spins", "20:32:4", "--masses", "0.0252:0.0254:1e-4", "--duration", "2"]
-    refused = levilab(*words, check=1)
+    refused = levilab(*words, check=2)
     assert "give --map, too" in refused.stderr
     assert refused.stdout == ""
     done = levilab(*words, "--map", "--out", "there", "--json")

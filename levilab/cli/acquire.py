@@ -1,0 +1,74 @@
+"""Acquire: experiments on the bench.  Heavy imports happen inside the commands that need them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from levilab.cli import exit_codes
+from levilab.cli.options import Json
+from levilab.cli.output import message, print_json
+
+acquire_app = typer.Typer(no_args_is_help=True, help="Run an experiment on the bench and write a run folder.")
+
+
+@acquire_app.command("spin", epilog="Example: levilab acquire spin --mock --note 'first try'")
+def acquire_spin(
+    mock: Annotated[bool, typer.Option("--mock", help="Use the virtual bench; needs no hardware.")] = False,
+    bench: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Describes the bench; with --mock only its settings count.", show_default="bench.toml"
+        ),
+    ] = None,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where the run folder is made.")] = Path("runs"),
+    scene: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SCENE",
+            help="With --mock: a top in full motion, such as spindown, or a scene's file.",
+            show_default="spin only",
+        ),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Makes a virtual run repeatable.")] = None,
+    note: Annotated[str, typer.Option(help="Kept with the run.")] = "",
+    realtime: Annotated[bool, typer.Option("--realtime", help="Keep the virtual bench to the wall clock.")] = False,
+    resume: Annotated[
+        Path | None, typer.Option(metavar="RUN", help="Go on with an interrupted run: read on, without driving again.")
+    ] = None,
+    wire_log: Annotated[bool, typer.Option("--wire-log", help="Keep all bytes sent and received.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Spin-down: drive the top up, switch the drive off, count its spin until it falls.
+
+    Ctrl-C ends the run after the reading under way; outputs go off and the run is kept.
+    """
+    from levilab.acquisition.loop import acquire
+    from levilab.acquisition.request import Options, request_for
+    from levilab.present.progress import to_stderr
+
+    options = Options(
+        mock=mock,
+        bench=bench,
+        out=out,
+        seed=seed,
+        scene=scene,
+        note=note,
+        realtime=realtime,
+        resume=resume,
+        wire_log=wire_log,
+        person=lambda question: typer.prompt(question, default="", show_default=False, prompt_suffix=" ", err=True),
+        tell=message,
+    )
+    run = acquire(request_for("spin", options), to_stderr())
+    readings = run.count()
+    if as_json:
+        print_json({"run": str(run.folder), "status": run.status, "readings": readings}, indent=None)
+    else:
+        typer.echo(f"{run.status}: {readings} reading{'s' * (readings != 1)} in {run.folder}")
+    if run.status == "interrupted":
+        if readings:
+            message(f"go on with it: levilab acquire spin --resume {run.folder}")
+        raise typer.Exit(exit_codes.INTERRUPTED)

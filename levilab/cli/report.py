@@ -1,0 +1,48 @@
+"""Report, and the list of runs.  Heavy imports happen inside the commands that need them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from levilab.cli.analyze import options
+from levilab.cli.options import Columns, Json, KeepOutliers, Paths, ReadingU
+from levilab.cli.output import print_json
+
+
+def add_to(app: typer.Typer) -> None:
+    """Make the commands known to the application."""
+    app.command(epilog="Example: levilab report sample_data/ -o report.html")(report)
+    app.command(epilog="Example: levilab runs runs/")(runs)
+
+
+def report(
+    paths: Paths,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE.html", help="The file to write.")] = Path(
+        "report.html"
+    ),
+    columns: Columns = "",
+    reading_u: ReadingU = None,
+    keep_outliers: KeepOutliers = False,
+) -> None:
+    """Report runs in one self-contained file: what was measured, with what, figures, numbers, warnings."""
+    from levilab.report.page import write_report
+
+    chosen = options(columns, reading_u, "covariance", keep_outliers)
+    typer.echo(f"the report is in {write_report(paths, output, chosen)}")
+
+
+def runs(
+    folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="The folder to search.")] = Path("runs"),
+    as_json: Json = False,
+) -> None:
+    """List runs: when, what, status, length."""
+    from levilab.runs.listing import list_runs, print_runs
+
+    found = list_runs(folder)
+    if as_json:
+        print_json([vars(run) for run in found])
+    else:
+        print_runs(found, folder)
