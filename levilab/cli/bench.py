@@ -54,8 +54,8 @@ def bench_init(
         _tell_found(found)
     if not any(one.kind for one in found) and not force:
         raise NoInstrument(
-            "no instrument answered that levilab has a driver for, so no file was written: is it on and connected?  Name "
-            "it with `addresses`, or take `force` for a file to fill in by hand"
+            "no instrument answered that levilab has a driver for, so no file was written: is it on and connected?  "
+            "Name it with `addresses`, or take `force` for a file to fill in by hand"
         )
     write_bench(out, bench_text(found, library))
     message(f"wrote {out}: look it over, then try it with `levilab bench check`")
