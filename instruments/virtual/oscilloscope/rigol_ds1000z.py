@@ -4,7 +4,7 @@ Sources: MSO1000Z/DS1000Z Programming Guide as public drivers quote it (ds1054z 
 driver).  From there: 25 codes per division, code 127 in the middle, 12 divisions, the limits of a block, the
 preamble's form, ASCII data with a block's head too.
 Assumed: what the error queue says when too much is asked for, the depth that AUTO takes.  The delayed sweep keeps its
-numbers within the limits of the guide, and is not drawn.
+numbers within the limits that the guide of a sister series gives, with 12 divisions for 14, and is not drawn.
 """
 
 from __future__ import annotations

@@ -1,17 +1,13 @@
 """The virtual counter against light whose frequency is known."""
 
-import itertools
 import math
 import struct
 import tracemalloc
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from instruments.clock import VirtualClock
-from instruments.virtual.counter.edges import RATE, EdgeFinder, Input, crossings
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from support.wire import ask, cable, errors, received, send
 
@@ -189,65 +185,7 @@ def test_what_follows_an_abort_in_the_same_bytes_is_not_lost():
     assert float(received(device, 1.0)) == 0.5
 
 
-# --- the Schmitt trigger ---
-
-
-def brute_force(voltage, level, hysteresis):
-    """One sample after the other: armed below level − hysteresis, fires at the level."""
-    found, armed = [], False
-    for k, (before, after) in enumerate(itertools.pairwise(voltage)):
-        armed = armed or before < level - hysteresis
-        if armed and after >= level:
-            found.append(k + (level - before) / (after - before))
-            armed = False
-    return found
-
-
-#: Few different voltages, so that samples meet the level and the lower threshold exactly.
-VOLTAGES = st.lists(st.integers(-4, 4).map(lambda k: k / 4), min_size=1, max_size=60)
-
-
-@given(
-    voltage=VOLTAGES, level=st.sampled_from([-0.25, 0.0, 0.3, 0.5]), hysteresis=st.sampled_from([0.0, 0.1, 0.25, 0.6])
-)
-def test_crossings_are_those_of_a_schmitt_trigger(voltage, level, hysteresis):
-    got = crossings(np.array(voltage), level, hysteresis)
-    # both divide the same small numbers; a crossing's place is of order 60 and rounded there
-    np.testing.assert_allclose(got, brute_force(voltage, level, hysteresis), rtol=1e-14, atol=1e-14)
-
-
-@given(voltage=VOLTAGES, level=st.sampled_from([-0.25, 0.0, 0.3]), hysteresis=st.sampled_from([0.0, 0.1, 0.6]))
-def test_crossings_lie_between_samples_and_one_turn_back_apart(voltage, level, hysteresis):
-    got = crossings(np.array(voltage), level, hysteresis)
-    assert np.all((got >= 0) & (got <= len(voltage) - 1))
-    assert np.all(np.diff(got) > 0)
-
-
-# --- light that is looked at in pieces ---
-
-
-@given(
-    voltage=VOLTAGES,
-    level=st.sampled_from([-0.25, 0.0, 0.3]),
-    hysteresis=st.sampled_from([0.0, 0.1, 0.6]),
-    falling=st.booleans(),
-    steps=st.lists(st.integers(1, 9), min_size=60, max_size=60),
-)
-def test_edges_found_in_pieces_are_those_of_the_whole(voltage, level, hysteresis, falling, steps):
-    def signal(start, step, n):
-        first = round(start * RATE)
-        return np.array((voltage + [voltage[-1]] * 100)[first : first + n])
-
-    finder = EdgeFinder(signal, Input(level, hysteresis, 0.02, falling=falling), 0.0)
-    for reached in itertools.accumulate(steps):
-        finder.look(reached / RATE, min(reached, len(voltage) - 1 + 1e-6) / RATE)
-    sign = -1 if falling else 1
-    whole = crossings(sign * np.array(voltage), sign * level, hysteresis)
-    found = []
-    while edge := finder.find(found[-1][1] + 1e-12 if found else 0.0):
-        found.append((edge.count, edge.time))
-    assert [count for count, _ in found] == list(range(len(whole)))
-    np.testing.assert_allclose([time * RATE for _, time in found], whole, rtol=1e-12, atol=1e-9)
+# --- long gates ---
 
 
 def test_a_gate_of_a_thousand_seconds_needs_little_memory():

@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from instruments.virtual.oscilloscope.acquisition import AUTO_AFTER
 from instruments.virtual.oscilloscope.record import Edge
 from support.scopes import RIGOL_READY, constant, pulses, ramp, rigol, rigol_stopped, rigol_volts, slow
 from support.wire import ask, send
@@ -89,7 +88,6 @@ def test_sweep_auto_loses_pulses_that_come_more_rarely_than_it_waits():
     for _ in range(20):
         device.clock.sleep(0.517)
         forced.append(device.record().forced)
-    assert AUTO_AFTER < 0.1
     assert any(forced)
 
 

@@ -1,0 +1,64 @@
+"""Edges of a sampled voltage: the Schmitt trigger, and light that is looked at in pieces."""
+
+import itertools
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from instruments.virtual.counter.edges import RATE, EdgeFinder, Input, crossings
+
+
+def brute_force(voltage, level, hysteresis):
+    """One sample after the other: armed below level − hysteresis, fires at the level."""
+    found, armed = [], False
+    for k, (before, after) in enumerate(itertools.pairwise(voltage)):
+        armed = armed or before < level - hysteresis
+        if armed and after >= level:
+            found.append(k + (level - before) / (after - before))
+            armed = False
+    return found
+
+
+#: Few different voltages, so that samples meet the level and the lower threshold exactly.
+VOLTAGES = st.lists(st.integers(-4, 4).map(lambda k: k / 4), min_size=1, max_size=60)
+
+
+@given(
+    voltage=VOLTAGES, level=st.sampled_from([-0.25, 0.0, 0.3, 0.5]), hysteresis=st.sampled_from([0.0, 0.1, 0.25, 0.6])
+)
+def test_crossings_are_those_of_a_schmitt_trigger(voltage, level, hysteresis):
+    got = crossings(np.array(voltage), level, hysteresis)
+    # both divide the same small numbers; a crossing's place is of order 60 and rounded there
+    np.testing.assert_allclose(got, brute_force(voltage, level, hysteresis), rtol=1e-14, atol=1e-14)
+
+
+@given(voltage=VOLTAGES, level=st.sampled_from([-0.25, 0.0, 0.3]), hysteresis=st.sampled_from([0.0, 0.1, 0.6]))
+def test_crossings_lie_between_samples_and_one_turn_back_apart(voltage, level, hysteresis):
+    got = crossings(np.array(voltage), level, hysteresis)
+    assert np.all((got >= 0) & (got <= len(voltage) - 1))
+    assert np.all(np.diff(got) > 0)
+
+
+@given(
+    voltage=VOLTAGES,
+    level=st.sampled_from([-0.25, 0.0, 0.3]),
+    hysteresis=st.sampled_from([0.0, 0.1, 0.6]),
+    falling=st.booleans(),
+    steps=st.lists(st.integers(1, 9), min_size=60, max_size=60),
+)
+def test_edges_found_in_pieces_are_those_of_the_whole(voltage, level, hysteresis, falling, steps):
+    def signal(start, step, n):
+        first = round(start * RATE)
+        return np.array((voltage + [voltage[-1]] * 100)[first : first + n])
+
+    finder = EdgeFinder(signal, Input(level, hysteresis, 0.02, falling=falling), 0.0)
+    for reached in itertools.accumulate(steps):
+        finder.look(reached / RATE, min(reached, len(voltage) - 1 + 1e-6) / RATE)
+    sign = -1 if falling else 1
+    whole = crossings(sign * np.array(voltage), sign * level, hysteresis)
+    found = []
+    while edge := finder.find(found[-1][1] + 1e-12 if found else 0.0):
+        found.append((edge.count, edge.time))
+    assert [count for count, _ in found] == list(range(len(whole)))
+    np.testing.assert_allclose([time * RATE for _, time in found], whole, rtol=1e-12, atol=1e-9)
