@@ -8,13 +8,24 @@ from typing import Protocol
 
 
 class Clock(Protocol):
-    """Seconds since the bench was switched on."""
+    """Seconds since the bench was switched on.
+
+    jumps: whether time stands still between the calls of `sleep`; if not, it passes by itself.
+    """
+
+    jumps: bool
 
     def now(self) -> float:
         """The time [s]."""
 
     def sleep(self, duration: float) -> None:
         """Let time pass [s]."""
+
+    def wall_duration(self, duration: float) -> float:
+        """How long the wall's clock runs until so much time may have passed here [s].
+
+        An event loop waits for that long.  On a clock that jumps `sleep` then returns without waiting.
+        """
 
 
 class WallClock:
@@ -23,6 +34,8 @@ class WallClock:
     speed: seconds of the bench per second of the wall, for a virtual bench that somebody watches.  Raises ValueError
     when it is not a positive number.
     """
+
+    jumps = False
 
     def __init__(self, *, speed: float = 1.0) -> None:
         if not 0 < speed < math.inf:
@@ -36,7 +49,11 @@ class WallClock:
 
     def sleep(self, duration: float) -> None:
         """Wait until so much time has passed on the bench [s]."""
-        time.sleep(max(0.0, duration) / self.speed)
+        time.sleep(self.wall_duration(duration))
+
+    def wall_duration(self, duration: float) -> float:
+        """See :class:`Clock` [s]."""
+        return max(0.0, duration) / self.speed
 
 
 class VirtualClock:
@@ -47,6 +64,8 @@ class VirtualClock:
     >>> clock.now()
     190.0
     """
+
+    jumps = True
 
     def __init__(self, *, realtime: bool = False) -> None:
         self._now = 0.0
@@ -61,3 +80,9 @@ class VirtualClock:
         self._now += max(0.0, duration)
         if self._wall:
             self._wall.sleep(self._now - self._wall.now())
+
+    def wall_duration(self, duration: float) -> float:
+        """See :class:`Clock` [s]."""
+        if self._wall is None:
+            return 0.0
+        return self._wall.wall_duration(self._now + max(0.0, duration) - self._wall.now())

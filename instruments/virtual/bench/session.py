@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Protocol
 from instruments.ieee488 import INFINITY
 from instruments.virtual.core.message import Framer, Overrun
 from instruments.virtual.core.parser import LONGEST_ANSWER, ScpiError
-from instruments.virtual.core.steps import Work, at_once
+from instruments.virtual.core.steps import Work
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Generator, Iterator, Sequence
 
     from instruments.virtual.core.device import Answer, VirtualInstrument
     from instruments.virtual.core.steps import Steps
@@ -25,6 +25,8 @@ _NOTHING = memoryview(b"")
 MOST_ANSWERS = 1000
 #: How long an instrument works in one slice [s], as the clock on the wall tells.
 SLICE = 0.01
+#: Bytes that are searched for the ends of messages in one slice.
+_PIECE = 1 << 12
 
 
 class LinkLost(Exception):
@@ -106,20 +108,46 @@ class Session:
     def write(self, data: bytes, *, end: bool = True) -> None:
         """Bytes for the instrument; it works on every message that they complete.  end: marked by the interface."""
         with self.lock:
-            at_once(self._steps(data, end=end))
+            for _ in self.slices(data, end=end):
+                pass
 
     def slices(self, data: bytes, *, end: bool = True) -> Iterator[None]:
-        """What write() does, in slices: the bus is locked while one is worked on, and free between them.
+        """Do what write() does, in slices: the bus is locked while one is worked on, and free between them.
 
-        Whoever closes this gives the rest up; so does a device clear.
+        Closing the iterator drops the rest, and so does a device clear.
         """
-        return self._sliced(self._steps(data, end=end))
+        for message in self.messages(data, end=end):
+            if message is None:
+                yield
+            else:
+                yield from self.work_on(message)
+
+    def messages(self, data: bytes, *, end: bool = True) -> Generator[str | None, None, None]:
+        """The messages that these bytes complete, for work_on(); none are left after a device clear.
+
+        Yields None between pieces: a million line feeds take a second to be cut apart.
+        """
+        with self.lock:
+            self._check_link()
+        clears = self._clears
+        for message in self._cut_apart(data, end=end and not self.stream):
+            if isinstance(message, Overrun):
+                with self.lock:
+                    self.device.parser.report(ScpiError(-363))
+            elif message != "":
+                yield message
+            if clears != self._clears:
+                return
+
+    def work_on(self, message: str) -> Steps[None]:
+        """Let the instrument work on a message, in slices."""
+        return self._sliced(self._run(message))
 
     def catch_up(self) -> Iterator[None]:
         """What has gone on in the instrument while nobody asked, in slices."""
         return self._sliced(self.device.catch_up())
 
-    def _sliced(self, steps: Steps[None]) -> Iterator[None]:
+    def _sliced(self, steps: Steps[None]) -> Steps[None]:
         work = Work(steps)
         try:
             while not work.done:
@@ -135,23 +163,16 @@ class Session:
             with self.lock:
                 work.give_up()
 
-    def _steps(self, data: bytes, *, end: bool) -> Steps[None]:
-        self._check_link()
-        clears = self._clears
-        for message in self._messages(data, end=end and not self.stream):
-            if clears != self._clears:
-                return
-            if isinstance(message, Overrun):
-                self.device.parser.report(ScpiError(-363))
-            elif message:
-                yield from self._run(message)
-
-    def _messages(self, data: bytes, *, end: bool) -> list[str | Overrun]:
-        """What these bytes complete.  END takes the place of a line feed if there is none (IEEE 488.2, 7.5)."""
-        messages = self._framer.feed(data if not end or data.endswith(b"\n") else data + b"\n")
+    def _cut_apart(self, data: bytes, *, end: bool) -> Iterator[str | Overrun | None]:
+        """See messages().  END takes the place of a line feed if there is none (IEEE 488.2, 7.5)."""
+        if end and not data.endswith(b"\n"):
+            data += b"\n"
+        for start in range(0, len(data), _PIECE):
+            if start:
+                yield None
+            yield from self._framer.feed(data[start : start + _PIECE])
         if end and self._framer.begun:  # that line feed was a byte of a block
-            messages += self._framer.feed(b"\n")
-        return messages
+            yield from self._framer.feed(b"\n")
 
     def _run(self, message: str) -> Steps[None]:
         self._drop_what_is_abandoned()
@@ -169,9 +190,14 @@ class Session:
             self._answers.append(answer)
             self._keep_within_bounds()
 
-    def cut_off_by(self, data: bytes) -> bool:
-        """Whether these bytes end what the instrument works on."""
-        return self.device.cut_off_by(data.decode("latin-1"))
+    def cut_off_by(self, message: str) -> bool:
+        """Whether this message ends what the instrument works on."""
+        return self.device.cut_off_by(message)
+
+    def cut_off_by_bytes(self, data: bytes, *, end: bool = True) -> bool:
+        """Whether these bytes are such a message, whole and by itself."""
+        whole = not self._framer.begun and ((end and not self.stream) or data.endswith(b"\n"))
+        return whole and self.cut_off_by(data.decode("latin-1"))
 
     def _keep_within_bounds(self) -> None:
         """Who asks on and on and never reads gets nothing of it (IEEE 488.2, 6.3.1.7)."""

@@ -6,8 +6,9 @@ An answer may take long to be worked out, so an instrument works on a message in
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
+from instruments.clock import Clock as Clock  # noqa: PLC0414, TC001 - the kinds of instruments take it from here
 from instruments.virtual.core.parameters import at_most_one, boolean, choice, limit, none, nr3, number, one
 from instruments.virtual.core.parser import Command, Parser
 from instruments.virtual.core.status import OPERATION_COMPLETE, Status
@@ -19,16 +20,6 @@ if TYPE_CHECKING:
     from instruments.virtual.core.steps import Steps
 
 Value = float | str | bool
-
-
-class Clock(Protocol):
-    """The one clock of the bench [s]."""
-
-    def now(self) -> float:
-        """Seconds since the bench was switched on."""
-
-    def sleep(self, duration: float) -> None:
-        """Let time pass."""
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,6 @@ from instruments.virtual.servers.hislip_messages import (
     Message,
     Problem,
     Type,
-    refuse,
 )
 from instruments.virtual.servers.station import FIRST_WORDS, MOST_CLIENTS, Disconnected, Link, Listener, first_of
 
@@ -59,7 +58,7 @@ class Client:
     async def listen(self) -> None:
         """Messages for the instrument.  Ends by an error, when the client is gone."""
         while True:
-            message = await self.sync.receive()
+            message = await _next(self.sync)
             if message.type == Type.DEVICE_CLEAR_COMPLETE:
                 self._cleared()
             elif message.type in {Type.DATA, Type.DATA_END, Type.TRIGGER}:
@@ -68,14 +67,15 @@ class Client:
                 if message.type == Type.FATAL_ERROR:
                     raise Disconnected
             else:
-                refuse(self.sync, message)
+                self.refuse(self.sync, message)
 
     async def _take(self, message: Message) -> None:
         if self.other is None:
             await self.sync.fatal(Fatal.NOT_BOTH_CHANNELS, "the asynchronous channel is missing")
         # a client that is kept out waits, and a device clear ends that
         await self.link.turn(given_up=lambda: self.clearing)
-        if not self.link.cut_off_by(message.payload):
+        end = message.type == Type.DATA_END
+        if not self.link.cut_off_by(message.payload, end=end):
             await self.link.finished(given_up=lambda: self.clearing)
         if self.clearing:
             return
@@ -86,18 +86,18 @@ class Client:
         if message.type == Type.TRIGGER:
             self.link.trigger()
             return
-        end = message.type == Type.DATA_END
         if end:
             if self.link.due() is not None:  # rule 1; the session drops the answer
-                self._interrupt(message.parameter)
+                await self._interrupt(message.parameter)
             self.answering = message.parameter
         await self.link.write(message.payload, end=end)
 
-    def _interrupt(self, number: int) -> None:
+    async def _interrupt(self, number: int) -> None:
         """Both are told, the asynchronous channel first (6.11, table 30)."""
         assert self.other
         self.other.send(Message(Type.ASYNC_INTERRUPTED, parameter=number))
         self.sync.send(Message(Type.INTERRUPTED, parameter=number))
+        await self.other.drain()
 
     def _cleared(self) -> None:
         """Both sides have dropped what was under way (6.12); synchronized mode, whatever the client would like."""
@@ -119,15 +119,10 @@ class Client:
         assert self.other
         try:
             while True:
-                message = await self.other.receive()
-                act = _ASIDE.get(message.type)
-                if act is None:
-                    refuse(self.other, message)
-                    continue
+                message = await _next(self.other)
                 if message.type == Type.ASYNC_STATUS_QUERY:
                     await self.link.caught_up()
-                act(self, self.other, message)
-                await self.other.drain()
+                _ASIDE.get(message.type, Client.refuse)(self, self.other, message)
         finally:
             if self.locking:
                 self.locking.cancel()
@@ -184,6 +179,10 @@ class Client:
         alone = bool(hold.holders) and hold.key is None
         channel.send(Message(Type.ASYNC_LOCK_INFO_RESPONSE, int(alone), len(hold.holders)))
 
+    def refuse(self, channel: Channel, message: Message) -> None:
+        """A type that is not known, or not on this channel (6.2)."""
+        channel.send(Message(Type.ERROR, Problem.UNRECOGNIZED_TYPE, payload=b"message type %d" % message.type))
+
     def ignore(self, channel: Channel, message: Message) -> None:
         """Error: what the client did not like would not be said in another way."""
 
@@ -194,6 +193,13 @@ class Client:
     def go_remote(self, channel: Channel, message: Message) -> None:
         """AsyncRemoteLocalControl: there is no front panel to lock (6.9)."""
         channel.send(Message(Type.ASYNC_REMOTE_LOCAL_RESPONSE))
+
+
+async def _next(channel: Channel) -> Message:
+    """The next message, once the client has read its replies: a flood that is never read piles up none of them."""
+    await channel.drain()
+    await asyncio.sleep(0)  # many messages may have come at once: the other clients' turn
+    return await channel.receive()
 
 
 _ASIDE: dict[int, Callable[[Client, Channel, Message], None]] = {

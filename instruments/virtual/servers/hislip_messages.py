@@ -108,6 +108,7 @@ class Channel:
             if length <= LONGEST:
                 return Message(kind, control, parameter, await self._reader.readexactly(length))
             self.send(Message(Type.ERROR, Problem.TOO_LARGE, payload=b"at most %d bytes" % LONGEST))
+            await self.drain()
             await self._skip(length)
 
     async def _skip(self, length: int) -> None:
@@ -129,8 +130,3 @@ class Channel:
         """Tell why, and end the connection.  Raises Disconnected."""
         self.send(Message(Type.FATAL_ERROR, code, payload=why.encode()))
         raise Disconnected
-
-
-def refuse(channel: Channel, message: Message) -> None:
-    """Tell that this type of message is not known, or not on this channel."""
-    channel.send(Message(Type.ERROR, Problem.UNRECOGNIZED_TYPE, payload=b"message type %d" % message.type))

@@ -76,7 +76,7 @@ class Program:
 
 async def read_record(reader: asyncio.StreamReader, longest: int) -> bytes:
     """The next record, from its fragments (RFC 5531, 11).  Raises Disconnected when it is longer than any call."""
-    record = b""
+    record = bytearray()  # a record may come in a million fragments
     while True:
         head = int.from_bytes(await reader.readexactly(4))
         length = head & 0x7FFFFFFF
@@ -84,7 +84,8 @@ async def read_record(reader: asyncio.StreamReader, longest: int) -> bytes:
             raise Disconnected
         record += await reader.readexactly(length)
         if head >> 31:
-            return record
+            return bytes(record)
+        await asyncio.sleep(0)  # the other clients' turn
 
 
 async def serve(program: Program, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

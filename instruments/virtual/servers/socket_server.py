@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING, Protocol
 from instruments.virtual.servers.station import CHUNK, Link, Listener, first_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from instruments.virtual.servers.station import Station
 
 #: How long answers under way are still delivered to a client that has nothing more to say [s].
@@ -72,10 +70,8 @@ async def converse(station: Station, wire: Wire) -> None:
 
     async def work() -> None:
         while True:
-            for piece in _lines(await received.get()):
-                await link.turn()
-                await link.quiet()
-                await link.write(piece)
+            await link.write(await received.get())
+            await link.quiet()
             received.task_done()
 
     async def answer() -> None:
@@ -86,17 +82,3 @@ async def converse(station: Station, wire: Wire) -> None:
         await first_of(receive(), work(), answer())
     finally:
         link.close()
-
-
-def _lines(data: bytes) -> Iterator[bytes]:
-    r"""Cut behind each line feed.
-
-    >>> list(_lines(b"*CLS\n*ID"))
-    [b'*CLS\n', b'*ID']
-    """
-    start = 0
-    while stop := data.find(b"\n", start) + 1:
-        yield data[start:stop]
-        start = stop
-    if start < len(data):
-        yield data[start:]

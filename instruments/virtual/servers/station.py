@@ -3,6 +3,9 @@
 One thread with one event loop serves all clients.  An instrument works while the bus is locked, in slices between which
 the other clients have their turn; its answers are waited for without that lock, on the bench's clock, and whatever
 happens to the instrument meanwhile is looked at.
+
+An instrument takes the next message when it is done with the last one, and the clients take turns, a message each: a
+flood of commands holds up the client that sends it, not the others.
 """
 
 from __future__ import annotations
@@ -20,11 +23,12 @@ from instruments.virtual.bench.session import LinkLost
 from instruments.virtual.core.parser import ScpiError
 
 if TYPE_CHECKING:
-    from collections.abc import Coroutine, Iterator
+    from collections.abc import Coroutine, Generator, Iterable
 
     from instruments.virtual.bench.bus import Bus
     from instruments.virtual.bench.session import Session
     from instruments.virtual.core.device import VirtualInstrument
+    from instruments.virtual.core.steps import Steps
 
 log = logging.getLogger(__name__)
 
@@ -47,17 +51,32 @@ class Disconnected(Exception):
 
 @dataclass(eq=False)
 class Station:
-    """One instrument of a bus, as its servers see it.  at_work: held by the client whose message takes long."""
+    """One instrument of a bus, as its servers see it.
+
+    at_work: held by the client whose message the instrument takes or works on; working: whether it works on that
+    message still.
+    """
 
     bus: Bus
     device: VirtualInstrument
     at_work: asyncio.Lock = field(default_factory=asyncio.Lock)
+    working: bool = False
     _stirred: asyncio.Event = field(default_factory=asyncio.Event)
 
     def stir(self) -> None:
         """Something happened to the instrument: whoever waits for it looks again."""
         self._stirred.set()
         self._stirred = asyncio.Event()
+
+    async def passes(self, duration: float) -> None:
+        """Wait until so much time has passed on the bench [s]; the other clients have their turn in any case."""
+        clock = self.device.clock
+        end = clock.now() + duration
+        while (wait := clock.wall_duration(end - clock.now())) > _NO_WAIT:
+            await asyncio.sleep(wait)
+        if clock.jumps:
+            clock.sleep(end - clock.now())
+        await asyncio.sleep(0)
 
     async def stirred(self, within: float | None) -> None:
         """Wait until something happens, at most so long by the clock on the wall [s]."""
@@ -75,7 +94,7 @@ class Link:
     def __init__(self, station: Station, *, stream: bool = False) -> None:
         self.station, self.closed = station, False
         self.session = self._new(stream=stream)
-        self._slices: Iterator[None] = iter(())
+        self._messages: Generator[str | None, None, None] | None = None
         self._work: asyncio.Task[None] | None = None
 
     def _new(self, *, stream: bool) -> Session:
@@ -93,29 +112,57 @@ class Link:
     ) -> bool:
         """Bytes for the instrument, once it has worked on those before; see Session.write.
 
-        What takes long goes on when this has returned.  Returns False if they were not taken within this time [s].
+        The instrument goes on with them when this has returned.  Returns False if they were not taken within this
+        time [s].
         """
-        cut_off = self.cut_off_by(data)
-        if not cut_off and not await self.finished(within, given_up=given_up):
+        if self.cut_off_by(data, end=end):
+            await self._work_on(self.session.messages(data, end=end))
+            return True
+        if not await self.finished(within, given_up=given_up):
             return False
-        slices = self.session.slices(data, end=end)
-        if (cut_off or not self.station.at_work.locked()) and next(slices, self) is self:
-            self.station.stir()
-        elif await self.finished():
-            self._slices, self._work = slices, asyncio.ensure_future(self._work_on(slices))
+        if self._work:
+            self._work.result()  # the instrument, or the link, may have failed
+        self._messages = self.session.messages(data, end=end)
+        self._work = asyncio.ensure_future(self._work_on(self._messages))
+        await asyncio.sleep(0)  # where no other client has its turn the first slice is done now
         return True
 
-    def cut_off_by(self, data: bytes) -> bool:
+    def cut_off_by(self, data: bytes, *, end: bool = True) -> bool:
         """Whether these bytes end what the instrument works on; see Session.cut_off_by."""
-        return self.session.cut_off_by(data)
+        return self.station.working and self.session.cut_off_by_bytes(data, end=end)
 
-    async def _work_on(self, slices: Iterator[None]) -> None:
+    async def _work_on(self, messages: Iterable[str | None]) -> None:
         try:
-            async with self.station.at_work:
-                for _ in slices:
-                    await asyncio.sleep(0)  # the others' turn
+            for message in messages:
+                if message is None:
+                    await asyncio.sleep(0)
+                elif self.station.working and self.session.cut_off_by(message):
+                    await self._finish(self.session.work_on(message))
+                else:
+                    await self._in_turn(message)
         finally:
             self.station.stir()
+
+    async def _in_turn(self, message: str) -> None:
+        """Let the instrument take a message when it is done with those of the other clients, and wait until it is."""
+        station = self.station
+        if self.session.stream:  # answers follow each other: the last one is delivered first
+            await self.turn()
+            await self._delivered()
+        async with station.at_work:
+            station.working = True
+            try:
+                await self._finish(self.session.work_on(message))
+            finally:
+                station.working = False
+            station.stir()
+            await station.passes(station.device.pace)
+
+    @staticmethod
+    async def _finish(slices: Steps[None]) -> None:
+        with contextlib.closing(slices):
+            for _ in slices:
+                await asyncio.sleep(0)  # the others' turn
 
     async def finished(self, within: float | None = None, *, given_up: Callable[[], bool] = lambda: False) -> bool:
         """Wait until the instrument has worked on everything; whether that is so within this time [s]."""
@@ -124,8 +171,9 @@ class Link:
     def _drop_work(self) -> None:
         if self._work is not None:
             self._work.cancel()
-            self._slices.close()  # type: ignore[attr-defined]
-        self._work = None
+        if self._messages is not None:
+            self._messages.close()
+        self._work = self._messages = None
 
     async def caught_up(self) -> None:
         """Let the instrument do what has gone on while nobody asked."""
@@ -169,13 +217,13 @@ class Link:
             return None
         clock = self.station.device.clock
         missing = max(0.0, instant - clock.now())
-        speed: float | None = getattr(clock, "speed", None)
         if missing >= INFINITY:  # it never comes
             return missing
-        if speed is None:  # a clock that stands still unless it is told to jump
+        if (wait := clock.wall_duration(missing)) > _NO_WAIT:
+            return wait
+        if clock.jumps:
             clock.sleep(missing)
-            return 0.0
-        return missing / speed if missing / speed > _NO_WAIT else 0.0
+        return 0.0
 
     async def answered(self, within: float | None = None, *, given_up: Callable[[], bool] = lambda: False) -> bool:
         """Wait until bytes are there; whether they are, within this time by the clock on the wall [s].
@@ -199,7 +247,12 @@ class Link:
 
     async def quiet(self) -> None:
         """Wait until the instrument has nothing to do, and no answer is under way."""
-        while await self.finished() and (due := self.due()) is not None:
+        while await self.finished() and self.due() is not None:
+            await self._delivered()
+
+    async def _delivered(self) -> None:
+        """Wait until no answer is under way."""
+        while (due := self.due()) is not None:
             await self.station.stirred(due or None)
 
     def status_byte(self, *, unread: bool = False) -> int:

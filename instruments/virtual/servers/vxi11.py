@@ -201,7 +201,7 @@ class _Connection:
     @staticmethod
     async def _answered(found: OpenLink, within: float) -> bool:
         link = found.link
-        if link.due() is None:
+        if link.due() is None and await link.finished(0.0) and link.due() is None:
             link.session.read(0, 0.0)  # who reads what was not asked for finds it in the error queue
         return await link.answered(within, given_up=lambda: found.aborted)
 
