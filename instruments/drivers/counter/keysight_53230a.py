@@ -35,7 +35,8 @@ class Keysight53230A(ReciprocalCounter):
     impedance = Setting("INP1:IMP", float, unit="ohm", low=50.0, high=1e6)
     probe_factor = Setting("INP1:PROB", float, low=1.0, high=10.0)
     input_range = Setting("INP1:RANG", float, unit="V", low=5.0, high=50.0)
-    trigger_level = Setting("INP1:LEV1", float, unit="V", low=-5.125, high=5.125)
+    #: Resolution: data sheet, for the range of 5 V.
+    trigger_level = Setting("INP1:LEV1", float, unit="V", low=-5.125, high=5.125, resolution=2.5e-3)
     automatic_level = Setting("INP1:LEV:AUTO", bool)
     slope = Setting("INP1:SLOP1", str, choices=("POSitive", "NEGative"))
     measurement_timeout = Setting("SYST:TIM", float, unit="s", low=0.01, high=2000.0)

@@ -40,7 +40,8 @@ class PendulumCNT91(ReciprocalCounter):
     impedance = Setting("INP1:IMP", float, unit="ohm", low=50.0, high=1e6)
     attenuation = Setting("INP1:ATT", float, low=1.0, high=10.0, form=Form(r"10?|\+1\.0+E\+0[01]", "10"))
     low_pass_filter = Setting("INP1:FILT", bool)
-    trigger_level = Setting("INP1:LEV", float, unit="V", low=-5.0, high=5.0)
+    #: Resolution: data sheet, without attenuation.
+    trigger_level = Setting("INP1:LEV", float, unit="V", low=-5.0, high=5.0, resolution=3e-3)
     automatic_level = Setting("INP1:LEV:AUTO", bool)
     slope = Setting("INP1:SLOP", str, choices=("POSitive", "NEGative"))
     measurement_timeout = Setting("SYST:TOUT:TIME", float, unit="s", low=0.01, high=1000.0)

@@ -58,8 +58,8 @@ class OutputSwitch(Setting[bool]):
 
 
 def frequency_setting(high: float) -> LimitedSetting:
-    """The frequency of the output, up to the highest of the family [Hz]."""
-    return LimitedSetting("FREQ", float, unit="Hz", low=1e-6, high=high, quantity="frequency_hz")
+    """The frequency of the output, in steps of 1 µHz, up to the highest of the family [Hz]."""
+    return LimitedSetting("FREQ", float, unit="Hz", low=1e-6, high=high, resolution=1e-6, quantity="frequency_hz")
 
 
 def amplitude_setting(low: float) -> LimitedSetting:
@@ -68,9 +68,10 @@ def amplitude_setting(low: float) -> LimitedSetting:
 
 
 def offset_setting() -> LimitedSetting:
-    """The offset of the output [V]."""
+    """The offset of the output, with four digits of 10 V [V]."""
+    low, high, resolution = -OPEN_V, OPEN_V, 1e-3
     return LimitedSetting(
-        "VOLT:OFFS", float, unit="V", low=-OPEN_V, high=OPEN_V, quantity="offset_v", partner="amplitude_vpp"
+        "VOLT:OFFS", float, "V", low, high, resolution=resolution, quantity="offset_v", partner="amplitude_vpp"
     )
 
 
