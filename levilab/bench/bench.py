@@ -146,4 +146,5 @@ def connected(kind: Kind[I], wiring: Wiring, *, log: TrafficLog | None = None) -
     """A driver on an open link.  Raises ConfigError for an unknown model, InstrumentError."""
     settings = wiring.described(kind.name)
     driver = kind.driver(settings.model)
-    return driver(transport_to(driver, settings, library=wiring.library, log=log), clock=wiring.clock)
+    transport = transport_to(driver, settings, library=wiring.library, clock=wiring.clock, log=log)
+    return driver(transport, clock=wiring.clock)

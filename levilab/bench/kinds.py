@@ -21,6 +21,7 @@ from levilab.bench.config import ConfigError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from instruments.clock import Clock
     from instruments.drivers.counter import Counter
     from instruments.drivers.generator import Generator
     from instruments.drivers.magnetometer import Magnetometer
@@ -88,11 +89,20 @@ KINDS: dict[str, Kind[Instrument]] = {kind.name: kind for kind in (COUNTER, GENE
 
 
 def transport_to(
-    driver: type[Instrument], settings: InstrumentSettings, *, library: Any = "@py", log: TrafficLog | None = None
+    driver: type[Instrument],
+    settings: InstrumentSettings,
+    *,
+    library: Any = "@py",
+    clock: Clock | None = None,
+    log: TrafficLog | None = None,
 ) -> Transport:
-    """An open link: pyserial's where the address is a port or its URL, else PyVISA's.  Raises NotConnected."""
+    """An open link: pyserial's where the address is a port or its URL, else PyVISA's.
+
+    clock: by which the pauses between messages are kept, the wall's by default.  Raises NotConnected.
+    """
     line = dict(driver.SERIAL) | settings.line
     serial_name = settings.address.upper().startswith("ASRL") and library == "@py"
     if "::" not in settings.address or serial_name:
         return SerialTransport(settings.address, timeout=settings.timeout_s, log=log, **line)
-    return VisaTransport(settings.address, library=library, timeout=settings.timeout_s, line=line, log=log)
+    options: dict[str, Any] = {"pause": line.pop("pause", 0.0), "clock": clock, "log": log}
+    return VisaTransport(settings.address, library=library, timeout=settings.timeout_s, line=line, **options)

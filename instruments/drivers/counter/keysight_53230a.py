@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from instruments.drivers.counter.reciprocal import READINGS_AT_ONCE, ReciprocalCounter
 from instruments.drivers.scpi import Setting
-from instruments.errors import InstrumentError
+from instruments.ieee488 import Form
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,15 +26,19 @@ class Keysight53230A(ReciprocalCounter):
     """
 
     MODELS: ClassVar[str] = r"532[23]0A"
+    #: Programmer's Reference, FORMat:DATA: fifteen digits, three of exponent.  Public drivers quote sixteen and two.
+    #: Both have 22 characters: an answer that lost one is neither.
+    NUMBER: ClassVar[Form] = Form(r"[+-]\d\.(\d{14}E[+-]\d{3}|\d{15}E[+-]\d{2})", "+1.00000000000000E-001")
 
     gate = Setting("SENS:FREQ:GATE:TIME", float, unit="s", low=100e-6, high=1000.0)
     coupling = Setting("INP1:COUP", str, choices=("AC", "DC"))
     impedance = Setting("INP1:IMP", float, unit="ohm", low=50.0, high=1e6)
     probe_factor = Setting("INP1:PROB", float, low=1.0, high=10.0)
     input_range = Setting("INP1:RANG", float, unit="V", low=5.0, high=50.0)
-    trigger_level = Setting("INP1:LEV1", float, unit="V", low=-5.125, high=5.125)
+    #: Resolution: data sheet, for the range of 5 V.
+    trigger_level = Setting("INP1:LEV1", float, unit="V", low=-5.125, high=5.125, resolution=2.5e-3)
     automatic_level = Setting("INP1:LEV:AUTO", bool)
-    slope = Setting("INP1:SLOP1", str, choices=("POS", "NEG"))
+    slope = Setting("INP1:SLOP1", str, choices=("POSitive", "NEGative"))
     measurement_timeout = Setting("SYST:TIM", float, unit="s", low=0.01, high=2000.0)
 
     def prepare(self, *, gate_s: float, trigger_level_v: float) -> None:
@@ -44,6 +47,7 @@ class Keysight53230A(ReciprocalCounter):
         CONFigure comes first, it resets the gate and the trigger.
         """
         self.command("CONF:FREQ (@1)")
+        self._unsent_end = ()
         self.command("SENS:FREQ:GATE:SOUR TIME")
         self.gate = gate_s
         self.coupling = "DC"
@@ -56,15 +60,14 @@ class Keysight53230A(ReciprocalCounter):
         # Without a signal the answer, "no reading", comes after this time (2000 s is the longest there is).
         self._patience = min(2 * gate_s + 1.0, 2000.0)
         self.measurement_timeout = self._patience
+        self.command("FORM ASC,15")  # another program may have left fewer digits, or binary numbers
         self._gives_up = True
 
     def readings(self, count: int) -> NDArray[np.float64]:
         """So many readings; see :class:`Counter`.  They are fetched as they come, each with its own patience."""
         self._check_count(count)
-        self.command(f"SAMP:COUN {count}")
         found: list[float] = []
-        try:
-            self.command("INIT")
+        with self._series(f"SAMP:COUN {count}", "INIT", end=("SAMP:COUN 1",)):
             while len(found) < count:
                 part = min(READINGS_AT_ONCE, count - len(found))
                 question = f"DATA:REM? {part},WAIT"
@@ -72,10 +75,4 @@ class Keysight53230A(ReciprocalCounter):
                 if answer is None:
                     break
                 found += self._split(question, answer, part)
-        except InstrumentError:
-            with contextlib.suppress(InstrumentError):  # the first error tells more
-                self._give_up()
-                self.command("SAMP:COUN 1")
-            raise
-        self.command("SAMP:COUN 1")
         return np.array(found + [np.nan] * (count - len(found)))

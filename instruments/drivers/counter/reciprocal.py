@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+import contextlib
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from instruments.drivers.scpi import ScpiInstrument, parse_reading
 from instruments.errors import BadAnswer, InstrumentError, NoAnswer, OutOfRange
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 #: Readings that are fetched with one question: an answer of 25 kB, seconds apart at most.
 READINGS_AT_ONCE = 1000
@@ -18,24 +22,35 @@ LONGEST_WAIT_S = 30 * 86400.0
 class ReciprocalCounter(ScpiInstrument):
     """What the drivers share: how long to wait for an answer, and what to do when none comes.
 
-    most: readings that the memory holds.
+    MOST: readings that the memory holds; EMPTY_IS_NONE: whether an empty answer, or an empty place in a list, means
+    that there was no reading.
     """
 
     MOST: ClassVar[int] = 1_000_000
+    EMPTY_IS_NONE: ClassVar[bool] = False
 
     #: How long the counter may work on one reading [s]; prepare() sets it.
     _patience = 3.0
     #: Whether it says so itself when there is no signal; prepare() sets it up to do so.
     _gives_up = False
+    #: The commands that end the series for which the counter is still set up; none, if it is not.
+    _unsent_end: tuple[str, ...] = ()
 
     def frequency(self) -> float | None:
         """One reading [Hz], or None; see :class:`Counter`.  Raises CommandRefused if an error was waiting."""
+        self._end_old_series()
         answer = self._ask("READ?", self._patience)
         with self.resynchronised():
-            return None if answer is None else self._parse(answer)
+            return None if answer is None else self._reading("READ?", answer)
 
-    def _parse(self, answer: str) -> float | None:
-        return parse_reading(self.transport.address, "READ?", answer)
+    def _reading(self, question: str, answer: str) -> float | None:
+        """A frequency or a time, or None.  Raises BadAnswer: neither is negative."""
+        if not answer and self.EMPTY_IS_NONE:
+            return None
+        value = parse_reading(self.transport.address, question, answer, self.NUMBER)
+        if value is not None and value < 0:
+            raise BadAnswer(self.transport.address, question, answer, f"a number from 0 on, as {self.NUMBER.example}")
+        return value
 
     def _ask(self, question: str, patience: float) -> str | None:
         """Read the error queue, then the data; None when a counter that may wait for ever never answers.
@@ -54,6 +69,36 @@ class ReciprocalCounter(ScpiInstrument):
                 raise
             return None
 
+    @contextlib.contextmanager
+    def _series(self, *commands: str, end: tuple[str, ...]) -> Iterator[None]:
+        """Set the counter up for a series with these commands, and back for single readings, whatever ends it.
+
+        After an error or an interruption the measurement is stopped, too.  If the counter cannot be reached then, or a
+        second interruption comes, that is done before the next reading.
+        """
+        self._end_old_series()
+        self._unsent_end = end
+        try:
+            for command in commands:
+                self.command(command)
+            yield
+        except BaseException:  # Ctrl-C as well
+            with contextlib.suppress(InstrumentError):  # the first error tells more
+                self._give_up()
+                self._end_series()
+            raise
+        self._end_series()
+
+    def _end_series(self) -> None:
+        for command in self._unsent_end:
+            self.command(command)
+        self._unsent_end = ()
+
+    def _end_old_series(self) -> None:
+        if self._unsent_end:
+            self._give_up()
+            self._end_series()
+
     def _give_up(self) -> None:
         """Stop a measurement that does not end, and let the link tell if it is dead."""
         self.transport.clear()
@@ -68,7 +113,6 @@ class ReciprocalCounter(ScpiInstrument):
         """The numbers of a list, NaN where there was no reading.  Raises BadAnswer if they are not so many."""
         words = answer.split(",")
         if len(words) != expected:
-            shown = answer if len(answer) < 80 else f"{answer[:80]}…"
-            raise BadAnswer(self.transport.address, question, shown, f"{expected} numbers, not {len(words)}")
-        found = (parse_reading(self.transport.address, question, word or "nan") for word in words)
+            raise BadAnswer(self.transport.address, question, answer, f"{expected} numbers, not {len(words)}")
+        found = (self._reading(question, word) for word in words)
         return [np.nan if value is None else value for value in found]

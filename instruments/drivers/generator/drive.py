@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, cast
 
-from instruments.drivers.generator import NO_LIMITS, OPEN_V, check_peak
+from instruments.drivers.generator import NO_LIMITS, OPEN_V, Limits, check_peak
 from instruments.drivers.scpi import ScpiInstrument, Setting
-from instruments.errors import BadAnswer, CommandRefused, OutOfRange
+from instruments.errors import CommandRefused, OutOfRange
 from instruments.ieee488 import INFINITY
 
 if TYPE_CHECKING:
@@ -59,8 +59,8 @@ class OutputSwitch(Setting[bool]):
 
 
 def frequency_setting(high: float) -> LimitedSetting:
-    """The frequency of the output, up to the highest of the family [Hz]."""
-    return LimitedSetting("FREQ", float, unit="Hz", low=1e-6, high=high, quantity="frequency_hz")
+    """The frequency of the output, in steps of 1 µHz, up to the highest of the family [Hz]."""
+    return LimitedSetting("FREQ", float, unit="Hz", low=1e-6, high=high, resolution=1e-6, quantity="frequency_hz")
 
 
 def amplitude_setting(low: float) -> LimitedSetting:
@@ -69,9 +69,10 @@ def amplitude_setting(low: float) -> LimitedSetting:
 
 
 def offset_setting() -> LimitedSetting:
-    """The offset of the output [V]."""
+    """The offset of the output, with four digits of 10 V [V]."""
+    low, high, resolution = -OPEN_V, OPEN_V, 1e-3
     return LimitedSetting(
-        "VOLT:OFFS", float, unit="V", low=-OPEN_V, high=OPEN_V, quantity="offset_v", partner="amplitude_vpp"
+        "VOLT:OFFS", float, "V", low, high, resolution=resolution, quantity="offset_v", partner="amplitude_vpp"
     )
 
 
@@ -88,9 +89,22 @@ class DriveGenerator(ScpiInstrument):
 
     def __init__(self, transport: Transport, *, clock: Clock | None = None) -> None:
         super().__init__(transport, clock=clock)
-        #: What the coil stands.
-        self.limits = NO_LIMITS
-        #: Whether the signal that is set is one of :meth:`prepare`.
+        self._limits = NO_LIMITS
+        #: Whether the signal that is set is one of :meth:`prepare`, under the limits as they are.
+        self.prepared_here = False
+
+    @property
+    def limits(self) -> Limits:
+        """What the coil stands.
+
+        New limits are for what comes: the signal that is set counts as prepared no longer, so the output does not go on
+        before :meth:`prepare` has set one under them.  An output that is on is left on: :meth:`off` ends it.
+        """
+        return self._limits
+
+    @limits.setter
+    def limits(self, limits: Limits) -> None:
+        self._limits = limits
         self.prepared_here = False
 
     def command(self, message: str) -> None:
@@ -147,8 +161,7 @@ class DriveGenerator(ScpiInstrument):
 
     def _is_on(self, output: str) -> bool:
         question = f"{output}?"
-        answer = self.transport.query(question).strip()
-        with self.resynchronised():
-            if answer not in {"0", "1"}:
-                raise BadAnswer(self.transport.address, question, answer, "0 or 1")
+        answer = self.transport.query(question)
+        if answer not in {"0", "1"}:
+            self.reject(question, answer, "0 or 1")
         return answer == "1"
