@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import (
@@ -16,6 +15,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from levilab.errors import LevilabError
+from levilab.files import parse_toml
 from levilab.settings import Settings, in_one_line
 
 if TYPE_CHECKING:
@@ -108,14 +108,14 @@ class BenchConfig(Settings):
 def read_bench(path: Path) -> BenchConfig:
     """The bench described in a TOML file.  Raises ConfigError."""
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        table = parse_toml(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise ConfigError(
             f"{path}: there is no such file: describe your bench in it (docs/bench.md), or try --mock"
         ) from None
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror}): a TOML file is expected") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise ConfigError(f"{path}: not readable as TOML: {error}") from error
     try:
         return BenchConfig.model_validate(table)
