@@ -1,11 +1,14 @@
-"""A file is replaced whole or not at all."""
+"""Files: read with every surprise as a ValueError, replaced whole or not at all."""
 
 from __future__ import annotations
 
 import contextlib
+import json
+import math
 import os
 import time
-from typing import TYPE_CHECKING
+import tomllib
+from typing import TYPE_CHECKING, Any
 
 from levilab.errors import LevilabError
 
@@ -17,6 +20,84 @@ class CannotWrite(LevilabError):
     """A file cannot be written (any more)."""
 
 
+#: Nobody writes tables within tables deeper than this; Python's recursion bears some hundreds.
+DEEPEST = 50
+#: Whole numbers beyond it have no float, and beyond 4300 digits Python does not even read them.
+LARGEST = 10**300
+
+
+def parse_json(text: str) -> Any:
+    """What a JSON text says.
+
+    Raises:
+        ValueError: it is not JSON, or it holds what no program of ours writes and much of Python stumbles over:
+            nesting beyond DEEPEST, a whole number beyond LARGEST, NaN, infinity, half a surrogate pair.
+    """
+    try:
+        value = json.loads(text, parse_int=_whole_number)
+    except RecursionError:
+        raise ValueError(_TOO_DEEP) from None
+    _refuse_oddities(value, finite=True)
+    return value
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """What a TOML text says.
+
+    Raises:
+        ValueError: it is not TOML, or it holds nesting beyond DEEPEST or a whole number beyond LARGEST.
+    """
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        raise
+    except RecursionError:
+        raise ValueError(_TOO_DEEP) from None
+    except ValueError:  # Python reads no more than 4300 digits
+        raise ValueError(_TOO_LARGE) from None
+    _refuse_oddities(table, finite=False)
+    return table
+
+
+_TOO_DEEP = f"it is nested more than {DEEPEST} levels deep"
+_TOO_LARGE = "a whole number in it has more than 300 digits"
+
+
+def _whole_number(digits: str) -> int:
+    if len(digits) > 301:
+        raise ValueError(_TOO_LARGE)
+    return int(digits)
+
+
+def _refuse_oddities(value: Any, *, finite: bool) -> None:
+    level, depth = [value], 0
+    while level:
+        if depth > DEEPEST:
+            raise ValueError(_TOO_DEEP)
+        for item in level:
+            if isinstance(item, str):
+                _refuse_surrogates(item)
+            elif isinstance(item, int) and abs(item) > LARGEST:
+                raise ValueError(_TOO_LARGE)
+            elif isinstance(item, float) and finite and not math.isfinite(item):
+                raise ValueError("a number in it is not finite")
+        level = [inner for item in level for inner in _parts(item)]
+        depth += 1
+
+
+def _parts(item: Any) -> list[Any]:
+    if isinstance(item, dict):
+        return [*item, *item.values()]
+    return item if isinstance(item, list) else []
+
+
+def _refuse_surrogates(text: str) -> None:
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        raise ValueError("a text in it holds half a surrogate pair") from None
+
+
 def replace_atomically(path: Path, content: str | bytes) -> None:
     """Write a file so that a reader sees the old one or the new one, whole, whatever happens meanwhile.
 
@@ -25,7 +106,8 @@ def replace_atomically(path: Path, content: str | bytes) -> None:
     data = content.encode() if isinstance(content, str) else content
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        with part.open("wb") as file:
+        part.unlink(missing_ok=True)  # of an earlier process of this number
+        with part.open("xb") as file:  # never through a link that stands there
             file.write(data)
             file.flush()
             os.fsync(file.fileno())

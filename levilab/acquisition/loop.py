@@ -69,7 +69,7 @@ def acquire(request: AcquisitionRequest, show: Show) -> Run:
     A bench that could not be opened leaves no new run, unless it was to be logged.
     """
     experiment = EXPERIMENTS[request.experiment]
-    with watching_for_interruption() as stop, _writer(request) as writer, contextlib.closing(show):
+    with watching_for_interruption() as stop, _writer(request, show) as writer, contextlib.closing(show):
         try:
             _at_the_bench(experiment, request, writer, show, stop)
             status: Status = "finished"
@@ -83,17 +83,17 @@ def acquire(request: AcquisitionRequest, show: Show) -> Run:
             with contextlib.suppress(CannotWrite):
                 writer.event(None, "failed", f"{type(error).__name__}: {error}")
                 writer.finish("failed")
-            if request.resume is None and not writer.record.instruments and not request.wire_log:
+            if not writer.record.instruments and not request.wire_log:
                 writer.discard()
             raise
         writer.finish(status)
     return Run.load(writer.folder)
 
 
-def _writer(request: AcquisitionRequest) -> RunWriter:
+def _writer(request: AcquisitionRequest, show: Show) -> RunWriter:
     if request.resume is None:
-        return RunWriter.create(request.out, _record(request))
-    return RunWriter.reopen(request.resume, note=request.note)
+        return RunWriter.create(request.out, _record(request), tell=show.message)
+    return RunWriter.reopen(request.resume, note=request.note, tell=show.message)
 
 
 def _at_the_bench(

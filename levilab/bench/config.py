@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from pydantic import (
@@ -14,6 +13,7 @@ from pydantic import (
 )
 
 from levilab.errors import LevilabError
+from levilab.files import parse_toml
 from levilab.settings import Settings, in_one_line
 
 if TYPE_CHECKING:
@@ -88,14 +88,14 @@ def read_bench(path: Path, tables: type[C]) -> C:
     tables: what the file may hold; `BenchConfig`, or one with more tables.  Raises ConfigError.
     """
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        table = parse_toml(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise ConfigError(
             f"{path}: there is no such file: describe your bench in it (docs/bench.md), or try `mock`"
         ) from None
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror}): a TOML file is expected") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise ConfigError(f"{path}: not readable as TOML: {error}") from error
     try:
         return tables.model_validate(table)

@@ -93,7 +93,7 @@ def print_runs(runs: Sequence[Listed], root: Path) -> None:
     """The list of runs, and below it what is wrong with the broken ones."""
     console = terminal()
     if not runs:
-        console.print(f"no runs in {escape(str(root))}")
+        console.print(f"no runs in {_harmless(str(root))}")
         return
     table = new_table(None, "when (UTC)", "run", "what", "status", "readings", "length", numbers=["readings", "length"])
     if with_notes := console.width >= ROOM_FOR_NOTES:
@@ -101,13 +101,18 @@ def print_runs(runs: Sequence[Listed], root: Path) -> None:
     for run in runs:
         when = (run.started_utc or "—")[:16].replace("T", " ")
         what = run.experiment + (f" {run.scene}" if run.scene else "") + (", synthetic" if run.synthetic else "")
-        what = escape(what)
-        cells = [when, escape(_below(run.path, root)), what, run.status, run.size, f"{run.length_s:.0f} s"]
-        table.add_row(*cells, *([escape(run.note)] if with_notes else []))
+        cells = [when, _below(run.path, root), what, run.status, run.size, f"{run.length_s:.0f} s"]
+        notes = [run.note] if with_notes else []
+        table.add_row(*(_harmless(text) for text in (*cells, *notes)))
     console.print(table)
     for run in runs:
         if run.problem:
-            console.print(f"[yellow]note:[/yellow] {escape(run.problem)}")
+            console.print(f"[yellow]note:[/yellow] {_harmless(run.problem)}")
+
+
+def _harmless(text: str) -> str:
+    """A text of unknown origin as it is printed: no markup, nothing that steers the terminal."""
+    return escape("".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text))
 
 
 def _below(path: str, root: Path) -> str:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from levilab.errors import DataError
+from levilab.files import parse_json
 from levilab.formats.table import read_run_readings
 from levilab.runs.traces import load_traces
 from levilab.settings import in_one_line
@@ -94,7 +95,7 @@ class Run:
     @classmethod
     def load(cls, folder: Path) -> Self:
         """Read ``run.json``.  Raises DataError when it is missing, cut off, or of another schema."""
-        record = _read_record(folder / RECORD)
+        record = read_record(folder)
         alive = record.status != "running" or _is_alive(folder)
         return cls(folder, record, record.status if alive else "interrupted")
 
@@ -117,7 +118,12 @@ class Run:
             raise DataError(
                 f"{self.folder}: ended before its first reading, there is nothing to go on with: start anew"
             )
-        elapsed = (datetime.now(UTC) - datetime.fromisoformat(self.record.time_zero_utc)).total_seconds()
+        try:
+            zero = datetime.fromisoformat(self.record.time_zero_utc)
+        except ValueError as error:
+            raise DataError(f"{self.folder / RECORD}: time_zero_utc: {error}; correct it or start anew") from error
+        zero = zero if zero.tzinfo else zero.replace(tzinfo=UTC)
+        elapsed = (datetime.now(UTC) - zero).total_seconds()
         last = float(self.readings().column("time_s")[-1]) if self.count() else 0.0
         if elapsed <= last:
             raise DataError(
@@ -129,13 +135,13 @@ class Run:
     def events(self) -> list[dict[str, Any]]:
         """The events so far, each with time_s (or None), kind and text; damaged lines are left out."""
         path = self.folder / EVENTS
-        lines = path.read_text(encoding="utf-8", errors="replace").splitlines() if path.exists() else []
+        lines = path.read_text(encoding="utf-8", errors="replace").split("\n") if path.is_file() else []
         return [event for line in lines if (event := _event(line))]
 
 
 def _event(line: str) -> dict[str, Any] | None:
     try:
-        event = json.loads(line)
+        event = parse_json(line)
     except ValueError:
         return None
     if not isinstance(event, dict) or not isinstance(event.get("text"), str):
@@ -161,17 +167,21 @@ def _is_alive(folder: Path) -> bool:
     return False
 
 
-def _read_record(path: Path) -> RunRecord:
+def read_record(folder: Path) -> RunRecord:
+    """What ``run.json`` of a folder says.  Raises DataError when it is missing, cut off, or of another schema."""
+    path = folder / RECORD
     rescue = f"its readings can still be analyzed: levilab analyze spindown {path.parent / READINGS}"
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        if path.exists() and not path.is_file():
+            raise DataError(f"{path}: is a folder, a pipe or a device; a file is expected; {rescue}")
+        data = parse_json(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror}): is {path.parent} a run folder?") from error
     except ValueError as error:
         raise DataError(f"{path}: is cut off or not JSON ({error}); {rescue}") from error
     if not isinstance(data, dict) or data.get("schema") != SCHEMA:
         seen = data.get("schema") if isinstance(data, dict) else type(data).__name__
-        raise DataError(f"{path}: schema is {seen!r}, expected {SCHEMA!r} of this version; {rescue}")
+        raise DataError(f"{path}: schema is {str(seen)[:60]!r}, expected {SCHEMA!r} of this version; {rescue}")
     try:
         return RunRecord.model_validate(data)
     except ValidationError as error:
@@ -179,14 +189,10 @@ def _read_record(path: Path) -> RunRecord:
 
 
 def find_run(name: Path, root: Path = Path("runs")) -> Path:
-    """The run folder that somebody means: a path, or the name of a run below a folder, its time left out or not."""
-    if name.exists() or name.name != str(name):
+    """The run folder that is meant: a path, or the name of a run in a folder, its time left out or not."""
+    if name.name != str(name) or name.exists() or not root.is_dir():
         return name
-    named = [
-        folder
-        for folder in root.glob(f"*{name}")
-        if folder.name.split("Z-", 1)[-1] == name.name or folder.name == name.name
-    ]
+    named = [folder for folder in root.iterdir() if name.name in {folder.name, folder.name.split("Z-", 1)[-1]}]
     return named[0] if len(named) == 1 else name
 
 

@@ -1,50 +1,83 @@
 """Writing a run folder while measuring, so that nothing is lost.
 
 ``run.json`` is replaced atomically, ``readings.csv`` and ``events.jsonl`` are flushed to the disk row by row:
-a process that is killed between two rows loses nothing that it has shown.
+a process that is killed between two rows loses nothing that it has shown. A folder that is removed under way is
+written anew, beside, from what this process holds in memory.
 """
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import hashlib
 import json
 import math
 import os
+import re
 import secrets
 import shutil
 from datetime import UTC, datetime
-from typing import IO, TYPE_CHECKING, Any, Self
+from itertools import count
+from typing import TYPE_CHECKING, Any, Self
 
 from levilab.files import CannotWrite, replace_atomically, sync_folder
 from levilab.runs import traces
-from levilab.runs.run import EVENTS, PACKAGE, READINGS, RECORD, STATES, WIRE, RunRecord, lock_of, utc_now
+from levilab.runs.run import (
+    EVENTS,
+    LOCK,
+    PACKAGE,
+    READINGS,
+    RECORD,
+    STATES,
+    WIRE,
+    RunRecord,
+    lock_of,
+    read_record,
+    utc_now,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
     from pathlib import Path
 
     from instruments.drivers.oscilloscope import Trace
     from levilab.runs.run import Run, Status
+
+#: Errors that free space would mend.
+_FULL = frozenset(getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG") if hasattr(errno, name))
 
 
 class RunWriter:
     """A run folder that is being written.  One row is one `write` of a whole line, on the disk before it is shown.
 
     Use it as a context manager: it holds the folder's lock, by which others see that the run is alive.
+
+    If ``readings.csv`` or the folder is removed, replaced or cut under way, the next reading, event or change of the
+    record notices it: all readings and events, those of a resumed run included, and the record are written into a
+    new folder beside, `folder` names that one from then on, and `tell` says so.
+
+    Attributes:
+        folder: where the run is written.
+        record: what run.json says.
+        tell: called with a sentence for the person at the bench.
     """
 
-    def __init__(self, folder: Path, record: RunRecord) -> None:
-        self.folder, self.record = folder, record
-        self._files: dict[str, IO[str]] = {}
+    def __init__(self, folder: Path, record: RunRecord, tell: Callable[[str], None] = lambda _: None) -> None:
+        self.folder, self.record, self.tell = folder, record, tell
+        self._files: dict[str, _GrowingFile] = {}
+        self._kept: dict[str, list[bytes]] = {}  # what was appended line by line, to be written anew
+        self._created = False
         self._lock = lock_of(folder)
 
     @classmethod
-    def create(cls, out: Path, record: RunRecord, table: str = READINGS) -> Self:
+    def create(
+        cls, out: Path, record: RunRecord, table: str = READINGS, *, tell: Callable[[str], None] = lambda _: None
+    ) -> Self:
         """A new folder ``<UTC>-<experiment>-<four hex digits>`` below `out`; table: its rows.  Raises CannotWrite."""
         with _told("create the run folder", out, safe=""):
-            out.mkdir(parents=True, exist_ok=True)
-            writer = cls(_new_folder(out, record.experiment), record)
+            _make_folder(out)
+            writer = cls(_new_folder(out, record.experiment), record, tell)
+            writer._created = True
             writer._lock.acquire(blocking=False)
             writer._append(table, writer._header())
             replace_atomically(writer.folder / RECORD, record.as_json())
@@ -52,20 +85,37 @@ class RunWriter:
         return writer
 
     @classmethod
-    def reopen(cls, run: Run, *, note: str = "") -> Self:
+    def reopen(cls, run: Run, *, note: str = "", tell: Callable[[str], None] = lambda _: None) -> Self:
         """Go on writing an ended run; torn last lines are cut off first, a note is added.  Raises CannotWrite."""
-        writer = cls(run.folder, run.record)
+        writer = cls(run.folder, run.record, tell)
         with _told("reopen the run", run.folder):
             try:
                 writer._lock.acquire(timeout=2)
             except TimeoutError:
                 raise CannotWrite(f"{run.folder}: another process is writing this run") from None
-            for name in (READINGS, EVENTS):
-                _cut_torn_line(run.folder / name)
-            writer._check_header()
-            notes = "; ".join(filter(None, (run.record.note, note)))
-            writer.update(status="running", ended_utc=None, note=notes)
+            try:
+                writer._take_up(run, note)
+            except BaseException:
+                writer._close()
+                raise
         return writer
+
+    def _take_up(self, run: Run, note: str) -> None:
+        """The record as it is by now, the files without torn lines."""
+        self.record = read_record(self.folder)
+        if self.record.status == "finished" != run.record.status:
+            raise CannotWrite(f"{self.folder}: is finished, another process has gone on with it meanwhile")
+        if not all("name" in channel for channel in self.record.channels):
+            raise CannotWrite(f"{self.folder / RECORD}: channels: each needs a name to be gone on with")
+        for name in (READINGS, EVENTS):
+            _refuse_special(self.folder / name)
+            _cut_torn_line(self.folder / name)
+        self._check_header()
+        for name in (READINGS, EVENTS):
+            if name not in self._files and (self.folder / name).exists():
+                self._open(name)
+        notes = "; ".join(filter(None, (self.record.note, note)))
+        self.update(status="running", ended_utc=None, note=notes)
 
     def _header(self) -> str:
         return ",".join(channel["name"] for channel in self.record.channels)
@@ -79,49 +129,78 @@ class RunWriter:
         elif first != self._header():
             raise CannotWrite(f"{path}: its header is {first!r}, run.json says {self._header()!r}: not gone on with")
 
-    def discard(self) -> None:
-        """Take a run away that never began.  Only for one without a reading."""
+    def discard(self) -> bool:
+        """Take a run away that never began.  Returns whether it is gone.
+
+        A folder that holds readings stays, and so does one that another process made.
+        """
+        gone = self._created and not self._holds_readings()
         self._close()
-        self._lock.release()
-        shutil.rmtree(self.folder, ignore_errors=True)
+        if gone:
+            shutil.rmtree(self.folder, ignore_errors=True)
+        return gone
+
+    def _holds_readings(self) -> bool:
+        """Whether there is more than a header, in memory or on the disk; what cannot be read may be readings."""
+        if self._lines_kept(READINGS) > 1:
+            return True
+        try:
+            return bool((self.folder / READINGS).read_bytes().partition(b"\n")[2].strip())
+        except FileNotFoundError:
+            return False
+        except OSError:
+            return True
+
+    def _lines_kept(self, name: str) -> int:
+        return sum(block.count(b"\n") for block in self._kept.get(name, ()))
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self._close()
-        self._lock.release()
 
     def _close(self) -> None:
-        """What is still in a buffer could not be written before and has been told: closing need not tell it again."""
+        """Close the files and release the lock.
+
+        What is still in a buffer could not be written before, and that was said: closing need not say it again.
+        """
         for file in self._files.values():
             with contextlib.suppress(OSError):
                 file.close()
         self._files.clear()
+        with contextlib.suppress(OSError):
+            self._lock.release()
 
     def update(self, **changes: Any) -> None:
-        """Change entries of run.json."""
-        record = self.record.model_copy(update=changes)
+        """Change entries of run.json.  Raises CannotWrite."""
         with _told("write run.json", self.folder):
+            self._rescue_if_lost()
+            record = self.record.model_copy(update=changes)
             replace_atomically(self.folder / RECORD, record.as_json())
         self.record = record
 
     def reading(self, row: Mapping[str, float | None]) -> None:
-        """Append a row to readings.csv.  None becomes an empty cell.  Raises CannotWrite with the row in it."""
+        """Append a row to readings.csv.  None becomes an empty cell.  Raises CannotWrite with the row in it.
+
+        When it returns, this row and all earlier ones are on the disk, in `folder`.
+        """
         line = ",".join(_cell(row.get(channel["name"])) for channel in self.record.channels)
         with _told(f"write the reading {line}", self.folder):
             self._append(READINGS, line)
+            self._rescue_if_lost()
 
     def states(self, lines: Iterable[str]) -> None:
         """Append many rows to states.csv, on the disk together.  Raises CannotWrite."""
         with _told(f"write {STATES}", self.folder, safe=""):
             for line in lines:
                 self._append(STATES, line, sync=False)
-            os.fsync(self._files[STATES].fileno())
+            self._files[STATES].sync()
 
     def trace(self, time_s: float, trace: Trace, channel: str) -> int:
         """Keep an oscilloscope's record; returns its number.  Raises CannotWrite."""
-        number = len(list((self.folder / traces.FOLDER).glob("*.npy"))) + 1
+        there = len(list((self.folder / traces.FOLDER).glob("*.npy")))
+        number = max(there, self._lines_kept(traces.INDEX)) + 1
         with _told(f"write the record {number}", self.folder):
             line = traces.save_codes(self.folder, number, time_s, trace, channel)
             self._append(traces.INDEX, line)
@@ -132,6 +211,7 @@ class RunWriter:
         event = {"utc": utc_now(), "time_s": time_s, "kind": kind, "text": text} | data
         with _told(f"write the event {text!r}", self.folder):
             self._append(EVENTS, json.dumps(event, ensure_ascii=False, allow_nan=False))
+            self._rescue_if_lost()
 
     def wire(self, address: str, direction: str, data: bytes) -> None:
         """Append bytes that went over the wire to wire.log.
@@ -154,13 +234,137 @@ class RunWriter:
             replace_atomically(self.folder / PACKAGE, _datapackage(self.folder, self.record))
 
     def _append(self, name: str, line: str, *, sync: bool = True) -> None:
+        """Append a line; with sync it is on the disk and kept in memory, too."""
         if name not in self._files:
-            self._files[name] = (self.folder / name).open("a", encoding="utf-8", newline="\n")
-        file = self._files[name]
-        file.write(line + "\n")
-        file.flush()
+            try:
+                self._open(name)
+            except FileNotFoundError:  # of the folder
+                self._rescue()
+            if name not in self._files:
+                self._open(name)
+        data = f"{line}\n".encode()
+        self._files[name].append(data)
         if sync:
-            os.fsync(file.fileno())
+            self._files[name].sync()
+            self._kept.setdefault(name, []).append(data)
+
+    def _open(self, name: str) -> None:
+        """Open a file to append to; what a resumed run holds in it is kept, too."""
+        path = self.folder / name
+        if name in {READINGS, EVENTS} and name not in self._kept and path.is_file():
+            self._kept[name] = [path.read_bytes()]
+        self._files[name] = _GrowingFile(path)
+
+    # --- a folder that is removed under way ---
+
+    def _rescue_if_lost(self) -> None:
+        """Write the run anew if what was written is no longer where it was written.  Raises OSError."""
+        kept = [file for name, file in self._files.items() if name in self._kept and name != STATES]
+        if any(file.is_lost() for file in kept):
+            self._rescue()
+        elif kept and not (self.folder / RECORD).exists():
+            replace_atomically(self.folder / RECORD, self.record.as_json())
+
+    def _rescue(self) -> None:
+        old = self.folder
+        self._close()
+        self.folder = _folder_beside(old)
+        self._lock = lock_of(self.folder)
+        self._lock.acquire(blocking=False)
+        for name, blocks in self._kept.items():
+            self._files[name] = _GrowingFile(self.folder / name)
+            self._files[name].append(b"".join(blocks))
+            self._files[name].sync()
+        _copy_others(old, self.folder, {*self._kept, RECORD, LOCK, PACKAGE})
+        self.record = self.record.model_copy(update={"rescued_from": str(old)})
+        replace_atomically(self.folder / RECORD, self.record.as_json())
+        sync_folder(self.folder.parent)
+        readings = self._lines_kept(READINGS) - 1
+        text = (
+            f"{old} was removed, replaced or cut while it was being written: all {readings} readings "
+            f"are in {self.folder} now, and the run goes on there"
+        )
+        event = {"utc": utc_now(), "time_s": None, "kind": "rescued", "text": text}
+        self._append(EVENTS, json.dumps(event, ensure_ascii=False))
+        self.tell(text)
+
+
+class _GrowingFile:
+    """A file that grows line by line, and notices when it is removed, replaced or cut.  Raises OSError."""
+
+    def __init__(self, path: Path) -> None:
+        _refuse_special(path)
+        self._path = path
+        self._file = path.open("ab")
+        self._opened = os.fstat(self._file.fileno())
+        self._size = self._opened.st_size
+        # some file systems number their files anew at each look
+        self._comparable = os.path.samestat(self._opened, path.lstat())
+
+    def append(self, data: bytes) -> None:
+        self._file.write(data)
+        self._file.flush()
+        self._size += len(data)
+
+    def sync(self) -> None:
+        os.fsync(self._file.fileno())
+
+    def close(self) -> None:
+        self._file.close()
+
+    def is_lost(self) -> bool:
+        """Whether the path no longer names this file, or not all of it.
+
+        Windows removes no file that is open.
+        """
+        try:
+            there = self._path.lstat()
+        except (FileNotFoundError, NotADirectoryError):
+            return True
+        if self._comparable and not os.path.samestat(self._opened, there):
+            return True
+        return there.st_size < self._size
+
+
+def _refuse_special(path: Path) -> None:
+    """Raise OSError for a symbolic link, which would be written through, and for a pipe, which would wait."""
+    if path.is_symlink():
+        raise OSError(errno.EINVAL, f"{path.name} is a symbolic link, which is not written through")
+    if path.exists() and not path.is_file():
+        raise OSError(errno.EINVAL, f"{path.name} is no regular file")
+
+
+def _make_folder(folder: Path) -> None:
+    """Make a folder and those above it, all of them on the disk."""
+    missing = [path for path in (folder, *folder.parents) if not path.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    for path in missing:
+        sync_folder(path.parent)
+
+
+def _folder_beside(old: Path) -> Path:
+    """A new folder whose name says that it continues another one."""
+    _make_folder(old.parent)
+    name = re.sub(r"-rescued(-\d+)?$", "", old.name)
+    for number in count(1):
+        folder = old.with_name(f"{name}-rescued" + (f"-{number}" if number > 1 else ""))
+        with contextlib.suppress(FileExistsError):
+            folder.mkdir()
+            return folder
+    raise AssertionError
+
+
+def _copy_others(old: Path, new: Path, ours: set[str]) -> None:
+    """Copy what else lies in the old folder, where there is any of it."""
+    with contextlib.suppress(OSError):
+        for path in old.iterdir():
+            if path.name in ours or path.is_symlink() or path.name.endswith(".part"):
+                continue
+            with contextlib.suppress(OSError, shutil.Error):
+                if path.is_dir():
+                    shutil.copytree(path, new / path.name, symlinks=True)
+                elif path.is_file():
+                    shutil.copy2(path, new / path.name)
 
 
 def _new_folder(out: Path, experiment: str) -> Path:
@@ -192,15 +396,21 @@ def _told(what: str, where: Path, safe: str = "all earlier readings are kept: ")
         yield
     except OSError as error:
         reason = error.strerror or str(error)
+        advice = "free space" if error.errno in _FULL else "look at the folder and its disk"
         raise CannotWrite(
-            f"could not {what} in {where} ({reason}); {safe}free space, or choose another place with `out`"
+            f"could not {what} in {where} ({reason}); {safe}{advice}, or choose another place with `out`"
         ) from error
 
 
 def _datapackage(folder: Path, record: RunRecord) -> str:
     """The Frictionless description of the folder: fields with units, and the hash of each file."""
     fields = [
-        {"name": channel["name"], "type": "number", "unit": channel["unit"], "description": channel["source"]}
+        {
+            "name": channel["name"],
+            "type": "number",
+            "unit": channel.get("unit", ""),
+            "description": channel.get("source", ""),
+        }
         for channel in record.channels
     ]
     resources: list[dict[str, Any]] = []

@@ -8,6 +8,7 @@ import tomllib
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import LevilabError
+from levilab.files import parse_toml
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -60,11 +61,13 @@ def parsed(setting: str) -> tuple[str, Any]:
 
 def _value(text: str) -> Any:
     try:
-        table = tomllib.loads(f"value = {text}")
+        table = parse_toml(f"value = {text}")
         if table.keys() == {"value"}:  # a line break in the text would begin another key
             return table["value"]
     except tomllib.TOMLDecodeError:
         pass
+    except ValueError as error:
+        raise SceneError(f"{shown(text)!r}: {error}") from None
     try:
         return float(text)  # .5 and 5. are numbers to everybody but TOML
     except ValueError:

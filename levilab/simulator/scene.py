@@ -8,7 +8,6 @@ with the key, its value and what is allowed.
 from __future__ import annotations
 
 import math
-import tomllib
 from importlib import resources
 from operator import attrgetter
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from pydantic import NonNegativeFloat, ValidationError, model_validator
 
+from levilab.files import parse_toml
 from levilab.settings import in_one_line
 from levilab.simulator.keys import SceneError, Table, as_toml, nearest, parsed, set_key, shown
 from levilab.simulator.parts import Base, Drag, Drive, Escape, Part, Start, Top, Washers
@@ -284,7 +284,7 @@ def _shipped() -> Traversable:
 def _described(file: Traversable | Path, name: str) -> Scene:
     """The scene of a file, which has the file's name if it gives itself none."""
     try:
-        table = tomllib.loads(file.read_bytes().decode("utf-8-sig"))
+        table = parse_toml(file.read_bytes().decode("utf-8-sig"))
     except FileNotFoundError:
         raise SceneError(
             f"{file}: there is no such file; scenes that ship are {', '.join(presets())}, "
@@ -292,7 +292,7 @@ def _described(file: Traversable | Path, name: str) -> Scene:
         ) from None
     except OSError as error:
         raise SceneError(f"{file}: cannot be read ({error.strerror}): a TOML file is expected") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise SceneError(f"{file}: not readable as TOML: {error}") from error
     try:
         return scene_of({"name": name} | table)

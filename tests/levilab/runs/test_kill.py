@@ -136,7 +136,7 @@ from pathlib import Path
 opened = Path.open
 def small(self, mode="r", *args, **named):
     file = opened(self, mode, *args, **named)
-    return Small(file) if self.name.endswith((".csv", ".jsonl", ".part")) and mode in ("a", "w", "wb") else file
+    return Small(file) if self.name.endswith((".csv", ".jsonl", ".part")) and mode[0] in "awx" else file
 Path.open = small
 """
 

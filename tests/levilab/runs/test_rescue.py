@@ -1,0 +1,252 @@
+"""A run folder that is removed, replaced or cut under way: what was shown is on the disk all the same."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from levilab.runs.run import Run, RunRecord
+from levilab.runs.writer import RunWriter
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+CHANNELS = [
+    {"name": "time_s", "unit": "s", "source": "clock"},
+    {"name": "spin_frequency_hz", "unit": "Hz", "source": "counter"},
+]
+posix_only = pytest.mark.skipif(os.name != "posix", reason="Windows removes no file that is open")
+
+
+def create(out: Path, told: list[str]) -> RunWriter:
+    record = RunRecord(experiment="spin", status="running", started_utc="2026-11-20T10:15:00Z", channels=CHANNELS)
+    return RunWriter.create(out, record, tell=told.append)
+
+
+def row(k: int) -> dict[str, float | None]:
+    return {"time_s": 10.0 * k, "spin_frequency_hz": 40.0 - k}
+
+
+def times(folder: Path) -> list[float]:
+    return list(Run.load(folder).readings().frame["time_s"])
+
+
+def replace_file(folder: Path) -> None:
+    """As an editor does that writes a new file and renames it."""
+    other = folder / "other"
+    other.write_bytes((folder / "readings.csv").read_bytes())
+    other.replace(folder / "readings.csv")
+
+
+def link_file(folder: Path) -> None:
+    (folder / "readings.csv").rename(folder.parent / "elsewhere.csv")
+    (folder / "readings.csv").symlink_to(folder.parent / "elsewhere.csv")
+
+
+def replace_folder(folder: Path) -> None:
+    shutil.rmtree(folder)
+    folder.mkdir()
+    (folder / "readings.csv").write_text("theirs\n", encoding="utf-8")
+
+
+LOSSES: dict[str, Callable[[Path], object]] = {
+    "the readings are removed": lambda folder: (folder / "readings.csv").unlink(),
+    "the events are removed": lambda folder: (folder / "events.jsonl").unlink(),
+    "the readings are replaced": replace_file,
+    "the readings become a link": link_file,
+    "the readings are cut": lambda folder: os.truncate(folder / "readings.csv", 30),
+    "the folder is removed": shutil.rmtree,
+    "the folder is moved": lambda folder: folder.rename(folder.parent / "moved"),
+    "the folder is replaced": replace_folder,
+    "all runs are removed": lambda folder: shutil.rmtree(folder.parent),
+}
+
+
+@posix_only
+@pytest.mark.parametrize("name", LOSSES)
+def test_a_loss_is_noticed_at_the_next_reading_and_rescued(tmp_path: Path, name: str) -> None:
+    told: list[str] = []
+    with create(tmp_path / "runs", told) as writer:
+        before = writer.folder
+        writer.event(None, "drive off", "drive off")
+        for k in range(3):
+            writer.reading(row(k))
+        LOSSES[name](before)
+        writer.reading(row(3))
+        assert times(writer.folder) == [0, 10, 20, 30]  # on the disk when it is shown
+        assert Run.load(writer.folder).status == "running"
+        writer.reading(row(4))
+        writer.finish("finished")
+    assert writer.folder == before.with_name(before.name + "-rescued")
+    run = Run.load(writer.folder)
+    assert times(writer.folder) == [0, 10, 20, 30, 40]
+    assert run.status == "finished"
+    assert [event["kind"] for event in run.events()] == ["drive off", "rescued"]
+    assert (run.record.model_extra or {})["rescued_from"] == str(before)
+    (text,) = told
+    assert str(before) in text
+    assert str(writer.folder) in text
+    assert "all 4 readings" in text
+
+
+@posix_only
+@pytest.mark.parametrize("step", ["event", "update", "finish"])
+def test_a_loss_is_noticed_by_whatever_is_written_next(tmp_path: Path, step: str) -> None:
+    steps: dict[str, Callable[[RunWriter], None]] = {
+        "event": lambda writer: writer.event(None, "fell", "the top fell"),
+        "update": lambda writer: writer.update(time_zero_utc="2026-11-20T10:16:00Z"),
+        "finish": lambda writer: writer.finish("finished"),
+    }
+    told: list[str] = []
+    with create(tmp_path, told) as writer:
+        writer.reading(row(0))
+        shutil.rmtree(writer.folder)
+        steps[step](writer)
+    assert times(writer.folder) == [0]
+    assert len(told) == 1
+
+
+@posix_only
+def test_a_run_that_is_lost_twice_is_rescued_twice(tmp_path: Path) -> None:
+    told: list[str] = []
+    with create(tmp_path, told) as writer:
+        first = writer.folder
+        for k in range(3):
+            writer.reading(row(k))
+            (writer.folder / "readings.csv").unlink()
+        writer.reading(row(3))
+    assert times(writer.folder) == [0, 10, 20, 30]
+    assert len(told) == 3
+    assert writer.folder.name == f"{first.name}-rescued-3"
+
+
+@posix_only
+def test_a_resumed_run_is_rescued_with_its_earlier_readings(tmp_path: Path) -> None:
+    with create(tmp_path, []) as writer:
+        writer.reading(row(0))
+        writer.event(0.0, "drive off", "drive off")
+    with RunWriter.reopen(Run.load(writer.folder)) as again:
+        again.reading(row(1))
+        shutil.rmtree(again.folder)
+        again.reading(row(2))
+        again.finish("finished")
+    assert times(again.folder) == [0, 10, 20]
+    assert [event["kind"] for event in Run.load(again.folder).events()] == ["drive off", "rescued"]
+
+
+@posix_only
+def test_what_else_lies_in_the_folder_is_rescued_with_it(tmp_path: Path) -> None:
+    with create(tmp_path, []) as writer:
+        writer.wire("GPIB0::1::INSTR", ">", b"*IDN?\n")
+        (writer.folder / "traces").mkdir()
+        (writer.folder / "traces" / "000001.npy").write_bytes(b"codes")
+        (writer.folder / "readings.csv").unlink()
+        writer.reading(row(0))
+        writer.wire("GPIB0::1::INSTR", "<", b"me\n")
+    assert (writer.folder / "traces" / "000001.npy").read_bytes() == b"codes"
+    assert len((writer.folder / "wire.log").read_text(encoding="utf-8").splitlines()) == 2
+
+
+@posix_only
+def test_a_record_that_is_removed_is_written_again(tmp_path: Path) -> None:
+    told: list[str] = []
+    with create(tmp_path, told) as writer:
+        (writer.folder / "run.json").unlink()
+        writer.reading(row(0))
+        assert Run.load(writer.folder).status == "running"
+    assert told == []
+
+
+def test_a_run_without_a_loss_is_not_rescued(tmp_path: Path) -> None:
+    told: list[str] = []
+    with create(tmp_path, told) as writer:
+        for k in range(5):
+            writer.reading(row(k))
+            writer.event(10.0 * k, "kept", "kept")
+        writer.finish("finished")
+    assert told == []
+    assert [path.name for path in tmp_path.iterdir()] == [writer.folder.name]
+
+
+# --- what is never discarded ---
+
+
+def test_a_run_that_never_began_is_discarded(tmp_path: Path) -> None:
+    with create(tmp_path, []) as writer:
+        assert writer.discard()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_that_holds_readings_is_not_discarded(tmp_path: Path) -> None:
+    with create(tmp_path, []) as writer:
+        writer.reading(row(0))
+        assert not writer.discard()
+    assert times(writer.folder) == [0]
+
+
+def test_a_run_is_not_discarded_if_its_file_holds_readings(tmp_path: Path) -> None:
+    with create(tmp_path, []) as writer:
+        with (writer.folder / "readings.csv").open("a", encoding="utf-8") as file:
+            file.write("0.0,40.0\n")  # another program's
+        assert not writer.discard()
+    assert times(writer.folder) == [0]
+
+
+def test_a_resumed_run_is_never_discarded(tmp_path: Path) -> None:
+    with create(tmp_path, []) as writer:
+        pass
+    with RunWriter.reopen(Run.load(writer.folder)) as again:
+        assert not again.discard()
+    assert (writer.folder / "run.json").exists()
+
+
+# --- a real process ---
+
+#: The process itself removes its run at the n-th time that it puts something on the disk.
+REMOVING = """
+import os, pathlib, shutil, sys
+sync, count = os.fsync, 0
+def removing(descriptor):
+    global count
+    sync(descriptor)
+    count += 1
+    if count == {at}:
+        (folder,) = pathlib.Path({out!r}).iterdir()
+        {act}
+os.fsync = removing
+sys.argv = ["levilab", "acquire", "spin", "--mock", "--seed", "7", "--out", {out!r}, "--json"]
+from levilab.cli.main import main
+main()
+"""
+ACTS = {
+    "folder": "shutil.rmtree(folder)",
+    "readings": "(folder / 'readings.csv').unlink()",
+    "all runs": "shutil.rmtree(folder.parent)",
+}
+
+
+@posix_only
+@pytest.mark.parametrize("act", ACTS)
+@pytest.mark.parametrize("at", [12, 20, 30])
+def test_a_process_whose_run_is_removed_loses_no_reading(tmp_path: Path, act: str, at: int) -> None:
+    out = tmp_path / "runs"
+    program = REMOVING.format(at=at, out=str(out), act=ACTS[act])
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, encoding="utf-8", check=False
+    )
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    folder = Path(result["run"])
+    assert folder.name.endswith("-rescued")
+    shown = [line.split() for line in done.stderr.splitlines() if " Hz" in line and line.lstrip()[:1].isdigit()]
+    assert len(shown) == result["readings"] > 15
+    frame = Run.load(folder).readings().frame
+    assert [f"{t:.2f}" for t in frame["time_s"]] == [words[0] for words in shown]
+    assert Run.load(folder).status == "finished"
