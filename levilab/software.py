@@ -1,10 +1,16 @@
 """The versions of what a result may depend on."""
 
+import platform
+from importlib.metadata import version
+
+#: The libraries that compute or speak to instruments.
+LIBRARIES = ("levilab", "numpy", "numba", "scipy", "pandas", "lmfit", "pyvisa", "pyvisa-py")
+
 
 def software_versions() -> dict[str, str]:
-    """Name → version, of Python, the system, and the libraries that compute or speak to instruments."""
-    import platform
-    from importlib.metadata import version
-
-    names = ("levilab", "numpy", "numba", "scipy", "pandas", "lmfit", "pyvisa", "pyvisa-py")
-    return {"python": platform.python_version(), "platform": platform.platform()} | {n: version(n) for n in names}
+    """Name → version, of Python, the system, and the libraries."""
+    return {
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        **{name: version(name) for name in LIBRARIES},
+    }

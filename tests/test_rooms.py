@@ -1,0 +1,112 @@
+"""The rooms of the house, as docs/decisions/0001-rooms.md has them; which way imports go is import-linter's."""
+
+from __future__ import annotations
+
+import ast
+from collections import Counter
+from functools import cache
+from typing import TYPE_CHECKING
+
+import pytest
+from support.paths import ROOT
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+PACKAGES = ("levilab", "instruments", "analysis", "pyvisa_levilab")
+
+#: What takes so long to load that it is imported where it is used: at least 10 ms, or not everywhere installed.
+HEAVY = {
+    "filelock", "grp", "heyoka", "jinja2", "lmfit", "matplotlib", "numba", "pandas", "pyvisa", "rich", "scipy",
+    "serial", "typst", "uncertainties",
+}  # fmt: skip
+
+
+def modules() -> Iterator[tuple[str, Path]]:
+    for package in PACKAGES:
+        for path in sorted((ROOT / package).rglob("*.py")):
+            parts = path.relative_to(ROOT).with_suffix("").parts
+            yield ".".join(parts[:-1] if parts[-1] == "__init__" else parts), path
+
+
+def imported(node: ast.AST) -> list[str]:
+    """The modules that a statement imports; of ``from a import b`` both a and a.b, whichever there is."""
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    if isinstance(node, ast.ImportFrom) and node.module:
+        return [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+    return []
+
+
+def top_level(tree: ast.Module) -> list[str]:
+    """What is loaded together with a module; ``if TYPE_CHECKING`` loads nothing."""
+    return [name for statement in tree.body for name in imported(statement)]
+
+
+@cache
+def sources() -> dict[str, ast.Module]:
+    return {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in modules()}
+
+
+@cache
+def loads_something_heavy(name: str) -> bool:
+    """Whether a package is heavy, or a module of ours loads a heavy one at its head or further down."""
+    if name.partition(".")[0] in HEAVY:
+        return True
+    seen, left = set(), [name]
+    while left:
+        here = left.pop()
+        if here in seen or here not in sources():
+            continue
+        seen.add(here)
+        for other in top_level(sources()[here]):
+            if other.partition(".")[0] in HEAVY:
+                return True
+            left.append(other)
+    return False
+
+
+def late_imports(tree: ast.Module) -> Iterator[tuple[int, list[str]]]:
+    for function in ast.walk(tree):
+        if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef):
+            for statement in ast.walk(function):
+                if names := imported(statement):
+                    yield statement.lineno, names  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("name", [name for name, _ in modules() if not name.startswith("levilab.cli")])
+def test_only_what_is_heavy_is_imported_where_it_is_used(name: str) -> None:
+    """The command line's modules import all that a command needs inside of the command: help is to be instant."""
+    late = [(line, names) for line, names in late_imports(sources()[name])]
+    assert [(line, names) for line, names in late if not any(map(loads_something_heavy, names))] == []
+
+
+def rooms(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir() if path.is_dir() and any(path.glob("*.py")))
+
+
+def files(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.glob("*.py"))
+
+
+def test_the_ground_floor_of_levilab_is_small() -> None:
+    assert len(files(ROOT / "levilab")) <= 8
+    assert len(rooms(ROOT / "levilab")) + len(files(ROOT / "levilab")) <= 20 + 1  # __main__ is no room
+
+
+def test_virtual_instruments_have_seven_rooms() -> None:
+    assert len(rooms(ROOT / "instruments/virtual")) <= 7
+    assert files(ROOT / "instruments/virtual") == ["__init__.py"]
+
+
+def test_no_folder_holds_a_family_of_files_with_one_prefix() -> None:
+    folders = {path.parent for _, path in modules()}
+    families = Counter(
+        (folder.relative_to(ROOT).as_posix(), name.partition("_")[0])
+        for folder in folders
+        for name in files(folder)
+        if "_" in name.removesuffix(".py").strip("_")
+    )
+    makers = {"lakeshore", "keysight", "rigol", "agilent", "pendulum"}  # models, which are alike by their makers
+    assert [family for family, count in families.items() if count > 2 and family[1] not in makers] == []
