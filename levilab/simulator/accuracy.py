@@ -60,9 +60,15 @@ def _relative(law: Any, spin: float) -> float:
 #: Estimated errors are about so many times the true ones: they are to bound them.
 CAUTION = 6.0
 
+#: With one ring, layer and angle more the error of a magnet's nodes falls at least by 2 to this power, where they are
+#: enough (`levilab.simulator.disc`): no estimate counts on more than that.
+NODES_ORDER = 6
+
 
 def estimate(fine: Array, twice: Array, four: Array, order: int) -> Any:
     """Estimated error of results at step h, from those at 2h and 4h; arrays of shape (…, 3), result (…).
+
+    Or of a magnet's nodes, from results with fewer and still fewer of them.
 
     From one doubling to the next the differences shrink by a factor q, and what is left of them is their sum,
     about q times the last one.  Where the order p is seen q is 2^−p; where rounding or chaos rules they do not

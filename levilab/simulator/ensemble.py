@@ -6,16 +6,17 @@ import itertools
 import math
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from levilab.errors import SimulationError
-from levilab.simulator.accuracy import estimate, longest_step
+from levilab.simulator.accuracy import NODES_ORDER, estimate, longest_step
 from levilab.simulator.escape import at_the_crossing, crossed_height, exit_speeds, within_limits
 from levilab.simulator.kernels.lanes import LANES, advance_many, numbers_of
+from levilab.simulator.kernels.loads import Disc
 from levilab.simulator.kernels.motion import LOOSE, STATE_SIZE, TIME, L, N, R, V
 from levilab.simulator.keys import SceneError
 from levilab.simulator.model import model_of
@@ -165,7 +166,8 @@ class _Top:
 
     @classmethod
     def of(cls, scene: Scene) -> _Top:
-        model, start = model_of(scene), start_of(scene)
+        start = start_of(scene)
+        model = model_of(scene, start[R])
         problem = Problem(scene, model, start, scheme_for(None, model))
         kinked = model.drive is not None and (scene.drive.waveform != "sine" or scene.drive.off_s is not None)
         return cls(problem, longest_step(scene, model, start, problem.scheme), kinked)
@@ -248,6 +250,10 @@ def _advance(
         four = _coarse(some, lasted, lengths[1]) if np.any(room) else twice
         for error, columns in ((ends.position_error, R), (ends.axis_error, N)):
             error[part] = estimate(states[:, columns], twice[:, columns], four[:, columns], problem.scheme.order)
+        if isinstance(problem.model.magnet, Disc):
+            fewer, fewest = (_coarse(_with_nodes(some, -less), lasted, lengths[0]) for less in (1, 2))
+            for error, columns in ((ends.position_error, R), (ends.axis_error, N)):
+                error[part] += estimate(twice[:, columns], fewer[:, columns], fewest[:, columns], NODES_ORDER)
     late = np.flatnonzero(~survived)
     if late.size:
         if not some[0].kinked:
@@ -257,6 +263,11 @@ def _advance(
             )
         _add_uncertain_moment([some[i] for i in late], states[late], np.array(part)[late], ends)
     ends.states[part], ends.survived[part] = states, survived
+
+
+def _with_nodes(some: list[_Top], more: int) -> list[_Top]:
+    """The same tops with so many more rings, layers and angles in their magnets."""
+    return [replace(one, problem=one.problem.with_nodes(more)) for one in some]
 
 
 def _add_uncertain_moment(some: list[_Top], states: Array, where: NDArray[np.intp], ends: _Ends) -> None:

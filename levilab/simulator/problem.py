@@ -16,6 +16,7 @@ from levilab.simulator.kernels.braking import Flowing, LooseFlowing
 from levilab.simulator.kernels.loads import Kinked
 from levilab.simulator.kernels.motion import STATE_SIZE, TIME, R
 from levilab.simulator.kernels.splitting import advance
+from levilab.simulator.model import model_of
 from levilab.simulator.schemes import SCHEMES, Scheme
 from levilab.simulator.stops import every_step
 
@@ -53,6 +54,10 @@ class Problem:
     def escape(self) -> tuple[float, float]:
         """Radius and height [m] outside of which the top counts as fallen."""
         return self.scene.escape.radius_m, self.scene.escape.height_m
+
+    def with_nodes(self, more: int) -> Problem:
+        """The same with so many more rings, layers and angles in a magnet of finite size; fewer where negative."""
+        return replace(self, model=model_of(self.scene, self.start[R], more))
 
     def advanced(self, start: Array, stops: Stops, escape: tuple[float, float]) -> tuple[Array, bool]:
         """The states at the stops that were reached, shape (n, 18), and whether that is all of them."""
