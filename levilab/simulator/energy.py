@@ -9,10 +9,7 @@ import numpy as np
 from levilab.simulator.kernels.fields import flux_density
 from levilab.simulator.kernels.loads import Aligned, Disc
 from levilab.simulator.kernels.motion import ARM, LOOSE, L, Model, N, R, V
-from levilab.simulator.model import (
-    Array,
-    gravity,
-)
+from levilab.simulator.model import Array, gravity
 
 if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
