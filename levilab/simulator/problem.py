@@ -121,6 +121,17 @@ def end_at(problem: Problem, stops: Stops) -> Array:
     return state
 
 
+def at_every_step(problem: Problem, stops: Stops) -> Array:
+    """The states after each step, shape (n, 18), with no escape; up to where the numbers leave their range."""
+    states = [problem.start[None]]
+    for first, last in stops.pieces(STEPS_IN_A_CALL):
+        some, through = problem.advanced(states[-1][-1], every_step(stops.part(first, last)), NOWHERE)
+        states.append(some[1:])
+        if not through:
+            break
+    return np.concatenate(states)
+
+
 def _escape(problem: Problem, state: Array, interval: Stops) -> tuple[Array, Event | None]:
     """The escape within an interval, step by step.
 

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from levilab.errors import SimulationError
-from levilab.simulator.accuracy import NODES_ORDER, estimate, longest_step
-from levilab.simulator.energy import energy
+from levilab.simulator.accuracy import NODES_ORDER, comes_near_zero, estimate, has_kink, longest_step
+from levilab.simulator.energy import energy, spins_of
 from levilab.simulator.escape import exit_speed, locate_zero, margins
 from levilab.simulator.kernels.loads import Disc
 from levilab.simulator.kernels.motion import CLOCK, TIME, L, N, R, V
 from levilab.simulator.model import model_of
-from levilab.simulator.problem import Problem, end_at, mover, scheme_for, travelled
+from levilab.simulator.problem import Problem, at_every_step, end_at, mover, scheme_for, travelled
 from levilab.simulator.spin import DECAYS, since_infinity
 from levilab.simulator.start import start_of
 from levilab.simulator.stops import every_step, kinks, stops_between
@@ -159,7 +159,8 @@ def _errors(problem: Problem, run: Run, step: float) -> tuple[Array, Array]:
     # rounding: a random walk of half a unit in the last place, twice for each stage
     floor = 2.2e-16 * math.sqrt(2 * run.steps * problem.scheme.stages)
     rounding = floor * np.array([np.linalg.norm(end[R]), 1.0])
-    of_steps = rounding + [estimate(end[part], twice[part], four[part], problem.scheme.order) for part in (R, N)]
+    order = None if _crosses_kink(problem, run, length) else problem.scheme.order
+    of_steps = rounding + [estimate(end[part], twice[part], four[part], order) for part in (R, N)]
     of_nodes = np.zeros(2)
     if isinstance(problem.model.magnet, Disc):
         fewer, fewest = (_with_steps(problem.with_nodes(-less), end[TIME], length) for less in (1, 2))
@@ -171,6 +172,21 @@ def _errors(problem: Problem, run: Run, step: float) -> tuple[Array, Array]:
         of_steps, of_nodes = of_steps + of_steps[0] * late, of_nodes + of_nodes[0] * late
     finite = np.all(np.isfinite(of_steps + of_nodes))
     return (of_steps, of_nodes) if finite else (np.full(2, math.inf), np.zeros(2))
+
+
+#: States at most so far apart [s] show whether a spin passes zero between them.
+_CLOSE_S = 0.0101
+
+
+def _crosses_kink(problem: Problem, run: Run, step: float) -> bool:
+    """Whether the spin, or that of loose washers, passes zero under a drag that is not smooth there."""
+    if not has_kink(problem.model.drag):
+        return False
+    states = run.states
+    if np.abs(np.diff(states[:, TIME])).max() > _CLOSE_S:
+        until = states[-1, TIME]
+        states = at_every_step(problem, stops_between(problem.start[TIME], until, step, problem.scene.drive))
+    return bool(np.any(comes_near_zero(spins_of(problem.scene, states))))
 
 
 def _others(problem: Problem, until: float, step: float) -> tuple[Array, Array, float]:
