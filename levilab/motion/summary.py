@@ -160,8 +160,13 @@ def _cannot_float(scene: Scene) -> list[str]:
 
 
 def _not_reached(accuracy: Accuracy) -> str:
-    said = f"the tolerance of {accuracy.tolerance:g} was not reached, and shorter steps do not help"
     worst = max(accuracy.position, accuracy.axis)
+    if accuracy.nodes > worst / 2:
+        return (
+            f"the tolerance of {accuracy.tolerance:g} was not reached: the magnet came so near to the base that the "
+            f"nodes it is averaged over leave an error of {accuracy.nodes:.1g}; end at a greater escape.height_m"
+        )
+    said = f"the tolerance of {accuracy.tolerance:g} was not reached, and shorter steps do not help"
     if worst < SMALL:
         return f"{said}: what rounding leaves, magnified by the motion, is {worst:.1g}"
     return (

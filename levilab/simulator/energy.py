@@ -9,10 +9,7 @@ import numpy as np
 from levilab.simulator.kernels.fields import flux_density
 from levilab.simulator.kernels.loads import Aligned, Disc
 from levilab.simulator.kernels.motion import ARM, LOOSE, L, Model, N, R, V
-from levilab.simulator.model import (
-    Array,
-    gravity,
-)
+from levilab.simulator.model import Array, gravity
 
 if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
@@ -57,3 +54,10 @@ def spin_of(scene: Scene, states: Array) -> Array:
     along = np.einsum("ij,ij->i", s[:, L], s[:, N])
     washers = scene.washers.inertia_kg_m2
     return np.asarray((along - s[:, LOOSE] * (washers > 0)) / (scene.top.inertia_axial_kg_m2 - washers))
+
+
+def spins_of(scene: Scene, states: Array) -> Array:
+    """ω₃ of the top, or of its core, and that of loose washers, shape (n, 2) [rad/s]; both the same where none are."""
+    s, spins = np.atleast_2d(states), spin_of(scene, states)
+    washers = scene.washers.inertia_kg_m2
+    return np.column_stack([spins, s[:, LOOSE] / washers if washers else spins])

@@ -6,16 +6,18 @@ import itertools
 import math
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from levilab.errors import SimulationError
-from levilab.simulator.accuracy import estimate, longest_step
+from levilab.simulator.accuracy import NODES_ORDER, comes_near_zero, estimate, has_kink, longest_step
+from levilab.simulator.energy import spins_of
 from levilab.simulator.escape import at_the_crossing, crossed_height, exit_speeds, within_limits
 from levilab.simulator.kernels.lanes import LANES, advance_many, numbers_of
+from levilab.simulator.kernels.loads import Disc
 from levilab.simulator.kernels.motion import LOOSE, STATE_SIZE, TIME, L, N, R, V
 from levilab.simulator.keys import SceneError
 from levilab.simulator.model import model_of
@@ -37,6 +39,8 @@ Counts = NDArray[np.int64]
 PILOTS = 6
 #: Motion [s] that a step is chosen on; errors grow with the time, and the tolerance is shared out accordingly.
 PILOT_DURATION = 3.0
+#: A spin below this [rad/s] may be turned through zero by the field; a top that floats is never as slow.
+SLOW_RAD_S = 2 * math.pi * 5.0
 
 
 @dataclass(frozen=True)
@@ -165,7 +169,8 @@ class _Top:
 
     @classmethod
     def of(cls, scene: Scene) -> _Top:
-        model, start = model_of(scene), start_of(scene)
+        start = start_of(scene)
+        model = model_of(scene, start[R])
         problem = Problem(scene, model, start, scheme_for(None, model))
         kinked = model.drive is not None and (scene.drive.waveform != "sine" or scene.drive.off_s is not None)
         return cls(problem, longest_step(scene, model, start, problem.scheme), kinked)
@@ -240,14 +245,7 @@ def _advance(
         states, taken = _together(some, starts, duration / counts, counts, problem.escape)
         survived = (taken == counts) & within_limits(states, problem.escape)
     if errors:
-        lasted = states[:, TIME]
-        # where a fall or a kink of the drive leaves no room for longer steps, half of them tell as much
-        room = (lasted > ROOM * steps) & ~np.array([one.kinked for one in some])
-        lengths = [np.where(room, times * steps, np.minimum(steps, lasted) / 2) for times in (2, 4)]
-        twice = _coarse(some, lasted, lengths[0])
-        four = _coarse(some, lasted, lengths[1]) if np.any(room) else twice
-        for error, columns in ((ends.position_error, R), (ends.axis_error, N)):
-            error[part] = estimate(states[:, columns], twice[:, columns], four[:, columns], problem.scheme.order)
+        ends.position_error[part], ends.axis_error[part] = _estimates(some, states, steps)
     late = np.flatnonzero(~survived)
     if late.size:
         if not some[0].kinked:
@@ -257,6 +255,44 @@ def _advance(
             )
         _add_uncertain_moment([some[i] for i in late], states[late], np.array(part)[late], ends)
     ends.states[part], ends.survived[part] = states, survived
+
+
+def _estimates(some: list[_Top], states: Array, steps: Array) -> tuple[Array, Array]:
+    """Estimated errors of places [m] and axes [rad] at the ends, shape (n,) each."""
+    problem, lasted = some[0].problem, states[:, TIME]
+    # where a fall or a kink of the drive leaves no room for longer steps, half of them tell as much
+    room = (lasted > ROOM * steps) & ~np.array([one.kinked for one in some])
+    lengths = [np.where(room, times * steps, np.minimum(steps, lasted) / 2) for times in (2, 4)]
+    twice = _coarse(some, lasted, lengths[0])
+    four = _coarse(some, lasted, lengths[1]) if np.any(room) else twice
+    found = [estimate(states[:, part], twice[:, part], four[:, part], problem.scheme.order) for part in (R, N)]
+    if has_kink(problem.model.drag):
+        lost = _may_have_stopped(some, states)
+        for error, part in zip(found, (R, N), strict=True):
+            error[lost] = estimate(states[lost][:, part], twice[lost][:, part], four[lost][:, part], None)
+    if isinstance(problem.model.magnet, Disc):
+        fewer, fewest = (_coarse(_with_nodes(some, -less), lasted, lengths[0]) for less in (1, 2))
+        of_nodes = [estimate(twice[:, part], fewer[:, part], fewest[:, part], NODES_ORDER) for part in (R, N)]
+        found = [a + b for a, b in zip(found, of_nodes, strict=True)]
+    return found[0], found[1]
+
+
+def _may_have_stopped(some: list[_Top], states: Array) -> NDArray[np.bool_]:
+    """Whether the spin of each top, or that of its washers, may have passed zero on the way to its end.
+
+    Of the way nothing is known: spins count that are slow at one of its ends, or that have changed by half.
+    """
+    ways = [
+        spins_of(one.problem.scene, np.array([one.problem.start, state]))
+        for one, state in zip(some, states, strict=True)
+    ]
+    spins = np.stack(ways, axis=1)
+    return np.asarray(np.any(comes_near_zero(spins) | (np.abs(spins).min(axis=0) < SLOW_RAD_S), axis=-1))
+
+
+def _with_nodes(some: list[_Top], more: int) -> list[_Top]:
+    """The same tops with so many more rings, layers and angles in their magnets."""
+    return [replace(one, problem=one.problem.with_nodes(more)) for one in some]
 
 
 def _add_uncertain_moment(some: list[_Top], states: Array, where: NDArray[np.intp], ends: _Ends) -> None:

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis import stability
+from levilab.simulator.disc import nodes_of, rule_for
 from levilab.simulator.kernels.fields import flux_density, flux_gradient, on_axis
 from levilab.simulator.keys import SceneError
-from levilab.simulator.model import base_field, disc_nodes
+from levilab.simulator.model import base_field
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -62,6 +63,17 @@ def symmetric(scene: Scene) -> stability.Symmetric:
     )
 
 
+#: Nodes of a magnet are chosen for a height of 2 inner radii, below the upper window: there, and in the lower window
+#: too, they move edges by 1e-8 at most, as the second differences below do.
+_HEIGHT_FOR_NODES = 2.0
+
+
+def _nodes(scene: Scene, angles: int) -> Array:
+    """The nodes of the scene's magnet, with so many angles."""
+    top, distance = scene.top, math.hypot(1, _HEIGHT_FOR_NODES) * scene.base.inner_radius_m
+    return nodes_of(top, rule_for(top.magnet_radius_m, top.magnet_height_m, distance)._replace(angles=angles))
+
+
 #: Steps for second differences [m, rad]: their error is 1e-7 of the stiffness, rounding 1e-8.
 _DX, _DTHETA = 1e-4, 1e-3
 
@@ -69,7 +81,7 @@ _DX, _DTHETA = 1e-4, 1e-3
 def _disc_stiffnesses(scene: Scene) -> Callable[[Array], Array]:
     """The stiffnesses of a magnet of finite size, from its energy when it is moved and tilted a little."""
     field = base_field(scene)
-    nodes = disc_nodes(scene.top.magnet_radius_m, scene.top.magnet_height_m)
+    nodes = _nodes(scene, angles=4)  # to the second order in x and θ no fourth harmonic of the angle is felt
     moment = scene.top.moment_a_m2 * scene.top.moment_tilt[1]
 
     def energy(heights: Array, x: float, theta: float) -> Array:
@@ -98,7 +110,7 @@ def axial_field(scene: Scene) -> Callable[[Array], Array]:
     field = base_field(scene)
     if scene.top.magnet == "point":
         return lambda z: on_axis(field, z)
-    nodes = disc_nodes(scene.top.magnet_radius_m, scene.top.magnet_height_m)
+    nodes = _nodes(scene, angles=1)  # on the axis all angles are the same
     step = 1e-4  # for B″: differences of the gradient, good to 1e-9 of it over a field's length of some cm
 
     def averaged(z: Array) -> Array:

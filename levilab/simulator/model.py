@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from levilab.simulator.disc import distance_to, nodes_of, rule_for
 from levilab.simulator.kernels import braking
 from levilab.simulator.kernels.fields import field_of
 from levilab.simulator.kernels.loads import Aligned, Disc, Kinked, Leaning, Sine, Tilted, Upright
@@ -19,8 +20,13 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-def model_of(scene: Scene) -> Model:
-    """The numbers of a scene, typed by what it models."""
+def model_of(scene: Scene, place: Array | None = None, more_nodes: int = 0) -> Model:
+    """The numbers of a scene, typed by what it models.
+
+    place: where the motion begins, shape (3,) [m], which a magnet of finite size takes its number of nodes from; the
+    scene's own position if none is given.  more_nodes: rings, layers and angles beyond that number, negative for fewer,
+    to tell their error from.
+    """
     top = scene.top
     return Model(
         field=base_field(scene, times=_moment(scene)),
@@ -30,7 +36,7 @@ def model_of(scene: Scene) -> Model:
             top.inertia_axial_kg_m2,
             Upright(scene.gravity_m_s2) if scene.base.tilt_rad == 0 else Leaning(*gravity(scene)),
         ),
-        magnet=_magnet(scene),
+        magnet=_magnet(scene, np.array(scene.start.position_m) if place is None else place, more_nodes),
         turning=_turning(scene),
         drag=_drag(scene),
         drive=_drive(scene),
@@ -62,31 +68,13 @@ def has_attitude(scene: Scene) -> bool:
     return bool(scene.top.moment_tilt[0] != 0 or scene.top.magnet == "disc" or scene.washers.inertia_kg_m2 > 0)
 
 
-def _magnet(scene: Scene) -> Any:
+def _magnet(scene: Scene, place: Array, more_nodes: int) -> Any:
     top = scene.top
     transverse, axial = top.moment_tilt
     if top.magnet == "disc":
-        return Disc(axial, transverse, disc_nodes(top.magnet_radius_m, top.magnet_height_m))
+        rule = rule_for(top.magnet_radius_m, top.magnet_height_m, distance_to(scene.base, place))
+        return Disc(axial, transverse, nodes_of(top, rule.with_more(more_nodes)))
     return Tilted(axial, transverse) if has_attitude(scene) else Aligned()
-
-
-def disc_nodes(radius: float, height: float) -> Array:
-    """A quadrature over a disc's volume, shape (36, 4): place along e₁, e₂, axis [m], and weight.
-
-    Gauss–Legendre in r² (3 rings) and along the axis (2 layers), 6 equal angles.  For the field of a ring that
-    is five radii away the average is good to 1e-7; see the tests.
-    """
-    x, wx = np.polynomial.legendre.leggauss(3)
-    z, wz = np.polynomial.legendre.leggauss(2)
-    rings, angles = radius * np.sqrt((x + 1) / 2), 2 * np.pi * np.arange(6) / 6
-    return np.array(
-        [
-            [ring * math.cos(angle), ring * math.sin(angle), layer * height / 2, u * w / 24]
-            for ring, u in zip(rings, wx, strict=True)
-            for angle in angles
-            for layer, w in zip(z, wz, strict=True)
-        ]
-    )
 
 
 def _turning(scene: Scene) -> Any:
@@ -139,9 +127,3 @@ def _drive(scene: Scene) -> Any:
     if drive.waveform == "sine":
         return Sine((x, y, z), drive.frequency_hz, drive.phase_rad / (2 * math.pi))
     return Kinked((x, y, z))
-
-
-# --- the start ---
-
-
-# --- what stays constant ---

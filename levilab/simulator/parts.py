@@ -173,8 +173,9 @@ class Drive(Part):
 class Start(Part):
     """How the motion begins: IC1 of the thesis.  place "equilibrium": at rest where the top floats.
 
-    precession "thesis": φ̇ = ψ̇ = 2π spin_hz/(1 + cos tilt); "steady": the slow precession without nutation;
-    "none": the axis starts at rest.  spin_hz: turns about the axis per second, ω₃/2π.
+    precession "thesis": φ̇ = ψ̇ = 2π spin_hz/(1 + cos tilt); "steady": the slow precession without nutation, or, below
+    about 21.7 Hz, where there is none, the rate nearest to one; "none": the axis starts at rest.  spin_hz: turns about
+    the axis per second, ω₃/2π.
     """
 
     place: Literal["given", "equilibrium"] = "given"

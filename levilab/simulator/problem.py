@@ -16,6 +16,7 @@ from levilab.simulator.kernels.braking import Flowing, LooseFlowing
 from levilab.simulator.kernels.loads import Kinked
 from levilab.simulator.kernels.motion import STATE_SIZE, TIME, R
 from levilab.simulator.kernels.splitting import advance
+from levilab.simulator.model import model_of
 from levilab.simulator.schemes import SCHEMES, Scheme
 from levilab.simulator.stops import every_step
 
@@ -53,6 +54,10 @@ class Problem:
     def escape(self) -> tuple[float, float]:
         """Radius and height [m] outside of which the top counts as fallen."""
         return self.scene.escape.radius_m, self.scene.escape.height_m
+
+    def with_nodes(self, more: int) -> Problem:
+        """The same with so many more rings, layers and angles in a magnet of finite size; fewer where negative."""
+        return replace(self, model=model_of(self.scene, self.start[R], more))
 
     def advanced(self, start: Array, stops: Stops, escape: tuple[float, float]) -> tuple[Array, bool]:
         """The states at the stops that were reached, shape (n, 18), and whether that is all of them."""
@@ -114,6 +119,17 @@ def end_at(problem: Problem, stops: Stops) -> Array:
             return np.full_like(state, math.nan)
         state = states[-1]
     return state
+
+
+def at_every_step(problem: Problem, stops: Stops) -> Array:
+    """The states after each step, shape (n, 18), with no escape; up to where the numbers leave their range."""
+    states = [problem.start[None]]
+    for first, last in stops.pieces(STEPS_IN_A_CALL):
+        some, through = problem.advanced(states[-1][-1], every_step(stops.part(first, last)), NOWHERE)
+        states.append(some[1:])
+        if not through:
+            break
+    return np.concatenate(states)
 
 
 def _escape(problem: Problem, state: Array, interval: Stops) -> tuple[Array, Event | None]:

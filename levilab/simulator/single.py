@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from levilab.errors import SimulationError
-from levilab.simulator.accuracy import estimate, longest_step
-from levilab.simulator.energy import energy
+from levilab.simulator.accuracy import NODES_ORDER, comes_near_zero, estimate, has_kink, longest_step
+from levilab.simulator.energy import energy, spins_of
 from levilab.simulator.escape import exit_speed, locate_zero, margins
+from levilab.simulator.kernels.loads import Disc
 from levilab.simulator.kernels.motion import CLOCK, TIME, L, N, R, V
 from levilab.simulator.model import model_of
-from levilab.simulator.problem import Problem, end_at, mover, scheme_for, travelled
+from levilab.simulator.problem import Problem, at_every_step, end_at, mover, scheme_for, travelled
 from levilab.simulator.spin import DECAYS, since_infinity
 from levilab.simulator.start import start_of
 from levilab.simulator.stops import every_step, kinks, stops_between
@@ -99,7 +100,6 @@ def simulate(
                 "take observed = motion"
             )
         return spin_alone(scene, duration, tolerance, rate)
-    model = model_of(scene)
     state = start_of(scene) if start is None else np.array(start, dtype=np.float64)
     if not np.all(np.isfinite(state)):
         raise SimulationError("the start has a value that is no number: 18 finite numbers are expected")
@@ -108,6 +108,7 @@ def simulate(
             f"escape.height_m = {scene.escape.height_m}: the top starts at {state[R][2]:.4g} m, outside of the "
             "limits of the escape, where it would be lost before it began"
         )
+    model = model_of(scene, state[R])
     problem = Problem(scene, model, state, scheme_for(scheme, model))
     wanted = _Wanted(duration, rate, events, progress)
     run, accuracy = _to_tolerance(problem, wanted, tolerance, step)
@@ -128,41 +129,68 @@ def _to_tolerance(problem: Problem, wanted: _Wanted, tolerance: float, step: flo
     longest = longest_step(problem.scene, problem.model, problem.start, problem.scheme)
     h = step or min(longest / 2, abs(wanted.duration) / 2)
     best: tuple[Run, Accuracy] | None = None
-    in_vain = 0
+    smallest, in_vain = math.inf, 0
     while True:
         run = _run(problem, wanted, h)
-        position, axis = _errors(problem, run, h)
-        accuracy = Accuracy(position, axis, tolerance, problem.scheme.name, h, run.steps)
-        worst = max(position, axis)
-        if best is None or worst <= 0.5 * max(best[1].position, best[1].axis):
-            best, in_vain = (run, accuracy), 0
+        of_steps, of_nodes = _errors(problem, run, h)
+        position, axis = (float(error) for error in of_steps + of_nodes)
+        accuracy = Accuracy(position, axis, tolerance, problem.scheme.name, h, run.steps, float(max(of_nodes)))
+        worst = float(max(of_steps))
+        if best is None or worst <= 0.5 * smallest:
+            best, smallest, in_vain = (run, accuracy), worst, 0
         else:
             in_vain += 1
         if accuracy.reached:
+            return run, accuracy
+        if max(of_steps) <= tolerance / 2:  # the rest is the nodes', of a magnet that has come near the base
             return run, accuracy
         if step or in_vain == MOST_IN_VAIN or h < longest * SMALLEST:
             return best
         h *= min(max(0.9 * (tolerance / worst) ** (1 / problem.scheme.order), 0.1), 0.7)
 
 
-def _errors(problem: Problem, run: Run, step: float) -> tuple[float, float]:
-    """Estimated errors of the last state, place [m] and axis [rad]: from the same motion with longer steps."""
+def _errors(problem: Problem, run: Run, step: float) -> tuple[Array, Array]:
+    """Estimated errors of the last state that the steps make, and that a magnet's nodes make; place [m] and axis [rad].
+
+    From the same motion with longer steps, and with fewer nodes in a magnet of finite size.
+    """
     end = run.states[-1]
-    twice, four = _others(problem, end[TIME], step)
+    twice, four, length = _others(problem, end[TIME], step)
     # rounding: a random walk of half a unit in the last place, twice for each stage
     floor = 2.2e-16 * math.sqrt(2 * run.steps * problem.scheme.stages)
-    position = estimate(end[R], twice[R], four[R], problem.scheme.order)
-    position += floor * float(np.linalg.norm(end[R]))
-    axis = floor + estimate(end[N], twice[N], four[N], problem.scheme.order)
+    rounding = floor * np.array([np.linalg.norm(end[R]), 1.0])
+    order = None if _crosses_kink(problem, run, length) else problem.scheme.order
+    of_steps = rounding + [estimate(end[part], twice[part], four[part], order) for part in (R, N)]
+    of_nodes = np.zeros(2)
+    if isinstance(problem.model.magnet, Disc):
+        fewer, fewest = (_with_steps(problem.with_nodes(-less), end[TIME], length) for less in (1, 2))
+        of_nodes += [estimate(twice[part], fewer[part], fewest[part], NODES_ORDER) for part in (R, N)]
     if run.fell is not None:  # the moment of the fall is uncertain, too: the motion across the limit turns it to time
-        late = position / exit_speed(end, run.fell.name)
-        position += late * float(np.linalg.norm(end[V]))
-        axis += late * float(np.linalg.norm(np.cross(end[L], end[N]))) * problem.model.body.inverse_transverse
-    return (position, axis) if math.isfinite(position + axis) else (math.inf, math.inf)
+        speed = exit_speed(end, run.fell.name)
+        turning = float(np.linalg.norm(np.cross(end[L], end[N]))) * problem.model.body.inverse_transverse
+        late = np.array([np.linalg.norm(end[V]), turning]) / speed
+        of_steps, of_nodes = of_steps + of_steps[0] * late, of_nodes + of_nodes[0] * late
+    finite = np.all(np.isfinite(of_steps + of_nodes))
+    return (of_steps, of_nodes) if finite else (np.full(2, math.inf), np.zeros(2))
 
 
-def _others(problem: Problem, until: float, step: float) -> tuple[Array, Array]:
-    """The state at a time with steps twice and four times as long, to tell the error from.
+#: States at most so far apart [s] show whether a spin passes zero between them.
+_CLOSE_S = 0.0101
+
+
+def _crosses_kink(problem: Problem, run: Run, step: float) -> bool:
+    """Whether the spin, or that of loose washers, passes zero under a drag that is not smooth there."""
+    if not has_kink(problem.model.drag):
+        return False
+    states = run.states
+    if np.abs(np.diff(states[:, TIME])).max() > _CLOSE_S:
+        until = states[-1, TIME]
+        states = at_every_step(problem, stops_between(problem.start[TIME], until, step, problem.scene.drive))
+    return bool(np.any(comes_near_zero(spins_of(problem.scene, states))))
+
+
+def _others(problem: Problem, until: float, step: float) -> tuple[Array, Array, float]:
+    """The state at a time with steps twice and four times as long, to tell the error from, and the former length [s].
 
     Where there is no room for them, because a fall or the next kink of the drive comes first, with half the steps.
     """
@@ -170,9 +198,10 @@ def _others(problem: Problem, until: float, step: float) -> tuple[Array, Array]:
     lasted = abs(until - begin)
     pieces = 1 + kinks(problem.scene.drive, min(begin, until), max(begin, until)).size
     if lasted / pieces > ROOM * step:
-        return _with_steps(problem, until, 2 * step), _with_steps(problem, until, 4 * step)
-    half = _with_steps(problem, until, min(step, lasted) / 2)
-    return half, half
+        return _with_steps(problem, until, 2 * step), _with_steps(problem, until, 4 * step), 2 * step
+    length = min(step, lasted) / 2
+    half = _with_steps(problem, until, length)
+    return half, half, length
 
 
 def _with_steps(problem: Problem, until: float, step: float) -> Array:

@@ -10,10 +10,7 @@ import numpy as np
 from levilab.simulator.equilibrium import floating_height
 from levilab.simulator.kernels.fields import flux_density
 from levilab.simulator.kernels.motion import ARM, CLOCK, LOOSE, STATE_SIZE, TIME, L, N, R, V
-from levilab.simulator.model import (
-    Array,
-    base_field,
-)
+from levilab.simulator.model import Array, base_field
 
 if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
@@ -51,13 +48,16 @@ def _precession(scene: Scene, spin: float, place: Array) -> float:
 def steady_precession(scene: Scene, spin: float, place: Array) -> float:
     """The slow root of I₁ cosθ φ̇² − I₃ω₃ φ̇ + P = 0 [rad/s], P = −μB_z: precession without nutation.
 
-    Goldstein, Classical Mechanics, § 5.7, with the torque of the field in place of the weight's.  A top too
-    slow for a steady precession starts at the rate nearest to one.
+    Goldstein, Classical Mechanics, § 5.7, with the torque of the field in place of the weight's.  A top too slow for a
+    steady precession, (I₃ω₃)² < 4 I₁ cosθ P, starts at the rate I₃ω₃/(2 I₁ cosθ), at which least torque is missing.
     """
     top = scene.top
     bz = float(flux_density(base_field(scene), place[None, :])[0, 2])
     restoring = -top.moment_a_m2 * top.moment_tilt[1] * bz
     a = top.inertia_transverse_kg_m2 * math.cos(scene.start.tilt_rad)
     b = top.inertia_axial_kg_m2 * spin
-    root = math.copysign(math.sqrt(max(b * b - 4 * a * restoring, 0.0)), b)
+    square = b * b - 4 * a * restoring
+    if square < 0:
+        return b / (2 * a)
+    root = math.copysign(math.sqrt(square), b)
     return 2 * restoring / (b + root) if b + root else 0.0

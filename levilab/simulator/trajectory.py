@@ -31,8 +31,9 @@ class Accuracy:
     """How good the end of a trajectory is.
 
     position [m], axis [rad]: estimated errors of the last state, made to bound the true ones; tolerance: what was
-    asked for; scheme, step [s], steps: how it was integrated.  A chaotic motion has errors as large as the motion
-    itself whatever the step: then `reached` is False and the estimate says so.
+    asked for; scheme, step [s], steps: how it was integrated; nodes: the larger of both errors as far as the nodes of
+    a magnet of finite size make it, which are enough where the top starts, and not at the base.  A chaotic motion has
+    errors as large as the motion itself whatever the step: then `reached` is False and the estimate says so.
     """
 
     position: float
@@ -41,6 +42,7 @@ class Accuracy:
     scheme: str
     step: float
     steps: int
+    nodes: float = 0.0
 
     @property
     def reached(self) -> bool:
