@@ -32,3 +32,23 @@ def test_a_virtual_clock_in_real_time_is_waited_for_and_then_jumps(monkeypatch):
     assert clock.wall_duration(10.0) == 0.0
     clock.sleep(10.0)
     assert clock.now() == 10.0
+
+
+def test_a_wall_clock_at_a_multiple_sleeps_that_much_shorter(monkeypatch):
+    wall = [100.0]
+
+    def sleep(duration):
+        wall[0] += duration
+
+    monkeypatch.setattr("instruments.clock.time.monotonic", lambda: wall[0])
+    monkeypatch.setattr("instruments.clock.time.sleep", sleep)
+    clock = WallClock(speed=1000.0)
+    clock.sleep(5.0)
+    assert wall[0] == pytest.approx(100.005)
+    assert clock.now() == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize("speed", [0.0, -1.0, float("nan"), float("inf")])
+def test_the_speed_of_a_clock_is_a_number_above_0(speed):
+    with pytest.raises(ValueError, match="a number above 0"):
+        WallClock(speed=speed)

@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 #: The newest revision spoken here, and the longest payload sent before the client has said what it takes [bytes].
 VERSION, UNASKED = 0x0200, 1 << 18
 
+#: How long a client may take for its second channel [s], as the clock on the wall tells.
+SECOND_CHANNEL = FIRST_WORDS
+
 #: The MessageID that a client begins with (3.1), and what one message differs from the next.
 _FIRST_ID, _STEP, _IDS = 0xFFFFFF00, 2, 1 << 32
 
@@ -274,7 +277,7 @@ class HislipServer:
 async def _both_channels(client: Client) -> None:
     """Ends when the second channel does not come in time."""
     try:
-        async with asyncio.timeout(FIRST_WORDS):
+        async with asyncio.timeout(SECOND_CHANNEL):
             await client.joined.wait()
     except TimeoutError:
         return

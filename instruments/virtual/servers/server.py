@@ -104,7 +104,7 @@ async def _offer(
 
 @dataclass
 class BenchServer:
-    """Offers a bus from a thread of its own, between ``with`` and its end.
+    """Offers a bus from a thread of its own, between ``with`` and its end; it may be entered again afterwards.
 
     offers: where the instruments are, once it runs.  Raises OSError when a port is taken.
 
@@ -116,19 +116,21 @@ class BenchServer:
     bus: Bus
     place: Place = field(default_factory=Place)
     offers: tuple[Offer, ...] = ()
-    _loop: asyncio.AbstractEventLoop | None = None
-    _end: asyncio.Event = field(default_factory=asyncio.Event)
-    _failed: Exception | None = None
+    _loop: asyncio.AbstractEventLoop | None = field(init=False, default=None)
+    _end: asyncio.Event = field(init=False)
+    _failed: Exception | None = field(init=False, default=None)
 
     def __enter__(self) -> Self:
         """Returns when every instrument can be reached."""
+        self._end = asyncio.Event()
         begun = threading.Event()
         self._thread = threading.Thread(target=self._run, args=(begun,), name="virtual bench")
         self._thread.start()
         begun.wait()
         if self._failed:
             self._thread.join()
-            raise self._failed
+            failed, self._failed = self._failed, None
+            raise failed
         return self
 
     def __exit__(

@@ -11,7 +11,8 @@ from instruments.virtual.servers.station import CHUNK, Link, Listener, first_of
 if TYPE_CHECKING:
     from instruments.virtual.servers.station import Station
 
-#: How long answers under way are still delivered to a client that has nothing more to say [s].
+#: How long the next message or answer of a client that has nothing more to say may take [s], as the clock on the wall
+#: tells.
 _LINGER = 1.0
 
 
@@ -62,11 +63,15 @@ async def converse(station: Station, wire: Wire) -> None:
     async def receive() -> None:
         while data := await wire.read():
             await received.put(data)
-        # somebody who sends no more may still want to read: printf '*IDN?\n' | nc
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(_LINGER):
-                await received.join()
-                await link.quiet()
+        # a client that sends no more may still want to read: printf '*IDN?\n' | nc
+        done = -1
+        while done < link.messages_done:
+            done = link.messages_done
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(_LINGER):
+                    await received.join()
+                    await link.quiet()
+                    return
 
     async def work() -> None:
         while True:

@@ -88,11 +88,12 @@ class Station:
 class Link:
     """One client's link to an instrument; whatever is done with it raises LinkLost when a fault has cut it.
 
-    session: see :class:`instruments.virtual.bench.bus.Session`; to be used from the event loop only.
+    session: see :class:`instruments.virtual.bench.bus.Session`; to be used from the event loop only; messages_done: how
+    many messages the instrument has worked on.
     """
 
     def __init__(self, station: Station, *, stream: bool = False) -> None:
-        self.station, self.closed = station, False
+        self.station, self.closed, self.messages_done = station, False, 0
         self.session = self._new(stream=stream)
         self._messages: Generator[str | None, None, None] | None = None
         self._work: asyncio.Task[None] | None = None
@@ -155,6 +156,7 @@ class Link:
                 await self._finish(self.session.work_on(message))
             finally:
                 station.working = False
+            self.messages_done += 1
             station.stir()
             await station.passes(station.device.pace)
 

@@ -1,7 +1,8 @@
 """The virtual world: the top under its drive, its fall, and the light that it makes."""
 
 import math
-import time
+import sys
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -486,22 +487,57 @@ def test_it_sees_an_arbitrary_waveform_too(model, load):
 # --- many changes ---
 
 
-def test_twenty_thousand_changes_cost_little_to_look_at_and_are_forgotten_when_nobody_can_ask_for_them():
+def changed_every_second(changes):
     top = world()
     drive(top, 0.0, "SIN", 30.0, FIELD)
-    for k in range(20_000):
+    for k in range(changes):
         top.clock.sleep(1.0)
         drive(top, top.clock.now(), "SIN", 30.0 + 0.1 * (k % 2), FIELD)
+    return top
+
+
+def test_changes_that_are_long_past_are_forgotten():
+    top = changed_every_second(20_000)
     now = top.clock.now()
     kept = len(top._stretches), len(top._coil.history)
     assert kept[0] <= 2 * (KEPT_S + 1001)  # pulled and locked, and a thousand that are not let go yet
     assert kept[1] <= KEPT_S + 1001
     assert spin_hz(top, now - KEPT_S + 1.9) == pytest.approx(spin_hz(top, now - KEPT_S + 3.9), rel=1e-12)
-    begin = time.perf_counter()
-    for k in range(1000):
-        top.motion(np.array([now - k]))
-        top.coil_field(now - k, 1e-3, 2)
-    assert time.perf_counter() - begin < 1.0  # each look through all of them would take milliseconds
+
+
+def cost_of_a_look(top, age):
+    """Instructions of Python and bytes for a look at the top as it was some time ago [s]."""
+    instructions = 0
+
+    def count(frame, event, _):
+        nonlocal instructions
+        frame.f_trace_opcodes = True
+        instructions += event == "opcode"
+        return count
+
+    def look():
+        top.motion(np.array([top.clock.now() - age]))
+        top.coil_field(top.clock.now() - age, 1e-3, 2)
+
+    look()
+    tracemalloc.start()
+    look()
+    memory = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    before = sys.gettrace()
+    sys.settrace(count)
+    try:
+        look()
+    finally:
+        sys.settrace(before)
+    return instructions, memory
+
+
+@pytest.mark.parametrize("age", [0.5, 5.5])
+def test_a_look_costs_the_same_after_twenty_thousand_changes(age):
+    few, many = (cost_of_a_look(changed_every_second(changes), age) for changes in (20, 20_000))
+    assert many[0] <= 1.2 * few[0]
+    assert many[1] <= 2 * few[1] + 4096  # each look through all of them would take a hundred thousand bytes
 
 
 def test_settings_at_one_time_and_of_an_output_that_is_off_leave_no_trace():

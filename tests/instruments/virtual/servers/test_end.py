@@ -1,0 +1,67 @@
+"""How a server ends: waiting clients, its thread, its sockets; and that it may begin again."""
+
+import asyncio
+import contextlib
+import gc
+import socket
+import threading
+
+import pytest
+
+from instruments.clock import WallClock
+from instruments.virtual.bench.bus import Bus
+from instruments.virtual.servers.hislip_messages import Type
+from instruments.virtual.servers.server import Place
+from instruments.virtual.servers.socket_server import socket_listener
+from instruments.virtual.servers.station import Station
+from support.served import AT_MOST, NETWORK, Served, Thing, channels, rpc, send
+
+
+def test_the_end_of_the_server_ends_waiting_clients_and_its_thread():
+    served = Served()
+    with served.opened:
+        with served.server:
+            bare, (sync, aside), reader = served.bare("socket"), channels(served), served.bare("vxi11")
+            bare.sendall(b"SLOW?\n")
+            send(sync, Type.DATA_END, 0, 2, b"SLOW?")
+            assert rpc(reader, procedure=0) == [1, 0, 0, 0, 0]
+        assert "virtual bench" not in {thread.name for thread in threading.enumerate()}
+        for connection in (bare, sync, aside, reader):
+            with contextlib.suppress(ConnectionError):
+                assert connection.recv(10) == b""
+        del served.server
+        gc.collect()  # a socket left open would warn
+
+
+@pytest.mark.parametrize("turns", range(6))  # of the event loop, until a connection is handed over
+def test_the_end_of_the_server_ends_a_client_that_is_just_connecting(turns):
+    thing = Thing(WallClock())
+
+    async def end_while_connecting():
+        listener = socket_listener(Station(Bus({NETWORK: thing}), thing))
+        await listener.open("127.0.0.1", 0)
+        with socket.create_connection(("127.0.0.1", listener.port), timeout=AT_MOST):
+            for _ in range(turns):
+                await asyncio.sleep(0)
+            async with asyncio.timeout(AT_MOST):
+                await listener.close()
+
+    asyncio.run(end_while_connecting())
+    gc.collect()  # a socket left open would warn
+
+
+def test_a_server_that_has_ended_may_begin_again():
+    served = Served()
+    for _ in range(3):
+        with served.server, served.opened:
+            assert served.open("socket").query("*IDN?").strip() == Thing.identity
+
+
+def test_a_server_that_could_not_begin_may_begin_later():
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        served = Served(place=Place(port_base=taken.getsockname()[1]))
+        with pytest.raises(OSError, match="in use"), served.server:
+            pass
+    served.server.place = Place()
+    with served.server, served.opened:
+        assert served.open("socket").query("*IDN?").strip() == Thing.identity

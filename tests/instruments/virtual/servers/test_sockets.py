@@ -1,0 +1,99 @@
+"""Bare TCP: a line feed ends a message, answers follow each other."""
+
+import asyncio
+import contextlib
+import socket
+
+import pytest
+
+from instruments.clock import WallClock
+from instruments.virtual.bench.bus import Bus
+from instruments.virtual.servers.socket_server import converse
+from instruments.virtual.servers.station import Station
+from support.served import AT_MOST, NETWORK, Thing, until
+
+
+def test_many_questions_at_once_are_answered_in_order(served):
+    bare = served.bare("socket")
+    bare.sendall(b"*OPC?\n" * 1000 + b"*IDN?\n")
+    received = b""
+    while not received.endswith(b"1.0\n"):
+        received += bare.recv(1 << 16)
+    assert received == b"1\n" * 1000 + b"levilab,thing,7,1.0\n"
+
+
+def test_bytes_may_come_one_by_one(served):
+    bare = served.bare("socket")
+    bare.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    for byte in b"*OPC?\r\n":
+        bare.sendall(bytes([byte]))
+    assert bare.recv(10) == b"1\n"
+
+
+def test_who_has_said_all_still_gets_the_answer(served, monkeypatch):
+    monkeypatch.setattr("instruments.virtual.servers.socket_server._LINGER", AT_MOST)
+    bare = served.bare("socket")
+    bare.sendall(b"*IDN?\n")
+    bare.shutdown(socket.SHUT_WR)
+    assert bare.recv(100) == b"levilab,thing,7,1.0\n"
+    assert bare.recv(100) == b""
+
+
+def test_a_flood_of_questions_without_reading_is_held_back(served):
+    bare = served.bare("socket")
+    bare.setblocking(False)
+    until(lambda: served.thing.blocks or not flooded(bare))
+    until(lambda: not flooded(bare))  # the server takes no more
+    assert served.open("hislip").query("*OPC?").strip() == "1"
+    assert served.thing.blocks < 10  # as many as fit into the system's buffers
+
+
+def flooded(bare):
+    """Whether the other side took some more questions."""
+    try:
+        return bare.send(b"BLOC?\n" * 10_000) > 0
+    except BlockingIOError:
+        return False
+
+
+class VirtualTime(asyncio.SelectorEventLoop):
+    """An event loop that jumps to the next timer instead of waiting for it."""
+
+    def __init__(self):
+        self.now = 0.0
+        super().__init__()
+        select = self._selector.select
+
+        def jump(timeout):
+            self.now += timeout or 0.0
+            return select(0)
+
+        self._selector.select = jump
+
+    def time(self):
+        return self.now
+
+
+class OneMessage:
+    """A wire whose other end sends these bytes, and then no more."""
+
+    def __init__(self, data):
+        self.left = [b"", data]
+
+    async def read(self):
+        return self.left.pop()
+
+    async def write(self, data):
+        pass
+
+
+def test_commands_sent_before_the_end_are_all_worked_on(monkeypatch):
+    loop = VirtualTime()
+    monkeypatch.setattr("instruments.clock.time.monotonic", lambda: loop.now)
+    thing = Thing(WallClock())
+    thing.pace = 0.02  # longer in all than a client that has said all may take without a message
+    with contextlib.closing(loop):
+        station = Station(Bus({NETWORK: thing}), thing)
+        loop.run_until_complete(converse(station, OneMessage(b"LEV 1\n" * 300 + b"LEV 7\n")))
+    assert thing.settings["level"] == 7
+    assert loop.now == pytest.approx(301 * 0.02)
