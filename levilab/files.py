@@ -101,9 +101,10 @@ def _refuse_surrogates(text: str) -> None:
 def replace_atomically(path: Path, content: str | bytes) -> None:
     """Write a file so that a reader sees the old one or the new one, whole, whatever happens meanwhile.
 
-    Text is written as UTF-8 with line feeds.  Raises OSError.
+    Text is written as UTF-8 with line feeds; what UTF-8 has no place for, as the name of a file that is none, becomes a
+    question mark.  Raises OSError.
     """
-    data = content.encode() if isinstance(content, str) else content
+    data = content.encode(errors="replace") if isinstance(content, str) else content
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         part.unlink(missing_ok=True)  # of an earlier process of this number

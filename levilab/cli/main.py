@@ -51,7 +51,7 @@ def levilab(
 
 def main() -> None:
     """The console script: known failures become one line and an exit status, everything else stays loud."""
-    _replace_unencodable()
+    _prepare_output()
     try:
         app()
     except BrokenPipeError:  # the reader closed the pipe
@@ -83,9 +83,14 @@ def _silence_output() -> None:
                 os.dup2(nowhere.fileno(), stream.fileno())
 
 
-def _replace_unencodable() -> None:
-    """Consoles and pipes of Windows may use code pages without ν and ω: those are shown as question marks there."""
-    for stream in (sys.stdout, sys.stderr):
-        reconfigure = getattr(stream, "reconfigure", None)
+def _prepare_output() -> None:
+    """Consoles and pipes of Windows may use code pages without ν and ω: those are shown as question marks there.
+
+    A stream that is closed from the start, as by ``>&-``, is None in Python: what goes there is thrown away.
+    """
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: PTH123, SIM115 - until the end
+        reconfigure = getattr(getattr(sys, name), "reconfigure", None)
         if reconfigure:
             reconfigure(errors="replace")

@@ -242,7 +242,7 @@ class RunWriter:
                 self._rescue()
             if name not in self._files:
                 self._open(name)
-        data = f"{line}\n".encode()
+        data = f"{line}\n".encode(errors="replace")
         self._files[name].append(data)
         if sync:
             self._files[name].sync()

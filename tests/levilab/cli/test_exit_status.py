@@ -1,0 +1,205 @@
+"""How each command ends on each mistake: 2 for wrong usage, 1 for a known failure, 3 for an instrument, in one line."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+import pytest
+
+from levilab.cli import exit_codes
+from levilab.cli.main import app, main
+from levilab.cli.options import in_options, option_names
+from levilab.errors import LevilabError, UsageError
+from support.commands import command
+from support.paths import ROOT, SAMPLE_DATA
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+SAMPLE = str(SAMPLE_DATA / "spin-down-1")
+
+#: The command → what its line says. What stands in "file" is a file, in "bench.toml" a bench that is not there.
+WRONG_USAGE = {
+    "acquire spin --seed 1": "--mock",
+    "acquire spin --realtime": "--mock",
+    "acquire spin --scene spindown": "--mock",
+    f"analyze spindown {SAMPLE} --reading-u 0": "--reading-u 0: ",
+    f"analyze spindown {SAMPLE} --reading-u -0.1": "--reading-u -0.1: ",
+    f"analyze spindown {SAMPLE} --reading-u nan": "--reading-u nan: ",
+    f"analyze spindown {SAMPLE} --columns t": "--columns 't': ",
+    f"analyze spindown {SAMPLE} --columns speed=f": "--columns: 'speed' is no quantity",
+    f"report {SAMPLE} --reading-u inf": "--reading-u inf: ",
+    f"report {SAMPLE} --columns t=": "--columns 't=': ",
+    f"report {SAMPLE} -o x.docx": "--output x.docx: ",
+    "simulate undriven --set nonsense=1": "--set: nonsense = 1: there is no key nonsense",
+    "simulate undriven --set top.mass_kg": "--set: 'top.mass_kg': KEY=VALUE is expected",
+    "simulate undriven --set top.mass_kg=-1": "--set: top.mass_kg",
+    "simulate undriven --duration -1": "--duration -1: a number above 0",
+    "simulate undriven --duration nan": "--duration nan: ",
+    "simulate undriven --duration inf": "--duration inf: ",
+    "simulate undriven --tolerance 0": "--tolerance 0: ",
+    "simulate undriven --rate -5": "--rate -5: ",
+    "simulate undriven --rate 1e9": "--duration 30: with --rate 1e+09 these are 3e+10 states",
+    "stability undriven --set nonsense=1": "--set: nonsense = 1",
+    "stability undriven --spins 20:30:1": "--spins: it is of a map: give --map, too",
+    "stability undriven --masses 0.02:0.03:0.001": "--masses: it is of a map: give --map, too",
+    "stability undriven --duration 5": "--duration: it is of a map: give --map, too",
+    "stability undriven --map --spins 20": "--spins 20: LOW:HIGH:STEP is expected",
+    "stability undriven --map --spins 30:20:1": "--spins 30:20:1: LOW:HIGH:STEP is expected",
+    "stability undriven --map --masses 0:1:1e-9": "--masses 0:1:1e-9: at most",
+    "stability undriven --map --masses -1:1:1": "--masses from -1 kg: masses above 0",
+    "stability undriven --map --duration -1": "--duration -1: a number of seconds above 0",
+    "bench check --mock --bench bench.toml": "--bench: does not go with --mock",
+    "bench serve --model nonsense": "--model",
+    "bench serve --model counter=nonsense": "--model",
+    "bench serve --speed 0": "--speed",
+    "bench serve --scene spindown --speed 1e6": "--speed",
+    "bench serve --port-base 65535": "--port-base",
+    "bench serve --host ::1": "--host ::1: ",
+}
+#: What the command line itself does not understand is shown with the usage, over several lines.
+NOT_UNDERSTOOD = (
+    "fly",
+    "acquire",
+    "acquire fly",
+    "acquire spin --mok",
+    "acquire spin --mock --seed -1",
+    "acquire spin --mock --seed many",
+    "analyze",
+    "analyze spindown",
+    "analyze spindown x --uncertainty perhaps",
+    "analyze spindown x --reading-u much",
+    "report",
+    "simulate",
+    "simulate undriven --duration long",
+    "stability",
+    "bench",
+    "bench serve --port-base 0",
+    "bench serve --port-base 65536",
+    "benchmark",
+    "benchmark fly",
+)
+FAILURES = {
+    "acquire spin --bench other.toml": "other.toml: there is no such file",
+    "acquire spin --mock --resume nowhere": "nowhere/run.json: cannot be read",
+    f"acquire spin --mock --resume {SAMPLE}": "is finished",
+    "acquire spin --mock --scene spindwon": "did you mean spindown?",
+    "acquire spin --mock --out file": "choose another place with --out",
+    "analyze spindown nowhere": "nowhere: there is no such file or folder",
+    "analyze spindown .": "found nothing",
+    "analyze spindown file": "file: is empty",
+    "report nowhere": "nowhere: there is no such file or folder",
+    "runs nowhere": "nowhere: there is no such folder",
+    "runs file": "file: is a file",
+    "simulate nowhere": "there is no scene 'nowhere'",
+    "simulate nowhere.toml": "nowhere.toml: there is no such file",
+    "simulate undriven --duration 0.01 --out file": "choose another place with --out",
+    "stability nowhere": "there is no scene 'nowhere'",
+    "stability undriven --map --out file": "give another folder with --out",
+    "bench check --bench other.toml": "other.toml: there is no such file",
+    "bench init --library @levilab --out nowhere/bench.toml": "nowhere is no folder",
+    "bench init --library @levilab": "bench.toml is there already",
+    "bench serve --scene nowhere": "there is no scene 'nowhere'",
+}
+INSTRUMENTS = {
+    "acquire spin": "TCPIP0::127.0.0.1::9::SOCKET: ",
+    "bench check": "",
+    "bench init --library @nonsense --out new.toml": "nonsense",
+}
+TABLE = [
+    (words, status, says)
+    for status, mistakes in (
+        (exit_codes.WRONG_USAGE, WRONG_USAGE),
+        (exit_codes.FAILED, FAILURES),
+        (exit_codes.INSTRUMENT, INSTRUMENTS),
+    )
+    for words, says in mistakes.items()
+]
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    """A folder with a file, and a bench at a port where nothing listens."""
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    (tmp_path / "bench.toml").write_text(
+        '[counter]\nmodel = "53230A"\naddress = "TCPIP0::127.0.0.1::9::SOCKET"\n'
+        '[generator]\nmodel = "33500B"\naddress = "TCPIP0::127.0.0.1::9::SOCKET"\n',
+        encoding="utf-8",
+    )
+    return tmp_path
+
+
+@pytest.mark.parametrize(("words", "status", "says"), TABLE, ids=[words for words, _, _ in TABLE])
+def test_each_mistake_has_its_exit_status_and_one_line(place: Path, words: str, status: int, says: str) -> None:
+    ended = command(*words.split(), cwd=place)
+    assert ended.status == status, ended
+    if words != "bench check":  # which tells of every instrument
+        line = ended.err.splitlines()[-1]
+        assert line.startswith("levilab: ")
+        assert says in line
+        assert "`" not in line
+    assert {path.name for path in place.iterdir()} <= {"file", "bench.toml", "runs"}
+
+
+@pytest.mark.parametrize("words", NOT_UNDERSTOOD)
+def test_what_is_not_understood_is_wrong_usage(place: Path, words: str) -> None:
+    assert command(*words.split(), cwd=place).status == exit_codes.WRONG_USAGE
+
+
+def test_an_interrupted_command_ends_with_130(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def interrupted(_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("levilab.runs.listing.list_runs", interrupted)
+    assert command("runs", ".", cwd=tmp_path).status == exit_codes.INTERRUPTED
+
+
+def test_a_defect_of_the_program_stays_loud(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def broken(_: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr("levilab.runs.listing.list_runs", broken)
+    monkeypatch.setattr("sys.argv", ["levilab", "runs", str(tmp_path)])
+    with pytest.raises(ZeroDivisionError):
+        main()
+
+
+# --- the names of options ---
+
+
+def test_a_quantity_in_a_message_becomes_its_option() -> None:
+    texts = {
+        "choose another place with `out`": "choose another place with --out",
+        "take `rate` = 500 or less": "take --rate 500 or less",
+        "or print only with `save` = False": "or print only with --no-save",
+        "goes with `mock` = True": "goes with --mock",
+        "change a key with `settings`": "change a key with --set",
+        "the `nonsense` stays": "the `nonsense` stays",
+    }
+    for text, shown in texts.items():
+        assert in_options(LevilabError(text), app) == shown
+    assert in_options(UsageError("reading_u", "above 0", value=-1.0), app) == "--reading-u -1: above 0"
+    assert in_options(UsageError("survival", "is a map"), app) == "--map: is a map"
+
+
+def test_one_quantity_has_one_option_in_all_commands() -> None:
+    names = option_names(app)
+    assert names["settings"] == ("--set", "")
+    assert names["save"] == ("--save", "--no-save")
+    assert names["output"] == ("--output", "")
+    assert len({on for on, _ in names.values()}) == len(names)
+
+
+#: The rooms whose messages are about quantities.
+ROOMS = ("runs", "formats", "motion", "stability")
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_messages_below_the_command_line_name_quantities_not_options(room: str) -> None:
+    names = option_names(app)
+    for path in (ROOT / "levilab" / room).glob("*.py"):
+        text = path.read_text(encoding="utf-8")
+        assert not re.findall(r'"[^"\n]*--[a-z]+[^"\n]*"', text), path
+        for name in re.findall(r'UsageError\(\s*"(\w+)"', text):
+            assert name in names, path

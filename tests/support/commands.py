@@ -1,0 +1,47 @@
+"""The command line in this process: quick, and with the exit status that a process of its own would have."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import sys
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from levilab.cli.main import main
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a command ended.  status: its exit status; out, err: what it wrote."""
+
+    status: int
+    out: str
+    err: str
+
+
+def command(*words: str | Path, cwd: Path) -> Ended:
+    """Run `levilab` with some words in a folder.  Raises what would be a traceback."""
+    out, err = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8") for _ in range(2))
+    argv, here = sys.argv, os.getcwd()  # noqa: PTH109 - also if it is gone
+    sys.argv = ["levilab", *map(str, words)]
+    os.chdir(cwd)
+    try:
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            main()
+        status = 0
+    except SystemExit as end:
+        status = end.code if isinstance(end.code, int) else int(end.code is not None)
+    finally:
+        sys.argv = argv
+        os.chdir(here)
+    texts = []
+    for stream in (out, err):
+        stream.flush()
+        stream.seek(0)
+        texts.append(stream.read())
+    return Ended(status, *texts)
