@@ -42,7 +42,7 @@ from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from instruments.virtual.oscilloscope.rigol_ds1000z import VirtualDS1000Z
 from instruments.virtual.servers.server import BenchServer
 from levilab.acquisition.loop import acquire
-from levilab.acquisition.request import Options, request_for
+from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.present.progress import Show
 from levilab.world.bench import virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld, drawn
@@ -375,7 +375,7 @@ def acquisition(rounds: int) -> dict[str, float]:
 
 def _acquired() -> dict[str, float]:
     with tempfile.TemporaryDirectory() as folder, ExitStack() as patched:
-        request = request_for("spin", Options(mock=True, out=Path(folder), seed=1))
+        request = request_for("spin", AcquisitionOptions(mock=True, out=Path(folder), seed=1))
         world: Any = SpinWorld(drawn(1), VirtualClock())
         light = world.light = Stopwatch(world.light)
         disk = Stopwatch(os.fsync)

@@ -8,6 +8,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 import pytest
+
 from support.paths import ROOT
 
 if TYPE_CHECKING:

@@ -41,7 +41,7 @@ class CannotResume(LevilabError):
 
 
 @dataclass(frozen=True)
-class Options:
+class AcquisitionOptions:
     """How an experiment is to be carried out.
 
     Attributes:
@@ -71,7 +71,7 @@ class Options:
     tell: Callable[[str], None] = lambda _: None
 
 
-def request_for(experiment: str, options: Options) -> AcquisitionRequest:
+def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequest:
     """What is to be acquired.  Raises ConfigError, CannotResume, UsageError, DataError, SceneError."""
     run = _resumable(find_run(options.resume, options.out), experiment) if options.resume else None
     virtual = options.mock or bool(run and run.record.seed is not None)
@@ -98,7 +98,7 @@ def request_for(experiment: str, options: Options) -> AcquisitionRequest:
     return request
 
 
-def _check_options(options: Options, run: Run | None, *, virtual: bool) -> None:
+def _check_options(options: AcquisitionOptions, run: Run | None, *, virtual: bool) -> None:
     for name in ("seed", "scene"):
         if getattr(options, name) is not None and (run or not options.mock):
             raise UsageError(name, f"goes with `mock`, and not with `resume`: a run keeps its {name}")
@@ -106,7 +106,7 @@ def _check_options(options: Options, run: Run | None, *, virtual: bool) -> None:
         raise UsageError("realtime", "goes with `mock`: a real bench always keeps to the wall clock")
 
 
-def _configuration(options: Options, run: Run | None, *, virtual: bool) -> BenchConfig:
+def _configuration(options: AcquisitionOptions, run: Run | None, *, virtual: bool) -> BenchConfig:
     """What the bench file says; a run is resumed as it was begun, only where the instruments are may have changed."""
     config = _as_it_was(run) if run else Configuration()
     if options.bench or not virtual:
@@ -141,7 +141,7 @@ def _resumable(folder: Path, experiment: str) -> Run:
 # --- the virtual bench ---
 
 
-def _on_the_virtual_bench(request: AcquisitionRequest, options: Options) -> AcquisitionRequest:
+def _on_the_virtual_bench(request: AcquisitionRequest, options: AcquisitionOptions) -> AcquisitionRequest:
     """The request with the wiring of a virtual bench, whose top spins only or moves as a scene's."""
     run = request.resume
     seed = run.record.seed if run else options.seed

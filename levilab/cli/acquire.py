@@ -46,10 +46,10 @@ def acquire_spin(
     Ctrl-C ends the run after the reading under way; outputs go off and the run is kept.
     """
     from levilab.acquisition.loop import acquire
-    from levilab.acquisition.request import Options, request_for
+    from levilab.acquisition.request import AcquisitionOptions, request_for
     from levilab.present.progress import to_stderr
 
-    options = Options(
+    options = AcquisitionOptions(
         mock=mock,
         bench=bench,
         out=out,

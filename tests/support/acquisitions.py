@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from instruments.clock import VirtualClock
 from levilab.acquisition.experiments.spin import SpinSettings
 from levilab.acquisition.loop import AcquisitionRequest
-from levilab.acquisition.request import Options, request_for
+from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.table import Configuration, with_settings
 from levilab.world.bench import virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld
@@ -58,7 +58,7 @@ class Impatient(Silent):
 
 def mock(out: Path, seed: int | None = 1, **changes: Any) -> AcquisitionRequest:
     """A spin-down on the virtual bench, as the command line asks for it."""
-    return request_for("spin", Options(mock=True, out=out, seed=seed, **changes))
+    return request_for("spin", AcquisitionOptions(mock=True, out=out, seed=seed, **changes))
 
 
 def in_world(request: AcquisitionRequest, world: World) -> AcquisitionRequest:
