@@ -147,7 +147,7 @@ def _on_the_virtual_bench(request: AcquisitionRequest, options: AcquisitionOptio
     seed = run.record.seed if run else options.seed
     seed = secrets.randbelow(1 << 31) if seed is None else seed
     config = request.config.model_copy(update={"visa_library": "@levilab", **VIRTUAL})
-    request = replace(request, seed=seed, config=config)
+    request = replace(request, seed=seed, config=config, person=ask_no_person)
     scene = _scene(options.scene, run)
 
     def clock() -> VirtualClock:

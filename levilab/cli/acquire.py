@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -59,7 +60,7 @@ def acquire_spin(
         realtime=realtime,
         resume=resume,
         wire_log=wire_log,
-        person=lambda question: typer.prompt(question, default="", show_default=False, prompt_suffix=" ", err=True),
+        person=_ask,
         tell=message,
     )
     run = acquire(request_for("spin", options), to_stderr())
@@ -72,3 +73,14 @@ def acquire_spin(
         if readings:
             message(f"go on with it: levilab acquire spin --resume {run.folder}")
         raise typer.Exit(exit_codes.INTERRUPTED)
+
+
+def _ask(question: str) -> str:
+    """Ask the person at the bench, on the terminal."""
+    from levilab.acquisition.session import ExperimentFailed
+
+    message(f"{question}  [Enter]")
+    answer = sys.stdin.readline()
+    if not answer:
+        raise ExperimentFailed(f"{question!r} cannot be answered: standard input is closed; start it at a terminal")
+    return answer

@@ -1,0 +1,22 @@
+"""What the acquire commands ask of the person at the bench."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+
+from levilab.acquisition.session import ExperimentFailed
+from levilab.cli.acquire import _ask
+
+
+def test_the_person_is_asked_on_the_terminal(monkeypatch, capsys):
+    monkeypatch.setattr("sys.stdin", io.StringIO("6.1 cm\n"))
+    assert _ask("How high is the probe?") == "6.1 cm\n"
+    assert capsys.readouterr().err == "How high is the probe?  [Enter]\n"
+
+
+def test_a_question_without_a_terminal_ends_with_what_to_do(monkeypatch):
+    monkeypatch.setattr("sys.stdin", io.StringIO(""))
+    with pytest.raises(ExperimentFailed, match="standard input is closed"):
+        _ask("How high is the probe?")
