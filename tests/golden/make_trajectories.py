@@ -128,6 +128,7 @@ def named() -> list[dict[str, Any]]:
     ic = {
         "IC1": {},
         "IC2": {"start__position_m": [0.0001, 0.0, 0.073], "start__velocity_m_s": [0.0, 0.0, 0.0]},
+        # x as the thesis prints it; a misprint of 3 mm, and as good a motion to compare
         "IC3": {"start__position_m": [0.005, 0.0, 0.0725], "start__velocity_m_s": [-0.002, 0.0, 0.0005]},
         "IC4": {"start__tilt_rad": 0.1},
     }

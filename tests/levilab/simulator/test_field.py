@@ -7,7 +7,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from levilab.simulator.kernels.fields import FieldError, field_of, flux_density, flux_gradient, on_axis
+from levilab.simulator.field import FieldError, field_of, flux_density, flux_gradient, on_axis
 from levilab.simulator.kernels.ring import elliptic
 
 A, B, RHO = 0.030, 0.055, 1.40e-3
