@@ -17,15 +17,16 @@ class CannotWrite(LevilabError):
     """A file cannot be written (any more)."""
 
 
-def replace_atomically(path: Path, text: str) -> None:
+def replace_atomically(path: Path, content: str | bytes) -> None:
     """Write a file so that a reader sees the old one or the new one, whole, whatever happens meanwhile.
 
-    Raises OSError.
+    Text is written as UTF-8 with line feeds.  Raises OSError.
     """
+    data = content.encode() if isinstance(content, str) else content
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        with part.open("w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
+        with part.open("wb") as file:
+            file.write(data)
             file.flush()
             os.fsync(file.fileno())
         _replace(part, path)

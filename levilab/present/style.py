@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 
+from levilab.files import replace_atomically
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -29,10 +31,10 @@ STYLE: Any = {
 
 
 def save_png(figure: Figure, path: Path) -> None:
-    """Write a figure as a picture.  Raises OSError."""
+    """Write a figure as a picture, which replaces an older one whole or not at all.  Raises OSError."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=150)
-    path.write_bytes(buffer.getvalue())
+    replace_atomically(path, buffer.getvalue())
 
 
 def as_svg(figure: Figure) -> str:
