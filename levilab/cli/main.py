@@ -269,8 +269,10 @@ def _mute() -> None:
 
 
 def _never_fail_to_print() -> None:
-    """Consoles and pipes of Windows may use code pages without ν and ω: those are shown as question marks there."""
+    """Consoles and pipes of Windows may use code pages without ν and ⁻³: those are spelled out there."""
+    from levilab.present.characters import SPELLED_OUT
+
     for stream in (sys.stdout, sys.stderr):
         reconfigure = getattr(stream, "reconfigure", None)
         if reconfigure:
-            reconfigure(errors="replace")
+            reconfigure(errors=SPELLED_OUT)
