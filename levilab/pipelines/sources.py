@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from levilab.errors import DataError
 from levilab.formats.table import read_table
-from levilab.pipelines.readings import Readings, spin_readings
+from levilab.pipelines.spindown.readings import Readings, spin_readings
 from levilab.runs.run import READINGS, RECORD, Run, find_runs
 
 if TYPE_CHECKING:

@@ -16,8 +16,9 @@ from levilab.files import CannotWrite, replace_atomically
 from levilab.pipelines.sources import Options
 from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
 from levilab.pipelines.spindown.figure import spindown_figure
+from levilab.pipelines.spindown.laws import SHOWN_LAWS, SYMBOLS
 from levilab.pipelines.spindown.table import all_warnings, law_constants
-from levilab.present.numbers import AXES, SYMBOLS, in_words, plain, share, with_uncertainty, without_unit
+from levilab.present.numbers import in_words, plain, share, with_uncertainty, without_unit
 from levilab.present.style import as_svg
 from levilab.report.inputs import describe
 from levilab.runs.run import utc_now
@@ -117,7 +118,8 @@ def _columns(analysis: SpinDownAnalysis) -> list[Column]:
     for law in combined.fits:
         if law.linearised:
             lines = [run.fit(law.name).linearised or {} for run in analysis.runs]
-            columns += _of_law(f"{AXES[law.name]} against t", law.linearised, lines)
+            straight = SHOWN_LAWS[law.name].straight
+            columns += _of_law(f"{straight.quantity if straight else ''} against t", law.linearised, lines)
     best = combined.fit(combined.best)
     fits = [run.fit(best.name).parameters for run in analysis.runs]
     starts = tuple(fit["start_frequency"] for fit in fits)

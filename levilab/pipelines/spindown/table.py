@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
-from levilab.present.numbers import AXES, SYMBOLS, in_words, plain, share, short_name, with_uncertainty, without_unit
+from levilab.pipelines.spindown.laws import SHOWN_LAWS, SYMBOLS
+from levilab.present.numbers import in_words, plain, share, short_name, with_uncertainty, without_unit
 from levilab.present.terminal import new_table, terminal
 
 if TYPE_CHECKING:
@@ -109,7 +110,7 @@ def _lines_table(analysis: SpinDownAnalysis) -> Table:
     """The thesis's straight lines, run by run, beside the fit of the favoured law."""
     best = analysis.combined.fit(analysis.combined.best)
     lines = [fit for fit in analysis.combined.fits if fit.linearised]
-    headers = [f"{AXES[fit.name]}\n{_header(fit.linearised or {})}" for fit in lines]
+    headers = [f"{_axis(fit.name)}\n{_header(fit.linearised or {})}" for fit in lines]
     favoured = f"{best.name} fit\n{_header(best.constants)}"
     table = new_table("Run by run: unweighted straight lines, and the fit of the best law", "run", *headers, favoured)
     for source, run in zip(analysis.sources, analysis.runs, strict=True):
@@ -120,6 +121,12 @@ def _lines_table(analysis: SpinDownAnalysis) -> Table:
         table.add_section()
         table.add_row("mean", *(_first(fit.linearised or {}) for fit in lines), _first(best.constants))
     return table
+
+
+def _axis(law: str) -> str:
+    """What is drawn against time to make a law a straight line."""
+    straight = SHOWN_LAWS[law].straight
+    return straight.quantity if straight else ""
 
 
 def _equations(estimates: Mapping[str, Estimate]) -> list[str]:

@@ -5,7 +5,7 @@ import pytest
 
 from levilab.formats.columns import TableError
 from levilab.formats.table import read_run_readings, read_table
-from levilab.pipelines.readings import spin_readings
+from levilab.pipelines.spindown.readings import spin_readings
 
 HEADER = "time_s,spin_frequency_hz,spin_frequency_u_hz\n"
 
