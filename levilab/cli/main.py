@@ -7,7 +7,7 @@ import os
 import sys
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn, cast
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, cast
 
 import typer
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from analysis.spindown.lawfit import Uncertainty as Kind
     from levilab.errors import LevilabError
+    from levilab.pipelines.catalogue import Analysis
     from levilab.pipelines.sources import Options
 
 app = typer.Typer(
@@ -154,24 +155,29 @@ def analyze_spindown(
     as_json: Json = False,
 ) -> None:
     """Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude."""
-    from levilab.pipelines.spindown.analysis import analyze_spindowns
-    from levilab.pipelines.spindown.document import as_document, save_result
-    from levilab.pipelines.spindown.table import print_spindown
+    from levilab.pipelines.catalogue import ANALYSES
 
-    analysis = analyze_spindowns(paths, _options(columns, reading_u, uncertainty.value, keep_outliers))
+    options = _options(columns, reading_u, uncertainty.value, keep_outliers)
+    _show(ANALYSES["spindown"], ANALYSES["spindown"].analyze(paths, options), save=save, out=out, as_json=as_json)
+
+
+def _show(analysis: Analysis[Any], found: Any, *, save: bool, out: Path | None, as_json: bool) -> None:
+    """Write the result, then print it: a reader that goes away must not cost the result."""
+    from levilab.pipelines.catalogue import print_analysis
+
     failure: LevilabError | None = None
     written: list[Path] = []
-    if save:  # first: a reader that goes away must not cost the result
-        failure, written = _tried(lambda: save_result(analysis, out or analysis.home))
+    if save:
+        failure, written = _tried(lambda: analysis.save(found, out))
     if as_json:
         import json
 
-        document = as_document(analysis, out or analysis.home)
+        document = analysis.document(found, out or found.home)
         typer.echo(json.dumps(document, indent=2, sort_keys=True, allow_nan=False))
     else:
-        print_spindown(analysis)
-    for path in written:
-        typer.echo(f"wrote {path}", err=True)
+        print_analysis(analysis, found)
+    for text in (*found.remarks, *(f"wrote {path}" for path in written)):
+        typer.echo(text, err=True)
     if failure:
         raise failure
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from rich import box
 from rich.console import Console
-from rich.table import Table
+from rich.markup import escape
+from rich.table import Table as RichTable
 
 from levilab.present.characters import for_encoding
 
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     from typing import Any
 
     from rich.text import Text
+
+    from levilab.present.tables import Table
 
 #: SIMPLE_HEAD in plain ASCII; rich itself would draw a frame.
 _ASCII_HEAD = box.Box("    \n    \n -- \n    \n    \n -- \n    \n    \n", ascii=True)
@@ -36,9 +39,9 @@ def terminal() -> Console:
     return _Terminal(width=max(width, 80), highlight=False)
 
 
-def new_table(title: str | None, *columns: str, numbers: Sequence[str] = ()) -> Table:
+def new_table(title: str | None, *columns: str, numbers: Sequence[str] = ()) -> RichTable:
     """An empty table; numbers: the columns that are aligned to the right."""
-    table = Table(
+    table = RichTable(
         box=box.SIMPLE_HEAD if _is_unicode(sys.stdout.encoding) else _ASCII_HEAD,
         padding=(0, 1, 0, 0),
         pad_edge=False,
@@ -49,6 +52,18 @@ def new_table(title: str | None, *columns: str, numbers: Sequence[str] = ()) -> 
     for column in columns:
         table.add_column(column, justify="right" if column in numbers else "left", overflow="fold")
     return table
+
+
+def draw(table: Table) -> RichTable:
+    """A table that is data."""
+    drawn = new_table(escape(table.title), *map(escape, table.heads))
+    for k in table.numbers:
+        drawn.columns[k].justify = "right"
+    for row in table.rows:
+        if row.kind == "together":
+            drawn.add_section()
+        drawn.add_row(*map(escape, row.cells))
+    return drawn
 
 
 def _is_unicode(encoding: str | None) -> bool:

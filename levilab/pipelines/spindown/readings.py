@@ -21,6 +21,20 @@ class Readings:
     u: "NDArray[np.float64] | None"
     warnings: tuple[str, ...]
 
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def same_as(self, other: "Readings") -> bool:
+        """Whether time and frequency are the same, but for the rounding of another unit in the file."""
+        pairs = ((self.time, other.time), (self.frequency, other.frequency))
+        return len(self) == len(other) and all(
+            abs(a[0] - b[0]) <= SAME * abs(b[0]) and bool(np.allclose(a, b, rtol=SAME, atol=0)) for a, b in pairs
+        )
+
+
+#: Relative: units and printed digits round in about the tenth digit, but no two runs agree so far in all readings.
+SAME = 1e-9
+
 
 def spin_readings(table: Table, *, fewest: int = FEWEST) -> Readings:
     """The readings of a spin-down: time, spin frequency and, if the table has it, its standard uncertainty.

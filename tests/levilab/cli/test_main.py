@@ -65,7 +65,7 @@ def test_no_save_writes_nothing_and_out_writes_there(levilab: Command, tmp_path:
     levilab("analyze", "spindown", path, "--no-save")
     assert list(tmp_path.iterdir()) == [path]
     levilab("analyze", "spindown", path, "--out", "there")
-    assert sorted(p.name for p in (tmp_path / "there").iterdir()) == ["result.json", "spindown.png"]
+    assert sorted(p.name for p in (tmp_path / "there").iterdir()) == ["my.result.json", "my.spindown.png"]
 
 
 def test_columns_of_another_name_are_mapped(levilab: Command, tmp_path: Path) -> None:
