@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, cast
 
 import typer
+import typer.core
 
 from levilab.cli import bench as cli_bench
 from levilab.cli import simulate as cli_simulator
 from levilab.cli.simulate import EXIT_INTERRUPTED, Json
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from analysis.spindown.lawfit import Uncertainty as Kind
     from levilab.errors import LevilabError
     from levilab.pipelines.catalogue import Analysis
@@ -32,12 +31,36 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 acquire_app = typer.Typer(no_args_is_help=True, help="Run an experiment on the bench and write a run folder.")
-analyze_app = typer.Typer(no_args_is_help=True, help="Analyze runs or data files.")
+
+
+class AnalyzeGroup(typer.core.TyperGroup):
+    """`levilab analyze PATH…` without the name of an analysis is `levilab analyze each PATH…`."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put in the name where there is none."""
+        named = not args or args[0] in self.commands or args[0] in ctx.help_option_names
+        return super().parse_args(ctx, args if named else ["each", *args])
+
+
+analyze_app = typer.Typer(
+    cls=AnalyzeGroup,
+    no_args_is_help=True,
+    help="Analyze runs or data files.  Without a COMMAND: each analysis that suits, as levilab analyze runs/.",
+)
 app.add_typer(acquire_app, name="acquire")
 app.add_typer(analyze_app, name="analyze")
 app.add_typer(cli_bench.bench_app, name="bench")
 
 EXIT_FAILED, EXIT_INSTRUMENT = 1, 3
+
+
+class Uncertainty(StrEnum):
+    """How the uncertainties of the fitted constants are found."""
+
+    COVARIANCE = "covariance"
+    PROFILE = "profile"
+    BOOTSTRAP = "bootstrap"
+
 
 Columns = Annotated[
     str,
@@ -51,15 +74,12 @@ ReadingU = Annotated[
     typer.Option(metavar="HZ", help="Standard uncertainty of every reading; goes before what the data say."),
 ]
 KeepOutliers = Annotated[bool, typer.Option("--keep-outliers", help="Fit readings that look like miscounts, too.")]
+UncertaintyKind = Annotated[
+    Uncertainty, typer.Option("--uncertainty", help="profile and bootstrap add 68 % intervals, and take longer.")
+]
+Save = Annotated[bool, typer.Option(help="Write the result and figures beside the run.")]
+ResultFolder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Write them there instead.")]
 Paths = Annotated[list[Path], typer.Argument(metavar="PATH…", help="Run folders, data files, or folders to search.")]
-
-
-class Uncertainty(StrEnum):
-    """How the uncertainties of the fitted constants are found."""
-
-    COVARIANCE = "covariance"
-    PROFILE = "profile"
-    BOOTSTRAP = "bootstrap"
 
 
 def _print_version(asked: bool) -> None:
@@ -146,40 +166,64 @@ def analyze_spindown(
     paths: Paths,
     columns: Columns = "",
     reading_u: ReadingU = None,
-    uncertainty: Annotated[
-        Uncertainty, typer.Option(help="profile and bootstrap add 68 % intervals, and take longer.")
-    ] = Uncertainty.COVARIANCE,
+    uncertainty: UncertaintyKind = Uncertainty.COVARIANCE,
     keep_outliers: KeepOutliers = False,
-    save: Annotated[bool, typer.Option(help="Write result.json and figures beside the run.")] = True,
-    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write them there instead.")] = None,
+    save: Save = True,
+    out: ResultFolder = None,
     as_json: Json = False,
 ) -> None:
     """Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude."""
     from levilab.pipelines.catalogue import ANALYSES
 
     options = _options(columns, reading_u, uncertainty.value, keep_outliers)
-    _show(ANALYSES["spindown"], ANALYSES["spindown"].analyze(paths, options), save=save, out=out, as_json=as_json)
+    analysis = ANALYSES["spindown"]
+    found = analysis.analyze(paths, options)
+    _write_and_print([(analysis, found)], save=save, out=out, as_json=as_json)
 
 
-def _show(analysis: Analysis[Any], found: Any, *, save: bool, out: Path | None, as_json: bool) -> None:
-    """Write the result, then print it: a reader that goes away must not cost the result."""
+@analyze_app.command("each", hidden=True, epilog="Example: levilab analyze sample_data/")
+def analyze_each(
+    paths: Paths,
+    columns: Columns = "",
+    reading_u: ReadingU = None,
+    uncertainty: UncertaintyKind = Uncertainty.COVARIANCE,
+    keep_outliers: KeepOutliers = False,
+    save: Save = True,
+    out: ResultFolder = None,
+    as_json: Json = False,
+) -> None:
+    """Each analysis that suits the runs or data files; --json prints a list where several suit."""
+    from levilab.pipelines.catalogue import analyze_suiting
+
+    options = _options(columns, reading_u, uncertainty.value, keep_outliers)
+    _write_and_print(analyze_suiting(paths, options), save=save, out=out, as_json=as_json)
+
+
+def _write_and_print(results: list[tuple[Analysis[Any], Any]], *, save: bool, out: Path | None, as_json: bool) -> None:
+    """Write the results, then print them: a reader that goes away must not cost a result."""
     from levilab.pipelines.catalogue import print_analysis
 
-    failure: LevilabError | None = None
-    written: list[Path] = []
-    if save:
-        failure, written = _tried(lambda: analysis.save(found, out))
+    failures: list[LevilabError] = []
+    messages: list[str] = []
+    for analysis, found in results:
+        messages += found.remarks
+        if save:
+            failure, written = _save(analysis, found, out)
+            failures += [failure] if failure else []
+            messages += [f"wrote {path}" for path in written]
     if as_json:
         import json
 
-        document = analysis.document(found, out or found.home)
-        typer.echo(json.dumps(document, indent=2, sort_keys=True, allow_nan=False))
+        documents = [analysis.document(found, out or found.home) for analysis, found in results]
+        one_or_all = documents[0] if len(documents) == 1 else documents
+        typer.echo(json.dumps(one_or_all, indent=2, sort_keys=True, allow_nan=False))
     else:
-        print_analysis(analysis, found)
-    for text in (*found.remarks, *(f"wrote {path}" for path in written)):
+        for analysis, found in results:
+            print_analysis(analysis, found)
+    for text in messages:
         typer.echo(text, err=True)
-    if failure:
-        raise failure
+    if failures:
+        raise failures[0]
 
 
 def _options(columns: str, reading_u: float | None, uncertainty: str, keep_outliers: bool) -> Options:
@@ -193,12 +237,12 @@ def _options(columns: str, reading_u: float | None, uncertainty: str, keep_outli
     return Options(parse_columns(columns), reading_u, cast("Kind", uncertainty), keep_outliers)
 
 
-def _tried(save: Callable[[], list[Path]]) -> tuple[LevilabError | None, list[Path]]:
+def _save(analysis: Analysis[Any], found: Any, out: Path | None) -> tuple[LevilabError | None, list[Path]]:
     """What kept the result from being written, or the files; what was found is shown either way."""
     from levilab.errors import LevilabError
 
     try:
-        return None, save()
+        return None, analysis.save(found, out)
     except LevilabError as error:
         return error, []
 
@@ -213,7 +257,11 @@ def report(
     reading_u: ReadingU = None,
     keep_outliers: KeepOutliers = False,
 ) -> None:
-    """Report runs in one self-contained file: what was measured, with what, figures, numbers, warnings."""
+    """Report runs in one self-contained file: what was measured, with what, figures, numbers, warnings.
+
+    The numbers are those that levilab analyze wrote beside the runs.  What has no result there, or one of other
+    readings or options than the given, is analyzed for the page.
+    """
     from levilab.report.page import write_report
 
     options = _options(columns, reading_u, "covariance", keep_outliers)

@@ -83,7 +83,7 @@ def _banner(found: Analyzed) -> tuple[str, str] | None:
     if len(made_up) == total:
         return "SYNTHETIC.", f"None of these {total} runs came from a real top. {below}"
     said = f"{len(made_up)} of {total} runs did not come from a real top ({', '.join(made_up)})"
-    mixed = "Means, comparison of the laws and figure are of both together and so no measurement: report the real runs "
+    mixed = "Means, comparisons and figure are of both together and so no measurement: report the real runs "
     return "REAL AND SYNTHETIC RUNS MIXED.", f"{said}. {mixed}by themselves. {below}"
 
 
