@@ -140,7 +140,7 @@ def a_million_readings() -> None:
     import pandas as pd
 
     from levilab.formats.table import read_table
-    from levilab.pipelines.readings import spin_readings
+    from levilab.pipelines.spindown.readings import spin_readings
 
     t = np.linspace(0, 190, 1_000_000)
     nu = spin("disc", t, 40.0, 2.34e-4) + np.random.default_rng(2).normal(0, 0.03, t.size)

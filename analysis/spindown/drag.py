@@ -109,7 +109,6 @@ class DragLaw:
 
     Attributes:
         name: its name in every result.
-        equation: for people.
         constants: names of its constants; with the start frequency these are its parameters, in this order.
         units: of the constants.
         orders: m = n − 1 of each term, none where the exponent is itself a parameter.
@@ -118,7 +117,6 @@ class DragLaw:
     """
 
     name: str
-    equation: str
     constants: tuple[str, ...]
     units: tuple[str, ...]
     orders: tuple[float, ...]
@@ -170,17 +168,17 @@ class DragLaw:
         return q
 
 
-def _of_order(m: float, name: str, equation: str, constant: str, unit: str) -> DragLaw:
+def _of_order(m: float, name: str, constant: str, unit: str) -> DragLaw:
     spin, gradient = partial(_power, m=m), partial(_power_gradient, m=m)
-    return DragLaw(name, equation, (constant,), (unit,), (m,), spin, gradient)
+    return DragLaw(name, (constant,), (unit,), (m,), spin, gradient)
 
 
 _TABLE = (
-    _of_order(0.0, "stokes", "ω̇ = −C₁ω", "c1", "1/s"),
-    _of_order(1.0, "newton", "ω̇ = −C₂ω²", "c2", "1/rad"),
-    _of_order(0.5, "disc", "ω̇ = −C₃⸝₂ω^(3/2)", "c32", "(rad/s)^-1/2/s"),
-    DragLaw("mixed", "ω̇ = −C₁ω − C₂ω²", ("c1", "c2"), ("1/s", "1/rad"), (0.0, 1.0), _mixed, _mixed_gradient),
-    DragLaw("power", "ω̇ = −cωⁿ", ("c", "exponent"), ("(rad/s)^(1-exponent)/s", "1"), (), _power, _power_gradient),
+    _of_order(0.0, "stokes", "c1", "1/s"),
+    _of_order(1.0, "newton", "c2", "1/rad"),
+    _of_order(0.5, "disc", "c32", "(rad/s)^-1/2/s"),
+    DragLaw("mixed", ("c1", "c2"), ("1/s", "1/rad"), (0.0, 1.0), _mixed, _mixed_gradient),
+    DragLaw("power", ("c", "exponent"), ("(rad/s)^(1-exponent)/s", "1"), (), _power, _power_gradient),
 )
 LAWS = MappingProxyType({law.name: law for law in _TABLE})
 

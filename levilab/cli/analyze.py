@@ -2,22 +2,42 @@
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
+import typer.core
 
 from levilab.cli.options import Columns, Json, KeepOutliers, Paths, ReadingU
+from levilab.cli.output import message, print_json
 from levilab.errors import LevilabError, UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from analysis.spindown.lawfit import Uncertainty as Kind
+    from levilab.pipelines.catalogue import Analysis
     from levilab.pipelines.sources import Options
 
-analyze_app = typer.Typer(no_args_is_help=True, help="Analyze runs or data files.")
+
+class AnalyzeGroup(typer.core.TyperGroup):
+    """`levilab analyze PATH…` without the name of an analysis is `levilab analyze each PATH…`."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put in the name where there is none, and none was meant."""
+        named = not args or args[0] in self.commands or args[0] in ctx.help_option_names
+        return super().parse_args(ctx, args if named or self._is_misspelt(args[0]) else ["each", *args])
+
+    def _is_misspelt(self, word: str) -> bool:
+        """Whether a word is nearly the name of an analysis, and no path."""
+        return bool(get_close_matches(word, self.commands)) and not Path(word).exists()
+
+
+analyze_app = typer.Typer(
+    cls=AnalyzeGroup,
+    no_args_is_help=True,
+    help="Analyze runs or data files.  Without a COMMAND: each analysis that suits, as levilab analyze runs/.",
+)
 
 
 class Uncertainty(StrEnum):
@@ -28,40 +48,72 @@ class Uncertainty(StrEnum):
     BOOTSTRAP = "bootstrap"
 
 
+UncertaintyKind = Annotated[
+    Uncertainty, typer.Option("--uncertainty", help="profile and bootstrap add 68 % intervals, and take longer.")
+]
+Save = Annotated[bool, typer.Option(help="Write the result and figures beside the run.")]
+ResultFolder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Write them there instead.")]
+
+
 @analyze_app.command("spindown", epilog="Example: levilab analyze spindown sample_data/")
 def analyze_spindown(
     paths: Paths,
     columns: Columns = "",
     reading_u: ReadingU = None,
-    uncertainty: Annotated[
-        Uncertainty, typer.Option(help="profile and bootstrap add 68 % intervals, and take longer.")
-    ] = Uncertainty.COVARIANCE,
+    uncertainty: UncertaintyKind = Uncertainty.COVARIANCE,
     keep_outliers: KeepOutliers = False,
-    save: Annotated[bool, typer.Option(help="Write result.json and figures beside the run.")] = True,
-    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write them there instead.")] = None,
+    save: Save = True,
+    out: ResultFolder = None,
     as_json: Json = False,
 ) -> None:
     """Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude."""
-    from levilab.pipelines.spindown.analysis import analyze_spindowns
-    from levilab.pipelines.spindown.document import as_document, save_result
-    from levilab.pipelines.spindown.table import print_spindown
+    from levilab.pipelines.catalogue import ANALYSES
 
-    analysis = analyze_spindowns(paths, options(columns, reading_u, uncertainty.value, keep_outliers))
-    failure: LevilabError | None = None
-    written: list[Path] = []
-    if save:  # first: a reader that goes away must not cost the result
-        failure, written = _tried(lambda: save_result(analysis, out or analysis.home))
+    analysis = ANALYSES["spindown"]
+    found = analysis.analyze(paths, options(columns, reading_u, uncertainty.value, keep_outliers))
+    _write_and_print([(analysis, found)], save=save, out=out, as_json=as_json)
+
+
+@analyze_app.command("each", hidden=True, epilog="Example: levilab analyze sample_data/")
+def analyze_each(
+    paths: Paths,
+    columns: Columns = "",
+    reading_u: ReadingU = None,
+    uncertainty: UncertaintyKind = Uncertainty.COVARIANCE,
+    keep_outliers: KeepOutliers = False,
+    save: Save = True,
+    out: ResultFolder = None,
+    as_json: Json = False,
+) -> None:
+    """Each analysis that suits the runs or data files; --json prints a list where several suit."""
+    from levilab.pipelines.catalogue import analyze_suiting
+
+    results = analyze_suiting(paths, options(columns, reading_u, uncertainty.value, keep_outliers))
+    _write_and_print(results, save=save, out=out, as_json=as_json)
+
+
+def _write_and_print(results: list[tuple[Analysis[Any], Any]], *, save: bool, out: Path | None, as_json: bool) -> None:
+    """Write the results, then print them: a reader that goes away must not cost a result."""
+    from levilab.pipelines.catalogue import print_analysis
+
+    failures: list[LevilabError] = []
+    messages: list[str] = []
+    for analysis, found in results:
+        messages += found.remarks
+        if save:
+            failure, written = _save(analysis, found, out)
+            failures += [failure] if failure else []
+            messages += [f"wrote {path}" for path in written]
     if as_json:
-        import json
-
-        document = as_document(analysis, out or analysis.home)
-        typer.echo(json.dumps(document, indent=2, sort_keys=True, allow_nan=False))
+        documents = [analysis.document(found, out or found.home) for analysis, found in results]
+        print_json(documents[0] if len(documents) == 1 else documents, sort_keys=True)
     else:
-        print_spindown(analysis)
-    for path in written:
-        typer.echo(f"wrote {path}", err=True)
-    if failure:
-        raise failure
+        for analysis, found in results:
+            print_analysis(analysis, found)
+    for text in messages:
+        message(text)
+    if failures:
+        raise failures[0]
 
 
 def options(columns: str, reading_u: float | None, uncertainty: str, keep_outliers: bool) -> Options:
@@ -74,9 +126,9 @@ def options(columns: str, reading_u: float | None, uncertainty: str, keep_outlie
     return Options(parse_columns(columns), reading_u, cast("Kind", uncertainty), keep_outliers)
 
 
-def _tried(save: Callable[[], list[Path]]) -> tuple[LevilabError | None, list[Path]]:
+def _save(analysis: Analysis[Any], found: Any, out: Path | None) -> tuple[LevilabError | None, list[Path]]:
     """What kept the result from being written, or the files; what was found is shown either way."""
     try:
-        return None, save()
+        return None, analysis.save(found, out)
     except LevilabError as error:
         return error, []

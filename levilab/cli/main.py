@@ -84,13 +84,15 @@ def _silence_output() -> None:
 
 
 def _prepare_output() -> None:
-    """Consoles and pipes of Windows may use code pages without ν and ω: those are shown as question marks there.
+    """Consoles and pipes of Windows may use code pages without ν and ⁻³: those are spelled out there.
 
     A stream that is closed from the start, as by ``>&-``, is None in Python: what goes there is thrown away.
     """
+    from levilab.present.characters import SPELLED_OUT
+
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: PTH123, SIM115 - until the end
         reconfigure = getattr(getattr(sys, name), "reconfigure", None)
         if reconfigure:
-            reconfigure(errors="replace")
+            reconfigure(errors=SPELLED_OUT)

@@ -27,7 +27,11 @@ def report(
     reading_u: ReadingU = None,
     keep_outliers: KeepOutliers = False,
 ) -> None:
-    """Report runs in one self-contained file: what was measured, with what, figures, numbers, warnings."""
+    """Report runs in one self-contained file: what was measured, with what, figures, numbers, warnings.
+
+    The numbers are those that levilab analyze wrote beside the runs.  What has no result there, or one of other
+    readings or options than the given, is analyzed for the page.
+    """
     from levilab.report.page import write_report
 
     chosen = options(columns, reading_u, "covariance", keep_outliers)

@@ -8,16 +8,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from analysis.uncertainty import Estimate
 
-#: The constants in the field's letters.
-SYMBOLS = {
-    "start_frequency": "ν₀",
-    "c1": "C₁",
-    "c2": "C₂",
-    "c32": "C₃/₂",
-    "c": "c",
-    "exponent": "n",
-}
-
 #: Units as people write them, where the files' plain text is harder to read.
 UNITS = {
     "1": "",
@@ -26,9 +16,6 @@ UNITS = {
     "(rad/s)^-1/2/s": "(rad/s)^−½/s",
     "(rad/s)^(1-exponent)/s": "(rad/s)^(1−n)/s",
 }
-
-#: What is drawn against time to make a law a straight line.
-AXES = {"stokes": "ln ω", "newton": "1/ω", "disc": "ω^−½"}
 
 
 def with_uncertainty(estimate: Estimate) -> str:

@@ -30,11 +30,16 @@ STYLE: Any = {
 }
 
 
-def save_png(figure: Figure, path: Path) -> None:
-    """Write a figure as a picture, which replaces an older one whole or not at all.  Raises OSError."""
+def as_png(figure: Figure) -> bytes:
+    """A figure as a picture."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=150)
-    replace_atomically(path, buffer.getvalue())
+    return buffer.getvalue()
+
+
+def save_png(figure: Figure, path: Path) -> None:
+    """Write a figure as a picture, which replaces an older one whole or not at all.  Raises OSError."""
+    replace_atomically(path, as_png(figure))
 
 
 def as_svg(figure: Figure) -> str:

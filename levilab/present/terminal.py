@@ -1,4 +1,4 @@
-"""The terminal: how wide it is, and what tables look like on it."""
+"""The terminal: how wide it is, which characters it has, and what tables look like on it."""
 
 from __future__ import annotations
 
@@ -8,22 +8,41 @@ from typing import TYPE_CHECKING
 
 from rich import box
 from rich.console import Console
-from rich.table import Table
+from rich.markup import escape
+from rich.table import Table as RichTable
+
+from levilab.present.characters import for_encoding
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from typing import Any
+
+    from rich.text import Text
+
+    from levilab.present.tables import Table
+
+#: SIMPLE_HEAD in plain ASCII; rich itself would draw a frame.
+_ASCII_HEAD = box.Box("    \n    \n -- \n    \n    \n -- \n    \n    \n", ascii=True)
+
+
+class _Terminal(Console):
+    """A console on which every text is spelled in the characters of the stream, before its width is measured."""
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        """All texts come through here: those printed, a table's cells, its title and its caption."""
+        return super().render_str(for_encoding(text, self.encoding), **options)
 
 
 def terminal() -> Console:
     """As wide as the terminal; into a pipe or file as wide as the tables need."""
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 160
-    return Console(width=max(width, 80), highlight=False)
+    return _Terminal(width=max(width, 80), highlight=False)
 
 
-def new_table(title: str | None, *columns: str, numbers: Sequence[str] = ()) -> Table:
+def new_table(title: str | None, *columns: str, numbers: Sequence[str] = ()) -> RichTable:
     """An empty table; numbers: the columns that are aligned to the right."""
-    table = Table(
-        box=box.SIMPLE_HEAD,
+    table = RichTable(
+        box=box.SIMPLE_HEAD if _is_unicode(sys.stdout.encoding) else _ASCII_HEAD,
         padding=(0, 1, 0, 0),
         pad_edge=False,
         title=title,
@@ -33,3 +52,19 @@ def new_table(title: str | None, *columns: str, numbers: Sequence[str] = ()) -> 
     for column in columns:
         table.add_column(column, justify="right" if column in numbers else "left", overflow="fold")
     return table
+
+
+def draw(table: Table) -> RichTable:
+    """A table that is data."""
+    drawn = new_table(escape(table.title), *map(escape, table.heads))
+    for k in table.numbers:
+        drawn.columns[k].justify = "right"
+    for row in table.rows:
+        if row.kind == "together":
+            drawn.add_section()
+        drawn.add_row(*map(escape, row.cells))
+    return drawn
+
+
+def _is_unicode(encoding: str | None) -> bool:
+    return for_encoding("─", encoding) == "─"

@@ -11,7 +11,7 @@ from rich.markup import escape
 from levilab.errors import DataError
 from levilab.present.numbers import short_name
 from levilab.present.terminal import new_table, terminal
-from levilab.runs.run import Run, find_runs
+from levilab.runs.run import READINGS, Run, find_runs
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -55,10 +55,10 @@ def list_runs(root: Path) -> list[Listed]:
 def _listed(folder: Path) -> Listed:
     try:
         run = Run.load(folder)
-        frame = run.readings().frame if run.count() else None
+        frame = run.readings().frame if (folder / READINGS).exists() else None
     except DataError as error:
         return Listed(str(folder), None, "?", "unreadable", 0, 0.0, synthetic=False, note="", problem=str(error))
-    times = frame["time_s"] if frame is not None and "time_s" in frame else None
+    times = frame["time_s"] if frame is not None and len(frame) and "time_s" in frame else None
     simulation = _table(run.record.model_extra, "simulation")
     return Listed(
         path=str(folder),

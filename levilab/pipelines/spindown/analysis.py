@@ -3,37 +3,78 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from analysis.errors import AnalysisError
 from analysis.spindown.combine import Combined, combine
 from analysis.spindown.fit import SpinDown, fit_spin_down
 from levilab.errors import DataError
-from levilab.pipelines.sources import (
-    Options,
-    Source,
-    collect,
-)
+from levilab.pipelines.result import Place, place_of
+from levilab.pipelines.sources import Needs, Options, Source, collect
+from levilab.pipelines.spindown.readings import Readings, spin_readings
 from levilab.runs.run import find_run
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
+    from pathlib import Path
+
+SPINDOWN = "spindown"
+#: The runs that suit, and what is needed of a data file.
+NEEDS = Needs(
+    analysis=SPINDOWN,
+    experiments=frozenset({"spin"}),
+    quantities=("time_s", "spin_frequency_hz", "spin_frequency_u_hz"),
+    read=spin_readings,
+)
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where the fits of one run come from.  options: how they were made; text: for people."""
+
+    options: Options
+    text: str = "analyzed now"
 
 
 @dataclass(frozen=True)
 class SpinDownAnalysis:
     """Spin-downs, each by itself and together.
 
-    runs: one per source; home: the folder that the result belongs to; warnings: about the inputs.
+    runs, origins: one per source; place: where the result belongs; warnings: about the inputs; remarks: what does not
+    belong to the analysis.
     """
 
-    sources: tuple[Source, ...]
+    sources: tuple[Source[Readings], ...]
     runs: tuple[SpinDown, ...]
     combined: Combined
     options: Options
-    home: Path
+    place: Place
     warnings: tuple[str, ...]
+    remarks: tuple[str, ...]
+    origins: tuple[Origin, ...]
+
+    @property
+    def home(self) -> Path:
+        """The folder that the result belongs to."""
+        return self.place.folder
+
+    @property
+    def text(self) -> str:
+        """What the data say, in a few sentences."""
+        return self.combined.verdict.text
+
+    @property
+    def all_warnings(self) -> list[str]:
+        """Every warning once, a run's with its name where there are several runs."""
+        several = len(self.runs) > 1
+        texts = [*self.warnings, *self.combined.warnings]
+        excluded = {name for name, _ in self.combined.verdict.excluded}  # what they lack is of no interest any more
+        texts += [text for fit in self.combined.fits if fit.name not in excluded for text in fit.warnings]
+        for source, run in zip(self.sources, self.runs, strict=True):
+            of_laws = [warning for fit in run.fits if fit.name not in excluded for warning in fit.warnings]
+            prefix = f"{source.name}: " if several else ""
+            texts += [prefix + text for text in (*source.warnings, *run.warnings, *of_laws)]
+        return list(dict.fromkeys(texts))
 
 
 def analyze_spindowns(paths: Sequence[Path], options: Options) -> SpinDownAnalysis:
@@ -42,13 +83,22 @@ def analyze_spindowns(paths: Sequence[Path], options: Options) -> SpinDownAnalys
     Raises DataError for what cannot be used; the text names the file.
     """
     paths = [find_run(path) for path in paths]
-    sources, warnings = collect(paths, "spindown", options)
-    runs = tuple(_fit(source, options) for source in sources)
-    told = (*warnings, *_about_inputs(sources, options))
-    return SpinDownAnalysis(sources, runs, combine(runs), options, _home(paths, sources), told)
+    found = collect(paths, NEEDS, lambda _: options.columns)
+    runs = tuple(fit_source(source, options) for source in found.sources)
+    return SpinDownAnalysis(
+        sources=found.sources,
+        runs=runs,
+        combined=combine(runs),
+        options=options,
+        place=place_of(paths, found.sources),
+        warnings=(*found.warnings, *about_inputs(found.sources, options)),
+        remarks=found.remarks,
+        origins=(Origin(options),) * len(runs),
+    )
 
 
-def _fit(source: Source, options: Options) -> SpinDown:
+def fit_source(source: Source[Readings], options: Options) -> SpinDown:
+    """All laws fitted to one input.  Raises DataError, which names the file."""
     readings = source.readings
     try:
         return fit_spin_down(
@@ -64,14 +114,8 @@ def _fit(source: Source, options: Options) -> SpinDown:
         raise DataError(f"{source.data}: {error}") from error
 
 
-def _home(paths: Sequence[Path], sources: Sequence[Source]) -> Path:
-    """Beside the run or the file; of several runs the folder that was searched for them, else the present one."""
-    if len(sources) == 1:
-        return sources[0].path if sources[0].run else sources[0].path.parent
-    return paths[0] if len(paths) == 1 else Path()
-
-
-def _about_inputs(sources: Sequence[Source], options: Options) -> Iterable[str]:
+def about_inputs(sources: Sequence[Source[Readings]], options: Options) -> Iterable[str]:
+    """What to know of the inputs before using the numbers."""
     synthetic = sum(source.synthetic for source in sources)
     if 0 < synthetic < len(sources):
         yield (
@@ -80,6 +124,6 @@ def _about_inputs(sources: Sequence[Source], options: Options) -> Iterable[str]:
         )
     given = [source.name for source in sources if source.readings.u is not None]
     if options.reading_u is not None and given:
-        yield f"--reading-u {options.reading_u:g} Hz takes the place of the uncertainties in {', '.join(given)}"
+        yield f"the given u of a reading, {options.reading_u:g} Hz, takes the place of the uncertainties in {', '.join(given)}"
     if options.columns and all(source.run for source in sources):
-        yield "--columns is for data files; there is none among the inputs"
+        yield "names of columns were given, but none of the inputs is a data file"

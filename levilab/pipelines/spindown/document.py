@@ -1,77 +1,274 @@
-"""Results → result.json, and the figures beside it."""
+"""Spin-downs ↔ result.json."""
 
 from __future__ import annotations
 
-import json
-import math
-import os
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Any, Literal, Self
 
-from levilab.files import CannotWrite, replace_atomically
-from levilab.pipelines.spindown.table import all_warnings
+import numpy as np
+from pydantic import Field, model_validator
+
+from analysis.spindown.combine import Combined, CombinedLaw, Mean, combine
+from analysis.spindown.drag import LAWS
+from analysis.spindown.fit import SpinDown
+from analysis.spindown.lawfit import LawFit
+from analysis.spindown.selection import Statistics
+from analysis.spindown.verdict import Verdict
+from levilab.errors import DataError
+from levilab.pipelines.result import (
+    SCHEMA,
+    Archive,
+    Earlier,
+    Part,
+    Place,
+    Result,
+    RunPart,
+    Value,
+    finite,
+    place_of,
+    relative,
+)
+from levilab.pipelines.result import save as save_files
+from levilab.pipelines.sources import Found, Options, Source, collect
+from levilab.pipelines.spindown.analysis import (
+    NEEDS,
+    SPINDOWN,
+    Origin,
+    SpinDownAnalysis,
+    about_inputs,
+    fit_source,
+)
+from levilab.runs.run import find_run
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
 
-    from analysis.spindown.lawfit import LawFit
-    from analysis.spindown.selection import Statistics
     from analysis.uncertainty import Estimate
-    from levilab.pipelines.sources import Source
-    from levilab.pipelines.spindown.analysis import SpinDownAnalysis
-
-SCHEMA = "levilab-result/1"
-RESULT, FIGURE = "result.json", "spindown.png"
-
-#: What of the statistics is written, in INTERFACE's names.
-_STATISTICS = (
-    "n", "rms_residual", "reduced_chi_square", "aicc", "bic", "weight", "durbin_watson", "runs_test_p",
-    "difference",
-)  # fmt: skip
+    from levilab.pipelines.spindown.readings import Readings
 
 
-def save_result(analysis: SpinDownAnalysis, folder: Path) -> list[Path]:
-    """Write result.json and the figure into a folder; returns the files.  Raises CannotWrite."""
+# --- what is in it -------------------------------------------------------------------------------------
+
+
+class StatisticsPart(Part):
+    """How well a law fits; see `analysis.spindown.selection.Statistics`."""
+
+    n: int
+    rms_residual: float
+    reduced_chi_square: float | None
+    aicc: float | None
+    bic: float | None
+    weight: float | None
+    durbin_watson: float | None
+    runs_test_p: float | None
+    difference: float | None
+
+
+class FitPart(Part):
+    """What it takes to draw and to combine a fit.
+
+    solution: in the dimensionless numbers of `analysis.spindown.drag`.
+    """
+
+    n_parameters: int
+    rss: float
+    chi_square: float | None
+    misfit: float
+    solution: tuple[float, ...] | None = None
+
+
+class ModelPart(Part):
+    """One drag law, fitted to one run or, without a start, over several."""
+
+    name: str
+    parameters: dict[str, Value]
+    covariance: tuple[tuple[float | None, ...], ...] | None
+    statistics: StatisticsPart
+    fit: FitPart
+    warnings: tuple[str, ...]
+    linearised: dict[str, Value] | None = None
+    scatter: dict[str, float | None] | None = None
+
+    @model_validator(mode="after")
+    def _is_a_law(self) -> Self:
+        law = LAWS.get(self.name)
+        if law is None:
+            raise ValueError(f"{self.name!r} is no drag law; known are {', '.join(LAWS)}")
+        if not set(law.constants) <= set(self.parameters):
+            raise ValueError(f"{self.name} lacks one of its constants {', '.join(law.constants)}")
+        return self
+
+
+class ExcludedPart(Part):
+    """A law that the readings exclude, and why."""
+
+    name: str
+    reason: str
+
+
+class StandingPart(Part):
+    """The laws by what the readings say about them; see `analysis.spindown.verdict.Verdict`."""
+
+    tied: tuple[str, ...]
+    needless: tuple[str, ...]
+    weak: tuple[str, ...]
+    excluded: tuple[ExcludedPart, ...]
+
+
+class OutlierPart(Part):
+    """A reading that does not belong to the others."""
+
+    index: int = Field(ge=0)
+    time_s: float
+    spin_frequency_hz: float
+
+
+class ReferencePart(Part):
+    """The units of the dimensionless solutions of a run."""
+
+    frequency_hz: float
+    time_s: float
+
+
+class _WithLaws(Part):
+    """What stands at the top of a result and with each of its runs."""
+
+    models: tuple[ModelPart, ...]
+    best_model: str
+    verdict: str
+    decided: bool
+    standing: StandingPart
+
+    @model_validator(mode="after")
+    def _best_is_there(self) -> Self:
+        if self.best_model not in {model.name for model in self.models}:
+            raise ValueError(f"best_model {self.best_model!r} is not among the models")
+        return self
+
+
+class SpinDownPart(RunPart, _WithLaws):
+    """One spin-down."""
+
+    reference: ReferencePart
+    outliers: tuple[OutlierPart, ...]
+
+    @property
+    def start_time(self) -> float:
+        """Time of the first reading [s]."""
+        start = self.values["start_time"].value
+        assert start is not None  # as validated
+        return start
+
+    @model_validator(mode="after")
+    def _is_whole(self) -> Self:
+        if "start_time" not in self.values or self.values["start_time"].value is None:
+            raise ValueError("a run lacks its start time")
+        for model in self.models:
+            if len(model.fit.solution or ()) != len(LAWS[model.name].parameters):
+                raise ValueError(f"{model.name}: its solution is missing or of another law")
+            if not set(LAWS[model.name].parameters) <= set(model.parameters):
+                raise ValueError(f"{model.name} lacks its start frequency")
+        return self
+
+
+class BootstrapPart(Part):
+    """How the bootstrap drew."""
+
+    samples: int
+    seed: int
+
+
+class SettingsPart(Part):
+    """How the readings were analyzed."""
+
+    columns: dict[str, str]
+    reading_u_hz: float | None
+    uncertainty: Literal["covariance", "profile", "bootstrap"]
+    keep_outliers: bool
+    bootstrap: BootstrapPart | None
+
+    @property
+    def options(self) -> Options:
+        """The same as options."""
+        drawn = {"bootstrap_samples": self.bootstrap.samples, "seed": self.bootstrap.seed} if self.bootstrap else {}
+        return Options(self.columns or None, self.reading_u_hz, self.uncertainty, self.keep_outliers, **drawn)
+
+
+class SpinDownResult(Result, _WithLaws):
+    """result.json of spin-downs."""
+
+    analysis: Literal["spindown"] = "spindown"
+    settings: SettingsPart
+    runs: tuple[SpinDownPart, ...]
+
+    @model_validator(mode="after")
+    def _laws_are_everywhere(self) -> Self:
+        names = {model.name for model in self.models}
+        if not all(names <= {model.name for model in run.models} for run in self.runs):
+            raise ValueError("a run lacks a model that the whole has")
+        return self
+
+
+# --- writing -------------------------------------------------------------------------------------------
+
+
+def save_result(analysis: SpinDownAnalysis, folder: Path | None = None) -> list[Path]:
+    """Write result.json and the figure beside the inputs, or into a folder; returns the files.  Raises CannotWrite."""
     from levilab.pipelines.spindown.figure import spindown_figure
-    from levilab.present.style import save_png
+    from levilab.present.style import as_png
 
-    text = json.dumps(as_document(analysis, folder), indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        replace_atomically(folder / RESULT, text + "\n")
-        save_png(spindown_figure(analysis), folder / FIGURE)
-    except OSError as error:
-        raise CannotWrite(
-            f"the result could not be written into {folder} ({error.strerror or error}): "
-            "choose another place with --out, or print only with --no-save"
-        ) from error
-    return [folder / RESULT, folder / FIGURE]
+    place = replace(analysis.place, folder=folder or analysis.home)
+    return save_files(result_of(analysis, place), place, as_png(spindown_figure(analysis)))
 
 
 def as_document(analysis: SpinDownAnalysis, folder: Path) -> dict[str, Any]:
     """The content of result.json; paths in it are relative to the folder that it is for."""
-    combined = analysis.combined
-    document: dict[str, Any] = _finite(
-        {
-            "schema": SCHEMA,
-            "analysis": "spindown",
-            "inputs": [
-                {"path": _relative(source.data, folder), "sha256": source.sha256} for source in analysis.sources
-            ],
-            "synthetic": any(source.synthetic for source in analysis.sources),
-            "software": software_versions(),
-            "settings": _settings(analysis),
-            "values": _combined_values(analysis),
-            "models": _combined_models(analysis),
-            "best_model": combined.best,
-            "verdict": combined.verdict.text,
-            "decided": combined.verdict.decided,
-            "runs": [_run(source, analysis, k, folder) for k, source in enumerate(analysis.sources)],
-            "warnings": all_warnings(analysis),
-        }
-    )
-    return document
+    return result_of(analysis, Place(folder)).as_dict()
+
+
+def result_of(analysis: SpinDownAnalysis, place: Place) -> SpinDownResult:
+    """The result for a place."""
+    combined, sources = analysis.combined, analysis.sources
+    document = {
+        "schema": SCHEMA,
+        "analysis": SPINDOWN,
+        "inputs": [{"path": relative(source.data, place.folder), "sha256": source.sha256} for source in sources],
+        "synthetic": any(source.synthetic for source in sources),
+        "software": software_versions(),
+        "settings": _settings(analysis.options),
+        "values": _combined_values(analysis),
+        "models": _combined_models(analysis),
+        "runs": [_run(analysis, k, place.folder) for k in range(len(sources))],
+        "warnings": analysis.all_warnings,
+    }
+    return SpinDownResult.model_validate(finite(document | _verdict(combined.best, combined.verdict)))
+
+
+def _settings(options: Options) -> dict[str, Any]:
+    drawn = {"samples": options.bootstrap_samples, "seed": options.seed}
+    return {
+        "columns": dict(options.columns or {}),
+        "reading_u_hz": options.reading_u,
+        "uncertainty": options.uncertainty,
+        "keep_outliers": options.keep_outliers,
+        "bootstrap": drawn if options.uncertainty == "bootstrap" else None,
+    }
+
+
+def _verdict(best: str, verdict: Verdict) -> dict[str, Any]:
+    return {
+        "best_model": best,
+        "verdict": verdict.text,
+        "decided": verdict.decided,
+        "standing": {
+            "tied": list(verdict.indistinguishable),
+            "needless": list(verdict.needless),
+            "weak": list(verdict.weak),
+            "excluded": [{"name": name, "reason": reason} for name, reason in verdict.excluded],
+        },
+    }
 
 
 def _combined_values(analysis: SpinDownAnalysis) -> dict[str, Any]:
@@ -95,7 +292,8 @@ def _combined_models(analysis: SpinDownAnalysis) -> list[dict[str, Any]]:
             "parameters": _values(fit.constants),
             "covariance": None,
             "scatter": {name: mean.scatter for name, mean in fit.constants.items()},
-            "statistics": _statistics(fit.statistics),
+            "statistics": _some(fit.statistics, StatisticsPart),
+            "fit": _some(fit.statistics, FitPart),
             "warnings": list(fit.warnings),
         }
         | ({"linearised": _values(fit.linearised)} if fit.linearised else {})
@@ -109,28 +307,17 @@ def _model(fit: LawFit) -> dict[str, Any]:
         "name": fit.name,
         "parameters": _values(fit.parameters),
         "covariance": None if fit.covariance is None else fit.covariance.tolist(),
-        "statistics": _statistics(fit.statistics),
+        "statistics": _some(fit.statistics, StatisticsPart),
+        "fit": _some(fit.statistics, FitPart) | {"solution": fit.solution.tolist()},
         "warnings": list(fit.warnings),
     } | ({"linearised": _values(fit.linearised)} if fit.linearised else {})
 
 
-def _settings(analysis: SpinDownAnalysis) -> dict[str, Any]:
-    options = analysis.options
+def _run(analysis: SpinDownAnalysis, k: int, folder: Path) -> dict[str, Any]:
+    source, run = analysis.sources[k], analysis.runs[k]
+    frequency, duration = run.fits[0].reference
     return {
-        "columns": dict(options.columns or {}),
-        "reading_u_hz": options.reading_u,
-        "uncertainty": options.uncertainty,
-        "keep_outliers": options.keep_outliers,
-        "bootstrap": {"samples": options.bootstrap_samples, "seed": options.seed}
-        if options.uncertainty == "bootstrap"
-        else None,
-    }
-
-
-def _run(source: Source, analysis: SpinDownAnalysis, k: int, folder: Path) -> dict[str, Any]:
-    run = analysis.runs[k]
-    return {
-        "path": _relative(source.path, folder),
+        "path": relative(source.path, folder),
         "synthetic": source.synthetic,
         "values": {
             "start_time": {"value": run.start_time, "u": None, "unit": "s"},
@@ -138,8 +325,7 @@ def _run(source: Source, analysis: SpinDownAnalysis, k: int, folder: Path) -> di
         }
         | _values(run.fit(run.best).parameters),
         "models": [_model(fit) for fit in run.fits],
-        "best_model": run.best,
-        "verdict": run.verdict.text,
+        "reference": {"frequency_hz": frequency, "time_s": duration},
         "outliers": [
             {
                 "index": i,
@@ -148,8 +334,8 @@ def _run(source: Source, analysis: SpinDownAnalysis, k: int, folder: Path) -> di
             }
             for i in run.outliers
         ],
-        "warnings": [*source.readings.warnings, *run.warnings],
-    }
+        "warnings": [*source.warnings, *run.warnings],
+    } | _verdict(run.best, run.verdict)
 
 
 def _values(estimates: Mapping[str, Estimate]) -> dict[str, Any]:
@@ -158,25 +344,179 @@ def _values(estimates: Mapping[str, Estimate]) -> dict[str, Any]:
 
 def _value(estimate: Estimate) -> dict[str, Any]:
     value: dict[str, Any] = {"value": estimate.value, "u": estimate.u, "unit": estimate.unit}
-    return value | ({"interval_68": list(estimate.interval)} if estimate.interval else {})
+    if estimate.interval:
+        value["interval_68"] = list(estimate.interval)
+    if isinstance(estimate, Mean) and estimate.scatter is not None:
+        value |= {"scatter": estimate.scatter, "runs": estimate.degrees_of_freedom + 1}
+    return value
 
 
-def _statistics(statistics: Statistics) -> dict[str, Any]:
-    return {name: getattr(statistics, name) for name in _STATISTICS}
+def _some(statistics: Statistics, part: type[Part]) -> dict[str, Any]:
+    """Those of the statistics that stand in a part of the document."""
+    return {name: getattr(statistics, name) for name in part.model_fields if hasattr(statistics, name)}
 
 
-def _relative(path: Path, folder: Path) -> str:
-    """With forward slashes on every system; whole where there is no way (another drive)."""
-    try:
-        return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
-    except ValueError:
-        return path.resolve().as_posix()
+# --- reading -------------------------------------------------------------------------------------------
 
 
-def _finite(value: Any) -> Any:
-    """What no number can say becomes null; json.dumps with allow_nan=False guards the rest."""
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+def recall_spindowns(paths: Sequence[Path], options: Options) -> SpinDownAnalysis:
+    """What `analyze` found at the paths, from its result.json; analyzed anew is only what has none that holds.
+
+    A result holds as long as the readings are the same bytes, and it was made with the given options.  Options that are
+    at their defaults are not given: those of the result then count, for what is analyzed anew, too.
+
+    Raises DataError for what cannot be used, a damaged result.json included.
+    """
+    paths = [find_run(path) for path in paths]
+    archive = Archive(paths, SpinDownResult)
+    given = {f.name: getattr(options, f.name) for f in fields(Options) if getattr(options, f.name) != f.default}
+
+    def columns(path: Path) -> Mapping[str, str] | None:
+        earlier = archive.earlier(path, path)
+        return options.columns or (earlier.result.settings.options.columns if earlier else None)
+
+    found = collect(paths, NEEDS, columns)
+    place = place_of(paths, found.sources)
+    whole = archive.whole(found.sources)
+    if whole and _holds(whole[1].settings.options, given):
+        return _restored(whole[1], whole[0], found, place)
+    recalled = [_recalled(source, archive, given) for source in found.sources]
+    runs = tuple(run for _, run, _ in recalled)
+    sources = tuple(source for source, _, _ in recalled)
+    return SpinDownAnalysis(
+        sources=sources,
+        runs=runs,
+        combined=combine(runs),
+        options=options,
+        place=place,
+        warnings=(*found.warnings, *about_inputs(sources, options)),
+        remarks=found.remarks,
+        origins=tuple(origin for _, _, origin in recalled),
+    )
+
+
+def _holds(made_with: Options, given: Mapping[str, Any]) -> bool:
+    return _settings(replace(made_with, **given)) == _settings(made_with)
+
+
+def _recalled(
+    source: Source[Readings], archive: Archive[SpinDownResult], given: Mapping[str, Any]
+) -> tuple[Source[Readings], SpinDown, Origin]:
+    """One input: what was found of it, or its fit."""
+    earlier = archive.earlier(source.path, source.data, source.sha256)
+    if earlier is None:
+        options = Options(**given)
+        return source, fit_source(source, options), Origin(options, "analyzed for this page: there was no result yet")
+    made_with = earlier.result.settings.options
+    if earlier.sha256 == source.sha256 and _holds(made_with, given):
+        run = _spin_down(earlier.result.runs[earlier.number], source, made_with, earlier.file)
+        return replace(source, warnings=()), run, _origin(earlier)
+    options = replace(made_with, **given)
+    why = "the readings are others than in" if earlier.sha256 != source.sha256 else "other options than those of"
+    return source, fit_source(source, options), Origin(options, f"analyzed for this page: {why} {earlier.file}")
+
+
+def _origin(earlier: Earlier[SpinDownResult]) -> Origin:
+    now, then = software_versions(), earlier.result.software
+    by = f", by levilab {then.get('levilab', '?')}" if then != now else ""
+    return Origin(earlier.result.settings.options, f"as levilab analyze found it{by}: {earlier.file}")
+
+
+def _restored(result: SpinDownResult, file: Path, found: Found[Readings], place: Place) -> SpinDownAnalysis:
+    """All of it as it was found."""
+    numbers = {given.sha256: k for k, given in enumerate(result.inputs)}
+    options = result.settings.options
+    order = [numbers[source.sha256] for source in found.sources]
+    return SpinDownAnalysis(
+        sources=tuple(replace(source, warnings=()) for source in found.sources),
+        runs=tuple(
+            _spin_down(result.runs[k], source, options, file) for k, source in zip(order, found.sources, strict=True)
+        ),
+        combined=_combined(result),
+        options=options,
+        place=place,
+        warnings=tuple(dict.fromkeys((*result.warnings, *found.warnings))),
+        remarks=found.remarks,
+        origins=tuple(_origin(Earlier(file, result, k)) for k in order),
+    )
+
+
+def _combined(result: SpinDownResult) -> Combined:
+    fits = tuple(
+        CombinedLaw(
+            name=model.name,
+            constants={name: _mean(model.parameters[name]) for name in LAWS[model.name].constants},
+            linearised={name: _mean(value) for name, value in model.linearised.items()} if model.linearised else None,
+            statistics=_statistics(model),
+            warnings=model.warnings,
+        )
+        for model in result.models
+    )
+    return Combined(fits, result.best_model, _verdict_of(result), len(result.runs), ())
+
+
+def _mean(value: Value) -> Mean:
+    estimate = value.estimate
+    return Mean(
+        estimate.value, estimate.u, estimate.unit, estimate.interval, value.scatter, value.runs - 1 if value.runs else 0
+    )
+
+
+def _spin_down(part: SpinDownPart, source: Source[Readings], options: Options, file: Path) -> SpinDown:
+    """One run; its curves and what they leave over from the readings."""
+    readings = source.readings
+    outliers = [one.index for one in part.outliers]
+    if max(outliers, default=0) >= len(readings):
+        raise DataError(f"{file}: names an outlier that {source.data} does not hold: analyze anew with levilab analyze")
+    used = np.ones(len(readings), dtype=bool)
+    if not options.keep_outliers:
+        used[outliers] = False
+    time, frequency = readings.time[used], readings.frequency[used]
+    u = readings.u if options.reading_u is None else np.full(len(readings), options.reading_u)
+    return SpinDown(
+        fits=tuple(_law_fit(model, part.reference, time, frequency, part.start_time) for model in part.models),
+        best=part.best_model,
+        verdict=_verdict_of(part),
+        time=time,
+        frequency=frequency,
+        u=None if u is None else u[used],
+        outliers=tuple(outliers),
+        start_time=part.start_time,
+        warnings=part.warnings,
+    )
+
+
+def _law_fit(
+    model: ModelPart, reference: ReferencePart, time: np.ndarray, frequency: np.ndarray, start_time: float
+) -> LawFit:
+    solution = np.array(model.fit.solution)
+    tau, x = (time - start_time) / reference.time_s, frequency / reference.frequency_hz
+    return LawFit(
+        name=model.name,
+        parameters={name: model.parameters[name].estimate for name in LAWS[model.name].parameters},
+        covariance=None if model.covariance is None else np.array(model.covariance, dtype=float),
+        statistics=_statistics(model),
+        residuals=reference.frequency_hz * (x - LAWS[model.name].spin(tau, solution)),
+        linearised={name: value.estimate for name, value in model.linearised.items()} if model.linearised else None,
+        warnings=model.warnings,
+        start_time=start_time,
+        solution=solution,
+        reference=(reference.frequency_hz, reference.time_s),
+    )
+
+
+def _statistics(model: ModelPart) -> Statistics:
+    return Statistics(**model.statistics.model_dump(), **model.fit.model_dump(exclude={"solution"}))
+
+
+def _verdict_of(part: _WithLaws) -> Verdict:
+    standing = part.standing
+    return Verdict(
+        best=part.best_model,
+        decided=part.decided,
+        indistinguishable=standing.tied,
+        needless=standing.needless,
+        weak=standing.weak,
+        excluded=tuple((one.name, one.reason) for one in standing.excluded),
+        text=part.verdict,
+    )

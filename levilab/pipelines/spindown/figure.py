@@ -1,4 +1,4 @@
-"""Results of analyses → figures, and what all figures look like."""
+"""Spin-downs → their figure."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont, get_font
 
+from levilab.pipelines.spindown.laws import SHOWN_LAWS
 from levilab.present.numbers import short_name
 from levilab.present.style import STYLE, row
 
@@ -23,23 +24,10 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: Okabe and Ito's colours, told apart by everyone; one a law, whatever the figure.
-COLOURS = {"stokes": "#0072B2", "newton": "#D55E00", "disc": "#009E73", "mixed": "#CC79A7", "power": "#E69F00"}
-EQUATIONS = {
-    "stokes": "ω̇ = −C₁ω",
-    "newton": "ω̇ = −C₂ω²",
-    "disc": "ω̇ = −Cω$^{3/2}$",
-    "mixed": "ω̇ = −C₁ω − C₂ω²",
-    "power": "ω̇ = −cωⁿ",
-}
 #: One a run, as long as there are so few.
 MARKERS = "osD^vP*X"
-#: (axis, what is drawn of ω, the law that makes it straight)
-STRAIGHT_LINES: tuple[tuple[str, Callable[[Array], Array], str], ...] = (
-    ("ln ω   (ω in rad/s)", np.log, "stokes"),
-    ("1/ω  [s/rad]", lambda omega: 1 / omega, "newton"),
-    ("ω$^{−1/2}$  [(s/rad)$^{1/2}$]", lambda omega: omega**-0.5, "disc"),
-)
+#: The laws that have a straight line.
+STRAIGHT_LINES = {name: law.straight for name, law in SHOWN_LAWS.items() if law.straight}
 #: More points than a panel can show are thinned out evenly; up to so many have bars each; so many means of more.
 MOST_POINTS, MOST_BARS, MEANS = 600, 200, 40
 #: A bar longer than the marker's radius, as part of the panel's height, is seen; outliers with their value written.
@@ -51,7 +39,7 @@ def spindown_figure(analysis: SpinDownAnalysis) -> Figure:
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10, 12.5))
         _draw_spin(row(figure, 0.665, 0.31)[0], analysis)
-        _draw_residuals(figure, row(figure, 0.425, 0.15, len(COLOURS), gap=0.055), analysis)
+        _draw_residuals(figure, row(figure, 0.425, 0.15, len(SHOWN_LAWS), gap=0.055), analysis)
         _draw_straight_lines(
             figure,
             row(figure, 0.16, 0.185, len(STRAIGHT_LINES), gap=0.095),
@@ -67,7 +55,7 @@ def spindown_figure(analysis: SpinDownAnalysis) -> Figure:
 def _draw_spin(axes: Axes, analysis: SpinDownAnalysis) -> None:
     """The readings of all runs, every law through the first, the best one through each."""
     span = _set_range(axes, analysis)
-    for name in COLOURS:
+    for name in SHOWN_LAWS:
         _draw_law(axes, analysis, name)
     for k in range(len(analysis.runs)):
         _draw_readings(axes, analysis, k, analysis.runs[k].frequency, span, label=_run_label(analysis, k))
@@ -93,14 +81,14 @@ def _draw_law(axes: Axes, analysis: SpinDownAnalysis, name: str) -> None:
     excluded = name in dict(verdict.excluded)
     as_good = name in verdict.needless or (name in verdict.indistinguishable and not best)
     note = "excluded" if excluded else "fits as well" if as_good else "best" if best and verdict.decided else ""
-    label = f"{name}   {EQUATIONS[name]}" + (f"   ({note})" if note else "")
+    label = f"{name}   {SHOWN_LAWS[name].equation}" + (f"   ({note})" if note else "")
     thick = 1.2 if len(analysis.runs) > 1 or _many(analysis) else 2.4
     for k, run in enumerate(analysis.runs if best else analysis.runs[:1]):
         t = np.linspace(run.time[0], run.time[-1], 200)
         axes.plot(
             t,
             run.fit(name).spin_frequency(t),
-            color=COLOURS[name],
+            color=SHOWN_LAWS[name].colour,
             linestyle="dashed" if excluded else "solid",
             linewidth=thick if best else 1.0,
             zorder=2.5 if best else 2.2,
@@ -159,7 +147,7 @@ def _draw_residuals(figure: Figure, panels: list[Axes], analysis: SpinDownAnalys
     band = "" if u is None else f"; grey: ±u of one reading, {u:.2g} Hz"
     means = "; black: means" if _many(analysis) else ""
     _head(figure, 0.605, f"Residuals, reading − law, each law on its own scale{band}{means}")
-    for axes, name in zip(panels, COLOURS, strict=True):
+    for axes, name in zip(panels, SHOWN_LAWS, strict=True):
         residuals = [run.fit(name).residuals for run in analysis.runs]
         most = max(float(np.abs(r).max()) for r in residuals)
         limit = max(1.1 * (most + (u or 0.0)), 1e-12 * float(analysis.runs[0].frequency[0]))
@@ -167,11 +155,11 @@ def _draw_residuals(figure: Figure, panels: list[Axes], analysis: SpinDownAnalys
             axes.axhspan(-u, u, color="black", alpha=0.12, linewidth=0)
         axes.axhline(0, color="black", linewidth=0.8)
         for k, values in enumerate(residuals):
-            _draw_readings(axes, analysis, k, values, 2 * limit, colour=COLOURS[name])
+            _draw_readings(axes, analysis, k, values, 2 * limit, colour=SHOWN_LAWS[name].colour)
             _draw_means(axes, analysis, values)
         axes.set(ylim=(-limit, limit), xlabel="time  [s]")
         axes.tick_params(labelsize=7)
-        axes.set_title(name, loc="left", color=COLOURS[name], fontweight="bold", pad=9)
+        axes.set_title(name, loc="left", color=SHOWN_LAWS[name].colour, fontweight="bold", pad=9)
         axes.set_title(f"to ±{most:.2g} Hz", loc="right", color="dimgrey", fontsize=8, pad=9)
     panels[0].set_ylabel("residual  [Hz]")
 
@@ -187,10 +175,10 @@ def _usual_u(analysis: SpinDownAnalysis) -> float | None:
 def _draw_straight_lines(figure: Figure, above: list[Axes], below: list[Axes], analysis: SpinDownAnalysis) -> None:
     """Where a law holds, its points lie on the line, and the strip below shows noise about zero."""
     _head(figure, 0.375, "Straight lines as one draws them on paper; below each, how far the points lie from the line")
-    for panel, strip, (quantity, transform, law) in zip(above, below, STRAIGHT_LINES, strict=True):
-        _draw_straight(panel, strip, analysis, transform, law)
-        panel.set_ylabel(quantity)
-        panel.set_title(f"straight if {law} holds", loc="left", color=COLOURS[law], fontweight="bold", pad=9)
+    for panel, strip, (law, straight) in zip(above, below, STRAIGHT_LINES.items(), strict=True):
+        _draw_straight(panel, strip, analysis, straight.transform, law)
+        panel.set_ylabel(straight.axis)
+        panel.set_title(f"straight if {law} holds", loc="left", color=SHOWN_LAWS[law].colour, fontweight="bold", pad=9)
         panel.tick_params(labelbottom=False)
         strip.set(xlabel="time  [s]", xlim=panel.get_xlim())
     most = max(abs(limit) for strip in below for limit in strip.get_ylim())
@@ -202,11 +190,11 @@ def _draw_straight_lines(figure: Figure, above: list[Axes], below: list[Axes], a
 def _draw_straight(
     panel: Axes, strip: Axes, analysis: SpinDownAnalysis, transform: Callable[[Array], Array], law: str
 ) -> None:
-    strip.axhline(0, color=COLOURS[law], linewidth=1)
+    strip.axhline(0, color=SHOWN_LAWS[law].colour, linewidth=1)
     for k, run in enumerate(analysis.runs):
         y = transform(2 * np.pi * run.frequency)
         line = np.polynomial.Polynomial.fit(run.time, y, 1)(run.time)
-        panel.plot(run.time[[0, -1]], line[[0, -1]], color=COLOURS[law], linewidth=1)
+        panel.plot(run.time[[0, -1]], line[[0, -1]], color=SHOWN_LAWS[law].colour, linewidth=1)
         _draw_readings(panel, analysis, k, y)
         off = 100 * (y - line) / (np.ptp(y) or 1.0)
         _draw_readings(strip, analysis, k, off)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from typing import TYPE_CHECKING
@@ -64,7 +65,43 @@ def test_no_save_writes_nothing_and_out_writes_there(levilab: Command, tmp_path:
     levilab("analyze", "spindown", path, "--no-save")
     assert list(tmp_path.iterdir()) == [path]
     levilab("analyze", "spindown", path, "--out", "there")
-    assert sorted(p.name for p in (tmp_path / "there").iterdir()) == ["result.json", "spindown.png"]
+    assert sorted(p.name for p in (tmp_path / "there").iterdir()) == ["my.result.json", "my.spindown.png"]
+
+
+def test_an_analysis_need_not_be_named(levilab: Command, sample_data: Path) -> None:
+    named = levilab("analyze", "spindown", sample_data, "--no-save")
+    assert levilab("analyze", sample_data, "--no-save").stdout == named.stdout
+    assert levilab("analyze", "--no-save", sample_data).stdout == named.stdout
+    assert json.loads(levilab("analyze", sample_data, "--no-save", "--json").stdout)["analysis"] == "spindown"
+    assert "no such file" in levilab("analyze", "spindwon", check=1).stderr
+
+
+def test_two_files_in_one_folder_have_a_result_each_and_the_report_reads_it(levilab: Command, tmp_path: Path) -> None:
+    for k, name in enumerate(("a.csv", "b.csv")):
+        levilab("analyze", "spindown", spin_down_csv(tmp_path / name, seed=k), "--uncertainty", "profile")
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {f"{file}.{kind}" for file in "ab" for kind in ("result.json", "spindown.png")} <= names
+    levilab("report", "b.csv")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "68 % interval (profile)" in page
+    assert "as levilab analyze found it: b.result.json" in page
+    levilab("report", "b.csv", "--keep-outliers")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "other options than those of b.result.json" in page
+
+
+def test_what_does_not_belong_to_the_analysis_is_a_message_and_no_warning(levilab: Command, sample_data: Path) -> None:
+    done = levilab("analyze", "spindown", sample_data, "--no-save")
+    assert "passed over" not in done.stdout
+    assert done.stderr == "passed over: 1 limit run\n"
+    assert "time [s]" in done.stdout
+
+
+def test_a_result_that_is_damaged_ends_the_report_with_one_line(levilab: Command, tmp_path: Path) -> None:
+    path = spin_down_csv(tmp_path / "my.csv")
+    (tmp_path / "my.result.json").write_text("{", encoding="utf-8")
+    (line,) = levilab("report", path, check=1).stderr.splitlines()
+    assert line.startswith(f"levilab: {tmp_path / 'my.result.json'}: is cut off")
 
 
 def test_columns_of_another_name_are_mapped(levilab: Command, tmp_path: Path) -> None:
@@ -266,16 +303,20 @@ def test_a_result_that_cannot_be_written_is_shown_all_the_same(levilab: Command,
     assert "--no-save" in done.stderr.splitlines()[-1]
 
 
-def test_a_pipe_of_an_old_code_page_gets_what_it_can_show(tmp_path: Path) -> None:
+@pytest.mark.parametrize("encoding", ["cp1252", "ascii"])
+def test_an_old_code_page_costs_no_number_its_exponent(tmp_path: Path, encoding: str) -> None:
     path = spin_down_csv(tmp_path / "my.csv")
     done = subprocess.run(
         [sys.executable, "-m", "levilab", "analyze", "spindown", str(path), "--no-save"],
         capture_output=True,
-        env=os.environ | {"PYTHONIOENCODING": "cp1252"},
+        env=os.environ | {"PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"},
         check=True,
         timeout=60,
     )
-    assert b"disc" in done.stdout
+    text = done.stdout.decode(encoding)
+    assert "?" not in text
+    assert re.search(r"C3/2 = 2\.\d+\(\d+\)e-4 \(rad/s\)\^-(1/2|½)/s", text)
+    assert "chi2/dof" in text
 
 
 def test_a_decoy_in_the_present_folder_is_not_imported(levilab: Command, tmp_path: Path) -> None:

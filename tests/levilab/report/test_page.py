@@ -5,17 +5,27 @@ from __future__ import annotations
 import json
 import re
 import shutil
+import subprocess
+import sys
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from levilab.errors import LevilabError
+from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.sources import Options
-from levilab.pipelines.spindown.analysis import analyze_spindowns
-from levilab.report.page import render, write_report
+from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
+from levilab.pipelines.spindown.document import recall_spindowns, save_result
+from levilab.report.page import render as render_found
+from levilab.report.page import write_report
 from support.paths import SAMPLE_DATA
 from support.spin_downs import spin_down_csv
+
+
+def render(found: SpinDownAnalysis) -> str:
+    return render_found(ANALYSES["spindown"], found)
 
 
 class Page(HTMLParser):
@@ -136,16 +146,14 @@ def test_times_are_to_the_second_and_what_is_not_known_is_left_out(run: Path) ->
     assert "2026-11-21 00:52:00 UTC to 2026-11-21 00:55:10 UTC" in text
 
 
-def test_what_happened_tells_the_fall_and_leaves_out_what_was_replayed(run: Path) -> None:
+def test_what_happened_tells_the_fall(run: Path) -> None:
     events = [
         {"utc": "2026-11-21T00:51:00Z", "time_s": None, "kind": "drive on", "text": "drive on at 30 Hz"},
-        {"utc": "2026-11-21T00:53:00Z", "time_s": None, "kind": "replayed", "text": "drive on again"},
         {"utc": "2026-11-21T00:55:00Z", "time_s": 200.0, "kind": "fell", "text": "fell between 190.0 s and 200.0 s"},
     ]
     (run / "events.jsonl").write_text("".join(json.dumps(event) + "\n" for event in events), encoding="utf-8")
     text = text_of(changed(run, time_zero_utc="2026-11-21T00:52:00Z"))
     assert "before drive on at 30 Hz" in text
-    assert "drive on again" not in text
     assert "The fall. fell between 190.0 s and 200.0 s; last reading that was fitted 21.75 Hz at 190.0 s." in text
 
 
@@ -186,6 +194,54 @@ def test_a_law_is_marked_best_only_where_the_readings_decide(tmp_path: Path, rea
     assert ("(best)" in parsed.text) == analysis.combined.verdict.decided
 
 
+def reported(*paths: Path, output: Path, **options: Any) -> str:
+    page = write_report(paths, output, Options(**options)).read_text(encoding="utf-8")
+    return " ".join(Page(page).text.split())
+
+
+def test_the_report_shows_what_analyze_found_intervals_included(run: Path, tmp_path: Path) -> None:
+    save_result(analyze_spindowns([run], Options(uncertainty="bootstrap", bootstrap_samples=50)))
+    result = json.loads((run / "result.json").read_text(encoding="utf-8"))
+    low, high = result["models"][2]["parameters"]["c32"]["interval_68"]
+    text = reported(run, output=tmp_path / "report.html")
+    assert "68 % interval (bootstrap)" in text
+    assert f"[{low:.5g}, {high:.5g}]" in text
+    assert f"as levilab analyze found it: {run / 'result.json'}" in text
+
+
+def test_the_report_does_not_fit_what_has_a_result(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    analysis = analyze_spindowns([run], Options())
+    save_result(analysis)
+    monkeypatch.setattr("levilab.pipelines.spindown.document.fit_source", pytest.fail)
+    recalled = render(recall_spindowns([run], Options()))
+    anew = render(analysis)
+    differ = [pair for pair in zip(recalled.split("\n"), anew.split("\n"), strict=True) if pair[0] != pair[1]]
+    assert all("Analysis" in here or "written" in here for here, _ in differ)
+
+
+def test_the_report_says_what_it_had_to_analyze(run: Path, tmp_path: Path) -> None:
+    before = sorted(run.rglob("*"))
+    assert "analyzed for this page: there was no result yet" in reported(run, output=tmp_path / "report.html")
+    assert sorted(run.rglob("*")) == before
+    save_result(analyze_spindowns([run], Options()))
+    text = reported(run, output=tmp_path / "report.html", reading_u=0.05)
+    assert f"analyzed for this page: other options than those of {run / 'result.json'}" in text
+    assert "u of a reading: 0.05 Hz, as given to the analysis" in text
+    (run / "readings.csv").write_text(spin_down_csv(tmp_path / "other.csv").read_text("utf-8"), encoding="utf-8")
+    text = reported(run, output=tmp_path / "report.html")
+    assert f"analyzed for this page: the readings are others than in {run / 'result.json'}" in text
+
+
+def test_the_page_needs_nothing_of_the_terminal() -> None:
+    code = "import sys, levilab.report.page; print('rich' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout == "False\n"
+
+
+def test_one_p_value_is_the_same_number_on_the_page_and_the_terminal(page: Page) -> None:
+    assert "2.3e-14" in page.text
+
+
 def test_nothing_is_folded_away_so_that_all_is_printed(page: Page) -> None:
     assert "details" not in {tag for tag, _ in page.tags}
 
@@ -211,5 +267,5 @@ def test_many_readings_are_cut_in_the_page_and_the_figure_stays_small(tmp_path: 
 
 def test_a_report_that_cannot_be_written_is_told_in_one_line(tmp_path: Path, sample_data: Path) -> None:
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
-    with pytest.raises(LevilabError, match="--output"):
+    with pytest.raises(LevilabError, match="`output`"):
         write_report([sample_data], tmp_path / "file" / "report.html")

@@ -114,7 +114,7 @@ def test_the_readings_of_a_run_are_that_run_and_as_synthetic(sample_data: Path, 
     shutil.copytree(sample_data / "spin-down-1", tmp_path / "broken")
     (tmp_path / "broken" / "run.json").write_text("{", encoding="utf-8")
     (source,) = analyze_spindowns([tmp_path / "broken" / "readings.csv"], Options()).sources
-    assert any("whether it is SYNTHETIC is not known" in warning for warning in source.readings.warnings)
+    assert any("whether it is SYNTHETIC is not known" in warning for warning in source.warnings)
 
 
 def test_real_and_synthetic_inputs_together_are_warned_of(sample_data: Path, tmp_path: Path) -> None:
@@ -144,7 +144,7 @@ def test_turns_per_minute_taken_for_hertz_are_doubted(tmp_path: Path) -> None:
     t, nu = np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)
     np.savetxt(path, np.c_[t, 60 * nu], delimiter=",", header="t,f", comments="")
     (source,) = analyze_spindowns([path], Options()).sources
-    assert "[rpm]" in source.readings.warnings[0]
+    assert "[rpm]" in source.warnings[0]
     stated = analyze_spindowns([path], Options(columns={"t": "t", "f": "f [rpm]"}))
     assert stated.runs[0].frequency[0] == pytest.approx(40, abs=0.1)
 
@@ -195,7 +195,7 @@ def test_a_folder_without_runs_says_what_it_found(sample_data: Path, tmp_path: P
 def test_a_folder_that_cannot_be_written_is_told_in_one_line(sample_data: Path, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     analysis = analyze_spindowns([sample_data], Options())
-    with pytest.raises(CannotWrite, match="--out") as caught:
+    with pytest.raises(CannotWrite, match="`out`") as caught:
         save_result(analysis, tmp_path / "file" / "below")
     assert isinstance(caught.value, LevilabError)
     assert "\n" not in str(caught.value)

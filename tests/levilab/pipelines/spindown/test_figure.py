@@ -10,9 +10,12 @@ from matplotlib.colors import to_hex
 
 from levilab.pipelines.sources import Options
 from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
-from levilab.pipelines.spindown.figure import COLOURS, MOST_POINTS, STRAIGHT_LINES, spindown_figure
+from levilab.pipelines.spindown.figure import MOST_POINTS, STRAIGHT_LINES, spindown_figure
+from levilab.pipelines.spindown.laws import SHOWN_LAWS
 from levilab.present.style import as_svg
 from support.spin_downs import spin_down_csv
+
+COLOURS = {name: law.colour for name, law in SHOWN_LAWS.items()}
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -21,6 +21,20 @@ class Readings:
     u: "NDArray[np.float64] | None"
     warnings: tuple[str, ...]
 
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def same_as(self, other: "Readings") -> bool:
+        """Whether time and frequency are the same, but for the rounding of another unit in the file."""
+        pairs = ((self.time, other.time), (self.frequency, other.frequency))
+        return len(self) == len(other) and all(
+            abs(a[0] - b[0]) <= SAME * abs(b[0]) and bool(np.allclose(a, b, rtol=SAME, atol=0)) for a, b in pairs
+        )
+
+
+#: Relative: units and printed digits round in about the tenth digit, but no two runs agree so far in all readings.
+SAME = 1e-9
+
 
 def spin_readings(table: Table, *, fewest: int = FEWEST) -> Readings:
     """The readings of a spin-down: time, spin frequency and, if the table has it, its standard uncertainty.
@@ -57,7 +71,7 @@ def _doubts(table: Table, frequency: "NDArray[np.float64]") -> list[str]:
     if middle <= FASTEST_HZ:
         return []
     doubt = f"{table.path.name}: the spin is about {middle:.4g} Hz, a Levitron spins at 20 to 60 Hz"
-    return [f"{doubt}; if these are turns per minute, say so: --columns 'f=NAME [rpm]'"]
+    return [f"{doubt}; if these are turns per minute, say so with their column, as f=NAME [rpm]"]
 
 
 #: Beyond these a number is no measurement, and its powers would leave the range of floating point.

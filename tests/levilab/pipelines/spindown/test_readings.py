@@ -5,7 +5,7 @@ import pytest
 
 from levilab.formats.columns import TableError
 from levilab.formats.table import read_run_readings, read_table
-from levilab.pipelines.readings import spin_readings
+from levilab.pipelines.spindown.readings import spin_readings
 
 HEADER = "time_s,spin_frequency_hz,spin_frequency_u_hz\n"
 
@@ -49,7 +49,7 @@ def test_what_cannot_be_a_spin_down_is_told_with_its_line(rows, line, words, tmp
 
 
 def test_a_missing_column_is_told_with_those_there_are(tmp_path):
-    with pytest.raises(TableError, match=r"spin_frequency_hz; it has 't', 'z': say --columns f=NAME"):
+    with pytest.raises(TableError, match=r"spin_frequency_hz; it has 't', 'z': say `columns` = f=NAME"):
         spin_readings(table_of(tmp_path, "t,z\n0,1\n1,2\n2,3\n"))
 
 

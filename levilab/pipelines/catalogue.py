@@ -1,0 +1,132 @@
+"""The analyses: a row each.  A new one gets a folder with the same file names, and a row here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+
+from levilab.errors import DataError
+from levilab.pipelines.spindown.analysis import NEEDS as SPINDOWN_NEEDS
+from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
+from levilab.pipelines.spindown.document import as_document, recall_spindowns, save_result
+from levilab.pipelines.spindown.report import spindown_part
+from levilab.pipelines.spindown.table import spindown_tables
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    from levilab.pipelines.part import ReportPart
+    from levilab.pipelines.sources import Needs, Options, Source
+    from levilab.present.tables import Table
+
+
+class Analyzed(Protocol):
+    """What results of all analyses have in common."""
+
+    @property
+    def sources(self) -> tuple[Source[Any], ...]:
+        """The inputs."""
+
+    @property
+    def home(self) -> Path:
+        """The folder that the result belongs to."""
+
+    @property
+    def text(self) -> str:
+        """What the data say, in a few sentences."""
+
+    @property
+    def all_warnings(self) -> list[str]:
+        """What to know before using the numbers."""
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What does not belong to the analysis, and is no cause for a warning."""
+
+
+A = TypeVar("A", bound=Analyzed)
+
+
+@dataclass(frozen=True)
+class Analysis(Generic[A]):
+    """One analysis.
+
+    needs: its name, the experiments whose runs suit it, and what a data file must hold;
+    analyze: what lies at the paths; recall: the same, from result.json where it holds; document: the content of
+    result.json for a folder; save: that and the figure, beside the inputs or into a folder; tables: for the terminal;
+    svg: the figure; part: of a report.
+    """
+
+    needs: Needs[Any]
+    analyze: Callable[[Sequence[Path], Options], A]
+    recall: Callable[[Sequence[Path], Options], A]
+    document: Callable[[A, Path], dict[str, Any]]
+    save: Callable[[A, Path | None], list[Path]]
+    tables: Callable[[A], tuple[Table, ...]]
+    svg: Callable[[A], str]
+    part: Callable[[A], ReportPart]
+
+    @property
+    def name(self) -> str:
+        """As in `levilab analyze NAME`."""
+        return self.needs.analysis
+
+
+def _spindown_svg(analysis: SpinDownAnalysis) -> str:
+    from levilab.pipelines.spindown.figure import spindown_figure  # with matplotlib
+    from levilab.present.style import as_svg
+
+    return as_svg(spindown_figure(analysis))
+
+
+_TABLE: tuple[Analysis[Any], ...] = (
+    Analysis[SpinDownAnalysis](
+        SPINDOWN_NEEDS,
+        analyze_spindowns,
+        recall_spindowns,
+        as_document,
+        save_result,
+        spindown_tables,
+        _spindown_svg,
+        spindown_part,
+    ),
+)
+ANALYSES = MappingProxyType({analysis.name: analysis for analysis in _TABLE})
+
+
+def analyze_suiting(paths: Sequence[Path], options: Options) -> list[tuple[Analysis[Any], Any]]:
+    """Each analysis that suits what lies at the paths, with what it found.  Raises DataError if none does."""
+    return _suiting(lambda analysis: analysis.analyze(paths, options))
+
+
+def recall_suiting(paths: Sequence[Path], options: Options) -> tuple[Analysis[Any], Any]:
+    """The first analysis that suits, with what it found or had found before.  Raises DataError if none does."""
+    return _suiting(lambda analysis: analysis.recall(paths, options))[0]
+
+
+def _suiting(run: Callable[[Analysis[Any]], Any]) -> list[tuple[Analysis[Any], Any]]:
+    found, errors = [], []
+    for analysis in ANALYSES.values():
+        try:
+            found.append((analysis, run(analysis)))
+        except DataError as error:
+            errors.append(error)
+    if not found:
+        raise errors[0]
+    return found
+
+
+def print_analysis(analysis: Analysis[A], found: A) -> None:
+    """The tables, what the data say, and the warnings, on the terminal."""
+    from rich.markup import escape
+
+    from levilab.present.terminal import draw, terminal  # with rich
+
+    console = terminal()
+    for table in analysis.tables(found):
+        console.print(draw(table))
+    console.print(f"[bold]What the data say.[/bold] {escape(found.text)}")
+    for warning in found.all_warnings:
+        console.print(f"[yellow]note:[/yellow] {escape(warning)}")

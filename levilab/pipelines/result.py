@@ -1,0 +1,279 @@
+"""result.json: what every analysis writes into it, where it lies, and reading it back."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, Literal, Self, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from analysis.uncertainty import Estimate
+from levilab.errors import DataError
+from levilab.files import CannotWrite, replace_atomically
+from levilab.runs.run import RECORD
+from levilab.settings import in_one_line
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from levilab.pipelines.sources import Source
+
+SCHEMA: Literal["levilab-result/1"] = "levilab-result/1"
+RESULT = "result.json"
+#: Endings of data files: two files that differ in nothing else must not share a result.
+DATA_SUFFIXES = frozenset({".csv", ".txt", ".dat", ".tsv", ".asc", ".wav"})
+
+
+# --- what is in it -------------------------------------------------------------------------------------
+
+
+class Part(BaseModel):
+    """A part of a result.  Keys that are not known here are of a newer version, and passed over."""
+
+    model_config = ConfigDict(frozen=True, validate_by_name=True, validate_by_alias=True)
+
+
+class Value(Part):
+    """A quantity: a mean over runs has their scatter and says how many there were."""
+
+    value: float | None
+    u: float | None
+    unit: str
+    interval_68: tuple[float, float] | None = None
+    scatter: float | None = None
+    runs: int | None = None
+
+    @property
+    def estimate(self) -> Estimate:
+        """The quantity as the analyses know it."""
+        return Estimate(self.value, self.u, self.unit, self.interval_68)
+
+
+class Input(Part):
+    """A data file, by its path relative to the result."""
+
+    path: str
+    sha256: str
+
+
+class RunPart(Part):
+    """One input by itself."""
+
+    path: str
+    synthetic: bool
+    values: dict[str, Value]
+    warnings: tuple[str, ...]
+
+
+class Result(Part):
+    """What results of all analyses have in common."""
+
+    schema_: Literal["levilab-result/1"] = Field(alias="schema")
+    analysis: str
+    inputs: tuple[Input, ...]
+    synthetic: bool
+    software: dict[str, str]
+    settings: Any
+    values: dict[str, Value]
+    runs: tuple[Any, ...]
+    warnings: tuple[str, ...]
+
+    @model_validator(mode="after")
+    def _one_run_an_input(self) -> Self:
+        if not self.runs or len(self.runs) != len(self.inputs):
+            raise ValueError(f"{len(self.inputs)} inputs but {len(self.runs)} runs")
+        return self
+
+    def as_dict(self) -> dict[str, Any]:
+        """As it stands in the file."""
+        return self.model_dump(mode="json", by_alias=True, exclude_unset=True)
+
+
+def finite(value: Any) -> Any:
+    """What no number can say becomes null; json.dumps with allow_nan=False guards the rest."""
+    if isinstance(value, dict):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def relative(path: Path, folder: Path) -> str:
+    """With forward slashes on every system; whole where there is no way (another drive)."""
+    try:
+        return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
+    except ValueError:
+        return path.resolve().as_posix()
+
+
+# --- where it lies -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a result belongs: a folder, and the name of the data file that it is of, if it is of one."""
+
+    folder: Path
+    name: str = ""
+
+    @property
+    def result(self) -> Path:
+        """The file of the result."""
+        return self.folder / (f"{self.name}.{RESULT}" if self.name else RESULT)
+
+    def figure(self, analysis: str) -> Path:
+        """The file of the figure."""
+        return self.folder / (f"{self.name}.{analysis}.png" if self.name else f"{analysis}.png")
+
+
+def beside(path: Path) -> Place:
+    """The place of a run folder's result, or of a data file's."""
+    return Place(path) if path.is_dir() else Place(path.parent, _result_name(path))
+
+
+def _result_name(path: Path) -> str:
+    """A data file's name without its ending, or with it where another data file has the same name."""
+    alike = [
+        other
+        for other in path.parent.iterdir()
+        if other.stem.casefold() == path.stem.casefold() and other.suffix.lower() in DATA_SUFFIXES
+    ]
+    return path.name if len({other.name for other in (*alike, path)}) > 1 else path.stem
+
+
+def place_of(paths: Sequence[Path], sources: Sequence[Source[Any]]) -> Place:
+    """Beside the run or the file; of several the folder that was searched for them, else the present one."""
+    if len(sources) == 1:
+        return beside(sources[0].path)
+    return Place(paths[0]) if len(paths) == 1 else Place(Path())
+
+
+def save(result: Result, place: Place, picture: bytes) -> list[Path]:
+    """Write a result and its figure; returns the files.  Raises CannotWrite."""
+    text = json.dumps(result.as_dict(), indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False)
+    files = [place.result, place.figure(result.analysis)]
+    try:
+        place.folder.mkdir(parents=True, exist_ok=True)
+        replace_atomically(files[0], text + "\n")
+        replace_atomically(files[1], picture)
+    except OSError as error:
+        raise CannotWrite(
+            f"the result could not be written into {place.folder} ({error.strerror or error}): "
+            "choose another place with `out`, or print only with `save` = False"
+        ) from error
+    return files
+
+
+# --- reading it back -----------------------------------------------------------------------------------
+
+R = TypeVar("R", bound=Result)
+
+
+def read_result(path: Path, model: type[R]) -> R | None:
+    """A result that was written before; None where there is none, or one of another analysis.
+
+    Raises DataError when it is damaged or of another schema.
+    """
+    if not path.is_file():
+        return None
+    advice = "analyze anew with levilab analyze, or move the file away"
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror}); {advice}") from error
+    except (ValueError, RecursionError) as error:
+        raise DataError(f"{path}: is cut off or not JSON ({error}); {advice}") from error
+    if not isinstance(data, dict) or data.get("schema") != SCHEMA:
+        seen = data.get("schema") if isinstance(data, dict) else type(data).__name__
+        raise DataError(f"{path}: schema is {repr(seen)[:60]}, expected {SCHEMA!r} of this version; {advice}")
+    if data.get("analysis") != model.model_fields["analysis"].default:
+        return None
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise DataError(f"{path}: {in_one_line(error)}; {advice}") from error
+
+
+@dataclass(frozen=True)
+class Earlier(Generic[R]):
+    """An input as it was found in a result written before.  file: the result; number: of the input in it."""
+
+    file: Path
+    result: R
+    number: int
+
+    @property
+    def sha256(self) -> str:
+        """Of the data file at that time."""
+        return self.result.inputs[self.number].sha256
+
+
+class Archive(Generic[R]):
+    """The results that were written before, where the paths of a command lead to them."""
+
+    def __init__(self, paths: Sequence[Path], model: type[R]) -> None:
+        self._model = model
+        self._read: dict[Path, R | None] = {}
+        self._known: dict[Path, dict[str | Path, int]] = {}
+        searched = len(paths) == 1 and paths[0].is_dir() and not (paths[0] / RECORD).exists()
+        self._together = paths[0] / RESULT if searched else Path(RESULT) if len(paths) > 1 else None
+
+    def whole(self, sources: Sequence[Source[Any]]) -> tuple[Path, R] | None:
+        """The result of just these inputs, unchanged."""
+        file = beside(sources[0].path).result if len(sources) == 1 else self._together
+        result = self._result(file) if file else None
+        wanted = sorted(source.sha256 for source in sources)
+        if file and result and sorted(given.sha256 for given in result.inputs) == wanted:
+            return file, result
+        return None
+
+    def earlier(self, path: Path, data: Path, sha256: str | None = None) -> Earlier[R] | None:
+        """What was found of an input: of the same bytes if there is such a result, else of the same path.
+
+        Args:
+            path: the run folder or the data file.
+            data: the file with the readings.
+            sha256: of that file.
+        """
+        files = self._files(path)
+        if files[-1] not in files[:-1]:
+            self._result_above(files[-1])
+        keys: list[str | Path] = [sha256] if sha256 else []
+        for key in (*keys, data.resolve()):
+            for file in files:
+                number = self._numbers(file).get(key)
+                if number is not None:
+                    result = self._result(file)
+                    assert result
+                    return Earlier(file, result, number)
+        return None
+
+    def _files(self, path: Path) -> list[Path]:
+        """Where an input's result may lie."""
+        together = [self._together] if self._together else []
+        return [*together, beside(path).result, path.parent / RESULT]
+
+    def _numbers(self, file: Path) -> dict[str | Path, int]:
+        """The inputs of a result by their hash and by their path."""
+        if file not in self._known:
+            result = self._result(file)
+            inputs = result.inputs if result else ()
+            self._known[file] = {given.sha256: k for k, given in enumerate(inputs)}
+            self._known[file] |= {(file.parent / given.path).resolve(): k for k, given in enumerate(inputs)}
+        return self._known[file]
+
+    def _result(self, file: Path) -> R | None:
+        if file not in self._read:
+            self._read[file] = read_result(file, self._model)
+        return self._read[file]
+
+    def _result_above(self, file: Path) -> R | None:
+        """A file of that name above a run, or beside a data file, may as well be another program's."""
+        try:
+            return self._result(file)
+        except DataError:
+            return self._read.setdefault(file, None)

@@ -1,0 +1,56 @@
+"""What people are shown of each drag law: one row a law, for tables, figures and reports."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StraightLine:
+    """What falls or rises in a straight line where a law holds.
+
+    quantity: for text; axis: for the axis of a figure, with its unit; transform: of ω [rad/s].
+    """
+
+    quantity: str
+    axis: str
+    transform: Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class ShownLaw:
+    """equation: as a figure's label; colour: the same in every figure; straight: None if nothing is."""
+
+    equation: str
+    colour: str
+    straight: StraightLine | None = None
+
+
+#: By the names of `analysis.spindown.drag.LAWS`, in their order.
+#: Okabe and Ito's colours: distinct to the colour-blind, too.
+SHOWN_LAWS = MappingProxyType({
+    "stokes": ShownLaw("ω̇ = −C₁ω", "#0072B2", StraightLine("ln ω", "ln ω   (ω in rad/s)", np.log)),
+    "newton": ShownLaw("ω̇ = −C₂ω²", "#D55E00", StraightLine("1/ω", "1/ω  [s/rad]", lambda omega: 1 / omega)),
+    "disc": ShownLaw(
+        "ω̇ = −Cω$^{3/2}$", "#009E73",
+        StraightLine("ω^−½", "ω$^{−1/2}$  [(s/rad)$^{1/2}$]", lambda omega: omega**-0.5),
+    ),
+    "mixed": ShownLaw("ω̇ = −C₁ω − C₂ω²", "#CC79A7"),
+    "power": ShownLaw("ω̇ = −cωⁿ", "#E69F00"),
+})  # fmt: skip
+
+#: The laws' parameters in the field's letters.
+SYMBOLS = MappingProxyType({
+    "start_frequency": "ν₀", "c1": "C₁", "c2": "C₂", "c32": "C₃/₂", "c": "c", "exponent": "n",
+})  # fmt: skip

@@ -1,0 +1,206 @@
+"""Spin-downs → their part of a report."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from analysis.uncertainty import Estimate
+from levilab.pipelines.part import InputPart, ReportPart
+from levilab.pipelines.spindown.laws import SYMBOLS
+from levilab.pipelines.spindown.table import QUALITY_IN_WORDS, is_best, law_constants, quality_table, straight_quantity
+from levilab.present.numbers import in_words, plain, short_name, with_uncertainty, without_unit
+from levilab.present.tables import Row, Table, table
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from analysis.spindown.combine import CombinedLaw, Mean
+    from analysis.spindown.fit import SpinDown
+    from levilab.pipelines.sources import Options, Source
+    from levilab.pipelines.spindown.analysis import SpinDownAnalysis
+    from levilab.pipelines.spindown.readings import Readings
+
+#: Readings printed in the page; more stay in the run folder.  They stand in blocks side by side.
+MOST_READINGS, BLOCK = 200, 10
+#: The event that says when the top fell.
+FELL = "fell"
+
+
+def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
+    """Verdict, laws, how well they fit, the constants run by run, and the readings."""
+    combined, several = analysis.combined, len(analysis.runs) > 1
+    n = combined.fit(combined.best).statistics.n
+    asked = {origin.options.uncertainty for origin in analysis.origins} - {"covariance"}
+    return ReportPart(
+        subject="spin-down",
+        heading="Spin-down of a levitated top",
+        lead=f"{n} readings used",
+        figure_text="Readings with all drag laws, residuals of each law, and straight lines",
+        template="pipelines/spindown/report.html.j2",
+        context={
+            "several": several,
+            "verdict": combined.verdict.text,
+            "best": combined.best + " law" + (", the best" if combined.verdict.decided else ""),
+            "falls": [
+                (short_name(source.name), fall)
+                for source, run in zip(analysis.sources, analysis.runs, strict=True)
+                if (fall := _fall(source, run))
+            ],
+            "laws": _laws_table(analysis),
+            "quality": quality_table(analysis, QUALITY_IN_WORDS),
+            "by_run": _by_run_table(analysis),
+            "intervals": " and ".join(sorted(asked)),
+            "durbin_watson": (max(2 - 4 / math.sqrt(n), 0), min(2 + 4 / math.sqrt(n), 4)),
+        },
+        inputs=tuple(
+            InputPart(
+                _in_words(source, run, origin.options),
+                origin.text,
+                run.verdict.text,
+                _readings(source, run, origin.options),
+            )
+            for source, run, origin in zip(analysis.sources, analysis.runs, analysis.origins, strict=True)
+        ),
+    )
+
+
+# --- tables --------------------------------------------------------------------------------------------
+
+
+def _laws_table(analysis: SpinDownAnalysis) -> Table:
+    several = len(analysis.runs) > 1
+    heads = ("law", "mean over the runs", "scatter s between the runs") if several else ("law", "constants")
+    rows = [
+        Row(_law_cells(analysis, law), "best" if is_best(analysis, law.name) else "") for law in analysis.combined.fits
+    ]
+    return table("", heads, rows)
+
+
+def _law_cells(analysis: SpinDownAnalysis, law: CombinedLaw) -> tuple[str, ...]:
+    name = law.name + (" (best)" if is_best(analysis, law.name) else "")
+    constants = [
+        f"{SYMBOLS[of]} = {with_uncertainty(value)} {interval(value)}".rstrip()
+        for of, value in law_constants(analysis, law.name).items()
+    ]
+    if len(analysis.runs) == 1:
+        return name, "\n".join(constants)
+    scatters = [with_uncertainty(s) if (s := scatter(mean)) else "—" for mean in law.constants.values()]
+    return name, "\n".join(constants), "\n".join(scatters)
+
+
+def interval(estimate: Estimate) -> str:
+    """The 68 % interval where one was asked for."""
+    return "[{}, {}]".format(*(plain(end, 5) for end in estimate.interval)) if estimate.interval else ""
+
+
+@dataclass(frozen=True)
+class _Column:
+    """A constant, run by run.  head: where it comes from, its symbol and unit; estimates: one a run."""
+
+    head: str
+    estimates: tuple[Estimate, ...]
+    mean: Mean | None = None
+
+    @property
+    def together(self) -> tuple[str, str]:
+        """Mean and scatter."""
+        spread = scatter(self.mean) if self.mean else None
+        return without_unit(self.mean) if self.mean else "", without_unit(spread) if spread else ""
+
+
+def _by_run_table(analysis: SpinDownAnalysis) -> Table:
+    columns = _columns(analysis)
+    rows = [
+        Row((short_name(source.name), str(len(run.time)), *(_with_interval(c.estimates[k]) for c in columns)))
+        for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True))
+    ]
+    if len(analysis.runs) > 1:
+        means, scatters = zip(*(column.together for column in columns), strict=True)
+        rows += [Row(("mean", "", *means), "together"), Row(("scatter s", "", *scatters), "together")]
+    return table("", ("run", "readings\nused", *(c.head for c in columns)), rows, numbers=["readings\nused"])
+
+
+def _with_interval(estimate: Estimate) -> str:
+    return f"{without_unit(estimate)}\n{interval(estimate)}".rstrip()
+
+
+def _columns(analysis: SpinDownAnalysis) -> list[_Column]:
+    """The straight lines' constants and those of the best law's fit."""
+    combined, columns = analysis.combined, []
+    for law in combined.fits:
+        if law.linearised:
+            lines = [run.fit(law.name).linearised or {} for run in analysis.runs]
+            columns += _of_law(f"{straight_quantity(law.name)} against t", law.linearised, lines)
+    best = combined.fit(combined.best)
+    fits = [run.fit(best.name).parameters for run in analysis.runs]
+    starts = tuple(fit["start_frequency"] for fit in fits)
+    columns.append(_Column(_head(f"{best.name} fit", "start_frequency", starts[0].unit), starts))
+    return columns + _of_law(f"{best.name} fit", best.constants, fits)
+
+
+def _of_law(of: str, means: Mapping[str, Mean], runs: Sequence[Mapping[str, Estimate]]) -> list[_Column]:
+    return [_Column(_head(of, name, mean.unit), tuple(run[name] for run in runs), mean) for name, mean in means.items()]
+
+
+def _head(of: str, name: str, unit: str) -> str:
+    shown = in_words(unit)
+    return f"{of}\n{SYMBOLS[name]}" + (f" [{shown}]" if shown else "")
+
+
+def scatter(mean: Mean) -> Estimate | None:
+    """Standard deviation between the runs; its own u is s/√(2·dof) (GUM E.4.3)."""
+    if mean.scatter is None:
+        return None
+    return Estimate(mean.scatter, mean.scatter / math.sqrt(2 * mean.degrees_of_freedom), mean.unit)
+
+
+# --- one input -----------------------------------------------------------------------------------------
+
+
+def _in_words(source: Source[Readings], fit: SpinDown, options: Options) -> tuple[str, ...]:
+    count, outliers = len(source.readings), len(fit.outliers)
+    text = f"{count} readings"
+    if outliers:
+        text += f", {outliers} of them outlier{'s' * (outliers > 1)}, {'kept' if options.keep_outliers else 'left out'}"
+    t, nu = fit.time, fit.frequency
+    span = f"{t[0]:.1f} s to {t[-1]:.1f} s, {nu[0]:.2f} Hz to {nu[-1]:.2f} Hz"
+    return f"{text}; {span}", _uncertainty(source, fit, options)
+
+
+def _uncertainty(source: Source[Readings], fit: SpinDown, options: Options) -> str:
+    """How large u of a reading is, and where it comes from."""
+    if fit.u is None:
+        return "u of a reading: not known, taken from the scatter about each law"
+    low, high = float(fit.u.min()), float(fit.u.max())
+    size = f"{low:.2g} Hz" if low == high else f"{low:.2g} Hz to {high:.2g} Hz"
+    if options.reading_u is not None:
+        return f"u of a reading: {size}, as given to the analysis"
+    channels = source.run.record.channels if source.run else []
+    origin = next((c.get("source") for c in channels if c.get("name") == "spin_frequency_u_hz"), None)
+    return f"u of a reading: {size}, {origin or 'from a column of the data'}"
+
+
+def _readings(source: Source[Readings], fit: SpinDown, options: Options) -> Mapping[str, object]:
+    """The first readings in blocks; rows of time [s], spin [Hz] and u [Hz]."""
+    readings, given_u = source.readings, options.reading_u
+    shown = min(len(readings), MOST_READINGS)
+    u = [given_u] * shown if readings.u is None or given_u is not None else readings.u[:shown].tolist()
+    outliers = frozenset(fit.outliers)
+    rows = [
+        Row((f"{t:.3f}", f"{nu:.5f}", "—" if u_ is None else f"{u_:.2g}"), "outlier" if i in outliers else "")
+        for i, (t, nu, u_) in enumerate(zip(readings.time[:shown], readings.frequency[:shown], u, strict=True))
+    ]
+    heads = ("t [s]", "ν [Hz]", "u [Hz]")
+    blocks = [table("", heads, rows[k : k + BLOCK], numbers=heads) for k in range(0, shown, BLOCK)]
+    return {"blocks": blocks, "shown": shown, "count": len(readings)}
+
+
+def _fall(source: Source[Readings], fit: SpinDown) -> str:
+    """What was seen of the fall."""
+    events = source.run.events() if source.run else []
+    text = next((str(event["text"]) for event in reversed(events) if event["kind"] == FELL), None)
+    if text is None:
+        return ""
+    return f"{text}; last reading that was fitted {fit.frequency[-1]:.2f} Hz at {fit.time[-1]:.1f} s"

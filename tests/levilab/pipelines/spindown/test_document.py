@@ -1,0 +1,204 @@
+"""From result.json back to what was found: nothing is analyzed that has a result which holds."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from levilab.errors import DataError
+from levilab.pipelines.result import save
+from levilab.pipelines.sources import Options
+from levilab.pipelines.spindown import document
+from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
+from levilab.pipelines.spindown.document import as_document, recall_spindowns, result_of
+from support.spin_downs import spin_down_csv
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@pytest.fixture
+def fitted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Names of the inputs that `recall_spindowns` fits."""
+    names: list[str] = []
+    fit = document.fit_source
+
+    def noted(source: Any, options: Options) -> Any:
+        names.append(source.path.name)
+        return fit(source, options)
+
+    monkeypatch.setattr(document, "fit_source", noted)
+    return names
+
+
+@pytest.fixture
+def runs(tmp_path: Path, sample_data: Path) -> Path:
+    """A folder of four runs."""
+    for k in range(1, 5):
+        shutil.copytree(sample_data / f"spin-down-{k}", tmp_path / "runs" / f"run-{k}")
+    return tmp_path / "runs"
+
+
+def analyzed(*paths: Path, **options: Any) -> SpinDownAnalysis:
+    """The analysis, and its result.json; the figure takes longer than all the rest."""
+    analysis = analyze_spindowns(paths, Options(**options))
+    save(result_of(analysis, analysis.place), analysis.place, picture=b"")
+    return analysis
+
+
+def same(one: Any, other: Any) -> bool:
+    """Equal to the last bit."""
+    if isinstance(one, np.ndarray):
+        return np.array_equal(one, other, equal_nan=True)
+    if isinstance(one, tuple | list):
+        return len(one) == len(other) and all(map(same, one, other))
+    if isinstance(one, dict):
+        return list(one) == list(other) and all(map(same, one.values(), other.values()))
+    if hasattr(one, "__dataclass_fields__"):
+        return type(one) is type(other) and all(
+            same(getattr(one, name), getattr(other, name)) for name in one.__dataclass_fields__ if name != "warnings"
+        )
+    return bool(one == other)
+
+
+@pytest.mark.parametrize("options", [{}, {"uncertainty": "profile"}, {"reading_u": 0.05}, {"keep_outliers": True}])
+def test_one_run_is_recalled_to_the_last_bit(tmp_path: Path, fitted: list[str], options: Any) -> None:
+    path = spin_down_csv(tmp_path / "my.csv")
+    path.write_text(path.read_text(encoding="utf-8").replace("\n50.0,", "\n50.0,1"), encoding="utf-8")  # an outlier
+    before = analyzed(path, **options)
+    assert before.runs[0].outliers
+    after = recall_spindowns([path], Options())
+    assert fitted == []
+    assert same(after.runs, before.runs)
+    assert after.all_warnings == before.all_warnings
+    assert after.options == before.options
+
+
+def test_several_runs_are_recalled_to_the_last_bit(runs: Path, fitted: list[str]) -> None:
+    before = analyzed(runs)
+    after = recall_spindowns([runs], Options())
+    assert fitted == []
+    assert same(after.runs, before.runs)
+    assert same(after.combined.fits, before.combined.fits)
+    assert same(after.combined.verdict, before.combined.verdict)
+    assert after.all_warnings == before.all_warnings
+    assert as_document(after, runs) == as_document(before, runs)
+
+
+@pytest.mark.parametrize("n", [3, 4, 5, 7])
+def test_results_that_lack_numbers_are_recalled_too(tmp_path: Path, fitted: list[str], n: int) -> None:
+    before = analyzed(spin_down_csv(tmp_path / "my.csv", n=n, u=n != 4))
+    after = recall_spindowns([tmp_path / "my.csv"], Options())
+    assert fitted == []
+    assert as_document(after, tmp_path) == as_document(before, tmp_path)
+
+
+def test_what_is_shown_is_what_stands_in_the_result(tmp_path: Path) -> None:
+    """Not a number is computed again."""
+    analyzed(spin_down_csv(tmp_path / "my.csv"))
+    file = tmp_path / "my.result.json"
+    result = json.loads(file.read_text(encoding="utf-8"))
+    result["verdict"] = "As a person wrote it."
+    result["runs"][0]["models"][2]["parameters"]["c32"] |= {"value": 1.25e-4, "interval_68": [1.2e-4, 1.3e-4]}
+    file.write_text(json.dumps(result), encoding="utf-8")
+    recalled = recall_spindowns([tmp_path / "my.csv"], Options())
+    constant = recalled.runs[0].fit("disc").parameters["c32"]
+    assert (constant.value, constant.interval) == (1.25e-4, (1.2e-4, 1.3e-4))
+    assert recalled.text == "As a person wrote it."
+
+
+def test_a_run_that_changed_is_analyzed_and_no_other(runs: Path, fitted: list[str]) -> None:
+    before = analyzed(runs, uncertainty="profile")
+    readings = runs / "run-2" / "readings.csv"
+    readings.write_text("\n".join(readings.read_text(encoding="utf-8").splitlines()[:-2]) + "\n", encoding="utf-8")
+    after = recall_spindowns([runs], Options())
+    assert fitted == ["run-2"]
+    assert same(after.runs[0], before.runs[0])
+    assert same(after.combined.fits, analyze_spindowns([runs], Options()).combined.fits)
+    assert after.runs[1].fit("disc").parameters["c32"].interval  # with the options of the result that held before
+    assert "the readings are others than in" in after.origins[1].text
+    assert after.origins[0].text.startswith("as levilab analyze found it")
+
+
+def test_a_new_run_beside_old_ones_is_the_only_one_analyzed(runs: Path, sample_data: Path, fitted: list[str]) -> None:
+    shutil.move(runs / "run-4", runs.parent / "run-4")
+    analyzed(runs)
+    shutil.move(runs.parent / "run-4", runs / "run-4")
+    after = recall_spindowns([runs], Options())
+    assert fitted == ["run-4"]
+    assert len(after.runs) == 4
+    assert "no result yet" in after.origins[3].text
+
+
+def test_runs_analyzed_one_by_one_are_combined_without_a_new_fit(runs: Path, fitted: list[str]) -> None:
+    for run in sorted(runs.iterdir()):
+        analyzed(run)
+    after = recall_spindowns([runs], Options())
+    assert fitted == []
+    assert same(after.combined, analyze_spindowns([runs], Options()).combined)
+
+
+def test_a_run_is_recalled_from_the_result_of_its_folder(runs: Path, fitted: list[str]) -> None:
+    analyzed(runs)
+    after = recall_spindowns([runs / "run-3"], Options())
+    assert fitted == []
+    assert same(after.runs[0], analyze_spindowns([runs / "run-3"], Options()).runs[0])
+
+
+@pytest.mark.parametrize("given", [{"reading_u": 0.05}, {"keep_outliers": True}])
+def test_other_options_analyze_anew_with_the_rest_as_before(tmp_path: Path, fitted: list[str], given: Any) -> None:
+    path = spin_down_csv(tmp_path / "my.csv")
+    analyzed(path, uncertainty="profile")
+    after = recall_spindowns([path], Options(**given))
+    assert fitted == ["my.csv"]
+    assert after.origins[0].options == replace(Options(uncertainty="profile"), **given)
+    assert "other options than those of" in after.origins[0].text
+    assert recall_spindowns([path], Options()).runs[0].u[0] == 0.03  # type: ignore[index]
+
+
+def test_the_columns_of_the_result_are_those_of_the_report(tmp_path: Path, fitted: list[str]) -> None:
+    path = spin_down_csv(tmp_path / "my.csv", u=False)
+    path.write_text(path.read_text(encoding="utf-8").replace("time_s,spin_frequency_hz", "Uhr,Kanal"), encoding="utf-8")
+    analyzed(path, columns={"t": "Uhr", "f": "Kanal"})
+    assert recall_spindowns([path], Options()).combined.best == "disc"
+    assert fitted == []
+
+
+def test_nothing_is_written_where_results_are_recalled(runs: Path) -> None:
+    analyzed(runs / "run-1")
+    before = {path: path.read_bytes() for path in runs.rglob("*") if path.is_file()}
+    recall_spindowns([runs], Options())
+    assert {path: path.read_bytes() for path in runs.rglob("*") if path.is_file()} == before
+
+
+def test_a_damaged_result_beside_a_run_is_an_error_that_names_it(runs: Path) -> None:
+    (runs / "run-2" / "result.json").write_text("{", encoding="utf-8")
+    with pytest.raises(DataError, match=r"run-2.result\.json: is cut off"):
+        recall_spindowns([runs], Options())
+
+
+def test_a_damaged_result_of_the_folder_is_an_error_that_names_it(runs: Path) -> None:
+    (runs / "result.json").write_text("{", encoding="utf-8")
+    with pytest.raises(DataError, match=r"runs.result\.json: is cut off"):
+        recall_spindowns([runs], Options())
+
+
+def test_a_file_of_that_name_above_the_input_may_be_anything(tmp_path: Path) -> None:
+    (tmp_path / "result.json").write_text('{"mine": 1}', encoding="utf-8")
+    assert recall_spindowns([spin_down_csv(tmp_path / "my.csv")], Options()).combined.best == "disc"
+
+
+def test_an_outlier_that_the_readings_do_not_hold_is_an_error(tmp_path: Path) -> None:
+    path = spin_down_csv(tmp_path / "my.csv")
+    analyzed(path)
+    file = tmp_path / "my.result.json"
+    result = json.loads(file.read_text(encoding="utf-8"))
+    result["runs"][0]["outliers"] = [{"index": 20, "time_s": 0.0, "spin_frequency_hz": 1.0}]
+    file.write_text(json.dumps(result), encoding="utf-8")
+    with pytest.raises(DataError, match="names an outlier"):
+        recall_spindowns([path], Options())

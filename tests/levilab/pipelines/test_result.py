@@ -1,0 +1,130 @@
+"""result.json on the disk: how it is named, and what happens to one that cannot be used."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from levilab.errors import DataError
+from levilab.pipelines.result import read_result, save
+from levilab.pipelines.sources import Options
+from levilab.pipelines.spindown.analysis import analyze_spindowns
+from levilab.pipelines.spindown.document import SpinDownResult, result_of, save_result
+from support.spin_downs import spin_down_csv
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def saved(*paths: Path) -> list[str]:
+    return [file.name for file in save_result(analyze_spindowns(paths, Options()))]
+
+
+def test_results_of_two_files_in_one_folder_stand_side_by_side(tmp_path: Path) -> None:
+    for k, name in enumerate(("monday.csv", "tuesday.csv")):
+        saved(spin_down_csv(tmp_path / name, seed=k))
+    for name in ("monday", "tuesday"):
+        result = json.loads((tmp_path / f"{name}.result.json").read_text(encoding="utf-8"))
+        assert result["inputs"][0]["path"] == f"{name}.csv"
+        assert (tmp_path / f"{name}.spindown.png").stat().st_size > 10_000
+
+
+def test_files_that_differ_in_their_ending_alone_keep_it_in_the_result(tmp_path: Path) -> None:
+    paths = [spin_down_csv(tmp_path / "run.csv", seed=1), spin_down_csv(tmp_path / "run.txt", seed=2)]
+    assert [saved(path) for path in paths] == [
+        ["run.csv.result.json", "run.csv.spindown.png"],
+        ["run.txt.result.json", "run.txt.spindown.png"],
+    ]
+
+
+def test_the_result_of_a_run_folder_is_result_json_in_it(tmp_path: Path, sample_data: Path) -> None:
+    import shutil
+
+    run = shutil.copytree(sample_data / "spin-down-1", tmp_path / "run")
+    assert saved(run) == ["result.json", "spindown.png"]
+    assert (run / "result.json").is_file()
+    assert analyze_spindowns([run / "readings.csv"], Options()).place.result == run / "result.json"
+
+
+def write_result(tmp_path: Path) -> Path:
+    """The result of a data file, without its figure."""
+    analysis = analyze_spindowns([spin_down_csv(tmp_path / "my.csv")], Options())
+    return save(result_of(analysis, analysis.place), analysis.place, picture=b"")[0]
+
+
+def damaged(content: dict[str, Any], *keys: str | int, value: object = ...) -> str:
+    """The content as text, with one place changed or, without a value, taken out."""
+    place: Any = content
+    for key in keys[:-1]:
+        place = place[key]
+    if value is ...:
+        del place[keys[-1]]
+    else:
+        place[keys[-1]] = value
+    return json.dumps(content)
+
+
+@pytest.mark.parametrize(
+    ("keys", "value", "says"),
+    [
+        (["schema"], "levilab-result/9", "schema is 'levilab-result/9', expected 'levilab-result/1'"),
+        (["schema"], ..., "schema is None"),
+        (["models"], ..., "models: Field required"),
+        (["models", 2, "name"], "cubic", "'cubic' is no drag law"),
+        (["models", 2, "parameters"], {}, "disc lacks one of its constants c32"),
+        (["runs", 0, "models", 2, "fit", "solution"], [1.0], "disc: its solution is missing or of another law"),
+        (["runs", 0, "models", 2, "statistics", "n"], "many", "statistics.n = 'many'"),
+        (["runs", 0, "values", "start_time"], ..., "lacks its start time"),
+        (["runs", 0, "outliers"], [{"index": -1, "time_s": 0, "spin_frequency_hz": 1}], "index"),
+        (["runs"], [], "1 inputs but 0 runs"),
+        (["best_model"], "cubic", "best_model 'cubic' is not among the models"),
+        (["settings", "uncertainty"], "guessed", "settings.uncertainty"),
+    ],
+)
+def test_a_damaged_result_is_refused_with_what_is_wrong(tmp_path: Path, keys: Any, value: object, says: str) -> None:
+    file = write_result(tmp_path)
+    file.write_text(damaged(json.loads(file.read_text(encoding="utf-8")), *keys, value=value), encoding="utf-8")
+    with pytest.raises(DataError) as caught:
+        read_result(file, SpinDownResult)
+    text = str(caught.value)
+    assert text.startswith(f"{file}: ")
+    assert says in text
+    assert "levilab analyze" in text
+    assert "\n" not in text
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "null", "[" * 100_000, '{"schema": ' + "1" * 5000 + "}"])
+def test_what_is_no_result_is_refused_in_one_line(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "result.json"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(DataError, match=r"cut off or not JSON|schema is"):
+        read_result(file, SpinDownResult)
+
+
+def test_bytes_that_are_no_text_are_refused_too(tmp_path: Path) -> None:
+    file = tmp_path / "result.json"
+    file.write_bytes(b"\xff\xfe\x00{")
+    with pytest.raises(DataError, match="not JSON"):
+        read_result(file, SpinDownResult)
+
+
+def test_a_result_of_another_analysis_is_none_of_this_one(tmp_path: Path) -> None:
+    file = write_result(tmp_path)
+    file.write_text(damaged(json.loads(file.read_text(encoding="utf-8")), "analysis", value="field"), encoding="utf-8")
+    assert read_result(file, SpinDownResult) is None
+    assert read_result(tmp_path / "nowhere.json", SpinDownResult) is None
+
+
+def test_keys_of_a_newer_version_are_passed_over(tmp_path: Path) -> None:
+    file = write_result(tmp_path)
+    file.write_text(damaged(json.loads(file.read_text(encoding="utf-8")), "new", value=1), encoding="utf-8")
+    assert read_result(file, SpinDownResult)
+
+
+def test_a_result_read_and_written_again_is_the_same_text(tmp_path: Path) -> None:
+    file = write_result(tmp_path)
+    result = read_result(file, SpinDownResult)
+    assert result
+    assert result.as_dict() == json.loads(file.read_text(encoding="utf-8"))

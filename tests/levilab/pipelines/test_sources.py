@@ -1,0 +1,74 @@
+"""What is found at paths: each set of readings once, and a warning only where something is wrong."""
+
+from __future__ import annotations
+
+import shutil
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from levilab.pipelines.sources import Options
+from levilab.pipelines.spindown.analysis import analyze_spindowns
+from support.spin_downs import spin_down_csv
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+
+def with_crlf(text: str) -> str:
+    return text.replace("\n", "\r\n")
+
+
+def with_quotes(text: str) -> str:
+    rows = [",".join(f'"{cell}"' for cell in row.split(",")) for row in text.split("\n")]
+    return "\n".join(rows[:-1]) + "\n"
+
+
+def with_decimal_commas(text: str) -> str:
+    return text.replace(",", ";").replace(".", ",")
+
+
+def in_other_units(text: str) -> str:
+    t, nu, u = np.loadtxt(text.splitlines()[1:], delimiter=",", unpack=True)
+    rows = [f"{1000 * x!r},{60 * y!r},{60 * z!r}" for x, y, z in zip(t.tolist(), nu.tolist(), u.tolist(), strict=True)]
+    return "\n".join(["t [ms],f [rpm],u [rpm]", *rows, ""])
+
+
+def without_uncertainties(text: str) -> str:
+    return "\n".join(row.rpartition(",")[0] for row in text.split("\n"))
+
+
+@pytest.mark.parametrize(
+    "rewritten", [with_crlf, with_quotes, with_decimal_commas, in_other_units, without_uncertainties]
+)
+def test_the_same_readings_in_another_file_format_count_once(tmp_path: Path, rewritten: Callable[[str], str]) -> None:
+    first = spin_down_csv(tmp_path / "first.csv")
+    second = tmp_path / "second.csv"
+    second.write_bytes(rewritten(first.read_text(encoding="utf-8")).encode())
+    analysis = analyze_spindowns([first, second], Options())
+    assert [source.name for source in analysis.sources] == ["first.csv"]
+    assert analysis.warnings == (f"{second}: holds the same readings as {first}, counted once",)
+
+
+def test_an_export_beside_the_run_counts_once(tmp_path: Path, sample_data: Path) -> None:
+    run = shutil.copytree(sample_data / "spin-down-1", tmp_path / "run")
+    export = tmp_path / "export.csv"
+    export.write_text(with_decimal_commas((run / "readings.csv").read_text(encoding="utf-8")), encoding="utf-8")
+    assert len(analyze_spindowns([run, export], Options()).sources) == 1
+
+
+def test_runs_that_differ_in_one_reading_are_two_runs(tmp_path: Path) -> None:
+    first = spin_down_csv(tmp_path / "first.csv")
+    lines = first.read_text(encoding="utf-8").splitlines()
+    time, frequency, u = lines[7].split(",")
+    lines[7] = f"{time},{float(frequency) * (1 + 1e-6)!r},{u}"
+    (tmp_path / "second.csv").write_text("\n".join([*lines, ""]), encoding="utf-8")
+    assert len(analyze_spindowns([first, tmp_path / "second.csv"], Options()).sources) == 2
+
+
+def test_runs_of_another_experiment_are_a_remark_and_no_warning(sample_data: Path) -> None:
+    analysis = analyze_spindowns([sample_data], Options())
+    assert analysis.remarks == ("passed over: 1 limit run",)
+    assert not any("passed over" in warning for warning in analysis.all_warnings)
