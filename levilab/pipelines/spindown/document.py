@@ -378,6 +378,8 @@ def recall_spindowns(paths: Sequence[Path], options: Options) -> SpinDownAnalysi
     found = collect(paths, NEEDS, columns)
     place = place_of(paths, found.sources)
     whole = archive.whole(found.sources)
+    if all(source.run for source in found.sources):
+        given.pop("columns", None)
     if whole and _holds(whole[1].settings.options, given):
         return _restored(whole[1], whole[0], found, place)
     recalled = [_recalled(source, archive, given) for source in found.sources]
@@ -403,6 +405,8 @@ def _recalled(
     source: Source[Readings], archive: Archive[SpinDownResult], given: Mapping[str, Any]
 ) -> tuple[Source[Readings], SpinDown, Origin]:
     """One input: what was found of it, or its fit."""
+    if source.run:  # the columns of a run are known
+        given = {name: value for name, value in given.items() if name != "columns"}
     earlier = archive.earlier(source.path, source.data, source.sha256)
     if earlier is None:
         options = Options(**given)

@@ -76,7 +76,7 @@ def test_an_analysis_need_not_be_named(levilab: Command, sample_data: Path) -> N
     assert "no such file" in levilab("analyze", "spindwon", check=1).stderr
 
 
-def test_two_files_in_one_folder_have_a_result_each_and_the_report_reads_it(levilab: Command, tmp_path: Path) -> None:
+def test_two_files_in_a_folder_have_a_result_each_that_the_report_reads(levilab: Command, tmp_path: Path) -> None:
     for k, name in enumerate(("a.csv", "b.csv")):
         levilab("analyze", "spindown", spin_down_csv(tmp_path / name, seed=k), "--uncertainty", "profile")
     names = {path.name for path in tmp_path.iterdir()}

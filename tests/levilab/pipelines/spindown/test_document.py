@@ -169,6 +169,13 @@ def test_the_columns_of_the_result_are_those_of_the_report(tmp_path: Path, fitte
     assert fitted == []
 
 
+def test_names_of_columns_do_not_matter_to_a_run(runs: Path, fitted: list[str]) -> None:
+    analyzed(runs)
+    recall_spindowns([runs], Options(columns={"t": "1"}))
+    recall_spindowns([runs / "run-1", runs / "run-2"], Options(columns={"t": "1"}))
+    assert fitted == []
+
+
 def test_nothing_is_written_where_results_are_recalled(runs: Path) -> None:
     analyzed(runs / "run-1")
     before = {path: path.read_bytes() for path in runs.rglob("*") if path.is_file()}
