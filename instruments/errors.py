@@ -43,12 +43,22 @@ class SilentLine(NoAnswer):
         self.args = (f"{self} Are baud rate, data bits and parity those of the instrument?",)
 
 
-class BadAnswer(InstrumentError):
-    """The instrument answered something else than was expected."""
+#: What to try after a bad answer, and how much of one stands in the message.
+_ASK_AGAIN = "ask again; if it stays so, check the model, the cable, and that no other program uses this link"
+_LONGEST_SHOWN = 80
 
-    def __init__(self, address: str, question: str, answer: str, expected: str) -> None:
+
+class BadAnswer(InstrumentError):
+    """The instrument answered something else than was expected.
+
+    question: the message that was sent; answer: what came, whole; expected: the form of an answer, in words; advice:
+    what to try.
+    """
+
+    def __init__(self, address: str, question: str, answer: str, expected: str, advice: str = _ASK_AGAIN) -> None:
         self.question, self.answer, self.expected = question, answer, expected
-        super().__init__(address, f"{question!r} was answered with {answer!r}, expected {expected}")
+        shown = answer if len(answer) <= _LONGEST_SHOWN else f"{answer[:_LONGEST_SHOWN]}…"
+        super().__init__(address, f"{question!r} was answered with {shown!r}, expected {expected}: {advice}")
 
 
 class CommandRefused(InstrumentError):

@@ -1,11 +1,14 @@
-"""Definite-length blocks: how instruments send bytes of any value, line feeds included.
+"""The forms of IEEE 488.2 answers: definite-length blocks, numbers, the identity.
 
-``#`` one digit n, n digits that say how many bytes follow, and so many bytes (IEEE 488.2-1992, 8.7.9).
+A block is ``#``, one digit n, n digits that say how many bytes follow, and so many bytes of any value, line feeds
+included (IEEE 488.2-1992, 8.7.9).
 """
 
 from __future__ import annotations
 
+import functools
 import re
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -76,6 +79,63 @@ def _size(head: bytes, digits: bytes) -> int:
     if size > LONGEST_BLOCK:
         raise BrokenBlock(f"{(head + digits).decode()}, which announces {size} bytes")
     return size
+
+
+@dataclass(frozen=True)
+class Form:
+    """The form in which an instrument prints an answer.
+
+    An answer that came for another question, or that lost a byte on the line, is recognised by its form only: the
+    narrower the form, the fewer of them pass.
+
+    pattern: a regular expression that the whole answer matches, in ASCII; example: an answer in this form.
+
+    >>> NR3.number("+2.5E+01"), NR1.matches("1_0"), NR1.matches("\u0661")
+    (25.0, False, False)
+    """
+
+    pattern: str
+    example: str
+
+    def matches(self, answer: str) -> bool:
+        """Whether the whole answer has this form."""
+        return _compiled(self.pattern).fullmatch(answer) is not None
+
+    def number(self, answer: str) -> float:
+        """The number in an answer of this form.  Raises ValueError."""
+        if not self.matches(answer):
+            raise ValueError(answer)
+        return float(answer)
+
+
+@functools.cache
+def _compiled(pattern: str) -> re.Pattern[str]:
+    return re.compile(pattern, re.ASCII)
+
+
+#: Numeric response data (IEEE 488.2-1992, 8.7.2 to 8.7.4): a whole number, one with a point, one with an exponent, and
+#: any of them.
+NR1 = Form(r"[+-]?\d{1,15}", "+12")
+NR2 = Form(r"[+-]?\d+\.\d+", "+12.5")
+NR3 = Form(r"[+-]?\d+\.\d+[Ee][+-]\d{1,3}", "+1.25E+01")
+NUMERIC = Form(f"{NR1.pattern}|{NR2.pattern}|{NR3.pattern}", NR3.example)
+
+#: How many fields an identity has, and what they are (IEEE 488.2-1992, 10.14.3).
+IDENTITY_FIELDS = ("maker", "model", "serial number", "firmware")
+
+
+def identity_fields(answer: str) -> tuple[str, ...]:
+    """Maker, model, serial number and firmware of an answer to ``*IDN?``.
+
+    Raises ValueError where there are not four fields, where maker or model is empty, or where it is no plain text.
+
+    >>> identity_fields("LSCI,MODEL425, VIRTUAL,1.0")
+    ('LSCI', 'MODEL425', 'VIRTUAL', '1.0')
+    """
+    fields = tuple(field.strip() for field in answer.split(","))
+    if len(fields) != len(IDENTITY_FIELDS) or not all(fields[:2]) or not (answer.isascii() and answer.isprintable()):
+        raise ValueError(answer)
+    return fields
 
 
 #: What SCPI instruments send when there is no reading, and for infinity (SCPI-1999, vol. 1, 7.2.1).

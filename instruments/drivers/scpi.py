@@ -9,41 +9,36 @@ import contextlib
 import math
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar, cast, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, NoReturn, TypeVar, cast, overload
 
 from instruments.errors import BadAnswer, CommandRefused, OutOfRange, WrongInstrument
-from instruments.ieee488 import INFINITY, NOT_A_NUMBER
+from instruments.ieee488 import IDENTITY_FIELDS, INFINITY, NOT_A_NUMBER, NUMERIC, Form, identity_fields
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
     from instruments.links.transport import Transport
 
 T = TypeVar("T", bound=bool | float | str)
 #: Error queues hold 20 to 32 entries; more questions than that mean that the instrument never says "none".
 _LONGEST_ERROR_QUEUE = 64
-#: An answer's text as a value.  Instruments quote some words, and print switches as 0 or 1.
-_FROM_WIRE: dict[type, Callable[[str], Any]] = {
-    float: lambda answer: _setting_of(float(answer)),
-    bool: lambda answer: bool(int(answer)),
-    str: lambda answer: answer.strip('"'),
-}
-
-
-def _setting_of(number: float) -> float:
-    """The number, if a setting can be it: infinity is printed as 9.9E37.  Raises ValueError."""
-    if not math.isfinite(number) or abs(number) >= NOT_A_NUMBER:
-        raise ValueError(number)
-    return number
+#: An entry of the error queue (SCPI-1999, vol. 2, 21.8): a number and a text in quotes.
+_QUEUE_ENTRY = re.compile(r"([+-]?\d{1,5}), ?(\"[ -~]*\")", re.ASCII)
+#: How instruments print a switch (SCPI-1999, vol. 1, 7.3).
+_SWITCH = {"0": False, "1": True}
+#: Instruments round what they are set to by this fraction of it at most.
+_ROUNDING = 0.01
 
 
 class ScpiInstrument:
     """An instrument that speaks SCPI over a transport.
 
-    MODELS: what the model field of ``*IDN?`` must match, whole (regular expression).
+    MODELS: what the model field of ``*IDN?`` must match, whole (regular expression); NUMBER: the form in which it
+    prints numbers, where a setting or a question has none of its own.
     """
 
     MODELS: ClassVar[str] = ".*"
+    NUMBER: ClassVar[Form] = NUMERIC
 
     def __init__(self, transport: Transport) -> None:
         self.transport = transport
@@ -51,12 +46,16 @@ class ScpiInstrument:
         self.set_to: dict[str, bool | float | str] = {}
 
     def identity(self) -> str:
-        """The answer to ``*IDN?``.  Raises WrongInstrument when another model answers, BadAnswer when it is no text."""
+        """The answer to ``*IDN?``.
+
+        Raises WrongInstrument when another model answers, BadAnswer when the answer has not the four fields of an
+        identity.
+        """
         answer = self.transport.query("*IDN?")
-        if not answer.isprintable():
-            with self.resynchronised():
-                raise BadAnswer(self.transport.address, "*IDN?", answer, "maker, model, serial number, firmware")
-        model = answer.split(",")[1].strip() if answer.count(",") >= 2 else answer
+        try:
+            _, model, *_ = identity_fields(answer)
+        except ValueError:
+            self.reject("*IDN?", answer, f"four fields with commas between them: {', '.join(IDENTITY_FIELDS)}")
         if not re.fullmatch(self.MODELS, model, re.IGNORECASE):
             raise WrongInstrument(self.transport.address, answer, f"one of {self.kind_of_instrument()}")
         return answer
@@ -85,13 +84,12 @@ class ScpiInstrument:
         entries: list[str] = []
         for _ in range(_LONGEST_ERROR_QUEUE):
             answer = self.transport.query("SYST:ERR?")
-            number, _, text = answer.partition(",")
-            if not re.fullmatch(r"[+-]?\d{1,9}", number.strip()):
-                self.transport.clear()
-                raise BadAnswer(self.transport.address, "SYST:ERR?", answer, 'a number and a text, as +0,"No error"')
-            if int(number) == 0:
+            entry = _QUEUE_ENTRY.fullmatch(answer)
+            if not entry:
+                self.reject("SYST:ERR?", answer, 'a number and a text, as +0,"No error"')
+            if int(entry[1]) == 0:
                 break
-            entries.append(f"{number} {text}")
+            entries.append(f"{entry[1]} {entry[2]}")
         if entries:
             raise CommandRefused(self.transport.address, after, tuple(entries))
 
@@ -104,7 +102,12 @@ class ScpiInstrument:
         self.raise_errors(question)
         answer = self.transport.query(question, patience=patience)
         with self.resynchronised():
-            return parse_reading(self.transport.address, question, answer)
+            return parse_reading(self.transport.address, question, answer, self.NUMBER)
+
+    def reject(self, question: str, answer: str, expected: str) -> NoReturn:
+        """Raise BadAnswer, and clear the link: the answer may have been another question's."""
+        with self.resynchronised():
+            raise BadAnswer(self.transport.address, question, answer, expected)
 
     @contextlib.contextmanager
     def resynchronised(self) -> Iterator[None]:
@@ -143,8 +146,13 @@ class ScpiInstrument:
 class Setting(Generic[T]):
     """A quantity of an instrument that can be set and asked for, declared in one line.
 
+    What the instrument answers is checked: a number must have the instrument's form, a switch is 0 or 1, a word is one
+    of the choices, in its short or long form.  Anything else is BadAnswer, and the link is cleared.
+
     header: the SCPI header; kind: float, bool or str; unit: of the number on the wire;
-    low, high: what the instrument takes; choices: the words it takes, in their short form.
+    low, high: what the instrument takes; choices: the words it takes, long form with the short form in capitals
+    (SINusoid); answers: words that it may answer beside the choices; form: the form of its answer, where that is not
+    the instrument's NUMBER, or of a text without choices; resolution: the step in which the instrument sets it [unit].
     """
 
     header: str
@@ -153,7 +161,14 @@ class Setting(Generic[T]):
     low: float = -math.inf
     high: float = math.inf
     choices: tuple[str, ...] = ()
+    answers: tuple[str, ...] = ()
+    form: Form | None = None
+    resolution: float = 0.0
     name: str = ""
+
+    def __post_init__(self) -> None:
+        if self.kind is str and not (self.choices or self.form):
+            raise TypeError(f"{self.header}: a word needs choices, and a text a form, or no answer could be checked")
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
@@ -168,52 +183,111 @@ class Setting(Generic[T]):
     @overload
     def __get__(self, instrument: ScpiInstrument, owner: type) -> T: ...
     def __get__(self, instrument: ScpiInstrument | None, owner: type) -> Setting[T] | T:
-        """Ask the instrument."""
+        """Ask the instrument.  Raises BadAnswer."""
         if instrument is None:
             return self
         question = f"{self.header}?"
         answer = instrument.transport.query(question)
-        with instrument.resynchronised():
-            return self._parse(instrument.transport.address, question, answer)
+        form = self.form or instrument.NUMBER
+        try:
+            return cast("T", self._parse(answer, form))
+        except ValueError:
+            instrument.reject(question, answer, self._expected(form))
 
     def __set__(self, instrument: ScpiInstrument, value: T) -> None:
         """Check, send, and read the error queue."""
         self._check(instrument.transport.address, value)
         instrument.command(f"{self.header} {self._spell(value)}")
-        instrument.set_to[self.full_name] = value
+        instrument.set_to[self.full_name] = self._canonical(value)
 
     def differs(self, asked: T, answered: T) -> bool:
-        """Whether an answer is another value than the one that was set; instruments round by a hundredth at most."""
+        """Whether an answer is another value than the one that was set, rounding and the setting's resolution aside."""
         if self.kind is float:
-            return not abs(float(answered) - float(asked)) <= 0.01 * abs(float(asked)) + 5e-3
-        return bool(str(asked).upper() != str(answered).upper())
+            return not abs(float(answered) - float(asked)) <= _ROUNDING * abs(float(asked)) + self.resolution
+        return self._canonical(asked) != self._canonical(answered)
 
-    def _parse(self, address: str, question: str, answer: str) -> T:
-        convert: Callable[[str], Any] = _FROM_WIRE[self.kind]
-        try:
-            return cast("T", convert(answer))
-        except ValueError:
-            raise BadAnswer(address, question, answer, "a number") from None
+    def _parse(self, answer: str, form: Form) -> bool | float | str:
+        """The value of an answer.  Raises ValueError."""
+        if self.kind is bool:
+            if answer not in _SWITCH:
+                raise ValueError(answer)
+            return _SWITCH[answer]
+        if self.kind is float:
+            number = form.number(answer)
+            if not abs(number) < NOT_A_NUMBER:  # infinity is a setting: a load of 9.9E37 ohm
+                raise ValueError(answer)
+            return number
+        if self.choices:
+            return _short_form(_without_quotes(answer), (*self.choices, *self.answers))
+        if not form.matches(answer):
+            raise ValueError(answer)
+        return answer
+
+    def _expected(self, form: Form) -> str:
+        """What an answer is expected to be, in words."""
+        if self.kind is bool:
+            return "0 or 1"
+        if self.kind is float:
+            return f"a number, as {form.example}"
+        if self.choices:
+            return "one of " + ", ".join((*self.choices, *self.answers))
+        return f"a text, as {form.example}"
+
+    def _canonical(self, value: T) -> T:
+        """A word in its short form, everything else as it is."""
+        if self.kind is not str or not self.choices:
+            return value
+        with contextlib.suppress(ValueError):
+            return cast("T", _short_form(str(value), (*self.choices, *self.answers)))
+        return value
 
     def _check(self, address: str, value: T) -> None:
-        if self.choices and str(value).upper() not in self.choices:
-            raise OutOfRange(address, self.name, value, "one of " + ", ".join(self.choices))
+        if self.choices:
+            try:
+                _short_form(str(value), self.choices)
+            except ValueError:
+                raise OutOfRange(address, self.name, value, "one of " + ", ".join(self.choices)) from None
         if self.kind is float and not self.low <= float(value) <= self.high:
             raise OutOfRange(address, self.name, value, f"{self.low:g} to {self.high:g} {self.unit}")
+        if self.kind is str and not self.choices and self.form and not self.form.matches(str(value)):
+            raise OutOfRange(address, self.name, value, f"a text, as {self.form.example}")
 
     def _spell(self, value: T) -> str:
         if self.kind is bool:
             return "ON" if value else "OFF"
-        return repr(float(value)) if self.kind is float else str(value).upper()
+        return repr(float(value)) if self.kind is float else str(self._canonical(value)).upper()
 
 
-def parse_reading(address: str, question: str, answer: str) -> float | None:
-    """A measured number, or None where the instrument says that there was nothing to measure.
+def _short_form(word: str, choices: tuple[str, ...]) -> str:
+    """The short form of the choice that this word is, in any case.  Raises ValueError where it is none.
 
-    Raises BadAnswer if it is no number at all.
+    >>> _short_form("sinusoid", ("SINusoid", "SQUare")), _short_form("SQU", ("SINusoid", "SQUare"))
+    ('SIN', 'SQU')
+    """
+    for choice in choices:
+        short = re.sub("[a-z]", "", choice)
+        if word.upper() in {short, choice.upper()}:
+            return short
+    raise ValueError(word)
+
+
+def _without_quotes(answer: str) -> str:
+    """Some instruments quote some words."""
+    quoted = re.fullmatch(r'"([^"]*)"', answer)
+    return quoted[1] if quoted else answer
+
+
+def parse_reading(address: str, question: str, answer: str, form: Form = NUMERIC) -> float | None:
+    """A measured number, or None where the instrument says that there was nothing to measure: 9.91E37, 9.9E37, -9.9E37.
+
+    Raises BadAnswer if it is no number of this form.
     """
     try:
-        number = float(answer)
+        number = form.number(answer)
     except ValueError:
-        raise BadAnswer(address, question, answer, "a number") from None
-    return None if not math.isfinite(number) or abs(number) >= INFINITY else number
+        number = math.nan
+    if number in {NOT_A_NUMBER, INFINITY, -INFINITY}:
+        return None
+    if not abs(number) < INFINITY:
+        raise BadAnswer(address, question, answer, f"a number, as {form.example}")
+    return number

@@ -10,6 +10,7 @@ import numpy as np
 from instruments.drivers.counter.reciprocal import READINGS_AT_ONCE, ReciprocalCounter
 from instruments.drivers.scpi import Setting
 from instruments.errors import InstrumentError
+from instruments.ieee488 import Form
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,6 +28,9 @@ class Keysight53230A(ReciprocalCounter):
     """
 
     MODELS: ClassVar[str] = r"532[23]0A"
+    #: Programmer's Reference, FORMat:DATA: fifteen digits, three of exponent.  Public drivers quote sixteen and two.
+    #: Both have 22 characters: an answer that lost one is neither.
+    NUMBER: ClassVar[Form] = Form(r"[+-]\d\.(\d{14}E[+-]\d{3}|\d{15}E[+-]\d{2})", "+1.00000000000000E-001")
 
     gate = Setting("SENS:FREQ:GATE:TIME", float, unit="s", low=100e-6, high=1000.0)
     coupling = Setting("INP1:COUP", str, choices=("AC", "DC"))
@@ -35,7 +39,7 @@ class Keysight53230A(ReciprocalCounter):
     input_range = Setting("INP1:RANG", float, unit="V", low=5.0, high=50.0)
     trigger_level = Setting("INP1:LEV1", float, unit="V", low=-5.125, high=5.125)
     automatic_level = Setting("INP1:LEV:AUTO", bool)
-    slope = Setting("INP1:SLOP1", str, choices=("POS", "NEG"))
+    slope = Setting("INP1:SLOP1", str, choices=("POSitive", "NEGative"))
     measurement_timeout = Setting("SYST:TIM", float, unit="s", low=0.01, high=2000.0)
 
     def prepare(self, *, gate_s: float, trigger_level_v: float) -> None:
@@ -56,6 +60,7 @@ class Keysight53230A(ReciprocalCounter):
         # Without a signal the answer, "no reading", comes after this time (2000 s is the longest there is).
         self._patience = min(2 * gate_s + 1.0, 2000.0)
         self.measurement_timeout = self._patience
+        self.command("FORM ASC,15")  # another program may have left fewer digits, or binary numbers
         self._gives_up = True
 
     def readings(self, count: int) -> NDArray[np.float64]:

@@ -18,10 +18,12 @@ LONGEST_WAIT_S = 30 * 86400.0
 class ReciprocalCounter(ScpiInstrument):
     """What the drivers share: how long to wait for an answer, and what to do when none comes.
 
-    most: readings that the memory holds.
+    MOST: readings that the memory holds; EMPTY_IS_NONE: whether an empty answer, or an empty place in a list, means
+    that there was no reading.
     """
 
     MOST: ClassVar[int] = 1_000_000
+    EMPTY_IS_NONE: ClassVar[bool] = False
 
     #: How long the counter may work on one reading [s]; prepare() sets it.
     _patience = 3.0
@@ -32,10 +34,16 @@ class ReciprocalCounter(ScpiInstrument):
         """One reading [Hz], or None; see :class:`Counter`.  Raises CommandRefused if an error was waiting."""
         answer = self._ask("READ?", self._patience)
         with self.resynchronised():
-            return None if answer is None else self._parse(answer)
+            return None if answer is None else self._reading("READ?", answer)
 
-    def _parse(self, answer: str) -> float | None:
-        return parse_reading(self.transport.address, "READ?", answer)
+    def _reading(self, question: str, answer: str) -> float | None:
+        """A frequency or a time, or None.  Raises BadAnswer: neither is negative."""
+        if not answer and self.EMPTY_IS_NONE:
+            return None
+        value = parse_reading(self.transport.address, question, answer, self.NUMBER)
+        if value is not None and value < 0:
+            raise BadAnswer(self.transport.address, question, answer, f"a number from 0 on, as {self.NUMBER.example}")
+        return value
 
     def _ask(self, question: str, patience: float) -> str | None:
         """Read the error queue, then the data; None when a counter that may wait for ever never answers.
@@ -68,7 +76,6 @@ class ReciprocalCounter(ScpiInstrument):
         """The numbers of a list, NaN where there was no reading.  Raises BadAnswer if they are not so many."""
         words = answer.split(",")
         if len(words) != expected:
-            shown = answer if len(answer) < 80 else f"{answer[:80]}…"
-            raise BadAnswer(self.transport.address, question, shown, f"{expected} numbers, not {len(words)}")
-        found = (parse_reading(self.transport.address, question, word or "nan") for word in words)
+            raise BadAnswer(self.transport.address, question, answer, f"{expected} numbers, not {len(words)}")
+        found = (self._reading(question, word) for word in words)
         return [np.nan if value is None else value for value in found]

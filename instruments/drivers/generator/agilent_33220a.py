@@ -13,7 +13,7 @@ from instruments.drivers.generator.drive import (
     offset_setting,
 )
 from instruments.drivers.scpi import Setting
-from instruments.ieee488 import INFINITY
+from instruments.ieee488 import INFINITY, Form
 
 
 class Agilent33220A(DriveGenerator):
@@ -24,9 +24,11 @@ class Agilent33220A(DriveGenerator):
     """
 
     MODELS: ClassVar[str] = "33220A"
+    #: User's Guide, answers of APPLy? and FREQuency?.
+    NUMBER: ClassVar[Form] = Form(r"[+-]\d\.\d{13}E[+-]\d{2}", "+1.0000000000000E+03")
     OUTPUT: ClassVar[str] = "OUTP"
 
-    waveform = Setting("FUNC", str, choices=("SIN", "SQU", "RAMP"))
+    waveform = Setting("FUNC", str, choices=("SINusoid", "SQUare", "RAMP"), answers=("PULSe", "NOISe", "DC", "USER"))
     symmetry = Setting("FUNC:RAMP:SYMM", float, unit="percent", low=0.0, high=100.0)
     frequency = frequency_setting(20e6)
     amplitude = amplitude_setting(20e-3)

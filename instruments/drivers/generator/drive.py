@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar, cast
 
 from instruments.drivers.generator import NO_LIMITS, OPEN_V, check_peak
 from instruments.drivers.scpi import ScpiInstrument, Setting
-from instruments.errors import BadAnswer, CommandRefused, OutOfRange
+from instruments.errors import CommandRefused, OutOfRange
 from instruments.ieee488 import INFINITY
 
 if TYPE_CHECKING:
@@ -146,8 +146,7 @@ class DriveGenerator(ScpiInstrument):
 
     def _is_on(self, output: str) -> bool:
         question = f"{output}?"
-        answer = self.transport.query(question).strip()
-        with self.resynchronised():
-            if answer not in {"0", "1"}:
-                raise BadAnswer(self.transport.address, question, answer, "0 or 1")
+        answer = self.transport.query(question)
+        if answer not in {"0", "1"}:
+            self.reject(question, answer, "0 or 1")
         return answer == "1"

@@ -13,7 +13,7 @@ from instruments.drivers.generator.drive import (
     offset_setting,
 )
 from instruments.drivers.scpi import Setting
-from instruments.ieee488 import INFINITY
+from instruments.ieee488 import INFINITY, Form
 
 if TYPE_CHECKING:
     from instruments.links.transport import Transport
@@ -27,11 +27,18 @@ class Keysight33500B(DriveGenerator):
     """
 
     MODELS: ClassVar[str] = r"335\d\d[AB]"
+    #: Operating and Service Guide, "typical response" of its queries.
+    NUMBER: ClassVar[Form] = Form(r"[+-]\d\.\d{15}E[+-]\d{2}", "+1.000000000000000E+03")
     OUTPUT: ClassVar[str] = "OUTP1"
     #: Those of the series that have a second channel, which nothing here drives.
     TWO_CHANNELS: ClassVar[frozenset[str]] = frozenset({"33510B", "33512B", "33520B", "33522A", "33522B"})
 
-    waveform = Setting("FUNC", str, choices=("SIN", "SQU", "TRI", "RAMP"))
+    waveform = Setting(
+        "FUNC",
+        str,
+        choices=("SINusoid", "SQUare", "TRIangle", "RAMP"),
+        answers=("PULSe", "PRBS", "NOISe", "ARBitrary", "DC"),
+    )
     frequency = frequency_setting(30e6)
     amplitude = amplitude_setting(2e-3)
     offset = offset_setting()
@@ -45,7 +52,7 @@ class Keysight33500B(DriveGenerator):
     def identity(self) -> str:
         """As every instrument; it says how many channels there are."""
         answer = super().identity()
-        self._model = answer.split(",")[1].strip().upper() if "," in answer else answer.upper()
+        self._model = answer.split(",")[1].strip().upper()
         return answer
 
     def outputs(self) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from instruments.drivers.scpi import ScpiInstrument, Setting
 from instruments.errors import BadAnswer, CommandRefused, OutOfRange
+from instruments.ieee488 import Form
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -21,6 +22,16 @@ _STRONGEST_T = 35.1
 #: TYPE? less 40, or less 50 with a cable that the user has programmed.
 _PROBES = ("HSE", "HST", "UHS")
 
+#: How they print numbers: a field as nnn.nnn with sign and exponent (manual of the 425, pages 56 and 57), a status as
+#: three digits, other numbers as one or two (public drivers of the 455 and 475).
+_FIELD = Form(r"[+-]\d{3}\.\d{3}E[+-]\d{2}", "+123.456E-04")
+_STATUS = Form(r"\d{3}", "004")
+_DIGITS = Form(r"\d{1,2}", "2")
+_LIST = Form(r"\+?\d{1,2}(,\+?\d{1,2})*", "1,2,1,1,1")
+#: What the message of a reading asks, and the form of its answer; OL: beyond the range.
+_READING = "UNIT?;RDGFIELD?;UNIT?;OPST?"
+_BEYOND_RANGE, _WITHOUT_PROBE = "OL", "NO PROBE"
+
 
 @dataclass(eq=False)
 class Coded(Setting[str]):
@@ -28,18 +39,34 @@ class Coded(Setting[str]):
 
     first: int = 1
 
-    def _parse(self, address: str, question: str, answer: str) -> str:
-        try:
-            index = int(answer) - self.first
-        except ValueError:
-            index = -1
+    def word(self, answer: str) -> str:
+        """The word that a number on the wire stands for.  Raises ValueError."""
+        index = int(_DIGITS.number(answer)) - self.first
         if not 0 <= index < len(self.choices):
-            last = self.first + len(self.choices) - 1
-            raise BadAnswer(address, question, answer, f"a number from {self.first} to {last}")
+            raise ValueError(answer)
         return self.choices[index]
+
+    def _parse(self, answer: str, form: Form) -> str:
+        return self.word(answer)
+
+    def _expected(self, form: Form) -> str:
+        return f"a number from {self.first} to {self.first + len(self.choices) - 1}"
 
     def _spell(self, value: str) -> str:
         return str(self.choices.index(str(value).upper()) + self.first)
+
+
+@dataclass(eq=False)
+class ListedNumbers(Setting[str]):
+    """Whole numbers with commas between them.  They may come with a leading zero, and are given without."""
+
+    def _parse(self, answer: str, form: Form) -> str:
+        if not form.matches(answer):
+            raise ValueError(answer)
+        return ",".join(str(int(number)) for number in answer.split(","))
+
+
+_UNIT = Coded("UNIT", str, choices=tuple(_UNITS_T))
 
 
 class LakeShoreGaussmeter(ScpiInstrument):
@@ -57,12 +84,10 @@ class LakeShoreGaussmeter(ScpiInstrument):
     _STEADY: ClassVar[str]
     #: So many readings are tried while the unit changes.
     _MOST_UNITS = 3
-    #: The unit as it was asked for last.
-    _unit: str | None = None
 
-    unit = Coded("UNIT", str, choices=tuple(_UNITS_T))
+    unit = _UNIT
     automatic_range = Coded("AUTO", str, choices=("OFF", "ON"), first=0)
-    mode = Setting("RDGMODE", str)
+    mode: Setting[str]
 
     def forget_errors(self) -> None:
         """There is no error queue."""
@@ -74,7 +99,7 @@ class LakeShoreGaussmeter(ScpiInstrument):
         """Set something and ask it back.  Raises CommandRefused when it is not so afterwards."""
         header, _, wanted = message.partition(" ")
         answer = self.transport.query(f"{message};{header}?")
-        if _numbers(answer) != _numbers(wanted):
+        if _whole_numbers(answer) != _whole_numbers(wanted):
             self.transport.clear()  # it may have been the answer to something else
             raise CommandRefused(self.transport.address, message, (f"{header}? answers {answer!r} afterwards",))
 
@@ -85,24 +110,22 @@ class LakeShoreGaussmeter(ScpiInstrument):
 
     def probe(self) -> str:
         """HSE, HST or UHS: high sensitivity, high stability, ultra-high sensitivity.  Raises BadAnswer."""
-        answer = self._ask("TYPE?")
-        with self.resynchronised():
-            if answer // 10 not in {4, 5} or answer % 10 >= len(_PROBES):
-                raise BadAnswer(self.transport.address, "TYPE?", str(answer), "a probe: is one plugged in?")
-        return _PROBES[answer % 10]
+        answer = self.transport.query("TYPE?")
+        if not re.fullmatch(r"[45][012]", answer, re.ASCII):
+            self.reject("TYPE?", answer, "40 to 42, or 50 to 52: is a probe plugged in?")
+        return _PROBES[int(answer[1])]
 
     def _range_t(self, probe: str) -> float:
         """The greatest flux density of the range in use [T]."""
         ranges = self.RANGES_T[probe]
-        number = self._ask("RANGE?")
-        with self.resynchronised():
-            if not 1 <= number <= len(ranges):
-                raise BadAnswer(self.transport.address, "RANGE?", str(number), f"1 to {len(ranges)}")
-        return ranges[number - 1]
+        answer = self.transport.query("RANGE?")
+        if not _DIGITS.matches(answer) or not 1 <= int(answer) <= len(ranges):
+            self.reject("RANGE?", answer, f"a number from 1 to {len(ranges)}")
+        return ranges[int(answer) - 1]
 
     def prepare(self, *, range_t: float | None) -> None:
         """Steady fields in tesla; the smallest range that holds range_t; see :class:`Magnetometer`."""
-        self.unit = self._unit = "TESLA"
+        self.unit = "TESLA"
         self.mode = self._STEADY
         if range_t is None:
             self.automatic_range = "ON"
@@ -117,56 +140,58 @@ class LakeShoreGaussmeter(ScpiInstrument):
     def flux_density(self) -> float | None:
         """One reading [T]; see :class:`Magnetometer`.
 
-        The unit is asked after each: somebody may have changed it at the front panel, or a reset.  Then it is not
-        known which one the reading was in, and another is taken.  Raises BadAnswer without a probe.
+        One message asks for the unit, the field, the unit again and the status: so the answer cannot be the one to
+        another question.  The unit may be changed at the front panel between the two: then it is not known which one
+        the reading is in, and another is taken.  Raises BadAnswer, also without a probe.
         """
         for _ in range(self._MOST_UNITS):
-            unit = self._unit or self.unit
-            answer = self.transport.query("RDGFIELD?")
-            self._unit = self.unit
-            if self._unit == unit:
-                return self._checked(answer, _UNITS_T[unit])
-        raise BadAnswer(self.transport.address, "UNIT?", str(self._unit), "a unit that stays what it is")
+            answer = self.transport.query(_READING)
+            with self.resynchronised():
+                before, field, after, status = self._parts(answer)
+                if before == after:
+                    return self._field_t(answer, field, _UNITS_T[before], status)
+        raise BadAnswer(self.transport.address, _READING, answer, "a unit that stays what it is")
 
-    def _checked(self, answer: str, per_unit: float) -> float | None:
-        """A reading, given the answer and the unit [T]."""
-        status = self._ask("OPST?")
-        if status & (_NO_PROBE | _INVALID_PROBE) or answer == "NO PROBE":
-            expected = "a flux density: is the probe plugged in (with the instrument off)?"
-            raise BadAnswer(self.transport.address, "RDGFIELD?", answer, expected)
-        if status & _OVERLOAD or answer == "OL":
+    def _parts(self, answer: str) -> tuple[str, str, str, int]:
+        """Unit, field, unit and status of an answer.  Raises BadAnswer."""
+        try:
+            before, field, after, status = answer.split(";")
+            return _UNIT.word(before), field, _UNIT.word(after), int(_STATUS.number(status))
+        except ValueError:
+            expected = f"unit, field, unit and status, as 2;{_FIELD.example};2;{_STATUS.example}"
+            raise BadAnswer(self.transport.address, _READING, answer, expected) from None
+
+    def _field_t(self, answer: str, field: str, per_unit: float, status: int) -> float | None:
+        """The field in an answer, given one of its unit [T] and the status.  Raises BadAnswer."""
+        if status & (_NO_PROBE | _INVALID_PROBE) or field == _WITHOUT_PROBE:
+            advice = "is the probe plugged in (with the instrument off)?"
+            raise BadAnswer(self.transport.address, _READING, answer, "a flux density", advice)
+        if field == _BEYOND_RANGE:
             return None
-        with self.resynchronised():
-            field_t = _number(self.transport.address, answer) * per_unit
-            if abs(field_t) > _STRONGEST_T:
-                raise BadAnswer(self.transport.address, "RDGFIELD?", answer, f"at most {_STRONGEST_T:g} T")
-        return field_t
+        expected = f"a number between the units, as {_FIELD.example}, of at most {_STRONGEST_T:g} T"
+        try:
+            field_t = _FIELD.number(field) * per_unit
+        except ValueError:
+            field_t = math.inf
+        if abs(field_t) > _STRONGEST_T:
+            raise BadAnswer(self.transport.address, _READING, answer, expected)
+        return None if status & _OVERLOAD else field_t
+
+    def _status(self) -> int:
+        """The bits of OPST?."""
+        answer = self.transport.query("OPST?")
+        if not _STATUS.matches(answer):
+            self.reject("OPST?", answer, f"three digits, as {_STATUS.example}")
+        return int(answer)
 
     def zero(self) -> None:
         """Zero the probe; see :class:`Magnetometer`.  Raises NoAnswer if that takes too long."""
         raise NotImplementedError
 
-    def _ask(self, question: str) -> int:
-        answer = self.transport.query(question)
-        with self.resynchronised():
-            if not re.fullmatch("[0-9]{1,9}", answer):
-                raise BadAnswer(self.transport.address, question, answer, "a whole number")
-        return int(answer)
 
-
-def _number(address: str, answer: str) -> float:
-    """The number in an answer to RDGFIELD?.  Raises BadAnswer."""
-    if not re.fullmatch(r"[+-]?\d+\.?\d*(E[+-]?\d{1,2})?", answer, re.ASCII):
-        raise BadAnswer(address, "RDGFIELD?", answer, "a number, as +123.456E-04")
-    return float(answer)
-
-
-def _numbers(text: str) -> list[float] | None:
+def _whole_numbers(text: str) -> list[int] | None:
     """The numbers of a list with commas; None if it is none."""
-    try:
-        return [float(part) for part in text.split(",")]
-    except ValueError:
-        return None
+    return [int(part) for part in text.split(",")] if _LIST.matches(text) else None
 
 
 #: Bits of the answer to OPST?.

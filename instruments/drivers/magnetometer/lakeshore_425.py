@@ -7,8 +7,10 @@ from typing import ClassVar
 from instruments.drivers.magnetometer.lakeshore import (
     ZERO_DONE,
     LakeShoreGaussmeter,
+    ListedNumbers,
 )
 from instruments.errors import NoAnswer
+from instruments.ieee488 import Form
 
 
 class LakeShore425(LakeShoreGaussmeter):
@@ -26,6 +28,8 @@ class LakeShore425(LakeShoreGaussmeter):
         "HST": (35e-3, 0.35, 3.5, 35.0),
         "UHS": (35e-6, 350e-6, 3.5e-3),
     }
+    #: Mode, filter, band.
+    mode = ListedNumbers("RDGMODE", str, form=Form(r"0?[12],0?[01],0?[12]", "1,1,1"))
     _STEADY = "1,1,1"  # with the filter
 
     #: Zeroing is over after some seconds; more questions than this mean that it never will be.
@@ -35,6 +39,6 @@ class LakeShore425(LakeShoreGaussmeter):
         """Zero the probe and wait for the bit that says that it is done; see :class:`Magnetometer`."""
         self.transport.write("ZPROBE")
         for _ in range(self._LONGEST_ZEROING):
-            if self._ask("OPST?") & ZERO_DONE:
+            if self._status() & ZERO_DONE:
                 return
         raise NoAnswer(self.transport.address, "ZPROBE", self._LONGEST_ZEROING * self.SERIAL["pause"])

@@ -6,7 +6,9 @@ from typing import ClassVar
 
 from instruments.drivers.magnetometer.lakeshore import (
     LakeShoreGaussmeter,
+    ListedNumbers,
 )
+from instruments.ieee488 import Form
 
 
 class LakeShore475(LakeShoreGaussmeter):
@@ -24,6 +26,8 @@ class LakeShore475(LakeShoreGaussmeter):
         "HST": (3.5e-3, 35e-3, 0.35, 3.5, 35.0),
         "UHS": (3.5e-6, 35e-6, 350e-6, 3.5e-3),
     }
+    #: Mode, resolution, filter, peak mode, peak shown.
+    mode = ListedNumbers("RDGMODE", str, form=Form(r"0?[123],0?[123],0?[123],0?[12],0?[123]", "1,2,1,1,1"))
     _STEADY = "1,2,1,1,1"  # four digits: 10 Hz
 
     #: How long zeroing may take [s].
@@ -31,4 +35,6 @@ class LakeShore475(LakeShoreGaussmeter):
 
     def zero(self) -> None:
         """Zero the probe and wait until the instrument says that it is done; see :class:`Magnetometer`."""
-        self.transport.query("ZPROBE;*OPC?", patience=self._LONGEST_ZEROING)
+        answer = self.transport.query("ZPROBE;*OPC?", patience=self._LONGEST_ZEROING)
+        if answer != "1":
+            self.reject("ZPROBE;*OPC?", answer, "1")

@@ -9,6 +9,7 @@ from instruments.drivers.oscilloscope.scope import Scope
 from instruments.drivers.oscilloscope.setup import SLOPES, Channel, Setup
 from instruments.drivers.scpi import Setting
 from instruments.errors import OutOfRange
+from instruments.ieee488 import NR1, Form
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -19,8 +20,14 @@ if TYPE_CHECKING:
     from instruments.drivers.oscilloscope.setup import Value
 
 
+#: Programmer's Guides, <NR3>: a sign, one to three digits, with or without a point, an exponent of two or three digits.
+_NUMBER = Form(r"[+-]\d{1,3}(\.\d{1,12})?E[+-]\d{2,3}", "+1.25000E-01")
+
+
 class _KeysightChannel(Channel):
     """An input of an InfiniiVision scope."""
+
+    NUMBER: ClassVar[Form] = _NUMBER
 
     probe_factor = Setting("PROB", float, low=0.1, high=1e4)
     coupling = Setting("COUP", str, choices=("AC", "DC"))
@@ -42,6 +49,9 @@ class KeysightDSOX(Scope):
     """
 
     MODELS: ClassVar[str] = r"(DSO|MSO|EDU)-?X ?[12]\d{3}[A-Z]*"
+    NUMBER: ClassVar[Form] = _NUMBER
+    #: Format, type, points, count; distance, first and reference of the times; the same of the voltages.
+    PREAMBLE = (NR1, NR1, NR1, NR1, _NUMBER, _NUMBER, NR1, _NUMBER, _NUMBER, NR1)
     CHANNEL = _KeysightChannel
     READY = ":STOP"
     CODES = (1, 255, 0)
@@ -50,10 +60,10 @@ class KeysightDSOX(Scope):
 
     time_range = Setting(":TIM:RANG", float, unit="s", low=50e-9, high=500.0)
     time_position = Setting(":TIM:POS", float, unit="s", low=-500.0, high=500.0)
-    time_reference = Setting(":TIM:REF", str, choices=("LEFT", "CENT", "RIGH"))
-    acquisition_type = Setting(":ACQ:TYPE", str, choices=("NORM", "AVER", "HRES", "PEAK"))
-    trigger_slope = Setting(":TRIG:EDGE:SLOP", str, choices=("POS", "NEG", "EITH", "ALT"))
-    sweep = Setting(":TRIG:SWE", str, choices=("AUTO", "NORM"))
+    time_reference = Setting(":TIM:REF", str, choices=("LEFT", "CENTer", "RIGHt"))
+    acquisition_type = Setting(":ACQ:TYPE", str, choices=("NORMal", "AVERage", "HRESolution", "PEAK"))
+    trigger_slope = Setting(":TRIG:EDGE:SLOP", str, choices=("POSitive", "NEGative", "EITHer", "ALTernate"))
+    sweep = Setting(":TRIG:SWE", str, choices=("AUTO", "NORMal"))
 
     _RUNNING = 8
     #: Points that can be asked for.
@@ -77,21 +87,20 @@ class KeysightDSOX(Scope):
         }
 
     def _start(self) -> None:
-        self._number(":AER?")  # reading it forgets an earlier arming
+        self._register(":AER?", most=1)  # reading it forgets an earlier arming
         self.command(":SING")
         self._armed = False
 
     def _complete(self) -> bool:
-        self._armed = self._armed or bool(self._number(":AER?"))
-        running = self._number(":OPER:COND?") & self._RUNNING
+        self._armed = self._armed or bool(self._register(":AER?", most=1))
+        running = self._register(":OPER:COND?", most=0x7FFF) & self._RUNNING
         return self._armed and not running
 
-    def _number(self, question: str) -> int:
+    def _register(self, question: str, *, most: int) -> int:
         answer = self.transport.query(question)
-        try:
-            return int(answer)
-        except ValueError:
-            self._misheard(question, answer, "a whole number")
+        if not NR1.matches(answer) or not 0 <= int(answer) <= most:
+            self.reject(question, answer, f"a whole number from 0 to {most}")
+        return int(answer)
 
     def _select(self, channel: int) -> None:
         self.command(f":WAV:SOUR CHAN{channel}")

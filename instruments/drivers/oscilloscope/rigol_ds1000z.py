@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from instruments.drivers.oscilloscope import Preamble
@@ -9,6 +10,7 @@ from instruments.drivers.oscilloscope.scope import Scope
 from instruments.drivers.oscilloscope.setup import SLOPES, Channel, Setup
 from instruments.drivers.scpi import Setting
 from instruments.errors import OutOfRange
+from instruments.ieee488 import NR1, Form
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -19,8 +21,26 @@ if TYPE_CHECKING:
     from instruments.drivers.oscilloscope.setup import Value
 
 
+#: Programming Guide, "scientific notation": six digits behind the point, two of exponent, a sign where it is negative.
+_NUMBER = Form(r"-?\d\.\d{6}[Ee][+-]\d{2}", "2.500000e-01")
+
+#: Points of the memory for one channel; two share it, more have a quarter each.
+_DEPTHS = (12_000, 120_000, 1_200_000, 12_000_000, 24_000_000)
+_SHARED_DEPTHS = sorted({depth // share for depth in _DEPTHS for share in (1, 2, 4)})
+
+
+@dataclass(eq=False)
+class _Depth(Setting[str]):
+    """A depth of the memory, or AUTO.  Some firmware prints the number with an exponent."""
+
+    def _parse(self, answer: str, form: Form) -> bool | float | str:
+        return super()._parse(f"{form.number(answer):.0f}" if form.matches(answer) else answer, form)
+
+
 class _RigolChannel(Channel):
     """An input of a DS1000Z."""
+
+    NUMBER: ClassVar[Form] = _NUMBER
 
     probe_factor = Setting("PROB", float, low=0.01, high=1000.0)
     coupling = Setting("COUP", str, choices=("AC", "DC", "GND"))
@@ -43,6 +63,9 @@ class RigolDS1000Z(Scope):
     """
 
     MODELS: ClassVar[str] = r"(DS|MSO)1\d{3}Z.*"
+    NUMBER: ClassVar[Form] = _NUMBER
+    #: Format, type, points, count; distance, first and reference of the times; the same of the voltages.
+    PREAMBLE = (NR1, NR1, NR1, NR1, _NUMBER, _NUMBER, NR1, _NUMBER, NR1, NR1)
     CHANNEL = _RigolChannel
     OFFSET_SIGN = -1.0
     #: Some firmware takes no memory depth when it has stopped.
@@ -54,14 +77,17 @@ class RigolDS1000Z(Scope):
 
     time_scale = Setting(":TIM:SCAL", float, unit="s", low=5e-9, high=50.0)
     time_offset = Setting(":TIM:OFFS", float, unit="s", low=-300.0, high=5000.0)
-    memory_depth = Setting(":ACQ:MDEP", str)
-    acquisition_type = Setting(":ACQ:TYPE", str, choices=("NORM", "AVER", "PEAK", "HRES"))
-    trigger_slope = Setting(":TRIG:EDGE:SLOP", str, choices=("POS", "NEG", "RFAL"))
-    sweep = Setting(":TRIG:SWE", str, choices=("AUTO", "NORM", "SING"))
+    memory_depth = _Depth(
+        ":ACQ:MDEP",
+        str,
+        choices=("AUTO", *map(str, _SHARED_DEPTHS)),
+    )
+    acquisition_type = Setting(":ACQ:TYPE", str, choices=("NORMal", "AVERages", "PEAK", "HRESolution"))
+    trigger_slope = Setting(":TRIG:EDGE:SLOP", str, choices=("POSitive", "NEGative", "RFALl"))
+    sweep = Setting(":TRIG:SWE", str, choices=("AUTO", "NORMal", "SINGle"))
 
-    #: Points of one block; of the memory, for one channel; how long a STOP may be an old one [s].
+    #: Points of one block; how long a STOP may be an old one [s].
     _LONGEST_BLOCK = 250_000
-    _DEPTHS = (12_000, 120_000, 1_200_000, 12_000_000, 24_000_000)
     _SETTLED = 0.2
     #: With sweep auto the trigger is forced after this time [s].
     _PATIENCE = 0.1
@@ -83,9 +109,9 @@ class RigolDS1000Z(Scope):
 
     def _depth(self, points: int, shown: int) -> int:
         share = {1: 1, 2: 2}.get(shown, 4)
-        found = next((depth // share for depth in self._DEPTHS if depth // share >= points), None)
+        found = next((depth // share for depth in _DEPTHS if depth // share >= points), None)
         if found is None or points < 1:
-            raise OutOfRange(self.transport.address, "points", points, f"1 to {self._DEPTHS[-1] // share}")
+            raise OutOfRange(self.transport.address, "points", points, f"1 to {_DEPTHS[-1] // share}")
         return found
 
     def _start(self) -> None:
@@ -96,7 +122,7 @@ class RigolDS1000Z(Scope):
     def _complete(self) -> bool:
         status = self.transport.query(":TRIG:STAT?")
         if status not in {"TD", "WAIT", "RUN", "AUTO", "STOP"}:
-            self._misheard(":TRIG:STAT?", status, "TD, WAIT, RUN, AUTO or STOP")
+            self.reject(":TRIG:STAT?", status, "TD, WAIT, RUN, AUTO or STOP")
         waited = self._clock.now() - self._started
         if status == "STOP":
             return self._seen or waited >= self._SETTLED

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import contextlib
 import re
-from typing import TYPE_CHECKING, ClassVar, NoReturn
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from instruments.drivers.oscilloscope import Clock, NeverTriggered, NothingAcquired, Preamble, Trace, WallClock
 from instruments.drivers.oscilloscope.setup import Channel, Setup, is_still
 from instruments.drivers.scpi import ScpiInstrument, Setting
-from instruments.errors import BadAnswer, InstrumentError, NoAnswer, OutOfRange, SettingsLost
+from instruments.errors import InstrumentError, NoAnswer, OutOfRange, SettingsLost
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -24,10 +24,22 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from instruments.drivers.oscilloscope.setup import Value
+    from instruments.ieee488 import Form
     from instruments.links.transport import Transport
 
 #: Between two questions whether the record is complete [s].
 _POLL = 0.02
+#: What the scopes of both families can trigger on, and where: words of both guides' :TRIGger chapters.
+_TRIGGER_MODES = (
+    *("EDGE", "GLITch", "PATTern", "TV", "DELay", "EBURst", "OR", "RUNT", "SHOLd", "TRANsition", "USB"),
+    *("SBUS1", "SBUS2", "PULSe", "SLOPe", "VIDeo", "TIMeout", "WINDows", "NEDGe", "DURATion", "RS232", "IIC", "SPI"),
+)
+_TRIGGER_SOURCES = (
+    *(f"CHANnel{n}" for n in range(1, 5)),
+    *("EXTernal", "EXT5", "AC", "ACLine", "LINE", "WGEN", "WMOD", "NONE"),
+    *(f"D{n}" for n in range(16)),
+    *(f"DIGital{n}" for n in range(16)),
+)
 #: Beyond the transport's time-out, a block may take this long on its way [s]; 1 MB over a slow link.
 _BLOCK_PATIENCE = 10.0
 
@@ -37,7 +49,8 @@ class Scope(ScpiInstrument):
 
     CHANNEL: the class of its inputs; OFFSET_SIGN: of the voltage in the middle of the screen, in its offset; READY: how
     it acquires while it is set up; SLOPES, SWEEPS: its words for them; CODES: of a clipped trace, and of no sample;
-    PASSING: settings that acquire() leaves in another state than they were prepared.
+    PASSING: settings that acquire() leaves in another state than they were prepared; PREAMBLE: the form of each of its
+    ten fields.
     """
 
     CHANNEL: ClassVar[type[Channel]]
@@ -47,10 +60,11 @@ class Scope(ScpiInstrument):
     SWEEPS: ClassVar[Mapping[str, str]]
     CODES: ClassVar[tuple[int, int, int | None]] = (0, 255, None)
     PASSING: ClassVar[Mapping[str, str]] = {}
+    PREAMBLE: ClassVar[tuple[Form, ...]]
 
-    time_mode = Setting(":TIM:MODE", str)
-    trigger_mode = Setting(":TRIG:MODE", str)
-    trigger_source = Setting(":TRIG:EDGE:SOUR", str)
+    time_mode = Setting(":TIM:MODE", str, choices=("MAIN", "WINDow", "XY", "ROLL"))
+    trigger_mode = Setting(":TRIG:MODE", str, choices=_TRIGGER_MODES)
+    trigger_source = Setting(":TRIG:EDGE:SOUR", str, choices=_TRIGGER_SOURCES)
     trigger_level = Setting(":TRIG:EDGE:LEV", float, unit="V", low=-1e5, high=1e5)
 
     def __init__(self, transport: Transport, *, clock: Clock | None = None) -> None:
@@ -65,8 +79,7 @@ class Scope(ScpiInstrument):
     def identity(self) -> str:
         """The answer to ``*IDN?``; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
         answer = super().identity()
-        model = answer.split(",")[1] if "," in answer else answer
-        self._inputs = self._number_of_inputs(model)
+        self._inputs = self._number_of_inputs(answer.split(",")[1])
         return answer
 
     _inputs: int | None = None
@@ -305,18 +318,17 @@ class Scope(ScpiInstrument):
         self._select(channel)
         answer = self.transport.query(":WAV:PRE?")
         try:
-            preamble = self._read_preamble([float(field) for field in answer.split(",")])
-        except (ValueError, OverflowError):
+            fields = answer.split(",")
+            numbers = [form.number(field) for form, field in zip(self.PREAMBLE, fields, strict=True)]
+            preamble = self._read_preamble(numbers)
+        except ValueError:
             preamble = None
-        # of some nothing follows, of others no record that any of these scopes has
-        if preamble is None or not preamble.plausible:
-            self._misheard(":WAV:PRE?", answer, "ten numbers, with points and their distance")
+        # a scope prints all exponents with as many digits: where one has fewer, a byte is missing
+        exponents = {len(field) for field in re.findall(r"[Ee][+-]\d+", answer)}
+        # 0: bytes, which is what was asked for; of some nothing follows, of others no record that any of these has
+        if preamble is None or len(exponents) > 1 or int(numbers[0]) != 0 or not preamble.plausible:
+            self.reject(":WAV:PRE?", answer, "ten numbers, with format 0, points and their distance")
         return preamble
-
-    def _misheard(self, question: str, answer: str, expected: str) -> NoReturn:
-        """Raise BadAnswer; the link is cleared, for the answer may have been another question's."""
-        with self.resynchronised():
-            raise BadAnswer(self.transport.address, question, answer, expected)
 
     def _select(self, channel: int) -> None:
         raise NotImplementedError
@@ -337,5 +349,5 @@ class Scope(ScpiInstrument):
             self.raise_errors(":WAV:DATA?")  # the reason stands in the queue, if there is one
             raise
         if len(block) != points:
-            self._misheard(":WAV:DATA?", f"{len(block)} bytes", f"{points} bytes")
+            self.reject(":WAV:DATA?", f"{len(block)} bytes", f"{points} bytes")
         return np.frombuffer(block, dtype=np.uint8)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, NoReturn, cast
 
 from instruments.drivers.scpi import ScpiInstrument, Setting
 
@@ -60,9 +60,13 @@ class Channel(ScpiInstrument):
         """Send a command of this input."""
         self.scope.command(self.head + message)
 
+    def reject(self, question: str, answer: str, expected: str) -> NoReturn:
+        """As every instrument; the question is named whole."""
+        self.scope.reject(self.head + question, answer, expected)
+
 
 class _Headed:
-    """A transport for questions that begin with the same header, and for what an answer that makes no sense needs."""
+    """A transport for questions that begin with the same header."""
 
     def __init__(self, transport: Transport, head: str) -> None:
         self.address, self._transport, self._head = transport.address, transport, head
@@ -70,22 +74,10 @@ class _Headed:
     def query(self, message: str, *, patience: float = 0.0) -> str:
         return self._transport.query(self._head + message, patience=patience)
 
-    def clear(self) -> None:
-        self._transport.clear()
-
 
 def is_still(setup: Setup | None, setting: Setting[Any], wanted: Value, now: Value) -> bool:
-    """Whether an answer is what was set, but for rounding and for long forms of words."""
+    """Whether an answer is what was set, rounding aside."""
     if setting.kind is float:
         rounding = setup.rounding(setting.unit) if setup else 0.0
         return abs(float(now) - float(wanted)) <= rounding + _OF_ITSELF * abs(float(wanted))
-    word, answer = str(wanted).upper(), str(now).upper()
-    # a number as a word is the same in any spelling
-    return float(word) == _number(answer) if word.isdigit() else answer.startswith(word)
-
-
-def _number(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None
+    return not setting.differs(wanted, now)

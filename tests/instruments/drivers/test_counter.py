@@ -36,6 +36,7 @@ def preparation(gate, level, timeout):
         f"INP1:LEV1 {level}",
         "INP1:SLOP1 POS",
         f"SYST:TIM {timeout}",
+        "FORM ASC,15",
     )
 
 
@@ -46,7 +47,7 @@ def test_the_counter_is_prepared_with_direct_coupling_and_a_fixed_level():
 
 @pytest.mark.parametrize(("gate", "patience"), [(0.1, 1.2), (1.0, 3.0), (10.0, 21.0)])
 def test_the_answer_is_waited_for_beyond_the_time_at_which_the_counter_itself_gives_up(gate, patience):
-    lines = [*preparation(f"{gate}", "0.6", f"{patience}"), NO_ERROR, ("READ?", "+9.91E+37")]
+    lines = [*preparation(f"{gate}", "0.6", f"{patience}"), NO_ERROR, ("READ?", "+9.91000000000000E+037")]
     with conversation(Keysight53230A, *lines) as counter:
         counter.prepare(gate_s=gate, trigger_level_v=0.6)
         counter.frequency()
@@ -117,9 +118,9 @@ def test_a_series_is_fetched_as_it_comes_and_the_counter_is_left_as_it_was():
     lines = [
         *accepted("SAMP:COUN 1002", "INIT"),
         NO_ERROR,
-        ("DATA:REM? 1000,WAIT", ",".join(["+2.5E+01"] * 1000)),
+        ("DATA:REM? 1000,WAIT", ",".join(["+2.50000000000000E+001"] * 1000)),
         NO_ERROR,
-        ("DATA:REM? 2,WAIT", "+2.6E+01,+9.91E+37"),
+        ("DATA:REM? 2,WAIT", "+2.60000000000000E+001,+9.91000000000000E+037"),
         *accepted("SAMP:COUN 1"),
     ]
     with conversation(Keysight53230A, *lines) as counter:

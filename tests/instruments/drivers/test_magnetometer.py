@@ -31,9 +31,12 @@ def steady(driver):
     return [kept("UNIT 2"), kept(f"RDGMODE {STEADY[driver]}")]
 
 
-def reading(answer, unit="2", status="004"):
-    """A first reading: the unit is asked before and after."""
-    return [("UNIT?", unit), ("RDGFIELD?", answer), ("UNIT?", unit), ("OPST?", status)]
+#: One message: the unit before and after the field, and the status.
+READING = "UNIT?;RDGFIELD?;UNIT?;OPST?"
+
+
+def reading(field, unit="2", status="004", after=None):
+    return (READING, f"{unit};{field};{after or unit};{status}")
 
 
 @pytest.mark.parametrize(
@@ -113,72 +116,83 @@ def test_a_setting_may_come_back_with_leading_zeros():
     ],
 )
 def test_a_reading_is_in_tesla_whatever_the_unit_at_the_front_panel(driver, answer, unit, tesla):
-    with conversation(driver, *reading(answer, unit)) as magnetometer:
+    with conversation(driver, reading(answer, unit)) as magnetometer:
         assert magnetometer.flux_density() == pytest.approx(tesla, rel=1e-12)
 
 
-def test_after_the_preparation_the_unit_is_asked_once_for_each_reading():
-    one = [("RDGFIELD?", "+100.000E-05"), ("UNIT?", "2"), ("OPST?", "004")]
-    with conversation(LakeShore425, *steady(LakeShore425), kept("AUTO 1"), *one, *one) as magnetometer:
+def test_a_reading_is_one_exchange():
+    lines = [*steady(LakeShore425), kept("AUTO 1"), *[reading("+100.000E-05")] * 2]
+    with conversation(LakeShore425, *lines) as magnetometer:
         magnetometer.prepare(range_t=None)
         assert [magnetometer.flux_density() for _ in range(2)] == [1e-3, 1e-3]
 
 
 def test_a_reading_during_which_the_unit_changed_is_taken_again():
     # tesla or gauss: who knows
-    lines = [*steady(LakeShore425), kept("AUTO 1"), ("RDGFIELD?", "+100.000E-05"), ("UNIT?", "1")]
-    lines += [("RDGFIELD?", "+100.000E-01"), ("UNIT?", "1"), ("OPST?", "004")]
+    lines = [reading("+100.000E-05", unit="2", after="1"), reading("+100.000E-01", unit="1")]
     with conversation(LakeShore425, *lines) as magnetometer:
-        magnetometer.prepare(range_t=None)
         assert magnetometer.flux_density() == pytest.approx(1e-3, rel=1e-12)
 
 
 def test_a_unit_that_changes_all_the_time_is_told():
-    lines = [("UNIT?", "2"), *[pair for unit in "121" for pair in (("RDGFIELD?", "+1.0"), ("UNIT?", unit))]]
+    lines = [reading("+100.000E-05", unit=unit, after=after) for unit, after in ("21", "12", "24")]
     with conversation(LakeShore425, *lines) as magnetometer, pytest.raises(BadAnswer, match="a unit that stays"):
         magnetometer.flux_density()
 
 
 @pytest.mark.parametrize(("answer", "status"), [("OL", "002"), ("OL", "000"), ("+350.000E-04", "006")])
 def test_a_field_beyond_the_range_is_no_reading(answer, status):
-    with conversation(LakeShore425, *reading(answer, status=status)) as magnetometer:
+    with conversation(LakeShore425, reading(answer, status=status)) as magnetometer:
         assert magnetometer.flux_density() is None
 
 
-@pytest.mark.parametrize(("answer", "status"), [("NO PROBE", "001"), ("+000.000E+00", "001"), ("+1.0", "016")])
+@pytest.mark.parametrize(("answer", "status"), [("NO PROBE", "001"), ("+000.000E+00", "001"), ("+100.000E+00", "016")])
 def test_no_probe_is_an_error_and_no_field(answer, status):
     with (
-        conversation(LakeShore475, *reading(answer, status=status)) as magnetometer,
+        conversation(LakeShore475, reading(answer, status=status), CLEARED) as magnetometer,
         pytest.raises(BadAnswer, match="plugged in") as bad,
     ):
         magnetometer.flux_density()
-    assert bad.value.answer == answer
+    assert bad.value.answer == f"2;{answer};2;{status}"
 
 
 @pytest.mark.parametrize(
-    "garbage", ["", "x", "1,2", "nan", "inf", "+123.4.5E+00", "1_0", "1e400", "+9.91E+37", "-360.000E-01"]
-)
-def test_garbage_is_no_reading_but_an_error(garbage):
-    with conversation(LakeShore425, *reading(garbage), CLEARED) as magnetometer, pytest.raises(BadAnswer) as bad:
-        magnetometer.flux_density()
-    assert (bad.value.question, bad.value.answer) == ("RDGFIELD?", garbage)
-
-
-@pytest.mark.parametrize(
-    ("lines", "question"),
+    "garbage",
     [
-        ([("UNIT?", "5")], "UNIT?"),
-        ([("UNIT?", "2"), ("RDGFIELD?", "+1.0"), ("UNIT?", "T")], "UNIT?"),
-        ([("UNIT?", "2"), ("RDGFIELD?", "+1.0"), ("UNIT?", "2"), ("OPST?", "?")], "OPST?"),
+        *("", "x", "1,2", "nan", "inf", "+123.4.5E+00", "1_0", "1e400", "+9.91E+37", "-360.000E-01"),
+        *("4", "+1.0", "123.456E-04", "+123.456E-0", "+123.456E", "+23.456E-04", "+123.46E-04", "+12\u0663.456E-04"),
     ],
 )
-def test_a_reading_whose_unit_or_status_is_unknown_is_none(lines, question):
-    with conversation(LakeShore425, *lines, CLEARED) as magnetometer, pytest.raises(BadAnswer) as bad:
+def test_garbage_is_no_reading_but_an_error(garbage):
+    with conversation(LakeShore425, reading(garbage), CLEARED) as magnetometer, pytest.raises(BadAnswer) as bad:
         magnetometer.flux_density()
-    assert bad.value.question == question
+    assert (bad.value.question, bad.value.answer) == (READING, f"2;{garbage};2;004")
 
 
-@pytest.mark.parametrize("probe", ["00", "43", "60", "HSE"])
+@pytest.mark.parametrize(
+    "answer",
+    [
+        "5;+100.000E-04;5;004",
+        "0;+100.000E-04;0;004",
+        "2;+100.000E-04;T;004",
+        "2;+100.000E-04;2;?",
+        "2;+100.000E-04;2;4",
+        "2;+100.000E-04;2",
+        "+100.000E-04;2;004",
+        "2;+100.000E-04;2;004;004",
+        # a late answer to another question: RANGE?, UNIT?, RDGMODE?, OPST?, TYPE?, *IDN?
+        *("4", "2", "1,1,1", "004", "40", "LSCI,MODEL425,VIRTUAL,1.0"),
+    ],
+)
+@BOTH
+def test_the_answer_to_another_question_is_never_taken_for_a_field(driver, answer):
+    with conversation(driver, (READING, answer), CLEARED) as magnetometer, pytest.raises(BadAnswer) as bad:
+        magnetometer.flux_density()
+    assert bad.value.answer == answer
+    assert "as 2;+123.456E-04;2;004" in bad.value.expected
+
+
+@pytest.mark.parametrize("probe", ["00", "43", "60", "HSE", "4", "2", "040", "4\u0660"])
 def test_an_unknown_probe_is_told(probe):
     lines = [*steady(LakeShore425), ("TYPE?", probe), CLEARED]
     with conversation(LakeShore425, *lines) as magnetometer, pytest.raises(BadAnswer, match=r"TYPE\?"):
@@ -201,6 +215,25 @@ def test_the_475_answers_when_it_is_zeroed():
     with conversation(LakeShore475, ("ZPROBE;*OPC?", "1")) as magnetometer:
         magnetometer.zero()
         assert magnetometer.transport.waited == [20.0]
+
+
+def test_a_475_that_answers_something_else_is_not_zeroed():
+    with conversation(LakeShore475, ("ZPROBE;*OPC?", "004"), CLEARED) as magnetometer, pytest.raises(BadAnswer):
+        magnetometer.zero()
+
+
+@pytest.mark.parametrize("answer", ["", "4", "04", "+4", "1_0", "2;004"])
+def test_a_status_is_three_digits(answer):
+    lines = [("ZPROBE", None), ("OPST?", answer), CLEARED]
+    with conversation(LakeShore425, *lines) as magnetometer, pytest.raises(BadAnswer, match="three digits"):
+        magnetometer.zero()
+
+
+@pytest.mark.parametrize("answer", ["0", "5", "+2", "1_", "+190.050E-04", ""])
+def test_a_range_that_the_probe_does_not_have_is_refused(answer):
+    lines = [("TYPE?", "40"), ("UNIT?", "2"), ("AUTO?", "0"), ("RDGMODE?", "1,1,1"), ("RANGE?", answer), CLEARED]
+    with conversation(LakeShore425, *lines) as magnetometer, pytest.raises(BadAnswer, match="from 1 to 4"):
+        magnetometer.settings()
 
 
 def test_a_475_that_is_silent_after_a_zero_is_told():

@@ -251,7 +251,7 @@ def test_a_scope_with_two_inputs_is_not_asked_for_four():
 @pytest.mark.parametrize(
     ("driver", "lines", "answer", "name"),
     [
-        (RigolDS1000Z, RIGOL_PREPARED, ("CHAN1:OFFS?", "0.0"), "channel1_offset_v"),
+        (RigolDS1000Z, RIGOL_PREPARED, ("CHAN1:OFFS?", "0.000000e+00"), "channel1_offset_v"),
         (KeysightDSOX, KEYSIGHT_PREPARED, (":TIM:RANG?", "+5E-02"), "time_range_s"),
     ],
 )
@@ -463,7 +463,7 @@ def test_what_an_earlier_program_left_in_the_memory_is_not_read(driver):
 
 def test_after_a_trigger_that_did_not_come_the_old_record_is_not_read():
     never = [*accepted(":SING"), (":TRIG:STAT?", "WAIT")]
-    asked = [(":TRIG:EDGE:LEV?", "1.3"), (":TRIG:EDGE:SOUR?", "CHAN1")]
+    asked = [(":TRIG:EDGE:LEV?", "1.300000e+00"), (":TRIG:EDGE:SOUR?", "CHAN1")]
     _, scope = talk(RigolDS1000Z, *RIGOL_ACQUIRED, *never, *asked, *STOPPED)
     scope.acquire(timeout_s=1.0)
     with pytest.raises(NeverTriggered):

@@ -138,7 +138,7 @@ def test_an_answer_that_is_no_queue_entry_is_not_taken_for_one(answer):
         (Keysight53230A, "Keysight Technologies,53220A,MY12345678,03.09-2037.776-1.28-4.15-127-156-36"),
         (Keysight33500B, "Agilent Technologies,33522B,MY52812345,3.05-1.19-2.00-52-00"),
         (Keysight33500B, "Keysight Technologies, 33509B ,MY59000123,5.03-3.15-2.00-58-00"),
-        (ScpiInstrument, "anything"),
+        (ScpiInstrument, "maker,anything,,"),
     ],
 )
 def test_the_expected_instrument_is_welcome(driver, identity):
@@ -153,7 +153,6 @@ def test_the_expected_instrument_is_welcome(driver, identity):
         (Keysight53230A, "Agilent Technologies,53131A,0,3944"),  # the counter before it, another language
         (Keysight53230A, "Keysight Technologies,53230AX,MY12345678,1"),
         (Keysight33500B, "Agilent Technologies,33220A,MY44000001,2.02-2.02-22-2"),
-        (Keysight33500B, ""),
     ],
 )
 def test_another_instrument_is_told_with_what_it_says(driver, identity):
@@ -186,7 +185,7 @@ def test_a_variant_of_a_driver_keeps_the_settings_of_its_model():
         phase = Setting("PHAS", float, unit="deg")
 
     questions = [(sent.split()[0] + "?", answer) for driver, *_, sent, answer in WIRE if driver is Keysight33500B]
-    with conversation(Variant, *questions, ("PHAS?", "0")) as generator:
+    with conversation(Variant, *questions, ("PHAS?", "+0.000000000000000E+00")) as generator:
         assert list(generator.settings()) == [
             *("waveform", "frequency_hz", "amplitude_vpp", "offset_v", "load_ohm", "output", "phase_deg")
         ]
@@ -200,7 +199,6 @@ def test_a_variant_of_a_driver_keeps_the_settings_of_its_model():
         ("+9.91000000000000E+037", None),  # not a number
         ("+9.9E+37", None),  # and infinity (SCPI-1999, vol. 1, 7.2.1)
         ("-9.9E+37", None),
-        ("NAN", None),
     ],
 )
 def test_what_stands_for_no_reading_is_none(answer, reading):

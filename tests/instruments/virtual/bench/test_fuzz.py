@@ -467,9 +467,11 @@ def test_what_no_setting_and_no_name_can_be_is_refused(line, ask):
     pair.close()
 
 
-def test_a_scope_that_says_its_model_and_no_more_is_known_by_it():
+def test_an_identity_without_its_four_fields_is_refused_and_the_next_one_taken():
     pair = Pair("DS1000Z", "messages", [(b"DS1054Z\n", 0.0, True)])
-    assert pair.driver.identity() == "DS1054Z"
+    with pytest.raises(BadAnswer, match="four fields"):
+        pair.driver.identity()
+    assert "DS1054Z" in pair.driver.identity()
     good("DS1000Z", pair.driver)
     pair.close()
 
