@@ -131,7 +131,8 @@ class Struck:
 class Wire:
     """The wire of one instrument: at most one fault is on it.
 
-    heard: what the instrument heard and answered, as Tapped keeps it; answers, messages: so many since it was armed.
+    heard: what the instrument heard and answered, as Tapped keeps it; answers, messages: so many.  All since a fault
+    was armed.
     """
 
     heard: list = field(default_factory=list)
@@ -146,6 +147,7 @@ class Wire:
         """Let this fault strike; None: no more."""
         with self._lock:
             self.fault, self.answers, self.messages, self.struck = fault, 0, 0, []
+            self.heard.clear()
 
     def question(self, answer):
         """What the instrument was asked last that it has answered so."""

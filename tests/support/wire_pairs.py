@@ -242,8 +242,8 @@ _UNITS_T = {"1": 1e-4, "2": 1.0, "3": 1e-4, "4": 4e-7 * math.pi}
 
 
 def _is_field(pair, value):
-    per_unit = _UNITS_T[pair.ask("UNIT?")]
-    return any(value == float(answer.decode().split(";")[0]) * per_unit for answer in pair.answers(r"RDGFIELD\?.*"))
+    answers = (answer.decode().split(";") for answer in pair.answers(r"UNIT\?;RDGFIELD\?;.*"))
+    return any(value == float(field) * _UNITS_T[unit] for unit, field, *_ in answers)
 
 
 def _magnetometer(driver):
@@ -296,6 +296,8 @@ WITHIN = ("messages", "stream", "line", "levilab")
 #: Those without frames: a line feed ends a message.
 FRAMED = ("hislip", "vxi11")
 STREAMS = ("stream", "line", "levilab", "socket", "serial", "pty")
+#: Those that carry seven bits of a byte.
+SEVEN_BITS = ("line", "levilab")
 _bench_numbers = itertools.count()
 
 
@@ -455,7 +457,6 @@ class Pair:
         """A new attempt."""
         if operation.ready:
             operation.ready(self)
-        del self.tap.heard[:-1]
         self._mark = len(self.tap.heard)
 
     def recover(self, *, anew, reset):

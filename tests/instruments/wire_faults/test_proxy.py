@@ -76,7 +76,7 @@ def struck(pair, fault, act):
 @pytest.mark.parametrize("way", WAYS)
 def test_a_digit_that_becomes_another_one_is_not_noticed(pair_over, way):
     pair = pair_over(way, "475")
-    field = struck(pair, Fault("another digit", junk=b"\x00"), lambda driver: driver.flux_density())
+    field = struck(pair, Fault("another digit", place=0.1, junk=b"\x00"), lambda driver: driver.flux_density())
     assert field == pytest.approx(0.029, abs=2e-4)  # 0.019 T in truth
 
 

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 
 from support.wire_faults import ANSWERS, MESSAGES, OF_FRAMES, Fault
-from support.wire_pairs import FRAMED, KINDS, WAYS, Pair, attempt, hasty_clients
+from support.wire_pairs import FRAMED, KINDS, SEVEN_BITS, STREAMS, WAYS, Pair, attempt, hasty_clients
 
 EXPLORING = settings.get_current_profile_name() == "explore"
 #: Faults for each way and driver, in the suite and in `make explore`.
@@ -24,33 +24,47 @@ tally = collections.Counter()
 
 # --- what a link cannot show ---
 
-#: Parts of an answer that a digit more or less does not make another kind of number.
-_WHOLE, _REST = re.compile(r"(?<![.\dE])[+-]?\d+"), re.compile(r"\d|(?<=E)[+-]")
+#: A number without a point, the digits behind one, and what may be another one in a number.
+_WHOLE, _BEHIND, _REST = re.compile(r"(?<![.\w])\d+(?![.\w])"), re.compile(r"(?<=\.)\d+"), re.compile(r"\d|[+-]")
+#: Models whose manuals do not say how many digits stand behind the point: as many as the resolution gives.
+_ANY_DIGITS = {"CNT-91", "DSOX1000"}
+#: Those that print a sign where the number is negative, and no other.
+_MINUS_ALONE = {"DS1000Z"}
 _STATES = {"RUN", "WAIT", "TD", "AUTO", "STOP"}
 
 
-def form(text):
-    """How a number, or a list of them, is printed: +1.25E+03 as 9.99E999, where a whole part may have any length."""
+def form(name, text):
+    """How an instrument prints numbers: 12000 and 4 as 9, -1.25E+03 as 99.99E999; as 99.9E999 with any digits."""
+    if name in _ANY_DIGITS:
+        text = _BEHIND.sub("9", text)
+    if name in _MINUS_ALONE:
+        text = re.sub(r"(?<![\w.])-", "", text)
     return _REST.sub("9", _WHOLE.sub("9", text))
 
 
-def has_the_form(kind, question, honest, taken):
+def has_the_form(name, question, honest, taken):
     """Whether an instrument could have answered this to the question, as far as its form goes."""
     question, honest, taken = (part.decode("latin-1").strip() for part in (question, honest, taken))
     if question == "*IDN?":
         fields, wanted = taken.split(","), honest.split(",")
-        return taken.isprintable() and len(fields) == len(wanted) and fields[1] == wanted[1]
+        known = re.fullmatch(KINDS[name].driver.MODELS, fields[1].strip()) if len(fields) == len(wanted) else None
+        return known is not None and taken.isprintable()
     if question == "SYST:ERR?":
         return re.fullmatch(r'[+-]?\d+,".*"', taken) is not None
     if question == ":TRIG:STAT?":
         return taken in _STATES
-    for row in rows(kind):
+    for row in rows(KINDS[name]):
         if re.fullmatch(rf"(:?CHAN\d:)?{re.escape(row.header)}\?", question):
             if row.kind is bool:
                 return taken in {"0", "1"}
             if row.choices and not honest.isdigit():
-                return any(taken.upper().startswith(word) for word in row.choices)
-    return form(taken) == form(honest)
+                return taken.upper() in spellings((*row.choices, *row.answers))
+    return form(name, taken) == form(name, honest)
+
+
+def spellings(choices):
+    """Words in their long and short forms."""
+    return {word for choice in choices for word in (choice.upper(), re.sub("[a-z]", "", choice))}
 
 
 def rows(kind):
@@ -66,9 +80,9 @@ def excuse(pair):
                 return reason
         elif struck.honest.startswith(b"#"):
             if len(struck.arrived) == len(struck.honest) and struck.arrived[:2] == struck.honest[:2]:
-                return "bytes of a block are others, and a block has no check"
+                return "bytes of a block become others, and a block has no check"
         elif (taken := taken_of(pair, struck)) != struck.honest.strip() and has_the_form(
-            pair.kind, struck.question, struck.honest, taken
+            pair.name, struck.question, struck.honest, taken
         ):
             return f"{struck.what}: it has the form of an answer to the question"
     return None
@@ -76,16 +90,36 @@ def excuse(pair):
 
 def taken_of(pair, struck):
     """What a link takes for the answer: all that comes in a frame, or the first line."""
-    return (struck.arrived if pair.way in FRAMED else struck.arrived.partition(b"\n")[0]).strip()
+    if pair.way in FRAMED:
+        return struck.arrived.strip()
+    arrived = bytes(byte & 0x7F for byte in struck.arrived) if pair.way in SEVEN_BITS else struck.arrived
+    return arrived.partition(b"\n")[0].strip()
 
 
 def excuse_of_a_message(pair, struck):
     """The same for a message to the instrument."""
+    heard = [(message, answer.rstrip(b"\n"), complained) for message, answer, complained in list(pair.wire.heard)]
+    if struck.what == "message doubled":
+        if pair.way in STREAMS and passes_for_the_next(pair.name, struck.question, heard):
+            return "a question is heard twice on a stream: its second answer has the form of the next one"
+        return None
     if not struck.arrived and b"?" not in struck.question:
-        return "a command is lost, and only its answer could be missed"
+        return "a command is lost: it would have had no answer"
     arrived = struck.arrived.decode("latin-1").strip("\n")
-    understood = any(message == arrived and not complained for message, _, complained in list(pair.tap.heard))
-    return "a message became another one that the instrument understands" if understood else None
+    understood = any(message == arrived and not complained for message, _, complained in heard)
+    return "a message becomes another one that the instrument understands" if understood else None
+
+
+def passes_for_the_next(name, question, heard):
+    """Whether an answer to a question has the form of one to a question that followed."""
+    asked = question.decode("latin-1").strip("\n")
+    twice = [n for n, (message, answer, _) in enumerate(heard) if message == asked and answer]
+    return any(
+        has_the_form(name, message.encode("latin-1"), answer, heard[n][1])
+        for n in twice
+        for message, answer, _ in heard[n + 2 :]
+        if answer
+    )
 
 
 # --- faults ---
