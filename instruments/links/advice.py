@@ -17,6 +17,8 @@ _ADVICE = {
     r"name or service not known|getaddrinfo|nodename": "this computer does not know that name: try the number",
     r"refused": "somebody is there, but not at this port: check port and protocol",
 }
+#: What a link says that its own program has closed.
+CLOSED = "this session was closed: open another one"
 _ALWAYS = "check the address, the cable and that it is on"
 
 

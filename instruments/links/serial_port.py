@@ -1,4 +1,4 @@
-"""The way to an instrument on a serial port: pyserial behind the protocol of :mod:`instruments.links.visa`.
+"""The way to an instrument on a serial port: pyserial behind the protocol of :mod:`instruments.links.transport`.
 
 The only module that imports pyserial.
 """
@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from instruments.errors import BadAnswer, InstrumentError, NotConnected, Occupied, OutOfRange, SilentLine
 from instruments.ieee488 import BrokenBlock, read_block
+from instruments.links.advice import CLOSED
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -75,7 +76,7 @@ class SerialTransport:
             "stopbits": stop_bits,
         }
         self._log = log
-        self._out_of_step = self._locked = False
+        self._out_of_step = self._locked = self._closed = False
         self._identities_due = 0  # answers to *IDN? that were not received, and may still come
         self._received = bytearray()
         self._rested_at = 0.0
@@ -105,14 +106,14 @@ class SerialTransport:
     # --- messages ---
 
     def write(self, message: str) -> None:
-        """Send one message; see :class:`instruments.links.visa.Transport`."""
+        """Send one message; see :class:`instruments.links.transport.Transport`."""
         with self._told_as_ours(message, self.timeout):
             if self._out_of_step:
                 self._resynchronise()
             self._send(message)
 
     def query(self, message: str, *, patience: float = 0.0) -> str:
-        """Ask; see :class:`instruments.links.visa.Transport`."""
+        """Ask; see :class:`instruments.links.transport.Transport`."""
         self.write(message)
         within = self.timeout + patience
         with self._told_as_ours(message, within):
@@ -121,7 +122,7 @@ class SerialTransport:
         return line.decode("ascii").strip()
 
     def query_block(self, message: str, *, patience: float = 0.0) -> bytes:
-        """Ask for a block; see :class:`instruments.links.visa.Transport`.
+        """Ask for a block; see :class:`instruments.links.transport.Transport`.
 
         A block may take longer than the time-out, but not be silent for so long.
         """
@@ -209,8 +210,9 @@ class SerialTransport:
         self._out_of_step = False
 
     def reopen(self) -> None:
-        """Open the port anew; see :class:`instruments.links.visa.Transport`."""
-        self.close()
+        """Open the port anew; see :class:`instruments.links.transport.Transport`."""
+        self._check_open()
+        self._close_port()
         self._port = self._open()
         self._out_of_step = True  # the instrument was not told, and may still be answering
         if self._locked:
@@ -220,6 +222,7 @@ class SerialTransport:
         """Keep other programs that ask for it from the port (POSIX); on Windows a port has one user at any time."""
         import serial
 
+        self._check_open()
         try:
             self._port.exclusive = True
         except serial.SerialException as error:
@@ -227,7 +230,15 @@ class SerialTransport:
         self._locked = True
 
     def close(self) -> None:
-        """Give the port back; closing twice does no harm."""
+        """Give the port back; see :class:`instruments.links.transport.Transport`."""
+        self._closed = True
+        self._close_port()
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise NotConnected(self.address, CLOSED)
+
+    def _close_port(self) -> None:
         link = _tcp_link(self._port)
         with contextlib.suppress(Exception):  # it may be gone for good
             self._port.close()
@@ -261,6 +272,7 @@ class SerialTransport:
             if isinstance(error, InstrumentError) or not isinstance(error, Exception):
                 raise
             # SerialException, OSError, termios.error
+            self._check_open()
             if getattr(error, "errno", None) in _IN_USE:
                 raise Occupied(self.address) from error
             told = f"no link at {question!r} ({_one_line(error)}): check the cable, and that it is on"

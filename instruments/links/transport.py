@@ -32,13 +32,13 @@ class Transport(Protocol):
         """Drop whatever is under way in either direction."""
 
     def reopen(self) -> None:
-        """Give the link up and make it anew.  Raises NotConnected."""
+        """Give the link up and make it anew.  Raises NotConnected, also after close()."""
 
     def lock(self) -> None:
         """Keep other programs from the instrument, where the interface can.  Raises Occupied if one has it."""
 
     def close(self) -> None:
-        """Give the instrument back."""
+        """Give the instrument back, for good.  Afterwards all else raises NotConnected; closing twice does no harm."""
 
 
 #: Called with the address, ">" or "<", and the bytes that were sent or received.

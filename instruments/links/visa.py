@@ -7,6 +7,7 @@ from a virtual one.
 from __future__ import annotations
 
 import contextlib
+import math
 import re
 import select
 import socket
@@ -14,9 +15,10 @@ import time
 import warnings
 from typing import TYPE_CHECKING, Any
 
+from instruments.clock import WallClock
 from instruments.errors import BadAnswer, NoAnswer, NotConnected, Occupied, SilentLine
 from instruments.ieee488 import BrokenBlock, block_of, read_block
-from instruments.links.advice import advice, one_line
+from instruments.links.advice import CLOSED, advice, one_line
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     from pyvisa.highlevel import VisaLibraryBase
     from pyvisa.resources import MessageBasedResource
 
+    from instruments.clock import Clock
     from instruments.links.transport import TrafficLog
 
 
@@ -55,15 +58,20 @@ class VisaTransport:
         library: str | VisaLibraryBase = "@py",
         timeout: float = 2.0,
         line: Mapping[str, Any] | None = None,
+        pause: float = 0.0,
+        clock: Clock | None = None,
         log: TrafficLog | None = None,
     ) -> None:
         """Open the resource.
 
         library: a PyVISA library, ``"@py"`` needs nothing installed, ``""`` is the vendor's; timeout: of one answer
-        [s]; line: of a serial resource, ``baud_rate``, ``data_bits``, ``parity`` (none, odd, …), ``stop_bits``.
-        Raises NotConnected.
+        [s]; line: of a serial resource, ``baud_rate``, ``data_bits``, ``parity`` (none, odd, …), ``stop_bits``;
+        pause: how long the instrument is left alone after each message and each answer [s]; clock: by which, the
+        wall's unless the instrument lives on another.  Raises NotConnected.
         """
         self.address, self.timeout, self._line = address, timeout, dict(line or {})
+        self.pause, self._clock = pause, clock or WallClock()
+        self._rested_at = -math.inf
         self._library, self._log = library, log
         self._out_of_step = self._closed = self._locked = False
         self._identities_due = 0  # answers to it that may still come
@@ -87,6 +95,7 @@ class VisaTransport:
             _send_at_once(resource)
         if self.address.upper().startswith("ASRL"):
             self._set_line(resource)
+        self._allowed: float | None = None  # the resource's time-out, as far as it was set [s]
         return resource  # type: ignore[no-any-return]
 
     def _set_line(self, resource: Any) -> None:
@@ -109,9 +118,24 @@ class VisaTransport:
         self._record(">", message.encode(errors="replace"))
 
     def _send(self, message: str) -> None:
+        """Send one message, within the link's own time-out: patience is for an answer."""
+        self._wait_at_most(self.timeout)
+        if self.pause and (rest := self._rested_at - self._clock.now()) > 0:
+            self._clock.sleep(rest)
         if self._stream:  # an answer that nobody waited for is no answer to this
             self._discard_received()
         self._resource.write(message)
+        self._rest()
+
+    def _wait_at_most(self, within: float) -> None:
+        """Set the resource's time-out [s]."""
+        if self._allowed != within:
+            self._resource.timeout = 1000 * within
+            self._allowed = within
+
+    def _rest(self) -> None:
+        if self.pause:
+            self._rested_at = self._clock.now() + self.pause
 
     def _discard_received(self) -> None:
         """Empty the pipe without waiting.
@@ -136,9 +160,10 @@ class VisaTransport:
         within = self.timeout + patience
         with self._told_as_ours(message, within):
             self._send(message)
-            self._resource.timeout = 1000 * within
+            self._wait_at_most(within)
             # more than the longest answer without an end is noise: it is left for the next resynchronisation
             answer = self._resource.read_bytes(_LONGEST_ANSWER, chunk_size=_TEXT_CHUNK, break_on_termchar=True)
+            self._rest()
             self._record("<", answer)
             text = answer.decode("ascii")
         return text.strip()
@@ -149,8 +174,9 @@ class VisaTransport:
         within = self.timeout + patience
         with self._told_as_ours(message, within):
             self._send(message)
-            self._resource.timeout = 1000 * within
+            self._wait_at_most(within)
             block = self._block()
+            self._rest()
             self._record("<", block if len(block) <= _SHORT else block[:_SHORT] + b"... (%d bytes)" % len(block))
         return block
 
@@ -173,6 +199,7 @@ class VisaTransport:
             self._drain_line()
         else:
             try:
+                self._wait_at_most(self.timeout)
                 self._resource.clear()
             except NotImplementedError:
                 pass
@@ -188,12 +215,11 @@ class VisaTransport:
         """
         due, self._identities_due, self._out_of_step = self._identities_due + 1, 0, False
         with self._told_as_ours(_WHO, self.timeout):
-            self._resource.timeout = 1000 * self.timeout
-            self._discard_received()
-            self._resource.write("")  # ends what may have been sent in part
+            self._send("")  # ends what may have been sent in part
             self._record(">", _WHO.encode())
-            self._resource.write(_WHO)
+            self._send(_WHO)
             self._read_identities(due)
+            self._rest()
 
     def _read_identities(self, due: int) -> None:
         """Lines up to so many names; fewer where a time-out tells that the other questions were never heard."""
@@ -214,8 +240,7 @@ class VisaTransport:
 
     def reopen(self) -> None:
         """Open the resource anew; see :class:`Transport`."""
-        if self._closed:
-            raise NotConnected(self.address, "this session was closed: open another one")
+        self._check_open()
         with contextlib.suppress(Exception):  # it may be gone for good
             self._resource.close()
         self._resource = self._open()
@@ -227,6 +252,7 @@ class VisaTransport:
         """Exclusive access until it is closed, over a link made anew, too; see :class:`Transport`."""
         import pyvisa
 
+        self._check_open()
         try:
             self._resource.lock_excl(timeout=1000 * self.timeout)
         except pyvisa.VisaIOError as error:
@@ -241,8 +267,12 @@ class VisaTransport:
             raise NotConnected(self.address, f"it could not be locked ({error!r})") from error
         self._locked = True
 
+    def _check_open(self) -> None:
+        if self._closed:
+            raise NotConnected(self.address, CLOSED)
+
     def close(self) -> None:
-        """Close the resource; closing twice does no harm."""
+        """Close the resource; see :class:`Transport`."""
         self._closed = True
         self._resource.close()
 
@@ -272,6 +302,7 @@ class VisaTransport:
             raise BadAnswer(self.address, question, repr(error.object[:40]), "plain text") from error
         except Exception as error:  # OSError, and whatever else pyvisa-py's protocols raise (EOFError, RPCError)
             self._out_of_step = True
+            self._check_open()
             raise NotConnected(self.address, _broken(question, error)) from error
         except BaseException:
             # an interruption between question and answer leaves the answer in the pipe

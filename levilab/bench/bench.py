@@ -169,7 +169,7 @@ def opened(
 ) -> ScpiInstrument:
     """A driver on an open link.  library: PyVISA's.  Raises ConfigError for an unknown model, InstrumentError."""
     driver: Any = driver_of(kind, settings.model)
-    transport = transport_to(kind, settings, library=library, log=log)
+    transport = transport_to(kind, settings, library=library, clock=clock, log=log)
     # a scope is waited for: on the bench's clock
     one: ScpiInstrument = driver(transport, clock=clock) if kind == "oscilloscope" else driver(transport)
     return one

@@ -17,6 +17,7 @@ from instruments.links.visa import VisaTransport
 from levilab.bench.config import ConfigError
 
 if TYPE_CHECKING:
+    from instruments.clock import Clock
     from instruments.drivers.scpi import ScpiInstrument
     from instruments.links.transport import TrafficLog, Transport
     from levilab.bench.config import InstrumentSettings
@@ -46,11 +47,20 @@ def driver_of(kind: str, model: str) -> type[ScpiInstrument]:
 
 
 def transport_to(
-    kind: str, settings: InstrumentSettings, *, library: Any = "@py", log: TrafficLog | None = None
+    kind: str,
+    settings: InstrumentSettings,
+    *,
+    library: Any = "@py",
+    clock: Clock | None = None,
+    log: TrafficLog | None = None,
 ) -> Transport:
-    """An open link: pyserial's where the address is a port or its URL, else PyVISA's.  Raises NotConnected."""
+    """An open link: pyserial's where the address is a port or its URL, else PyVISA's.
+
+    clock: by which the pauses between messages are kept, the wall's by default.  Raises NotConnected.
+    """
     line = dict(getattr(driver_of(kind, settings.model), "SERIAL", {})) | settings.line
     serial_name = settings.address.upper().startswith("ASRL") and library == "@py"
     if "::" not in settings.address or serial_name:
         return SerialTransport(settings.address, timeout=settings.timeout_s, log=log, **line)
-    return VisaTransport(settings.address, library=library, timeout=settings.timeout_s, line=line, log=log)
+    options: dict[str, Any] = {"pause": line.pop("pause", 0.0), "clock": clock, "log": log}
+    return VisaTransport(settings.address, library=library, timeout=settings.timeout_s, line=line, **options)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from instruments.drivers.counter.reciprocal import READINGS_AT_ONCE, ReciprocalCounter
 from instruments.drivers.scpi import Setting
-from instruments.errors import InstrumentError
 from instruments.ieee488 import Form
 
 if TYPE_CHECKING:
@@ -37,7 +35,8 @@ class Keysight53230A(ReciprocalCounter):
     impedance = Setting("INP1:IMP", float, unit="ohm", low=50.0, high=1e6)
     probe_factor = Setting("INP1:PROB", float, low=1.0, high=10.0)
     input_range = Setting("INP1:RANG", float, unit="V", low=5.0, high=50.0)
-    trigger_level = Setting("INP1:LEV1", float, unit="V", low=-5.125, high=5.125)
+    #: Resolution: data sheet, for the range of 5 V.
+    trigger_level = Setting("INP1:LEV1", float, unit="V", low=-5.125, high=5.125, resolution=2.5e-3)
     automatic_level = Setting("INP1:LEV:AUTO", bool)
     slope = Setting("INP1:SLOP1", str, choices=("POSitive", "NEGative"))
     measurement_timeout = Setting("SYST:TIM", float, unit="s", low=0.01, high=2000.0)
@@ -48,6 +47,7 @@ class Keysight53230A(ReciprocalCounter):
         CONFigure comes first, it resets the gate and the trigger.
         """
         self.command("CONF:FREQ (@1)")
+        self._unsent_end = ()
         self.command("SENS:FREQ:GATE:SOUR TIME")
         self.gate = gate_s
         self.coupling = "DC"
@@ -66,10 +66,8 @@ class Keysight53230A(ReciprocalCounter):
     def readings(self, count: int) -> NDArray[np.float64]:
         """So many readings; see :class:`Counter`.  They are fetched as they come, each with its own patience."""
         self._check_count(count)
-        self.command(f"SAMP:COUN {count}")
         found: list[float] = []
-        try:
-            self.command("INIT")
+        with self._series(f"SAMP:COUN {count}", "INIT", end=("SAMP:COUN 1",)):
             while len(found) < count:
                 part = min(READINGS_AT_ONCE, count - len(found))
                 question = f"DATA:REM? {part},WAIT"
@@ -77,10 +75,4 @@ class Keysight53230A(ReciprocalCounter):
                 if answer is None:
                     break
                 found += self._split(question, answer, part)
-        except InstrumentError:
-            with contextlib.suppress(InstrumentError):  # the first error tells more
-                self._give_up()
-                self.command("SAMP:COUN 1")
-            raise
-        self.command("SAMP:COUN 1")
         return np.array(found + [np.nan] * (count - len(found)))

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from instruments.drivers.counter.reciprocal import LONGEST_WAIT_S, READINGS_AT_ONCE, ReciprocalCounter
 from instruments.drivers.scpi import Setting
-from instruments.errors import InstrumentError, OutOfRange
+from instruments.errors import OutOfRange
 from instruments.ieee488 import Form
 
 if TYPE_CHECKING:
@@ -41,7 +40,8 @@ class PendulumCNT91(ReciprocalCounter):
     impedance = Setting("INP1:IMP", float, unit="ohm", low=50.0, high=1e6)
     attenuation = Setting("INP1:ATT", float, low=1.0, high=10.0, form=Form(r"10?|\+1\.0+E\+0[01]", "10"))
     low_pass_filter = Setting("INP1:FILT", bool)
-    trigger_level = Setting("INP1:LEV", float, unit="V", low=-5.0, high=5.0)
+    #: Resolution: data sheet, without attenuation.
+    trigger_level = Setting("INP1:LEV", float, unit="V", low=-5.0, high=5.0, resolution=3e-3)
     automatic_level = Setting("INP1:LEV:AUTO", bool)
     slope = Setting("INP1:SLOP", str, choices=("POSitive", "NEGative"))
     measurement_timeout = Setting("SYST:TOUT:TIME", float, unit="s", low=0.01, high=1000.0)
@@ -73,6 +73,7 @@ class PendulumCNT91(ReciprocalCounter):
         if self._patience <= 1000.0:
             self.measurement_timeout = self._patience
         self.gives_up = self._gives_up = self._patience <= 1000.0
+        self._unsent_end = ()
 
     def _check_count(self, count: int) -> None:
         super()._check_count(count)
@@ -90,21 +91,14 @@ class PendulumCNT91(ReciprocalCounter):
 
         Times are the counter's: only their differences mean something.  Raises OutOfRange as readings() does.
         """
-        self._check_count(count)
-        self.time_stamps = True
-        try:
-            return self._block(count, columns=2)
-        finally:
-            with contextlib.suppress(InstrumentError):  # an error under way tells more
-                self.time_stamps = False
+        return self._block(count, columns=2)
 
     def _block(self, count: int, *, columns: int) -> NDArray[np.float64]:
         """A measurement of so many readings, fetched when it is complete."""
         self._check_count(count)
-        self.command(f"ARM:COUN {count}")
         found: list[float] = []
-        try:
-            self.command("INIT")
+        begin, end = (("FORM:TINF ON",), ("FORM:TINF OFF",)) if columns == 2 else ((), ())
+        with self._series(*begin, f"ARM:COUN {count}", "INIT", end=("ARM:COUN 1", *end)):
             complete = self._ask("*OPC?", count * self._patience)
             if complete not in {"1", None}:
                 self.reject("*OPC?", complete, "1")
@@ -115,10 +109,4 @@ class PendulumCNT91(ReciprocalCounter):
                 if answer is None:
                     break
                 found += self._split(question, answer, part * columns)
-        except InstrumentError:
-            with contextlib.suppress(InstrumentError):  # the first error tells more
-                self._give_up()
-                self.command("ARM:COUN 1")
-            raise
-        self.command("ARM:COUN 1")
         return np.array(found + [np.nan] * (count * columns - len(found))).reshape(count, columns)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+import contextlib
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from instruments.drivers.scpi import ScpiInstrument, parse_reading
 from instruments.errors import BadAnswer, InstrumentError, NoAnswer, OutOfRange
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 #: Readings that are fetched with one question: an answer of 25 kB, seconds apart at most.
 READINGS_AT_ONCE = 1000
@@ -29,9 +33,12 @@ class ReciprocalCounter(ScpiInstrument):
     _patience = 3.0
     #: Whether it says so itself when there is no signal; prepare() sets it up to do so.
     _gives_up = False
+    #: The commands that end the series for which the counter is still set up; none, if it is not.
+    _unsent_end: tuple[str, ...] = ()
 
     def frequency(self) -> float | None:
         """One reading [Hz], or None; see :class:`Counter`.  Raises CommandRefused if an error was waiting."""
+        self._end_old_series()
         answer = self._ask("READ?", self._patience)
         with self.resynchronised():
             return None if answer is None else self._reading("READ?", answer)
@@ -61,6 +68,36 @@ class ReciprocalCounter(ScpiInstrument):
             if self._gives_up:
                 raise
             return None
+
+    @contextlib.contextmanager
+    def _series(self, *commands: str, end: tuple[str, ...]) -> Iterator[None]:
+        """Set the counter up for a series with these commands, and back for single readings, whatever ends it.
+
+        After an error or an interruption the measurement is stopped, too.  If the counter cannot be reached then, or a
+        second interruption comes, that is done before the next reading.
+        """
+        self._end_old_series()
+        self._unsent_end = end
+        try:
+            for command in commands:
+                self.command(command)
+            yield
+        except BaseException:  # Ctrl-C as well
+            with contextlib.suppress(InstrumentError):  # the first error tells more
+                self._give_up()
+                self._end_series()
+            raise
+        self._end_series()
+
+    def _end_series(self) -> None:
+        for command in self._unsent_end:
+            self.command(command)
+        self._unsent_end = ()
+
+    def _end_old_series(self) -> None:
+        if self._unsent_end:
+            self._give_up()
+            self._end_series()
 
     def _give_up(self) -> None:
         """Stop a measurement that does not end, and let the link tell if it is dead."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, cast
 
-from instruments.drivers.generator import NO_LIMITS, OPEN_V, check_peak
+from instruments.drivers.generator import NO_LIMITS, OPEN_V, Limits, check_peak
 from instruments.drivers.scpi import ScpiInstrument, Setting
 from instruments.errors import CommandRefused, OutOfRange
 from instruments.ieee488 import INFINITY
@@ -58,8 +58,8 @@ class OutputSwitch(Setting[bool]):
 
 
 def frequency_setting(high: float) -> LimitedSetting:
-    """The frequency of the output, up to the highest of the family [Hz]."""
-    return LimitedSetting("FREQ", float, unit="Hz", low=1e-6, high=high, quantity="frequency_hz")
+    """The frequency of the output, in steps of 1 µHz, up to the highest of the family [Hz]."""
+    return LimitedSetting("FREQ", float, unit="Hz", low=1e-6, high=high, resolution=1e-6, quantity="frequency_hz")
 
 
 def amplitude_setting(low: float) -> LimitedSetting:
@@ -68,9 +68,10 @@ def amplitude_setting(low: float) -> LimitedSetting:
 
 
 def offset_setting() -> LimitedSetting:
-    """The offset of the output [V]."""
+    """The offset of the output, with four digits of 10 V [V]."""
+    low, high, resolution = -OPEN_V, OPEN_V, 1e-3
     return LimitedSetting(
-        "VOLT:OFFS", float, unit="V", low=-OPEN_V, high=OPEN_V, quantity="offset_v", partner="amplitude_vpp"
+        "VOLT:OFFS", float, "V", low, high, resolution=resolution, quantity="offset_v", partner="amplitude_vpp"
     )
 
 
@@ -87,9 +88,22 @@ class DriveGenerator(ScpiInstrument):
 
     def __init__(self, transport: Transport) -> None:
         super().__init__(transport)
-        #: What the coil stands.
-        self.limits = NO_LIMITS
-        #: Whether the signal that is set is one of :meth:`prepare`.
+        self._limits = NO_LIMITS
+        #: Whether the signal that is set is one of :meth:`prepare`, under the limits as they are.
+        self.prepared_here = False
+
+    @property
+    def limits(self) -> Limits:
+        """What the coil stands.
+
+        New limits are for what comes: the signal that is set counts as prepared no longer, so the output does not go on
+        before :meth:`prepare` has set one under them.  An output that is on is left on: :meth:`off` ends it.
+        """
+        return self._limits
+
+    @limits.setter
+    def limits(self, limits: Limits) -> None:
+        self._limits = limits
         self.prepared_here = False
 
     def command(self, message: str) -> None:

@@ -303,6 +303,45 @@ def test_the_settings_can_all_be_asked_for(bench):
     assert NOT_A_NUMBER not in settings.values()
 
 
+def interrupted(clock, monkeypatch, act, after):
+    """Ctrl-C in the middle of a wait, after so many others."""
+    sleep, waits = clock.sleep, iter(range(after))
+
+    def ctrl_c(duration):
+        if next(waits, None) is not None:
+            return sleep(duration)
+        monkeypatch.undo()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(clock, "sleep", ctrl_c)
+    with pytest.raises(KeyboardInterrupt):
+        act()
+
+
+@pytest.mark.parametrize("after", range(5))
+@pytest.mark.parametrize("stamps", [False, True])
+def test_after_an_interrupted_series_the_next_reading_works(bench, monkeypatch, stamps, after):
+    counter, clock = bench
+    counter.prepare(gate_s=0.1, trigger_level_v=0.6)
+    take = getattr(counter, "timed_readings", counter.readings) if stamps else counter.readings
+    interrupted(clock, monkeypatch, lambda: take(50), after)
+    for _ in range(2):
+        assert counter.frequency() == pytest.approx(25.0, rel=1e-4)
+    np.testing.assert_allclose(counter.readings(3), 25.0, rtol=1e-4)
+
+
+def test_a_series_whose_end_could_not_be_sent_is_ended_before_the_next_reading():
+    dead = [NO_ERROR, ("DATA:REM? 3,WAIT", SILENCE), (CLEAR, None), ("*CLS", None), ("ABOR", None)]
+    dead += [("SYST:ERR?", SILENCE), (CLEAR, None), ("*CLS", None), ("ABOR", None), ("SYST:ERR?", SILENCE)]
+    back = [(CLEAR, None), ("*CLS", None), *accepted("ABOR", "SAMP:COUN 1")]
+    reading = [NO_ERROR, ("READ?", "+2.50000000000000E+001")]
+    lines = [*accepted("SAMP:COUN 3", "INIT"), *dead, *back, *reading, *reading]
+    with conversation(Keysight53230A, *lines) as counter:
+        with pytest.raises(NoAnswer, match="DATA:REM"):
+            counter.readings(3)
+        assert [counter.frequency(), counter.frequency()] == [25.0, 25.0]
+
+
 def test_time_stamps_are_the_gates_openings():
     clock = VirtualClock()
     counter = PendulumCNT91(

@@ -135,6 +135,27 @@ def test_after_a_reset_the_output_stays_off_until_a_signal_is_prepared():
             generator.output = True
 
 
+@pytest.mark.parametrize("driver", [Keysight33500B, Agilent33220A])
+def test_limits_bind_what_was_prepared_before_they_were_set(driver):
+    output = driver.OUTPUT
+    signal = ("FUNC SIN", "FREQ 30.0", "VOLT:OFFS 0.0", "VOLT 20.0")
+    lines = accepted("*RST", f"{output}:LOAD INF", "VOLT:UNIT VPP", *signal)
+    with conversation(driver, *lines) as generator:
+        generator.prepare(waveform="SIN", frequency_hz=30.0, amplitude_vpp=20.0)
+        generator.limits = Limits(drive_amplitude_vpp=1.0)
+        with pytest.raises(OutOfRange, match=r"prepare\(\) first.*limits\.drive_amplitude_vpp"):
+            generator.output = True  # nothing is sent
+        assert generator.limits == Limits(drive_amplitude_vpp=1.0)
+
+
+def test_without_new_limits_what_was_prepared_goes_on():
+    signal = ("FUNC SIN", "FREQ 30.0", "VOLT:OFFS 0.0", "VOLT 4.0", "OUTP ON")
+    with conversation(Agilent33220A, *accepted("*RST", "OUTP:LOAD INF", "VOLT:UNIT VPP", *signal)) as generator:
+        generator.limits = LIMITS
+        generator.prepare(waveform="SIN", frequency_hz=30.0, amplitude_vpp=4.0)
+        generator.output = True
+
+
 def test_what_the_generator_itself_finds_wrong_is_told():
     refused = [("VOLT 10.0", None), ("SYST:ERR?", '-222,"Data out of range;value clipped to upper limit"'), NO_ERROR]
     with conversation(Keysight33500B, *refused) as generator, pytest.raises(CommandRefused, match="clipped"):

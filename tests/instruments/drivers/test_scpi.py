@@ -205,6 +205,49 @@ def test_what_stands_for_no_reading_is_none(answer, reading):
     assert parse_reading("A", "READ?", answer) == reading
 
 
+@pytest.mark.parametrize(
+    ("driver", "name", "asked", "now"),
+    [
+        (Keysight53230A, "gate", 1e-3, 5e-3),
+        (Keysight53230A, "gate", 1.0, 1.011),
+        (Keysight53230A, "trigger_level", 0.0, 2.6e-3),
+        (Keysight53230A, "trigger_level", 0.6, 0.62),
+        (Keysight53230A, "coupling", "DC", "AC"),
+        (Keysight53230A, "automatic_level", False, True),
+        (Keysight33500B, "amplitude", 2e-3, 6e-3),
+        (Keysight33500B, "amplitude", 10.0, 9.89),
+        (Keysight33500B, "frequency", 1e-3, 5e-3),
+        (Keysight33500B, "offset", 0.0, -1.1e-3),
+        (Keysight33500B, "load", 9.9e37, 50.0),
+        (Keysight33500B, "waveform", "SIN", "SQU"),
+    ],
+)
+def test_a_changed_setting_is_noticed_in_whatever_unit_it_is(driver, name, asked, now):
+    assert getattr(driver, name).differs(asked, now)
+    assert not getattr(driver, name).differs(now, now)
+
+
+@pytest.mark.parametrize(
+    ("name", "asked", "now"),
+    [
+        ("gate", 1e-3, 1.0099e-3),
+        ("trigger_level", 0.0, 2.4e-3),
+        ("trigger_level", 0.6, 0.5975),
+        ("slope", "pos", "POS"),
+    ],
+)
+def test_what_the_instrument_rounds_is_no_change(name, asked, now):
+    assert not getattr(Keysight53230A, name).differs(asked, now)
+
+
+def test_a_gate_that_another_program_changed_is_named():
+    lines = [*accepted("SENS:FREQ:GATE:TIME 0.001")]
+    with conversation(Keysight53230A, *lines) as counter:
+        counter.gate = 1e-3
+        now = {row.full_name: 0.0 for row in counter.declared()} | {"gate_s": 5e-3}
+        assert counter.unlike(now) == {"gate_s": (1e-3, 5e-3)}
+
+
 def test_closing_the_driver_closes_its_transport():
     with conversation(ScpiInstrument) as instrument:
         instrument.close()

@@ -454,15 +454,13 @@ def test_a_locked_port_is_occupied_until_it_is_given_back(bus):
         assert third.query("*IDN?") == IDENTITY
 
 
-def test_closing_twice_does_no_harm_and_nothing_is_sent_after_it(bus):
+@pytest.mark.parametrize("act", ["query", "write", "query_block", "clear", "reopen", "lock"])
+def test_a_closed_link_says_that_it_was_closed_whatever_it_is_used_for(bus, act):
     transport = SerialTransport(SLOW)
     transport.close()
     transport.close()
-    with pytest.raises(NotConnected, match=r"no link at '\*IDN\?'"):
-        transport.query("*IDN?")
-    transport.reopen()
-    assert transport.query("*IDN?") == IDENTITY
-    transport.close()
+    with pytest.raises(NotConnected, match="this session was closed: open another one"):
+        getattr(transport, act)(*(["*IDN?"] if act in {"query", "write", "query_block"} else []))
 
 
 # --- the URL handler ---

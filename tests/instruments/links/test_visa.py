@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 from pyvisa import VisaIOError
-from pyvisa.constants import StatusCode
+from pyvisa.constants import ResourceAttribute, StatusCode
 
 from instruments.clock import VirtualClock
 from instruments.errors import BadAnswer, NoAnswer, NotConnected, Occupied
@@ -170,12 +170,71 @@ def test_the_log_gets_the_bytes_of_both_directions(bus):
     ]
 
 
-def test_closing_twice_does_no_harm_and_nothing_is_sent_after_it(bus):
-    transport = VisaTransport(ADDRESS, library=library_for(bus))
+@pytest.mark.parametrize("address", [ADDRESS, SOCKET])
+@pytest.mark.parametrize("act", ["query", "write", "query_block", "clear", "reopen", "lock"])
+def test_a_closed_link_says_that_it_was_closed_whatever_it_is_used_for(bus, address, act):
+    transport = VisaTransport(address, library=library_for(bus))
     transport.close()
     transport.close()
-    with pytest.raises(NotConnected, match="session"):
+    with pytest.raises(NotConnected, match="this session was closed: open another one"):
+        getattr(transport, act)(*(["*IDN?"] if act in {"query", "write", "query_block"} else []))
+
+
+# --- how long things may take ---
+
+
+def test_patience_is_for_an_answer_and_not_for_the_messages_after_it(bus):
+    """A dead link must not hold the next command as long as the last question: up to 30 days for a counter's series."""
+    allowed = []
+
+    def noted(method):
+        def call(self, session, *rest):
+            allowed.append((method, self.get_attribute(session, ResourceAttribute.timeout_value)[0]))
+            return getattr(LevilabVisaLibrary, method)(self, session, *rest)
+
+        return call
+
+    transport = VisaTransport(ADDRESS, library=library_with(bus, write=noted("write"), clear=noted("clear")))
+    transport.query("*IDN?", patience=3000.0)
+    transport.write("*CLS")
+    transport.query("*IDN?", patience=3000.0)
+    transport.clear()
+    transport.query("*IDN?", patience=3000.0)
+    transport.query("*IDN?")
+    assert allowed == [("clear" if k == 3 else "write", 2000) for k in range(6)]
+    transport.timeout = 5.0
+    transport.write("*CLS")
+    assert allowed[-1] == ("write", 5000)
+
+
+@pytest.mark.parametrize("address", [ADDRESS, SOCKET, "ASRLslow.levilab::INSTR"])
+def test_between_two_messages_the_instrument_is_left_alone(clock, address):
+    sent, answered = [], []
+
+    def log(_, direction, __):
+        (sent if direction == ">" else answered).append(clock.now())
+
+    library = library_for(Bus({address: Slow(clock)}))
+    transport = VisaTransport(address, library=library, pause=0.05, clock=clock, log=log)
+    for _ in range(3):
         transport.query("*IDN?")
+    transport.write("*CLS")
+    transport.write("*CLS")
+    end = clock.now()
+    # the log is written before the pause: the next answer shows that it was kept
+    assert all(after >= before + 0.05 for before, after in itertools.pairwise(answered))
+    assert end >= answered[-1] + 2 * 0.05
+    with pytest.raises(NoAnswer):
+        transport.query("FOO?")
+    assert clock.now() >= end + 0.05 + 2.0
+    transport.close()
+
+
+def test_without_a_pause_no_time_is_lost(bus, clock):
+    transport = VisaTransport(ADDRESS, library=library_for(bus), clock=clock)
+    for _ in range(3):
+        transport.query("*IDN?")
+    assert clock.now() < 0.05
 
 
 # --- a serial line, which has no device clear ---

@@ -460,3 +460,13 @@ def test_a_virtual_bench_that_is_described_keeps_to_the_wall_clock_as_whoever_me
 def test_a_gate_must_fit_into_the_interval(tmp_path):
     with pytest.raises(ConfigError, match=r"gate_s = 12 must be shorter than interval_s = 10"):
         read_bench(written(tmp_path, "[spin]\ngate_s = 12\ninterval_s = 10\n"))
+
+
+def test_a_gaussmeter_is_left_alone_between_two_messages_on_the_clock_of_its_bench(world):
+    # manual of the 425, page 50: 30 ms
+    with open_bench(BenchConfig(), ("magnetometer",), world=world) as bench:
+        meter = bench.instruments["magnetometer"]
+        before = world.clock.now()
+        for _ in range(10):
+            meter.transport.query("*IDN?")
+        assert world.clock.now() - before >= 10 * meter.SERIAL["pause"]
