@@ -24,22 +24,29 @@ tally = collections.Counter()
 
 # --- what a link cannot show ---
 
-#: A number without a point, the digits behind one, and what may be another one in a number.
-_WHOLE, _BEHIND, _REST = re.compile(r"(?<![.\w])\d+(?![.\w])"), re.compile(r"(?<=\.)\d+"), re.compile(r"\d|[+-]")
-#: Models whose manuals do not say how many digits stand behind the point: as many as the resolution gives.
-_ANY_DIGITS = {"CNT-91", "DSOX1000"}
+#: What may be another digit or sign in a number.
+_REST = re.compile(r"\d|[+-]")
+#: Numbers whose length is not known, by model: as many digits as the resolution gives (CNT-91, handbook 8-36), NR3 and
+#: NR1 of any length (InfiniiVision), codes with and without a leading zero (Lake Shore).
+_OF_ANY_LENGTH = {
+    "CNT-91": r"[+-]\d\.\d{1,15}E[+-]\d{2}",
+    "DSOX1000": r"[+-]\d{1,3}(\.\d{1,12})?E[+-]\d{2,3}|[+-]?\d+",
+    "425": r"\d{1,2}",
+    "475": r"\d{1,2}",
+}
 #: Those that print a sign where the number is negative, and no other.
 _MINUS_ALONE = {"DS1000Z"}
 _STATES = {"RUN", "WAIT", "TD", "AUTO", "STOP"}
 
 
 def form(name, text):
-    """How an instrument prints numbers: 12000 and 4 as 9, -1.25E+03 as 99.99E999; as 99.9E999 with any digits."""
-    if name in _ANY_DIGITS:
-        text = _BEHIND.sub("9", text)
+    """How an instrument prints numbers: 99.99E999 for -1.25E+03, N for one that may have any length."""
+    if name in _OF_ANY_LENGTH:
+        any_length = re.compile(_OF_ANY_LENGTH[name])
+        text = re.sub(r"[^,;]+", lambda field: "N" if any_length.fullmatch(field[0]) else field[0], text)
     if name in _MINUS_ALONE:
         text = re.sub(r"(?<![\w.])-", "", text)
-    return _REST.sub("9", _WHOLE.sub("9", text))
+    return _REST.sub("9", text)
 
 
 def has_the_form(name, question, honest, taken):
@@ -106,7 +113,12 @@ def excuse_of_a_message(pair, struck):
     if not struck.arrived and b"?" not in struck.question:
         return "a command is lost: it would have had no answer"
     arrived = struck.arrived.decode("latin-1").strip("\n")
-    understood = any(message == arrived and not complained for message, _, complained in heard)
+    # on a stream what is left of a message that was cut stands before the next one: ":" does no harm there
+    cut = struck.what == "message cut" and pair.way in STREAMS
+    understood = any(
+        (message.startswith(arrived) if cut else message == arrived) and not complained
+        for message, _, complained in heard
+    )
     return "a message becomes another one that the instrument understands" if understood else None
 
 
