@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import re
+import socket
 import sys
 import time
 from pathlib import Path
@@ -86,7 +87,9 @@ class SerialTransport:
 
         port = port_name(self.address)
         try:
-            return serial.serial_for_url(port, timeout=self.timeout, write_timeout=self.timeout, **self._options)
+            return _at_once(
+                serial.serial_for_url(port, timeout=self.timeout, write_timeout=self.timeout, **self._options)
+            )
         except Exception as error:  # pyserial lets termios.error and ValueError through
             raise self._not_opened(port, error) from error
 
@@ -236,8 +239,11 @@ class SerialTransport:
             raise NotConnected(self.address, CLOSED)
 
     def _close_port(self) -> None:
+        link = _tcp_link(self._port)
         with contextlib.suppress(Exception):  # it may be gone for good
             self._port.close()
+        if link is not None:  # pyserial leaves it open if the other side has hung up
+            link.close()
 
     def _wait_at_most(self, within: float) -> None:
         if self._port.timeout != within:  # setting it configures the port anew
@@ -279,6 +285,20 @@ class _Garbled(Exception):
     def __init__(self, seen: bytes) -> None:
         self.seen = seen
         super().__init__(seen)
+
+
+def _at_once(port: Any) -> Any:
+    """The port; over TCP a message that follows one without an answer does not wait for that one's acknowledgement."""
+    link = _tcp_link(port)
+    if link is not None:
+        link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    return port
+
+
+def _tcp_link(port: Any) -> socket.socket | None:
+    """The connection behind a port that is a URL ``socket://``."""
+    link = getattr(port, "_socket", None)
+    return link if isinstance(link, socket.socket) else None
 
 
 def port_name(address: str) -> str:

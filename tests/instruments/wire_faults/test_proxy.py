@@ -1,0 +1,133 @@
+"""The proxy and its faults themselves: they do what they say, and what a link cannot show is shown here."""
+
+import pytest
+
+from instruments.errors import InstrumentError
+from support.wire_faults import ANSWERS, MESSAGES, OF_FRAMES, Fault
+from support.wire_pairs import FRAMED, KINDS, STREAMS, WAYS, Pair, attempt, hasty_clients
+
+CELLS = [(way, name) for way, names in WAYS.items() for name in names]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def clients():
+    with hasty_clients():
+        yield
+
+
+@pytest.fixture
+def pair_over():
+    pairs = []
+
+    def made(way, name):
+        pairs.append(Pair(way, name))
+        return pairs[-1]
+
+    yield made
+    for pair in pairs:
+        pair.close()
+
+
+@pytest.mark.parametrize(("way", "name"), CELLS)
+def test_without_a_fault_every_operation_gives_the_right_value(pair_over, way, name):
+    pair = pair_over(way, name)
+    for wanted, operation in KINDS[name].operations.items():
+        value, error = attempt(pair, operation)
+        assert error is None, wanted
+        assert operation.right(pair, value), wanted
+        if operation.remakes:
+            pair.recover(anew=True, reset=False)
+
+
+@pytest.mark.parametrize("what", [*ANSWERS, *MESSAGES])
+@pytest.mark.parametrize("way", WAYS)
+def test_every_fault_strikes_on_every_way(pair_over, way, what):
+    pair = pair_over(way, WAYS[way][-1])
+    pair.wire.arm(Fault(what, at=1, place=0.5, junk=b"~"))
+    pair.hurry()
+    operation = pair.kind.operations["settings"]
+    value, error = attempt(pair, operation)
+    assert pair.wire.struck
+    assert error or operation.right(pair, value) or what == "another digit"
+    silent = {"withheld", "late", "ended", "message lost"} | ({"cut"} if way in STREAMS else set())
+    if what in silent:
+        assert error
+    pair.recover(anew=False, reset=False)
+    value, error = attempt(pair, operation)
+    assert error is None
+    assert operation.right(pair, value)
+
+
+def test_faults_of_frames_are_those_of_answers():
+    assert set(ANSWERS) > OF_FRAMES
+
+
+# --- what a link cannot show: see docs/bench.md ---
+
+
+def struck(pair, fault, act):
+    """What this gives while the fault is on the wire."""
+    pair.wire.arm(fault)
+    value = act(pair.driver)
+    assert pair.wire.struck
+    return value
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_digit_that_becomes_another_one_is_not_noticed(pair_over, way):
+    pair = pair_over(way, "475")
+    field = struck(pair, Fault("another digit", place=0.1, junk=b"\x00"), lambda driver: driver.flux_density())
+    assert field == pytest.approx(0.029, abs=2e-4)  # 0.019 T in truth
+
+
+@pytest.mark.parametrize("way", [way for way in WAYS if "DSOX1000" in WAYS[way]])
+def test_a_byte_of_a_record_that_becomes_another_one_is_not_noticed(pair_over, way):
+    pair = pair_over(way, "DSOX1000")
+    sound = pair.driver.trace(1).codes
+    pair.wire.arm(None)
+    pair.begin(pair.kind.operations["trace"])
+    pair.driver.trace(1)
+    at = next(n for n, answer in enumerate(pair.answers(".*")) if answer.startswith(b"#"))
+    trace = struck(pair, Fault("garbled", at=at, place=0.5, junk=b"\xff"), lambda driver: driver.trace(1))
+    assert (trace.codes != sound).sum() == 1
+
+
+@pytest.mark.parametrize("way", ["stream", "socket"])
+def test_on_a_stream_an_answer_that_comes_again_may_pass_for_the_next(pair_over, way):
+    pair = pair_over(way, "53230A")
+    assert struck(pair, Fault("doubled later"), lambda driver: driver.gate) == 0.5
+    assert pair.driver.measurement_timeout == 0.5  # 2.0 in truth
+    assert pair.driver.measurement_timeout == 2.0
+
+
+@pytest.mark.parametrize("way", FRAMED)
+def test_where_frames_are_numbered_an_answer_that_comes_again_is_dropped(pair_over, way):
+    pair = pair_over(way, "53230A")
+    assert struck(pair, Fault("doubled later"), lambda driver: driver.gate) == 0.5
+    assert pair.driver.measurement_timeout == 2.0
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_command_that_is_lost_is_noticed_where_it_is_asked_back(pair_over, way):
+    pair = pair_over(way, "475")
+    for at in range(2):  # unit, mode
+        pair.hurry()
+        with pytest.raises(InstrumentError):
+            struck(pair, Fault("message lost", at=at), KINDS["475"].prepare)
+        pair.recover(anew=True, reset=False)
+
+
+@pytest.mark.parametrize("way", ["messages", "stream", "socket"])
+def test_a_command_that_is_lost_without_a_trace_is_found_by_its_setting(pair_over, way):
+    pair = pair_over(way, "53230A")
+    pair.driver.gate = 0.5
+    struck(pair, Fault("message lost"), lambda driver: setattr(driver, "gate", 0.25))
+    assert pair.driver.unlike(pair.driver.settings()) == {"gate_s": (0.25, 0.5)}
+
+
+@pytest.mark.parametrize("way", FRAMED)
+def test_where_frames_are_numbered_a_command_that_is_lost_is_noticed(pair_over, way):
+    pair = pair_over(way, "53230A")
+    pair.hurry()
+    with pytest.raises(InstrumentError):
+        struck(pair, Fault("message lost"), lambda driver: setattr(driver, "gate", 0.25))

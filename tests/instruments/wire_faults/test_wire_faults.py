@@ -1,0 +1,256 @@
+"""Random faults on the wire, over every way and with all drivers: the right value or a clear error.
+
+A wrong value is allowed where nothing on the link can show that it is one: `excuse` says where, and docs/bench.md.
+"""
+
+import collections
+import re
+import zlib
+
+import pytest
+from hypothesis import HealthCheck, Phase, given, seed, settings
+from hypothesis import strategies as st
+
+from support.wire_faults import ANSWERS, MESSAGES, OF_FRAMES, Fault
+from support.wire_pairs import FRAMED, KINDS, SEVEN_BITS, STREAMS, WAYS, Pair, attempt, hasty_clients
+
+EXPLORING = settings.get_current_profile_name() == "explore"
+#: Faults for each way and driver, in the suite and in `make explore`.
+FAULTS_EACH = 150 if EXPLORING else 8
+
+#: Way, model, and what became of a fault → how often.  `pytest -s` prints it.
+tally = collections.Counter()
+
+
+# --- what a link cannot show ---
+
+#: What may be another digit or sign in a number.
+_REST = re.compile(r"\d|[+-]")
+#: Numbers whose length is not known, by model: as many digits as the resolution gives (CNT-91, handbook 8-36), NR3 and
+#: NR1 of any length (InfiniiVision), codes with and without a leading zero (Lake Shore).
+_OF_ANY_LENGTH = {
+    "CNT-91": r"[+-]\d\.\d{1,15}E[+-]\d{2}",
+    "DSOX1000": r"[+-]\d{1,3}(\.\d{1,12})?E[+-]\d{2,3}|[+-]?\d+",
+    "425": r"\d{1,2}",
+    "475": r"\d{1,2}",
+}
+#: Those that print a sign where the number is negative, and no other.
+_MINUS_ALONE = {"DS1000Z"}
+_STATES = {"RUN", "WAIT", "TD", "AUTO", "STOP"}
+
+
+def form(name, text):
+    """How an instrument prints numbers: 99.99E999 for -1.25E+03, N for one that may have any length."""
+    if name in _OF_ANY_LENGTH:
+        any_length = re.compile(_OF_ANY_LENGTH[name])
+        text = re.sub(r"[^,;]+", lambda field: "N" if any_length.fullmatch(field[0]) else field[0], text)
+    if name in _MINUS_ALONE:
+        text = re.sub(r"(?<![\w.])-", "", text)
+    return _REST.sub("9", text)
+
+
+def has_the_form(name, question, honest, taken):
+    """Whether an instrument could have answered this to the question, as far as its form goes."""
+    question, honest, taken = (part.decode("latin-1").strip() for part in (question, honest, taken))
+    if question == "*IDN?":
+        fields, wanted = taken.split(","), honest.split(",")
+        known = re.fullmatch(KINDS[name].driver.MODELS, fields[1].strip()) if len(fields) == len(wanted) else None
+        return known is not None and taken.isprintable()
+    if question == "SYST:ERR?":
+        return re.fullmatch(r'[+-]?\d+,".*"', taken) is not None
+    if question == ":TRIG:STAT?":
+        return taken in _STATES
+    for row in rows(KINDS[name]):
+        if re.fullmatch(rf"(:?CHAN\d:)?{re.escape(row.header)}\?", question):
+            if row.kind is bool:
+                return taken in {"0", "1"}
+            if row.choices and not honest.isdigit():
+                return taken.upper() in spellings((*row.choices, *row.answers))
+    return form(name, taken) == form(name, honest)
+
+
+def spellings(choices):
+    """Words in their long and short forms."""
+    return {word for choice in choices for word in (choice.upper(), re.sub("[a-z]", "", choice))}
+
+
+def rows(kind):
+    """The settings that a driver declares, those of a scope's inputs included."""
+    return [*kind.driver.declared(), *(kind.driver.CHANNEL.declared() if hasattr(kind.driver, "CHANNEL") else ())]
+
+
+def excuse(pair):
+    """Why nothing on the link could show what the fault has done; None if something could."""
+    for struck in pair.wire.struck:
+        if struck.what in MESSAGES:
+            if reason := excuse_of_a_message(pair, struck):
+                return reason
+        elif struck.honest.startswith(b"#"):
+            if len(struck.arrived) == len(struck.honest) and struck.arrived[:2] == struck.honest[:2]:
+                return "bytes of a block become others, and a block has no check"
+        elif (taken := taken_of(pair, struck)) != struck.honest.strip() and has_the_form(
+            pair.name, struck.question, struck.honest, taken
+        ):
+            return f"{struck.what}: it has the form of an answer to the question"
+    return None
+
+
+def taken_of(pair, struck):
+    """What a link takes for the answer: all that comes in a frame, or the first line."""
+    if pair.way in FRAMED:
+        return struck.arrived.strip()
+    arrived = bytes(byte & 0x7F for byte in struck.arrived) if pair.way in SEVEN_BITS else struck.arrived
+    return arrived.partition(b"\n")[0].strip()
+
+
+def excuse_of_a_message(pair, struck):
+    """The same for a message to the instrument."""
+    heard = [(message, answer.rstrip(b"\n"), complained) for message, answer, complained in list(pair.wire.heard)]
+    if struck.what == "message doubled":
+        if pair.way in STREAMS and passes_for_the_next(pair.name, struck.question, heard):
+            return "a question is heard twice on a stream: its second answer has the form of the next one"
+        return None
+    if not struck.arrived and b"?" not in struck.question:
+        return "a command is lost: it would have had no answer"
+    arrived = struck.arrived.decode("latin-1").strip("\n")
+    # on a stream what is left of a message that was cut stands before the next one: ":" does no harm there
+    cut = struck.what == "message cut" and pair.way in STREAMS
+    understood = any(
+        (message.startswith(arrived) if cut else message == arrived) and not complained
+        for message, _, complained in heard
+    )
+    return "a message becomes another one that the instrument understands" if understood else None
+
+
+def passes_for_the_next(name, question, heard):
+    """Whether an answer to a question has the form of one to a question that followed."""
+    asked = question.decode("latin-1").strip("\n")
+    twice = [n for n, (message, answer, _) in enumerate(heard) if message == asked and answer]
+    return any(
+        has_the_form(name, message.encode("latin-1"), answer, heard[n][1])
+        for n in twice
+        for message, answer, _ in heard[n + 2 :]
+        if answer
+    )
+
+
+# --- faults ---
+
+DIGITS = st.integers(0, 9999).map(lambda number: str(number).encode())
+PIECES = st.sampled_from(
+    [b"\n", b"\r\n", b"1\n", b"0\n", b'+0,"No error"\n', b"+1.000000000000000E+00\n", b",", b";", b"#"]
+)
+JUNK = st.one_of(st.binary(min_size=1, max_size=6), st.binary(min_size=1, max_size=1), DIGITS, PIECES)
+
+
+def faults(framed):
+    """One fault, wherever it may strike in an operation of so many exchanges as `at` is a share of."""
+    what = [what for what in (*ANSWERS, *ANSWERS, *MESSAGES) if framed or what not in OF_FRAMES]
+    return st.tuples(
+        st.sampled_from(what), st.floats(0, 1, exclude_max=True), st.floats(0, 1, exclude_max=True), JUNK, st.booleans()
+    )
+
+
+class Pairs:
+    """The pairs of one way, each made when it is first needed, and what goes on in their operations without faults."""
+
+    def __init__(self, way):
+        self.way = way
+        self._pairs = {}
+        self._exchanges = {}
+
+    def pair(self, name):
+        if name not in self._pairs:
+            self._pairs[name] = Pair(self.way, name)
+        return self._pairs[name]
+
+    def exchanges(self, name, wanted):
+        """Answers and messages of an operation without faults."""
+        if (name, wanted) not in self._exchanges:
+            pair, operation = self.pair(name), KINDS[name].operations[wanted]
+            pair.wire.arm(None)
+            value, error = attempt(pair, operation)
+            assert error is None
+            assert operation.right(pair, value)
+            self._exchanges[name, wanted] = pair.wire.answers, pair.wire.messages
+            pair.recover(anew=operation.remakes, reset=False)
+        return self._exchanges[name, wanted]
+
+    def discard(self, name):
+        self._pairs.pop(name).close()
+
+    def close(self):
+        for name in list(self._pairs):
+            self.discard(name)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def clients():
+    with hasty_clients():
+        yield
+    for row, count in sorted(tally.items()):
+        print(*row, count, sep="\t")  # noqa: T201 - what `pytest -s` is for
+
+
+def judged(pair, operation):
+    """What became of one attempt: right, an error, or why it may be wrong.  Fails for a wrong value."""
+    value, error = attempt(pair, operation)
+    if error:
+        return "error"
+    if operation.right(pair, value):
+        return "right"
+    reason = excuse(pair)
+    assert reason, ("a wrong value", value, pair.wire.fault, pair.wire.struck)
+    return reason
+
+
+def strike(pairs, name, wanted, drawn):
+    """One fault in an operation; then the same once more, and once more when the program has recovered."""
+    what, share, place, junk, marked = drawn
+    operation = KINDS[name].operations[wanted]
+    answers, messages = pairs.exchanges(name, wanted)
+    fault = Fault(what, int(share * (messages if what in MESSAGES else answers)), place, junk, marked)
+    pair = pairs.pair(name)
+    pair.wire.arm(fault)
+    pair.hurry()
+    became = judged(pair, operation)
+    again = judged(pair, operation)
+    struck = bool(pair.wire.struck)
+    failed = "error" in {became, again}
+    pair.recover(anew=failed and operation.remakes, reset=fault.toward)
+    value, error = attempt(pair, operation)
+    assert error is None, ("not recovered", fault, became, again, error)
+    assert operation.right(pair, value), ("not recovered", fault, became, again, value)
+    if operation.remakes:
+        pair.recover(anew=True, reset=False)
+    return (became if struck else "not struck"), again
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_fault_on_the_wire_gives_the_right_value_or_an_error(way):
+    pairs = Pairs(way)
+
+    @settings(
+        max_examples=FAULTS_EACH * len(WAYS[way]),
+        deadline=None,
+        suppress_health_check=list(HealthCheck),
+        phases=[phase for phase in Phase if phase is not Phase.explain],
+    )
+    @given(st.sampled_from(WAYS[way]), st.data(), faults(framed=way in FRAMED))
+    def any_fault(name, data, drawn):
+        wanted = data.draw(st.sampled_from(sorted(KINDS[name].operations)))
+        try:
+            became, again = strike(pairs, name, wanted, drawn)
+        except BaseException:
+            pairs.discard(name)
+            raise
+        tally[way, name, became] += 1
+        if again not in {"right", "error"}:
+            tally[way, name, "again: " + again] += 1
+
+    # the same faults each time, but others on each way
+    run = any_fault if EXPLORING else seed(zlib.crc32(way.encode()))(any_fault)
+    try:
+        run()
+    finally:
+        pairs.close()
