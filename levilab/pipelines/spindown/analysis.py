@@ -124,6 +124,7 @@ def about_inputs(sources: Sequence[Source[Readings]], options: Options) -> Itera
         )
     given = [source.name for source in sources if source.readings.u is not None]
     if options.reading_u is not None and given:
-        yield f"the given u of a reading, {options.reading_u:g} Hz, takes the place of the uncertainties in {', '.join(given)}"
+        names = ", ".join(given)
+        yield f"the given u of a reading, {options.reading_u:g} Hz, takes the place of the uncertainties in {names}"
     if options.columns and all(source.run for source in sources):
         yield "names of columns were given, but none of the inputs is a data file"
