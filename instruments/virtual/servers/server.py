@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import socket
 import threading
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Self
@@ -46,8 +47,6 @@ class Place:
 
     def shown(self) -> str:
         """The host as it stands in resource names."""
-        import socket
-
         return socket.gethostname() if self.host in {"", "0.0.0.0"} else self.host  # noqa: S104 - only asked for
 
     def ports(self, index: int) -> Iterator[int]:
