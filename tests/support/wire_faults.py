@@ -1,11 +1,12 @@
 """Faults of a wire, one scripted fault at a time: what becomes of the bytes between a program and an instrument.
 
 A :class:`Wire` decides, for each answer of the instrument and for each message to it, what arrives; it knows nothing of
-sockets.  :mod:`support.proxy` applies it to TCP connections and pseudo-terminals, :class:`FaultyBus`
-to the links within the process.
+sockets.  :mod:`support.proxy` applies it to TCP connections and pseudo-terminals, :class:`FaultyBus` to the links
+within the process.
 """
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from instruments.virtual.bench.bus import Bus
@@ -45,7 +46,7 @@ class Delivery:
     later: bytes | None = None
     marked: bool = True
     ended: bool = False
-    spoil: "object | None" = None
+    spoil: Callable[[bytes], bytes] | None = None
 
 
 @dataclass(frozen=True)

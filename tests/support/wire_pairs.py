@@ -199,7 +199,7 @@ def _acquire(driver):
 
 
 def _has_record(pair, _):
-    return pair.heard(":SING") and not pair.is_running()
+    return pair.has_done("SING") and not pair.is_running()
 
 
 def _is_trace(pair, trace):
@@ -410,9 +410,10 @@ class Pair:
         heard = list(self.tap.heard)[self._mark :]
         return [answer for message, answer, _ in heard if answer and re.fullmatch(pattern, message)]
 
-    def heard(self, message):
-        """Whether it has heard this message in this attempt."""
-        return any(heard == message for heard, _, _ in list(self.tap.heard)[self._mark :])
+    def has_done(self, command):
+        """Whether it has carried this command out in this attempt."""
+        heard = list(self.tap.heard)[self._mark :]
+        return any(command in message and not complained for message, _, complained in heard)
 
     def is_running(self):
         """Whether a scope still takes a record."""

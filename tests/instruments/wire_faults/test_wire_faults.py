@@ -36,6 +36,8 @@ _OF_ANY_LENGTH = {
 }
 #: Those that print a sign where the number is negative, and no other.
 _MINUS_ALONE = {"DS1000Z"}
+#: What instruments pass over before and behind a message (IEEE 488.2-1992, 7.4.1.2).
+WHITE_SPACE = "".join(map(chr, range(33)))
 _STATES = {"RUN", "WAIT", "TD", "AUTO", "STOP"}
 
 
@@ -112,11 +114,11 @@ def excuse_of_a_message(pair, struck):
         return None
     if not struck.arrived and b"?" not in struck.question:
         return "a command is lost: it would have had no answer"
-    arrived = struck.arrived.decode("latin-1").strip("\n")
+    arrived = struck.arrived.decode("latin-1").strip(WHITE_SPACE)
     # on a stream what is left of a message that was cut stands before the next one: ":" does no harm there
     cut = struck.what == "message cut" and pair.way in STREAMS
     understood = any(
-        (message.startswith(arrived) if cut else message == arrived) and not complained
+        (message.startswith(arrived) if cut else message.strip(WHITE_SPACE) == arrived) and not complained
         for message, _, complained in heard
     )
     return "a message becomes another one that the instrument understands" if understood else None
