@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from support.spin_downs import spin_down_csv
+from support.waiting import HANG_GUARD_S
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -230,7 +231,7 @@ def test_a_reader_that_goes_away_costs_neither_the_run_nor_the_result(tmp_path: 
         assert process.stdout
         process.stdout.readline()
         process.stdout.close()
-        process.wait(timeout=60)
+        process.wait(timeout=HANG_GUARD_S)
     (run,) = (tmp_path / "runs").iterdir()
     assert '"finished"' in (run / "run.json").read_text(encoding="utf-8")
     assert (run / "result.json").exists()
@@ -273,7 +274,7 @@ def test_a_pipe_of_an_old_code_page_gets_what_it_can_show(tmp_path: Path) -> Non
         capture_output=True,
         env=os.environ | {"PYTHONIOENCODING": "cp1252"},
         check=True,
-        timeout=60,
+        timeout=HANG_GUARD_S,
     )
     assert b"disc" in done.stdout
 
@@ -313,7 +314,7 @@ def test_nothing_heavy_is_imported_where_it_is_not_used(tmp_path: Path, words: l
         encoding="utf-8",
         cwd=tmp_path,
         check=True,
-        timeout=60,
+        timeout=HANG_GUARD_S,
     )
     heavy = set(done.stdout.splitlines()[-1].split()[1:])
     assert heavy <= allowed
