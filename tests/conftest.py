@@ -9,7 +9,7 @@ from hypothesis import settings
 #: Makes the golden data, with a package that the tests do not need.
 collect_ignore = ["golden/make_trajectories.py"]
 
-# What is green stays green: the same examples each time, however busy the machine is. `make explore` looks for others.
+# What is green stays green: the same examples each time, however busy the machine. `make explore` looks for others.
 settings.register_profile("repeat", derandomize=True, deadline=None)
 settings.register_profile("explore", max_examples=1000, deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeat"))

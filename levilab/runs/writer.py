@@ -313,10 +313,9 @@ class _GrowingFile:
         self._file.close()
 
     def is_lost(self) -> bool:
-        """Whether the path no longer names this file, or not all of it.
-
-        Windows removes no file that is open.
-        """
+        """Whether the path no longer names this file, or not all of it."""
+        if os.name == "nt":  # Windows removes no file that is open, and tells its size late
+            return False
         try:
             there = self._path.lstat()
         except (FileNotFoundError, NotADirectoryError):

@@ -8,16 +8,15 @@ from __future__ import annotations
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
 
 from levilab.runs.listing import list_runs
 from levilab.runs.run import Run
+from support.waiting import HANG_GUARD_S
 
 SHOWN = re.compile(r"^ *(\d+\.\d\d) s +(\d+\.\d{4}) Hz")
 posix_only = pytest.mark.skipif(os.name != "posix", reason="Windows has neither these signals nor resource limits")
@@ -49,38 +48,40 @@ def stored_in(run: Run) -> list[tuple[str, str]]:
     return [(f"{t:.2f}", f"{f:.4f}") for t, f in zip(frame["time_s"], frame["spin_frequency_hz"], strict=True)]
 
 
-def slowly(milliseconds: int) -> str:
-    """Let each reading take a while, so that a kill can fall between any two steps of writing one down."""
-    return (
-        "import os, time\nsync = os.fsync\n"
-        f"def slow(fd):\n    time.sleep({milliseconds / 2000}); sync(fd); time.sleep({milliseconds / 2000})\n"
-        "os.fsync = slow"
-    )
+#: At the n-th time that the process puts something on the disk it does something, before or after.
+AT_THE_NTH = """
+import os, signal
+sync, count = os.fsync, 0
+def counting(descriptor):
+    global count
+    count += 1
+    if count == {n} and {before}:
+        {act}
+    sync(descriptor)
+    if count == {n} and not {before}:
+        {act}
+os.fsync = counting
+"""
+#: No process can prevent it: signal 9 ends one on Windows, too.
+KILL = "os.kill(os.getpid(), 9)"
 
 
-@pytest.mark.parametrize("moment", range(16))
-def test_a_killed_process_loses_no_reading_that_it_had_shown(tmp_path: Path, moment: int) -> None:
-    """Killed after `moment` readings were shown, and a different fraction of a reading's 8 ms later each time."""
-    process = start(tmp_path, before=slowly(8))
-    assert process.stderr
-    lines: list[str] = []
-    for line in process.stderr:
-        lines.append(line)
-        if len(shown_in("".join(lines))) >= moment:
-            break
-    time.sleep(moment % 5 * 0.002)
-    process.kill()
-    rest, _ = process.stderr.read(), process.wait()
-    process.stderr.close()
-    process.stdout.close() if process.stdout else None
-    shown = shown_in("".join(lines) + rest)
-    (listed,) = list_runs(tmp_path)
-    run = Run.load(Path(listed.path))
-    assert listed.status == "interrupted"
-    assert stored_in(run)[: len(shown)] == shown
-    assert len(shown) >= moment
-    if len(shown) >= 3:
-        assert analyzed(run.folder) >= len(shown)
+@pytest.mark.parametrize("before", [True, False], ids=["before", "after"])
+@pytest.mark.parametrize("n", [3, 5, 8, 11, 12, 13, 17, 22])
+def test_a_killed_process_loses_no_reading_that_it_had_shown(tmp_path: Path, n: int, before: bool) -> None:
+    """Killed before or after the n-th sync: one of the record, or of a reading, or of an event."""
+    process = start(tmp_path, before=AT_THE_NTH.format(n=n, before=before, act=KILL))
+    _, told = process.communicate(timeout=HANG_GUARD_S)
+    assert process.returncode
+    shown = shown_in(told)
+    listed = list_runs(tmp_path)
+    assert listed or not shown  # killed before the record is there, it has shown nothing
+    for one in listed:
+        run = Run.load(Path(one.path))
+        assert one.status == "interrupted"
+        assert stored_in(run)[: len(shown)] == shown
+        if len(shown) >= 3:
+            assert analyzed(run.folder) >= len(shown)
 
 
 def analyzed(folder: Path) -> int:
@@ -91,7 +92,7 @@ def analyzed(folder: Path) -> int:
         text=True,
         encoding="utf-8",
         check=True,
-        timeout=60,
+        timeout=HANG_GUARD_S,
     )
     return int(json.loads(done.stdout)["models"][0]["statistics"]["n"])
 
@@ -99,15 +100,9 @@ def analyzed(folder: Path) -> int:
 @posix_only
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 def test_a_signal_ends_the_process_with_130_and_the_run_kept(tmp_path: Path, name: str) -> None:
-    process = start(tmp_path, before=slowly(20))
-    assert process.stderr
-    shown: list[str] = []
-    for line in process.stderr:
-        shown.append(line)
-        if len(shown_in("".join(shown))) == 3:
-            process.send_signal(getattr(signal, name))
-            break
-    out, err = process.communicate(timeout=60)
+    send = f"os.kill(os.getpid(), signal.{name})"
+    process = start(tmp_path, before=AT_THE_NTH.format(n=14, before=True, act=send))
+    out, err = process.communicate(timeout=HANG_GUARD_S)
     assert process.returncode == 130
     assert "Traceback" not in err
     (listed,) = list_runs(tmp_path)
@@ -158,7 +153,7 @@ os.fsync = limiting
 def survives(tmp_path: Path, before: str, reason: str) -> int:
     """The process ends with one line and status 1, and what it had shown is there; returns how much that was."""
     process = start(tmp_path, before=before)
-    _, err = process.communicate(timeout=60)
+    _, err = process.communicate(timeout=HANG_GUARD_S)
     assert process.returncode == 1, err
     assert "Traceback" not in err
     assert err.splitlines()[-1].startswith("levilab: could not ")

@@ -14,6 +14,8 @@ import pytest
 
 from levilab.runs.run import Run, RunRecord
 from levilab.runs.writer import RunWriter
+from support.commands import command
+from support.paths import SAMPLE_DATA
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -205,6 +207,23 @@ def test_a_resumed_run_is_never_discarded(tmp_path: Path) -> None:
     with RunWriter.reopen(Run.load(writer.folder)) as again:
         assert not again.discard()
     assert (writer.folder / "run.json").exists()
+
+
+def test_a_resume_at_a_bench_that_does_not_answer_keeps_the_run(tmp_path: Path) -> None:
+    """Nothing listens on port 9 of this machine; the run names no instruments, as those of other programs may not."""
+    folder = tmp_path / "run"
+    shutil.copytree(SAMPLE_DATA / "spin-down-1", folder)
+    record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    changes = {"status": "interrupted", "instruments": {}, "seed": None, "time_zero_utc": "2026-11-20T10:15:00Z"}
+    (folder / "run.json").write_text(json.dumps(record | changes), encoding="utf-8")
+    (tmp_path / "bench.toml").write_text(
+        '[counter]\nmodel = "53230A"\naddress = "TCPIP0::127.0.0.1::9::SOCKET"\n'
+        '[generator]\nmodel = "33500B"\naddress = "TCPIP0::127.0.0.1::9::SOCKET"\n',
+        encoding="utf-8",
+    )
+    before = (folder / "readings.csv").read_bytes()
+    assert command("acquire", "spin", "--resume", folder, cwd=tmp_path).status == 3
+    assert (folder / "readings.csv").read_bytes() == before
 
 
 # --- a real process ---

@@ -1,0 +1,269 @@
+"""Whatever stands in a file that a person can write: one line about it, never a traceback, and no other run suffers."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from levilab.errors import DataError
+from levilab.files import CannotWrite, parse_json, parse_toml, replace_atomically
+from levilab.runs.listing import list_runs
+from levilab.runs.run import Run, find_run
+from levilab.runs.writer import RunWriter
+from support.commands import command
+from support.paths import SAMPLE_DATA
+
+SAMPLE = SAMPLE_DATA / "spin-down-1"
+RECORD = json.loads((SAMPLE / "run.json").read_text(encoding="utf-8"))
+posix_only = pytest.mark.skipif(os.name != "posix", reason="Windows has no such files, or asks for a privilege")
+
+#: Values that programs stumble over, as JSON and mostly TOML write them.
+ODD = {
+    "nested deeply": "[" * 100_000,
+    "nested deeply, and closed": "[" * 400 + "]" * 400,
+    "a number of 5000 digits": "9" * 5000,
+    "a number beyond all floats": "9" * 400,
+}
+ODD_JSON = ODD | {
+    "objects nested deeply": '{"a":' * 100_000,
+    "not a number": "NaN",
+    "infinity": "1e999",
+    "half a surrogate pair": r'"\ud800"',
+}
+
+
+def run_with(folder: Path, **texts: str) -> Path:
+    """A copy of a run in which keys of run.json have the values that the texts say."""
+    shutil.copytree(SAMPLE, folder)
+    entries = {key: json.dumps(value) for key, value in RECORD.items()} | texts
+    text = "{" + ", ".join(f'"{key}": {value}' for key, value in entries.items()) + "}"
+    (folder / "run.json").write_text(text, encoding="utf-8")
+    return folder
+
+
+@pytest.mark.parametrize("name", ODD_JSON)
+def test_an_odd_record_costs_one_line_and_no_other_run(tmp_path: Path, name: str) -> None:
+    runs = tmp_path / "runs"
+    run_with(runs / "odd", configuration=ODD_JSON[name])
+    shutil.copytree(SAMPLE, runs / "sound")
+    assert [(Path(run.path).name, run.status) for run in list_runs(runs)] == [
+        ("odd", "unreadable"),
+        ("sound", "finished"),
+    ]
+    listed = command("runs", runs, cwd=tmp_path)
+    assert listed.status == 0
+    assert "is cut off or not JSON" in listed.out
+    assert command("runs", runs, "--json", cwd=tmp_path).status == 0
+    refused = command("acquire", "spin", "--mock", "--resume", runs / "odd", cwd=tmp_path)
+    assert refused.status == 1
+    assert len(refused.err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", ODD_JSON)
+def test_an_odd_event_is_left_out(tmp_path: Path, name: str) -> None:
+    folder = run_with(tmp_path / "run")
+    lines = ['{"text": "before"}', f'{{"text": "odd", "time_s": {ODD_JSON[name]}}}', '{"text": "after"}', ""]
+    (folder / "events.jsonl").write_text("\n".join(lines), encoding="utf-8")
+    assert [event["text"] for event in Run.load(folder).events()] == ["before", "after"]
+
+
+@pytest.mark.parametrize("name", ODD)
+@pytest.mark.parametrize(
+    "words", [["bench", "check", "--bench", "odd.toml"], ["simulate", "odd.toml"], ["stability", "odd.toml"]]
+)
+def test_an_odd_bench_or_scene_is_told_in_one_line(tmp_path: Path, words: list[str], name: str) -> None:
+    (tmp_path / "odd.toml").write_text(f"x = {ODD[name]}", encoding="utf-8")
+    ended = command(*words, cwd=tmp_path)
+    assert ended.status == 1
+    (line,) = ended.err.splitlines()
+    assert "odd.toml: not readable as TOML: " in line
+
+
+@pytest.mark.parametrize("name", [name for name, text in ODD.items() if len(text) < 10_000])  # as a word may be
+def test_an_odd_value_of_a_key_is_wrong_usage(tmp_path: Path, name: str) -> None:
+    ended = command("simulate", "undriven", "--set", f"top.mass_kg={ODD[name]}", cwd=tmp_path)
+    assert ended.status == 2
+    assert len(ended.err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", ["a**b", "**", "*", "[a", "?", "a*b", "sp*n", ".", "a" * 5000, "\udcff"])
+def test_a_name_is_compared_and_never_a_pattern(tmp_path: Path, name: str) -> None:
+    shutil.copytree(SAMPLE, tmp_path / "runs" / "20261120T101500Z-spin-7f3a")
+    (tmp_path / "data").mkdir()
+    for words in (["analyze", "spindown", name, "--no-save"], ["acquire", "spin", "--mock", "--resume", name]):
+        ended = command(*words, cwd=tmp_path / "data")
+        assert ended.status == 1
+        assert len(ended.err.splitlines()) == 1
+    if len(name) < 100:
+        assert find_run(Path(name), tmp_path / "runs") == Path(name)
+
+
+def test_a_name_with_brackets_is_found_as_it_is(tmp_path: Path) -> None:
+    shutil.copytree(SAMPLE, tmp_path / "20261120T101500Z-[a]")
+    assert find_run(Path("[a]"), tmp_path) == tmp_path / "20261120T101500Z-[a]"
+
+
+def test_markup_and_escapes_in_a_record_are_printed_as_text(tmp_path: Path) -> None:
+    odd = json.dumps("[/] [red]x \x1b[31m\n\u202e")
+    run_with(tmp_path / "runs" / "odd", note=odd, experiment=odd, started_utc=odd)
+    ended = command("runs", "runs", cwd=tmp_path)
+    assert ended.status == 0
+    assert "[red]x" in ended.out
+    assert "\x1b" not in ended.out
+    assert "\u202e" not in ended.out
+
+
+# --- resuming ---
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("channels", '[{"unit": "s"}]'),
+        ("channels", "[]"),
+        ("time_zero_utc", '"noon"'),
+        ("time_zero_utc", '"2026-11-20"'),
+        ("time_zero_utc", '"9999-12-31T23:59:59"'),
+        ("configuration", '{"spin": 3}'),
+        ("configuration", '{"scene": {"top": []}}'),
+    ],
+)
+def test_an_odd_run_is_not_resumed_or_is_resumed(tmp_path: Path, key: str, value: str) -> None:
+    entries = {"status": '"interrupted"', "time_zero_utc": '"2026-11-20T10:15:00Z"'} | {key: value}
+    folder = run_with(tmp_path / "run", **entries)
+    for bench in (["--mock"], []):
+        ended = command("acquire", "spin", *bench, "--resume", folder, cwd=tmp_path)
+        assert ended.status in {0, 1, 2}
+        assert "Traceback" not in ended.err
+
+
+@pytest.mark.parametrize(("text", "says"), [("noon", "time_zero_utc"), ("9999-12-31T23:59:59", "set back")])
+def test_a_time_zero_that_makes_no_sense_is_told(tmp_path: Path, text: str, says: str) -> None:
+    with pytest.raises(DataError, match=says):
+        Run.load(run_with(tmp_path / "run", time_zero_utc=json.dumps(text))).elapsed()
+
+
+def interrupted(out: Path) -> Path:
+    return run_with(out, status='"interrupted"')
+
+
+@posix_only
+@pytest.mark.parametrize("name", ["readings.csv", "events.jsonl"])
+def test_a_link_is_not_written_through(tmp_path: Path, name: str) -> None:
+    folder = interrupted(tmp_path / "run")
+    other = tmp_path / "precious"
+    (folder / name).rename(other) if (folder / name).exists() else other.write_text("mine\n", encoding="utf-8")
+    before = other.read_bytes()
+    (folder / name).symlink_to(other)
+    with pytest.raises(CannotWrite, match=f"{name} is a symbolic link"):
+        RunWriter.reopen(Run.load(folder))
+    assert other.read_bytes() == before
+
+
+@posix_only
+def test_a_link_in_the_place_of_the_new_file_is_not_written_through(tmp_path: Path) -> None:
+    (tmp_path / "precious").write_text("mine", encoding="utf-8")
+    (tmp_path / f".run.json.{os.getpid()}.part").symlink_to(tmp_path / "precious")
+    replace_atomically(tmp_path / "run.json", "new")
+    assert (tmp_path / "precious").read_text(encoding="utf-8") == "mine"
+    assert (tmp_path / "run.json").read_text(encoding="utf-8") == "new"
+
+
+@posix_only
+@pytest.mark.parametrize("name", ["run.json", "readings.csv", "events.jsonl"])
+def test_a_pipe_in_a_run_is_waited_for_by_no_command(tmp_path: Path, name: str) -> None:
+    folder = interrupted(tmp_path / "runs" / "run")
+    (folder / name).unlink(missing_ok=True)
+    os.mkfifo(folder / name)
+    assert command("runs", "runs", cwd=tmp_path).status == 0
+    assert command("acquire", "spin", "--mock", "--resume", folder, cwd=tmp_path).status == 1
+    if name != "run.json":
+        with pytest.raises(CannotWrite, match=f"{name} is no regular file"):
+            RunWriter.reopen(Run.load(folder))
+
+
+def test_a_run_that_was_finished_meanwhile_is_not_reopened(tmp_path: Path) -> None:
+    run = Run.load(interrupted(tmp_path / "run"))
+    with RunWriter.reopen(run) as writer:
+        writer.finish("finished")
+    with pytest.raises(CannotWrite, match="is finished"):
+        RunWriter.reopen(run)
+
+
+def test_a_text_that_utf_8_cannot_hold_is_written_with_a_question_mark(tmp_path: Path) -> None:
+    replace_atomically(tmp_path / "page.html", "runs/\udcff")
+    assert (tmp_path / "page.html").read_bytes() == b"runs/?"
+
+
+# --- what may stand in a file ---
+
+LEAVES = (
+    st.none()
+    | st.booleans()
+    | st.integers(-(10**20), 10**20)
+    | st.floats(allow_nan=False, allow_infinity=False)
+    | st.text(st.characters(exclude_categories=["Cs"]))
+)
+TREES = st.recursive(LEAVES, lambda inner: st.lists(inner) | st.dictionaries(st.text(max_size=5), inner), max_leaves=8)
+KEYS = sorted({*RECORD, "simulation", "instruments", "channels", "time_zero_utc", "seed"} - {"schema"})
+
+
+@given(st.dictionaries(st.sampled_from(KEYS), TREES, max_size=2), st.lists(TREES, max_size=3))
+@settings(max_examples=60)
+def test_whatever_a_record_says_the_list_of_runs_goes_on(changes: dict[str, object], events: list[object]) -> None:
+    with tempfile.TemporaryDirectory() as place:
+        folder = run_with(Path(place) / "run", **{key: json.dumps(value) for key, value in changes.items()})
+        lines = [json.dumps({"text": "x", "time_s": event}) for event in events]
+        (folder / "events.jsonl").write_text("\n".join(lines), encoding="utf-8")
+        for words in (["runs", "."], ["runs", ".", "--json"]):
+            ended = command(*words, cwd=Path(place))
+            assert ended.status == 0, ended
+        with contextlib.suppress(DataError):
+            assert len(Run.load(folder).events()) == len(events)
+
+
+@given(st.text() | st.binary(max_size=60).map(lambda data: data.decode("latin-1")))
+def test_whatever_a_text_says_it_is_read_or_refused(text: str) -> None:
+    for parse in (parse_json, parse_toml):
+        with contextlib.suppress(ValueError):
+            parse(text)
+
+
+def test_python_refuses_numbers_as_long_as_those_that_are_tested() -> None:
+    assert 0 < sys.get_int_max_str_digits() < 5000
+
+
+FEW_FILES = """
+import resource, sys
+resource.setrlimit(resource.RLIMIT_NOFILE, ({files}, {files}))
+sys.argv = ["levilab", *{words!r}]
+from levilab.cli.main import main
+main()
+"""
+
+
+@posix_only
+@pytest.mark.parametrize("files", [5, 6, 8])
+@pytest.mark.parametrize("words", [["acquire", "spin", "--mock"], ["report", str(SAMPLE)], ["runs", str(SAMPLE)]])
+def test_too_few_open_files_cost_one_line(tmp_path: Path, words: list[str], files: int) -> None:
+    program = [sys.executable, "-c", FEW_FILES.format(files=files, words=words)]
+    done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, encoding="utf-8", check=False)
+    assert "Traceback" not in done.stderr
+    assert done.returncode == 0 or "Too many open files" in done.stderr.splitlines()[-1]
+
+
+@posix_only
+def test_a_closed_standard_output_costs_no_command(tmp_path: Path) -> None:
+    words = " ".join([sys.executable, "-m", "levilab", "runs", str(SAMPLE)])
+    done = subprocess.run(["sh", "-c", f"{words} >&-"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
