@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from levilab.simulator.field import flux_density
 from levilab.simulator.kernels import braking
-from levilab.simulator.kernels.fields import flux_density
 from levilab.simulator.kernels.motion import CLOCK, L, R
 
 if TYPE_CHECKING:

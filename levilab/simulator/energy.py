@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from levilab.simulator.kernels.fields import flux_density
+from levilab.simulator.field import flux_density
 from levilab.simulator.kernels.loads import Aligned, Disc
 from levilab.simulator.kernels.motion import ARM, LOOSE, L, Model, N, R, V
 from levilab.simulator.model import Array, gravity

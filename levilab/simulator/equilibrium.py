@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from analysis import stability
 from levilab.simulator.disc import nodes_of, rule_for
-from levilab.simulator.kernels.fields import flux_density, flux_gradient, on_axis
+from levilab.simulator.field import flux_density, flux_gradient, on_axis
 from levilab.simulator.keys import SceneError
 from levilab.simulator.model import base_field
 

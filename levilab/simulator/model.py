@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from levilab.simulator.disc import distance_to, nodes_of, rule_for
+from levilab.simulator.field import field_of
 from levilab.simulator.kernels import braking
-from levilab.simulator.kernels.fields import field_of
 from levilab.simulator.kernels.loads import Aligned, Disc, Kinked, Leaning, Sine, Tilted, Upright
 from levilab.simulator.kernels.motion import Body, Loose, Model, Rigid
 
@@ -47,7 +47,8 @@ def base_field(scene: Scene, times: float = 1.0) -> Any:
     """The field of the scene's base, one of the kinds of `levilab.simulator.kernels.fields`, times a factor."""
     base = scene.base
     strength = base.strength_t_m * times
-    return field_of(base.inner_radius_m, base.outer_radius_m, strength, base.field, base.thickness_m, base.origin_m)
+    radii = base.inner_radius_m, base.outer_radius_m
+    return field_of(*radii, strength, base.field, thickness=base.thickness_m, origin=base.origin_m)
 
 
 def _moment(scene: Scene) -> float:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from levilab.simulator.equilibrium import floating_height
-from levilab.simulator.kernels.fields import flux_density
+from levilab.simulator.field import flux_density
 from levilab.simulator.kernels.motion import ARM, CLOCK, LOOSE, STATE_SIZE, TIME, L, N, R, V
 from levilab.simulator.model import Array, base_field
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from instruments.virtual.generator.voltage import fundamental
-from levilab.simulator.kernels.fields import flux_density
+from levilab.simulator.field import flux_density
 from levilab.simulator.model import base_field
 from levilab.world.coil import Coil
 from levilab.world.flight import Flight

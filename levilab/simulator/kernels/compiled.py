@@ -31,16 +31,21 @@ F = TypeVar("F", bound="Callable[..., Any]")
 PART_OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract"}, "forceinline": True}
 
 
+def cache_key(sources: Path) -> str:
+    """What compiled code depends on: the files of this folder and no others, numba's version and Python's."""
+    digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:2]}".encode())
+    for source in sorted(sources.glob("*.py")):
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
 @cache
 def _folder() -> Path | None:
     """Where compiled code is kept, or None if nothing can be: then it is compiled for each process.
 
     Numba would look for another place, beside its source, where it takes notice of one file's changes only.
     """
-    digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:2]}".encode())
-    for source in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(source.read_bytes())
-    folder = user_cache_path("levilab", appauthor=False) / "kernels" / digest.hexdigest()[:16]
+    folder = user_cache_path("levilab", appauthor=False) / "kernels" / cache_key(Path(__file__).parent)
     try:
         if not folder.exists():
             _sweep(folder.parent)
@@ -52,7 +57,7 @@ def _folder() -> Path | None:
 
 
 def _sweep(kernels: Path) -> None:
-    """Take away what other versions of the source have left, if nobody has used it for a month."""
+    """Take away what other versions of the source have left, if it has not been used for a month."""
     with contextlib.suppress(OSError):
         for old in kernels.iterdir():
             if time.time() - old.stat().st_mtime > 30 * 86400:

@@ -7,7 +7,7 @@ import pytest
 from levilab.motion.summary import summarise
 from levilab.simulator import disc
 from levilab.simulator.ensemble import simulate_many
-from levilab.simulator.kernels.fields import field_of, flux_density, flux_gradient
+from levilab.simulator.field import field_of, flux_density, flux_gradient
 from levilab.simulator.kernels.loads import Disc
 from levilab.simulator.model import model_of
 from levilab.simulator.problem import Problem, end_at, scheme_for

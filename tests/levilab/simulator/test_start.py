@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from levilab.simulator.kernels.fields import flux_density
+from levilab.simulator.field import flux_density
 from levilab.simulator.model import base_field
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate

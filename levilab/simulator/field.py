@@ -1,0 +1,147 @@
+"""The field of the base as functions of places: which kind it is, B, its gradient, and its derivatives on the axis."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from levilab.errors import LevilabError
+from levilab.simulator.kernels.fields import Field, evaluate
+from levilab.simulator.kernels.paraxial import Paraxial, Paraxial2, ParaxialThick, weights
+from levilab.simulator.kernels.ring import Sheet, Thick
+
+Array = NDArray[np.float64]
+
+#: Highest power of the series.  Beyond, its terms grow again at r ~ 2 cm, and the exact field costs less.
+HIGHEST = 20
+#: Terms of the series near the axis, where r² < (R² + z²)/1000.
+_NEAR_AXIS_TERMS = 6
+#: Sheets that a thick base is made of: to 1e-12 where the distance from it is its thickness, 1e-10 at a quarter.
+_SHEETS = 24
+#: A thinner base is a sheet: the closed forms divide a difference by the thickness, and lose eps z/h.
+_THINNEST = 1e-5
+
+
+class FieldError(LevilabError):
+    """A base that cannot be."""
+
+
+def field_of(
+    inner_radius: float,
+    outer_radius: float,
+    strength: float,
+    kind: str,
+    *,
+    thickness: float = 0.0,
+    origin: float = 0.0,
+) -> Field:
+    """The field of a ring magnet.
+
+    Radii and thickness [m]; strength: dipole density over the thickness [T m]; kind: "paraxial-2" … "paraxial-20",
+    the highest power of r in the potential, or "exact"; origin: height of the middle of the thickness [m].
+    Raises FieldError.
+    """
+    _check(inner_radius, outer_radius, strength, thickness, origin)
+    ring = (2 * math.pi * strength, inner_radius**2, outer_radius**2, origin)
+    power = _power(kind)
+    if power is None:
+        series = weights(_NEAR_AXIS_TERMS)
+        return Sheet(*ring, series) if thickness == 0 else Thick(*ring, thickness, series, _sheets(thickness))
+    if thickness > 0:
+        return ParaxialThick(*ring, thickness, weights(power // 2))
+    return Paraxial2(*ring) if power == 2 else Paraxial(*ring, weights(power // 2))
+
+
+def _check(inner: float, outer: float, strength: float, thickness: float, origin: float) -> None:
+    for name, value in (("inner radius", inner), ("strength", strength), ("thickness", thickness), ("origin", origin)):
+        if not math.isfinite(value):
+            raise FieldError(f"{name} = {value}: a finite number is expected")
+    if not 0 < inner < outer < math.inf:
+        raise FieldError(f"inner radius {inner} m, outer radius {outer} m: 0 < inner < outer is expected")
+    if thickness != 0 and not thickness >= _THINNEST:
+        raise FieldError(f"thickness = {thickness} m: 0 for a sheet, or at least {_THINNEST:g} m, is expected")
+
+
+def _power(kind: str) -> int | None:
+    if kind == "exact":
+        return None
+    name, _, number = kind.partition("-")
+    if name == "paraxial" and number.isdecimal() and int(number) % 2 == 0 and 2 <= int(number) <= HIGHEST:
+        return int(number)
+    raise FieldError(f"field {kind!r}: exact or paraxial-2, paraxial-4, … paraxial-{HIGHEST} is expected")
+
+
+def _sheets(thickness: float) -> Array:
+    place, weight = np.polynomial.legendre.leggauss(_SHEETS)
+    return np.column_stack([place * thickness / 2, weight / 2])
+
+
+def _five(field: Field, positions: ArrayLike) -> tuple[Array, Array]:
+    places = np.ascontiguousarray(positions, dtype=np.float64)
+    flat = places.reshape(-1, 3)
+    values = np.empty((len(flat), 5))
+    evaluate(field, flat, values)
+    return places, values.reshape(*places.shape[:-1], 5)
+
+
+def flux_density(field: Field, positions: ArrayLike) -> Array:
+    """B at places of shape (…, 3) [m], same shape [T].
+
+    >>> base = field_of(0.030, 0.055, 1.40e-3, "exact")
+    >>> flux_density(base, [0.0, 0.0, 0.073]).round(7)
+    array([0.       , 0.       , 0.0187455])
+    """
+    places, five = _five(field, positions)
+    b = places * five[..., :1]
+    b[..., 2] = five[..., 2]
+    return b
+
+
+def flux_gradient(field: Field, positions: ArrayLike) -> Array:
+    """∂B_i/∂x_j at places of shape (…, 3) [m], shape (…, 3, 3) [T/m]; symmetric."""
+    places, five = _five(field, positions)
+    p, q, _, s, g = np.moveaxis(five, -1, 0)
+    across = places[..., :2]
+    gradient = np.empty((*places.shape, 3))
+    gradient[..., :2, :2] = q[..., None, None] * across[..., :, None] * across[..., None, :]
+    gradient[..., 0, 0] += p
+    gradient[..., 1, 1] += p
+    gradient[..., :2, 2] = gradient[..., 2, :2] = s[..., None] * across
+    gradient[..., 2, 2] = g
+    return gradient
+
+
+def on_axis(field: Field, z: ArrayLike, order: int = 3) -> Array:
+    """B_z on the axis and its derivatives up to order 3, at heights of shape (n,) [m]; shape (order + 1, n) [T/mᵏ].
+
+    On the axis s = −∂²B_z/∂z²/2 where the divergence vanishes, and its derivative comes from a series of high power.
+    """
+    heights = np.atleast_1d(np.asarray(z, dtype=np.float64))
+    places = np.zeros((heights.size, 3))
+    places[:, 2] = heights
+    _, five = _five(field, places)
+    values = [five[:, 2], five[:, 4], -2 * five[:, 3], _third(field, heights)]
+    return np.array(values[: order + 1])
+
+
+def _third(field: Field, z: Array) -> Array:
+    """∂³B_z/∂z³ on the axis [T/m³]: −φ₄, in closed form."""
+    h = field.thickness if isinstance(field, ParaxialThick | Thick) else 0.0
+    height = z - field.origin
+
+    def phi(n: int, at: Array) -> Array:
+        """φ₃ or φ₄ of the sheet."""
+        total = np.zeros_like(at)
+        for radius2, sign in ((field.inner2, 1), (field.outer2, -1)):
+            u2 = 1 / (radius2 + at * at)
+            if n == 3:
+                total += sign * 3 * radius2 * u2**3.5 * (4 * at * at - radius2)
+            else:
+                total -= sign * 15 * radius2 * u2**4.5 * at * (4 * at * at - 3 * radius2)
+        return field.strength * total
+
+    if h == 0:
+        return -phi(4, height)
+    return (phi(3, height - h / 2) - phi(3, height + h / 2)) / h

@@ -1,0 +1,57 @@
+"""The room of the compiled code: what is in it, and that it is compiled anew for changes in it alone."""
+
+import ast
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+from levilab.simulator.kernels import compiled
+
+KERNELS = Path(compiled.__file__).parent
+ALLOWED = {"numba", "numpy", "platformdirs", *sys.stdlib_module_names}
+
+
+@pytest.fixture
+def copy(tmp_path):
+    """A copy of the simulator's sources, whose kernels have the same key."""
+    shutil.copytree(KERNELS.parent, tmp_path / "simulator", ignore=shutil.ignore_patterns("__pycache__"))
+    assert key(tmp_path / "simulator") == compiled.cache_key(KERNELS)
+    return tmp_path / "simulator"
+
+
+def key(simulator):
+    return compiled.cache_key(simulator / "kernels")
+
+
+def test_a_change_outside_of_the_room_compiles_nothing_anew(copy):
+    before = key(copy)
+    for source in (*copy.glob("*.py"), *copy.glob("scenes/*")):
+        source.write_text(source.read_text(encoding="utf-8") + "\n# changed\n", encoding="utf-8")
+    (copy / "new.py").write_text("x = 1\n", encoding="utf-8")
+    assert key(copy) == before
+
+
+@pytest.mark.parametrize("name", sorted(source.name for source in KERNELS.glob("*.py")))
+def test_a_change_of_any_file_of_the_room_compiles_anew(copy, name):
+    before, source = key(copy), copy / "kernels" / name
+    source.write_text(source.read_text(encoding="utf-8") + "\n# changed\n", encoding="utf-8")
+    assert key(copy) != before
+
+
+def test_the_code_on_the_disk_lies_under_the_key_of_the_room(monkeypatch, tmp_path):
+    monkeypatch.setattr(compiled, "user_cache_path", lambda *_, **__: tmp_path)
+    folder = compiled._folder.__wrapped__()
+    assert folder == tmp_path / "kernels" / compiled.cache_key(KERNELS)
+    assert folder.is_dir()
+
+
+@pytest.mark.parametrize("source", sorted(KERNELS.glob("*.py")), ids=lambda path: path.name)
+def test_the_room_imports_nothing_from_outside_but_what_compiles(source):
+    # a module outside that a kernel is made of could change without its being compiled anew
+    for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+        names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+        names += [node.module] if isinstance(node, ast.ImportFrom) else []
+        for name in names:
+            assert name.startswith("levilab.simulator.kernels.") or name.partition(".")[0] in ALLOWED, name
