@@ -20,11 +20,11 @@ import numpy as np
 from levilab.simulator import preset
 from levilab.simulator.kernels.motion import R
 from levilab.simulator.model import model_of
-from levilab.simulator.order_conditions import residuals
 from levilab.simulator.problem import Problem, end_at
 from levilab.simulator.schemes import SCHEMES, Scheme
 from levilab.simulator.start import start_of
 from levilab.simulator.stops import stops_between
+from order_conditions import residuals
 
 DURATION = 5.0  # [s]
 #: Stages per second of simulated time, where a good composition of order 6 has errors of 1e-6 to 1e-9 cm.

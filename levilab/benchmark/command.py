@@ -30,6 +30,7 @@ def run_and_tell(*, quick: bool, out: Path | None, as_json: bool) -> None:
 
 
 def _write(found: Comparison, document: str, out: Path) -> None:
+    # matplotlib, which a benchmark that is not written does not need
     from levilab.benchmark.figure import work_precision_figure
     from levilab.present.style import save_png
 

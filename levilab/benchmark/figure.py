@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import matplotlib as mpl
@@ -77,7 +78,6 @@ def _lanes(found: Comparison) -> str:
 def _write(axes: mpl.axes.Axes, labels: list[tuple[float, float, str, str]]) -> None:
     """Names at the right, in the order of the lines' ends, not nearer to each other than a line of writing."""
     low, high = axes.get_ylim()
-    import math
 
     def place(speed: float) -> float:
         return math.log(speed / low) / math.log(high / low)

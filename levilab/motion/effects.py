@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analysis import stability
 from analysis.lines import spectral_lines
 from levilab.errors import SimulationError
 from levilab.motion.lines import rate_for
-from levilab.simulator.equilibrium import advice, axial_field, stability_of, symmetric
-from levilab.simulator.keys import SceneError
+from levilab.simulator.equilibrium import advice, modes_at, stability_of
+from levilab.simulator.scene import SceneError
 from levilab.simulator.single import simulate
 
 if TYPE_CHECKING:
@@ -186,7 +185,7 @@ def _precession(motion: Trajectory) -> float:
     """The strongest line of n_x + i n_y near where theory has the precession; NaN if there is none."""
     scene, n = motion.scene, motion.time.size - 1
     height, spin = float(np.mean(motion.position[:, 2])), float(np.mean(motion.spin_hz))
-    modes = stability.modes(axial_field(scene), symmetric(scene), height, spin)
+    modes = modes_at(scene, height, spin)
     expected = modes[2].real if spin > 0 else modes[1].real
     rate = (n - 1) / float(motion.time[n - 1] - motion.time[0])
     found = spectral_lines((motion.axis[:, 0] + 1j * motion.axis[:, 1])[:n], rate, most=16, weakest=1e-4).lines

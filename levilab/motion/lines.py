@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.lines import FEWEST, LOBE, amplitude_spectrum, spectral_lines
+from levilab.simulator.equilibrium import modes_at
 
 if TYPE_CHECKING:
     from analysis.lines import Line
@@ -141,12 +142,9 @@ def _expected(motion: Trajectory) -> dict[str, float]:
 
 def _modes(motion: Trajectory) -> dict[str, float]:
     """The modes of small motions about the mean height; none where they are not stable."""
-    from analysis import stability
-    from levilab.simulator.equilibrium import axial_field, symmetric
-
     scene = motion.scene
     height, spin = float(np.mean(motion.position[:, 2])), float(motion.spin_hz[0])
-    modes = stability.modes(axial_field(scene), symmetric(scene), height, spin)
+    modes = modes_at(scene, height, spin)
     if np.abs(modes.imag).max() > 1e-6 * np.abs(modes).max():
         return {}  # whatever lines there are, they are not these
     slow1, slow2, precession, nutation = sorted(modes.real, key=abs)

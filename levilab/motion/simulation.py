@@ -17,7 +17,7 @@ from levilab.motion.lines import rate_for
 from levilab.motion.summary import as_document, summarise
 from levilab.runs.run import STATES, RunRecord, utc_now
 from levilab.runs.writer import RunWriter
-from levilab.simulator.compilation import telling_of_compilation
+from levilab.simulator.compilation import announce_compilation
 from levilab.simulator.single import LONGEST_S, simulate
 from levilab.software import software_versions
 
@@ -121,7 +121,7 @@ def _simulated(
     message: Callable[[str], None],
     progress: Callable[[float], None] | None,
 ) -> Summary:
-    with telling_of_compilation(message), interrupted_afterwards():
+    with announce_compilation(message), interrupted_afterwards():
         simulate(order.scene, min(_FIRST_S, order.duration), rate=None)
     begin = time.perf_counter()
     motion = simulate(
@@ -154,6 +154,7 @@ def _record(order: SimulationOrder) -> RunRecord:
 
 
 def _write(summary: Summary, factor: int, writer: RunWriter) -> None:
+    # matplotlib, which a motion that is not written does not need
     from levilab.motion.figure import motion_figure
     from levilab.present.style import save_png
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from levilab.motion.lines import LONGEST_S, AxisLines, lines_of, rate_for
+from levilab.simulator.equilibrium import advice, stability_of
 from levilab.simulator.scene import remarks
 
 if TYPE_CHECKING:
@@ -153,8 +154,6 @@ def _notes(motion: Trajectory, lines: AxisLines, rate: float) -> list[str]:
 
 def _cannot_float(scene: Scene) -> list[str]:
     """Why a top was lost that had no chance."""
-    from levilab.simulator.equilibrium import advice, stability_of
-
     found = stability_of(scene)
     return [] if found.floating else [advice(found)]
 

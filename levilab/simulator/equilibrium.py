@@ -33,13 +33,15 @@ HEAVIEST_KG = 1.0
 class Stability:
     """What the theory says of a scene.
 
-    windows: heights and masses, adiabatic; equilibria: of the scene's own mass; floating: the one in which it
-    floats, None if there is none; modes [Hz]: sideways, at the scene's spin, complex where unstable; vertical,
-    sleeping [Hz]: the up-and-down mode and the sleeping top's limit there; nearest: the mass [kg] nearest to the
-    scene's that floats, None where no mass does.
+    top, field: the scene's, as `analysis.stability` takes them; windows: heights and masses, adiabatic; equilibria: of
+    the scene's own mass; floating: the one in which it floats, None if there is none; modes [Hz]: sideways, at the
+    scene's spin, complex where unstable; vertical, sleeping [Hz]: the up-and-down mode and the sleeping top's limit
+    there; nearest: the mass [kg] nearest to the scene's that floats, None where no mass does.
     """
 
     scene: Scene
+    top: stability.Symmetric
+    field: stability.AxialField
     windows: tuple[stability.Window, ...]
     equilibria: tuple[stability.Equilibrium, ...]
     floating: stability.Equilibrium | None
@@ -48,6 +50,11 @@ class Stability:
     sleeping: float
     thesis_estimate: float
     nearest: float | None
+
+    @property
+    def lifted(self) -> tuple[stability.Window, ...]:
+        """The windows in which the field lifts a moment of this sign: the force μB′ points up."""
+        return tuple(w for w in self.windows if _lifts(w, self.top, self.field))
 
 
 def symmetric(scene: Scene) -> stability.Symmetric:
@@ -102,7 +109,7 @@ def _disc_stiffnesses(scene: Scene) -> Callable[[Array], Array]:
     return stiffnesses
 
 
-def axial_field(scene: Scene) -> Callable[[Array], Array]:
+def axial_field(scene: Scene) -> stability.AxialField:
     """B, B′ and B″ on the axis as an upright top feels them: at its centre, or averaged over its magnet.
 
     The average's force and its stiffness up and down are those of a point in it; what tilting does is in `symmetric`.
@@ -127,6 +134,11 @@ def axial_field(scene: Scene) -> Callable[[Array], Array]:
     return averaged
 
 
+def modes_at(scene: Scene, height: float, spin_hz: float) -> NDArray[np.complex128]:
+    """The four sideways modes [Hz] of the scene's top at a height [m] and a spin [Hz]; complex where unstable."""
+    return stability.modes(axial_field(scene), symmetric(scene), height, spin_hz)
+
+
 def stability_of(scene: Scene) -> Stability:
     """Windows, equilibria and modes of a scene's top, upright on the axis of its base (a lean of it is left out)."""
     if scene.gravity_m_s2 == 0:
@@ -140,6 +152,8 @@ def stability_of(scene: Scene) -> Stability:
     spin = scene.start.spin_hz
     return Stability(
         scene,
+        top,
+        field,
         found,
         balance,
         floating,
@@ -156,19 +170,16 @@ def _range(scene: Scene) -> tuple[float, float]:
     return top_face + _LOW * scene.base.inner_radius_m, top_face + _HIGH * scene.base.outer_radius_m
 
 
-def lifting(
-    windows: tuple[stability.Window, ...], top: stability.Symmetric, field: Callable[[Array], Array]
-) -> list[stability.Window]:
-    """The windows in which the field lifts a moment of this sign: the force μB′ points up."""
-    return [w for w in windows if top.moment * float(field(np.array([(w.low + w.high) / 2]))[1, 0]) > 0]
+def _lifts(window: stability.Window, top: stability.Symmetric, field: stability.AxialField) -> bool:
+    return top.moment * float(field(np.array([(window.low + window.high) / 2]))[1, 0]) > 0
 
 
 def nearest_mass(
-    windows: tuple[stability.Window, ...], top: stability.Symmetric, field: Callable[[Array], Array]
+    windows: tuple[stability.Window, ...], top: stability.Symmetric, field: stability.AxialField
 ) -> float | None:
     """The mass [kg] nearest to the top's that floats; a thousandth inside of its window, whose edge holds nothing."""
     candidates = []
-    for window in lifting(windows, top, field):
+    for window in (w for w in windows if _lifts(w, top, field)):
         margin = (window.heavy - window.light) / 1000
         candidates.append(min(max(top.mass, window.light + margin), window.heavy - margin))
     return min(candidates, key=lambda mass: abs(mass - top.mass), default=None)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from levilab.simulator.kernels.motion import TIME, R, V
 from levilab.simulator.trajectory import Event
@@ -104,8 +105,6 @@ def locate_zero(
     name: str, before: Array, length: float, moved: Callable[[Array, float], Array], value: Callable[[Array], float]
 ) -> Event:
     """The moment within a step at which a value passes through zero, to the last digits of the time."""
-    from scipy.optimize import brentq
-
     if value(before) == 0:
         return Event(name, float(before[TIME]), before)
     # relative to the step: xtol below the rounding of the time itself

@@ -10,12 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from levilab.errors import UsageError
-from levilab.simulator.equilibrium import (
-    axial_field,
-    lifting,
-    stability_of,
-    symmetric,
-)
+from levilab.simulator.ensemble import simulate_many
+from levilab.simulator.equilibrium import stability_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -119,8 +115,7 @@ def survival_map(
 
 def _floating(scene: Scene) -> tuple[tuple[float, float], ...]:
     """The masses [kg] that float, the region nearest to the scene's mass first."""
-    windows = lifting(stability_of(scene).windows, symmetric(scene), axial_field(scene))
-    windows.sort(key=lambda w: abs((w.light + w.heavy) / 2 - scene.top.mass_kg))
+    windows = sorted(stability_of(scene).lifted, key=lambda w: abs((w.light + w.heavy) / 2 - scene.top.mass_kg))
     return tuple((window.light, window.heavy) for window in windows)
 
 
@@ -154,8 +149,6 @@ def survival(
     progress: Callable[[float], None] | None = None,
 ) -> NDArray[np.bool_]:
     """Whether the top is still up after so long [s], for spins [Hz] and masses [kg]; shape (masses, spins)."""
-    from levilab.simulator.ensemble import simulate_many
-
     values = {"start.spin_hz": np.asarray(spins)[None, :], "top.mass_kg": np.asarray(masses)[:, None]}
     # from the given place: some of the masses of a map float nowhere
     given = scene.changed({"start.place": "given"})

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
 
+from levilab.files import CannotWrite, replace_atomically
 from levilab.present.terminal import new_table, terminal
-from levilab.simulator.equilibrium import advice, axial_field, lifting, symmetric
+from levilab.simulator.equilibrium import advice
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -16,9 +17,7 @@ if TYPE_CHECKING:
 
     from levilab.simulator.equilibrium import Stability
     from levilab.simulator.scene import Scene
-    from levilab.stability.map import (
-        Map,
-    )
+    from levilab.stability.map import Map
 
 #: The master's thesis on the Levitron: its simulated limits of four starts, and what it measured.
 THESIS = {
@@ -73,15 +72,13 @@ def _headline(found: Stability) -> str:
 
 def _windows_table(found: Stability) -> Any:
     table = new_table("Where tops float, if they spin", "region", "heights \\[cm]", "masses \\[g]", "this moment")
-    top, field = symmetric(found.scene), axial_field(found.scene)
-    lifted = lifting(found.windows, top, field)
     for number, window in enumerate(found.windows):
         name = "upper" if number and number == len(found.windows) - 1 else "lower"
         table.add_row(
             name,
             f"{100 * window.low:.4f} – {100 * window.high:.4f}",
             f"{1000 * window.light:.3f} – {1000 * window.heavy:.3f}",
-            "is lifted" if window in lifted else "is pulled down; one of the other sign is lifted",
+            "is lifted" if window in found.lifted else "is pulled down; one of the other sign is lifted",
         )
     return table
 
@@ -179,8 +176,6 @@ TABLE, PICTURE = "survival.csv", "survival.png"
 
 def place_for_map(folder: Path) -> None:
     """Make the folder, before anything is simulated; a map that is there stays.  Raises CannotWrite."""
-    from levilab.files import CannotWrite
-
     for path in (folder / TABLE, folder / PICTURE):
         if path.exists():
             raise CannotWrite(f"{path} is there already: give another folder with `out`, or move it away")
@@ -194,7 +189,7 @@ def place_for_map(folder: Path) -> None:
 
 def write_map(found: Map, folder: Path) -> list[Path]:
     """survival.png and survival.csv (one row a top; 1: survived) into a folder."""
-    from levilab.files import replace_atomically
+    # matplotlib, which a command without --map does not need
     from levilab.present.style import save_png
     from levilab.stability.figure import map_figure
 
@@ -211,6 +206,4 @@ def write_map(found: Map, folder: Path) -> list[Path]:
 
 
 def _cannot(folder: Path, error: OSError) -> Exception:
-    from levilab.files import CannotWrite
-
     return CannotWrite(f"{folder}: the map cannot be written: {error.strerror}; give another folder with `out`")

@@ -130,10 +130,10 @@ def scene_world(
     the top is put back, None: it is not.  Raises SceneError for a scene without motion, SimulationError for one that
     cannot be simulated.
     """
-    from levilab.simulator.compilation import telling_of_compilation  # the compiler takes a moment to load
+    from levilab.simulator.compilation import announce_compilation  # the compiler takes a moment to load
     from levilab.world.motion_world import MotionWorld, prepare
 
-    with telling_of_compilation(tell):
+    with announce_compilation(tell):
         prepare(scene)
     return MotionWorld(scene, clock(), again_s=again_s, seed=seed)
 

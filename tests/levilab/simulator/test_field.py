@@ -225,18 +225,18 @@ def test_a_thin_base_is_nearly_a_sheet():
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("ring", "kind", "more", "words"),
     [
-        ((0.05, 0.03, RHO, "exact"), "0 < inner < outer"),
-        ((0.0, 0.03, RHO, "exact"), "0 < inner < outer"),
-        ((A, B, math.nan, "exact"), "strength = nan"),
-        ((A, B, RHO, "paraxial-3"), "paraxial-2, paraxial-4"),
-        ((A, B, RHO, "paraxial-22"), "paraxial-20"),
-        ((A, B, RHO, "dipole"), "exact or paraxial"),
-        ((A, B, RHO, "exact", -0.01), "thickness = -0.01"),
-        ((A, B, RHO, "exact", 0.0, math.inf), "origin = inf"),
+        ((0.05, 0.03, RHO), "exact", {}, "0 < inner < outer"),
+        ((0.0, 0.03, RHO), "exact", {}, "0 < inner < outer"),
+        ((A, B, math.nan), "exact", {}, "strength = nan"),
+        ((A, B, RHO), "paraxial-3", {}, "paraxial-2, paraxial-4"),
+        ((A, B, RHO), "paraxial-22", {}, "paraxial-20"),
+        ((A, B, RHO), "dipole", {}, "exact or paraxial"),
+        ((A, B, RHO), "exact", {"thickness": -0.01}, "thickness = -0.01"),
+        ((A, B, RHO), "exact", {"origin": math.inf}, "origin = inf"),
     ],
 )
-def test_a_base_that_cannot_be_is_refused_by_name(arguments, words):
+def test_a_base_that_cannot_be_is_refused_by_name(ring, kind, more, words):
     with pytest.raises(FieldError, match=words):
-        field_of(*arguments)
+        field_of(*ring, kind, **more)

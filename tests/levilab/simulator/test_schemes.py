@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from levilab.simulator.order_conditions import residuals
 from levilab.simulator.scene import Scene
 from levilab.simulator.schemes import SCHEMES, Scheme
 from levilab.simulator.single import simulate
+from order_conditions import residuals, trees
 from support.scenes import KINDS
 
 #: Steps [1/s] at which each scheme's error lies above rounding (1e-13) and its first term dominates; whole numbers
@@ -47,6 +47,11 @@ def test_a_composition_is_symmetric_and_adds_up_to_one_step(scheme: Scheme):
     assert len(scheme.drifts) == scheme.stages + 1
     assert sum(scheme.drifts) == pytest.approx(1, abs=1e-15)
     assert sum(scheme.kicks) == pytest.approx(1, abs=1e-15)
+
+
+def test_there_are_as_many_trees_of_an_order_as_the_literature_has():
+    # Hairer, Nørsett, Wanner II.14: special Nyström trees
+    assert [len(trees(order)) for order in range(1, 8)] == [1, 1, 2, 3, 6, 10, 20]
 
 
 @pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
