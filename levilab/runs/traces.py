@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import io
-import json
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from pydantic import Field, ValidationError
 
 from instruments.drivers.oscilloscope import Trace
 from levilab.errors import DataError
-from levilab.files import replace_atomically
+from levilab.files import parse_json, replace_atomically
+from levilab.settings import Settings, in_one_line
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -20,8 +21,23 @@ if TYPE_CHECKING:
 #: The folder of the codes, and the file with a line for each record.
 FOLDER, INDEX = "traces", "traces.jsonl"
 
-#: What a line of the index says of the codes, in the names of `Trace`.
-_SCALING = ("dt_s", "t0_s", "volts_per_code", "offset_v", "lowest", "highest", "none")
+
+class Record(Settings):
+    """A line of the index: when and of what the record is, its codes, and how to read them in the names of `Trace`."""
+
+    number: int
+    time_s: float
+    channel: str
+    path: str = Field(pattern=rf"^{FOLDER}/\d+\.npy$")
+    sha256: str
+    scope_channel: int
+    dt_s: float
+    t0_s: float
+    volts_per_code: float
+    offset_v: float
+    lowest: int
+    highest: int
+    none: int | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,15 +65,22 @@ def save_codes(folder: Path, number: int, time_s: float, trace: Trace, channel: 
     content = buffer.getvalue()
     name = f"{FOLDER}/{number:06d}.npy"
     replace_atomically(folder / name, content)
-    about: dict[str, Any] = {
-        "number": number,
-        "time_s": time_s,
-        "channel": channel,
-        "path": name,
-        "scope_channel": trace.channel,
-        "sha256": hashlib.sha256(content).hexdigest(),
-    }
-    return json.dumps(about | {key: getattr(trace, key) for key in _SCALING}, ensure_ascii=False, allow_nan=False)
+    record = Record(
+        number=number,
+        time_s=time_s,
+        channel=channel,
+        path=name,
+        sha256=hashlib.sha256(content).hexdigest(),
+        scope_channel=trace.channel,
+        dt_s=trace.dt_s,
+        t0_s=trace.t0_s,
+        volts_per_code=trace.volts_per_code,
+        offset_v=trace.offset_v,
+        lowest=trace.lowest,
+        highest=trace.highest,
+        none=trace.none,
+    )
+    return record.model_dump_json()
 
 
 def load_traces(folder: Path) -> list[StoredTrace]:
@@ -67,18 +90,35 @@ def load_traces(folder: Path) -> list[StoredTrace]:
     """
     index = folder / INDEX
     text = index.read_text(encoding="utf-8") if index.exists() else ""
-    return [_load(folder, json.loads(line)) for line in text[: text.rfind("\n") + 1].splitlines()]
+    return [_load(folder, _line(index, line)) for line in text[: text.rfind("\n") + 1].splitlines()]
 
 
-def _load(folder: Path, about: dict[str, Any]) -> StoredTrace:
-    path = folder / about["path"]
+def _line(index: Path, line: str) -> Record:
+    try:
+        return Record.model_validate(parse_json(line))
+    except ValidationError as error:
+        raise DataError(f"{index}: a line describes no record: {in_one_line(error)}") from error
+    except ValueError as error:
+        raise DataError(f"{index}: a line of it is damaged ({error})") from error
+
+
+def _load(folder: Path, record: Record) -> StoredTrace:
+    path = folder / record.path
     try:
         content = path.read_bytes()
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror}): {INDEX} names it") from error
-    if hashlib.sha256(content).hexdigest() != about["sha256"]:
+    if hashlib.sha256(content).hexdigest() != record.sha256:
         raise DataError(f"{path}: is not what was recorded: its sha256 differs from the one in {INDEX}")
-    codes = np.load(io.BytesIO(content), allow_pickle=False)
-    scaling = {key: about[key] for key in _SCALING}
-    trace = Trace(codes=codes, channel=about["scope_channel"], **scaling)
-    return StoredTrace(about["number"], about["time_s"], about["channel"], trace)
+    trace = Trace(
+        np.load(io.BytesIO(content), allow_pickle=False),
+        record.dt_s,
+        record.t0_s,
+        record.volts_per_code,
+        record.offset_v,
+        record.scope_channel,
+        record.lowest,
+        record.highest,
+        record.none,
+    )
+    return StoredTrace(record.number, record.time_s, record.channel, trace)

@@ -43,6 +43,8 @@ if TYPE_CHECKING:
     from instruments.drivers.oscilloscope import Trace
     from levilab.runs.run import Run, Status
 
+#: What grows line by line, and is kept in memory to be written anew.
+_KEPT = (READINGS, EVENTS, traces.INDEX)
 #: Errors that free space would mend.
 _FULL = frozenset(getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG") if hasattr(errno, name))
 
@@ -107,11 +109,11 @@ class RunWriter:
             raise CannotWrite(f"{self.folder}: is finished, another process has gone on with it meanwhile")
         if not all("name" in channel for channel in self.record.channels):
             raise CannotWrite(f"{self.folder / RECORD}: channels: each needs a name to be gone on with")
-        for name in (READINGS, EVENTS):
+        for name in _KEPT:
             _refuse_special(self.folder / name)
             _cut_torn_line(self.folder / name)
         self._check_header()
-        for name in (READINGS, EVENTS):
+        for name in _KEPT:
             if name not in self._files and (self.folder / name).exists():
                 self._open(name)
         notes = "; ".join(filter(None, (self.record.note, note)))
@@ -251,7 +253,7 @@ class RunWriter:
     def _open(self, name: str) -> None:
         """Open a file to append to; what a resumed run holds in it is kept, too."""
         path = self.folder / name
-        if name in {READINGS, EVENTS} and name not in self._kept and path.is_file():
+        if name in _KEPT and name not in self._kept and path.is_file():
             self._kept[name] = [path.read_bytes()]
         self._files[name] = _GrowingFile(path)
 

@@ -256,10 +256,10 @@ class Tapped:
     def __getattr__(self, name):
         return getattr(self.device, name)
 
-    def execute(self, message):
-        """Run a message; see VirtualInstrument."""
+    def steps(self, message):
+        """Run a message, in steps; see VirtualInstrument."""
         before = len(self.device.parser.errors)
-        answer = self.device.execute(message)
+        answer = yield from self.device.steps(message)
         complained = len(self.device.parser.errors) > before
         self.heard.append((message, answer.data if answer else b"", complained))
         return answer

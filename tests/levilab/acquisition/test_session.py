@@ -119,6 +119,25 @@ def test_codes_that_were_changed_afterwards_are_refused(request_of_a_scan: Acqui
         run.traces()
 
 
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("{", "a line of it is damaged"),
+        ("[" * 5000, "nested"),
+        ('{"number": 1}', "describes no record: time_s: Field required"),
+        ('{"path": "../../elsewhere.npy"}', "describes no record"),
+    ],
+)
+def test_an_index_that_is_damaged_is_refused_in_a_line(
+    request_of_a_scan: AcquisitionRequest, line: str, says: str
+) -> None:
+    run = acquire(request_of_a_scan, Silent())
+    (run.folder / "traces.jsonl").write_text(line + "\n", encoding="utf-8")
+    with pytest.raises(DataError, match=r"traces\.jsonl: a line") as caught:
+        run.traces()
+    assert says in str(caught.value)
+
+
 def test_the_person_is_asked_and_the_answer_is_kept(request_of_a_scan: AcquisitionRequest) -> None:
     answers = iter(["", " at 6.1 cm, the stand slips ", ""])
     asked: list[str] = []

@@ -74,7 +74,7 @@ def test_an_analysis_need_not_be_named(levilab: Command, sample_data: Path) -> N
     assert levilab("analyze", sample_data, "--no-save").stdout == named.stdout
     assert levilab("analyze", "--no-save", sample_data).stdout == named.stdout
     assert json.loads(levilab("analyze", sample_data, "--no-save", "--json").stdout)["analysis"] == "spindown"
-    assert "no such file" in levilab("analyze", "spindwon", check=1).stderr
+    assert "Did you mean 'spindown'?" in levilab("analyze", "spindwon", check=2).stderr
 
 
 def test_two_files_in_a_folder_have_a_result_each_that_the_report_reads(levilab: Command, tmp_path: Path) -> None:
