@@ -28,7 +28,7 @@ test: setup lint  ## everything that must pass: style, types, imports, tests
 	$(BIN)/python -m pytest
 
 explore: setup  ## the property tests with new random examples
-	HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest tests/levilab/test_formats.py tests/analysis tests/instruments
+	HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest tests/levilab/formats tests/analysis tests/instruments
 
 fuzz: setup  ## what a fuzzer guided by coverage finds, SECONDS for each target (60); see docs/fuzzing.md
 	$(BIN)/nox --session fuzz -- --seconds $(or $(SECONDS),60)

@@ -1,7 +1,7 @@
 """What is fuzzed: functions of bytes that must end, and must not raise.
 
 Each takes any bytes, does with them what somebody at the other end of a wire could do, and asserts what must hold
-afterwards.  Nothing here knows the fuzzer: tests/instruments/test_fuzz.py calls the same functions.
+afterwards.  Nothing here knows the fuzzer: tests/instruments/virtual/bench/test_fuzz.py calls the same functions.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What an instrument may have to bear: words to make messages of, a cheap world, and what must hold afterwards.
 
-Used by tests/instruments/test_fuzz.py and by fuzz/.
+Used by tests/instruments/virtual/bench/test_fuzz.py and by fuzz/.
 """
 
 import inspect
