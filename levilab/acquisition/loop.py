@@ -64,7 +64,7 @@ class AcquisitionRequest:
 
 
 def acquire(request: AcquisitionRequest, show: Show) -> Run:
-    """Run an experiment.  Returns the run, finished or interrupted; other ends raise, the run kept all the same.
+    """Run an experiment.  Returns the run, finished or interrupted; other ends raise, and the run is kept, too.
 
     A bench that could not be opened leaves no new run, unless it was to be logged.
     """
@@ -79,7 +79,7 @@ def acquire(request: AcquisitionRequest, show: Show) -> Run:
             show.message(text)
             status = "interrupted"
         except Exception as error:
-            # the disk may be full: what is told is the first thing that went wrong
+            # the disk may be full: the first thing that went wrong is what counts
             with contextlib.suppress(CannotWrite):
                 writer.event(None, "failed", f"{type(error).__name__}: {error}")
                 writer.finish("failed")
@@ -121,7 +121,7 @@ def _at_the_bench(
         finally:
             stop.shield()
             bench.outputs_off()
-            with contextlib.suppress(CannotWrite):  # if the disk is full, what failed first is told
+            with contextlib.suppress(CannotWrite):  # if the disk is full, what failed first counts
                 _note_instruments(session, "end")
 
 

@@ -152,10 +152,12 @@ class Session(Generic[S]):
 
     def event(self, kind: str, text: str, **data: Any) -> None:
         """Write down and show what happened."""
-        if self._replaying:
-            return
+        if not self._replaying:
+            self._write_event(kind, text, **data)
+            self.show.message(text)
+
+    def _write_event(self, kind: str, text: str, **data: Any) -> None:
         self.writer.event(None if self.zero is None else self.now(), kind, text, **data)
-        self.show.message(text)
 
     def progress(self, text: str, share: float) -> None:
         """Show how far the bench is on the way to the first reading.  share: from 0 to 1."""
@@ -168,11 +170,11 @@ class Session(Generic[S]):
         Returns the answer, empty where nothing but Enter was typed or no person is at the bench.  The first Ctrl-C
         ends the wait.
         """
-        self.event("asked the person", question)
+        self._write_event("asked the person", question)
         with self.stop.at_once():
             answer = self.person(question).strip()
         if answer:
-            self.event("answered", answer)
+            self._write_event("answered", answer)
         return answer
 
     def keep(self, row: Row, time_left_s: float) -> None:

@@ -83,14 +83,22 @@ def save_codes(folder: Path, number: int, time_s: float, trace: Trace, channel: 
     return record.model_dump_json()
 
 
+def has_codes(folder: Path, line: str) -> bool:
+    """Whether the codes that a line of the index describes are in a run folder."""
+    return (folder / _line(folder / INDEX, line).path).is_file()
+
+
 def load_traces(folder: Path) -> list[StoredTrace]:
     """The records of a run folder, in the order in which they were kept; a torn last line is left out.
 
     Raises DataError for codes that are missing or are not those that were written.
     """
     index = folder / INDEX
-    text = index.read_text(encoding="utf-8") if index.exists() else ""
-    return [_load(folder, _line(index, line)) for line in text[: text.rfind("\n") + 1].splitlines()]
+    try:
+        text = index.read_text(encoding="utf-8", errors="replace") if index.exists() else ""
+    except OSError as error:
+        raise DataError(f"{index}: cannot be read ({error.strerror})") from error
+    return [_load(folder, _line(index, line)) for line in text.split("\n")[:-1]]
 
 
 def _line(index: Path, line: str) -> Record:

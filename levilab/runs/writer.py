@@ -69,6 +69,7 @@ class RunWriter:
         self._files: dict[str, _GrowingFile] = {}
         self._kept: dict[str, list[bytes]] = {}  # what was appended line by line, to be written anew
         self._created = False
+        self._records = 0  # of the oscilloscope
         self._lock = lock_of(folder)
 
     @classmethod
@@ -113,6 +114,7 @@ class RunWriter:
             _refuse_special(self.folder / name)
             _cut_torn_line(self.folder / name)
         self._check_header()
+        self._records = len(list((self.folder / traces.FOLDER).glob("*.npy")))
         for name in _KEPT:
             if name not in self._files and (self.folder / name).exists():
                 self._open(name)
@@ -201,12 +203,16 @@ class RunWriter:
 
     def trace(self, time_s: float, trace: Trace, channel: str) -> int:
         """Keep an oscilloscope's record; returns its number.  Raises CannotWrite."""
-        there = len(list((self.folder / traces.FOLDER).glob("*.npy")))
-        number = max(there, self._lines_kept(traces.INDEX)) + 1
-        with _told(f"write the record {number}", self.folder):
-            line = traces.save_codes(self.folder, number, time_s, trace, channel)
-            self._append(traces.INDEX, line)
-        return number
+        self._records += 1
+        with _told(f"write the record {self._records}", self.folder):
+            self._rescue_if_lost()
+            written = None
+            while written != self.folder:  # once more where the folder was removed meanwhile
+                written = self.folder
+                line = traces.save_codes(written, self._records, time_s, trace, channel)
+                self._append(traces.INDEX, line)
+                self._rescue_if_lost()
+        return self._records
 
     def event(self, time_s: float | None, kind: str, text: str, **data: Any) -> None:
         """Append a line to events.jsonl."""
@@ -273,11 +279,12 @@ class RunWriter:
         self.folder = _folder_beside(old)
         self._lock = lock_of(self.folder)
         self._lock.acquire(blocking=False)
+        _copy_others(old, self.folder, {*self._kept, RECORD, LOCK, PACKAGE})
+        lost = self._forget_lost_records()
         for name, blocks in self._kept.items():
             self._files[name] = _GrowingFile(self.folder / name)
             self._files[name].append(b"".join(blocks))
             self._files[name].sync()
-        _copy_others(old, self.folder, {*self._kept, RECORD, LOCK, PACKAGE})
         self.record = self.record.model_copy(update={"rescued_from": str(old)})
         replace_atomically(self.folder / RECORD, self.record.as_json())
         sync_folder(self.folder.parent)
@@ -285,10 +292,22 @@ class RunWriter:
         text = (
             f"{old} was removed, replaced or cut while it was being written: all {readings} readings "
             f"are in {self.folder} now, and the run goes on there"
+            + (f"; {lost} record{'s' * (lost > 1)} of the oscilloscope are gone" if lost else "")
         )
         event = {"utc": utc_now(), "time_s": None, "kind": "rescued", "text": text}
         self._append(EVENTS, json.dumps(event, ensure_ascii=False))
         self.tell(text)
+
+    def _forget_lost_records(self) -> int:
+        """Take records whose codes are gone out of the index; returns how many.
+
+        Codes are not kept in memory: a record may have as many as an oscilloscope holds.
+        """
+        lines = b"".join(self._kept.get(traces.INDEX, ())).splitlines(keepends=True)
+        there = [line for line in lines if traces.has_codes(self.folder, line.decode())]
+        if lines:
+            self._kept[traces.INDEX] = there
+        return len(lines) - len(there)
 
 
 class _GrowingFile:

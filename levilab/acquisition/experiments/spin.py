@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from enum import StrEnum
 from typing import TYPE_CHECKING, Literal
 
@@ -31,8 +32,9 @@ _HIGHEST_SHARE, _HALVING_S = 1.05, 100.0
 _SAME_SHARE = 0.03
 #: A fallen top rattles: after so many times without a credible count it is taken for fallen.
 _MOST_MISSED = 3
-#: Spin at which a top falls (mean of the ten published limits) [Hz], and how long that takes from 40 Hz [s].
-_FALL_HZ, _USUAL_S = 21.86, 190.0
+#: Spin at which a top falls (mean of the ten published limits) [Hz], and the usual drag of a laminar disc (mean of the
+#: four published runs) [(rad/s)^−½/s]: for the time left while there is one reading.
+_FALL_HZ, _USUAL_DRAG = 21.86, 2.34e-4
 
 
 class SpinSettings(CounterSettings):
@@ -96,7 +98,7 @@ def run(session: Session[SpinSettings]) -> None:
         else:
             missed.clear()
             first = session.rows[0] if session.rows else reading
-            session.keep(reading, _time_left(first, reading))
+            session.keep(reading, time_left(first, reading))
 
 
 def _prepare_counter(session: Session[SpinSettings]) -> None:
@@ -286,13 +288,17 @@ def _fall(session: Session[SpinSettings], missed: list[Missed]) -> str:
     return ""
 
 
-def _time_left(first: Row, last: Row) -> float:
-    """ν^(−1/2) grows evenly under the drag of a laminar disc: carried on to the usual spin of the fall [s]."""
+def time_left(first: Row, last: Row) -> float:
+    """Until the usual spin of the fall [s]: under the drag of a laminar disc ω^(−1/2) grows evenly.
+
+    Its growth is that between two readings, or while they are one that of the usual drag.
+    """
+    start, now, fall = (
+        (2 * math.pi * spin) ** -0.5 for spin in (first["spin_frequency_hz"], last["spin_frequency_hz"], _FALL_HZ)
+    )
     lapse = last["time_s"] - first["time_s"]
-    growth = last["spin_frequency_hz"] ** -0.5 - first["spin_frequency_hz"] ** -0.5
-    if lapse <= 0 or growth <= 0:
-        return _USUAL_S
-    left: float = (_FALL_HZ**-0.5 - last["spin_frequency_hz"] ** -0.5) * lapse / growth
+    growth = (now - start) / lapse if lapse > 0 and now > start else _USUAL_DRAG / 2
+    left: float = (fall - now) / growth
     return max(0.0, left)
 
 

@@ -17,7 +17,7 @@ from instruments.drivers.counter.keysight_53230a import Keysight53230A
 from instruments.drivers.generator.keysight_33500b import Keysight33500B
 from instruments.errors import InstrumentError, NoAnswer
 from instruments.virtual.bench.visa_library import library_for
-from levilab.acquisition.experiments.spin import SpinSettings, is_plausible
+from levilab.acquisition.experiments.spin import SpinSettings, is_plausible, time_left
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import Configuration
@@ -342,6 +342,22 @@ def test_an_interrupted_run_is_resumed_where_it_was_left(tmp_path: Path) -> None
     assert len(frame) == len(whole)
     # gates open a little earlier or later, at 0.1 Hz/s, and each sees noise of its own
     assert np.allclose(frame["spin_frequency_hz"], whole["spin_frequency_hz"], atol=0.2)
+
+
+@pytest.mark.parametrize("highest", [28.0, 32.0, 40.0])
+def test_the_first_time_left_is_right_within_a_third(tmp_path: Path, highest: float) -> None:
+    show = Silent()
+    acquire(of_scene(tmp_path, SpinScene(start_hz=26.0), SpinSettings(drive_frequency_hz=highest)), show)
+    lasted = float(show.readings[-1].split()[0]) - float(show.readings[0].split()[0]) + 5.0
+    assert show.left[0] == pytest.approx(lasted, rel=0.33)
+
+
+def test_the_time_left_follows_the_drag_that_is_seen() -> None:
+    """A disc's drag of half the usual constant, from 40 to 35 Hz: the rest to 21.86 Hz by the same law."""
+    c, first = 1.17e-4, {"time_s": 0.0, "spin_frequency_hz": 40.0}
+    to = {hz: 2 / c * ((2 * np.pi * hz) ** -0.5 - (2 * np.pi * 40.0) ** -0.5) for hz in (35.0, 21.86)}
+    last = {"time_s": to[35.0], "spin_frequency_hz": 35.0}
+    assert time_left(first, last) == pytest.approx(to[21.86] - to[35.0], rel=1e-9)
 
 
 def test_a_resume_that_fails_keeps_the_run_and_its_readings(tmp_path: Path) -> None:

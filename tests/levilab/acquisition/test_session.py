@@ -146,8 +146,10 @@ def test_the_person_is_asked_and_the_answer_is_kept(request_of_a_scan: Acquisiti
         asked.append(question)
         return next(answers)
 
-    run = acquire(dataclasses.replace(request_of_a_scan, person=person), Silent())
+    show = Silent()
+    run = acquire(dataclasses.replace(request_of_a_scan, person=person), show)
     assert asked[0] == "Move the probe to 5 cm."
+    assert not any("Move the probe" in text for text in show.messages)  # the one who asks has shown it
     happened = [(event["kind"], event["text"]) for event in run.events()]
     assert happened.count(("asked the person", "Move the probe to 6 cm.")) == 1
     assert ("answered", "at 6.1 cm, the stand slips") in happened

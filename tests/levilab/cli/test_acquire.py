@@ -6,8 +6,9 @@ import io
 
 import pytest
 
+from levilab.acquisition import loop
 from levilab.acquisition.session import ExperimentFailed
-from levilab.cli.acquire import _ask
+from levilab.cli.acquire import _ask, acquire_spin
 
 
 def test_the_person_is_asked_on_the_terminal(monkeypatch, capsys):
@@ -20,3 +21,24 @@ def test_a_question_without_a_terminal_ends_with_what_to_do(monkeypatch):
     monkeypatch.setattr("sys.stdin", io.StringIO(""))
     with pytest.raises(ExperimentFailed, match="standard input is closed"):
         _ask("How high is the probe?")
+
+
+def test_the_command_hands_the_person_over(monkeypatch, tmp_path):
+    class Stopped(Exception):
+        pass
+
+    asked = []
+
+    def acquire(request, show):
+        asked.append(request.person)
+        raise Stopped
+
+    bench = tmp_path / "bench.toml"
+    bench.write_text(
+        "[counter]\nmodel = '53230A'\naddress = 'A::1'\n[generator]\nmodel = '33500B'\naddress = 'A::2'\n",
+        encoding="utf-8",
+    )
+    monkeypatch.setattr(loop, "acquire", acquire)
+    with pytest.raises(Stopped):
+        acquire_spin(bench=bench, out=tmp_path)
+    assert asked == [_ask]

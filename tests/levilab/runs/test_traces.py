@@ -1,0 +1,88 @@
+"""Records of an oscilloscope in a run folder: kept raw, found again, and what is left of them when it is removed."""
+
+from __future__ import annotations
+
+import shutil
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from instruments.drivers.oscilloscope import Trace
+from levilab.errors import DataError
+from levilab.runs.run import Run, RunRecord, utc_now
+from levilab.runs.writer import RunWriter
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def record_of(first: int) -> Trace:
+    codes = np.arange(first, first + 100, dtype=np.uint8)
+    return Trace(codes, dt_s=1e-4, t0_s=-5e-3, volts_per_code=0.01, offset_v=-1.0, channel=1)
+
+
+@pytest.fixture
+def said() -> list[str]:
+    return []
+
+
+@pytest.fixture
+def writer(tmp_path: Path, said: list[str]) -> RunWriter:
+    channels = [{"name": "time_s", "unit": "s", "source": "a test"}]
+    record = RunRecord(experiment="trace", status="running", started_utc=utc_now(), channels=channels)
+    return RunWriter.create(tmp_path, record, tell=said.append)
+
+
+def test_records_come_back_as_they_were(writer: RunWriter) -> None:
+    with writer:
+        assert [writer.trace(k / 10, record_of(k), "light") for k in range(3)] == [1, 2, 3]
+        writer.finish("finished")
+    stored = Run.load(writer.folder).traces()
+    assert [one.time_s for one in stored] == [0.0, 0.1, 0.2]
+    assert [one.trace.codes[0] for one in stored] == [0, 1, 2]
+    assert np.array_equal(stored[2].trace.volts, record_of(2).volts)
+
+
+@pytest.mark.parametrize("name", ["light\u2028left", "light\u0085", "light\x0cright", "Licht µ"])
+def test_a_channel_may_have_any_name(writer: RunWriter, name: str) -> None:
+    with writer:
+        writer.trace(0.0, record_of(0), name)
+        writer.trace(1.0, record_of(1), "other")
+    assert [one.channel for one in Run.load(writer.folder).traces()] == [name, "other"]
+
+
+def test_a_resumed_run_numbers_its_records_on(writer: RunWriter) -> None:
+    with writer:
+        writer.trace(0.0, record_of(0), "light")
+        writer.finish("interrupted")
+    with RunWriter.reopen(Run.load(writer.folder)) as again:
+        assert again.trace(1.0, record_of(1), "light") == 2
+        again.finish("finished")
+    assert [one.number for one in Run.load(writer.folder).traces()] == [1, 2]
+
+
+def test_a_folder_removed_before_a_record_costs_the_records_before_it_alone(writer: RunWriter, said: list[str]) -> None:
+    with writer:
+        writer.trace(0.0, record_of(0), "light")
+        shutil.rmtree(writer.folder)
+        assert writer.trace(1.0, record_of(1), "light") == 2
+        writer.finish("finished")
+    assert [one.number for one in Run.load(writer.folder).traces()] == [2]
+    assert "1 record of the oscilloscope" in said[0]
+
+
+def test_an_index_removed_alone_is_written_anew_with_every_record(writer: RunWriter) -> None:
+    with writer:
+        writer.trace(0.0, record_of(0), "light")
+        (writer.folder / "traces.jsonl").unlink()
+        writer.trace(1.0, record_of(1), "light")
+        writer.finish("finished")
+    assert [one.number for one in Run.load(writer.folder).traces()] == [1, 2]
+
+
+def test_an_index_that_cannot_be_read_is_an_error_in_a_line(writer: RunWriter) -> None:
+    with writer:
+        (writer.folder / "traces.jsonl").mkdir()
+    with pytest.raises(DataError, match=r"traces\.jsonl: cannot be read"):
+        Run.load(writer.folder).traces()
