@@ -47,6 +47,7 @@ class Client:
     sync: Channel
     other: Channel | None = None  # the asynchronous one, once it is there
     joined: asyncio.Event = field(default_factory=asyncio.Event)
+    heard_out: asyncio.Event = field(default_factory=asyncio.Event)  # nothing more comes on the synchronous one
     gone: asyncio.Event = field(default_factory=asyncio.Event)
     longest: int = UNASKED
     clearing: bool = False
@@ -59,7 +60,16 @@ class Client:
     # --- the synchronous channel ---
 
     async def listen(self) -> None:
-        """Messages for the instrument.  Ends by an error, when the client is gone."""
+        """Messages for the instrument.  Ends by an error, when the client is gone and they have been worked on."""
+        try:
+            await self._take_all()
+        except EOFError:
+            await self.link.linger(self.link.finished)
+            raise
+        finally:
+            self.heard_out.set()
+
+    async def _take_all(self) -> None:
         while True:
             message = await _next(self.sync)
             if message.type == Type.DEVICE_CLEAR_COMPLETE:
@@ -270,6 +280,9 @@ class HislipServer:
         channel.send(Message(Type.ASYNC_INITIALIZE_RESPONSE))
         try:
             await first_of(client.listen_aside(), client.gone.wait())
+        except (EOFError, OSError):
+            await client.link.linger(client.heard_out.wait)  # its last commands may wait in the other channel
+            raise
         finally:
             client.gone.set()
 

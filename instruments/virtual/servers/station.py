@@ -41,6 +41,9 @@ FIRST_WORDS = 5.0
 #: A wait that is shorter than this is none [s]: an event loop wakes at whole milliseconds.
 _NO_WAIT = 1e-4
 
+#: How long the next message of a client that has nothing more to say may take [s], as the clock on the wall tells.
+LINGER = 1.0
+
 #: How often somebody who is kept out looks whether the lock was given up by a program in our own process [s].
 _LOOK_AGAIN = 0.2
 
@@ -169,6 +172,22 @@ class Link:
     async def finished(self, within: float | None = None, *, given_up: Callable[[], bool] = lambda: False) -> bool:
         """Wait until the instrument has worked on everything; whether that is so within this time [s]."""
         return await self._comes(lambda: self._work is None or self._work.done(), within, given_up)
+
+    async def linger(self, ended: Callable[[], Awaitable[object]]) -> None:
+        """Wait for the end of what a client has sent that says no more, as long as the instrument goes on with it.
+
+        On a stream an answer is waited for, too: the client may have closed its own direction alone.
+        """
+        done = -1
+        while done < self.messages_done or self._answers_later():
+            done = self.messages_done
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(LINGER):
+                    await ended()
+                    return
+
+    def _answers_later(self) -> bool:
+        return self.session.stream and 0 < (self.due() or 0.0) < INFINITY
 
     def _drop_work(self) -> None:
         if self._work is not None:

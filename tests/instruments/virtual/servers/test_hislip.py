@@ -160,7 +160,8 @@ def test_a_second_channel_that_does_not_come_ends_the_first(served, monkeypatch)
 
 
 @pytest.mark.parametrize("which", [0, 1])
-def test_either_channel_takes_the_other_with_it(served, which):
+def test_either_channel_takes_the_other_with_it(served, monkeypatch, which):
+    monkeypatch.setattr("instruments.virtual.servers.station.LINGER", 0.01)
     both = channels(served)
     both[which].close()
     assert both[1 - which].recv(10) == b""
