@@ -133,14 +133,19 @@ class Link:
 
     def cut_off_by(self, data: bytes, *, end: bool = True) -> bool:
         """Whether these bytes end what the instrument works on; see Session.cut_off_by."""
-        return self.station.working and self.session.cut_off_by_bytes(data, end=end)
+        return self._may_cut_off() and self.session.cut_off_by_bytes(data, end=end)
+
+    def _may_cut_off(self) -> bool:
+        return self.station.working and not self.kept_out()
 
     async def _work_on(self, messages: Iterable[str | None]) -> None:
         try:
             for message in messages:
                 if message is None:
                     await asyncio.sleep(0)
-                elif self.station.working and self.session.cut_off_by(message):
+                    continue
+                await self._let_in()
+                if self._may_cut_off() and self.session.cut_off_by(message):
                     await self._finish(self.session.work_on(message))
                 else:
                     await self._in_turn(message)
@@ -149,19 +154,27 @@ class Link:
 
     async def _in_turn(self, message: str) -> None:
         """Let the instrument take a message when it is done with those of the other clients, and wait until it is."""
-        station = self.station
+        station, taken = self.station, False
         if self.session.stream:  # answers follow each other: the last one is delivered first
-            await self.turn()
             await self._delivered()
-        async with station.at_work:
-            station.working = True
-            try:
-                await self._finish(self.session.work_on(message))
-            finally:
-                station.working = False
-            self.messages_done += 1
-            station.stir()
-            await station.passes(station.device.pace)
+        while not taken and not self.closed:
+            await self._let_in()
+            async with station.at_work:
+                if self.session.stream and self.kept_out():  # the lock was given to another client meanwhile
+                    continue
+                taken = station.working = True
+                try:
+                    await self._finish(self.session.work_on(message))
+                finally:
+                    station.working = False
+                self.messages_done += 1
+                station.stir()
+                await station.passes(station.device.pace)
+
+    async def _let_in(self) -> None:
+        """On a stream, wait for the lock here; the servers of the other protocols have done that."""
+        if self.session.stream:
+            await self.turn()
 
     @staticmethod
     async def _finish(slices: Steps[None]) -> None:
