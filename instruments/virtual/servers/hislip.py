@@ -47,6 +47,7 @@ class Client:
     sync: Channel
     other: Channel | None = None  # the asynchronous one, once it is there
     joined: asyncio.Event = field(default_factory=asyncio.Event)
+    heard_out: asyncio.Event = field(default_factory=asyncio.Event)  # nothing more comes on the synchronous one
     gone: asyncio.Event = field(default_factory=asyncio.Event)
     longest: int = UNASKED
     clearing: bool = False
@@ -59,7 +60,16 @@ class Client:
     # --- the synchronous channel ---
 
     async def listen(self) -> None:
-        """Messages for the instrument.  Ends by an error, when the client is gone."""
+        """Messages for the instrument.  Ends by an error, when the client is gone and they have been worked on."""
+        try:
+            await self._take_all()
+        except EOFError:
+            await self.link.linger(self.link.finished)
+            raise
+        finally:
+            self.heard_out.set()
+
+    async def _take_all(self) -> None:
         while True:
             message = await _next(self.sync)
             if message.type == Type.DEVICE_CLEAR_COMPLETE:
@@ -75,12 +85,7 @@ class Client:
     async def _take(self, message: Message) -> None:
         if self.other is None:
             await self.sync.fatal(Fatal.NOT_BOTH_CHANNELS, "the asynchronous channel is missing")
-        # a client that is kept out waits, and a device clear ends that
-        await self.link.turn(given_up=lambda: self.clearing)
-        end = message.type == Type.DATA_END
-        if not self.link.cut_off_by(message.payload, end=end):
-            await self.link.finished(given_up=lambda: self.clearing)
-        if self.clearing:
+        if not await self._let_in(message):
             return
         self.received = message.parameter
         if self.rmt_expected and not message.control & 1:  # 3.1.1, rule 2: the client is not told
@@ -89,11 +94,21 @@ class Client:
         if message.type == Type.TRIGGER:
             self.link.trigger()
             return
+        end = message.type == Type.DATA_END
         if end:
             if self.link.due() is not None:  # rule 1; the session drops the answer
                 await self._interrupt(message.parameter)
+                if self.clearing:  # the client has begun a device clear meanwhile
+                    return
             self.answering = message.parameter
         await self.link.write(message.payload, end=end)
+
+    async def _let_in(self, message: Message) -> bool:
+        """Wait until the instrument may take a message; whether it may: a device clear ends the wait."""
+        await self.link.turn(given_up=lambda: self.clearing)
+        if not self.link.cut_off_by(message.payload, end=message.type == Type.DATA_END):
+            await self.link.finished(given_up=lambda: self.clearing)
+        return not self.clearing
 
     async def _interrupt(self, number: int) -> None:
         """Both are told, the asynchronous channel first (6.11, table 30)."""
@@ -270,6 +285,9 @@ class HislipServer:
         channel.send(Message(Type.ASYNC_INITIALIZE_RESPONSE))
         try:
             await first_of(client.listen_aside(), client.gone.wait())
+        except (EOFError, OSError):
+            await client.link.linger(client.heard_out.wait)  # its last commands may wait in the other channel
+            raise
         finally:
             client.gone.set()
 

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 from typing import TYPE_CHECKING, Protocol
 
 from instruments.virtual.servers.station import CHUNK, Link, Listener, first_of
 
 if TYPE_CHECKING:
     from instruments.virtual.servers.station import Station
-
-#: How long the next message or answer of a client that has nothing more to say may take [s], as the clock on the wall
-#: tells.
-_LINGER = 1.0
 
 
 class Wire(Protocol):
@@ -63,15 +58,11 @@ async def converse(station: Station, wire: Wire) -> None:
     async def receive() -> None:
         while data := await wire.read():
             await received.put(data)
-        # a client that sends no more may still want to read: printf '*IDN?\n' | nc
-        done = -1
-        while done < link.messages_done:
-            done = link.messages_done
-            with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(_LINGER):
-                    await received.join()
-                    await link.quiet()
-                    return
+        await link.linger(delivered)  # a client that sends no more may still want to read: printf '*IDN?\n' | nc
+
+    async def delivered() -> None:
+        await received.join()
+        await link.quiet()
 
     async def work() -> None:
         while True:

@@ -41,6 +41,9 @@ FIRST_WORDS = 5.0
 #: A wait that is shorter than this is none [s]: an event loop wakes at whole milliseconds.
 _NO_WAIT = 1e-4
 
+#: How long the next message of a client that has nothing more to say may take [s], as the clock on the wall tells.
+LINGER = 1.0
+
 #: How often somebody who is kept out looks whether the lock was given up by a program in our own process [s].
 _LOOK_AGAIN = 0.2
 
@@ -130,14 +133,19 @@ class Link:
 
     def cut_off_by(self, data: bytes, *, end: bool = True) -> bool:
         """Whether these bytes end what the instrument works on; see Session.cut_off_by."""
-        return self.station.working and self.session.cut_off_by_bytes(data, end=end)
+        return self._may_cut_off() and self.session.cut_off_by_bytes(data, end=end)
+
+    def _may_cut_off(self) -> bool:
+        return self.station.working and not self.kept_out()
 
     async def _work_on(self, messages: Iterable[str | None]) -> None:
         try:
             for message in messages:
                 if message is None:
                     await asyncio.sleep(0)
-                elif self.station.working and self.session.cut_off_by(message):
+                    continue
+                await self._let_in()
+                if self._may_cut_off() and self.session.cut_off_by(message):
                     await self._finish(self.session.work_on(message))
                 else:
                     await self._in_turn(message)
@@ -146,19 +154,27 @@ class Link:
 
     async def _in_turn(self, message: str) -> None:
         """Let the instrument take a message when it is done with those of the other clients, and wait until it is."""
-        station = self.station
+        station, taken = self.station, False
         if self.session.stream:  # answers follow each other: the last one is delivered first
-            await self.turn()
             await self._delivered()
-        async with station.at_work:
-            station.working = True
-            try:
-                await self._finish(self.session.work_on(message))
-            finally:
-                station.working = False
-            self.messages_done += 1
-            station.stir()
-            await station.passes(station.device.pace)
+        while not taken and not self.closed:
+            await self._let_in()
+            async with station.at_work:
+                if self.session.stream and self.kept_out():  # the lock was given to another client meanwhile
+                    continue
+                taken = station.working = True
+                try:
+                    await self._finish(self.session.work_on(message))
+                finally:
+                    station.working = False
+                self.messages_done += 1
+                station.stir()
+                await station.passes(station.device.pace)
+
+    async def _let_in(self) -> None:
+        """On a stream, wait for the lock here; the servers of the other protocols have done that."""
+        if self.session.stream:
+            await self.turn()
 
     @staticmethod
     async def _finish(slices: Steps[None]) -> None:
@@ -169,6 +185,22 @@ class Link:
     async def finished(self, within: float | None = None, *, given_up: Callable[[], bool] = lambda: False) -> bool:
         """Wait until the instrument has worked on everything; whether that is so within this time [s]."""
         return await self._comes(lambda: self._work is None or self._work.done(), within, given_up)
+
+    async def linger(self, ended: Callable[[], Awaitable[object]]) -> None:
+        """Wait for the end of what a client has sent that says no more, as long as the instrument goes on with it.
+
+        On a stream an answer is waited for, too: the client may have closed its own direction alone.
+        """
+        done = -1
+        while done < self.messages_done or self._answers_later():
+            done = self.messages_done
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(LINGER):
+                    await ended()
+                    return
+
+    def _answers_later(self) -> bool:
+        return self.session.stream and 0 < (self.due() or 0.0) < INFINITY
 
     def _drop_work(self) -> None:
         if self._work is not None:

@@ -86,6 +86,9 @@ class Vxi11Server:
         connection = _Connection(self)
         try:
             await serve(_program(CORE, connection.procedures()), reader, writer)
+        except EOFError:
+            await connection.linger()
+            raise
         finally:
             connection.close()
 
@@ -126,6 +129,12 @@ class _Connection:
     def __init__(self, server: Vxi11Server) -> None:
         self._server = server
         self._numbers: set[int] = set()
+
+    async def linger(self) -> None:
+        """Let the instrument work on the last commands."""
+        for number in self._numbers:
+            link = self._server.link(number).link
+            await link.linger(link.finished)
 
     def close(self) -> None:
         for number in self._numbers:
@@ -260,6 +269,8 @@ class _Connection:
         number = parameters.number()
         if number not in self._numbers:
             return packed(Error.INVALID_LINK)
+        link = self._server.link(number).link
+        await link.linger(link.finished)  # the last commands may wait for those of other clients
         self._forget(number)
         return packed(Error.NONE)
 

@@ -228,6 +228,56 @@ def test_empty_lines_leave_the_others_their_turn(monkeypatch):
     assert asyncio.run(turns_meanwhile()) >= 255  # a turn after every 4096 bytes
 
 
+# --- locks ---
+
+
+async def turns(n=300):
+    for _ in range(n):
+        await asyncio.sleep(0)
+
+
+@pytest.mark.parametrize("message", [b"ABOR\n", b"ABOR\n*CLS\n"], ids=["alone", "with another message"])
+def test_who_is_kept_out_does_not_abort_the_holders_measurement(monkeypatch, message):
+    bench = Bench(monkeypatch)
+
+    async def abort():
+        holder, other = bench.link(), bench.link(stream=True)
+        assert await holder.lock(None, 0.0)
+        assert await holder.write(b"ENDL?\n")
+        assert await other.write(message)
+        await turns()
+        yield bench.station.working
+        holder.unlock()
+        await turns()
+        yield bench.station.working
+
+    assert asyncio.run(collected(abort())) == [True, False]
+
+
+async def collected(values):
+    return [value async for value in values]
+
+
+def test_a_command_that_waits_its_turn_waits_for_a_lock_given_meanwhile(monkeypatch):
+    bench = Bench(monkeypatch)
+
+    async def lock_meanwhile():
+        busy, waiting, holder = bench.link(), bench.link(stream=True), bench.link()
+        assert await busy.write(b"ENDL?\n")
+        assert await waiting.write(b"*RST\n")
+        await turns()
+        assert await holder.lock(None, 0.0)
+        assert await holder.write(b"ABOR\n")
+        await turns()
+        assert not bench.station.working
+        yield bench.counter.resets
+        holder.unlock()
+        await turns()
+        yield bench.counter.resets
+
+    assert asyncio.run(collected(lock_meanwhile())) == [0, 1]
+
+
 # --- the same, in slices ---
 
 

@@ -8,7 +8,7 @@ import pytest
 from instruments.clock import WallClock
 from instruments.virtual.bench.bus import Bus
 from instruments.virtual.servers.hislip import Client
-from instruments.virtual.servers.hislip_messages import HEADER, LONGEST, Channel, Type
+from instruments.virtual.servers.hislip_messages import HEADER, LONGEST, Channel, Message, Type
 from instruments.virtual.servers.station import Link, Station
 from support.served import NETWORK, NO_ERROR, Thing, channels, header, send, until
 
@@ -160,7 +160,8 @@ def test_a_second_channel_that_does_not_come_ends_the_first(served, monkeypatch)
 
 
 @pytest.mark.parametrize("which", [0, 1])
-def test_either_channel_takes_the_other_with_it(served, which):
+def test_either_channel_takes_the_other_with_it(served, monkeypatch, which):
+    monkeypatch.setattr("instruments.virtual.servers.station.LINGER", 0.01)
     both = channels(served)
     both[which].close()
     assert both[1 - which].recv(10) == b""
@@ -210,6 +211,34 @@ def test_replies_that_are_never_read_do_not_pile_up(which, kind, control, payloa
         return [writer.piled_up for writer in writers]
 
     assert max(asyncio.run(flood())) < 100  # one reply
+
+
+class ClearedMeanwhile(FullWriter):
+    """The connection to a client that begins a device clear while it is told that its answer is interrupted."""
+
+    client = None
+
+    async def drain(self):
+        if self.piled_up:
+            self.client.clear(self.client.other, None)
+
+
+def test_a_message_is_dropped_by_a_clear_while_the_interruption_is_told():
+    thing = Thing(WallClock())
+
+    async def clear_meanwhile():
+        writer = ClearedMeanwhile()
+        reader = asyncio.StreamReader()
+        client = writer.client = Client(Link(Station(Bus({NETWORK: thing}), thing)), Channel(reader, FullWriter()))
+        client.other = Channel(reader, writer)
+        await client._take(Message(Type.DATA_END, parameter=2, payload=b"SLOW?"))
+        await client.link.finished()
+        await client._take(Message(Type.DATA_END, parameter=4, payload=b"LEV 5"))
+        await client.link.finished()
+        assert client.clearing
+
+    asyncio.run(clear_meanwhile())
+    assert thing.settings["level"] == 0
 
 
 @pytest.mark.parametrize("which", [0, 1])

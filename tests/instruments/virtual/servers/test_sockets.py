@@ -1,16 +1,8 @@
 """Bare TCP: a line feed ends a message, answers follow each other."""
 
-import asyncio
-import contextlib
 import socket
 
-import pytest
-
-from instruments.clock import WallClock
-from instruments.virtual.bench.bus import Bus
-from instruments.virtual.servers.socket_server import converse
-from instruments.virtual.servers.station import Station
-from support.served import AT_MOST, NETWORK, Thing, until
+from support.served import AT_MOST, until
 
 
 def test_many_questions_at_once_are_answered_in_order(served):
@@ -31,7 +23,7 @@ def test_bytes_may_come_one_by_one(served):
 
 
 def test_who_has_said_all_still_gets_the_answer(served, monkeypatch):
-    monkeypatch.setattr("instruments.virtual.servers.socket_server._LINGER", AT_MOST)
+    monkeypatch.setattr("instruments.virtual.servers.station.LINGER", AT_MOST)
     bare = served.bare("socket")
     bare.sendall(b"*IDN?\n")
     bare.shutdown(socket.SHUT_WR)
@@ -54,46 +46,3 @@ def flooded(bare):
         return bare.send(b"BLOC?\n" * 10_000) > 0
     except BlockingIOError:
         return False
-
-
-class VirtualTime(asyncio.SelectorEventLoop):
-    """An event loop that jumps to the next timer instead of waiting for it."""
-
-    def __init__(self):
-        self.now = 0.0
-        super().__init__()
-        select = self._selector.select
-
-        def jump(timeout):
-            self.now += timeout or 0.0
-            return select(0)
-
-        self._selector.select = jump
-
-    def time(self):
-        return self.now
-
-
-class OneMessage:
-    """A wire whose other end sends these bytes, and then no more."""
-
-    def __init__(self, data):
-        self.left = [b"", data]
-
-    async def read(self):
-        return self.left.pop()
-
-    async def write(self, data):
-        pass
-
-
-def test_commands_sent_before_the_end_are_all_worked_on(monkeypatch):
-    loop = VirtualTime()
-    monkeypatch.setattr("instruments.clock.time.monotonic", lambda: loop.now)
-    thing = Thing(WallClock())
-    thing.pace = 0.02  # longer in all than a client that has said all may take without a message
-    with contextlib.closing(loop):
-        station = Station(Bus({NETWORK: thing}), thing)
-        loop.run_until_complete(converse(station, OneMessage(b"LEV 1\n" * 300 + b"LEV 7\n")))
-    assert thing.settings["level"] == 7
-    assert loop.now == pytest.approx(301 * 0.02)
