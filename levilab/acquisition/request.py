@@ -32,6 +32,7 @@ HOW = (
     "acquired on the virtual bench: the drivers are the real ones, the instruments wire-level models, the top {top}, "
     "and no real top was measured"
 )
+_ANEW = "correct it or start anew"
 _SPIN_ONLY = "a spin that decays by the {law}; drag and fall were drawn by the seed"
 _IN_MOTION = "that of the scene {name}, simulated in full motion"
 
@@ -89,11 +90,14 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
         person=options.person,
     )
     if virtual:
-        return _on_the_virtual_bench(request, options)
-    wiring = described_wiring(config)
-    for kind in EXPERIMENTS[experiment].instruments:
-        wiring.described(kind)
+        request = _on_the_virtual_bench(request, options)
+    else:
+        wiring = described_wiring(config)
+        for kind in EXPERIMENTS[experiment].instruments:
+            wiring.described(kind)
     if run:
+        _check_readings(run, request)
+    if run and not virtual:
         run.elapsed()  # raises before the bench is touched
     return request
 
@@ -136,6 +140,28 @@ def _resumable(folder: Path, experiment: str) -> Run:
     if run.record.time_zero_utc is None or not run.count():
         raise CannotResume(f"{folder}: ended before its first reading, there is nothing to go on with: start anew")
     return run
+
+
+def _check_readings(run: Run, request: AcquisitionRequest) -> None:
+    """Raise CannotResume for readings after which the experiment cannot go on."""
+    experiment = EXPERIMENTS[request.experiment]
+    settings = settings_of(request.config, experiment.name)
+    channels = experiment.channels(settings)
+    names = [channel.name for channel in channels]
+    if [channel.get("name") for channel in run.record.channels] != names:
+        raise CannotResume(f"{run.folder}/run.json: channels: {', '.join(names)} are expected here; {_ANEW}")
+    readings = run.readings()
+    if list(readings.header) != names:
+        raise CannotResume(f"{readings.path}: the columns {', '.join(names)} are expected; {_ANEW}")
+    for channel in channels:
+        if channel.unit == "Hz" and channel.name in readings.frame and not (readings.column(channel.name) > 0).all():
+            raise CannotResume(f"{readings.path}: {channel.name}: only numbers above 0 are expected; {_ANEW}")
+    last = float(readings.column("time_s")[-1])
+    if isinstance(settings, CounterSettings) and last > settings.longest_s:
+        raise CannotResume(
+            f"{run.folder}: its last reading is of {last:g} s, and it was to end after {settings.longest_s:g} s "
+            f"({experiment.name}.longest_s): there is nothing to go on with; start anew"
+        )
 
 
 # --- the virtual bench ---
@@ -189,6 +215,8 @@ def _scene(name: str | None, run: Run | None) -> Scene | None:
     begun = run.record.configuration.get("scene") if run else None
     if name is None and begun is None:
         return None
+    if begun is not None and not isinstance(begun, dict):
+        raise CannotResume(f"{run.folder if run else ''}/run.json: configuration.scene: a table is expected; {_ANEW}")
     scene = scene_of(begun) if begun is not None else read_scene(str(name))
     if scene.top.aligned:
         raise SceneError(

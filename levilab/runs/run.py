@@ -54,7 +54,7 @@ class RunRecord(BaseModel):
     configuration: dict[str, Any] = {}
     instruments: dict[str, dict[str, Any]] = {}
     software: dict[str, str] = {}
-    seed: int | None = None
+    seed: int | None = Field(default=None, ge=0)
     note: str = ""
     synthetic: bool = False
     synthetic_how: str | None = None

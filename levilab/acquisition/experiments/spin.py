@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 
 #: The drive goes up in steps; each makes a held top swing a little about it [s].
 _RAMP_STEP_S = 1.0
+#: A ramp that takes longer from standstill to the drive's frequency is refused [s]: at 40 Hz one of 0.0019 Hz/s.  The
+#: top's mass fits its place for as long as the room keeps its temperature, which is no longer than some hours.
+_LONGEST_RAMP_S = 6 * 3600.0
 #: A held top swings about the drive's frequency by what the drive can hold at most, 0.5 Hz at 0.4 mT [Hz].
 _HELD_WITHIN_HZ = 1.0
 #: Whether the drive takes hold depends on how the top happens to point when it comes on, and one time in four it does
@@ -61,6 +64,12 @@ class SpinSettings(CounterSettings):
             raise ConfigError(
                 f"{table}.drive_frequency_hz = {self.drive_frequency_hz:g} is less than this bench allows, "
                 f"limits.drive_lowest_hz = {limits.drive_lowest_hz:g}"
+            )
+        slowest = self.drive_frequency_hz / _LONGEST_RAMP_S
+        if self.ramp_hz_per_s < slowest:
+            raise ConfigError(
+                f"{table}.ramp_hz_per_s = {self.ramp_hz_per_s:g} would raise the top for hours to "
+                f"{table}.drive_frequency_hz = {self.drive_frequency_hz:g}: at least {slowest:.2g} is expected"
             )
 
 

@@ -36,11 +36,11 @@ IDENTITIES = {
 
 
 @pytest.mark.parametrize("identity", IDENTITIES)
-def test_an_instrument_is_driver_for_identity_by_its_answer(identity):
+def test_the_answer_to_idn_names_the_driver_of_an_instrument(identity):
     assert driver_for_identity(identity) == IDENTITIES[identity]
 
 
-def test_everybody_who_is_listed_or_named_is_identify():
+def test_instruments_that_are_listed_or_named_are_asked_who_they_are():
     told = []
     found = search("@levilab", ["TCPIP0::nobody::inst0::INSTR"], told.append)
     assert [one.address for one in found] == ["TCPIP0::nobody::inst0::INSTR", *(s.address for s in VIRTUAL.values())]
@@ -100,7 +100,7 @@ def test_a_check_reads_each_kind_and_leaves_the_output_off():
 
 
 @pytest.mark.parametrize(("kind", "model"), [(kind, model) for kind, models in MODELS.items() for model in models])
-def test_every_virtual_model_is_driver_for_identity_by_what_it_says_of_itself(kind, model):
+def test_the_answer_of_every_virtual_model_names_its_driver(kind, model):
     device = MODELS[kind][model](own_world())
     assert driver_for_identity(device.identity) == (kind, model)
     assert "VIRTUAL" in device.identity  # so that a run with it is known as synthetic

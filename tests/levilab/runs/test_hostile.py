@@ -15,11 +15,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from levilab.acquisition.loop import acquire
 from levilab.errors import DataError
 from levilab.files import CannotWrite, parse_json, parse_toml, replace_atomically
+from levilab.formats.columns import CANONICAL
 from levilab.runs.listing import list_runs
 from levilab.runs.run import Run, find_run
 from levilab.runs.writer import RunWriter
+from support.acquisitions import Impatient, mock
 from support.commands import command
 from support.paths import SAMPLE_DATA
 
@@ -136,6 +139,8 @@ def test_markup_and_escapes_in_a_record_are_printed_as_text(tmp_path: Path) -> N
         ("time_zero_utc", '"9999-12-31T23:59:59"'),
         ("configuration", '{"spin": 3}'),
         ("configuration", '{"scene": {"top": []}}'),
+        ("seed", "-1"),
+        ("experiment", '"../x"'),
     ],
 )
 def test_an_odd_run_is_not_resumed_or_is_resumed(tmp_path: Path, key: str, value: str) -> None:
@@ -145,6 +150,94 @@ def test_an_odd_run_is_not_resumed_or_is_resumed(tmp_path: Path, key: str, value
         ended = command("acquire", "spin", *bench, "--resume", folder, cwd=tmp_path)
         assert ended.status in {0, 1, 2}
         assert "Traceback" not in ended.err
+
+
+@pytest.fixture(scope="module")
+def half(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A virtual run that was interrupted after some readings."""
+    return acquire(mock(tmp_path_factory.mktemp("half")), Impatient(8)).folder
+
+
+def refusal(half: Path, place: Path) -> str:
+    """The line with which a run is not resumed, and is left as it was."""
+    before = {path.name: path.read_bytes() for path in half.iterdir()}
+    ended = command("acquire", "spin", "--mock", "--resume", half, cwd=place)
+    assert ended.status == 1
+    (line,) = ended.err.splitlines()
+    assert {path.name: path.read_bytes() for path in half.iterdir()} == before
+    return line
+
+
+TIME, SPIN, U = ({"name": name, "unit": "", "source": ""} for name in CANONICAL[:3])
+
+
+@pytest.mark.parametrize(
+    ("way", "value", "says"),
+    [
+        (["seed"], -1, "seed = '-1'"),
+        (["configuration", "scene"], "x", "configuration.scene"),
+        (["configuration", "scene"], [], "configuration.scene"),
+        (["configuration", "spin", "ramp_hz_per_s"], 5e-324, "spin.ramp_hz_per_s"),
+        (["configuration", "spin", "ramp_hz_per_s"], 1e-4, "spin.ramp_hz_per_s"),
+        (["configuration", "limits", "drive_frequency_hz"], 1e308, "spin.ramp_hz_per_s"),
+        (["configuration", "spin", "longest_s"], 50.0, "spin.longest_s"),
+        (["channels"], [TIME, U], "channels"),
+        (["channels"], [SPIN, U], "channels"),
+        (["channels"], [TIME, SPIN, SPIN], "channels"),
+        (["channels"], [TIME, SPIN, U, {"name": "x"}], "channels"),
+    ],
+)
+def test_a_run_with_an_odd_record_is_not_resumed(
+    tmp_path: Path, half: Path, way: list[str], value: object, says: str
+) -> None:
+    folder = Path(shutil.copytree(half, tmp_path / "run"))
+    record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    *tables, key = way
+    table = record
+    for name in tables:
+        table = table[name]
+    table[key] = value
+    if way[-1] == "drive_frequency_hz":  # what the bench allows, too
+        record["configuration"]["spin"][key] = value
+    (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
+    assert says in refusal(folder, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("row", "says"),
+    [
+        ("80,0,0.03", "spin_frequency_hz"),
+        ("80,-1,0.03", "spin_frequency_hz"),
+        ("1e9,30,0.03", "spin.longest_s"),
+    ],
+)
+def test_a_run_with_odd_readings_is_not_resumed(tmp_path: Path, half: Path, row: str, says: str) -> None:
+    folder = Path(shutil.copytree(half, tmp_path / "run"))
+    with (folder / "readings.csv").open("a", encoding="utf-8") as file:
+        file.write(row + "\n")
+    assert says in refusal(folder, tmp_path)
+
+
+def test_readings_without_a_declared_column_are_not_resumed(tmp_path: Path, half: Path) -> None:
+    folder = Path(shutil.copytree(half, tmp_path / "run"))
+    (folder / "readings.csv").write_text("time_s\n0\n10\n20\n", encoding="utf-8")
+    assert "readings.csv" in refusal(folder, tmp_path)
+
+
+@pytest.mark.parametrize("row", ["80,nan,0.03", "80,inf,0.03", "nan,30,0.03", "80,,", "80,30,"])
+def test_a_missed_reading_does_not_keep_a_run_from_going_on(tmp_path: Path, half: Path, row: str) -> None:
+    folder = Path(shutil.copytree(half, tmp_path / "run"))
+    with (folder / "readings.csv").open("a", encoding="utf-8") as file:
+        file.write(row + "\n")
+    assert command("acquire", "spin", "--mock", "--resume", folder, cwd=tmp_path).status == 0
+
+
+def test_a_ramp_of_days_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "slow.toml").write_text("[spin]\nramp_hz_per_s = 1e-6\n", encoding="utf-8")
+    ended = command("acquire", "spin", "--mock", "--bench", "slow.toml", cwd=tmp_path)
+    assert ended.status == 1
+    (line,) = ended.err.splitlines()
+    assert "spin.ramp_hz_per_s = 1e-06" in line
 
 
 @pytest.mark.parametrize(("text", "says"), [("noon", "time_zero_utc"), ("9999-12-31T23:59:59", "set back")])

@@ -214,7 +214,13 @@ def test_a_resume_at_a_bench_that_does_not_answer_keeps_the_run(tmp_path: Path) 
     folder = tmp_path / "run"
     shutil.copytree(SAMPLE_DATA / "spin-down-1", folder)
     record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-    changes = {"status": "interrupted", "instruments": {}, "seed": None, "time_zero_utc": "2026-11-20T10:15:00Z"}
+    changes = {
+        "status": "interrupted",
+        "instruments": {},
+        "seed": None,
+        "time_zero_utc": "2026-11-20T10:15:00Z",
+        "configuration": {"spin": {"reading_u_hz": 0.03}},
+    }
     (folder / "run.json").write_text(json.dumps(record | changes), encoding="utf-8")
     (tmp_path / "bench.toml").write_text(
         '[counter]\nmodel = "53230A"\naddress = "TCPIP0::127.0.0.1::9::SOCKET"\n'
