@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 
 SCHEMA: Literal["levilab-result/1"] = "levilab-result/1"
 RESULT = "result.json"
-#: Endings of data files: two files that differ in nothing else must not share a result.
-DATA_SUFFIXES = frozenset({".csv", ".txt", ".dat", ".tsv", ".asc", ".wav"})
 
 
 # --- what is in it -------------------------------------------------------------------------------------
@@ -131,18 +129,8 @@ class Place:
 
 
 def beside(path: Path) -> Place:
-    """The place of a run folder's result, or of a data file's."""
-    return Place(path) if path.is_dir() else Place(path.parent, _result_name(path))
-
-
-def _result_name(path: Path) -> str:
-    """A data file's name without its ending, or with it where another data file has the same name."""
-    alike = [
-        other
-        for other in path.parent.iterdir()
-        if other.stem.casefold() == path.stem.casefold() and other.suffix.lower() in DATA_SUFFIXES
-    ]
-    return path.name if len({other.name for other in (*alike, path)}) > 1 else path.stem
+    """The place of a run folder's result, or of a data file's: its whole name, which no other file beside it has."""
+    return Place(path) if path.is_dir() else Place(path.parent, path.name)
 
 
 def place_of(paths: Sequence[Path], sources: Sequence[Source[Any]]) -> Place:
