@@ -50,9 +50,10 @@ def test_no_two_files_share_a_result_whoever_lies_beside_them(names: set[str]) -
             path.write_bytes(b"")
         places = [beside(path) for path in paths]
     assert places == before  # a file that comes later renames no result
-    files = [place.result for place in (*places, Place(Path(folder)))]
-    files += [place.figure("spindown") for place in (*places, Place(Path(folder)))]
-    assert len({str(file).casefold() for file in files}) == 2 * (len(names) + 1)
+    places.append(Place(Path(folder)))
+    files = [place.result(analysis) for place in places for analysis in ("", "spindown", "field")]
+    files += [place.figure(analysis) for place in places for analysis in ("spindown", "field")]
+    assert len({str(file).casefold() for file in files}) == 5 * len(places)
 
 
 def test_files_that_differ_in_their_ending_alone_keep_their_results(tmp_path: Path) -> None:
@@ -70,7 +71,7 @@ def test_the_result_of_a_run_folder_is_result_json_in_it(tmp_path: Path, sample_
     run = shutil.copytree(sample_data / "spin-down-1", tmp_path / "run")
     assert saved(run) == ["result.json", "spindown.png"]
     assert (run / "result.json").is_file()
-    assert analyze_spindowns([run / "readings.csv"], Options()).place.result == run / "result.json"
+    assert analyze_spindowns([run / "readings.csv"], Options()).place.result() == run / "result.json"
 
 
 def write_result(tmp_path: Path) -> Path:
