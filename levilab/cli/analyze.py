@@ -128,7 +128,9 @@ def options(columns: str, reading_u: float | None, uncertainty: str, keep_outlie
 
 def _save(analysis: Analysis[Any], found: Any, out: Path | None) -> tuple[LevilabError | None, list[Path]]:
     """What kept the result from being written, or the files; what was found is shown either way."""
+    from levilab.pipelines.catalogue import save
+
     try:
-        return None, analysis.save(found, out)
+        return None, save(analysis, found, out)
     except LevilabError as error:
         return error, []

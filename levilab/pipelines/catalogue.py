@@ -47,6 +47,14 @@ class Analyzed(Protocol):
 
 
 A = TypeVar("A", bound=Analyzed)
+A_contra = TypeVar("A_contra", bound=Analyzed, contravariant=True)
+
+
+class Save(Protocol[A_contra]):
+    """How an analysis writes."""
+
+    def __call__(self, found: A_contra, folder: Path | None, /, *, first: bool) -> list[Path]:
+        """Write the result and the figure, beside the inputs or into a folder; first: whether result.json is its."""
 
 
 @dataclass(frozen=True)
@@ -55,15 +63,15 @@ class Analysis(Generic[A]):
 
     needs: its name, the experiments whose runs suit it, and what a data file must hold;
     analyze: what lies at the paths; recall: the same, from result.json where it holds; document: the content of
-    result.json for a folder; save: that and the figure, beside the inputs or into a folder; tables: for the terminal;
-    svg: the figure; part: of a report.
+    result.json for a folder; save: see the function of that name; tables: for the terminal; svg: the figure; part: of a
+    report.
     """
 
     needs: Needs[Any]
     analyze: Callable[[Sequence[Path], Options], A]
     recall: Callable[[Sequence[Path], Options], A]
     document: Callable[[A, Path], dict[str, Any]]
-    save: Callable[[A, Path | None], list[Path]]
+    save: Save[A]
     tables: Callable[[A], tuple[Table, ...]]
     svg: Callable[[A], str]
     part: Callable[[A], ReportPart]
@@ -116,6 +124,17 @@ def _suiting(run: Callable[[Analysis[Any]], Any]) -> list[tuple[Analysis[Any], A
     if not found:
         raise errors[0]
     return found
+
+
+def save(analysis: Analysis[A], found: A, folder: Path | None = None) -> list[Path]:
+    """Write the result and the figure beside the inputs, or into a folder; returns the files.  Raises CannotWrite.
+
+    The name result.json belongs to the first row that takes the run's experiment; with data files and with several
+    inputs, which may be of any kind, to the first row of all.  Every other analysis has its name in its result's.
+    """
+    run = found.sources[0].run if len(found.sources) == 1 else None
+    rows = [row for row in ANALYSES.values() if run is None or run.record.experiment in row.needs.experiments]
+    return analysis.save(found, folder, first=rows[0].name == analysis.name)
 
 
 def print_analysis(analysis: Analysis[A], found: A) -> None:

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 
 SCHEMA: Literal["levilab-result/1"] = "levilab-result/1"
 RESULT = "result.json"
-#: Endings of data files: two files that differ in nothing else must not share a result.
-DATA_SUFFIXES = frozenset({".csv", ".txt", ".dat", ".tsv", ".asc", ".wav"})
 
 
 # --- what is in it -------------------------------------------------------------------------------------
@@ -115,47 +113,58 @@ def relative(path: Path, folder: Path) -> str:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a result belongs: a folder, and the name of the data file that it is of, if it is of one."""
+    """Where results belong: a folder, and the name of the data file that they are of, if they are of one.
+
+    No two files share a name: an analysis has no dot in its name and is not called "result".
+    """
 
     folder: Path
     name: str = ""
 
-    @property
-    def result(self) -> Path:
-        """The file of the result."""
-        return self.folder / (f"{self.name}.{RESULT}" if self.name else RESULT)
+    def result(self, analysis: str = "") -> Path:
+        """The file of the result: of the analysis that is first here, or of another one by its name."""
+        return self._file(f"result.{analysis}.json" if analysis else RESULT)
+
+    def results(self, analysis: str) -> tuple[Path, Path]:
+        """The files that may hold the result of an analysis."""
+        return self.result(), self.result(analysis)
 
     def figure(self, analysis: str) -> Path:
         """The file of the figure."""
-        return self.folder / (f"{self.name}.{analysis}.png" if self.name else f"{analysis}.png")
+        return self._file(f"{analysis}.png")
+
+    def _file(self, name: str) -> Path:
+        return self.folder / (f"{self.name}.{name}" if self.name else name)
 
 
 def beside(path: Path) -> Place:
-    """The place of a run folder's result, or of a data file's."""
-    return Place(path) if path.is_dir() else Place(path.parent, _result_name(path))
-
-
-def _result_name(path: Path) -> str:
-    """A data file's name without its ending, or with it where another data file has the same name."""
-    alike = [
-        other
-        for other in path.parent.iterdir()
-        if other.stem.casefold() == path.stem.casefold() and other.suffix.lower() in DATA_SUFFIXES
-    ]
-    return path.name if len({other.name for other in (*alike, path)}) > 1 else path.stem
+    """The place of a run folder's result, or of a data file's: its whole name, which no other file beside it has."""
+    return Place(path) if path.is_dir() else Place(path.parent, path.name)
 
 
 def place_of(paths: Sequence[Path], sources: Sequence[Source[Any]]) -> Place:
-    """Beside the run or the file; of several the folder that was searched for them, else the present one."""
-    if len(sources) == 1:
-        return beside(sources[0].path)
-    return Place(paths[0]) if len(paths) == 1 else Place(Path())
+    """Beside the run or the file; of several see `_together`."""
+    return beside(sources[0].path) if len(sources) == 1 else _together(paths)
 
 
-def save(result: Result, place: Place, picture: bytes) -> list[Path]:
-    """Write a result and its figure; returns the files.  Raises CannotWrite."""
+def _together(paths: Sequence[Path]) -> Place:
+    """Of several inputs: the folder that was searched for them, else the present one, or above it if that is a run."""
+    if len(paths) == 1:
+        return Place(paths[0])
+    return Place(Path("..") if Path(RECORD).exists() else Path())
+
+
+def save(result: Result, place: Place, picture: bytes, *, first: bool = True) -> list[Path]:
+    """Write a result and its figure; returns the files.  Raises CannotWrite.
+
+    Args:
+        result: what is written.
+        place: where.
+        picture: the figure, as PNG.
+        first: whether the analysis is the first here, so that result.json is its own.
+    """
     text = json.dumps(result.as_dict(), indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False)
-    files = [place.result, place.figure(result.analysis)]
+    files = [place.result("" if first else result.analysis), place.figure(result.analysis)]
     try:
         place.folder.mkdir(parents=True, exist_ok=True)
         replace_atomically(files[0], text + "\n")
@@ -217,18 +226,20 @@ class Archive(Generic[R]):
 
     def __init__(self, paths: Sequence[Path], model: type[R]) -> None:
         self._model = model
+        self._analysis: str = model.model_fields["analysis"].default
         self._read: dict[Path, R | None] = {}
         self._known: dict[Path, dict[str | Path, int]] = {}
-        searched = len(paths) == 1 and paths[0].is_dir() and not (paths[0] / RECORD).exists()
-        self._together = paths[0] / RESULT if searched else Path(RESULT) if len(paths) > 1 else None
+        several = len(paths) > 1 or (paths[0].is_dir() and not (paths[0] / RECORD).exists())
+        self._together = _together(paths).results(self._analysis) if several else ()
 
     def whole(self, sources: Sequence[Source[Any]]) -> tuple[Path, R] | None:
         """The result of just these inputs, unchanged."""
-        file = beside(sources[0].path).result if len(sources) == 1 else self._together
-        result = self._result(file) if file else None
+        files = beside(sources[0].path).results(self._analysis) if len(sources) == 1 else self._together
         wanted = sorted(source.sha256 for source in sources)
-        if file and result and sorted(given.sha256 for given in result.inputs) == wanted:
-            return file, result
+        for file in files:
+            result = self._result(file)
+            if result and sorted(given.sha256 for given in result.inputs) == wanted:
+                return file, result
         return None
 
     def earlier(self, path: Path, data: Path, sha256: str | None = None) -> Earlier[R] | None:
@@ -240,8 +251,6 @@ class Archive(Generic[R]):
             sha256: of that file.
         """
         files = self._files(path)
-        if files[-1] not in files[:-1]:
-            self._result_above(files[-1])
         keys: list[str | Path] = [sha256] if sha256 else []
         for key in (*keys, data.resolve()):
             for file in files:
@@ -254,8 +263,12 @@ class Archive(Generic[R]):
 
     def _files(self, path: Path) -> list[Path]:
         """Where an input's result may lie."""
-        together = [self._together] if self._together else []
-        return [*together, beside(path).result, path.parent / RESULT]
+        own = [*self._together, *beside(path).results(self._analysis)]
+        above = Place(path.parent).results(self._analysis)
+        for file in above:
+            if file not in own:
+                self._result_above(file)
+        return [*own, *above]
 
     def _numbers(self, file: Path) -> dict[str | Path, int]:
         """The inputs of a result by their hash and by their path."""

@@ -214,13 +214,19 @@ class SpinDownResult(Result, _WithLaws):
 # --- writing -------------------------------------------------------------------------------------------
 
 
-def save_result(analysis: SpinDownAnalysis, folder: Path | None = None) -> list[Path]:
-    """Write result.json and the figure beside the inputs, or into a folder; returns the files.  Raises CannotWrite."""
+def save_result(analysis: SpinDownAnalysis, folder: Path | None = None, *, first: bool = True) -> list[Path]:
+    """Write the result and the figure beside the inputs, or into a folder; returns the files.  Raises CannotWrite.
+
+    Args:
+        analysis: what was found.
+        folder: in the place of that of the inputs.
+        first: whether this is the first analysis of the inputs, see `levilab.pipelines.catalogue.save`.
+    """
     from levilab.pipelines.spindown.figure import spindown_figure
     from levilab.present.style import as_png
 
     place = replace(analysis.place, folder=folder or analysis.home)
-    return save_files(result_of(analysis, place), place, as_png(spindown_figure(analysis)))
+    return save_files(result_of(analysis, place), place, as_png(spindown_figure(analysis)), first=first)
 
 
 def as_document(analysis: SpinDownAnalysis, folder: Path) -> dict[str, Any]:

@@ -66,7 +66,7 @@ def test_no_save_writes_nothing_and_out_writes_there(levilab: Command, tmp_path:
     levilab("analyze", "spindown", path, "--no-save")
     assert list(tmp_path.iterdir()) == [path]
     levilab("analyze", "spindown", path, "--out", "there")
-    assert sorted(p.name for p in (tmp_path / "there").iterdir()) == ["my.result.json", "my.spindown.png"]
+    assert sorted(p.name for p in (tmp_path / "there").iterdir()) == ["my.csv.result.json", "my.csv.spindown.png"]
 
 
 def test_an_analysis_need_not_be_named(levilab: Command, sample_data: Path) -> None:
@@ -81,14 +81,14 @@ def test_two_files_in_a_folder_have_a_result_each_that_the_report_reads(levilab:
     for k, name in enumerate(("a.csv", "b.csv")):
         levilab("analyze", "spindown", spin_down_csv(tmp_path / name, seed=k), "--uncertainty", "profile")
     names = {path.name for path in tmp_path.iterdir()}
-    assert {f"{file}.{kind}" for file in "ab" for kind in ("result.json", "spindown.png")} <= names
+    assert {f"{file}.csv.{kind}" for file in "ab" for kind in ("result.json", "spindown.png")} <= names
     levilab("report", "b.csv")
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "68 % interval (profile)" in page
-    assert "as levilab analyze found it: b.result.json" in page
+    assert "as levilab analyze found it: b.csv.result.json" in page
     levilab("report", "b.csv", "--keep-outliers")
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "other options than those of b.result.json" in page
+    assert "other options than those of b.csv.result.json" in page
 
 
 def test_what_does_not_belong_to_the_analysis_is_a_message_and_no_warning(levilab: Command, sample_data: Path) -> None:
@@ -100,9 +100,9 @@ def test_what_does_not_belong_to_the_analysis_is_a_message_and_no_warning(levila
 
 def test_a_result_that_is_damaged_ends_the_report_with_one_line(levilab: Command, tmp_path: Path) -> None:
     path = spin_down_csv(tmp_path / "my.csv")
-    (tmp_path / "my.result.json").write_text("{", encoding="utf-8")
+    (tmp_path / "my.csv.result.json").write_text("{", encoding="utf-8")
     (line,) = levilab("report", path, check=1).stderr.splitlines()
-    assert line.startswith(f"levilab: {tmp_path / 'my.result.json'}: is cut off")
+    assert line.startswith(f"levilab: {tmp_path / 'my.csv.result.json'}: is cut off")
 
 
 def test_columns_of_another_name_are_mapped(levilab: Command, tmp_path: Path) -> None:

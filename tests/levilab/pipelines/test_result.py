@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from levilab.errors import DataError
-from levilab.pipelines.result import read_result, save
+from levilab.pipelines.result import Place, beside, read_result, save
 from levilab.pipelines.sources import Options
 from levilab.pipelines.spindown.analysis import analyze_spindowns
 from levilab.pipelines.spindown.document import SpinDownResult, result_of, save_result
 from support.spin_downs import spin_down_csv
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 def saved(*paths: Path) -> list[str]:
@@ -25,17 +26,42 @@ def saved(*paths: Path) -> list[str]:
 def test_results_of_two_files_in_one_folder_stand_side_by_side(tmp_path: Path) -> None:
     for k, name in enumerate(("monday.csv", "tuesday.csv")):
         saved(spin_down_csv(tmp_path / name, seed=k))
-    for name in ("monday", "tuesday"):
+    for name in ("monday.csv", "tuesday.csv"):
         result = json.loads((tmp_path / f"{name}.result.json").read_text(encoding="utf-8"))
-        assert result["inputs"][0]["path"] == f"{name}.csv"
+        assert result["inputs"][0]["path"] == name
         assert (tmp_path / f"{name}.spindown.png").stat().st_size > 10_000
 
 
-def test_files_that_differ_in_their_ending_alone_keep_it_in_the_result(tmp_path: Path) -> None:
-    paths = [spin_down_csv(tmp_path / "run.csv", seed=1), spin_down_csv(tmp_path / "run.txt", seed=2)]
+#: Names that come near one another: with dots, without an ending, like results themselves.
+WORDS = st.sampled_from(["x", "run", "csv", "txt", "log", "001", "002", "result", "json", "spindown", "png", ""])
+NAMES = st.lists(WORDS, min_size=1, max_size=4).map(".".join).filter(lambda name: name.strip("."))
+
+
+@given(names=st.sets(NAMES, min_size=2, max_size=12))
+@example(names={"run.001", "run.002"})
+@example(names={"a.log", "a.prn", "a"})
+@example(names={"x.csv", "x.txt", "x.csv.dat", "x"})
+@example(names={"result", "result.json", "x.result"})
+def test_no_two_files_share_a_result_whoever_lies_beside_them(names: set[str]) -> None:
+    with TemporaryDirectory() as folder:
+        paths = [Path(folder) / name for name in sorted(names)]
+        before = [beside(path) for path in paths]
+        for path in paths:
+            path.write_bytes(b"")
+        places = [beside(path) for path in paths]
+    assert places == before  # a file that comes later renames no result
+    places.append(Place(Path(folder)))
+    files = [place.result(analysis) for place in places for analysis in ("", "spindown", "field")]
+    files += [place.figure(analysis) for place in places for analysis in ("spindown", "field")]
+    assert len({str(file).casefold() for file in files}) == 5 * len(places)
+
+
+def test_files_that_differ_in_their_ending_alone_keep_their_results(tmp_path: Path) -> None:
+    paths = [spin_down_csv(tmp_path / name, seed=k) for k, name in enumerate(("run.001", "run.002", "run"))]
     assert [saved(path) for path in paths] == [
-        ["run.csv.result.json", "run.csv.spindown.png"],
-        ["run.txt.result.json", "run.txt.spindown.png"],
+        ["run.001.result.json", "run.001.spindown.png"],
+        ["run.002.result.json", "run.002.spindown.png"],
+        ["run.result.json", "run.spindown.png"],
     ]
 
 
@@ -45,7 +71,7 @@ def test_the_result_of_a_run_folder_is_result_json_in_it(tmp_path: Path, sample_
     run = shutil.copytree(sample_data / "spin-down-1", tmp_path / "run")
     assert saved(run) == ["result.json", "spindown.png"]
     assert (run / "result.json").is_file()
-    assert analyze_spindowns([run / "readings.csv"], Options()).place.result == run / "result.json"
+    assert analyze_spindowns([run / "readings.csv"], Options()).place.result() == run / "result.json"
 
 
 def write_result(tmp_path: Path) -> Path:

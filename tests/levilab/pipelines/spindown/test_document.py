@@ -101,7 +101,7 @@ def test_results_that_lack_numbers_are_recalled_too(tmp_path: Path, fitted: list
 def test_what_is_shown_is_what_stands_in_the_result(tmp_path: Path) -> None:
     """Not a number is computed again."""
     analyzed(spin_down_csv(tmp_path / "my.csv"))
-    file = tmp_path / "my.result.json"
+    file = tmp_path / "my.csv.result.json"
     result = json.loads(file.read_text(encoding="utf-8"))
     result["verdict"] = "As a person wrote it."
     result["runs"][0]["models"][2]["parameters"]["c32"] |= {"value": 1.25e-4, "interval_68": [1.2e-4, 1.3e-4]}
@@ -203,7 +203,7 @@ def test_a_file_of_that_name_above_the_input_may_be_anything(tmp_path: Path) -> 
 def test_an_outlier_that_the_readings_do_not_hold_is_an_error(tmp_path: Path) -> None:
     path = spin_down_csv(tmp_path / "my.csv")
     analyzed(path)
-    file = tmp_path / "my.result.json"
+    file = tmp_path / "my.csv.result.json"
     result = json.loads(file.read_text(encoding="utf-8"))
     result["runs"][0]["outliers"] = [{"index": 20, "time_s": 0.0, "spin_frequency_hz": 1.0}]
     file.write_text(json.dumps(result), encoding="utf-8")

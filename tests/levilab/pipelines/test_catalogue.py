@@ -1,0 +1,116 @@
+"""Several analyses of the same inputs: each keeps its result, and only what does not suit one is passed over."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Literal
+
+import pytest
+
+from levilab.pipelines import catalogue
+from levilab.pipelines.catalogue import ANALYSES, Analysis, analyze_suiting, recall_suiting
+from levilab.pipelines.catalogue import save as save_found
+from levilab.pipelines.result import Archive, save
+from levilab.pipelines.sources import Options
+from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
+from levilab.pipelines.spindown.document import SpinDownResult, result_of
+from support.spin_downs import spin_down_csv
+
+SPINDOWN = ANALYSES["spindown"]
+
+
+class SecondResult(SpinDownResult):
+    """The result of another analysis."""
+
+    analysis: Literal["second"] = "second"  # type: ignore[assignment]
+
+
+def save_spindown(found: SpinDownAnalysis, folder: Path | None = None, *, first: bool) -> list[Path]:
+    """Without drawing."""
+    place = replace(found.place, folder=folder or found.home)
+    return save(result_of(found, place), place, b"", first=first)
+
+
+def save_second(found: SpinDownAnalysis, folder: Path | None = None, *, first: bool) -> list[Path]:
+    place = replace(found.place, folder=folder or found.home)
+    result = SecondResult.model_validate(result_of(found, place).as_dict() | {"analysis": "second"})
+    return save(result, place, b"", first=first)
+
+
+def second_row(*experiments: str) -> Analysis[Any]:
+    """Another analysis that reads spin-downs."""
+    needs = replace(SPINDOWN.needs, analysis="second", experiments=frozenset(experiments))
+    return replace(SPINDOWN, needs=needs, save=save_second)
+
+
+def use(monkeypatch: pytest.MonkeyPatch, *rows: Analysis[Any]) -> None:
+    monkeypatch.setattr(catalogue, "ANALYSES", {row.name: row for row in rows})
+
+
+@pytest.fixture
+def two(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A second analysis of the same runs and files, below the first."""
+    use(monkeypatch, replace(SPINDOWN, save=save_spindown), second_row("spin"))
+
+
+@pytest.fixture
+def runs(tmp_path: Path, sample_data: Path) -> Path:
+    for k in (1, 2):
+        shutil.copytree(sample_data / f"spin-down-{k}", tmp_path / "runs" / f"run-{k}")
+    return tmp_path / "runs"
+
+
+def analyzed(*paths: Path) -> dict[str, str]:
+    """Name of each result → the analysis that it says it is of."""
+    written = [save_found(row, found)[0] for row, found in analyze_suiting(paths, Options())]
+    return {file.name: json.loads(file.read_text(encoding="utf-8"))["analysis"] for file in written}
+
+
+@pytest.mark.usefixtures("two")
+def test_two_analyses_of_one_input_have_a_result_each(tmp_path: Path, runs: Path) -> None:
+    both = {"result.json": "spindown", "result.second.json": "second"}
+    assert analyzed(runs / "run-1") == both
+    assert analyzed(runs) == both
+    file = spin_down_csv(tmp_path / "my.csv")
+    assert analyzed(file) == {f"my.csv.{name}": analysis for name, analysis in both.items()}
+
+
+@pytest.mark.usefixtures("two")
+@pytest.mark.parametrize("name", ["runs", "runs/run-1", "my.csv"])
+def test_each_analysis_finds_its_own_result_again(tmp_path: Path, runs: Path, name: str) -> None:
+    spin_down_csv(tmp_path / "my.csv")
+    path = runs.parent / name
+    analyzed(path)
+    row, recalled = recall_suiting([path], Options())
+    assert row.name == "spindown"
+    assert all(origin.text.startswith("as levilab analyze found it") for origin in recalled.origins)
+    archive = Archive([path], SecondResult)
+    whole = archive.whole(recalled.sources)
+    assert whole
+    assert whole[0].name.endswith("result.second.json")
+    source = recalled.sources[-1]
+    earlier = Archive([source.path], SecondResult).earlier(source.path, source.data, source.sha256)
+    assert earlier
+    assert earlier.file.name.endswith("result.second.json")
+
+
+def test_result_json_belongs_to_the_first_row_for_the_experiment(monkeypatch: pytest.MonkeyPatch, runs: Path) -> None:
+    field = replace(SPINDOWN, needs=replace(SPINDOWN.needs, analysis="field", experiments=frozenset({"field"})))
+    use(monkeypatch, field, second_row("spin"), replace(SPINDOWN, save=save_spindown))
+    found = analyze_spindowns([runs / "run-1"], Options())
+    rows = catalogue.ANALYSES
+    assert save_found(rows["second"], found)[0].name == "result.json"
+    assert save_found(rows["spindown"], found)[0].name == "result.spindown.json"
+    together = analyze_spindowns([runs], Options())
+    assert save_found(rows["second"], together)[0].name == "result.second.json"
+
+
+def test_several_inputs_leave_the_result_of_the_present_run_alone(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(runs / "run-1")
+    paths = [Path(), Path("../run-2")]
+    written = save_spindown(analyze_spindowns(paths, Options()), first=True)[0]
+    assert written.resolve() == runs / "result.json"
+    assert SPINDOWN.recall(paths, Options()).origins[1].text.endswith(str(written))
