@@ -137,8 +137,13 @@ def _resumable(folder: Path, experiment: str) -> Run:
         )
     if run.status in {"running", "finished"}:
         raise CannotResume(f"{folder}: is {run.status}, only an interrupted or failed run can be resumed")
-    if run.record.time_zero_utc is None or not run.count():
+    if not run.count():
         raise CannotResume(f"{folder}: ended before its first reading, there is nothing to go on with: start anew")
+    if run.record.time_zero_utc is None:
+        raise CannotResume(
+            f"{folder}/run.json: has no time_zero_utc, so it is not known at which time its readings go on; they are "
+            "kept and can be analyzed"
+        )
     return run
 
 

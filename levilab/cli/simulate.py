@@ -132,13 +132,14 @@ def stability(
         typer.Option(metavar="S", help="How long a top of the map has to stay up.", show_default="30"),
     ] = None,
     out: Annotated[
-        Path, typer.Option(metavar="DIR", help="Where the map is written: survival.png and survival.csv.")
-    ] = Path(),
+        Path | None,
+        typer.Option(metavar="DIR", help="Where the map is written: survival.png and survival.csv.", show_default="."),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Where the top floats: heights, masses and spins, from the field and the theory of small motions."""
     chosen = _scene(scene, settings)
-    of_map = {"spins": spins, "masses": masses, "duration": duration}
+    of_map = {"spins": spins, "masses": masses, "duration": duration, "out": out}
     if not survival and (without := [name for name, given in of_map.items() if given is not None]):
         raise UsageError(without[0], "it is of a map: give `survival`, too")
 
@@ -155,7 +156,7 @@ def stability(
     if not as_json:
         print_stability(found)
     if survival:
-        document["map"] = _mapped(chosen, spans, stay, out)
+        document["map"] = _mapped(chosen, spans, stay, out or Path())
     if as_json:
         print_json(document)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import shutil
 import signal
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,7 @@ from pydantic import Field, create_model
 from instruments.clock import VirtualClock
 from levilab.acquisition.experiment import Experiment, ExperimentSettings
 from levilab.acquisition.loop import AcquisitionRequest, acquire
+from levilab.acquisition.request import AcquisitionOptions, CannotResume, request_for
 from levilab.acquisition.session import ExperimentFailed, Session
 from levilab.acquisition.table import EXPERIMENTS
 from levilab.bench.config import BenchConfig
@@ -233,3 +235,12 @@ def test_the_run_that_is_listed_has_its_traces_described(request_of_a_scan: Acqu
     assert "traces/000003.npy" in package
     assert "traces.jsonl" in package
     assert Run.load(run.folder).count() == 3
+
+
+def test_a_run_whose_time_zero_is_not_known_is_not_called_empty(sample_data: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(sample_data / "spin-down-1", tmp_path / "run")
+    record = Run.load(folder).record
+    assert record.time_zero_utc is None
+    (folder / "run.json").write_text(record.model_copy(update={"status": "interrupted"}).as_json(), encoding="utf-8")
+    with pytest.raises(CannotResume, match=r"has no time_zero_utc.* they are kept and can be analyzed"):
+        request_for("spin", AcquisitionOptions(resume=folder))

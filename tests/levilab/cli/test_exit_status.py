@@ -45,6 +45,7 @@ WRONG_USAGE = {
     "stability undriven --spins 20:30:1": "--spins: it is of a map: give --map, too",
     "stability undriven --masses 0.02:0.03:0.001": "--masses: it is of a map: give --map, too",
     "stability undriven --duration 5": "--duration: it is of a map: give --map, too",
+    "stability undriven --out x": "--out: it is of a map: give --map, too",
     "stability undriven --map --spins 20": "--spins 20: LOW:HIGH:STEP is expected",
     "stability undriven --map --spins 30:20:1": "--spins 30:20:1: LOW:HIGH:STEP is expected",
     "stability undriven --map --masses 0:1:1e-9": "--masses 0:1:1e-9: at most",
