@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 READINGS_AT_ONCE = 1000
 #: Readings that are waited for with one question: so long, at most [s].  VISA waits for 49 days and no longer.
 LONGEST_WAIT_S = 30 * 86400.0
+#: The impedances of an input [ohm], printed short (regular expression, without a sign).
+IMPEDANCES = r"50|1000000|5\.0{1,9}E\+01|1\.0{1,9}E\+06"
 
 
 class ReciprocalCounter(ScpiInstrument):
