@@ -57,7 +57,8 @@ class ReciprocalCounter(ScpiInstrument):
     def _ask(self, question: str, patience: float) -> str | None:
         """Read the error queue, then the data; None when a counter that may wait for ever never answers.
 
-        One that was told to give up says so itself: then silence is a fault of the link, and no sign of a dark signal.
+        A counter that is set to give up answers in any case: then silence is a fault of the link, and no sign of a dark
+        signal.
         """
         self.raise_errors(question)
         try:
