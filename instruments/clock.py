@@ -31,7 +31,7 @@ class Clock(Protocol):
 class WallClock:
     """The time of a real bench, or that time at a multiple.
 
-    speed: seconds of the bench per second of the wall, for a virtual bench that somebody watches.  Raises ValueError
+    speed: seconds of the bench per second of the wall, for a virtual bench that a person watches.  Raises ValueError
     when it is not a positive number.
     """
 

@@ -102,7 +102,7 @@ class ScpiInstrument:
     def measured(self, question: str, *, patience: float = 0.0) -> float | None:
         """A measured number, None where there was nothing to measure.
 
-        The error queue is read first: what went wrong before is told instead of a number that cannot be trusted.
+        The error queue is read first: after an earlier error no number can be trusted.
         patience: how long the measurement takes [s].  Raises CommandRefused, NoAnswer, BadAnswer.
         """
         self.raise_errors(question)

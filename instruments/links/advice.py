@@ -1,4 +1,4 @@
-"""What to try when an instrument cannot be reached: from the words of whoever failed to reach it."""
+"""What to try when an instrument cannot be reached: from the words of the error."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _ADVICE = {
     r"gpib": "for GPIB install linux-gpib or gpib-ctypes, or a VISA library of a vendor",
     r"permission|access denied|errno 13": "you may not use this device: on Linux a udev rule gives the right to it",
     r"name or service not known|getaddrinfo|nodename": "this computer does not know that name: try the number",
-    r"refused": "somebody is there, but not at this port: check port and protocol",
+    r"refused": "the host is there, but not at this port: check port and protocol",
 }
 #: What a link says that its own program has closed.
 CLOSED = "this session was closed: open another one"
@@ -28,7 +28,7 @@ def advice(error: BaseException, address: str = "", library: object = "@py") -> 
     address: what was to be opened; library: by which PyVISA library.
 
     >>> advice(OSError("[Errno 111] Connection refused"))
-    ': somebody is there, but not at this port: check port and protocol'
+    ': the host is there, but not at this port: check port and protocol'
     """
     if ".levilab" in address.lower() and library == "@py":
         return ': an address of the virtual bench: take visa_library = "@levilab"'

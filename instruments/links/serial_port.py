@@ -1,7 +1,4 @@
-"""The way to an instrument on a serial port: pyserial behind the protocol of :mod:`instruments.links.transport`.
-
-The only module that imports pyserial.
-"""
+"""The way to an instrument on a serial port: pyserial behind the protocol of :mod:`instruments.links.transport`."""
 
 from __future__ import annotations
 
@@ -107,7 +104,7 @@ class SerialTransport:
 
     def write(self, message: str) -> None:
         """Send one message; see :class:`instruments.links.transport.Transport`."""
-        with self._told_as_ours(message, self.timeout):
+        with self._translated_errors(message, self.timeout):
             if self._out_of_step:
                 self._resynchronise()
             self._send(message)
@@ -116,7 +113,7 @@ class SerialTransport:
         """Ask; see :class:`instruments.links.transport.Transport`."""
         self.write(message)
         within = self.timeout + patience
-        with self._told_as_ours(message, within):
+        with self._translated_errors(message, within):
             line = self._line(message, within)
         self._record("<", line)
         return line.decode("ascii").strip()
@@ -128,7 +125,7 @@ class SerialTransport:
         """
         self.write(message)
         within = self.timeout + patience
-        with self._told_as_ours(message, within):
+        with self._translated_errors(message, within):
             self._wait_at_most(within)
             head = self._exactly(len(b"#n"))
             if not head:
@@ -141,7 +138,7 @@ class SerialTransport:
 
     def _send(self, message: str) -> None:
         time.sleep(max(0.0, self._rested_at - time.monotonic()))
-        self._port.reset_input_buffer()  # an answer that nobody waited for is no answer to this
+        self._port.reset_input_buffer()  # an answer that came unasked is no answer to this
         self._received.clear()
         line = message.encode("ascii", errors="replace")
         self._record(">", line)
@@ -181,7 +178,7 @@ class SerialTransport:
     def clear(self) -> None:
         """Drop what is under way; the line is resynchronised before the next message."""
         self._out_of_step = True
-        with self._told_as_ours("", self.timeout):
+        with self._translated_errors("", self.timeout):
             self._port.reset_output_buffer()
             self._port.reset_input_buffer()
 
@@ -257,7 +254,7 @@ class SerialTransport:
             self._log(self.address, direction, message + b"\n")
 
     @contextlib.contextmanager
-    def _told_as_ours(self, question: str, within: float) -> Iterator[None]:
+    def _translated_errors(self, question: str, within: float) -> Iterator[None]:
         """What pyserial raises, as ours; afterwards the next exchange starts with a clean line."""
         try:
             yield

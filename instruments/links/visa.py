@@ -1,6 +1,6 @@
 """The way to an instrument: PyVISA behind one small protocol.
 
-The only module that imports PyVISA.  A driver sees a :class:`Transport` and cannot tell a real instrument
+A driver sees a :class:`Transport` and cannot tell a real instrument
 from a virtual one.
 """
 
@@ -109,7 +109,7 @@ class VisaTransport:
     def write(self, message: str) -> None:
         """Send one message; see :class:`Transport`."""
         self._begin(message)
-        with self._told_as_ours(message, self.timeout):
+        with self._translated_errors(message, self.timeout):
             self._send(message)
 
     def _begin(self, message: str) -> None:
@@ -122,7 +122,7 @@ class VisaTransport:
         self._wait_at_most(self.timeout)
         if self.pause and (rest := self._rested_at - self._clock.now()) > 0:
             self._clock.sleep(rest)
-        if self._stream:  # an answer that nobody waited for is no answer to this
+        if self._stream:  # an answer that came unasked is no answer to this
             self._discard_received()
         self._resource.write(message)
         self._rest()
@@ -158,7 +158,7 @@ class VisaTransport:
         """Ask; see :class:`Transport`."""
         self._begin(message)
         within = self.timeout + patience
-        with self._told_as_ours(message, within):
+        with self._translated_errors(message, within):
             self._send(message)
             self._wait_at_most(within)
             # more than the longest answer without an end is noise: it is left for the next resynchronisation
@@ -172,7 +172,7 @@ class VisaTransport:
         """Ask for a block; see :class:`Transport`."""
         self._begin(message)
         within = self.timeout + patience
-        with self._told_as_ours(message, within):
+        with self._translated_errors(message, within):
             self._send(message)
             self._wait_at_most(within)
             block = self._block()
@@ -214,7 +214,7 @@ class VisaTransport:
         Raises NoAnswer when none comes: the line is still out of step then.
         """
         due, self._identities_due, self._out_of_step = self._identities_due + 1, 0, False
-        with self._told_as_ours(_WHO, self.timeout):
+        with self._translated_errors(_WHO, self.timeout):
             self._send("")  # ends what may have been sent in part
             self._record(">", _WHO.encode())
             self._send(_WHO)
@@ -281,7 +281,7 @@ class VisaTransport:
             self._log(self.address, direction, data if data.endswith(b"\n") else data + b"\n")
 
     @contextlib.contextmanager
-    def _told_as_ours(self, question: str, within: float) -> Any:
+    def _translated_errors(self, question: str, within: float) -> Any:
         """PyVISA's errors as ours; afterwards the next exchange starts from a clean pipe."""
         import pyvisa
 

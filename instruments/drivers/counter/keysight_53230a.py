@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from instruments.drivers.counter.reciprocal import READINGS_AT_ONCE, ReciprocalCounter
+from instruments.drivers.counter.reciprocal import IMPEDANCES, READINGS_AT_ONCE, ReciprocalCounter
 from instruments.drivers.scpi import Setting
 from instruments.ieee488 import Form
 
@@ -30,11 +30,16 @@ class Keysight53230A(ReciprocalCounter):
     #: Both have 22 characters: an answer that lost one is neither.
     NUMBER: ClassVar[Form] = Form(r"[+-]\d\.(\d{14}E[+-]\d{3}|\d{15}E[+-]\d{2})", "+1.00000000000000E-001")
 
+    #: How the settings of few values are printed is not confirmed: as numbers, or short.
+    _IMPEDANCE: ClassVar[Form] = Form(rf"{NUMBER.pattern}|\+?({IMPEDANCES})", "1000000")
+    _PROBE: ClassVar[Form] = Form(NUMBER.pattern + r"|\+?(10?|1\.0{1,9}E\+0[01])", "10")
+    _RANGE: ClassVar[Form] = Form(NUMBER.pattern + r"|\+?(50?|5\.0{1,9}E\+0[01])", "50")
+
     gate = Setting("SENS:FREQ:GATE:TIME", float, unit="s", low=100e-6, high=1000.0)
     coupling = Setting("INP1:COUP", str, choices=("AC", "DC"))
-    impedance = Setting("INP1:IMP", float, unit="ohm", low=50.0, high=1e6)
-    probe_factor = Setting("INP1:PROB", float, low=1.0, high=10.0)
-    input_range = Setting("INP1:RANG", float, unit="V", low=5.0, high=50.0)
+    impedance = Setting("INP1:IMP", float, unit="ohm", low=50.0, high=1e6, form=_IMPEDANCE)
+    probe_factor = Setting("INP1:PROB", float, low=1.0, high=10.0, form=_PROBE)
+    input_range = Setting("INP1:RANG", float, unit="V", low=5.0, high=50.0, form=_RANGE)
     #: Resolution: data sheet, for the range of 5 V.
     trigger_level = Setting("INP1:LEV1", float, unit="V", low=-5.125, high=5.125, resolution=2.5e-3)
     automatic_level = Setting("INP1:LEV:AUTO", bool)

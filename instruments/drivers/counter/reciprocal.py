@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 READINGS_AT_ONCE = 1000
 #: Readings that are waited for with one question: so long, at most [s].  VISA waits for 49 days and no longer.
 LONGEST_WAIT_S = 30 * 86400.0
+#: The impedances of an input [ohm], printed short (regular expression, without a sign).
+IMPEDANCES = r"50|1000000|5\.0{1,9}E\+01|1\.0{1,9}E\+06"
 
 
 class ReciprocalCounter(ScpiInstrument):
@@ -55,7 +57,8 @@ class ReciprocalCounter(ScpiInstrument):
     def _ask(self, question: str, patience: float) -> str | None:
         """Read the error queue, then the data; None when a counter that may wait for ever never answers.
 
-        One that was told to give up says so itself: then silence is a fault of the link, and no sign of a dark signal.
+        A counter that is set to give up answers in any case: then silence is a fault of the link, and no sign of a dark
+        signal.
         """
         self.raise_errors(question)
         try:

@@ -108,7 +108,7 @@ class DriveGenerator(ScpiInstrument):
         self.prepared_here = False
 
     def command(self, message: str) -> None:
-        """As every instrument; after a reset, or one that was cut off, the signal is nobody's."""
+        """As every instrument; after a reset, or one that was cut off, no program answers for the signal."""
         if message.upper().startswith("*RST"):
             self.prepared_here = False
         super().command(message)

@@ -57,7 +57,7 @@ class Keysight33500B(DriveGenerator):
         return answer
 
     def outputs(self) -> tuple[str, ...]:
-        """How the headers of all its outputs begin; it is asked who it is where nobody has asked yet."""
+        """How the headers of all its outputs begin; `*IDN?` is sent first where it was not sent yet."""
         if not self._model:
             self.identity()
         return ("OUTP1", "OUTP2") if self._model in self.TWO_CHANNELS else ("OUTP1",)

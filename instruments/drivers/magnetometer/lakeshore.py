@@ -76,7 +76,6 @@ class LakeShoreGaussmeter(ScpiInstrument):
     message, ``UNIT 2;UNIT?``: one exchange, for they want to be left alone between two.
     """
 
-    #: What SerialTransport must be told; pause: between two exchanges [s].
     #: Greatest flux density of each range [T], by probe, lowest first.
     RANGES_T: ClassVar[Mapping[str, tuple[float, ...]]]
     #: RDGMODE for steady fields.

@@ -1,7 +1,7 @@
 """Oscilloscopes: a trace with time base, scaling and trigger, whatever the model.
 
-What the drivers share is in oscilloscope_base.py; facts and their sources stand with each driver, in
-oscilloscope_rigol.py and oscilloscope_keysight.py.
+What the drivers share is in scope.py and setup.py; facts and their sources stand with each driver, in
+rigol_ds1000z.py and keysight_dsox.py.
 """
 
 from __future__ import annotations

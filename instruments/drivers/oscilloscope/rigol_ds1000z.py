@@ -42,7 +42,13 @@ class _RigolChannel(Channel):
 
     NUMBER: ClassVar[Form] = _NUMBER
 
-    probe_factor = Setting("PROB", float, low=0.01, high=1000.0)
+    #: The guide prints it with six digits; other firmware may print it short, which is not confirmed.
+    probe_factor = Setting(
+        *("PROB", float),
+        low=0.01,
+        high=1000.0,
+        form=Form(rf"{_NUMBER.pattern}|\+?([125]0{{0,3}}|0\.0?[125])|\+[125]\.0{{1,5}}[Ee][+-]0[0-3]", "10"),
+    )
     coupling = Setting("COUP", str, choices=("AC", "DC", "GND"))
     scale = Setting("SCAL", float, unit="V", low=1e-3, high=1e4)
     offset = Setting("OFFS", float, unit="V", low=-1e5, high=1e5)

@@ -211,7 +211,7 @@ class Scope(ScpiInstrument):
         return differing
 
     def _check_taken(self) -> None:
-        """Whether the scope set what it was told to.
+        """Check that the scope has set what was sent to it.
 
         Raises OutOfRange for a voltage or a time that it set otherwise, without a word; SettingsLost if more than these
         differ, as after a reset.
@@ -232,14 +232,14 @@ class Scope(ScpiInstrument):
 
     @contextlib.contextmanager
     def _blaming_changes(self) -> Iterator[None]:
-        """An error that came because the scope was changed is told as SettingsLost."""
+        """Raise SettingsLost in the place of an error that came because the scope was changed."""
         try:
             yield
         except SettingsLost:
             raise
         except InstrumentError as error:
             differing: dict[str, tuple[object, object]] = {}
-            with contextlib.suppress(InstrumentError):  # if it does not answer at all, the first error tells more
+            with contextlib.suppress(InstrumentError):  # if it does not answer at all, the first error is raised
                 differing = self.lost()
             if not differing:
                 raise
@@ -260,10 +260,8 @@ class Scope(ScpiInstrument):
             self._start()
             self._wait(timeout_s)
         except BaseException:
-            with contextlib.suppress(
-                InstrumentError
-            ):  # it may not trigger when nobody waits; the first error tells more
-                self.off()
+            with contextlib.suppress(InstrumentError):  # the first error is raised
+                self.off()  # it may not trigger later, when no program waits for it
             raise
         self._acquired = True
 

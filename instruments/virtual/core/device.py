@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from instruments.clock import Clock as Clock  # noqa: PLC0414, TC001 - the kinds of instruments take it from here
 from instruments.virtual.core.parameters import at_most_one, boolean, choice, limit, none, nr3, number, one
 from instruments.virtual.core.parser import Command, Parser
 from instruments.virtual.core.status import OPERATION_COMPLETE, Status
@@ -17,6 +16,7 @@ from instruments.virtual.core.steps import Work, at_once
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from instruments.clock import Clock
     from instruments.virtual.core.steps import Steps
 
 Value = float | str | bool

@@ -22,7 +22,7 @@ from instruments.virtual.counter.parameters import truth, without_channels
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from instruments.virtual.core.device import Clock
+    from instruments.clock import Clock
     from instruments.virtual.core.steps import Steps
     from instruments.virtual.counter.edges import Array, Input, Signal
     from instruments.virtual.counter.run import Run

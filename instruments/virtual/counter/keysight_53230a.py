@@ -19,7 +19,7 @@ from instruments.virtual.counter.parameters import block, channels_of, without_c
 from instruments.virtual.counter.run import Run
 
 if TYPE_CHECKING:
-    from instruments.virtual.core.device import Clock
+    from instruments.clock import Clock
     from instruments.virtual.core.steps import Steps
     from instruments.virtual.counter.edges import Array, Signal
 

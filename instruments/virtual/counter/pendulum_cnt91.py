@@ -20,7 +20,7 @@ from instruments.virtual.counter.run import Run
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
 
-    from instruments.virtual.core.device import Clock
+    from instruments.clock import Clock
     from instruments.virtual.core.steps import Steps
     from instruments.virtual.counter.edges import Array, Signal
 

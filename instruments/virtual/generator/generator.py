@@ -6,20 +6,19 @@ import math
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
-from instruments.virtual.core.device import Clock, VirtualInstrument, answers, does
+from instruments.virtual.core.device import VirtualInstrument, answers, does
 from instruments.virtual.core.parameters import at_most_one, choice, limit, nr3, one
 from instruments.virtual.core.parser import Command, ScpiError
 from instruments.virtual.generator.arbitrary import Refused, attribute, plain_name, samples
-from instruments.virtual.generator.channel import INFINITE, Burst, Channel, Output, quantity_of
+from instruments.virtual.generator.channel import INFINITE, Channel, Output, quantity_of
 from instruments.virtual.generator.couplings import MODES, settle
 from instruments.virtual.generator.family import HZ, PERCENT, S, V
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from instruments.clock import Clock
     from instruments.virtual.generator.family import Family, Waveform
-
-__all__ = ["Burst", "Output", "VirtualGenerator"]
 
 _LEVEL = "VOLTage[:LEVel][:IMMediate]"
 

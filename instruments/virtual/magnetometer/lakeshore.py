@@ -24,7 +24,8 @@ from instruments.virtual.magnetometer.hall_probe import HallProbe, Reading
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from instruments.virtual.core.device import Answer, Clock
+    from instruments.clock import Clock
+    from instruments.virtual.core.device import Answer
     from instruments.virtual.core.line import LineSettings
     from instruments.virtual.core.steps import Steps
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
-from instruments.virtual.core.device import Clock, answers, does
+from instruments.virtual.core.device import answers, does
 from instruments.virtual.core.line import LineSettings
 from instruments.virtual.core.parameters import none
 from instruments.virtual.core.parser import Command
 from instruments.virtual.magnetometer.lakeshore import Number, VirtualGaussmeter, field_text
 
 if TYPE_CHECKING:
+    from instruments.clock import Clock
     from instruments.virtual.magnetometer.hall_probe import Reading
 
 

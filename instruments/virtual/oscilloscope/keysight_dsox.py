@@ -23,7 +23,7 @@ from instruments.virtual.oscilloscope.screenshot import bmp8, bmp24, draw, grey,
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from instruments.virtual.core.device import Clock
+    from instruments.clock import Clock
     from instruments.virtual.oscilloscope.record import Record, Signal
 
 #: Points of the memory; the fastest rate [1/s].

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from instruments.virtual.core.device import Clock
+    from instruments.clock import Clock
     from instruments.virtual.oscilloscope.record import Signal
 
 #: Below the level by this part of a division the trigger is armed again.

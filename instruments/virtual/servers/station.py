@@ -91,8 +91,8 @@ class Station:
 class Link:
     """One client's link to an instrument; whatever is done with it raises LinkLost when a fault has cut it.
 
-    session: see :class:`instruments.virtual.bench.bus.Session`; to be used from the event loop only; messages_done: how
-    many messages the instrument has worked on.
+    session: see :class:`instruments.virtual.bench.session.Session`; to be used from the event loop only;
+    messages_done: how many messages the instrument has worked on.
     """
 
     def __init__(self, station: Station, *, stream: bool = False) -> None:

@@ -454,6 +454,17 @@ def test_a_preamble_that_is_none_is_an_error(preamble):
     said(script)
 
 
+def test_a_preamble_with_a_digit_of_an_exponent_lost_is_an_error():
+    cut = KEYSIGHT_PREAMBLE.replace("E-004", "E-00")
+    lines = [*KEYSIGHT_ACQUIRED, *KEYSIGHT_SELECTED, (":WAV:PRE?", cut), (CLEAR, None)]
+    script, scope = talk(KeysightDSOX, *KEYSIGHT_PREPARED, *lines, *KEYSIGHT_KEPT)
+    scope.prepare(**PULSES)
+    scope.acquire(timeout_s=1.0)
+    with pytest.raises(BadAnswer, match="ten numbers"):
+        scope.trace(1)
+    said(script)
+
+
 @pytest.mark.parametrize("driver", [RigolDS1000Z, KeysightDSOX])
 def test_what_an_earlier_program_left_in_the_memory_is_not_read(driver):
     _, scope = talk(driver)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
-from instruments.virtual.generator.generator import Burst, Output
+from instruments.virtual.generator.channel import Burst, Output
 from instruments.virtual.generator.voltage import fundamental
 from levilab.errors import LeftRange, SimulationError
 from levilab.simulator import SceneError, preset, simulate

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 from instruments.clock import VirtualClock
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
-from instruments.virtual.generator.generator import Burst, Output
+from instruments.virtual.generator.channel import Burst, Output
 from instruments.virtual.generator.voltage import fundamental, voltage
 from levilab.simulator.spin import DECAYS
 from levilab.world import bench as virtual_bench

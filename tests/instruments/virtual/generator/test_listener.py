@@ -6,7 +6,7 @@ Source: Agilent/Keysight 33500 Series Operating and Service Guide, unless a test
 import pytest
 
 from instruments.clock import VirtualClock
-from instruments.virtual.generator.generator import Output
+from instruments.virtual.generator.channel import Output
 from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from support.generators import number
 from support.wire import ask, received, send

@@ -5,7 +5,7 @@ Source: Agilent/Keysight 33500 Series Operating and Service Guide, unless a test
 
 import pytest
 
-from instruments.virtual.generator.generator import Burst
+from instruments.virtual.generator.channel import Burst
 from support.generators import entries, number
 from support.wire import ask, cable, errors, send
 
