@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from difflib import get_close_matches
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 import typer.core
 
-from levilab.cli.options import Columns, Json, KeepOutliers, Paths, ReadingU
+from levilab.cli.options import Columns, Json, KeepOutliers, Paths, ReadingU, option_names, with_options
 from levilab.cli.output import message, print_json
 from levilab.errors import LevilabError, UsageError
 
@@ -57,6 +58,7 @@ ResultFolder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=
 
 @analyze_app.command("spindown", epilog="Example: levilab analyze spindown sample_data/")
 def analyze_spindown(
+    context: typer.Context,
     paths: Paths,
     columns: Columns = "",
     reading_u: ReadingU = None,
@@ -71,11 +73,12 @@ def analyze_spindown(
 
     analysis = ANALYSES["spindown"]
     found = analysis.analyze(paths, options(columns, reading_u, uncertainty.value, keep_outliers))
-    _write_and_print([(analysis, found)], save=save, out=out, as_json=as_json)
+    _write_and_print(context, [(analysis, found)], save=save, out=out, as_json=as_json)
 
 
 @analyze_app.command("each", hidden=True, epilog="Example: levilab analyze sample_data/")
 def analyze_each(
+    context: typer.Context,
     paths: Paths,
     columns: Columns = "",
     reading_u: ReadingU = None,
@@ -89,13 +92,21 @@ def analyze_each(
     from levilab.pipelines.catalogue import analyze_suiting
 
     results = analyze_suiting(paths, options(columns, reading_u, uncertainty.value, keep_outliers))
-    _write_and_print(results, save=save, out=out, as_json=as_json)
+    _write_and_print(context, results, save=save, out=out, as_json=as_json)
 
 
-def _write_and_print(results: list[tuple[Analysis[Any], Any]], *, save: bool, out: Path | None, as_json: bool) -> None:
+def _write_and_print(
+    context: typer.Context,
+    results: list[tuple[Analysis[Any], Any]],
+    *,
+    save: bool,
+    out: Path | None,
+    as_json: bool,
+) -> None:
     """Write the results, then print them: a reader that goes away must not cost a result."""
     from levilab.pipelines.catalogue import print_analysis
 
+    in_words = partial(with_options, names=option_names(context.find_root().command))
     failures: list[LevilabError] = []
     messages: list[str] = []
     for analysis, found in results:
@@ -109,9 +120,9 @@ def _write_and_print(results: list[tuple[Analysis[Any], Any]], *, save: bool, ou
         print_json(documents[0] if len(documents) == 1 else documents, sort_keys=True)
     else:
         for analysis, found in results:
-            print_analysis(analysis, found)
+            print_analysis(analysis, found, in_words)
     for text in messages:
-        message(text)
+        message(in_words(text))
     if failures:
         raise failures[0]
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import html
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from typing import TYPE_CHECKING
@@ -75,6 +77,23 @@ def test_an_analysis_need_not_be_named(levilab: Command, sample_data: Path) -> N
     assert levilab("analyze", "--no-save", sample_data).stdout == named.stdout
     assert json.loads(levilab("analyze", sample_data, "--no-save", "--json").stdout)["analysis"] == "spindown"
     assert "Did you mean 'spindown'?" in levilab("analyze", "spindwon", check=2).stderr
+
+
+def test_notes_name_options_on_the_terminal_and_quantities_where_stored(
+    levilab: Command, tmp_path: Path, sample_data: Path
+) -> None:
+    runs = tmp_path / "runs"
+    for name in ("sound", "torn"):
+        shutil.copytree(sample_data / "spin-down-1", runs / name)
+    (runs / "torn" / "readings.csv").write_text("time_s,x\n0,1\n10,2\n20,3\n", encoding="utf-8")
+    shown = " ".join(levilab("analyze", "spindown", runs).stdout.split())
+    assert "say --columns f=NAME" in shown
+    (result,) = runs.rglob("result.json")
+    levilab("report", runs)
+    page = html.unescape((tmp_path / "report.html").read_text(encoding="utf-8"))
+    for text in (result.read_text(encoding="utf-8"), page):
+        assert "say columns = f=NAME" in text
+        assert text.count("passed over") == 1
 
 
 def test_two_files_in_a_folder_have_a_result_each_that_the_report_reads(levilab: Command, tmp_path: Path) -> None:
