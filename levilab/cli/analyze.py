@@ -26,8 +26,23 @@ class AnalyzeGroup(typer.core.TyperGroup):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Put in the name where there is none, and none was meant."""
-        named = not args or args[0] in self.commands or args[0] in ctx.help_option_names
-        return super().parse_args(ctx, args if named or self._is_misspelt(args[0]) else ["each", *args])
+        if args and args[0] not in ctx.help_option_names:
+            k = self._first_word(args)
+            named = k is not None and (args[k] in self.commands or self._is_misspelt(args[k]))
+            args = [args[k], *args[:k], *args[k + 1 :]] if k is not None and named else ["each", *args]
+        return super().parse_args(ctx, args)
+
+    def _first_word(self, args: list[str]) -> int | None:
+        """Where the first word stands that is no option, nor the value of one."""
+        options = [one for one in self.commands["each"].params if not getattr(one, "is_flag", True)]
+        with_value = {name for option in options for name in option.opts}
+        numbered = iter(enumerate(args))
+        for k, word in numbered:
+            if word in with_value:
+                next(numbered, None)
+            elif word == "--" or not word.startswith("-"):
+                return None if word == "--" else k
+        return None
 
     def _is_misspelt(self, word: str) -> bool:
         """Whether a word is nearly the name of an analysis, and no path."""

@@ -79,6 +79,14 @@ def test_an_analysis_need_not_be_named(levilab: Command, sample_data: Path) -> N
     assert "Did you mean 'spindown'?" in levilab("analyze", "spindwon", check=2).stderr
 
 
+def test_options_may_stand_before_the_name_of_an_analysis(levilab: Command, sample_data: Path) -> None:
+    named = levilab("analyze", "spindown", sample_data, "--no-save").stdout
+    for first in (["--out", "spindown"], ["--out=there"], ["--no-save"], ["--uncertainty", "covariance"]):
+        assert levilab("analyze", *first, "spindown", sample_data, "--no-save").stdout == named
+    assert "Did you mean 'spindown'?" in levilab("analyze", "--out", "there", "spindwon", check=2).stderr
+    assert "spindown: there is no such file" in levilab("analyze", "--no-save", "--", "spindown", check=1).stderr
+
+
 def test_notes_name_options_on_the_terminal_and_quantities_where_stored(
     levilab: Command, tmp_path: Path, sample_data: Path
 ) -> None:
