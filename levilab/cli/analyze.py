@@ -71,8 +71,18 @@ Save = Annotated[bool, typer.Option(help="Write the result and figures beside th
 ResultFolder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Write them there instead.")]
 
 
-@analyze_app.command("spindown", epilog="Example: levilab analyze spindown sample_data/")
-def analyze_spindown(
+#: Analysis → what its command does.  The catalogue itself takes too long to import for a help page.
+ANALYSIS_HELP = {
+    "spindown": (
+        "Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude."
+    ),
+}
+#: The command that stands for no name, and is not listed.
+_EACH = "each"
+_EACH_HELP = "Each analysis that suits the runs or data files; --json prints a list where several suit."
+
+
+def analyze_inputs(
     context: typer.Context,
     paths: Paths,
     columns: Columns = "",
@@ -83,31 +93,21 @@ def analyze_spindown(
     out: ResultFolder = None,
     as_json: Json = False,
 ) -> None:
-    """Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude."""
-    from levilab.pipelines.catalogue import ANALYSES
+    """Carry out the analysis that the command is named after."""
+    from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
 
-    analysis = ANALYSES["spindown"]
-    found = analysis.analyze(paths, options(columns, reading_u, uncertainty.value, keep_outliers))
-    _write_and_print(context, [(analysis, found)], save=save, out=out, as_json=as_json)
-
-
-@analyze_app.command("each", hidden=True, epilog="Example: levilab analyze sample_data/")
-def analyze_each(
-    context: typer.Context,
-    paths: Paths,
-    columns: Columns = "",
-    reading_u: ReadingU = None,
-    uncertainty: UncertaintyKind = Uncertainty.COVARIANCE,
-    keep_outliers: KeepOutliers = False,
-    save: Save = True,
-    out: ResultFolder = None,
-    as_json: Json = False,
-) -> None:
-    """Each analysis that suits the runs or data files; --json prints a list where several suit."""
-    from levilab.pipelines.catalogue import analyze_suiting
-
-    results = analyze_suiting(paths, options(columns, reading_u, uncertainty.value, keep_outliers))
+    chosen = options(columns, reading_u, uncertainty.value, keep_outliers)
+    if context.info_name == _EACH:
+        results = analyze_suiting(paths, chosen)
+    else:
+        analysis = ANALYSES[str(context.info_name)]
+        results = [(analysis, analysis.analyze(paths, chosen))]
     _write_and_print(context, results, save=save, out=out, as_json=as_json)
+
+
+for _name, _help in ANALYSIS_HELP.items():
+    analyze_app.command(_name, help=_help, epilog=f"Example: levilab analyze {_name} sample_data/")(analyze_inputs)
+analyze_app.command(_EACH, help=_EACH_HELP, hidden=True, epilog="Example: levilab analyze sample_data/")(analyze_inputs)
 
 
 def _write_and_print(

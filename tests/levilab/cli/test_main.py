@@ -13,6 +13,10 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from levilab.acquisition.table import EXPERIMENTS
+from levilab.cli.acquire import EXPERIMENT_HELP
+from levilab.cli.analyze import ANALYSIS_HELP
+from levilab.pipelines.catalogue import ANALYSES
 from support.spin_downs import spin_down_csv
 from support.waiting import HANG_GUARD_S
 
@@ -31,6 +35,11 @@ def test_every_command_has_help_and_the_ones_that_do_something_an_example(levila
     assert "Usage:" in text
     if command not in {"", "acquire", "analyze"}:
         assert f"Example: levilab {command}" in text
+
+
+def test_each_experiment_and_each_analysis_has_its_command() -> None:
+    assert EXPERIMENT_HELP.keys() == EXPERIMENTS.keys()
+    assert ANALYSIS_HELP.keys() == ANALYSES.keys()
 
 
 def test_the_version_is_printed(levilab: Command) -> None:
