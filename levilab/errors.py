@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 
 class LevilabError(Exception):
     """A known failure. The text says what was seen, what was expected and what to do.
@@ -9,6 +11,19 @@ class LevilabError(Exception):
     A quantity that the caller can set stands in the text between backquotes, by the name of the function's argument:
     "free space, or choose another place with `out`". The command line writes it as its option, ``--out``.
     """
+
+
+#: A quantity in a message.
+_QUANTITY = re.compile(r"`([a-z]\w*)`")
+
+
+def unquoted(text: str) -> str:
+    """A message as it is stored for people who may never see the command line: quantities without backquotes.
+
+    >>> unquoted("f.csv: say `columns` = t=1,f=2; `levilab analyze` reads it then")
+    'f.csv: say columns = t=1,f=2; `levilab analyze` reads it then'
+    """
+    return _QUANTITY.sub(r"\1", text)
 
 
 class UsageError(LevilabError):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Generic, Self, TypeVar
 
-from pydantic import PositiveFloat, model_validator
+from pydantic import Field, PositiveFloat, model_validator
 from pydantic_core import PydanticCustomError
 
 from levilab.settings import Settings
@@ -19,24 +19,26 @@ if TYPE_CHECKING:
 
 
 class ExperimentSettings(Settings):
-    """What the bench file says of an experiment, in a table of its name."""
+    """What the bench file says of an experiment, in a table of its name.
+
+    A field's description is its comment in a new bench file, where the fields stand in order, inherited ones last; a
+    field that is None by default has an example.
+    """
 
     def check(self, table: str, limits: Limits) -> None:
         """Raise ConfigError for what the bench does not allow.  table: the name of these settings in the bench file."""
 
 
 class CounterSettings(ExperimentSettings):
-    """Readings of the counter at an interval.
+    """Readings of the counter at an interval."""
 
-    interval_s: from one reading to the next; longest_s: an end if nothing else ends it; gate_s: of one reading;
-    trigger_level_v: between dark and bright; reading_u_hz: standard uncertainty of one reading, where it is known.
-    """
-
-    interval_s: PositiveFloat = 10.0
-    longest_s: PositiveFloat = 1800.0
-    gate_s: PositiveFloat = 1.0
-    trigger_level_v: float = 0.6
-    reading_u_hz: PositiveFloat | None = None
+    interval_s: PositiveFloat = Field(default=10.0, description="then read every so often,")
+    gate_s: PositiveFloat = Field(default=1.0, description="counting for so long")
+    trigger_level_v: float = Field(default=0.6, description="half way between dark and the pulse of the tape")
+    reading_u_hz: PositiveFloat | None = Field(
+        default=None, description="standard uncertainty of a reading, if you know it", examples=[0.03]
+    )
+    longest_s: PositiveFloat = Field(default=1800.0, description="an end if the top never falls")
 
     @model_validator(mode="after")
     def _gate_within_interval(self) -> Self:

@@ -15,6 +15,7 @@ from instruments.errors import InstrumentError
 from levilab.acquisition.session import Earlier, Session, ask_no_person
 from levilab.acquisition.table import EXPERIMENTS, settings_of
 from levilab.bench.bench import open_bench
+from levilab.errors import unquoted
 from levilab.files import CannotWrite
 from levilab.interruption import Interrupted, watching_for_interruption
 from levilab.runs.run import Run, RunRecord, utc_now
@@ -81,7 +82,7 @@ def acquire(request: AcquisitionRequest, show: Show) -> Run:
         except Exception as error:
             # the disk may be full: the first thing that went wrong is what counts
             with contextlib.suppress(CannotWrite):
-                writer.event(None, "failed", f"{type(error).__name__}: {error}")
+                writer.event(None, "failed", unquoted(f"{type(error).__name__}: {error}"))
                 writer.finish("failed")
             if not writer.record.instruments and not request.wire_log:
                 writer.discard()

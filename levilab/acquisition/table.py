@@ -9,8 +9,11 @@ from pydantic import Field, create_model
 from levilab.acquisition.experiment import CounterSettings, Experiment
 from levilab.acquisition.experiments import spin
 from levilab.bench.config import BenchConfig
+from levilab.bench.template import Setting, SettingsTable
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from levilab.acquisition.experiment import ExperimentSettings
 
 #: Name → experiment.
@@ -22,6 +25,24 @@ _TABLES: dict[str, Any] = {
 }
 #: What a bench file holds: the bench, and for each experiment a table of its name.
 Configuration: type[BenchConfig] = create_model("Configuration", __base__=BenchConfig, **_TABLES)
+
+
+def tables_to_write() -> tuple[SettingsTable, ...]:
+    """The experiments' tables as they stand in a new bench file: the defaults, with what they mean."""
+    return tuple(
+        SettingsTable(experiment.name, experiment.about, tuple(_settings_to_write(experiment.settings)))
+        for experiment in EXPERIMENTS.values()
+    )
+
+
+def _settings_to_write(settings: type[ExperimentSettings]) -> Iterator[Setting]:
+    """Its own settings before those that it inherits."""
+    inherited = {name for base in settings.__bases__ for name in getattr(base, "model_fields", {})}
+    for name in sorted(settings.model_fields, key=lambda name: name in inherited):
+        field = settings.model_fields[name]
+        default = field.get_default(call_default_factory=True)
+        example = field.examples[0] if default is None and field.examples else default
+        yield Setting(name, example, field.description or "", is_set=default is not None)
 
 
 def settings_of(config: BenchConfig, experiment: str) -> Any:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from levilab.bench.kinds import KINDS
 from levilab.errors import LevilabError
@@ -16,12 +17,37 @@ if TYPE_CHECKING:
     from levilab.bench.discover import Found
 
 
+@dataclass(frozen=True)
+class Setting:
+    """A line of a table.  comment: what it means, or empty; is_set: otherwise the line is a comment, an example."""
+
+    name: str
+    value: Any
+    comment: str = ""
+    is_set: bool = True
+
+    @property
+    def line(self) -> str:
+        """As it stands in the file."""
+        assignment = f"{'' if self.is_set else '# '}{self.name} = {_quoted(self.value)}"
+        return f"{assignment:31} # {self.comment}" if self.comment else assignment
+
+
+@dataclass(frozen=True)
+class SettingsTable:
+    """A table of settings.  about: what it is of."""
+
+    name: str
+    about: str
+    settings: tuple[Setting, ...]
+
+
 class WouldOverwrite(LevilabError):
     """A file that is there already."""
 
 
-def bench_text(found: Sequence[Found], library: str) -> str:
-    """The text of a bench.toml: the first instrument of each kind, the others as comments."""
+def bench_text(found: Sequence[Found], library: str, tables: Sequence[SettingsTable]) -> str:
+    """The text of a bench.toml: the first instrument of each kind, the others as comments, and more tables."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(  # noqa: S701 - no HTML
@@ -48,11 +74,12 @@ def bench_text(found: Sequence[Found], library: str) -> str:
         kinds=about,
         chosen={kind: ones[0] if ones else None for kind, ones in by_kind.items()},
         others={kind: ones[1:] for kind, ones in by_kind.items()},
+        tables=tables,
         unknown=[one for one in found if one.identity and not one.kind],
     )
 
 
-def _quoted(value: str) -> str:
+def _quoted(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 

@@ -15,8 +15,15 @@ from levilab.cli.output import message, print_json
 acquire_app = typer.Typer(no_args_is_help=True, help="Run an experiment on the bench and write a run folder.")
 
 
-@acquire_app.command("spin", epilog="Example: levilab acquire spin --mock --note 'first try'")
-def acquire_spin(
+#: Experiment → what its command does.  The table of experiments itself takes too long to import for a help page.
+EXPERIMENT_HELP = {
+    "spin": "Spin-down: drive the top up, switch the drive off, count its spin until it falls.",
+}
+_ENDING = "Ctrl-C ends the run after the reading under way; outputs go off and the run is kept."
+
+
+def acquire_experiment(
+    context: typer.Context,
     mock: Annotated[bool, typer.Option("--mock", help="Use the virtual bench; needs no hardware.")] = False,
     bench: Annotated[
         Path | None,
@@ -42,10 +49,7 @@ def acquire_spin(
     wire_log: Annotated[bool, typer.Option("--wire-log", help="Keep all bytes sent and received.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Spin-down: drive the top up, switch the drive off, count its spin until it falls.
-
-    Ctrl-C ends the run after the reading under way; outputs go off and the run is kept.
-    """
+    """Carry out the experiment that the command is named after."""
     from levilab.acquisition.loop import acquire
     from levilab.acquisition.request import AcquisitionOptions, request_for
     from levilab.present.progress import to_stderr
@@ -63,7 +67,8 @@ def acquire_spin(
         person=_ask,
         tell=message,
     )
-    run = acquire(request_for("spin", options), to_stderr())
+    experiment = str(context.info_name)
+    run = acquire(request_for(experiment, options), to_stderr())
     readings = run.count()
     if as_json:
         print_json({"run": str(run.folder), "status": run.status, "readings": readings}, indent=None)
@@ -71,8 +76,14 @@ def acquire_spin(
         typer.echo(f"{run.status}: {readings} reading{'s' * (readings != 1)} in {run.folder}")
     if run.status == "interrupted":
         if readings:
-            message(f"go on with it: levilab acquire spin --resume {run.folder}")
+            message(f"go on with it: levilab acquire {experiment} --resume {run.folder}")
         raise typer.Exit(exit_codes.INTERRUPTED)
+
+
+for _name, _help in EXPERIMENT_HELP.items():
+    acquire_app.command(
+        _name, help=f"{_help}\n\n{_ENDING}", epilog=f"Example: levilab acquire {_name} --mock --note 'first try'"
+    )(acquire_experiment)
 
 
 def _ask(question: str) -> str:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from difflib import get_close_matches
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 import typer.core
 
-from levilab.cli.options import Columns, Json, KeepOutliers, Paths, ReadingU
+from levilab.cli.options import Columns, Json, KeepOutliers, Paths, ReadingU, option_names, with_options
 from levilab.cli.output import message, print_json
 from levilab.errors import LevilabError, UsageError
 
@@ -25,8 +26,23 @@ class AnalyzeGroup(typer.core.TyperGroup):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Put in the name where there is none, and none was meant."""
-        named = not args or args[0] in self.commands or args[0] in ctx.help_option_names
-        return super().parse_args(ctx, args if named or self._is_misspelt(args[0]) else ["each", *args])
+        if args and args[0] not in ctx.help_option_names:
+            k = self._first_word(args)
+            named = k is not None and (args[k] in self.commands or self._is_misspelt(args[k]))
+            args = [args[k], *args[:k], *args[k + 1 :]] if k is not None and named else ["each", *args]
+        return super().parse_args(ctx, args)
+
+    def _first_word(self, args: list[str]) -> int | None:
+        """Where the first word stands that is no option, nor the value of one."""
+        options = [one for one in self.commands["each"].params if not getattr(one, "is_flag", True)]
+        with_value = {name for option in options for name in option.opts}
+        numbered = iter(enumerate(args))
+        for k, word in numbered:
+            if word in with_value:
+                next(numbered, None)
+            elif word == "--" or not word.startswith("-"):
+                return None if word == "--" else k
+        return None
 
     def _is_misspelt(self, word: str) -> bool:
         """Whether a word is nearly the name of an analysis, and no path."""
@@ -55,8 +71,19 @@ Save = Annotated[bool, typer.Option(help="Write the result and figures beside th
 ResultFolder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Write them there instead.")]
 
 
-@analyze_app.command("spindown", epilog="Example: levilab analyze spindown sample_data/")
-def analyze_spindown(
+#: Analysis → what its command does.  The catalogue itself takes too long to import for a help page.
+ANALYSIS_HELP = {
+    "spindown": (
+        "Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude."
+    ),
+}
+#: The command that stands for no name, and is not listed.
+_EACH = "each"
+_EACH_HELP = "Each analysis that suits the runs or data files; --json prints a list where several suit."
+
+
+def analyze_inputs(
+    context: typer.Context,
     paths: Paths,
     columns: Columns = "",
     reading_u: ReadingU = None,
@@ -66,36 +93,35 @@ def analyze_spindown(
     out: ResultFolder = None,
     as_json: Json = False,
 ) -> None:
-    """Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude."""
-    from levilab.pipelines.catalogue import ANALYSES
+    """Carry out the analysis that the command is named after."""
+    from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
 
-    analysis = ANALYSES["spindown"]
-    found = analysis.analyze(paths, options(columns, reading_u, uncertainty.value, keep_outliers))
-    _write_and_print([(analysis, found)], save=save, out=out, as_json=as_json)
+    chosen = options(columns, reading_u, uncertainty.value, keep_outliers)
+    if context.info_name == _EACH:
+        results = analyze_suiting(paths, chosen)
+    else:
+        analysis = ANALYSES[str(context.info_name)]
+        results = [(analysis, analysis.analyze(paths, chosen))]
+    _write_and_print(context, results, save=save, out=out, as_json=as_json)
 
 
-@analyze_app.command("each", hidden=True, epilog="Example: levilab analyze sample_data/")
-def analyze_each(
-    paths: Paths,
-    columns: Columns = "",
-    reading_u: ReadingU = None,
-    uncertainty: UncertaintyKind = Uncertainty.COVARIANCE,
-    keep_outliers: KeepOutliers = False,
-    save: Save = True,
-    out: ResultFolder = None,
-    as_json: Json = False,
+for _name, _help in ANALYSIS_HELP.items():
+    analyze_app.command(_name, help=_help, epilog=f"Example: levilab analyze {_name} sample_data/")(analyze_inputs)
+analyze_app.command(_EACH, help=_EACH_HELP, hidden=True, epilog="Example: levilab analyze sample_data/")(analyze_inputs)
+
+
+def _write_and_print(
+    context: typer.Context,
+    results: list[tuple[Analysis[Any], Any]],
+    *,
+    save: bool,
+    out: Path | None,
+    as_json: bool,
 ) -> None:
-    """Each analysis that suits the runs or data files; --json prints a list where several suit."""
-    from levilab.pipelines.catalogue import analyze_suiting
-
-    results = analyze_suiting(paths, options(columns, reading_u, uncertainty.value, keep_outliers))
-    _write_and_print(results, save=save, out=out, as_json=as_json)
-
-
-def _write_and_print(results: list[tuple[Analysis[Any], Any]], *, save: bool, out: Path | None, as_json: bool) -> None:
     """Write the results, then print them: a reader that goes away must not cost a result."""
     from levilab.pipelines.catalogue import print_analysis
 
+    in_words = partial(with_options, names=option_names(context.find_root().command))
     failures: list[LevilabError] = []
     messages: list[str] = []
     for analysis, found in results:
@@ -109,9 +135,9 @@ def _write_and_print(results: list[tuple[Analysis[Any], Any]], *, save: bool, ou
         print_json(documents[0] if len(documents) == 1 else documents, sort_keys=True)
     else:
         for analysis, found in results:
-            print_analysis(analysis, found)
+            print_analysis(analysis, found, in_words)
     for text in messages:
-        message(text)
+        message(in_words(text))
     if failures:
         raise failures[0]
 

@@ -40,6 +40,7 @@ def bench_init(
     Only *IDN? is sent.  Instruments on the network are found by themselves where PyVISA can look for them (pip install
     psutil zeroconf); else name them with --address.
     """
+    from levilab.acquisition.table import tables_to_write
     from levilab.bench.discover import search
     from levilab.bench.template import bench_text, refuse_to_overwrite, write_bench
 
@@ -57,7 +58,7 @@ def bench_init(
             "no instrument answered that levilab has a driver for, so no file was written: is it on and connected?  "
             "Name it with `addresses`, or take `force` for a file to fill in by hand"
         )
-    write_bench(out, bench_text(found, library))
+    write_bench(out, bench_text(found, library, tables_to_write()))
     message(f"wrote {out}: look it over, then try it with `levilab bench check`")
 
 

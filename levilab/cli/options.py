@@ -11,7 +11,7 @@ import typer
 from levilab.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else on standard output.")]
 Columns = Annotated[
@@ -39,14 +39,16 @@ Settings = Annotated[
 _QUANTITY = re.compile(r"`([a-z]\w*)`( = False\b| = True\b| = )?")
 
 
-def option_names(app: typer.Typer) -> dict[str, tuple[str, str]]:
+def option_names(app: Any) -> dict[str, tuple[str, str]]:
     """Quantity → the option that sets it, and the one that switches it off (empty if there is none), of all commands.
+
+    app: the application, or the command of its name.
 
     A quantity has the name of the parameter by which a command takes it.
     """
     return {
         parameter.name: (parameter.opts[0], next(iter(parameter.secondary_opts), ""))
-        for parameter in _parameters(typer.main.get_command(app))
+        for parameter in _parameters(typer.main.get_command(app) if isinstance(app, typer.Typer) else app)
         if parameter.opts[0].startswith("--")
     }
 
@@ -60,6 +62,15 @@ def _parameters(command: Any) -> Iterator[Any]:
 def in_options(error: Exception, app: typer.Typer) -> str:
     """The text of an error with options in the place of quantities: "duration = -1: …" is "--duration -1: …"."""
     names = option_names(app)
+    if not isinstance(error, UsageError):
+        return with_options(str(error), names)
+    head = names.get(error.name, (error.name, ""))[0]
+    given = head if error.value is None else f"{head} {error.value}"
+    return f"{given}: {with_options(error.text, names)}"
+
+
+def with_options(text: str, names: Mapping[str, tuple[str, str]]) -> str:
+    """A text with options in the place of quantities.  names: see `option_names`."""
 
     def option(match: re.Match[str]) -> str:
         name, setting = match[1], match[2] or ""
@@ -70,8 +81,4 @@ def in_options(error: Exception, app: typer.Typer) -> str:
             return off
         return on if setting in {"", " = True"} else on + " "
 
-    if not isinstance(error, UsageError):
-        return _QUANTITY.sub(option, str(error))
-    head = names.get(error.name, (error.name, ""))[0]
-    given = head if error.value is None else f"{head} {error.value}"
-    return f"{given}: {_QUANTITY.sub(option, error.text)}"
+    return _QUANTITY.sub(option, text)

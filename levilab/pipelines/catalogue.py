@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
-from levilab.errors import DataError
+from levilab.errors import DataError, unquoted
 from levilab.pipelines.spindown.analysis import NEEDS as SPINDOWN_NEEDS
 from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
 from levilab.pipelines.spindown.document import as_document, recall_spindowns, save_result
@@ -137,8 +137,8 @@ def save(analysis: Analysis[A], found: A, folder: Path | None = None) -> list[Pa
     return analysis.save(found, folder, first=rows[0].name == analysis.name)
 
 
-def print_analysis(analysis: Analysis[A], found: A) -> None:
-    """The tables, what the data say, and the warnings, on the terminal."""
+def print_analysis(analysis: Analysis[A], found: A, in_words: Callable[[str], str] = unquoted) -> None:
+    """The tables, what the data say, and the warnings, on the terminal.  in_words: a message as the person reads it."""
     from rich.markup import escape
 
     from levilab.present.terminal import draw, terminal  # with rich
@@ -148,4 +148,4 @@ def print_analysis(analysis: Analysis[A], found: A) -> None:
         console.print(draw(table))
     console.print(f"[bold]What the data say.[/bold] {escape(found.text)}")
     for warning in found.all_warnings:
-        console.print(f"[yellow]note:[/yellow] {escape(warning)}")
+        console.print(f"[yellow]note:[/yellow] {escape(in_words(warning))}")

@@ -61,7 +61,7 @@ def _facts(source: Source[Any], part: InputPart) -> list[tuple[str, tuple[str, .
         ("When", _when(record)),
         ("Status", (source.run.status,)),
         *about_readings,
-        ("Drive", _drive(record.configuration)),
+        ("Drive", _drive(record)),
         *(instruments or [("Instruments", ("no instruments recorded",))]),
         ("Command", (" ".join(record.command_line),) if record.command_line else ()),
     ]
@@ -100,13 +100,15 @@ def _moment(event: Mapping[str, Any], zero: str | None) -> str:
 # --- with what -----------------------------------------------------------------------------------------
 
 
-def _drive(configuration: Mapping[str, Any]) -> tuple[str, ...]:
+def _drive(record: RunRecord) -> tuple[str, ...]:
     """What drove the top before the readings, and what the bench stands."""
-    spin, limits = configuration.get("spin"), configuration.get("limits")
-    if not isinstance(spin, dict):
+    settings, limits = (record.configuration.get(table) for table in (record.experiment, "limits"))
+    if not isinstance(settings, dict):
         return ()
-    signal = [value_in_words(key, spin[key]) for key in _DRIVE if key in spin]
-    ramp = [f"raised by {spin['ramp_hz_per_s']} Hz/s"] if "ramp_hz_per_s" in spin else []
+    signal = [value_in_words(key, settings[key]) for key in _DRIVE if key in settings]
+    ramp = [f"raised by {settings['ramp_hz_per_s']} Hz/s"] if "ramp_hz_per_s" in settings else []
+    if not signal + ramp:
+        return ()
     bounds = [setting_in_words(key, value) for key, value in limits.items()] if isinstance(limits, dict) else []
     return (", ".join(signal + ramp), *([f"limits of the bench: {', '.join(bounds)}"] if bounds else []))
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import base64
 from typing import TYPE_CHECKING, TypeVar
 
-from levilab.errors import UsageError
+from levilab.errors import UsageError, unquoted
 from levilab.files import CannotWrite, replace_atomically
 from levilab.pipelines.catalogue import Analysis, Analyzed, recall_suiting
 from levilab.pipelines.sources import Options
@@ -64,7 +64,7 @@ def render(analysis: Analysis[A], found: A) -> str:
         banner=_banner(found),
         inputs=[describe(*pair) for pair in zip(found.sources, part.inputs, strict=True)],
         figure=_as_image(analysis.svg(found)),
-        warnings=found.all_warnings,
+        warnings=[unquoted(text) for text in found.all_warnings],
         software=software_versions(),
         written=utc_now()[:19].replace("T", " ") + " UTC",
     )

@@ -170,7 +170,7 @@ def _is_alive(folder: Path) -> bool:
 def read_record(folder: Path) -> RunRecord:
     """What ``run.json`` of a folder says.  Raises DataError when it is missing, cut off, or of another schema."""
     path = folder / RECORD
-    rescue = f"its readings can still be analyzed: levilab analyze spindown {path.parent / READINGS}"
+    rescue = f"its readings can still be analyzed: levilab analyze {path.parent / READINGS}"
     try:
         if path.exists() and not path.is_file():
             raise DataError(f"{path}: is a folder, a pipe or a device; a file is expected; {rescue}")

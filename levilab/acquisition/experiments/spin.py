@@ -6,7 +6,7 @@ import math
 from enum import StrEnum
 from typing import TYPE_CHECKING, Literal
 
-from pydantic import PositiveFloat
+from pydantic import Field, PositiveFloat
 
 from instruments.errors import InstrumentError, OutOfRange
 from levilab.acquisition.experiment import CounterSettings, Experiment
@@ -47,10 +47,10 @@ class SpinSettings(CounterSettings):
     the swing about the drive most of the rest.
     """
 
-    drive_frequency_hz: PositiveFloat = 40.0
+    drive_frequency_hz: PositiveFloat = Field(default=40.0, description="drive the top up to this,")
+    ramp_hz_per_s: PositiveFloat = Field(default=0.05, description="no faster than it can follow")
     drive_amplitude_vpp: PositiveFloat = 10.0
-    drive_waveform: Literal["SIN", "SQU", "TRI"] = "SIN"
-    ramp_hz_per_s: PositiveFloat = 0.05
+    drive_waveform: Literal["SIN", "SQU", "TRI"] = Field(default="SIN", description="SIN, SQU or TRI")
 
     def check(self, table: str, limits: Limits) -> None:
         """Raise ConfigError for a drive that the bench does not allow."""

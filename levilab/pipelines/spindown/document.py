@@ -14,7 +14,7 @@ from analysis.spindown.fit import SpinDown
 from analysis.spindown.lawfit import LawFit
 from analysis.spindown.selection import Statistics
 from analysis.spindown.verdict import Verdict
-from levilab.errors import DataError
+from levilab.errors import DataError, unquoted
 from levilab.pipelines.result import (
     SCHEMA,
     Archive,
@@ -247,7 +247,7 @@ def result_of(analysis: SpinDownAnalysis, place: Place) -> SpinDownResult:
         "values": _combined_values(analysis),
         "models": _combined_models(analysis),
         "runs": [_run(analysis, k, place.folder) for k in range(len(sources))],
-        "warnings": analysis.all_warnings,
+        "warnings": [unquoted(text) for text in analysis.all_warnings],
     }
     return SpinDownResult.model_validate(finite(document | _verdict(combined.best, combined.verdict)))
 
@@ -340,7 +340,7 @@ def _run(analysis: SpinDownAnalysis, k: int, folder: Path) -> dict[str, Any]:
             }
             for i in run.outliers
         ],
-        "warnings": [*source.warnings, *run.warnings],
+        "warnings": [unquoted(text) for text in (*source.warnings, *run.warnings)],
     } | _verdict(run.best, run.verdict)
 
 
@@ -445,7 +445,7 @@ def _restored(result: SpinDownResult, file: Path, found: Found[Readings], place:
         combined=_combined(result),
         options=options,
         place=place,
-        warnings=tuple(dict.fromkeys((*result.warnings, *found.warnings))),
+        warnings=tuple(dict.fromkeys((*result.warnings, *map(unquoted, found.warnings)))),
         remarks=found.remarks,
         origins=tuple(_origin(Earlier(file, result, k)) for k in order),
     )

@@ -381,6 +381,17 @@ def test_a_resume_that_fails_keeps_the_run_and_its_readings(tmp_path: Path) -> N
     assert kept.readings().frame.equals(before)
 
 
+def test_why_a_run_failed_is_written_down_without_backquotes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(self: RunWriter, row: object) -> None:
+        raise CannotWrite("the disk is full: choose another place with `out`")
+
+    monkeypatch.setattr(RunWriter, "reading", full)
+    with pytest.raises(CannotWrite, match="`out`"):
+        acquire(mock(tmp_path), Silent())
+    (folder,) = tmp_path.iterdir()
+    assert Run.load(folder).events()[-1]["text"] == "CannotWrite: the disk is full: choose another place with out"
+
+
 def test_what_a_resumed_virtual_run_goes_through_again_is_not_shown(tmp_path: Path) -> None:
     class Bar(Silent):
         def preparing(self, text: str, fraction: float) -> None:

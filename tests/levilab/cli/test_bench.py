@@ -2,11 +2,14 @@
 
 import json
 import re
+from dataclasses import replace
 
 import pytest
+from pydantic import Field
 
+from levilab.acquisition.experiment import ExperimentSettings
 from levilab.acquisition.experiments.spin import SpinSettings
-from levilab.acquisition.table import Configuration, settings_of
+from levilab.acquisition.table import EXPERIMENTS, Configuration, settings_of, tables_to_write
 from levilab.bench.check import Light, check
 from levilab.bench.config import ConfigError, InstrumentSettings, Limits, read_bench
 from levilab.bench.discover import Found, driver_for_identity, identify, search
@@ -57,7 +60,7 @@ def test_a_serial_port_is_asked_at_every_speed_that_a_driver_knows():
 
 def test_what_was_found_becomes_a_bench_that_can_be_read_and_checked(tmp_path):
     path = tmp_path / "bench.toml"
-    path.write_text(bench_text(search("@levilab", [], lambda _: None), "@levilab"), encoding="utf-8")
+    path.write_text(bench_text(search("@levilab", [], lambda _: None), "@levilab", tables_to_write()), encoding="utf-8")
     config = read_bench(path, Configuration)
     assert {kind: getattr(config, kind).model for kind in VIRTUAL} == {k: s.model for k, s in VIRTUAL.items()}
     # what is written beside the instruments are the defaults
@@ -77,7 +80,7 @@ def test_kinds_that_were_not_found_stand_there_as_comments_and_others_are_told(t
         Found("A::3", odd),
         Found("A::4", trouble="no answer"),
     ]
-    text = bench_text(found, "@py")
+    text = bench_text(found, "@py", tables_to_write())
     path.write_text(text, encoding="utf-8")
     config = read_bench(path, Configuration)
     assert config.counter == InstrumentSettings(model="53230A", address="A::1")
@@ -133,10 +136,43 @@ def test_where_nobody_answers_no_file_is_written_but_one_to_fill_in_when_asked_f
     assert read_bench(path, Configuration).counter is None
 
 
+#: As it stands in docs/bench.md, where it is explained.
+SPIN_TABLE = """
+[spin]                          # drive the top up, switch the drive off, and count its spin until it falls
+drive_frequency_hz = 40.0       # drive the top up to this,
+ramp_hz_per_s = 0.05            # no faster than it can follow
+drive_amplitude_vpp = 10.0
+drive_waveform = "SIN"          # SIN, SQU or TRI
+interval_s = 10.0               # then read every so often,
+gate_s = 1.0                    # counting for so long
+trigger_level_v = 0.6           # half way between dark and the pulse of the tape
+# reading_u_hz = 0.03           # standard uncertainty of a reading, if you know it
+longest_s = 1800.0              # an end if the top never falls
+"""
+
+
+def test_a_new_bench_file_has_a_commented_table_for_each_experiment(levilab, tmp_path, monkeypatch):
+    class ScanSettings(ExperimentSettings):
+        step_mm: float = Field(default=0.5, description="from one height to the next")
+
+    levilab("bench", "init", "--library", "@levilab")
+    assert (tmp_path / "bench.toml").read_text(encoding="utf-8").endswith(SPIN_TABLE)
+    scan = replace(EXPERIMENTS["spin"], name="scan", about="the field along the axis", settings=ScanSettings)
+    monkeypatch.setitem(EXPERIMENTS, "scan", scan)
+    text = bench_text([], "@py", tables_to_write())
+    assert text.endswith(
+        SPIN_TABLE
+        + """
+[scan]                          # the field along the axis
+step_mm = 0.5                   # from one height to the next
+"""
+    )
+
+
 def test_signs_that_no_file_can_hold_are_no_part_of_a_name(tmp_path):
     path = tmp_path / "bench.toml"
     odd = [Found("A::1", 'ma"ker,B#1,\\,"""')]
-    path.write_text(bench_text(odd, "@py"), encoding="utf-8")
+    path.write_text(bench_text(odd, "@py", ()), encoding="utf-8")
     assert read_bench(path, Configuration).counter is None
 
 

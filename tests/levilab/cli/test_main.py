@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import html
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from typing import TYPE_CHECKING
 
 import pytest
 
+from levilab.acquisition.table import EXPERIMENTS
+from levilab.cli.acquire import EXPERIMENT_HELP
+from levilab.cli.analyze import ANALYSIS_HELP
+from levilab.pipelines.catalogue import ANALYSES
 from support.spin_downs import spin_down_csv
 from support.waiting import HANG_GUARD_S
 
@@ -29,6 +35,11 @@ def test_every_command_has_help_and_the_ones_that_do_something_an_example(levila
     assert "Usage:" in text
     if command not in {"", "acquire", "analyze"}:
         assert f"Example: levilab {command}" in text
+
+
+def test_each_experiment_and_each_analysis_has_its_command() -> None:
+    assert EXPERIMENT_HELP.keys() == EXPERIMENTS.keys()
+    assert ANALYSIS_HELP.keys() == ANALYSES.keys()
 
 
 def test_the_version_is_printed(levilab: Command) -> None:
@@ -75,6 +86,31 @@ def test_an_analysis_need_not_be_named(levilab: Command, sample_data: Path) -> N
     assert levilab("analyze", "--no-save", sample_data).stdout == named.stdout
     assert json.loads(levilab("analyze", sample_data, "--no-save", "--json").stdout)["analysis"] == "spindown"
     assert "Did you mean 'spindown'?" in levilab("analyze", "spindwon", check=2).stderr
+
+
+def test_options_may_stand_before_the_name_of_an_analysis(levilab: Command, sample_data: Path) -> None:
+    named = levilab("analyze", "spindown", sample_data, "--no-save").stdout
+    for first in (["--out", "spindown"], ["--out=there"], ["--no-save"], ["--uncertainty", "covariance"]):
+        assert levilab("analyze", *first, "spindown", sample_data, "--no-save").stdout == named
+    assert "Did you mean 'spindown'?" in levilab("analyze", "--out", "there", "spindwon", check=2).stderr
+    assert "spindown: there is no such file" in levilab("analyze", "--no-save", "--", "spindown", check=1).stderr
+
+
+def test_notes_name_options_on_the_terminal_and_quantities_where_stored(
+    levilab: Command, tmp_path: Path, sample_data: Path
+) -> None:
+    runs = tmp_path / "runs"
+    for name in ("sound", "torn"):
+        shutil.copytree(sample_data / "spin-down-1", runs / name)
+    (runs / "torn" / "readings.csv").write_text("time_s,x\n0,1\n10,2\n20,3\n", encoding="utf-8")
+    shown = " ".join(levilab("analyze", "spindown", runs).stdout.split())
+    assert "say --columns f=NAME" in shown
+    (result,) = runs.rglob("result.json")
+    levilab("report", runs)
+    page = html.unescape((tmp_path / "report.html").read_text(encoding="utf-8"))
+    for text in (result.read_text(encoding="utf-8"), page):
+        assert "say columns = f=NAME" in text
+        assert text.count("passed over") == 1
 
 
 def test_two_files_in_a_folder_have_a_result_each_that_the_report_reads(levilab: Command, tmp_path: Path) -> None:

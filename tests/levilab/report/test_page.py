@@ -18,8 +18,10 @@ from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.sources import Options
 from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
 from levilab.pipelines.spindown.document import recall_spindowns, save_result
+from levilab.report.inputs import _drive
 from levilab.report.page import render as render_found
 from levilab.report.page import write_report
+from levilab.runs.run import RunRecord
 from support.paths import SAMPLE_DATA
 from support.spin_downs import spin_down_csv
 
@@ -137,6 +139,12 @@ def test_the_drive_its_limits_and_the_origin_of_u_are_told(run: Path) -> None:
     assert "SIN, 40 Hz, 10 Vpp, raised by 0.2 Hz/s" in text
     assert "limits of the bench: drive amplitude 12 Vpp" in text
     assert "u of a reading: 0.03 Hz, standard deviation of the noise" in text
+
+
+def test_the_drive_is_that_of_the_run_s_own_experiment() -> None:
+    tables = {"spin": {"drive_frequency_hz": 40.0}, "tilt": {"drive_frequency_hz": 30.0}, "scan": {"step_m": 0.01}}
+    assert _drive(RunRecord(experiment="tilt", status="finished", started_utc=None, configuration=tables)) == ("30 Hz",)
+    assert _drive(RunRecord(experiment="scan", status="finished", started_utc=None, configuration=tables)) == ()
 
 
 def test_times_are_to_the_second_and_what_is_not_known_is_left_out(run: Path) -> None:

@@ -113,7 +113,7 @@ def test_a_broken_run_json_says_what_is_wrong_and_how_to_save_the_readings(
     (folder / "run.json").write_text(text, encoding="utf-8")
     with pytest.raises(DataError, match=says) as caught:
         Run.load(folder)
-    assert "levilab analyze spindown" in str(caught.value)
+    assert f"levilab analyze {folder / 'readings.csv'}" in str(caught.value)
     listed = list_runs(tmp_path)
     assert [run.status for run in listed] == ["unreadable"]
 
