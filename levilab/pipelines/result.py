@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
-from levilab.files import CannotWrite, replace_atomically
+from levilab.files import CannotWrite, parse_json, replace_atomically
 from levilab.runs.run import RECORD
 from levilab.settings import in_one_line
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 SCHEMA: Literal["levilab-result/1"] = "levilab-result/1"
 RESULT = "result.json"
+ANEW = "analyze anew with levilab analyze"
 
 
 # --- what is in it -------------------------------------------------------------------------------------
@@ -32,7 +33,7 @@ RESULT = "result.json"
 class Part(BaseModel):
     """A part of a result.  Keys that are not known here are of a newer version, and passed over."""
 
-    model_config = ConfigDict(frozen=True, validate_by_name=True, validate_by_alias=True)
+    model_config = ConfigDict(frozen=True, validate_by_name=True, validate_by_alias=True, allow_inf_nan=False)
 
 
 class Value(Part):
@@ -42,8 +43,14 @@ class Value(Part):
     u: float | None
     unit: str
     interval_68: tuple[float, float] | None = None
-    scatter: float | None = None
-    runs: int | None = None
+    scatter: float | None = Field(default=None, ge=0)
+    runs: int | None = Field(default=None, ge=2)
+
+    @model_validator(mode="after")
+    def _scatter_is_of_runs(self) -> Self:
+        if self.scatter is not None and self.runs is None:
+            raise ValueError("a scatter does not say of how many runs it is")
+        return self
 
     @property
     def estimate(self) -> Estimate:
@@ -189,12 +196,12 @@ def read_result(path: Path, model: type[R]) -> R | None:
     """
     if not path.is_file():
         return None
-    advice = "analyze anew with levilab analyze, or move the file away"
+    advice = f"{ANEW}, or move the file away"
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = parse_json(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror}); {advice}") from error
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise DataError(f"{path}: is cut off or not JSON ({error}); {advice}") from error
     if not isinstance(data, dict) or data.get("schema") != SCHEMA:
         seen = data.get("schema") if isinstance(data, dict) else type(data).__name__
