@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, Self, TypeVar
@@ -189,6 +190,10 @@ def save(result: Result, place: Place, picture: bytes, *, first: bool = True) ->
 R = TypeVar("R", bound=Result)
 
 
+class NoResult(DataError):
+    """A file of that name that no levilab wrote."""
+
+
 def read_result(path: Path, model: type[R]) -> R | None:
     """A result that was written before; None where there is none, or one of another analysis.
 
@@ -202,10 +207,12 @@ def read_result(path: Path, model: type[R]) -> R | None:
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror}); {advice}") from error
     except ValueError as error:
-        raise DataError(f"{path}: is cut off or not JSON ({error}); {advice}") from error
+        raise NoResult(f"{path}: is cut off or not JSON ({error}); {advice}") from error
     if not isinstance(data, dict) or data.get("schema") != SCHEMA:
         seen = data.get("schema") if isinstance(data, dict) else type(data).__name__
-        raise DataError(f"{path}: schema is {repr(seen)[:60]}, expected {SCHEMA!r} of this version; {advice}")
+        ours = isinstance(seen, str) and seen.startswith("levilab-result/")
+        text = f"{path}: schema is {repr(seen)[:60]}, expected {SCHEMA!r} of this version; {advice}"
+        raise DataError(text) if ours else NoResult(text)
     if data.get("analysis") != model.model_fields["analysis"].default:
         return None
     try:
@@ -238,6 +245,11 @@ class Archive(Generic[R]):
         self._known: dict[Path, dict[str | Path, int]] = {}
         several = len(paths) > 1 or (paths[0].is_dir() and not (paths[0] / RECORD).exists())
         self._together = _together(paths).results(self._analysis) if several else ()
+        if len(paths) > 1:
+            for file in self._together:  # what lies in the present folder may as well be another program's
+                with suppress(NoResult):
+                    self._result(file)
+                self._read.setdefault(file, None)
 
     def whole(self, sources: Sequence[Source[Any]]) -> tuple[Path, R] | None:
         """The result of just these inputs, unchanged."""

@@ -184,6 +184,8 @@ def _of_run(run: Run, needs: Needs[R]) -> Source[R]:
 
 def sha256_of(path: Path) -> str:
     """The hash of a file.  Raises DataError."""
+    if path.exists() and not path.is_file():  # reading from a pipe would wait for ever
+        raise DataError(f"{path}: is a folder, a pipe or a device; a file is expected")
     try:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()

@@ -233,3 +233,34 @@ def test_a_fit_that_leaves_the_range_of_numbers_is_an_error(tmp_path: Path) -> N
     file.write_text(json.dumps(result), encoding="utf-8")
     with pytest.raises(DataError, match="leave the range of numbers"):
         recall_spindowns([path], Options())
+
+
+@pytest.mark.parametrize("text", ['{"mine": 1}', "[1, 2]", "mine", '{"schema": "mine/1"}'])
+def test_another_program_may_have_a_result_in_the_present_folder(
+    runs: Path, monkeypatch: pytest.MonkeyPatch, text: str
+) -> None:
+    monkeypatch.chdir(runs.parent)
+    (runs.parent / "result.json").write_text(text, encoding="utf-8")
+    assert len(recall_spindowns([runs / "run-1", runs / "run-2"], Options()).runs) == 2
+
+
+def test_a_result_of_another_version_in_the_present_folder_is_an_error(
+    runs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(runs.parent)
+    (runs.parent / "result.json").write_text('{"schema": "levilab-result/9"}', encoding="utf-8")
+    with pytest.raises(DataError, match="levilab-result/9"):
+        recall_spindowns([runs / "run-1", runs / "run-2"], Options())
+
+
+def test_a_warning_about_an_input_is_recalled_once_however_it_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    paths = [spin_down_csv(tmp_path / name, seed=k) for k, name in enumerate(("one.csv", "two.csv"))]
+    for path in paths:
+        lines = path.read_text(encoding="utf-8").splitlines()
+        path.write_text("\n".join([*lines[1:], ""]), encoding="utf-8")
+        analyzed(path)
+    monkeypatch.chdir(tmp_path)
+    after = recall_spindowns([path.relative_to(tmp_path) for path in paths], Options())
+    assert sum("no header" in text for text in after.all_warnings) == 2
