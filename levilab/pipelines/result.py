@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 from contextlib import suppress
 from dataclasses import dataclass
@@ -97,15 +96,6 @@ class Result(Part):
     def as_dict(self) -> dict[str, Any]:
         """As it stands in the file."""
         return self.model_dump(mode="json", by_alias=True, exclude_unset=True)
-
-
-def finite(value: Any) -> Any:
-    """What no number can say becomes null; json.dumps with allow_nan=False guards the rest."""
-    if isinstance(value, dict):
-        return {key: finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def relative(path: Path, folder: Path) -> str:

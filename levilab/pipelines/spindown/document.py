@@ -15,6 +15,7 @@ from analysis.spindown.lawfit import LawFit
 from analysis.spindown.selection import Statistics
 from analysis.spindown.verdict import Verdict
 from levilab.errors import DataError
+from levilab.files import finite
 from levilab.formats.table import FEWEST
 from levilab.pipelines.result import (
     ANEW,
@@ -26,7 +27,6 @@ from levilab.pipelines.result import (
     Result,
     RunPart,
     Value,
-    finite,
     place_of,
     relative,
 )
