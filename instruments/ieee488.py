@@ -7,6 +7,7 @@ included (IEEE 488.2-1992, 8.7.9).
 from __future__ import annotations
 
 import functools
+import io
 import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -56,20 +57,17 @@ def read_block(read: Callable[[int], bytes]) -> bytes:
 def block_of(message: bytes) -> bytes:
     r"""The bytes of a block that came as a whole message.  Raises BrokenBlock.
 
+    The line feed behind the block is part of an answer (IEEE 488.2, 8.7.9): without it a block that lost a byte on its
+    way would be taken for whole, with the line feed as its last byte.
+
     >>> block_of(b"#13\x00\x0a\xff\n")
     b'\x00\n\xff'
     """
-    head = message[:2]
-    if not _HEAD.fullmatch(head):
-        raise BrokenBlock(repr(message[:20]))
-    data = 2 + head[1] - ord("0")
-    size = _size(head, message[2:data])
-    rest = message[data + size :]
-    if len(message) < data + size:
-        raise BrokenBlock(f"{len(message) - data} bytes of a block of {size}")
-    if rest.strip(b"\r\n"):
-        raise BrokenBlock(f"a block of {size} bytes that goes on with {rest[:20]!r}")
-    return message[data : data + size]
+    stream = io.BytesIO(message)
+    block = read_block(stream.read)
+    if rest := stream.read().strip(b"\r\n"):
+        raise BrokenBlock(f"a block of {len(block)} bytes that goes on with {rest[:20]!r}")
+    return block
 
 
 def _size(head: bytes, digits: bytes) -> int:

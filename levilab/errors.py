@@ -50,6 +50,10 @@ class DataError(LevilabError):
     """A data file or run folder that cannot be used as it is."""
 
 
+class DoesNotSuit(DataError):
+    """What lies there is sound, but of another kind than an analysis needs: another experiment, other columns."""
+
+
 class NoInstrument(LevilabError):
     """No instrument answered that there is a driver for."""
 

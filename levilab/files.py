@@ -63,6 +63,19 @@ _TOO_DEEP = f"it is nested more than {DEEPEST} levels deep"
 _TOO_LARGE = "a whole number in it has more than 300 digits"
 
 
+def finite(value: Any) -> Any:
+    """A value for JSON: what no number can say becomes null, in tables and lists too.
+
+    >>> finite({"mean": 1.0, "spread": [math.inf, math.nan]})
+    {'mean': 1.0, 'spread': [None, None]}
+    """
+    if isinstance(value, dict):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
 def _whole_number(digits: str) -> int:
     if len(digits) > 301:
         raise ValueError(_TOO_LARGE)

@@ -70,8 +70,9 @@ def simulate(
     """
     chosen = _scene(scene, settings)
 
+    from levilab.files import finite
     from levilab.motion.simulation import SimulationOrder, carry_out
-    from levilab.motion.summary import as_document, finite
+    from levilab.motion.summary import as_document
     from levilab.present.progress import Share
 
     order = SimulationOrder(chosen, duration, tolerance, rate, out)

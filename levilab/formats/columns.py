@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from levilab.errors import DataError
+from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.titles import CANONICAL, COMPANIONS, UNITS, Title, dimension, implied_unit, read_title, unit_factor
 
 SHORTHANDS = {"t": "time_s", "f": "spin_frequency_hz", "u": "spin_frequency_u_hz"}
@@ -18,6 +18,10 @@ class TableError(DataError):
         self.path, self.line = path, line
         place = f"{shown(str(path), 200)}, line {line}" if line is not None else shown(str(path), 200)
         super().__init__(f"{place}: {message}")
+
+
+class NoSuchColumn(TableError, DoesNotSuit):
+    """A table without a quantity that is wanted."""
 
 
 @dataclass(frozen=True)

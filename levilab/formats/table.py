@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from levilab.errors import UsageError
-from levilab.formats.columns import SHORTHANDS, Column, TableError, choose_columns, listed, shown
+from levilab.formats.columns import SHORTHANDS, Column, NoSuchColumn, TableError, choose_columns, listed, shown
 from levilab.formats.dialect import Dialect
 from levilab.formats.layout import Layout, sniff
 from levilab.formats.rows import Rows, read_rows
@@ -51,7 +51,7 @@ class Table:
         """
         if name not in self.frame.columns:
             key = next((short for short, long in SHORTHANDS.items() if long == name), name)
-            raise TableError(
+            raise NoSuchColumn(
                 self.path, f"no column is known to be {name}; it has {listed(self.header)}: say `columns` = {key}=NAME"
             )
         values: NDArray[np.float64] = self.frame[name].to_numpy(dtype=np.float64)
@@ -80,7 +80,7 @@ def read_table(
         chosen, doubts = choose_columns(path, header, layout.units, wanted, quantities)
         if not chosen:
             known = "time_s, spin_frequency_hz, t, f [Hz], rpm …"
-            raise TableError(
+            raise NoSuchColumn(
                 path,
                 f"no title is known ({known}) among {listed(header)}: say `columns` = t=NAME,f=NAME",
                 line=layout.header_line or layout.first_line,

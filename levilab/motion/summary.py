@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from levilab.files import finite
 from levilab.motion.lines import LONGEST_S, AxisLines, lines_of, rate_for
 from levilab.simulator.equilibrium import advice, stability_of
 from levilab.simulator.scene import remarks
@@ -221,12 +222,3 @@ def as_document(summary: Summary) -> dict[str, Any]:
 def _washers(motion: Trajectory) -> dict[str, float]:
     loose = motion.scene.washers.inertia_kg_m2 > 0
     return {"washer_spin_end_hz": float(motion.washer_spin_hz[-1])} if loose else {}
-
-
-def finite(value: Any) -> Any:
-    """What no number can say as None, in tables and lists too."""
-    if isinstance(value, dict):
-        return {key: finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
-from levilab.errors import DataError, unquoted
+from levilab.errors import DoesNotSuit, unquoted
 from levilab.pipelines.spindown.analysis import NEEDS as SPINDOWN_NEEDS
 from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
 from levilab.pipelines.spindown.document import as_document, recall_spindowns, save_result
@@ -105,7 +105,7 @@ ANALYSES = MappingProxyType({analysis.name: analysis for analysis in _TABLE})
 
 
 def analyze_suiting(paths: Sequence[Path], options: Options) -> list[tuple[Analysis[Any], Any]]:
-    """Each analysis that suits what lies at the paths, with what it found.  Raises DataError if none does."""
+    """Each analysis that suits what lies at the paths, with what it found.  Raises DataError: none suits, or damage."""
     return _suiting(lambda analysis: analysis.analyze(paths, options))
 
 
@@ -119,7 +119,7 @@ def _suiting(run: Callable[[Analysis[Any]], Any]) -> list[tuple[Analysis[Any], A
     for analysis in ANALYSES.values():
         try:
             found.append((analysis, run(analysis)))
-        except DataError as error:
+        except DoesNotSuit as error:
             errors.append(error)
     if not found:
         raise errors[0]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-import math
 import os
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, Self, TypeVar
@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
-from levilab.files import CannotWrite, replace_atomically
+from levilab.files import CannotWrite, parse_json, replace_atomically
 from levilab.runs.run import RECORD
 from levilab.settings import in_one_line
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 SCHEMA: Literal["levilab-result/1"] = "levilab-result/1"
 RESULT = "result.json"
+ANEW = "analyze anew with levilab analyze"
 
 
 # --- what is in it -------------------------------------------------------------------------------------
@@ -32,7 +33,7 @@ RESULT = "result.json"
 class Part(BaseModel):
     """A part of a result.  Keys that are not known here are of a newer version, and passed over."""
 
-    model_config = ConfigDict(frozen=True, validate_by_name=True, validate_by_alias=True)
+    model_config = ConfigDict(frozen=True, validate_by_name=True, validate_by_alias=True, allow_inf_nan=False)
 
 
 class Value(Part):
@@ -42,8 +43,14 @@ class Value(Part):
     u: float | None
     unit: str
     interval_68: tuple[float, float] | None = None
-    scatter: float | None = None
-    runs: int | None = None
+    scatter: float | None = Field(default=None, ge=0)
+    runs: int | None = Field(default=None, ge=2)
+
+    @model_validator(mode="after")
+    def _scatter_is_of_runs(self) -> Self:
+        if self.scatter is not None and self.runs is None:
+            raise ValueError("a scatter does not say of how many runs it is")
+        return self
 
     @property
     def estimate(self) -> Estimate:
@@ -89,15 +96,6 @@ class Result(Part):
     def as_dict(self) -> dict[str, Any]:
         """As it stands in the file."""
         return self.model_dump(mode="json", by_alias=True, exclude_unset=True)
-
-
-def finite(value: Any) -> Any:
-    """What no number can say becomes null; json.dumps with allow_nan=False guards the rest."""
-    if isinstance(value, dict):
-        return {key: finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def relative(path: Path, folder: Path) -> str:
@@ -182,6 +180,10 @@ def save(result: Result, place: Place, picture: bytes, *, first: bool = True) ->
 R = TypeVar("R", bound=Result)
 
 
+class NoResult(DataError):
+    """A file of that name that no levilab wrote."""
+
+
 def read_result(path: Path, model: type[R]) -> R | None:
     """A result that was written before; None where there is none, or one of another analysis.
 
@@ -189,16 +191,18 @@ def read_result(path: Path, model: type[R]) -> R | None:
     """
     if not path.is_file():
         return None
-    advice = "analyze anew with levilab analyze, or move the file away"
+    advice = f"{ANEW}, or move the file away"
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = parse_json(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror}); {advice}") from error
-    except (ValueError, RecursionError) as error:
-        raise DataError(f"{path}: is cut off or not JSON ({error}); {advice}") from error
+    except ValueError as error:
+        raise NoResult(f"{path}: is cut off or not JSON ({error}); {advice}") from error
     if not isinstance(data, dict) or data.get("schema") != SCHEMA:
         seen = data.get("schema") if isinstance(data, dict) else type(data).__name__
-        raise DataError(f"{path}: schema is {repr(seen)[:60]}, expected {SCHEMA!r} of this version; {advice}")
+        ours = isinstance(seen, str) and seen.startswith("levilab-result/")
+        text = f"{path}: schema is {repr(seen)[:60]}, expected {SCHEMA!r} of this version; {advice}"
+        raise DataError(text) if ours else NoResult(text)
     if data.get("analysis") != model.model_fields["analysis"].default:
         return None
     try:
@@ -231,6 +235,11 @@ class Archive(Generic[R]):
         self._known: dict[Path, dict[str | Path, int]] = {}
         several = len(paths) > 1 or (paths[0].is_dir() and not (paths[0] / RECORD).exists())
         self._together = _together(paths).results(self._analysis) if several else ()
+        if len(paths) > 1:
+            for file in self._together:  # what lies in the present folder may as well be another program's
+                with suppress(NoResult):
+                    self._result(file)
+                self._read.setdefault(file, None)
 
     def whole(self, sources: Sequence[Source[Any]]) -> tuple[Path, R] | None:
         """The result of just these inputs, unchanged."""

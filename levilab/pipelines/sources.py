@@ -7,7 +7,7 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, TypeVar
 
-from levilab.errors import DataError
+from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.table import Table, read_table
 from levilab.runs.run import READINGS, RECORD, Run, find_runs
 
@@ -176,7 +176,7 @@ def _of_file(path: Path, needs: Needs[R], columns: Mapping[str, str] | None) -> 
 def _of_run(run: Run, needs: Needs[R]) -> Source[R]:
     if run.record.experiment not in needs.experiments:
         kind = run.record.experiment
-        raise DataError(f"{run.folder}: holds a {kind} run, {needs.analysis} needs a {needs.runs} run")
+        raise DoesNotSuit(f"{run.folder}: holds a {kind} run, {needs.analysis} needs a {needs.runs} run")
     data = run.folder / READINGS
     readings = needs.read(run.readings())
     return Source(run.folder, data, sha256_of(data), run, readings, run.folder.name, readings.warnings)
@@ -184,6 +184,8 @@ def _of_run(run: Run, needs: Needs[R]) -> Source[R]:
 
 def sha256_of(path: Path) -> str:
     """The hash of a file.  Raises DataError."""
+    if path.exists() and not path.is_file():  # reading from a pipe would wait for ever
+        raise DataError(f"{path}: is a folder, a pipe or a device; a file is expected")
     try:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
@@ -206,7 +208,8 @@ def _search(root: Path, needs: Needs[R]) -> Found[R]:
         except DataError as error:
             broken.append(f"passed over: {error}")
     if not found:
-        raise DataError(f"{root}: {_nothing_found(root, needs, others, broken)}")
+        text = f"{root}: {_nothing_found(root, needs, others, broken)}"
+        raise DataError(text) if broken else DoesNotSuit(text)
     kinds = [f"passed over: {count} {kind} run{'s' * (count > 1)}" for kind, count in sorted(others.items())]
     return Found(tuple(found), tuple(broken), tuple(kinds))
 

@@ -60,3 +60,8 @@ def test_noise_is_a_block_or_is_refused(noise):
         except BrokenBlock:
             continue
         assert data in noise
+
+
+def test_a_block_that_lost_a_byte_is_not_completed_by_its_line_feed():
+    with pytest.raises(BrokenBlock, match="goes on with b''"):
+        block_of(b"#13\x00\x0a\n")

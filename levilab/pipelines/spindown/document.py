@@ -15,7 +15,10 @@ from analysis.spindown.lawfit import LawFit
 from analysis.spindown.selection import Statistics
 from analysis.spindown.verdict import Verdict
 from levilab.errors import DataError, unquoted
+from levilab.files import finite
+from levilab.formats.table import FEWEST
 from levilab.pipelines.result import (
+    ANEW,
     SCHEMA,
     Archive,
     Earlier,
@@ -24,7 +27,6 @@ from levilab.pipelines.result import (
     Result,
     RunPart,
     Value,
-    finite,
     place_of,
     relative,
 )
@@ -38,6 +40,8 @@ from levilab.pipelines.spindown.analysis import (
     about_inputs,
     fit_source,
 )
+from levilab.pipelines.spindown.laws import SHOWN_LAWS
+from levilab.pipelines.spindown.readings import EARLIEST_S, HIGHEST_HZ, SLOWEST_HZ
 from levilab.runs.run import find_run
 from levilab.software import software_versions
 
@@ -55,9 +59,9 @@ if TYPE_CHECKING:
 class StatisticsPart(Part):
     """How well a law fits; see `analysis.spindown.selection.Statistics`."""
 
-    n: int
-    rms_residual: float
-    reduced_chi_square: float | None
+    n: int = Field(ge=1)
+    rms_residual: float = Field(ge=0)
+    reduced_chi_square: float | None = Field(ge=0)
     aicc: float | None
     bic: float | None
     weight: float | None
@@ -72,9 +76,9 @@ class FitPart(Part):
     solution: in the dimensionless numbers of `analysis.spindown.drag`.
     """
 
-    n_parameters: int
-    rss: float
-    chi_square: float | None
+    n_parameters: int = Field(ge=1)
+    rss: float = Field(ge=0)
+    chi_square: float | None = Field(ge=0)
     misfit: float
     solution: tuple[float, ...] | None = None
 
@@ -98,6 +102,13 @@ class ModelPart(Part):
             raise ValueError(f"{self.name!r} is no drag law; known are {', '.join(LAWS)}")
         if not set(law.constants) <= set(self.parameters):
             raise ValueError(f"{self.name} lacks one of its constants {', '.join(law.constants)}")
+        size = len(law.parameters)
+        if self.covariance is not None and [len(row) for row in self.covariance] != [size] * size:
+            raise ValueError(f"{self.name}: its covariance is not {size} × {size}")
+        lines = set(law.constants) if SHOWN_LAWS[self.name].straight else set()
+        if set(self.linearised or ()) != lines:
+            seen, expected = (", ".join(names) or "nothing" for names in (self.linearised or (), lines))
+            raise ValueError(f"{self.name}: linearised has {seen}, expected {expected}")
         return self
 
 
@@ -116,6 +127,13 @@ class StandingPart(Part):
     weak: tuple[str, ...]
     excluded: tuple[ExcludedPart, ...]
 
+    @model_validator(mode="after")
+    def _names_are_known(self) -> Self:
+        for name in (*self.tied, *self.needless, *self.weak, *(one.name for one in self.excluded)):
+            if name not in LAWS:
+                raise ValueError(f"{name!r} is no drag law; known are {', '.join(LAWS)}")
+        return self
+
 
 class OutlierPart(Part):
     """A reading that does not belong to the others."""
@@ -128,8 +146,8 @@ class OutlierPart(Part):
 class ReferencePart(Part):
     """The units of the dimensionless solutions of a run."""
 
-    frequency_hz: float
-    time_s: float
+    frequency_hz: float = Field(ge=SLOWEST_HZ / 2, le=2 * HIGHEST_HZ)
+    time_s: float = Field(ge=1e-30, le=3 * EARLIEST_S)
 
 
 class _WithLaws(Part):
@@ -142,8 +160,11 @@ class _WithLaws(Part):
     standing: StandingPart
 
     @model_validator(mode="after")
-    def _best_is_there(self) -> Self:
-        if self.best_model not in {model.name for model in self.models}:
+    def _laws_are_there(self) -> Self:
+        names = [model.name for model in self.models]
+        if names != list(LAWS):
+            raise ValueError(f"the models are {', '.join(names)}, expected {', '.join(LAWS)}")
+        if self.best_model not in names:
             raise ValueError(f"best_model {self.best_model!r} is not among the models")
         return self
 
@@ -176,15 +197,15 @@ class SpinDownPart(RunPart, _WithLaws):
 class BootstrapPart(Part):
     """How the bootstrap drew."""
 
-    samples: int
-    seed: int
+    samples: int = Field(ge=1)
+    seed: int = Field(ge=0)
 
 
 class SettingsPart(Part):
     """How the readings were analyzed."""
 
     columns: dict[str, str]
-    reading_u_hz: float | None
+    reading_u_hz: float | None = Field(gt=0)
     uncertainty: Literal["covariance", "profile", "bootstrap"]
     keep_outliers: bool
     bootstrap: BootstrapPart | None
@@ -202,13 +223,6 @@ class SpinDownResult(Result, _WithLaws):
     analysis: Literal["spindown"] = "spindown"
     settings: SettingsPart
     runs: tuple[SpinDownPart, ...]
-
-    @model_validator(mode="after")
-    def _laws_are_everywhere(self) -> Self:
-        names = {model.name for model in self.models}
-        if not all(names <= {model.name for model in run.models} for run in self.runs):
-            raise ValueError("a run lacks a model that the whole has")
-        return self
 
 
 # --- writing -------------------------------------------------------------------------------------------
@@ -477,14 +491,20 @@ def _spin_down(part: SpinDownPart, source: Source[Readings], options: Options, f
     readings = source.readings
     outliers = [one.index for one in part.outliers]
     if max(outliers, default=0) >= len(readings):
-        raise DataError(f"{file}: names an outlier that {source.data} does not hold: analyze anew with levilab analyze")
+        raise DataError(f"{file}: names an outlier that {source.data} does not hold: {ANEW}")
     used = np.ones(len(readings), dtype=bool)
     if not options.keep_outliers:
         used[outliers] = False
+    if used.sum() < FEWEST:
+        raise DataError(f"{file}: names so many outliers that {used.sum()} readings of {source.data} are left: {ANEW}")
     time, frequency = readings.time[used], readings.frequency[used]
     u = readings.u if options.reading_u is None else np.full(len(readings), options.reading_u)
+    with np.errstate(all="ignore"):
+        fits = tuple(_law_fit(model, part.reference, time, frequency, part.start_time) for model in part.models)
+    if not all(np.isfinite(fit.residuals).all() for fit in fits):
+        raise DataError(f"{file}: its fits leave the range of numbers at the readings of {source.data}: {ANEW}")
     return SpinDown(
-        fits=tuple(_law_fit(model, part.reference, time, frequency, part.start_time) for model in part.models),
+        fits=fits,
         best=part.best_model,
         verdict=_verdict_of(part),
         time=time,

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import pytest
 
+from levilab.errors import DataError
 from levilab.pipelines import catalogue
 from levilab.pipelines.catalogue import ANALYSES, Analysis, analyze_suiting, recall_suiting
 from levilab.pipelines.catalogue import save as save_found
@@ -114,3 +115,32 @@ def test_several_inputs_leave_the_result_of_the_present_run_alone(runs: Path, mo
     written = save_spindown(analyze_spindowns(paths, Options()), first=True)[0]
     assert written.resolve() == runs / "result.json"
     assert SPINDOWN.recall(paths, Options()).origins[1].text.endswith(str(written))
+
+
+@pytest.mark.usefixtures("two")
+@pytest.mark.parametrize("name", ["run-1", ""])
+def test_damage_is_not_passed_over_because_another_analysis_runs(
+    monkeypatch: pytest.MonkeyPatch, runs: Path, name: str
+) -> None:
+    """The second row is content with anything; the first one finds its result damaged."""
+    second = replace(second_row("spin"), recall=SPINDOWN.analyze)
+    use(monkeypatch, SPINDOWN, second)
+    (runs / name / "result.json").write_text("{", encoding="utf-8")
+    with pytest.raises(DataError, match="is cut off"):
+        recall_suiting([runs / name], Options())
+
+
+def test_an_analysis_that_does_not_suit_is_passed_over(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, sample_data: Path
+) -> None:
+    other = replace(second_row("limit"), analyze=lambda *_: "other")
+    use(monkeypatch, SPINDOWN, other)
+    (tmp_path / "empty").mkdir()
+    table = tmp_path / "field.csv"
+    table.write_text("time_s,field_t\n0,1\n1,2\n2,3\n", encoding="utf-8")
+    for path in (sample_data / "lower-limits", tmp_path / "empty", table):
+        assert [row.name for row, _ in analyze_suiting([path], Options())] == ["second"], path
+    text = table.read_text(encoding="utf-8").replace("field_t", "spin_frequency_hz")
+    table.write_text(text.replace("1,2", "1,two"), encoding="utf-8")
+    with pytest.raises(DataError, match="line 3"):
+        analyze_suiting([table], Options())

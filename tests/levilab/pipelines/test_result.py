@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -92,6 +93,9 @@ def damaged(content: dict[str, Any], *keys: str | int, value: object = ...) -> s
     return json.dumps(content)
 
 
+ONE = {"value": 1, "u": 1, "unit": ""}
+
+
 @pytest.mark.parametrize(
     ("keys", "value", "says"),
     [
@@ -107,6 +111,28 @@ def damaged(content: dict[str, Any], *keys: str | int, value: object = ...) -> s
         (["runs"], [], "1 inputs but 0 runs"),
         (["best_model"], "cubic", "best_model 'cubic' is not among the models"),
         (["settings", "uncertainty"], "guessed", "settings.uncertainty"),
+        (["settings", "reading_u_hz"], -1.0, "reading_u_hz"),
+        (["settings", "bootstrap"], {"samples": 100, "seed": -1}, "bootstrap.seed"),
+        (["settings", "bootstrap"], {"samples": 0, "seed": 0}, "bootstrap.samples"),
+        (["runs", 0, "reference", "time_s"], 0.0, "reference.time_s"),
+        (["runs", 0, "reference", "frequency_hz"], -1.0, "reference.frequency_hz"),
+        (["runs", 0, "reference", "frequency_hz"], 1e308, "reference.frequency_hz"),
+        (["runs", 0, "reference", "time_s"], 5e-324, "reference.time_s"),
+        (["runs", 0, "reference", "time_s"], math.nan, "not finite"),
+        (["runs", 0, "models", 0, "fit", "solution"], [math.nan, 1.0], "not finite"),
+        (["runs", 0, "values", "start_time", "value"], math.inf, "not finite"),
+        (["runs", 0, "models", 2, "covariance"], [[1.0], [1.0, 2.0]], "disc: its covariance is not 2 × 2"),
+        (["models", 2, "covariance"], [], "disc: its covariance is not 2 × 2"),
+        (["models", 0, "linearised"], {"zz": ONE}, "stokes: linearised has zz, expected c1"),
+        (["runs", 0, "models", 0, "linearised"], None, "stokes: linearised has nothing, expected c1"),
+        (["models", 3, "linearised"], {"c1": ONE}, "mixed: linearised has c1, expected nothing"),
+        (["models", 1], ..., "the models are stokes, disc, mixed, power, expected"),
+        (["runs", 0, "models", 1], ..., "the models are stokes, disc, mixed, power, expected"),
+        (["standing", "tied"], ["cubic"], "'cubic' is no drag law"),
+        (["runs", 0, "standing", "excluded"], [{"name": "cubic", "reason": ""}], "'cubic' is no drag law"),
+        (["models", 2, "statistics", "n"], 0, "statistics.n"),
+        (["models", 2, "parameters", "c32", "runs"], 1, "c32.runs"),
+        (["models", 2, "parameters", "c32", "scatter"], 0.1, "of how many runs"),
     ],
 )
 def test_a_damaged_result_is_refused_with_what_is_wrong(tmp_path: Path, keys: Any, value: object, says: str) -> None:

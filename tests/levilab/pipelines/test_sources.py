@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
-from levilab.pipelines.sources import Options
+from levilab.errors import DataError
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.sources import Options, sha256_of
 from levilab.pipelines.spindown.analysis import analyze_spindowns
 from support.spin_downs import spin_down_csv
 
@@ -72,3 +75,21 @@ def test_runs_of_another_experiment_are_a_remark_and_no_warning(sample_data: Pat
     analysis = analyze_spindowns([sample_data], Options())
     assert analysis.remarks == ("passed over: 1 limit run",)
     assert not any("passed over" in warning for warning in analysis.all_warnings)
+
+
+def test_what_is_no_regular_file_has_no_hash(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="a file is expected"):
+        sha256_of(tmp_path)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has no such pipes in folders")
+def test_a_pipe_in_the_place_of_readings_is_refused_at_once(tmp_path: Path, sample_data: Path) -> None:
+    run = shutil.copytree(sample_data / "spin-down-1", tmp_path / "run")
+    (run / "readings.csv").unlink()
+    for pipe, paths in ((run / "readings.csv", [run]), (tmp_path / "my.csv", [tmp_path / "my.csv"])):
+        os.mkfifo(pipe)
+        for find in (ANALYSES["spindown"].analyze, ANALYSES["spindown"].recall):
+            with pytest.raises(DataError, match="pipe"):
+                find(paths, Options())
+        with pytest.raises(DataError, match="a file is expected"):
+            sha256_of(pipe)

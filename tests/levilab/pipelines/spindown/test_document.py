@@ -200,12 +200,67 @@ def test_a_file_of_that_name_above_the_input_may_be_anything(tmp_path: Path) -> 
     assert recall_spindowns([spin_down_csv(tmp_path / "my.csv")], Options()).combined.best == "disc"
 
 
-def test_an_outlier_that_the_readings_do_not_hold_is_an_error(tmp_path: Path) -> None:
+def one_outlier(index: int) -> dict[str, Any]:
+    return {"index": index, "time_s": 0.0, "spin_frequency_hz": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("entries", "says"),
+    [
+        ({"outliers": [one_outlier(20)]}, "names an outlier"),
+        ({"outliers": [one_outlier(k) for k in range(20)]}, "so many outliers that 0 readings"),
+        ({"outliers": [one_outlier(k) for k in range(18)]}, "so many outliers that 2 readings"),
+    ],
+)
+def test_a_result_that_the_readings_belie_is_an_error(tmp_path: Path, entries: dict[str, Any], says: str) -> None:
     path = spin_down_csv(tmp_path / "my.csv")
     analyzed(path)
     file = tmp_path / "my.csv.result.json"
     result = json.loads(file.read_text(encoding="utf-8"))
-    result["runs"][0]["outliers"] = [{"index": 20, "time_s": 0.0, "spin_frequency_hz": 1.0}]
+    result["runs"][0] |= entries
     file.write_text(json.dumps(result), encoding="utf-8")
-    with pytest.raises(DataError, match="names an outlier"):
+    with pytest.raises(DataError, match=says) as caught:
         recall_spindowns([path], Options())
+    assert str(caught.value).startswith(f"{file}: ")
+
+
+def test_a_fit_that_leaves_the_range_of_numbers_is_an_error(tmp_path: Path) -> None:
+    path = spin_down_csv(tmp_path / "my.csv")
+    analyzed(path)
+    file = tmp_path / "my.csv.result.json"
+    result = json.loads(file.read_text(encoding="utf-8"))
+    result["runs"][0]["models"][3]["fit"]["solution"] = [1e308, 0.0, -1e308]
+    file.write_text(json.dumps(result), encoding="utf-8")
+    with pytest.raises(DataError, match="leave the range of numbers"):
+        recall_spindowns([path], Options())
+
+
+@pytest.mark.parametrize("text", ['{"mine": 1}', "[1, 2]", "mine", '{"schema": "mine/1"}'])
+def test_another_program_may_have_a_result_in_the_present_folder(
+    runs: Path, monkeypatch: pytest.MonkeyPatch, text: str
+) -> None:
+    monkeypatch.chdir(runs.parent)
+    (runs.parent / "result.json").write_text(text, encoding="utf-8")
+    assert len(recall_spindowns([runs / "run-1", runs / "run-2"], Options()).runs) == 2
+
+
+def test_a_result_of_another_version_in_the_present_folder_is_an_error(
+    runs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(runs.parent)
+    (runs.parent / "result.json").write_text('{"schema": "levilab-result/9"}', encoding="utf-8")
+    with pytest.raises(DataError, match="levilab-result/9"):
+        recall_spindowns([runs / "run-1", runs / "run-2"], Options())
+
+
+def test_a_warning_about_an_input_is_recalled_once_however_it_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    paths = [spin_down_csv(tmp_path / name, seed=k) for k, name in enumerate(("one.csv", "two.csv"))]
+    for path in paths:
+        lines = path.read_text(encoding="utf-8").splitlines()
+        path.write_text("\n".join([*lines[1:], ""]), encoding="utf-8")
+        analyzed(path)
+    monkeypatch.chdir(tmp_path)
+    after = recall_spindowns([path.relative_to(tmp_path) for path in paths], Options())
+    assert sum("no header" in text for text in after.all_warnings) == 2
