@@ -5,10 +5,12 @@ from __future__ import annotations
 import io
 
 import pytest
+from typer.testing import CliRunner
 
 from levilab.acquisition import loop
 from levilab.acquisition.session import ExperimentFailed
-from levilab.cli.acquire import _ask, acquire_spin
+from levilab.cli.acquire import _ask
+from levilab.cli.main import app
 
 
 def test_the_person_is_asked_on_the_terminal(monkeypatch, capsys):
@@ -40,5 +42,7 @@ def test_the_command_hands_the_person_over(monkeypatch, tmp_path):
     )
     monkeypatch.setattr(loop, "acquire", acquire)
     with pytest.raises(Stopped):
-        acquire_spin(bench=bench, out=tmp_path)
+        CliRunner().invoke(
+            app, ["acquire", "spin", "--bench", str(bench), "--out", str(tmp_path)], catch_exceptions=False
+        )
     assert asked == [_ask]
