@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -46,6 +45,8 @@ class AnalyzeGroup(typer.core.TyperGroup):
 
     def _is_misspelt(self, word: str) -> bool:
         """Whether a word is nearly the name of an analysis, and no path."""
+        from difflib import get_close_matches  # not for every help
+
         return bool(get_close_matches(word, self.commands)) and not Path(word).exists()
 
 
