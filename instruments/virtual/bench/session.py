@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Protocol
 from instruments.ieee488 import INFINITY
 from instruments.virtual.core.message import Framer, Overrun
 from instruments.virtual.core.parser import LONGEST_ANSWER, ScpiError
-from instruments.virtual.core.steps import Work
+from instruments.virtual.core.steps import Work, at_once
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator, Sequence
@@ -108,8 +108,9 @@ class Session:
     def write(self, data: bytes, *, end: bool = True) -> None:
         """Bytes for the instrument; it works on every message that they complete.  end: marked by the interface."""
         with self.lock:
-            for _ in self.slices(data, end=end):
-                pass
+            for message in self.messages(data, end=end):
+                if message is not None:
+                    at_once(self._run(message))
 
     def slices(self, data: bytes, *, end: bool = True) -> Iterator[None]:
         """Do what write() does, in slices: the bus is locked while one is worked on, and free between them.

@@ -71,8 +71,15 @@ class VirtualInstrument:
             self._work.give_up()
         while self._work and self._work.step():
             yield
-        work = self._work = Work(self._answered(message))
+        answered = self._answered(message)
         try:
+            next(answered)
+        except StopIteration as end:  # as nearly every message is: at once
+            answer: Answer | None = end.value
+            return answer
+        work = self._work = Work(answered)
+        try:
+            yield
             while work.step():
                 yield
         finally:

@@ -121,8 +121,9 @@ class Parser:
         """Do what run() does, in steps: a message may be interrupted after each of its units."""
         answers: list[str] = []
         length, path = 0, ""
-        for unit in split_units(message):
-            yield
+        for k, unit in enumerate(split_units(message)):
+            if k:
+                yield
             if unit is None:
                 continue
             header, rest, path = read_unit(unit, path)
