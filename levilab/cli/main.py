@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import contextlib
 import os
 import sys
@@ -62,7 +63,10 @@ def main() -> None:
 
 
 def _exit_with(error: Exception) -> NoReturn:
-    status = exit_codes.exit_status(error)
+    try:
+        status = exit_codes.exit_status(error)
+    except OSError:  # no file can be opened any more, not even that of a module
+        status = exit_codes.FAILED
     if status is None:
         raise error
     with contextlib.suppress(OSError):
@@ -88,11 +92,13 @@ def _prepare_output() -> None:
 
     A stream that is closed from the start, as by ``>&-``, is None in Python: what goes there is thrown away.
     """
-    from levilab.present.characters import SPELLED_OUT
-
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: PTH123, SIM115 - until the end
         reconfigure = getattr(getattr(sys, name), "reconfigure", None)
-        if reconfigure:
+        if reconfigure and codecs.lookup(getattr(sys, name).encoding or "utf-8").name != "utf-8":
+            from levilab.present.characters import SPELLED_OUT
+
             reconfigure(errors=SPELLED_OUT)
+        elif reconfigure:  # what UTF-8 has no place for, as in the name of a file
+            reconfigure(errors="replace")
