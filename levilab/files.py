@@ -20,7 +20,7 @@ class CannotWrite(LevilabError):
     """A file cannot be written (any more)."""
 
 
-#: Nobody writes tables within tables deeper than this; Python's recursion bears some hundreds.
+#: No program writes tables within tables deeper than this; Python's recursion bears some hundreds.
 DEEPEST = 50
 #: Whole numbers beyond it have no float, and beyond 4300 digits Python does not even read them.
 LARGEST = 10**300

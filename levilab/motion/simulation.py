@@ -82,7 +82,7 @@ def carry_out(
 ) -> Simulation:
     """Simulate, look at the motion, and write it down; what does not come to its end leaves nothing behind.
 
-    message: is told what takes a moment; progress: the share that is done.  Raises UsageError, SimulationError,
+    message: called with what takes a moment; progress: the share that is done.  Raises UsageError, SimulationError,
     CannotWrite.
     """
     factor = _samples_per_state(order)

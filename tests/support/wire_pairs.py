@@ -478,7 +478,7 @@ class Pair:
     def recover(self, *, anew, reset):
         """What a program does after an error: a new link if there is none, the error queue emptied, set up if need be.
 
-        reset: the instrument may have got a command that nobody has sent, and is switched off and on.
+        reset: the instrument may have got a command that the program has not sent, and is switched off and on.
         """
         self.calm()
         self.room.clock.sleep(60.0)
@@ -501,7 +501,7 @@ class Pair:
         self.driver.identity()
 
     def _come_into_step(self):
-        """A line has no clear; names that were waited for in vain, and come after all, are told by their form."""
+        """A line has no clear; names that were waited for in vain, and come after all, are known by their form."""
         self.driver.transport.timeout = 10 * SHORT  # names that never come are waited for once so long
         for _ in range(10):
             try:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 class Bus:
     """The instruments of one virtual bench by resource name.
 
-    lock: whoever lets an instrument work holds it; servers do so from several threads; faults: that are to happen;
+    lock: held while an instrument works; servers do so from several threads; faults: that are to happen;
     away: until when [s] instruments cannot be reached, by the id of the device.
     """
 

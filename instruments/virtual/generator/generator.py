@@ -1,4 +1,4 @@
-"""Virtual function generators: what they put out is told to whoever listens.  Both families share what stands here."""
+"""Virtual function generators: a listener gets what they put out.  Both families share this."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class VirtualGenerator(VirtualInstrument):
     """Bytes in, a signal out; the commands that both families have.
 
     listener: called with the time [s] and the new Output of channel 1 at each change, and beforehand with the end of
-    a burst that is under way: a later change takes the place of what was told for after it.
+    a burst that is under way: a later change replaces what was announced for the time after it.
     """
 
     family: ClassVar[Family]
@@ -556,7 +556,7 @@ class VirtualGenerator(VirtualInstrument):
 
     @staticmethod
     def attributes(channel: Channel, header: str) -> tuple[Command, ...]:
-        """DATA:ATTRibute: what there is to know of a waveform, by default the one that is selected."""
+        """DATA:ATTRibute: the properties of a waveform, by default the one that is selected."""
 
         def ask(which: str, parameters: list[str]) -> str:
             asked = at_most_one(parameters)

@@ -338,7 +338,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
         return lambda: self._preamble()[k]
 
     def _set_points(self, parameters: list[str]) -> None:
-        """A number, rounded to the next the scope can give when it is asked for; MAXimum takes what there is."""
+        """A number, rounded to the next the scope can give when it is asked for; MAXimum takes all."""
         self.settings["wav_points"] = number(one(parameters), low=1, high=8e6, default=_FOR_SCREEN)
 
     def _sequence(self) -> tuple[Record, float, int]:

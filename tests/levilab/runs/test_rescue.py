@@ -1,4 +1,4 @@
-"""A run folder that is removed, replaced or cut under way: what was shown is on the disk all the same."""
+"""A run folder that is removed, replaced or cut under way: what was shown is on the disk nevertheless."""
 
 from __future__ import annotations
 

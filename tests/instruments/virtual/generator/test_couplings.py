@@ -92,7 +92,7 @@ def test_whatever_is_set_the_settings_fit_each_other(commands):
         channel = device.channels[0]
         low, high = channel.levels()
         half = 0.0 if channel["waveform"] == "DC" else channel.number("amplitude_vpp") / 2
-        if low < high:  # voltage limits that leave no room are nobody's
+        if low < high:  # voltage limits that leave no room count for nothing
             assert channel.number("offset") + half <= high + 1e-6 or half >= (high - low) / 2 - 1e-6
         assert all(np.isfinite(value) for value in device.settings.values() if isinstance(value, float))
         slowest, fastest = channel.frequency_limits()

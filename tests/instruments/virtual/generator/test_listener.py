@@ -1,4 +1,4 @@
-"""What the listener of a virtual generator is told.
+"""What the listener of a virtual generator gets.
 
 Source: Agilent/Keysight 33500 Series Operating and Service Guide, unless a test names another.
 """

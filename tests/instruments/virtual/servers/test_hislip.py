@@ -214,7 +214,7 @@ def test_replies_that_are_never_read_do_not_pile_up(which, kind, control, payloa
 
 
 class ClearedMeanwhile(FullWriter):
-    """The connection to a client that begins a device clear while it is told that its answer is interrupted."""
+    """The connection to a client that begins a device clear while the server reports that its answer is interrupted."""
 
     client = None
 
