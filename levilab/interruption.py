@@ -8,7 +8,7 @@ import threading
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
     from types import FrameType
 
 #: What asks a program to end: Ctrl-C, kill, a closed terminal, and on Windows Ctrl-Break.
@@ -87,16 +87,25 @@ def watching_for_interruption() -> Iterator[Stop]:
 
 
 @contextlib.contextmanager
-def interrupted_afterwards() -> Iterator[None]:
-    """Ctrl-C waits for the end of what is short and must not be torn, as the compiler must not (main thread only)."""
+def interruption_postponed() -> Iterator[Callable[[], None]]:
+    """Ctrl-C waits, for what is short and must not be torn, as the compiler must not (main thread only).
+
+    It waits until the function given here is called, or until the end; KeyboardInterrupt is raised then.
+    """
     if threading.current_thread() is not threading.main_thread():
-        yield
+        yield lambda: None
         return
     asked: list[int] = []
+    postponed = contextlib.ExitStack()
+
+    def admit() -> None:
+        postponed.close()
+        if asked:
+            asked.clear()
+            raise KeyboardInterrupt
+
     before = signal.signal(signal.SIGINT, lambda number, _: asked.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-    if asked:
-        raise KeyboardInterrupt
+    postponed.callback(signal.signal, signal.SIGINT, before)
+    with postponed:
+        yield admit
+    admit()

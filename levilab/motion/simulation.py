@@ -12,7 +12,7 @@ import numpy as np
 
 from levilab.errors import UsageError
 from levilab.files import CannotWrite
-from levilab.interruption import interrupted_afterwards
+from levilab.interruption import interruption_postponed
 from levilab.motion.lines import rate_for
 from levilab.motion.summary import as_document, summarise
 from levilab.runs.run import STATES, RunRecord, utc_now
@@ -88,8 +88,9 @@ def carry_out(
     factor = _samples_per_state(order)
     if order.out is None:
         return Simulation(_simulated(order, factor, message, progress), None)
-    with RunWriter.create(order.out, _record(order), STATES) as writer:
+    with interruption_postponed() as admit_interruption, RunWriter.create(order.out, _record(order), STATES) as writer:
         try:
+            admit_interruption()  # from here on the folder is taken away again
             summary = _simulated(order, factor, message, progress)
             _write(summary, factor, writer)
         except BaseException:
@@ -121,7 +122,7 @@ def _simulated(
     message: Callable[[str], None],
     progress: Callable[[float], None] | None,
 ) -> Summary:
-    with announce_compilation(message), interrupted_afterwards():
+    with announce_compilation(message), interruption_postponed():
         simulate(order.scene, min(_FIRST_S, order.duration), rate=None)
     begin = time.perf_counter()
     motion = simulate(

@@ -5,7 +5,7 @@ import threading
 
 import pytest
 
-from levilab.interruption import Interrupted, watching_for_interruption
+from levilab.interruption import Interrupted, interruption_postponed, watching_for_interruption
 
 SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
 
@@ -97,3 +97,21 @@ def test_in_another_thread_signals_are_left_to_the_main_one():
     thread.start()
     thread.join(5.0)
     assert seen == [before]
+
+
+def test_postponed_ctrl_c_waits_until_it_is_admitted():
+    with interruption_postponed() as admit:
+        signal.raise_signal(signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            admit()
+        with pytest.raises(KeyboardInterrupt):  # from here on it comes at once
+            signal.raise_signal(signal.SIGINT)
+
+
+def test_postponed_ctrl_c_comes_at_the_end_at_the_latest():
+    reached = False
+    with pytest.raises(KeyboardInterrupt), interruption_postponed():  # noqa: PT012 (the end of the block raises)
+        signal.raise_signal(signal.SIGINT)
+        reached = True
+    assert reached
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

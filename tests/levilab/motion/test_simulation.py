@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -21,6 +21,7 @@ from levilab.motion.summary import as_document, summarise
 from levilab.motion.table import print_motion
 from levilab.present.progress import Share
 from levilab.runs.run import Run
+from levilab.runs.writer import RunWriter
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
 
@@ -360,6 +361,22 @@ def test_interrupted_it_says_so_in_one_line_and_leaves_nothing(tmp_path: Path) -
     assert told.splitlines()[-1] == "levilab: interrupted, nothing was written"
     assert "Traceback" not in told
     assert list((tmp_path / "runs").iterdir()) == []
+
+
+def test_interrupted_while_its_folder_is_made_it_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = RunWriter.create
+
+    def interrupted(*arguments: Any) -> RunWriter:
+        writer = made(*arguments)
+        signal.raise_signal(signal.SIGINT)
+        return writer
+
+    monkeypatch.setattr(RunWriter, "create", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        carry_out(SimulationOrder(preset("driven"), out=tmp_path), print)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_no_bar_is_shown_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
