@@ -27,6 +27,8 @@ Choice = Literal["auto", "edges", "matched", "likelihood"]
 
 #: Samples per second of the shortened trace in which pulses are searched for.
 SEARCH_RATE = 2500.0
+#: Fewer edges than this have to stand out of the noise so many times, or they may be noise.
+FEW, CLEAR = 16, 3.0
 #: Pulses that last longer than this part of a turn are placed by their edges alone.
 WIDE = 0.2
 #: The matched filter is not trusted where more than these parts of the turns have no pulse, or one at a wrong place.
@@ -119,7 +121,7 @@ def _by_edges(trace: Trace, start: float) -> SpinFrequency:
             train.doubled, start, method="edges", origin=0.0, notes=trace.notes,
         )  # fmt: skip
     edges = place_edges(trace.samples, trace.rate, train.fit, width=events.width, sign=events.sign)
-    if edges is None:
+    if edges is None or (edges.turns < FEW and edges.height < CLEAR * edges.noise):
         raise trace.too_few(train.used.size)
     return _result(edges, train.doubled, start, method="edges", origin=0.0, notes=trace.notes)
 
