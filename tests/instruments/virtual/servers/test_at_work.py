@@ -63,7 +63,7 @@ class Served:
         return resource
 
     def at_work(self):
-        return self.counter._work is not None and not self.counter._work.done
+        return self.counter.work is not None and not self.counter.work.done
 
     def ask_for_ever(self, way):
         """A client whose question is worked on without end."""
@@ -220,7 +220,7 @@ def test_empty_lines_leave_the_others_their_turn(monkeypatch):
         link = bench.link()
         assert await link.write(b"\n" * (1 << 20))
         turns = 0
-        while not link._work.done():
+        while link.busy():
             await asyncio.sleep(0)
             turns += 1
         return turns
@@ -310,13 +310,13 @@ def test_a_message_that_comes_in_process_waits_for_the_one_before(monkeypatch):
     monkeypatch.setattr("instruments.virtual.bench.session.SLICE", -1.0)  # a slice is one step
     counter = Virtual53230A(VirtualClock(), signal=pulses)
     bus = Bus({COUNTER: counter})
-    slices = bus.open(COUNTER).slices(b"SAMP:COUN 2000;:READ?")
-    next(slices)
-    other = bus.open(COUNTER)
+    asking, other = bus.open(COUNTER), bus.open(COUNTER)
+    work = asking.begin("SAMP:COUN 2000;:READ?")
+    assert asking.go_on(work)
     other.write(b"SAMP:COUN?")
-    assert counter._work.done
+    assert not asking.go_on(work)
     assert other.read(100, 1e9)[0] == b"+2000\n"
-    assert list(slices) == []
+    assert asking.read(1 << 20, 1e9)[0].count(b",") == 1999
 
 
 def test_a_counter_that_was_not_asked_for_long_catches_up_in_slices(monkeypatch):
@@ -326,5 +326,8 @@ def test_a_counter_that_was_not_asked_for_long_catches_up_in_slices(monkeypatch)
     session = Bus({COUNTER: counter}).open(COUNTER)
     session.write(b"INP1:LEV:AUTO OFF;:INP1:LEV1 0.6;:INP1:COUP DC;:SAMP:COUN 1000000;:INIT")
     clock.sleep(1000.0)
-    assert sum(1 for _ in session.catch_up()) > 1
+    work = session.catch_up()
+    assert session.go_on(work)
+    while session.go_on(work):
+        pass
     assert counter._memory.held > 5000
