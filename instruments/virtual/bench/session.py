@@ -223,7 +223,7 @@ class Session:
             if math.isfinite(timeout):  # for ever is no time to jump to
                 clock.sleep(timeout)
             return None
-        clock.sleep(max(0.0, ready - clock.now()))
+        clock.sleep(ready - clock.now())
         return self.take(count, until=until)
 
     def take(self, count: int, *, until: bytes = b"") -> tuple[bytes, bool]:

@@ -5,8 +5,7 @@ An answer may take long to be worked out, so an instrument works on a message in
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from instruments.virtual.core.parameters import at_most_one, boolean, choice, limit, none, nr3, number, one
 from instruments.virtual.core.parser import Command, Parser
@@ -22,8 +21,7 @@ if TYPE_CHECKING:
 Value = float | str | bool
 
 
-@dataclass(frozen=True)
-class Answer:
+class Answer(NamedTuple):
     """What an instrument says: the bytes, and when they are ready [s].
 
     epoch: of the measurement they come from; complete: whether its end is among them.
@@ -68,7 +66,6 @@ class VirtualInstrument:
 
     def steps(self, message: str) -> Steps[Answer | None]:
         """Do what execute() does, in steps."""
-        yield from self.catch_up()
         self._begin_message()
         return self._answer((yield from self.parser.steps(message)))
 
@@ -77,7 +74,7 @@ class VirtualInstrument:
         return False
 
     def catch_up(self) -> Steps[None]:
-        """Work out what has happened in the instrument since the last message."""
+        """Work out what has happened in the instrument since the last message, where anything happens in between."""
         yield from ()
 
     def _begin_message(self) -> None:

@@ -112,7 +112,9 @@ def _split(text: str, separator: str) -> Iterator[str | None]:
 
 
 def _piece(text: str, start: int, end: int, block_end: int) -> str:
-    kept = max(start, min(block_end, end))
+    if block_end <= start:
+        return text[start:end].strip(_BLANK)
+    kept = min(block_end, end)
     return (text[start:kept] + text[kept:end].rstrip(_BLANK)).lstrip(_BLANK)
 
 
@@ -163,7 +165,7 @@ class Framer:
         messages: list[str | Overrun] = []
         while (end := self._end_of_message()) is not None:
             if not self._dropping:
-                text = bytes(self._buffer[: self._block_end]) + self._buffer[self._block_end : end].rstrip(_BLANK_BYTES)
+                text = self._buffer[: self._block_end] + self._buffer[self._block_end : end].rstrip(_BLANK_BYTES)
                 messages.append(text.lstrip(_BLANK_BYTES).decode("latin-1"))
             self._forget(end + 1)
         if len(self._buffer) > max(self._block_end, 0) + LONGEST_LINE:

@@ -150,12 +150,13 @@ class Parser:
         return act
 
     def _find(self, name: str) -> Command:
-        if name not in self._known:
-            found = next((command for command in self.commands if command.header.fullmatch(name)), None)
-            if found is None:  # unknown headers are not remembered: they could be any number
+        known = self._known.get(name)
+        if known is None:
+            known = next((command for command in self.commands if command.header.fullmatch(name)), None)
+            if known is None:  # unknown headers are not remembered: they could be any number
                 raise ScpiError(-113, name[:40])
-            self._known[name] = found
-        return self._known[name]
+            self._known[name] = known
+        return known
 
     def report(self, error: ScpiError) -> None:
         """Put an entry into the error queue; when it is full its last entry says so."""

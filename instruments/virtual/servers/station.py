@@ -74,12 +74,12 @@ class Job:
 
     def may_have_turn(self) -> bool:
         """Whether the instrument may take the message now."""
-        session, waits = self.link.session, self.link.kept_out()
-        if self.link.station.working:
-            return not waits and session.cut_off_by(self.message or "")
-        # on a stream answers follow each other: the last one is delivered first.  The servers of the other protocols
-        # have waited for the lock
-        return self.work is not None or not session.stream or not (waits or self.link.answers_wait())
+        link = self.link
+        if link.station.working:
+            return link.session.cut_off_by(self.message or "") and not link.kept_out()
+        if self.work or not link.session.stream:  # the servers of the other protocols have waited for the lock
+            return True
+        return not link.kept_out() and not link.answers_wait()  # they follow each other: the last one goes first
 
     def work_for_a_slice(self) -> bool:
         """Let the instrument work on the message; whether it is done with it."""
@@ -97,10 +97,10 @@ class Station:
     bus: Bus
     device: VirtualInstrument
     _jobs: deque[Job] = field(default_factory=deque)  # in the order of their turns
-    _under_way: Job | None = None  # the instrument works on its message
+    _under_way: Job | None = None  # whose message the instrument works on
     _free: float = 0.0  # when the instrument takes the next message [s]
     _next_turn: asyncio.TimerHandle | None = None
-    _stirred: asyncio.Future[None] | None = None  # somebody waits for it
+    _stirred: asyncio.Future[None] | None = None  # what stirred() waits for
 
     @property
     def working(self) -> bool:
@@ -130,16 +130,14 @@ class Station:
 
     def _give_turn(self) -> None:
         """Work for a slice on the message under way, or on that of the client whose turn it is, and come again."""
-        if self._next_turn:
-            self._next_turn.cancel()
-            self._next_turn = None
-        if wait := 0.0 if self._under_way or not self._jobs else self.wall_duration_until(self._free):
-            self._come_again(wait)
-        elif job := self._choose():
-            self._work_for_a_slice(job)
-            self._come_again(0.0)
-        else:
-            self._come_again(_LOOK_AGAIN)
+        wait = 0.0 if self._under_way else self.wall_duration_until(self._free)
+        if wait == 0.0:
+            job = self._choose()
+            if job:
+                self._work_for_a_slice(job)
+            else:
+                wait = _LOOK_AGAIN
+        self._come_again(wait)
 
     def _come_again(self, wait: float) -> None:
         """Give the next turn after a while [s], if anything waits for one."""
