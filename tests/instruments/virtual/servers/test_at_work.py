@@ -81,7 +81,9 @@ def serving(counter, clock):
 
 
 @pytest.fixture
-def served():
+def served(monkeypatch):
+    monkeypatch.setattr("instruments.virtual.bench.session.SLICE", 1e-3)  # a turn more often costs the test less
+    monkeypatch.setattr("instruments.virtual.servers.station.LINGER", 0.05)  # the work here never ends
     clock = WallClock()
     with serving(BusyCounter(clock), clock) as served:
         yield served  # the end of the server does not wait for the counter: it would wait for ever
