@@ -188,7 +188,9 @@ class Station:
     def stir(self) -> None:
         """Something happened to the instrument: all that waits for it looks again."""
         self._wake()
-        self._come_again(0.0)
+        # a turn that is due stays: a client that stirs without end would put it off
+        if self._next_turn and self._next_turn.when() > asyncio.get_running_loop().time():
+            self._come_again(0.0)
 
     def _wake(self) -> None:
         if self._stirred:

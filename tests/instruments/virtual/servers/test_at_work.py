@@ -215,6 +215,20 @@ def test_one_long_line_leaves_the_others_their_turn(monkeypatch):
     assert asyncio.run(turns_meanwhile()) >= 25_000
 
 
+def test_a_flood_of_triggers_does_not_keep_the_instrument_from_its_work(monkeypatch):
+    bench = Bench(monkeypatch)
+
+    async def trigger_meanwhile():
+        assert await bench.link().write(b"*RST;" * 100)
+        other = bench.link()
+        for _ in range(200):
+            other.trigger()
+            await asyncio.sleep(0)
+
+    asyncio.run(trigger_meanwhile())
+    assert bench.counter.resets == 100
+
+
 def test_empty_lines_leave_the_others_their_turn(monkeypatch):
     bench = Bench(monkeypatch)
 
