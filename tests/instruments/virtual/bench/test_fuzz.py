@@ -33,9 +33,10 @@ from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.core.device import Answer
 from support import hostile
 
-#: `make explore` draws forty times as many; a machine that is busy is no reason to fail.
+#: `make explore` draws 1000: here 30 examples reach as many lines of instruments/ (4968) as 60 do (4975), in half the
+#: time.  A machine that is busy is no reason to fail.
 EXPLORING = settings.get_current_profile_name() == "explore"
-FEW = settings(max_examples=1000 if EXPLORING else 60, deadline=None, suppress_health_check=list(HealthCheck))
+FEW = settings(max_examples=1000 if EXPLORING else 30, deadline=None, suppress_health_check=list(HealthCheck))
 
 
 # --- messages ---
