@@ -23,6 +23,7 @@ from levilab.world.spin_world import KEPT_S
 
 if TYPE_CHECKING:
     from instruments.clock import Clock
+    from instruments.virtual.counter.edges import Thresholds
     from instruments.virtual.generator.channel import Output
     from levilab.simulator.scene import Scene
 
@@ -77,6 +78,7 @@ class MotionWorld:
         self._coil, self._flight = Coil(), Flight(scene, again_s, stem_height_m=self._laser.height_m)
         self._tape_at = float(np.random.default_rng(seed).uniform()) if seed else 0.0
         self._told = 0.0  # the last time that a change was told for [s]
+        self._aim_m = self._flight.first_lift()  # where the lens looks
         probe = np.array([[0.0, 0.0, PROBE_M]])
         self._probe_t = float(flux_density(base_field(scene), probe)[0, 2])
 
@@ -118,8 +120,31 @@ class MotionWorld:
     def light(self, start: float, step: float, n: int) -> Array:
         """The phototransistor's voltage; see World."""
         self._forget()
-        turns, up = self._flight.turns(start + step * np.arange(n, dtype=np.float64))
-        return self._tape.light(turns + self._tape_at, up, start, self._seed)
+        times = start + step * np.arange(n, dtype=np.float64)
+        return self._clean(times) + self._tape.noise_at(times, self._seed)
+
+    def _clean(self, times: Array) -> Array:
+        turns, rate, lift = self._flight.tape(times)
+        return self._tape.clean(turns + self._tape_at, rate, times, self._tape.height(lift - self._aim_m))
+
+    def crossings(self, start: float, stop: float, triggers: Thresholds) -> Array | None:
+        """See World: the pieces of the motion are asked when the tape has the place at which the trigger fires."""
+        self._forget()
+        around = 2e-4  # noise, and a pulse of another height, move a crossing by less
+        passed = self._flight.passages(lambda _: (0.5 - self._tape_at) % 1.0, start, stop)
+        least = float(self._tape.height(self._flight.tape(passed)[2] - self._aim_m).min(initial=1.0))
+
+        def place(rate: float) -> float:
+            offset = self._tape.offset(triggers, rate, least)
+            unknown.append(offset is None)
+            return (0.5 + (offset or 0.0) - self._tape_at) % 1.0
+
+        unknown: list[bool] = []
+        near = self._flight.passages(place, start - around, stop + around)
+        if any(unknown):
+            return None
+        found = self._tape.crossing(near, self._clean, triggers.fire, self._seed)
+        return np.asarray(found[(found >= start) & (found < stop)])
 
     def laser(self, start: float, step: float, n: int) -> Array:
         """The voltage of the laser's phototransistor; see World."""
