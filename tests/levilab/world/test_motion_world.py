@@ -275,7 +275,7 @@ def test_the_times_of_the_pulses_are_those_that_the_light_shows():
     top.drive(0.7, Output("SIN", 21.0, 4e-4, 0.0))
     seen = 5e-5 * crossings(top.light(0.0, 5e-5, 80_000), 0.6, 0.04)
     said = np.concatenate([top.crossings(a, a + 0.37, Thresholds(0.6, 0.56)) for a in 0.37 * np.arange(11)])
-    assert said.size > 60
+    assert said.size > 20
     np.testing.assert_allclose(said[said < 4.0], seen, atol=2e-6)  # straight between samples
     narrow = world(tape=Tape(view_m=0.003))
     assert narrow.crossings(0.0, 1.0, Thresholds(0.6, 0.56)) is None  # IC1 bobs half out of the lens's view
