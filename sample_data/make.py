@@ -132,6 +132,8 @@ def write_traces(name: str, scene: str | None, settings: str, note: str) -> None
         shutil.copytree(run.folder, HERE / name, ignore=shutil.ignore_patterns("datapackage.json", "run.lock"))
     path = HERE / name / "run.json"
     record = json.loads(path.read_text(encoding="utf-8"))
+    kept = ("limits", "oscilloscope", "generator", "scene", "trace")  # what the run has used
+    record["configuration"] = {key: value for key, value in record["configuration"].items() if key in kept}
     record |= {"started_utc": None, "ended_utc": None, "time_zero_utc": None, "software": {}}
     record["command_line"] = ["python", "sample_data/make.py"]
     record["synthetic_how"] = "SYNTHETIC: " + record["synthetic_how"]
