@@ -1,0 +1,216 @@
+"""What follows from a scan of the base for the tops that float there: heights, masses, spins, and the moment.
+
+The theory is that of `analysis.stability`; the top's magnet is a point or a disc (`analysis.field.magnet`).  All that
+is known, parameters of the scan and those of the top, goes through it once as it is and twice beside for each
+uncertainty (central differences at half of it); the slopes carry the whole covariance to the results.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.field.fit import FieldScan
+from analysis.field.magnet import Disc, axial_field, stiffnesses
+from analysis.field.ring import Ring
+from analysis.stability import AxialField, Symmetric, Window, equilibria, spin_windows, windows
+from analysis.uncertainty import Estimate, propagate
+
+Array = NDArray[np.float64]
+
+#: Remanence of hard ferrite per kelvin (IEC 60404-8-1: −0.2 %/K); base and top, each of it, lose so much.
+FERRITE_PER_K = -0.002
+#: Tops are looked for from a tenth of the inner radius to four outer radii above the upper face, as in the simulator.
+_LOW, _HIGH = 0.1, 4.0
+#: By how many hundredths of its width a window may move in a step of the differences: it is looked for so far around.
+_AROUND = 2.0
+
+#: The results in the order of their covariance, and their units.
+RESULTS: Mapping[str, str] = {
+    "lowest_height": "m",
+    "highest_height": "m",
+    "lightest_mass": "kg",
+    "heaviest_mass": "kg",
+    "mass_to_set": "kg",
+    "height_at_mass": "m",
+    "height_per_mass": "m/kg",
+    "slowest_spin": "Hz",
+    "fastest_spin": "Hz",
+    "moment": "A m^2",
+    "mass_to_add": "kg",
+}
+#: What is put in beside the parameters of the ring.
+_OF_TOP = ("mass", "transverse", "axial", "moment", "height")
+
+
+@dataclass(frozen=True, eq=False)
+class KnownTop:
+    """What is known of the top.
+
+    transverse, axial: I₁, I₃ [kg m²]; moment: its size [A m²]; mass [kg]; height: where it floats, on the scale of the
+    scan's heights [m]; with mass and height the moment follows from them.  covariance: of mass, I₁ and I₃, where they
+    come from the same parts, shape (3, 3).
+    """
+
+    transverse: Estimate
+    axial: Estimate
+    moment: Estimate | None = None
+    mass: Estimate | None = None
+    height: Estimate | None = None
+    gravity: float = 9.82
+    covariance: Array | None = None
+    magnet: Disc | None = None
+
+    @property
+    def weighed(self) -> bool:
+        """Whether the moment follows from weight and height."""
+        return self.height is not None and self.mass is not None
+
+
+@dataclass(frozen=True)
+class Floating:
+    """What follows.
+
+    values: name → estimate, of RESULTS; the heights and masses of the window far above the base, the spins of a top of
+    mass_to_set, floating at height_at_mass; height_per_mass: how it moves with the mass; moment and mass_to_add only
+    where the top's mass is known, and for the moment its height.  warnings: what to know.
+    """
+
+    values: Mapping[str, Estimate]
+    warnings: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> float:
+        value = self.values[name].value
+        assert value is not None
+        return value
+
+
+class FloatsNowhere(Exception):
+    """No top floats high above this base, or none of these inertias spins stably."""
+
+
+def follow(scan: FieldScan, top: KnownTop) -> Floating | None:
+    """What follows from a scan for a top; None where no top floats over such a base.
+
+    Raises ValueError for a top of which neither the moment nor mass and height are known.
+    """
+    if top.moment is None and not top.weighed:
+        raise ValueError("a moment, or mass and height, is needed")
+    values, covariance = _together(scan, top)
+    evaluate = _evaluator(top)
+    try:
+        found = evaluate(values)
+        u = _carried(evaluate, values, covariance)
+    except FloatsNowhere:
+        return None
+    estimates = {
+        name: Estimate(float(value), float(size) if math.isfinite(size) else None, unit)
+        for (name, unit), value, size in zip(RESULTS.items(), found, u, strict=True)
+        if math.isfinite(value)
+    }
+    floating = Floating(estimates)
+    return replace(floating, warnings=tuple(_doubts(floating, top)))
+
+
+def _together(scan: FieldScan, top: KnownTop) -> tuple[Array, Array]:
+    """Strength, origin, thickness, radii, then mass, I₁, I₃, moment, height; NaN and 0 where nothing is known."""
+    ring = [0, 1, 2, 4, 5]
+    known = [getattr(top, name) for name in _OF_TOP]
+    if top.weighed:
+        known[3] = None
+    values = np.array([*scan.values[ring], *(math.nan if one is None else one.value for one in known)], dtype=float)
+    covariance = np.zeros((10, 10))
+    covariance[:5, :5] = scan.covariance[np.ix_(ring, ring)]
+    covariance[range(5, 10), range(5, 10)] = [((one.u or 0.0) if one else 0.0) ** 2 for one in known]
+    if top.covariance is not None:
+        covariance[5:8, 5:8] = top.covariance
+    return values, covariance
+
+
+def _carried(evaluate: Callable[[Array], Array], values: Array, covariance: Array) -> Array:
+    """Standard uncertainties of the results, to first order, shape (results,)."""
+    u = np.sqrt(np.diagonal(covariance))
+    moved = np.flatnonzero(u > 0)
+    slopes = np.zeros((len(RESULTS), len(values)))
+    for k in moved:
+        step = np.zeros_like(values)
+        step[k] = min(u[k] / 2, 1e-3 * abs(values[k])) if values[k] else u[k] / 2
+        slopes[:, k] = (evaluate(values + step) - evaluate(values - step)) / (2 * step[k])
+    sizes = np.full(len(RESULTS), np.nan)
+    for row, line in enumerate(slopes):
+        if np.isfinite(line).all():
+            sizes[row] = propagate(covariance, line[None])[1][0]
+    return sizes
+
+
+def _evaluator(top: KnownTop) -> Callable[[Array], Array]:
+    """The results as a function of all that is put in; a window is looked for near that of the first call."""
+    near: list[Window] = []
+
+    def evaluate(values: Array) -> Array:
+        ring = Ring(*(float(value) for value in values[:5]))
+        mass, transverse, axial, moment, height = (float(value) for value in values[5:])
+
+        field = axial_field(ring, top.magnet)
+
+        if top.weighed:
+            slope = float(field(np.array([height]))[1, 0])
+            moment = mass * top.gravity / abs(slope) if slope else math.inf
+        if not math.isfinite(moment):
+            raise FloatsNowhere
+        # high above the base the field has the sign of the strength, and the moment stands against it
+        moment = -math.copysign(moment, ring.strength)
+        stiffness = None if top.magnet is None else stiffnesses(ring, top.magnet, moment)
+        symmetric = Symmetric(1.0, transverse, axial, moment, top.gravity, stiffness)
+        window = _upper_window(field, symmetric, ring, near)
+        near[:] = [window]
+        middle = (window.light + window.heavy) / 2
+        symmetric = replace(symmetric, mass=middle)
+        place = next((e for e in equilibria(field, symmetric, window.low, window.high)), None)
+        spins = spin_windows(field, symmetric, place.height) if place else ()
+        if place is None or not spins:
+            raise FloatsNowhere
+        bend = float(field(np.array([place.height]))[2, 0])
+        per_mass = -top.gravity / abs(moment * bend)
+        weighed = abs(moment) if top.weighed else math.nan
+        return np.array([window.low, window.high, window.light, window.heavy, middle, place.height, per_mass, *spins[0],
+                         weighed, middle - mass])  # fmt: skip
+
+    return evaluate
+
+
+def _upper_window(field: AxialField, top: Symmetric, ring: Ring, near: list[Window]) -> Window:
+    """The window farthest above the base."""
+    if near:
+        margin = _AROUND * (near[0].high - near[0].low)
+        low, high = near[0].low - margin, near[0].high + margin
+    else:
+        face = ring.origin + ring.thickness / 2
+        low, high = face + _LOW * ring.inner_radius, face + _HIGH * ring.outer_radius
+    found = windows(field, top, low, high)
+    lifted = [w for w in found if top.moment * float(field(np.array([(w.low + w.high) / 2]))[1, 0]) > 0]
+    if not lifted:
+        raise FloatsNowhere
+    return lifted[-1]
+
+
+def _doubts(found: Floating, top: KnownTop) -> list[str]:
+    texts = []
+    if top.height is not None and top.height.value is not None:
+        height = top.height.value
+        low, high = found["lowest_height"], found["highest_height"]
+        if not low <= height <= high:
+            texts.append(
+                f"the top is said to float at {1e3 * height:.4g} mm, by this scan tops float from {1e3 * low:.4g} to "
+                f"{1e3 * high:.4g} mm: are both counted from the same zero?"
+            )
+    width = found["heaviest_mass"] - found["lightest_mass"]
+    u = found.values["mass_to_set"].u
+    if u is not None and u > width / 4:
+        texts.append(
+            f"the mass to set is known to {1e3 * u:.2g} g only, and the window is {1e3 * width:.2g} g wide: "
+            "try masses about it; the height at which one floats tells the moment"
+        )
+    return texts
