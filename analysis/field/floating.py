@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from analysis.field.fit import FieldScan
 from analysis.field.magnet import Disc, axial_field, stiffnesses
 from analysis.field.ring import Ring
-from analysis.stability import AxialField, Symmetric, Window, equilibria, spin_windows, windows
+from analysis.stability import AxialField, Symmetric, Window, equilibria, windows
 from analysis.uncertainty import Estimate, propagate
 
 Array = NDArray[np.float64]
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 FERRITE_PER_K = -0.002
 #: Tops are looked for from a tenth of the inner radius to four outer radii above the upper face, as in the simulator.
 _LOW, _HIGH = 0.1, 4.0
-#: By how many hundredths of its width a window may move in a step of the differences: it is looked for so far around.
+#: A window is looked for around the one before it, by so many times its width on either side.
 _AROUND = 2.0
 
 #: The results in the order of their covariance, and their units.
@@ -145,40 +145,69 @@ def _carried(evaluate: Callable[[Array], Array], values: Array, covariance: Arra
     return sizes
 
 
+def floating_top(ring: Ring, top: KnownTop) -> Symmetric:
+    """The top as the theory takes it, its mass 1 kg; the moment stands against the field high above the ring.
+
+    Raises FloatsNowhere where the field has no slope at the height from which the moment follows.
+    """
+    field, moment = axial_field(ring, top.magnet), math.nan
+    if top.mass is not None and top.height is not None:
+        weight, slope = (top.mass.value or 0.0) * top.gravity, float(field(np.array([top.height.value]))[1, 0])
+        moment = weight / abs(slope) if slope else math.inf
+    elif top.moment is not None:
+        moment = top.moment.value or math.nan
+    if not math.isfinite(moment):
+        raise FloatsNowhere
+    # high above the base the field has the sign of the strength
+    moment = -math.copysign(moment, ring.strength)
+    stiffness = None if top.magnet is None else stiffnesses(ring, top.magnet, moment)
+    inertias = float(top.transverse.value or 0.0), float(top.axial.value or 0.0)
+    return Symmetric(1.0, *inertias, moment, top.gravity, stiffness)
+
+
+def floating_spins(ring: Ring, top: KnownTop, mass: float) -> tuple[float, float] | None:
+    """The slowest and the fastest spin [Hz] of a top of this mass [kg], where it floats; None where it does not."""
+    field, body = axial_field(ring, top.magnet), replace(floating_top(ring, top), mass=mass)
+    low, high = _range(ring)
+    stable = [place for place in equilibria(field, body, low, high) if place.stable and place.spins]
+    return stable[-1].spins[0] if stable else None
+
+
+def _range(ring: Ring) -> tuple[float, float]:
+    face = ring.origin + ring.thickness / 2
+    return face + _LOW * ring.inner_radius, face + _HIGH * ring.outer_radius
+
+
 def _evaluator(top: KnownTop) -> Callable[[Array], Array]:
     """The results as a function of all that is put in; a window is looked for near that of the first call."""
     near: list[Window] = []
 
     def evaluate(values: Array) -> Array:
         ring = Ring(*(float(value) for value in values[:5]))
-        mass, transverse, axial, moment, height = (float(value) for value in values[5:])
-
+        given = dict(zip(_OF_TOP, values[5:].tolist(), strict=True))
+        body = floating_top(ring, _with_values(top, given))
         field = axial_field(ring, top.magnet)
-
-        if top.weighed:
-            slope = float(field(np.array([height]))[1, 0])
-            moment = mass * top.gravity / abs(slope) if slope else math.inf
-        if not math.isfinite(moment):
-            raise FloatsNowhere
-        # high above the base the field has the sign of the strength, and the moment stands against it
-        moment = -math.copysign(moment, ring.strength)
-        stiffness = None if top.magnet is None else stiffnesses(ring, top.magnet, moment)
-        symmetric = Symmetric(1.0, transverse, axial, moment, top.gravity, stiffness)
-        window = _upper_window(field, symmetric, ring, near)
+        window = _upper_window(field, body, ring, near)
         near[:] = [window]
         middle = (window.light + window.heavy) / 2
-        symmetric = replace(symmetric, mass=middle)
-        place = next((e for e in equilibria(field, symmetric, window.low, window.high)), None)
-        spins = spin_windows(field, symmetric, place.height) if place else ()
-        if place is None or not spins:
+        body = replace(body, mass=middle)
+        place = next(iter(equilibria(field, body, window.low, window.high)), None)
+        if place is None or not place.spins:
             raise FloatsNowhere
         bend = float(field(np.array([place.height]))[2, 0])
-        per_mass = -top.gravity / abs(moment * bend)
-        weighed = abs(moment) if top.weighed else math.nan
-        return np.array([window.low, window.high, window.light, window.heavy, middle, place.height, per_mass, *spins[0],
-                         weighed, middle - mass])  # fmt: skip
+        per_mass = -top.gravity / abs(body.moment * bend)
+        moment = abs(body.moment) if top.weighed else math.nan
+        return np.array([
+            window.low, window.high, window.light, window.heavy, middle, place.height, per_mass,
+            *place.spins[0], moment, middle - given["mass"],
+        ])  # fmt: skip
 
     return evaluate
+
+
+def _with_values(top: KnownTop, values: Mapping[str, float]) -> KnownTop:
+    known = {name: replace(one, value=values[name]) for name in _OF_TOP if (one := getattr(top, name)) is not None}
+    return replace(top, **known)
 
 
 def _upper_window(field: AxialField, top: Symmetric, ring: Ring, near: list[Window]) -> Window:
@@ -187,8 +216,7 @@ def _upper_window(field: AxialField, top: Symmetric, ring: Ring, near: list[Wind
         margin = _AROUND * (near[0].high - near[0].low)
         low, high = near[0].low - margin, near[0].high + margin
     else:
-        face = ring.origin + ring.thickness / 2
-        low, high = face + _LOW * ring.inner_radius, face + _HIGH * ring.outer_radius
+        low, high = _range(ring)
     found = windows(field, top, low, high)
     lifted = [w for w in found if top.moment * float(field(np.array([(w.low + w.high) / 2]))[1, 0]) > 0]
     if not lifted:
