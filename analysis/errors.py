@@ -91,9 +91,10 @@ class TooFewHeights(AnalysisError):
 
     def __init__(self, *, seen: int, needed: int, lowest: float, highest: float) -> None:
         self.seen, self.needed, self.lowest, self.highest = seen, needed, lowest, highest
-        where = f"all at {1e3 * lowest:.4g} mm" if seen == 1 else f"from {1e3 * lowest:.4g} to {1e3 * highest:.4g} mm"
+        span = f" (from {1e3 * lowest:.4g} to {1e3 * highest:.4g} mm)" if seen else ""
+        where = f" (all at {1e3 * lowest:.4g} mm)" if seen == 1 else span
         super().__init__(
-            f"readings at {seen} height{'s' * (seen > 1)} ({where}), at least {needed} are needed: "
+            f"readings at {seen} height{'s' * (seen != 1)}{where}, at least {needed} are needed: "
             "scan on, from below to above the place where the top floats"
         )
 

@@ -1,20 +1,28 @@
-"""Make the sample data: four synthetic spin-downs and the ten published lower limits, as run folders.
+"""Make the sample data: four synthetic spin-downs, the ten published lower limits, and a scan of a field.
 
 The thesis prints the constants of four spin-downs, C₁ and C₂ of unweighted straight lines, but none of their
 readings.  These readings are made up so that they give those constants: the law of a laminar disc from about
 40 Hz, a reading each 10 s, noise N(0, 0.03 Hz), start and constant solved for so that the straight lines
 return the published C₁ and C₂, rounded to 0.01 Hz.  They are not the author's data.
 
+The scan of a base's field comes from the virtual bench, `levilab acquire field --mock`: its times and what differs
+between computers are left out.
+
 Run it from anywhere: ``python sample_data/make.py``.  It writes the same bytes each time.
 """
 
 import json
+import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import root
+
+from levilab.acquisition.loop import acquire
+from levilab.acquisition.request import AcquisitionOptions, request_for
+from levilab.present.progress import Lines
 
 HERE = Path(__file__).parent
 NOISE_HZ, STEP_S, DIGIT_HZ = 0.03, 10.0, 0.01
@@ -98,8 +106,39 @@ def write(folder: Path, header: str, rows: list[str], record: dict[str, Any]) ->
     (folder / "readings.csv").write_text("\n".join([header, *rows, ""]), encoding="utf-8", newline="\n")
 
 
+class Quiet(Lines):
+    """Shows nothing."""
+
+    def message(self, text: str) -> None:
+        """Nothing."""
+
+
+def from_the_virtual_bench(experiment: str, folder: str, seed: int, note: str) -> None:
+    """A run of the virtual bench, without what would differ from one making to the next."""
+    with tempfile.TemporaryDirectory() as out:
+        run = acquire(request_for(experiment, AcquisitionOptions(mock=True, out=Path(out), seed=seed)), Quiet())
+        header, *rows = (run.folder / "readings.csv").read_text(encoding="utf-8").splitlines()
+    record = run.record
+    write(
+        HERE / folder,
+        header,
+        rows,
+        {
+            "experiment": experiment,
+            "started_utc": None,
+            "channels": record.channels,
+            "configuration": {experiment: record.configuration[experiment]},
+            "seed": seed,
+            "note": note,
+            "synthetic": True,
+            "synthetic_how": f"SYNTHETIC: {record.synthetic_how}; made by sample_data/make.py",
+        },
+    )
+    print(f"{folder}: {record.synthetic_how}")
+
+
 def main() -> None:
-    """Write the five run folders."""
+    """Write the run folders."""
     for number, (c1, c2, n) in enumerate(PUBLISHED, start=1):
         t, nu, how = solve(c1, c2, n)
         write(
@@ -132,6 +171,7 @@ def main() -> None:
             "synthetic_how": None,
         },
     )
+    from_the_virtual_bench("field", "field-scan", 11, "a base as in device.toml, heights set by hand to 0.2 mm")
 
 
 if __name__ == "__main__":

@@ -35,7 +35,7 @@ def known_of(source: Source[FieldReadings], device: Device | None) -> Known:
     if base.inner_radius_m is None or base.outer_radius_m is None:
         raise DataError(
             f"{source.path}: the radii of the base are not known: write [base] with inner_radius_m and outer_radius_m "
-            "into a file, as sample_data/device.toml, and give it with `device`"
+            "into a file, as sample_data/device.toml, and give it to levilab analyze field with `device`"
         )
     told = device.magnetometer if device else None
     gain = told.gain_u if told and told.gain_u is not None else _number(of_run, "gain_u", 0.0)

@@ -47,7 +47,7 @@ def _in_words(run: FieldRun) -> tuple[str, ...]:
     scan = run.scan
     low, high = 1e3 * scan.height[0], 1e3 * scan.height[-1]
     text = f"{scan.statistics.n} heights, {low:.1f} mm to {high:.1f} mm"
-    u = f"u of a reading against the fit: {1e6 * scan.u.min():.2g} µT to {1e6 * scan.u.max():.2g} µT"
+    u = f"u of a reading against the fit: {1e6 * scan.u.min():.0f} µT to {1e6 * scan.u.max():.0f} µT"
     return text, f"{u}, that of its height included"
 
 
