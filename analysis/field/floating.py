@@ -1,8 +1,8 @@
 """What follows from a scan of the base for the tops that float there: heights, masses, spins, and the moment.
 
 The theory is that of `analysis.stability`; the top's magnet is a point or a disc (`analysis.field.magnet`).  All that
-is known, parameters of the scan and those of the top, goes through it once as it is and twice beside for each
-uncertainty (central differences at half of it); the slopes carry the whole covariance to the results.
+is known, parameters of the scan and those of the top, goes through it once as it is and once beside for each
+uncertainty; the slopes carry the whole covariance to the results.
 """
 
 import math
@@ -102,7 +102,7 @@ def follow(scan: FieldScan, top: KnownTop) -> Floating | None:
     evaluate = _evaluator(top)
     try:
         found = evaluate(values)
-        u = _carried(evaluate, values, covariance)
+        u = _carried(evaluate, values, found, covariance)
     except FloatsNowhere:
         return None
     estimates = {
@@ -129,15 +129,19 @@ def _together(scan: FieldScan, top: KnownTop) -> tuple[Array, Array]:
     return values, covariance
 
 
-def _carried(evaluate: Callable[[Array], Array], values: Array, covariance: Array) -> Array:
+#: Step of the differences, in standard uncertainties: of a slope 1e-4 is lost to curvature, and less to rounding.
+_STEP = 0.01
+
+
+def _carried(evaluate: Callable[[Array], Array], values: Array, found: Array, covariance: Array) -> Array:
     """Standard uncertainties of the results, to first order, shape (results,)."""
     u = np.sqrt(np.diagonal(covariance))
     moved = np.flatnonzero(u > 0)
     slopes = np.zeros((len(RESULTS), len(values)))
     for k in moved:
         step = np.zeros_like(values)
-        step[k] = min(u[k] / 2, 1e-3 * abs(values[k])) if values[k] else u[k] / 2
-        slopes[:, k] = (evaluate(values + step) - evaluate(values - step)) / (2 * step[k])
+        step[k] = _STEP * u[k]
+        slopes[:, k] = (evaluate(values + step) - found) / step[k]
     sizes = np.full(len(RESULTS), np.nan)
     for row, line in enumerate(slopes):
         if np.isfinite(line).all():
@@ -165,11 +169,13 @@ def floating_top(ring: Ring, top: KnownTop) -> Symmetric:
     return Symmetric(1.0, *inertias, moment, top.gravity, stiffness)
 
 
-def floating_spins(ring: Ring, top: KnownTop, mass: float) -> tuple[float, float] | None:
-    """The slowest and the fastest spin [Hz] of a top of this mass [kg], where it floats; None where it does not."""
+def floating_spins(ring: Ring, top: KnownTop, mass: float, window: tuple[float, float]) -> tuple[float, float] | None:
+    """The slowest and the fastest spin [Hz] of a top of this mass [kg] that floats in a window of heights [m].
+
+    None where it does not.
+    """
     field, body = axial_field(ring, top.magnet), replace(floating_top(ring, top), mass=mass)
-    low, high = _range(ring)
-    stable = [place for place in equilibria(field, body, low, high) if place.stable and place.spins]
+    stable = [place for place in equilibria(field, body, *window) if place.stable and place.spins]
     return stable[-1].spins[0] if stable else None
 
 

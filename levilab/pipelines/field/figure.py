@@ -29,7 +29,7 @@ FLOATS, SET = "#009E73", "#E69F00"
 #: The curves go on by this part of the scan's length on either side.
 _BEYOND = 0.06
 #: Points of a curve, and of the windows of spin, which take longer.
-_POINTS, _MASSES = 300, 25
+_POINTS, _MASSES = 300, 11
 
 
 def field_figure(analysis: FieldAnalysis) -> Figure:
@@ -168,7 +168,8 @@ def _draw_spins(axes: Axes, run: FieldRun) -> None:
     assert floating is not None
     light, heavy = floating["lightest_mass"], floating["heaviest_mass"]
     masses = light + (heavy - light) * np.linspace(0.0, 1.0, _MASSES)
-    found = [floating_spins(run.scan.ring, run.top, float(mass)) for mass in masses]
+    heights = floating["lowest_height"], floating["highest_height"]
+    found = [floating_spins(run.scan.ring, run.top, float(mass), heights) for mass in masses]
     spins: Array = np.array([window or (math.nan, math.nan) for window in found])
     slow, fast = spins.T
     axes.fill_between(1e3 * masses, slow, fast, color=FLOATS, alpha=0.2, linewidth=0)
