@@ -124,6 +124,17 @@ class FieldTurnsOver(AnalysisError):
         )
 
 
+class NoField(AnalysisError):
+    """A scan in which the probe sees nothing of a base.  largest: of its readings, background_u: of their zero [T]."""
+
+    def __init__(self, *, largest: float, background_u: float) -> None:
+        self.largest, self.background_u = largest, background_u
+        super().__init__(
+            f"the flux density is nowhere above {1e3 * largest:.3g} mT, which zero and background alone may make "
+            f"(u = {1e3 * background_u:.2g} mT): is the base there, and was the probe zeroed in its chamber?"
+        )
+
+
 class ImpossibleRing(AnalysisError):
     """Radii that no ring has."""
 

@@ -19,6 +19,7 @@ from analysis.errors import (
     FieldStandsStill,
     FieldTurnsOver,
     ImpossibleRing,
+    NoField,
     NotFinite,
     NotFitted,
     NotPositive,
@@ -49,6 +50,8 @@ FEWEST_HEIGHTS = 4
 _SAME_HEIGHT = 1e-5
 #: The effective variance follows the slope; after so many turns it has settled to 1e-6.
 _MOST_TURNS = 8
+#: A field below so many u of the background is none.
+_NO_FIELD = 5.0
 #: A χ² less probable than this: the model, or the stated uncertainty, is wrong.
 NO_FIT = 1e-3
 #: A χ² so far below its expectation: what the stated uncertainties hold is mostly common to all readings.
@@ -198,6 +201,7 @@ def fit_scan(
         ShapesDiffer, NotFinite, NotPositive: no numbers to fit.
         ImpossibleRing: radii that no ring has.
         TooFewHeights: fewer than four.
+        NoField: nothing above the background.
         FieldStandsStill: the probe is saturated.
         FieldTurnsOver: the probe was turned over.
         NotFitted: the search did not end.
@@ -248,6 +252,8 @@ def _refuse_bad_scans(z: Array, b: Array, known: Known) -> None:
         raise TooFewHeights(seen=starts.size, needed=FEWEST_HEIGHTS, lowest=lowest, highest=highest)
     distinct = z[starts]
     mean = np.array([part.mean() for part in np.split(b, starts[1:])])
+    if np.abs(b).max() < _NO_FIELD * known.background.u:
+        raise NoField(largest=float(np.abs(b).max()), background_u=known.background.u)
     _refuse_plateau(distinct, mean)
     # the reversal is known as well as the origin is; the field near it is small, and may have either sign
     origin = known.origin or Prior(0.0, 0.05)
