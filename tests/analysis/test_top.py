@@ -62,13 +62,13 @@ def test_uncertainties_are_those_of_parts_that_are_drawn():
             part, **{n: getattr(part, n) + getattr(part, f"{n}_u") * random.standard_normal() for n in names}
         )
 
-    found = np.array([values(top_of([drawn(RING), drawn(STEM)])) for _ in range(1500)])
+    found = np.array([values(top_of([drawn(RING), drawn(STEM)])) for _ in range(600)])
     u = [top.mass.u, top.transverse.u, top.axial.u, top.centre.u]
-    # three standard errors of a standard deviation from 1500: 5.5 %
-    assert found.std(axis=0) == pytest.approx(u, rel=0.055)
+    # three standard errors of a standard deviation from 600: 8.7 %
+    assert found.std(axis=0) == pytest.approx(u, rel=0.087)
     seen = np.corrcoef(found[:, :3].T)
     expected = top.covariance / np.sqrt(np.outer(np.diagonal(top.covariance), np.diagonal(top.covariance)))
-    assert seen == pytest.approx(expected, abs=0.08)
+    assert seen == pytest.approx(expected, abs=0.13)
 
 
 @pytest.mark.parametrize(

@@ -42,16 +42,16 @@ def drawn(seed):
 @pytest.mark.parametrize("free_radii", [False, True])
 def test_uncertainties_predict_the_scatter(free_radii):
     pulls, reduced = [], []
-    for seed in range(40):
+    for seed in range(25):
         ring, background = drawn(seed)
         found = fit_scan(Z, scan(seed, ring, background), KNOWN, U_B * np.ones(17), U_Z, free_radii=free_radii)
         truth = [ring.strength, ring.origin, ring.thickness, background, ring.inner_radius, ring.outer_radius]
         pulls.append((found.values - truth) / np.sqrt(np.diagonal(found.covariance)))
         reduced.append(found.statistics.reduced_chi_square)
-    # three standard errors of a standard deviation, and of a mean, from 40
-    assert np.std(pulls, axis=0) == pytest.approx(np.ones(6), abs=0.34)
-    assert np.mean(pulls, axis=0) == pytest.approx(np.zeros(6), abs=0.48)
-    assert np.mean(reduced) == pytest.approx(1.0, abs=3 * np.sqrt(2 / 16 / 40) + 0.05)  # 0.05: radii that are held
+    # three standard errors of a standard deviation, and of a mean, from 25
+    assert np.std(pulls, axis=0) == pytest.approx(np.ones(6), abs=0.43)
+    assert np.mean(pulls, axis=0) == pytest.approx(np.zeros(6), abs=0.6)
+    assert np.mean(reduced) == pytest.approx(1.0, abs=3 * np.sqrt(2 / 16 / 25) + 0.05)  # 0.05: radii that are held
 
 
 def test_a_scan_without_noise_gives_the_ring_back():

@@ -22,7 +22,6 @@ from levilab.pipelines.field.table import field_tables
 from levilab.pipelines.result import save
 from levilab.pipelines.sources import Options
 from levilab.pipelines.top import calculate_top
-from levilab.present.style import as_svg
 from levilab.report.page import render
 from levilab.world.base import Base
 
@@ -91,7 +90,8 @@ def test_a_result_holds_what_was_found_and_is_read_not_computed(
     assert recalled.origins[0].text.startswith("as levilab analyze found it")
     assert as_document(recalled, scan) == document
     assert field_tables(recalled) == field_tables(found)
-    assert as_svg(field_figure(recalled)) == as_svg(field_figure(found))
+    for name in ("height", "flux_density", "u", "residuals", "covariance"):  # all that is drawn comes from these
+        assert np.array_equal(getattr(recalled.runs[0].scan, name), getattr(found.runs[0].scan, name)), name
     assert recalled.all_warnings == found.all_warnings
 
 
@@ -236,9 +236,8 @@ def test_the_commands_print_and_refuse_in_one_line(
     done = levilab("analyze", "field", scan, "--device", device, "--height", "73.5", "--no-save")
     for said in ("strength ρ", "moment of the top", "mass to set", "SYNTHETIC", "1 K warmer"):
         assert said in done.stdout
-    shown = json.loads(levilab("analyze", "field", scan, "--json").stdout)
+    shown = json.loads(levilab("analyze", "field", scan, "--json", "--no-save").stdout)
     assert shown["values"]["strength"]["value"] == pytest.approx(1.409e-3, rel=0.02)
-    assert (scan / "field.png").stat().st_size > 20_000
     levilab("report", scan, "-o", "page.html")
     assert "Field of the base on its axis" in (tmp_path / "page.html").read_text(encoding="utf-8")
     top = json.loads(levilab("top", device, "--json").stdout)
