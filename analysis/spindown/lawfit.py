@@ -13,7 +13,7 @@ from analysis.residuals import DENSE, ar1, durbin_watson, runs_test_p
 from analysis.spindown.drag import LAWS, DragLaw
 from analysis.spindown.readings import Readings
 from analysis.spindown.selection import Statistics, statistics
-from analysis.spindown.tilt import MORE, UNKNOWN_PART, WOBBLE, CountedLaw, Law, counted
+from analysis.spindown.tilt import MORE, UNKNOWN_PART, UNKNOWN_TILT, WOBBLE, CountedLaw, Law, counted
 from analysis.uncertainty import Curvature, Estimate, bootstrap, curvature, propagate
 
 Array = NDArray[np.float64]
@@ -302,6 +302,7 @@ def _with_unknown_part(covariance: Array | None, u: Array, values: Array, plain:
     change = np.zeros(len(values))
     with np.errstate(invalid="ignore", over="ignore"):
         change[: len(plain)] = UNKNOWN_PART * (values[: len(plain)] - plain)
+        change[len(plain)] = UNKNOWN_TILT * values[len(plain)]
     if not np.isfinite(change).all():
         return covariance, u
     wider = np.hypot(u, change)

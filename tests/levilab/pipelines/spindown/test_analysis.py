@@ -73,7 +73,7 @@ def test_the_result_is_written_as_the_interface_says(sample_data: Path, tmp_path
     for model in run["models"]:
         assert set(model["parameters"]) >= {"start_frequency"}
         assert set(model["statistics"]) == {
-            "n", "rms_residual", "reduced_chi_square", "aicc", "bic", "weight", "durbin_watson", "runs_test_p",
+            "n", "rms_residual", "reduced_chi_square", "aicc", "bic", "weight", "durbin_watson", "runs_test_p", "n_effective",
             "difference",
         }  # fmt: skip
     assert run["models"][0]["linearised"]["c1"]["unit"] == "1/s"
