@@ -36,7 +36,7 @@ KAPPA = 0.4
 # At a height in the middle of the stable range (computed for the thesis's base at 7.4 cm); it is 2.5 at its upper end.
 BETA = 3.3
 # What of the change that the tilt makes in a constant is not known, as κ and β are of another top, and since the top's
-# other motions count, too.  Found with 32 simulated tops, see docs/decisions/0010.
+# other motions count, too.  Found with 32 simulated tops, see docs/decisions/0011.
 UNKNOWN_PART = 0.1
 # The same of δ itself, which stands and falls with the height that β is for: of 40 other tops 85 % had it within 2 u
 # without this part.

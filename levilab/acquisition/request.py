@@ -12,9 +12,9 @@ from pydantic import ValidationError
 from instruments.clock import VirtualClock
 from levilab.acquisition.experiment import CounterSettings
 from levilab.acquisition.loop import AcquisitionRequest
-from levilab.acquisition.session import ask_no_person
 from levilab.acquisition.table import EXPERIMENTS, Configuration, settings_of, with_settings
 from levilab.bench.config import BenchConfig, ConfigError, read_bench
+from levilab.bench.person import ask_no_person
 from levilab.bench.wiring import described_wiring
 from levilab.errors import LevilabError, UsageError
 from levilab.runs.run import Run, find_run
@@ -26,15 +26,21 @@ from levilab.world.spin_world import SpinScene, SpinWorld, drawn
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from levilab.bench.person import Person
     from levilab.simulator.scene import Scene
 
 HOW = (
-    "acquired on the virtual bench: the drivers are the real ones, the instruments wire-level models, the top {top}, "
+    "acquired on the virtual bench: the drivers are the real ones, the instruments wire-level models, {what}, "
     "and no real top was measured"
 )
 _ANEW = "correct it or start anew"
-_SPIN_ONLY = "a spin that decays by the {law}; drag and fall were drawn by the seed"
-_IN_MOTION = "that of the scene {name}, simulated in full motion"
+_SPIN_ONLY = "the top a spin that decays by the {law}; drag and fall were drawn by the seed"
+_BASE = (
+    "the base a ring of strength {strength_t_m:.6e} T m, radii {inner_radius_m:.6f} and {outer_radius_m:.6f} m, "
+    "thickness {thickness_m:.6f} m, its middle at {origin_m:+.6f} m, in a background of {background_t:+.3e} T, all "
+    "drawn by the seed"
+)
+_IN_MOTION = "the top that of the scene {name}, simulated in full motion"
 
 
 class CannotResume(LevilabError):
@@ -55,7 +61,7 @@ class AcquisitionOptions:
         realtime: keeps the virtual bench to the wall clock.
         resume: the run to go on with.
         wire_log: keeps all bytes on the wire.
-        person: asks the person at a real bench a question, and returns the answer.
+        person: carries out what the experiment asks of a person at a real bench.
         tell: called with a line about what takes long before it begins.
     """
 
@@ -68,7 +74,7 @@ class AcquisitionOptions:
     realtime: bool = False
     resume: Path | None = None
     wire_log: bool = False
-    person: Callable[[str], str] = ask_no_person
+    person: Person = ask_no_person
     tell: Callable[[str], None] = lambda _: None
 
 
@@ -82,18 +88,17 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
     request = AcquisitionRequest(
         experiment,
         config,
-        lambda: described_wiring(config),
+        lambda: described_wiring(config, options.person),
         out=options.out,
         note=options.note,
         wire_log=options.wire_log,
         resume=run,
-        person=options.person,
     )
     if virtual:
         request = _on_the_virtual_bench(request, options)
     else:
         wiring = described_wiring(config)
-        for kind in EXPERIMENTS[experiment].instruments:
+        for kind in EXPERIMENTS[experiment].kinds(settings_of(config, experiment)):
             wiring.described(kind)
     if run:
         _check_readings(run, request)
@@ -178,18 +183,23 @@ def _on_the_virtual_bench(request: AcquisitionRequest, options: AcquisitionOptio
     seed = run.record.seed if run else options.seed
     seed = secrets.randbelow(1 << 31) if seed is None else seed
     config = request.config.model_copy(update={"visa_library": "@levilab", **VIRTUAL})
-    request = replace(request, seed=seed, config=config, person=ask_no_person)
-    scene = _scene(options.scene, run)
+    request = replace(request, seed=seed, config=config)
+    scene = _scene(options.scene or EXPERIMENTS[request.experiment].mock_scene, run)
 
     def clock() -> VirtualClock:
         return VirtualClock(realtime=options.realtime)
 
     if scene is None:
         return _with_a_spinning_top(request, drawn(seed), clock)
+    if run is None:
+        settings = settings_of(config, request.experiment).for_scene(scene)
+        settings.check(request.experiment, config.limits)
+        config = with_settings(config, request.experiment, settings)
     return replace(
         request,
+        config=config,
         wiring=lambda: virtual_wiring(scene_world(scene, clock, options.tell, seed=seed), config.limits),
-        synthetic_how=HOW.format(top=_IN_MOTION.format(name=scene.name)),
+        synthetic_how=HOW.format(what=_IN_MOTION.format(name=scene.name)),
         scene=scene.as_table(),
     )
 
@@ -206,8 +216,16 @@ def _with_a_spinning_top(
         request,
         config=config,
         wiring=lambda: virtual_wiring(SpinWorld(scene, clock()), config.limits),
-        synthetic_how=HOW.format(top=_SPIN_ONLY.format(law=_law_in_words(scene))),
+        synthetic_how=HOW.format(what=_world_in_words(scene, request.experiment)),
     )
+
+
+def _world_in_words(scene: SpinScene, experiment: str) -> str:
+    """What of the world an experiment measures."""
+    if "magnetometer" in EXPERIMENTS[experiment].instruments:
+        base = scene.base
+        return _BASE.format(**vars(base))
+    return _SPIN_ONLY.format(law=_law_in_words(scene))
 
 
 def _law_in_words(scene: SpinScene) -> str:

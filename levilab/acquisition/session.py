@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from instruments.errors import InstrumentError, SettingsLost
+from levilab.bench.person import ask_no_person
 from levilab.errors import LevilabError
 from levilab.runs.run import utc_now
 from levilab.settings import Settings
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
     from instruments.drivers.oscilloscope import Trace
     from levilab.bench.bench import Bench
+    from levilab.bench.person import Person, Task
     from levilab.interruption import Stop
     from levilab.present.progress import Show
     from levilab.runs.channel import Channel
@@ -25,7 +27,7 @@ if TYPE_CHECKING:
 
 S = TypeVar("S", bound=Settings)
 
-#: Longest sleep between two checks for Ctrl-C [s].
+#: Longest sleep between two checks for Ctrl-C [s], by the clock on the wall: one that jumps sleeps through at once.
 _NAP_S = 0.2
 #: Pauses [s] before the tries to reach an instrument again, half a minute in all.
 REOPENING_S = (0.0, 1.0, 2.0, 4.0, 8.0, 16.0)
@@ -49,11 +51,6 @@ class Earlier:
     replay: bool
 
 
-def ask_no_person(question: str) -> str:  # noqa: ARG001 - as a person is asked
-    """The answer where no person is at the bench: none."""
-    return ""
-
-
 @dataclass
 class Session(Generic[S]):
     """An acquisition under way.
@@ -65,7 +62,7 @@ class Session(Generic[S]):
         writer: the run folder.
         show: what the person at the bench sees.
         stop: whether the end was asked for.
-        person: asks the person at the bench a question, and returns the answer.
+        person: carries out what the experiment asks of a person at the bench.
         earlier: the run that is resumed, if one is.
         rows: the readings so far, those of the resumed run included.
         zero: bench time of time_s = 0 [s], None before it is reached.
@@ -78,7 +75,7 @@ class Session(Generic[S]):
     writer: RunWriter
     show: Show
     stop: Stop
-    person: Callable[[str], str] = ask_no_person
+    person: Person = ask_no_person
     earlier: Earlier | None = None
     rows: list[Row] = field(default_factory=list)
     zero: float | None = None
@@ -95,19 +92,22 @@ class Session(Generic[S]):
 
     def wait(self, duration: float) -> None:
         """Let bench time pass [s].  Raises Interrupted if the end was asked for."""
-        end = self.bench.clock.now() + duration
+        clock = self.bench.clock
+        end = clock.now() + duration
         while True:
             self.stop.check()
-            left = end - self.bench.clock.now()
+            left = end - clock.now()
             if left <= 0:
                 return
-            self.bench.clock.sleep(min(left, _NAP_S))
+            wall = clock.wall_duration(left)
+            clock.sleep(left * _NAP_S / wall if wall > _NAP_S else left)
 
-    def begin(self, start: Callable[[], None]) -> None:
+    def begin(self, start: Callable[[], None], *, resumed: str = "without driving again") -> None:
         """Bring the top to where reading begins: that moment is time zero.
 
         A resumed run is taken up where it was left, without starting again: a real top has gone on meanwhile; the one
         of a virtual bench is started once more, which is no event of the run, and left alone up to the last reading.
+        resumed: how it goes on, for the event of a resumed run.
         """
         if self.earlier is None:
             start()
@@ -122,7 +122,7 @@ class Session(Generic[S]):
         else:
             self.zero = self.bench.clock.now() - self.earlier.run.elapsed()
         count = len(self.rows)
-        self.event("resumed", f"resumed after {count} reading{'s' * (count != 1)}, without driving again")
+        self.event("resumed", f"resumed after {count} reading{'s' * (count != 1)}, {resumed}")
 
     @contextlib.contextmanager
     def _replay(self) -> Iterator[None]:
@@ -164,15 +164,15 @@ class Session(Generic[S]):
         if not self._replaying:
             self.show.preparing(text, share)
 
-    def ask(self, question: str) -> str:
+    def ask(self, task: Task) -> str:
         """Let the person at the bench do or answer something.  Both stand in the events.
 
         Returns the answer, empty where nothing but Enter was typed or no person is at the bench.  The first Ctrl-C
         ends the wait.
         """
-        self._write_event("asked the person", question)
+        self._write_event("asked the person", task.text)
         with self.stop.at_once():
-            answer = self.person(question).strip()
+            answer = self.person(task).strip()
         if answer:
             self._write_event("answered", answer)
         return answer

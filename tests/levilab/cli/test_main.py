@@ -48,17 +48,17 @@ def test_the_version_is_printed(levilab: Command) -> None:
     assert levilab("--version").stdout == f"levilab {version('levilab')}\n"
 
 
-def test_acquire_analyze_report_and_list_from_an_empty_folder(levilab: Command, tmp_path: Path) -> None:
-    acquired = levilab("acquire", "spin", "--mock", "--note", "one")
+def test_acquire_analyze_report_and_list_from_an_empty_folder(levilab_process: Command, tmp_path: Path) -> None:
+    acquired = levilab_process("acquire", "spin", "--mock", "--note", "one")
     assert acquired.stdout.startswith("finished: ")
     assert "s left" in acquired.stderr
-    analyzed = levilab("analyze", "spindown", "runs")
+    analyzed = levilab_process("analyze", "spindown", "runs")
     assert "What the data say" in analyzed.stdout
     (run,) = (tmp_path / "runs").iterdir()
     assert {"result.json", "spindown.png"} <= {path.name for path in run.iterdir()}
-    assert "report.html" in levilab("report", "runs").stdout
+    assert "report.html" in levilab_process("report", "runs").stdout
     assert (tmp_path / "report.html").stat().st_size > 10_000
-    listed = levilab("runs").stdout
+    listed = levilab_process("runs").stdout
     assert "finished" in listed
     assert "one" in listed
 
@@ -81,10 +81,11 @@ def test_no_save_writes_nothing_and_out_writes_there(levilab: Command, tmp_path:
 
 
 def test_an_analysis_need_not_be_named(levilab: Command, sample_data: Path) -> None:
-    named = levilab("analyze", "spindown", sample_data, "--no-save")
-    assert levilab("analyze", sample_data, "--no-save").stdout == named.stdout
-    assert levilab("analyze", "--no-save", sample_data).stdout == named.stdout
-    assert json.loads(levilab("analyze", sample_data, "--no-save", "--json").stdout)["analysis"] == "spindown"
+    runs = [sample_data / "spin-down-1", sample_data / "spin-down-2"]
+    named = levilab("analyze", "spindown", *runs, "--no-save")
+    assert levilab("analyze", *runs, "--no-save").stdout == named.stdout
+    assert levilab("analyze", "--no-save", *runs).stdout == named.stdout
+    assert json.loads(levilab("analyze", *runs, "--no-save", "--json").stdout)["analysis"] == "spindown"
     assert "Did you mean 'spindown'?" in levilab("analyze", "spindwon", check=2).stderr
 
 
@@ -130,7 +131,7 @@ def test_two_files_in_a_folder_have_a_result_each_that_the_report_reads(levilab:
 def test_what_does_not_belong_to_the_analysis_is_a_message_and_no_warning(levilab: Command, sample_data: Path) -> None:
     done = levilab("analyze", "spindown", sample_data, "--no-save")
     assert "passed over" not in done.stdout
-    assert done.stderr == "passed over: 1 limit run\n"
+    assert "passed over: 1 limit run\n" in done.stderr
     assert "time [s]" in done.stdout
 
 

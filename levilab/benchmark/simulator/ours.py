@@ -1,0 +1,79 @@
+"""The simulator's own points: each scheme at fixed steps, lanes, and all of `simulate` with its error estimate."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from levilab.benchmark.simulator import motion
+from levilab.benchmark.simulator.peers import Point, best_time, error_of
+from levilab.simulator.kernels.lanes import LANES, advance_many, numbers_of
+from levilab.simulator.model import model_of
+from levilab.simulator.problem import Problem
+from levilab.simulator.scene import preset
+from levilab.simulator.schemes import SCHEMES
+from levilab.simulator.single import simulate
+from levilab.simulator.start import start_of
+from levilab.simulator.stops import stops_between
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+#: Steps in the 5 s.
+STEPS = {
+    "strang": (2000, 8000, 32000),
+    "suzuki-4": (500, 1000, 2000, 4000, 8000),
+    "blanes-moan-4": (350, 500, 700, 1000, 1400, 2000, 3000, 4500),
+    "kahan-li-6": (500, 1000, 2000, 4000),
+    "blanes-moan-6": (200, 250, 300, 350, 400, 500, 700, 1000, 1200, 1250, 1400, 2000, 2800),
+    "levitron-6": (120, 160, 200, 240, 280, 320, 400, 500, 640, 800, 900, 1000, 1200, 1400, 2000),
+    "kahan-li-8": (350, 500, 700, 1000, 1400, 1700, 2000, 2400),
+}
+
+
+def problem(name: str) -> Problem:
+    """The scene `undriven` for a scheme."""
+    scene = preset("undriven")
+    return Problem(scene, model_of(scene), start_of(scene), SCHEMES[name])
+
+
+def scalar(quick: bool) -> Iterator[Point]:  # noqa: FBT001
+    """One top, one core, fixed steps: the kernel alone."""
+    for name, counts in STEPS.items():
+        ready = problem(name)
+        for count in counts[:: 2 if quick else 1]:
+            stops = stops_between(0.0, motion.DURATION, motion.DURATION / count, ready.scene.drive)
+            states, _ = ready.advanced(ready.start, stops, ready.escape)
+            seconds = best_time(partial(ready.advanced, ready.start, stops, ready.escape))
+            yield Point(name, f"{count} steps", error_of(states[-1, :3]), motion.DURATION / seconds)
+
+
+def many(quick: bool) -> Iterator[Point]:  # noqa: FBT001
+    """Four times as many tops as lanes, one core, fixed steps; the error of the first."""
+    tops = 4 * LANES
+    for name in ("levitron-6", "kahan-li-8"):
+        ready = problem(name)
+        numbers = np.tile(numbers_of(ready.model), (tops, 1))
+        starts = np.tile(ready.start, (tops, 1))
+        starts[:, 0] += np.arange(tops) * 1e-6
+        a, b = np.array(ready.scheme.drifts), np.array(ready.scheme.kicks)
+        for count in STEPS[name][:: 2 if quick else 1]:
+            ends, taken = np.empty_like(starts), np.zeros(tops, dtype=np.int64)
+            h, counts = np.full(tops, motion.DURATION / count), np.full(tops, count)
+            arguments = (ready.model, starts, numbers, h, counts, a, b, ready.escape, ends, taken)
+            advance_many(*arguments)
+            seconds = best_time(partial(advance_many, *arguments))
+            yield Point(f"{name}, lanes", f"{count} steps", error_of(ends[0, :3]), tops * motion.DURATION / seconds)
+
+
+def with_estimate(quick: bool) -> Iterator[Point]:  # noqa: FBT001
+    """`simulate` as it is called: the step searched for, the error estimated, arrays made."""
+    scene = preset("undriven")
+    for tolerance in (1e-3, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)[:: 2 if quick else 1]:
+        end = simulate(scene, motion.DURATION, tolerance=tolerance, rate=None)
+        seconds = best_time(partial(simulate, scene, motion.DURATION, tolerance=tolerance, rate=None))
+        yield Point(
+            "simulate, all in all", f"tolerance {tolerance:g}", error_of(end.position[-1]), motion.DURATION / seconds
+        )
