@@ -74,7 +74,7 @@ def sniff(path: Path) -> Layout:
     if dialect is None:
         at, line = next((n, line) for n, line in enumerate(lines, 1) if line.strip())
         raise TableError(path, f"'{shown(line.strip())}' begins no table of at least two columns; {EXPORT}", line=at)
-    return _layout(lines, encoding, dialect, head)
+    return lay_out(lines, encoding, dialect, head)
 
 
 def _encoding(head: bytes) -> str:
@@ -88,7 +88,8 @@ def _encoding(head: bytes) -> str:
     return "utf-8"
 
 
-def _layout(lines: list[str], encoding: str, dialect: Dialect, head: bytes) -> Layout:
+def lay_out(lines: list[str], encoding: str, dialect: Dialect, head: bytes) -> Layout:
+    """Where a table stands in lines that were read.  head: their bytes, for the offset of the first row."""
     sample = content(lines[-SAMPLE:], dialect, 1 + max(0, len(lines) - SAMPLE))
     rows = [line for line in sample if line.is_row]
     width = usual(row.filled for row in rows)

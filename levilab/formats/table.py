@@ -74,7 +74,7 @@ def read_table(
     Raises:
         TableError: there is no such table, or it cannot be understood without doubt.
     """
-    with _file_errors(path):
+    with file_errors(path):
         layout = sniff(path)
         header, wanted, warnings = _titles(path, layout, columns or {})
         chosen, doubts = choose_columns(path, header, layout.units, wanted, quantities)
@@ -110,7 +110,7 @@ def read_run_readings(path: Path, channels: Collection[str] = ()) -> Table:
     Raises:
         TableError: it cannot be read, its header is not ours, or a line is damaged.
     """
-    with _file_errors(path):
+    with file_errors(path):
         with path.open("rb") as stream:
             first = stream.readline(LONGEST_HEADER)
         title = first.decode("utf-8-sig", errors="replace")
@@ -160,8 +160,8 @@ def _must_be_file(path: Path) -> None:
 
 
 @contextmanager
-def _file_errors(path: Path) -> Iterator[None]:
-    """Tell in one line what keeps a file from being opened."""
+def file_errors(path: Path) -> Iterator[None]:
+    """Say in one line what keeps a file from being opened."""
     try:
         _must_be_file(path)
         yield
