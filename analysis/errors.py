@@ -15,6 +15,17 @@ class TooFewReadings(AnalysisError):
         super().__init__(f"{seen} usable readings, at least {needed} are needed: record longer or more often")
 
 
+class TooFewPulses(AnalysisError):
+    """Fewer pulses than a frequency and its slope need; duration [s]: of what was searched."""
+
+    def __init__(self, *, seen: int, needed: int, duration: float) -> None:
+        self.seen, self.needed, self.duration = seen, needed, duration
+        super().__init__(
+            f"{seen} pulses in {duration:.3g} s, at least {needed} are needed: "
+            "record longer, or look at the trace: does light reach the detector, is the trigger level inside the pulse?"
+        )
+
+
 class ShapesDiffer(AnalysisError):
     """Two columns of one table that do not have the same length, or are no columns at all."""
 
