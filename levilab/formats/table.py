@@ -59,7 +59,11 @@ class Table:
 
 
 def read_table(
-    path: Path, *, columns: Mapping[str, str] | None = None, quantities: Collection[str] = CANONICAL
+    path: Path,
+    *,
+    columns: Mapping[str, str] | None = None,
+    quantities: Collection[str] = CANONICAL,
+    guess: bool = True,
 ) -> Table:
     """Read a table of text: CSV of any kind, tabs or blanks, decimal point or comma, with or without units.
 
@@ -67,6 +71,7 @@ def read_table(
         path: the file.
         columns: {canonical column, or t, f, u: title in the file or 1-based number}, where titles are not known.
         quantities: canonical columns that are wanted; what stands in others is nobody's concern.
+        guess: whether columns without titles are taken as time, spin frequency and its uncertainty.
 
     Returns:
         At least three rows. Rows with a missed reading (empty, nan, inf, 9.91E37) are left out, with a warning.
@@ -76,7 +81,7 @@ def read_table(
     """
     with file_errors(path):
         layout = sniff(path)
-        header, wanted, warnings = _titles(path, layout, columns or {})
+        header, wanted, warnings = _titles(path, layout, columns or {}, guess=guess)
         chosen, doubts = choose_columns(path, header, layout.units, wanted, quantities)
         if not chosen:
             known = "time_s, spin_frequency_hz, t, f [Hz], rpm …"
@@ -176,7 +181,7 @@ def file_errors(path: Path) -> Iterator[None]:
 
 
 def _titles(
-    path: Path, layout: Layout, wanted: Mapping[str, str]
+    path: Path, layout: Layout, wanted: Mapping[str, str], *, guess: bool
 ) -> tuple[tuple[str, ...], Mapping[str, str], list[str]]:
     """The file's titles, or numbers in their place; what to take for what; a warning where that is a guess."""
     if layout.header:
@@ -185,13 +190,13 @@ def _titles(
     if wanted:
         return numbers, wanted, []
     if layout.header_line:
-        raise TableError(
+        raise NoSuchColumn(
             path,
             f"is no header for the {layout.width} columns below: correct it, or say `columns` = t=1,f=2",
             line=layout.header_line,
         )
-    if layout.width > len(TITLES_WITHOUT_HEADER):
-        raise TableError(
+    if layout.width > len(TITLES_WITHOUT_HEADER) or not guess:
+        raise NoSuchColumn(
             path, f"{layout.width} columns and no header; add one, or say `columns` = t=1,f=2", line=layout.first_line
         )
     guess = dict(zip(TITLES_WITHOUT_HEADER, numbers, strict=False))

@@ -8,7 +8,7 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from levilab.formats.columns import TableError
+from levilab.formats.columns import NoTable, TableError
 from levilab.formats.layout import BYTE_ORDER_MARKS, EXPORT, HEAD, NO_TABLES
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def read_head(path: Path) -> Head:
     """The first 64 KiB of a text file as lines.
 
     Raises:
-        TableError: it is no text, or empty.
+        NoTable: it is no text, or empty.
         OSError: it cannot be read.
     """
     with path.open("rb") as stream:
@@ -45,16 +45,16 @@ def read_head(path: Path) -> Head:
         whole = not stream.read(1)
     for mark, what in NO_TABLES:
         if head.startswith(mark):
-            raise TableError(path, f"is {what}; {EXPORT}")
+            raise NoTable(path, f"is {what}; {EXPORT}")
     encoding = _encoding(head)
     text = codecs.getincrementaldecoder(encoding)(errors="replace").decode(head, final=whole).replace("\0", "")
     if _CONTROL.search(text):
-        raise TableError(path, f"is a binary file; {EXPORT}")
+        raise NoTable(path, f"is a binary file; {EXPORT}")
     lines = list(io.StringIO(text, newline=None))
     if not whole and lines and not lines[-1].endswith("\n"):
         lines.pop()
     if not any(line.strip() for line in lines):
-        raise TableError(path, f"is {'empty' if whole else 'one line without end'}; {EXPORT}")
+        raise NoTable(path, f"is {'empty' if whole else 'one line without end'}; {EXPORT}")
     return Head(path, encoding, tuple(lines), whole)
 
 

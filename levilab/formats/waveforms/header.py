@@ -41,6 +41,10 @@ class NoWaveform(NoSuchColumn):
     """A table that holds no samples."""
 
 
+class NoRate(NoWaveform):
+    """Samples whose rate is not known."""
+
+
 @dataclass(frozen=True)
 class Printed:
     """A number as it stands in a text.  resolution: one unit of its last digit."""

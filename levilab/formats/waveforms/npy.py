@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from levilab.formats.columns import TableError, shown
+from levilab.formats.waveforms.header import NoRate
 from levilab.formats.waveforms.waveform import BLOCK, PulseTimes, Signal, Waveform, check_count, check_step
 
 if TYPE_CHECKING:
@@ -26,7 +27,8 @@ def read_npy(path: Path, rate: float | None) -> Waveform | PulseTimes:
     """An array of samples [V], shape (n,), (n, channels) or (channels, n); without a rate, pulse times [s], shape (n,).
 
     Raises:
-        TableError: it is neither.
+        NoRate: it holds no pulse times, and no rate is given.
+        TableError: it is damaged.
         OSError: it cannot be read.
     """
     data = _load(path)

@@ -9,7 +9,7 @@ import numpy as np
 
 from levilab.formats.columns import TableError, shown
 from levilab.formats.titles import is_unit, plain_unit, read_title, unit_factor
-from levilab.formats.waveforms.header import NoWaveform
+from levilab.formats.waveforms.header import NoRate, NoWaveform
 from levilab.formats.waveforms.rows import read_blocks
 from levilab.formats.waveforms.waveform import PulseTimes, Signal, Waveform, check_count, check_step
 
@@ -28,8 +28,14 @@ FEWEST_PULSES = 4
 _MOST_TITLES = 20
 
 
-def read_column(head: Head, dialect: Dialect, rate: float | None) -> PulseTimes | Waveform:
+def read_column(head: Head, dialect: Dialect, rate: float | None, *, guess: bool = True) -> PulseTimes | Waveform:
     """A file with one number a line: times that increase, or with a rate samples.
+
+    Args:
+        head: the beginning of the file.
+        dialect: of its lines.
+        rate: samples per second [Hz], of samples.
+        guess: whether a column without a title of times is taken for times.
 
     Raises:
         NoWaveform: it holds something else.
@@ -45,12 +51,14 @@ def read_column(head: Head, dialect: Dialect, rate: float | None) -> PulseTimes 
     blocks = partial(read_blocks, path, head.encoding, dialect, first + 1, [0])
     if rate is not None:
         return _samples(head, rate, blocks)
+    if not guess and not any(read_title(text).column == "time_s" or "pulse" in text.casefold() for text in titles):
+        raise NoWaveform(path, "holds one column of numbers, which nothing calls times")
     factor = _factor(titles)
     found = list(blocks())
     times = np.concatenate([block.numbers[:, 0] for block in found]) * factor
     late = np.flatnonzero(np.diff(times) <= 0)
     if late.size > max(0.01 * len(times), 3):
-        raise NoWaveform(path, "holds one column of numbers that do not increase: of samples say the `rate` in Hz")
+        raise NoRate(path, "holds one column of numbers that do not increase: of samples say the `rate` in Hz")
     if late.size:
         k = int(late[0])
         raise TableError(

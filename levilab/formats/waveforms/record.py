@@ -26,7 +26,7 @@ SEARCHED = TEXTS | SUFFIXES | {".wav", ".npy"}
 
 
 def read_record(
-    path: Path, *, columns: Mapping[str, str] | None = None, rate: float | None = None
+    path: Path, *, columns: Mapping[str, str] | None = None, rate: float | None = None, guess: bool = True
 ) -> Waveform | PulseTimes:
     """Samples or pulse times from a file: WAV, NumPy, a scope's CSV or binary file, CSV with times, a column of times.
 
@@ -34,6 +34,7 @@ def read_record(
         path: the file.
         columns: `t` names the column of times of a table whose titles are not known.
         rate: samples per second [Hz]; goes before what the file says.
+        guess: whether one column without a title is taken for pulse times.
 
     Raises:
         NoWaveform: it is sound perhaps, but holds neither.
@@ -56,5 +57,5 @@ def read_record(
             raise NoWaveform(path, "holds readings: its columns are named")
         dialect = dialect_of(head)
         if dialect.separator is None and all(len(dialect.split(line)) < 2 for line in head.lines[-20:]):
-            return read_column(head, dialect, rate)
+            return read_column(head, dialect, rate, guess=guess)
         return read_samples(head, columns=columns or {}, rate=rate)

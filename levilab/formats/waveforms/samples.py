@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from levilab.formats.columns import TableError, shown
-from levilab.formats.waveforms.header import LONGEST_DOUBTFUL_STEP_S, Header, NoWaveform, printed, read_header
+from levilab.formats.waveforms.header import LONGEST_DOUBTFUL_STEP_S, Header, NoRate, NoWaveform, printed, read_header
 from levilab.formats.waveforms.rows import read_blocks
 from levilab.formats.waveforms.waveform import Signal, Waveform, check_count, check_step
 
@@ -165,7 +165,7 @@ def _times(path: Path, header: Header, survey: _Survey, rate: float | None) -> t
         _check_numbers(path, survey.clock)
     known = header.step.value if header.step else None
     if rate is None and known is None:
-        raise TableError(path, "does not say its sampling rate: say `rate` in Hz")
+        raise NoRate(path, "does not say its sampling rate: say `rate` in Hz")
     step = 1 / rate if rate is not None else known or 0.0
     number = (survey.clock.first or 0.0) if header.sequence is not None else 0.0
     return (header.start or 0.0) + number * step, step, _replaced(path, known, rate)

@@ -265,7 +265,7 @@ def test_a_file_larger_than_memory_is_read_in_pieces(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Five times as many samples take no more memory, which is less than the larger file's numbers would."""
-    monkeypatch.setattr(head, "PIECE", 1 << 14)
+    monkeypatch.setattr(head, "PIECE", 1 << 13)
     monkeypatch.setattr(wav, "BLOCK", 1 << 12)
     peaks = []
     for n in (20_000, 100_000):
