@@ -64,7 +64,8 @@ class Experiment(Generic[S]):
     """An experiment.
 
     about: one line; instruments: the kinds that it needs; settings: its table in the bench file; channels: the columns
-    that it writes, given its settings; run: carries it out.
+    that it writes, given its settings; run: carries it out; mock_scene: the scene of a mock unless another is asked
+    for, None: a top that only spins.
     """
 
     name: str
@@ -73,3 +74,4 @@ class Experiment(Generic[S]):
     settings: type[S]
     channels: Callable[[S], tuple[Channel, ...]]
     run: Callable[[Session[S]], None]
+    mock_scene: str | None = None

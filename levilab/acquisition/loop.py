@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from instruments.errors import InstrumentError
-from levilab.acquisition.session import Earlier, Session, ask_no_person
+from levilab.acquisition.session import Earlier, Session
 from levilab.acquisition.table import EXPERIMENTS, settings_of
 from levilab.bench.bench import open_bench
 from levilab.errors import unquoted
@@ -48,7 +48,6 @@ class AcquisitionRequest:
         note: kept with the run.
         wire_log: whether all bytes on the wire are kept.
         resume: the run to go on with.
-        person: asks the person at the bench a question, and returns the answer.
     """
 
     experiment: str
@@ -61,7 +60,6 @@ class AcquisitionRequest:
     note: str = ""
     wire_log: bool = False
     resume: Run | None = None
-    person: Callable[[str], str] = ask_no_person
 
 
 def acquire(request: AcquisitionRequest, show: Show) -> Run:
@@ -104,7 +102,8 @@ def _at_the_bench(
     settings = settings_of(request.config, experiment.name)
     earlier = _earlier(request)
     log = writer.wire if request.wire_log else None
-    with open_bench(request.wiring(), experiment.instruments, log=log, check=stop.check) as bench:
+    wiring = request.wiring()
+    with open_bench(wiring, experiment.instruments, log=log, check=stop.check) as bench:
         session: Session[Any] = Session(
             bench,
             settings,
@@ -112,7 +111,7 @@ def _at_the_bench(
             writer,
             show,
             stop,
-            person=request.person,
+            person=wiring.person,
             earlier=earlier,
             rows=list(earlier.rows) if earlier else [],
         )

@@ -12,9 +12,9 @@ from pydantic import ValidationError
 from instruments.clock import VirtualClock
 from levilab.acquisition.experiment import CounterSettings
 from levilab.acquisition.loop import AcquisitionRequest
-from levilab.acquisition.session import ask_no_person
 from levilab.acquisition.table import EXPERIMENTS, Configuration, settings_of, with_settings
 from levilab.bench.config import BenchConfig, ConfigError, read_bench
+from levilab.bench.person import ask_no_person
 from levilab.bench.wiring import described_wiring
 from levilab.errors import LevilabError, UsageError
 from levilab.runs.run import Run, find_run
@@ -26,6 +26,7 @@ from levilab.world.spin_world import SpinScene, SpinWorld, drawn
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from levilab.bench.person import Person
     from levilab.simulator.scene import Scene
 
 HOW = (
@@ -55,7 +56,7 @@ class AcquisitionOptions:
         realtime: keeps the virtual bench to the wall clock.
         resume: the run to go on with.
         wire_log: keeps all bytes on the wire.
-        person: asks the person at a real bench a question, and returns the answer.
+        person: carries out what the experiment asks of a person at a real bench.
         tell: called with a line about what takes long before it begins.
     """
 
@@ -68,7 +69,7 @@ class AcquisitionOptions:
     realtime: bool = False
     resume: Path | None = None
     wire_log: bool = False
-    person: Callable[[str], str] = ask_no_person
+    person: Person = ask_no_person
     tell: Callable[[str], None] = lambda _: None
 
 
@@ -82,12 +83,11 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
     request = AcquisitionRequest(
         experiment,
         config,
-        lambda: described_wiring(config),
+        lambda: described_wiring(config, options.person),
         out=options.out,
         note=options.note,
         wire_log=options.wire_log,
         resume=run,
-        person=options.person,
     )
     if virtual:
         request = _on_the_virtual_bench(request, options)
@@ -178,8 +178,8 @@ def _on_the_virtual_bench(request: AcquisitionRequest, options: AcquisitionOptio
     seed = run.record.seed if run else options.seed
     seed = secrets.randbelow(1 << 31) if seed is None else seed
     config = request.config.model_copy(update={"visa_library": "@levilab", **VIRTUAL})
-    request = replace(request, seed=seed, config=config, person=ask_no_person)
-    scene = _scene(options.scene, run)
+    request = replace(request, seed=seed, config=config)
+    scene = _scene(options.scene or EXPERIMENTS[request.experiment].mock_scene, run)
 
     def clock() -> VirtualClock:
         return VirtualClock(realtime=options.realtime)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from instruments.errors import InstrumentError, SettingsLost
+from levilab.bench.person import ask_no_person
 from levilab.errors import LevilabError
 from levilab.runs.run import utc_now
 from levilab.settings import Settings
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
     from instruments.drivers.oscilloscope import Trace
     from levilab.bench.bench import Bench
+    from levilab.bench.person import Person, Task
     from levilab.interruption import Stop
     from levilab.present.progress import Show
     from levilab.runs.channel import Channel
@@ -49,11 +51,6 @@ class Earlier:
     replay: bool
 
 
-def ask_no_person(question: str) -> str:  # noqa: ARG001 - as a person is asked
-    """The answer where no person is at the bench: none."""
-    return ""
-
-
 @dataclass
 class Session(Generic[S]):
     """An acquisition under way.
@@ -65,7 +62,7 @@ class Session(Generic[S]):
         writer: the run folder.
         show: what the person at the bench sees.
         stop: whether the end was asked for.
-        person: asks the person at the bench a question, and returns the answer.
+        person: carries out what the experiment asks of a person at the bench.
         earlier: the run that is resumed, if one is.
         rows: the readings so far, those of the resumed run included.
         zero: bench time of time_s = 0 [s], None before it is reached.
@@ -78,7 +75,7 @@ class Session(Generic[S]):
     writer: RunWriter
     show: Show
     stop: Stop
-    person: Callable[[str], str] = ask_no_person
+    person: Person = ask_no_person
     earlier: Earlier | None = None
     rows: list[Row] = field(default_factory=list)
     zero: float | None = None
@@ -164,15 +161,15 @@ class Session(Generic[S]):
         if not self._replaying:
             self.show.preparing(text, share)
 
-    def ask(self, question: str) -> str:
+    def ask(self, task: Task) -> str:
         """Let the person at the bench do or answer something.  Both stand in the events.
 
         Returns the answer, empty where nothing but Enter was typed or no person is at the bench.  The first Ctrl-C
         ends the wait.
         """
-        self._write_event("asked the person", question)
+        self._write_event("asked the person", task.text)
         with self.stop.at_once():
-            answer = self.person(question).strip()
+            answer = self.person(task).strip()
         if answer:
             self._write_event("answered", answer)
         return answer

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from instruments.clock import Clock, WallClock
 from levilab.bench.config import ConfigError, InstrumentSettings, Limits
 from levilab.bench.kinds import KINDS
+from levilab.bench.person import Person, ask_no_person
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,13 +21,14 @@ class Wiring:
     """Where the instruments are and what leads to them.
 
     instruments: kind → model and address, for those that the bench has; limits: what the coil stands; library:
-    PyVISA's, or a virtual one; clock: of the bench.
+    PyVISA's, or a virtual one; clock: of the bench; person: who stands at it.
     """
 
     instruments: Mapping[str, InstrumentSettings]
     limits: Limits
     library: Any
     clock: Clock
+    person: Person = ask_no_person
 
     def described(self, kind: str) -> InstrumentSettings:
         """What is known of an instrument.  Raises ConfigError where nothing is, or its model has no driver."""
@@ -37,8 +39,8 @@ class Wiring:
         return settings
 
 
-def described_wiring(config: BenchConfig) -> Wiring:
+def described_wiring(config: BenchConfig, person: Person = ask_no_person) -> Wiring:
     """The wiring of the bench that a bench file describes."""
     # a measurement waits by the wall clock, so a virtual bench that jumps from answer to answer would stand still
     library = "realtime@levilab" if config.visa_library == "@levilab" else config.visa_library
-    return Wiring(config.instruments(), config.limits, library, WallClock())
+    return Wiring(config.instruments(), config.limits, library, WallClock(), person)

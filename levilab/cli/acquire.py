@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from levilab.cli import exit_codes
 from levilab.cli.options import Json
 from levilab.cli.output import message, print_json
+
+if TYPE_CHECKING:
+    from levilab.bench.person import Task
 
 acquire_app = typer.Typer(no_args_is_help=True, help="Run an experiment on the bench and write a run folder.")
 
@@ -47,11 +50,15 @@ def acquire_experiment(
         Path | None, typer.Option(metavar="RUN", help="Go on with an interrupted run: read on, without driving again.")
     ] = None,
     wire_log: Annotated[bool, typer.Option("--wire-log", help="Keep all bytes sent and received.")] = False,
+    yes: Annotated[
+        bool, typer.Option("--yes", help="Ask the person at the bench nothing: all is as the experiment wants it.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Carry out the experiment that the command is named after."""
     from levilab.acquisition.loop import acquire
     from levilab.acquisition.request import AcquisitionOptions, request_for
+    from levilab.bench.person import ask_no_person
     from levilab.present.progress import to_stderr
 
     options = AcquisitionOptions(
@@ -64,7 +71,7 @@ def acquire_experiment(
         realtime=realtime,
         resume=resume,
         wire_log=wire_log,
-        person=_ask,
+        person=ask_no_person if yes else _ask,
         tell=message,
     )
     experiment = str(context.info_name)
@@ -86,12 +93,14 @@ for _name, _help in EXPERIMENT_HELP.items():
     )(acquire_experiment)
 
 
-def _ask(question: str) -> str:
+def _ask(task: Task) -> str:
     """Ask the person at the bench, on the terminal."""
     from levilab.acquisition.session import ExperimentFailed
 
-    message(f"{question}  [Enter]")
+    message(f"{task.text}  [Enter]")
     answer = sys.stdin.readline()
     if not answer:
-        raise ExperimentFailed(f"{question!r} cannot be answered: standard input is closed; start it at a terminal")
+        raise ExperimentFailed(
+            f"{task.text!r} cannot be answered: standard input is closed; start it at a terminal, or with --yes"
+        )
     return answer

@@ -20,6 +20,7 @@ from instruments.virtual.oscilloscope.keysight_dsox import VirtualDSOX1000
 from instruments.virtual.oscilloscope.rigol_ds1000z import VirtualDS1000Z
 from levilab.bench.config import ConfigError, InstrumentSettings, Limits
 from levilab.bench.wiring import Wiring
+from levilab.world.person import VirtualPerson
 from levilab.world.spin_world import SpinScene, SpinWorld
 
 if TYPE_CHECKING:
@@ -93,7 +94,7 @@ def virtual_bus(world: World | None = None, models: Mapping[str, str] | None = N
 
 def virtual_wiring(world: World, limits: Limits | None = None) -> Wiring:
     """The wiring of a virtual bench that measures this world.  limits: by default those of a bench file without any."""
-    return Wiring(VIRTUAL, limits or Limits(), library_for(virtual_bus(world)), world.clock)
+    return Wiring(VIRTUAL, limits or Limits(), library_for(virtual_bus(world)), world.clock, VirtualPerson(world))
 
 
 def plug_in_serial(bus: Bus | None = None) -> Bus:

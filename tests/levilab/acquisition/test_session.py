@@ -18,6 +18,7 @@ from levilab.acquisition.request import AcquisitionOptions, CannotResume, reques
 from levilab.acquisition.session import ExperimentFailed, Session
 from levilab.acquisition.table import EXPERIMENTS
 from levilab.bench.config import BenchConfig
+from levilab.bench.person import PlaceProbe
 from levilab.errors import DataError
 from levilab.runs.channel import Channel
 from levilab.runs.run import Run
@@ -28,6 +29,8 @@ from support.acquisitions import Silent
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
+
+    from levilab.bench.person import Person, Task
 
 
 class ScanSettings(ExperimentSettings):
@@ -51,7 +54,7 @@ def scan(session: Session[ScanSettings]) -> None:
     bench.oscilloscope.prepare(duration_s=0.1, points=1000, volts_per_division=0.5, trigger_level_v=0.6, sweep="auto")
     session.begin(lambda: session.progress("probe in its chamber", 1.0))
     for k, height in enumerate(session.settings.heights_m):
-        session.ask(f"Move the probe to {100 * height:g} cm.")
+        session.ask(PlaceProbe(f"Move the probe to {100 * height:g} cm.", height))
         flux_density = bench.magnetometer.flux_density()
         assert flux_density is not None
         bench.oscilloscope.acquire(timeout_s=5.0)
@@ -82,6 +85,12 @@ def request_of_a_scan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Acquis
     return AcquisitionRequest(
         "scan", SCAN_TABLES(), lambda: virtual_wiring(world), out=tmp_path, synthetic_how="a test"
     )
+
+
+def with_person(request: AcquisitionRequest, person: Person) -> AcquisitionRequest:
+    """The same with this person at the bench."""
+    wiring = dataclasses.replace(request.wiring(), person=person)
+    return dataclasses.replace(request, wiring=lambda: wiring)
 
 
 def test_an_experiment_of_another_shape_writes_what_it_declares(request_of_a_scan: AcquisitionRequest) -> None:
@@ -144,12 +153,12 @@ def test_the_person_is_asked_and_the_answer_is_kept(request_of_a_scan: Acquisiti
     answers = iter(["", " at 6.1 cm, the stand slips ", ""])
     asked: list[str] = []
 
-    def person(question: str) -> str:
-        asked.append(question)
+    def person(task: Task) -> str:
+        asked.append(task.text)
         return next(answers)
 
     show = Silent()
-    run = acquire(dataclasses.replace(request_of_a_scan, person=person), show)
+    run = acquire(with_person(request_of_a_scan, person), show)
     assert asked[0] == "Move the probe to 5 cm."
     assert not any("Move the probe" in text for text in show.messages)  # the one who asks has shown it
     happened = [(event["kind"], event["text"]) for event in run.events()]
@@ -158,11 +167,11 @@ def test_the_person_is_asked_and_the_answer_is_kept(request_of_a_scan: Acquisiti
 
 
 def test_the_first_ctrl_c_ends_a_question(request_of_a_scan: AcquisitionRequest) -> None:
-    def leaves(_: str) -> str:
+    def leaves(_: Task) -> str:
         signal.raise_signal(signal.SIGINT)
         pytest.fail("the signal did not break through")
 
-    run = acquire(dataclasses.replace(request_of_a_scan, person=leaves), Silent())
+    run = acquire(with_person(request_of_a_scan, leaves), Silent())
     assert run.status == "interrupted"
 
 

@@ -1,0 +1,34 @@
+"""The person at the bench: what an experiment may have to ask of one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a person is to do or to answer.  text: as the person reads it."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class PlaceProbe(Task):
+    """The magnetometer's probe is to stand on the axis.  height_m: above the base [m]."""
+
+    height_m: float
+
+
+@dataclass(frozen=True)
+class FloatTop(Task):
+    """The top is to be spun by hand and to float."""
+
+
+#: Carries out a task and returns the answer, empty where none is asked for.
+Person = Callable[[Task], str]
+
+
+def ask_no_person(task: Task) -> str:  # noqa: ARG001 - as a person is asked
+    """The answer where no person is at the bench: none."""
+    return ""

@@ -1,0 +1,27 @@
+"""The person at a virtual bench: carries out tasks in the world."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from levilab.bench.person import Task
+    from levilab.world.spin_world import World
+
+
+class VirtualPerson:
+    """Carries out, at once, the tasks that change something in the world; all others are answered with nothing."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+
+    def __call__(self, task: Task) -> str:
+        """Carry out a task; returns the answer."""
+        carry_out = _DEEDS.get(type(task))
+        return carry_out(self.world, task) if carry_out else ""
+
+
+#: Kind of task → what is done in the world; returns the answer.
+_DEEDS: dict[type[Task], Callable[[World, Task], str]] = {}
