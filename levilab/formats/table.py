@@ -199,8 +199,8 @@ def _titles(
         raise NoSuchColumn(
             path, f"{layout.width} columns and no header; add one, or say `columns` = t=1,f=2", line=layout.first_line
         )
-    guess = dict(zip(TITLES_WITHOUT_HEADER, numbers, strict=False))
-    return numbers, guess, [f"{shown(str(path), 200)}: no header; the columns are taken as {', '.join(guess)}"]
+    taken = dict(zip(TITLES_WITHOUT_HEADER, numbers, strict=False))
+    return numbers, taken, [f"{shown(str(path), 200)}: no header; the columns are taken as {', '.join(taken)}"]
 
 
 def _table(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections import Counter
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, TypeVar
@@ -15,15 +16,15 @@ from levilab.formats.waveforms.record import SEARCHED
 from levilab.runs.run import READINGS, RECORD, Run, find_runs
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
 
 @dataclass(frozen=True)
 class InputOptions:
     """How inputs are read, whatever is done with them; each analysis adds its own options.
 
-    columns: the data file's own names; channel: of a record with several; rate: samples per second [Hz], in the place of
-    what the file says; guess: whether a file without titles is taken for what it looks like.
+    columns: the data file's own names; channel: of a record with several; rate: samples per second [Hz], in the place
+    of what the file says; guess: whether a file without titles is taken for what it looks like.
     """
 
     columns: Mapping[str, str] | None = None
@@ -205,29 +206,38 @@ def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]
     remarks: list[str] = []
     others: Counter[str] = Counter()
     for folder in find_runs(root):
+        chosen = options(folder)
         try:
             run = Run.load(folder)
             if needs.take(run):
-                found.append(_of_run(run, needs, options(folder)))
+                found.append(_of_run(run, needs, chosen))
             else:
                 others[run.record.experiment] += 1
         except DataError as error:
             broken.append(f"passed over: {error}")
     files = data_files(root)
     for file in files:
-        try:
-            found.append(_of_file(file, needs, replace(options(file), guess=False)))
-        except NoRate as error:
-            remarks.append(f"passed over: {error}")
-        except DoesNotSuit:
-            continue
-        except DataError as error:
-            broken.append(f"passed over: {error}")
+        chosen = replace(options(file), guess=False)
+        with _passing_over(broken, remarks):
+            found.append(_of_file(file, needs, chosen))
     if not found:
         text = f"{root}: {_nothing_found(needs, others, broken, [file.name for file in files])}"
         raise DataError(text) if broken else DoesNotSuit(text)
     kinds = [f"passed over: {count} {kind} run{'s' * (count > 1)}" for kind, count in sorted(others.items())]
     return Found(tuple(found), tuple(broken), (*kinds, *remarks))
+
+
+@contextmanager
+def _passing_over(broken: list[str], remarks: list[str]) -> Iterator[None]:
+    """Note what is wrong with a data file that nobody named; one of another kind is of no concern."""
+    try:
+        yield
+    except NoRate as error:
+        remarks.append(f"passed over: {error}")
+    except DoesNotSuit:
+        return
+    except DataError as error:
+        broken.append(f"passed over: {error}")
 
 
 def data_files(root: Path) -> list[Path]:

@@ -70,7 +70,5 @@ def _load(path: Path) -> NDArray[Any]:
 def _pulse_times(path: Path, data: NDArray[Any]) -> PulseTimes:
     times = np.array(data, dtype=np.float64)
     if data.ndim != 1 or not bool(np.isfinite(times).all()) or not bool((np.diff(times) > 0).all()):
-        raise TableError(
-            path, "does not say its sampling rate: say `rate` in Hz (pulse times would increase throughout)"
-        )
+        raise NoRate(path, "does not say its sampling rate: say `rate` in Hz (pulse times would increase throughout)")
     return PulseTimes(path, "NumPy array of pulse times", times)

@@ -90,6 +90,16 @@ class _Clock:
         self.count = n + m
 
 
+@dataclass(frozen=True)
+class _Times:
+    """Start, step and its standard uncertainty where rounded times give it [s], and what to know of them."""
+
+    start: float
+    step: float
+    warnings: tuple[str, ...] = ()
+    step_u: float = 0.0
+
+
 @dataclass
 class _Survey:
     """What one pass over the rows finds.  torn: of a last line that was cut off."""
@@ -115,17 +125,17 @@ def read_samples(head: Head, *, columns: Mapping[str, str], rate: float | None) 
     certain = header.certain or rate is not None
     try:
         survey = _look_over(head, header)
-        start, step, warnings = _times(path, header, survey, rate)
-        check_step(path, step, "the sampling interval")
+        times = _times(path, header, survey, rate)
+        check_step(path, times.step, "the sampling interval")
         check_count(path, survey.count)
     except TableError as error:
         if certain:
             raise
         raise NoWaveform(path, str(error).partition(": ")[2], line=error.line) from error
-    if not certain and step > LONGEST_DOUBTFUL_STEP_S:
-        text = f"its rows are {step:g} s apart, which is no sampling of a top that spins: say `rate` if it is"
+    if not certain and times.step > LONGEST_DOUBTFUL_STEP_S:
+        text = f"its rows are {times.step:g} s apart, which is no sampling of a top that spins: say `rate` if it is"
         raise NoWaveform(path, text)
-    warnings += _about_count(path, header, survey)
+    warnings = (*times.warnings, *_about_count(path, header, survey))
 
     def read(signal: int) -> Iterator[Array]:
         column = header.columns[signal]
@@ -134,7 +144,7 @@ def read_samples(head: Head, *, columns: Mapping[str, str], rate: float | None) 
                 yield block.numbers[:, 0] * column.factor if column.factor != 1 else block.numbers[:, 0]
 
     signals = tuple(Signal(column.name, column.unit) for column in header.columns)
-    return Waveform(path, header.format, start, step, survey.count, signals, read, tuple(warnings))
+    return Waveform(path, header.format, times.start, times.step, survey.count, signals, read, warnings, times.step_u)
 
 
 def _about_count(path: Path, header: Header, survey: _Survey) -> Iterator[str]:
@@ -157,7 +167,7 @@ def _look_over(head: Head, header: Header) -> _Survey:
     return survey
 
 
-def _times(path: Path, header: Header, survey: _Survey, rate: float | None) -> tuple[float, float, list[str]]:
+def _times(path: Path, header: Header, survey: _Survey, rate: float | None) -> _Times:
     """Start and step [s], and what to know of them."""
     if header.time is not None:
         return _printed_times(path, header, survey, rate)
@@ -168,7 +178,7 @@ def _times(path: Path, header: Header, survey: _Survey, rate: float | None) -> t
         raise NoRate(path, "does not say its sampling rate: say `rate` in Hz")
     step = 1 / rate if rate is not None else known or 0.0
     number = (survey.clock.first or 0.0) if header.sequence is not None else 0.0
-    return (header.start or 0.0) + number * step, step, _replaced(path, known, rate)
+    return _Times((header.start or 0.0) + number * step, step, tuple(_replaced(path, known, rate)))
 
 
 def _replaced(path: Path, known: float | None, rate: float | None) -> list[str]:
@@ -189,7 +199,7 @@ def _check_numbers(path: Path, clock: _Clock) -> None:
             )
 
 
-def _printed_times(path: Path, header: Header, survey: _Survey, rate: float | None) -> tuple[float, float, list[str]]:
+def _printed_times(path: Path, header: Header, survey: _Survey, rate: float | None) -> _Times:
     clock, n = survey.clock, survey.count
     if clock.first is None or n < 2:
         check_count(path, n)
@@ -197,7 +207,7 @@ def _printed_times(path: Path, header: Header, survey: _Survey, rate: float | No
     first, last = (clock.first or 0.0) * unit, clock.last * unit
     mean = (last - first) / (n - 1)
     if rate is not None:
-        return first, 1 / rate, _replaced(path, header.step.value if header.step else mean, rate)
+        return _Times(first, 1 / rate, tuple(_replaced(path, header.step.value if header.step else mean, rate)))
     if not mean > 0:
         raise TableError(
             path, f"its times do not increase, from {first:g} s to {last:g} s: sort the rows, or say `rate`"
@@ -210,7 +220,7 @@ def _printed_times(path: Path, header: Header, survey: _Survey, rate: float | No
     step, u = header.step.value, 0.505 * header.step.resolution
     off = abs(mean - step)
     if off <= u + allowed / (n - 1):
-        return first, step if off <= SAME * step or u <= allowed / (n - 1) else mean, []
+        return _Times(first, step if off <= SAME * step or u <= allowed / (n - 1) else mean)
     return _contradiction(path, header, first, mean)
 
 
@@ -218,19 +228,18 @@ def _printed_times(path: Path, header: Header, survey: _Survey, rate: float | No
 _FINE = 1e-6
 
 
-def _fitted(
-    path: Path, clock: _Clock, unit: float, *, first: float, mean: float, allowed: float
-) -> tuple[float, float, list[str]]:
+def _fitted(path: Path, clock: _Clock, unit: float, *, first: float, mean: float, allowed: float) -> _Times:
     """Where times alone give the step: from the ends, or by a straight line where they lost digits."""
     if allowed / (clock.count - 1) < 1e-3 * _FINE * mean:
-        return first, mean, []
+        return _Times(first, mean)
     step, resolution = clock.slope * unit, clock.resolution * unit
     alike = max(resolution / step, 1.0)  # neighbours that are rounded to the same time
     u = resolution * alike**0.5 / clock.count**1.5  # of n rounded times, each ± resolution/√12
     if u < _FINE * step or clock.longest[0] - clock.shortest[0] < 1e-6 * clock.resolution:  # all differences alike
-        return first, step, []
+        return _Times(first, step)
     told = f"its printed times have lost digits (one unit of the last is {resolution:g} s, a step {step:.4g} s): the "
-    return first, step, [f"{path.name}: {told}sampling rate, and so any frequency, is known to {u / step:.1g} of it"]
+    known = f"{path.name}: {told}sampling rate, and so any frequency, is known to {u / step:.1g} of it"
+    return _Times(first, step, (known,), u)
 
 
 def _check_even(path: Path, clock: _Clock, unit: float, mean: float, allowed: float) -> None:
@@ -244,7 +253,7 @@ def _check_even(path: Path, clock: _Clock, unit: float, mean: float, allowed: fl
             )
 
 
-def _contradiction(path: Path, header: Header, first: float, mean: float) -> tuple[float, float, list[str]]:
+def _contradiction(path: Path, header: Header, first: float, mean: float) -> _Times:
     """Header and printed times disagree: a unit of the times that only the step shows, else a reason to refuse."""
     step = header.step.value if header.step else mean
     factor = next((unit for unit in _UNITS if abs(mean / step / unit - 1) < 1e-3), None)
@@ -255,4 +264,4 @@ def _contradiction(path: Path, header: Header, first: float, mean: float) -> tup
             f"`rate` = {1 / step:.6g} or {1 / mean:.6g}",
         )
     told = f"its printed times are {mean:.6g} s apart where its header says {step:.6g} s: the times are taken to be in "
-    return first / factor, step, [f"{shown(path.name, 200)}: {told}units of {1 / factor:g} s"]
+    return _Times(first / factor, step, (f"{shown(path.name, 200)}: {told}units of {1 / factor:g} s",))

@@ -48,7 +48,7 @@ class Waveform:
         path: the file.
         format: what wrote it, in words.
         start: time of the first sample [s].
-        step: from one sample to the next [s].
+        step: from one sample to the next [s]; step_u: its standard uncertainty [s], where it comes from rounded times.
         count: samples of each channel.
         signals: the channels.
         read: from the index of a channel to its samples in order, in blocks, each of shape (m,), in the channel's unit.
@@ -63,6 +63,7 @@ class Waveform:
     signals: tuple[Signal, ...]
     read: Callable[[int], Iterator[Array]]
     warnings: tuple[str, ...] = ()
+    step_u: float = 0.0
 
     @property
     def rate(self) -> float:

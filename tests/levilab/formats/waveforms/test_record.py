@@ -286,7 +286,7 @@ def test_a_file_larger_than_memory_is_read_in_pieces(
         finally:
             tracemalloc.stop()
     assert peaks[1] < 1.25 * peaks[0]
-    assert peaks[1] < 8 * 100_000
+    assert peaks[1] < (2 if kind == "csv" else 1) * 8 * 100_000  # the numbers of two columns, of one
 
 
 def read_or_refused(path: Path, rate: float | None) -> Waveform | PulseTimes | None:
