@@ -55,7 +55,7 @@ class Needs(Generic[R]):
 
     analysis: its name; experiments: those whose runs suit it; read_file, read_run: to readings, which raise DoesNotSuit
     for what is of another kind and DataError for what cannot be used; data: the file of a run that the readings come
-    from; also: whether a run of any experiment suits.
+    from; also: whether a run of any experiment suits; wanted: such runs in words, where their experiment says too little.
     """
 
     analysis: str
@@ -64,11 +64,12 @@ class Needs(Generic[R]):
     read_run: Callable[[Run, InputOptions], R]
     data: str = READINGS
     also: Callable[[Run], bool] | None = None
+    wanted: str = ""
 
     @property
     def runs(self) -> str:
         """Which runs suit, in words."""
-        return " or ".join(sorted(self.experiments))
+        return self.wanted or f"{' or '.join(sorted(self.experiments))} run"
 
     def take(self, run: Run) -> bool:
         """Whether a run suits."""
@@ -182,7 +183,7 @@ def _of_file(path: Path, needs: Needs[R], options: InputOptions) -> Source[R]:
 def _of_run(run: Run, needs: Needs[R], options: InputOptions) -> Source[R]:
     if not needs.take(run):
         kind = run.record.experiment
-        raise DoesNotSuit(f"{run.folder}: holds a {kind} run, {needs.analysis} needs a {needs.runs} run")
+        raise DoesNotSuit(f"{run.folder}: holds a {kind} run, {needs.analysis} needs a {needs.runs}")
     data = run.folder / needs.data
     readings = needs.read_run(run, options)
     return Source(run.folder, data, sha256_of(data), run, readings, run.folder.name, readings.warnings)
@@ -258,4 +259,4 @@ def _nothing_found(needs: Needs[Any], others: Counter[str], broken: list[str], f
     seen += [f"{len(broken)} that cannot be used, as {broken[0].removeprefix('passed over: ')}"] if broken else []
     seen += [f"{len(files)} data file{'s' * (len(files) > 1)}, as {files[0]}"] if files else []
     what = f"found only {'; '.join(seen)}" if seen else "found nothing"
-    return f"no {needs.runs} run to analyze in this folder ({what}); name a run folder or a data file"
+    return f"no {needs.runs} to analyze in this folder ({what}); name a run folder or a data file"

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
     from levilab.formats.waveforms.head import Head
 
+#: What is read.
+WANTED = "samples beside their times, a scope's CSV, WAV, .npy, or a column of pulse times is expected"
 #: A header ends within so many lines.
 MOST_LINES = 200
 #: Words for volts beside the symbols.
@@ -151,7 +153,7 @@ def dialect_of(head: Head) -> Dialect:
         return found
     if sum(bool(re.fullmatch(r"[+-]?\d*[.,]?\d+([eE][+-]?\d+)?[,;]?", text)) for text in texts) < 0.5 * len(texts):
         at, line = next((n, line) for n, line in enumerate(head.lines, 1) if line.strip())
-        raise NoWaveform(head.path, f"'{shown(line.strip())}' begins no table of samples", line=at)
+        raise NoWaveform(head.path, f"'{shown(line.strip())}' begins no table of samples; {WANTED}", line=at)
     return Dialect(None, "," if any(match for match in one_comma) else ".")
 
 

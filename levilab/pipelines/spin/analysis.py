@@ -39,6 +39,7 @@ NEEDS = Needs(
     read_run=read_spin_run,
     data=INDEX,
     also=has_traces,
+    wanted="run with traces",
 )
 #: A longer record is cut into windows [s]: a top that coasts loses 3 % of its spin meanwhile, and a parabola of the
 #: phase still holds.
