@@ -195,11 +195,12 @@ def turn_times(fit: Fit, middle: float, duration: float) -> tuple[Array, Array, 
 
 def learn(x: Array, cell: NDArray[np.intp], valid: NDArray[np.bool_] | None, width: float) -> Pulse:
     """The mean pulse from pieces x and their places in the table, both of shape (turns, n); width: of it [turns]."""
+    # bins hold four samples or more, and are no finer than the samples: missing pulses would leave a comb at those
+    most = min(x.size / 4, 1.5 * x.shape[1])
     if valid is not None:
         x, cell = x[valid], cell[valid]
     x, cell = x.ravel(), cell.ravel()
-    # so many bins that ten samples or more fall into each
-    bins = int(2 ** np.clip(np.floor(np.log2(x.size / 10)), 4, 10))
+    bins = int(2 ** np.clip(np.floor(np.log2(most)), 4, 10))
     place = cell // (TABLE // bins)
     counts = np.maximum(np.bincount(place, minlength=bins), 1)
     mean = np.bincount(place, x, bins) / counts

@@ -15,8 +15,8 @@ Array = NDArray[np.float64]
 CURVED = 4.0
 #: Residuals are grouped into so many blocks to see whether neighbours resemble each other.
 BLOCKS = 50
-#: Blocks that scatter like single residuals with at least this probability count as white.
-WHITE = 0.02
+#: Blocks scatter more, or less, than single residuals where chance would do it with less than this probability.
+WHITE, ALTERNATING = 0.01, 0.001
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ def fit_turns(times: Array, turns: Array, weight: Array | None = None, *, degree
     fit = _fit(times, turns, weight, degree or 2)
     if degree is None and times.size >= 12:
         cubic = _fit(times, turns, weight, 3)
-        u = float(np.sqrt(cubic.covariance[3, 3]))
+        u = float(np.sqrt(cubic.covariance[3, 3] * max(1.0, 1 / cubic.inflation)))
         if abs(cubic.coefficients[3]) > CURVED * u:
             return cubic
     return fit
@@ -147,6 +147,6 @@ def scatter(residuals: Array, parameters: int) -> tuple[float, float, float]:
     from scipy.special import fdtr
 
     p = float(fdtr(blocks - parameters, freedom, ratio))
-    if min(p, 1 - p) > WHITE / 2:
+    if ALTERNATING < p < 1 - WHITE:
         return variance, 1.0, freedom
     return variance, ratio, blocks - parameters

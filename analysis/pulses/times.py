@@ -99,7 +99,7 @@ def fit_train(times: Array, *, degree: int | None = None) -> Train:
         whole = np.rint(phase).astype(np.int64)
         away = phase - whole
         spread = 1.4826 * float(np.median(np.abs(fit.residuals))) + 1e-12
-        near = np.abs(away) < np.clip(GROSS * spread, 1e-9, 0.25)
+        near = np.abs(away) < np.clip(GROSS * spread, 1e-9, numbering.tolerance)
         new = _one_a_turn(Numbering(whole, near), np.abs(away))
         if new.size < FEWEST:
             break

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.errors import NotPositive, ShapesDiffer, TooFewPulses
+from analysis.pulses.clean import clean
 from analysis.pulses.edges import Edges, place_edges
 from analysis.pulses.matched import Match, match, window_of
 from analysis.pulses.result import Finding, Method, SpinFrequency
@@ -45,7 +46,8 @@ def spin_of_trace(
     """
     x, bad = _checked(samples, rate)
     factor = max(int(rate // SEARCH_RATE), 1)
-    bins = shorten(x, factor)
+    cleaned = clean(x, rate, shorten(x, factor), bad)
+    x, bins, bad = cleaned.samples, cleaned.bins, cleaned.bad
     events = find_events(bins, rate / factor)
     if events.times.size < FEWEST:
         raise TooFewPulses(seen=events.times.size, needed=FEWEST, duration=x.size / rate)
@@ -54,7 +56,7 @@ def spin_of_trace(
         edges = place_edges(x, rate, train.fit, width=events.width, sign=events.sign)
         if edges is None:
             raise TooFewPulses(seen=train.used.size, needed=FEWEST, duration=x.size / rate)
-        return _result(edges, train, start, method, 0.0)
+        return _result(edges, train, start, method, 0.0, cleaned.notes)
     middles = ((np.arange(bins.size, dtype=np.float64) + 0.5) * factor - 0.5) / rate
     window = window_of(bins, train.fit.phase(middles))
     if window is None:
@@ -62,7 +64,7 @@ def spin_of_trace(
     found = match(x, rate, train.fit, window, bad=bad, degree=degree)
     if found is None:
         raise TooFewPulses(seen=train.used.size, needed=FEWEST, duration=x.size / rate)
-    return _result(found, train, start, "matched" if method == "auto" else method, found.origin)
+    return _result(found, train, start, "matched" if method == "auto" else method, found.origin, cleaned.notes)
 
 
 def _checked(samples: ArrayLike, rate: float) -> tuple[Array, NDArray[np.bool_] | None]:
@@ -83,11 +85,13 @@ def _checked(samples: ArrayLike, rate: float) -> tuple[Array, NDArray[np.bool_] 
     return x, bad
 
 
-def _result(found: Match | Edges, train: Train, start: float, method: Method, origin: float) -> SpinFrequency:
+def _result(
+    found: Match | Edges, train: Train, start: float, method: Method, origin: float, before: tuple[Finding, ...]
+) -> SpinFrequency:
     fit = found.fit
     frequency, chirp, reference = fit.frequency_and_chirp()
     assert frequency.value is not None
-    notes = []
+    notes = list(before)
     if found.missing:
         notes.append(Finding("missing", f"{found.missing} turns have no pulse"))
     if found.wrong:

@@ -32,10 +32,15 @@ SUPPORT = 0.6
 
 @dataclass(frozen=True)
 class Numbering:
-    """Turn number of each pulse, shape (n,), and whether the pulse belongs to that turn, shape (n,)."""
+    """Which turn each pulse belongs to.
+
+    turns: number of the nearest turn, shape (n,); belongs: whether the pulse is one of that turn, shape (n,); tolerance:
+    a pulse farther away than this never is [turns].
+    """
 
     turns: Turns
     belongs: NDArray[np.bool_]
+    tolerance: float = 0.25
 
 
 def number_turns(times: Array) -> Numbering:
@@ -67,8 +72,8 @@ def _from_intervals(times: Array) -> Numbering | None:
 
 def _line(x: Array, y: Array) -> tuple[float, float, float]:
     """Value at, slope about, and place of the mean of x, without what lies off the line."""
-    keep = np.ones(x.size, dtype=bool)
     value, slope, origin = float(np.median(y)), 0.0, float(x.mean())
+    keep = np.abs(y / value - 1) < 0.25
     for _ in range(3):
         origin = float(x[keep].mean())
         d = x[keep] - origin
@@ -111,15 +116,18 @@ def windows_of(times: Array, size: int = WINDOW) -> Windows:
     since = inside - centre[:, None]
     frequency = 1 / _periods(since)
     trials = [_refine(since, frequency * k) for k in (1, 2, 3)]
-    best = np.max([sharpness for _, _, sharpness in trials], axis=0)
-    frequency, phase, sharpness = trials[0]
-    for k in (2, 1):  # the lowest multiple at which most pulses lie at one place
-        wanted = trials[k - 1][2] >= SHARP * best
-        frequency, phase, sharpness = (
-            np.where(wanted, a, b)
-            for a, b in zip(trials[k - 1], (frequency, phase, sharpness) if k < 2 else trials[2], strict=True)
-        )
-    return Windows(starts, starts + size - 1, centre, frequency, phase, sharpness)
+    sharpness = np.array([_smooth(found[2]) for found in trials])  # neighbours decide together
+    # the lowest multiple at which most pulses lie at one place
+    chosen = np.argmax(sharpness >= SHARP * sharpness.max(axis=0), axis=0)
+    frequency, phase, sharp = (np.choose(chosen, [found[i] for found in trials]) for i in range(3))
+    return Windows(starts, starts + size - 1, centre, frequency, phase, sharp)
+
+
+def _smooth(values: Array) -> Array:
+    """Each row with its two neighbours on either side, weighted 1 2 3 2 1."""
+    padded = np.concatenate([values[:1], values[:1], values, values[-1:], values[-1:]])
+    n = len(values)
+    return np.asarray(sum(w * padded[i : i + n] for i, w in enumerate((1, 2, 3, 2, 1))) / 9)
 
 
 def _periods(since: Array) -> Array:
@@ -140,9 +148,7 @@ def _periods(since: Array) -> Array:
     votes += np.bincount(flat.ravel() + 1, (share * valid).ravel(), count * classes)
     votes = votes.reshape(count, classes)
     votes[:, 1:-1] = votes[:, :-2] + votes[:, 1:-1] + votes[:, 2:]
-    if count > 1:  # neighbouring windows have nearly the same period
-        padded = np.concatenate([votes[:1], votes, votes[-1:]])
-        votes = votes + 0.5 * (padded[:-2] + padded[2:])
+    votes = _smooth(votes)  # neighbouring windows have nearly the same period
     enough = votes >= SUPPORT * votes.max(axis=1, keepdims=True)
     first = np.argmax(enough, axis=1)
     best = np.empty(count)
@@ -194,7 +200,8 @@ def _from_windows(times: Array) -> Numbering:
     """The better of two: windows joined one by one, or one frequency and slope for all of them."""
     found = windows_of(times)
     joined, common = _joined(times, found), _common(times, found)
-    return max(joined, common, key=lambda numbering: int(np.count_nonzero(numbering.belongs)))
+    # a joined phase can bend to whatever lies near: it has to be much better
+    return joined if np.count_nonzero(joined.belongs) > 1.2 * np.count_nonzero(common.belongs) else common
 
 
 def _common(times: Array, found: Windows) -> Numbering:
@@ -219,10 +226,17 @@ def _common(times: Array, found: Windows) -> Numbering:
     phase = frequency * since + 0.5 * slope * since**2
     phase = phase - _densest(phase[None, :])[0]
     turns = np.rint(phase)
-    return Numbering(turns.astype(np.int64), np.abs(phase - turns) < CORE)
+    return Numbering(turns.astype(np.int64), np.abs(phase - turns) < CORE, 2 * CORE)
 
 
 def _joined(times: Array, found: Windows) -> Numbering:
+    middle = (
+        np.median(np.lib.stride_tricks.sliding_window_view(np.pad(found.frequency, 2, mode="reflect"), 5), axis=1)
+        if found.centre.size > 4
+        else found.frequency
+    )
+    sound = np.abs(found.frequency / middle - 1) < 0.1
+    found = Windows(*(getattr(found, name)[sound] for name in Windows.__dataclass_fields__))
     base, phase = 0.0, 0.0
     knots, counts = [], []
     for i in range(found.centre.size):
@@ -237,7 +251,7 @@ def _joined(times: Array, found: Windows) -> Numbering:
         counts.append(base)
     number = phase_between(times, np.array(knots), np.array(counts), found.frequency)
     turns = np.rint(number)
-    return Numbering(turns.astype(np.int64), np.abs(number - turns) < CORE)
+    return Numbering(turns.astype(np.int64), np.abs(number - turns) < CORE, 2 * CORE)
 
 
 def phase_between(times: Array, knots: Array, counts: Array, frequency: Array) -> Array:
