@@ -55,7 +55,7 @@ class Needs(Generic[R]):
 
     analysis: its name; experiments: those whose runs suit it; read_file, read_run: to readings, which raise DoesNotSuit
     for what is of another kind and DataError for what cannot be used; data: the file of a run that the readings come
-    from; also: whether a run of any experiment suits; wanted: such runs in words, where their experiment says too little.
+    from; also: whether a run of any experiment suits; wanted: such runs in words, where the experiment says too little.
     """
 
     analysis: str

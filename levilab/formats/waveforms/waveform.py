@@ -89,7 +89,9 @@ class Waveform:
         if wanted.strip().isdecimal() and 1 <= int(wanted) <= len(names):
             return int(wanted) - 1
         has = listed(signal.name for signal in self.signals)
-        raise NoSuchSignal("channel", f"{shown(str(self.path), 200)} has {has}: name one of them", value=shown(wanted))
+        raise NoSuchSignal(
+            "channel", f"{shown(str(self.path), 200)} has {has}: name one of them", value=f"'{shown(wanted)}'"
+        )
 
     def blocks(self, wanted: str | None = None) -> Iterator[Array]:
         """The samples of a channel in order, in blocks that fit into memory."""

@@ -146,9 +146,11 @@ def _part(waveform: Waveform, channel: str | None, first: int, count: int) -> Ar
 
 
 def _arrivals(signal: Array, turns: Array, spin: SpinFrequency) -> tuple[Array, Array]:
-    """Times of pulses [s] and how far they are from the fit [s]: the centre of what rises above half of the height."""
+    """Times of pulses [s] and how far they are from the fit [s]: the centre of what rises out of the noise."""
     base, height = _levels(signal, turns)
-    above = np.clip((signal - base) / height - 0.5, 0.0, 1.0)
+    level = (signal - base) / height
+    noise = 1.4826 * float(np.nanmedian(np.abs(level)))  # most of a turn is between the pulses
+    above = np.clip(level - min(max(4 * noise, 0.1), 0.5), 0.0, 1.0)
     whole = np.rint(turns)
     off = turns - whole
     above[~np.isfinite(above) | (np.abs(off) > 0.25)] = 0.0

@@ -77,6 +77,10 @@ def read_spin_file(path: "Path", options: "InputOptions") -> Readings:
             raise
     except NoWaveform:
         pass
+    except DataError as error:
+        if not options.guess:  # a damaged record that nobody called a spin-down
+            raise DoesNotSuit(str(error)) from error
+        raise
     else:
         return record_readings(record, options)
     return spin_readings(read_table(path, columns=options.columns, quantities=QUANTITIES, guess=options.guess))

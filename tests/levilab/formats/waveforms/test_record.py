@@ -116,6 +116,15 @@ def test_headers_with_their_variants(tmp_path: Path, text: str, start: float, st
     assert record.count == 20
 
 
+def test_times_in_single_precision_are_even_enough(write: Write) -> None:
+    """As a DS1102E prints them: -5.9999997e-04, -5.9800001e-04."""
+    times = (np.arange(300) * 2e-6 - 6e-4).astype(np.float32)
+    text = "X,CH1,\nSecond,Volt,\n" + "".join(f"{t:.7e},1.0,\n" for t in times.tolist())
+    record = waveform(write(text))
+    assert record.step == pytest.approx(2e-6, rel=1e-6)
+    assert record.warnings == ()
+
+
 SIGLENT = "Record Length,Analog:{n}\nSample Interval,Analog:{step}\nHorizontal Units,{unit}\nSource,CH1\nSecond,Volt\n"
 
 

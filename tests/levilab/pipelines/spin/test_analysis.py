@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def true_frequency(name: str, time: float) -> float:
-    """Of the sample files, as sample_data/make.py made them: 30 Hz at time 0 of the scopes, 0.25 s into WAV and .npy."""
+    """Of the sample files, as sample_data/make.py makes them: 30 Hz at time 0 of the scopes, 0.25 s into WAV, .npy."""
     from_middle = time - 0.25 if name.endswith((".wav", ".npy")) else time
     return 30.0 - 0.095 * from_middle
 
@@ -84,7 +84,7 @@ def test_a_long_list_of_pulse_times_feeds_the_drag_laws(tmp_path: Path) -> None:
 
 
 def test_a_record_that_is_too_short_is_no_spin_down(sample_data: Path) -> None:
-    with pytest.raises(DoesNotSuit, match="lasts 0.5 s, a spin-down needs 3 windows of 2 s"):
+    with pytest.raises(DoesNotSuit, match=r"lasts 0\.5 s, a spin-down needs 3 windows of 2 s"):
         analyze_spindowns([sample_data / "scope-files" / "recording.wav"], SpinDownOptions())
 
 
@@ -177,7 +177,7 @@ def test_each_analysis_takes_its_own_out_of_a_folder(sample_data: Path, tmp_path
 def test_what_is_damaged_is_a_note_of_the_analysis_that_it_belongs_to(sample_data: Path, tmp_path: Path) -> None:
     shutil.copy(sample_data / "scope-files" / "recording.wav", tmp_path)
     cut = (sample_data / "scope-files" / "siglent-sds1202x-e.csv").read_text(encoding="utf-8")
-    (tmp_path / "cut.csv").write_text(cut.replace("-0.20000000000,", "-0.20000000000,x"), encoding="utf-8")
+    (tmp_path / "cut.csv").write_text(cut.replace("-0.20000000000,", "-0.20000000000,x "), encoding="utf-8")
     ((row, found),) = analyze_suiting([tmp_path], {})
     assert row.name == "spin"
     assert len(found.runs) == 1
@@ -191,7 +191,7 @@ def test_the_figure_shows_the_trace_the_turns_the_residuals_and_the_frequency(
     files: dict[str, Any] = {
         "trace": [sample_data / "scope-files" / "recording.wav"],
         "times": [sample_data / "scope-files" / "pulse-times.txt"],
-        "long": [coasting_wav(tmp_path / "long.wav", seconds=14)] if what == "long" else [],
+        "long": [coasting_wav(tmp_path / "long.wav", seconds=14, rate=4000)] if what == "long" else [],
         "many": [sample_data / "scope-files"],
     }
     figure = spin_figure(analyze_spins(files[what], SpinOptions()))
@@ -199,4 +199,4 @@ def test_the_figure_shows_the_trace_the_turns_the_residuals_and_the_frequency(
     assert len(panels) == (12 if what == "many" else 4)
     residuals = np.concatenate([np.asarray(line.get_ydata(), float) for line in panels[2].get_lines()[1:]])
     assert len(residuals) > 10
-    assert np.abs(residuals).max() < 200  # µs: of a turn of 33 ms
+    assert np.abs(residuals).max() < 200  # µs: a fifth of a pulse's width
