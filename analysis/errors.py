@@ -26,6 +26,15 @@ class TooFewPulses(AnalysisError):
         )
 
 
+class OnlyHum(TooFewPulses):
+    """Hum of the mains, and too few pulses or none."""
+
+    def __init__(self, *, seen: int, needed: int, duration: float) -> None:
+        super().__init__(seen=seen, needed=needed, duration=duration)
+        text = f"the trace holds hum of the mains and {seen} pulses in {duration:.3g} s, at least {needed} are needed: "
+        self.args = (text + "shield the detector from lamps, and look at the trace",)
+
+
 class ShapesDiffer(AnalysisError):
     """Two columns of one table that do not have the same length, or are no columns at all."""
 

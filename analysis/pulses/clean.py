@@ -1,4 +1,4 @@
-"""What is no pulse is taken off a trace: hum of the mains, a wandering baseline, times at which the detector is dead."""
+"""What is no pulse is taken off a trace: hum of the mains, a baseline that wanders, times without a signal."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.pulses.regression import median
 from analysis.pulses.result import Finding
-from analysis.pulses.search import shorten
+from analysis.pulses.search import WIDE, noise_of, shorten
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -16,7 +17,7 @@ Mask = NDArray[np.bool_]
 #: Mains and its multiples [Hz], and how far from nominal a grid strays [Hz].
 MAINS, STRAYS = (50.0, 60.0), 0.25
 #: Lines are looked for below this, and need a record of so long.
-HIGHEST, SHORTEST = 260.0, 1.0
+HIGHEST, SHORTEST = 210.0, 1.0
 #: A line of the mains holds so many times the power of all within 1.5 Hz beside it ...
 NARROW = 1.2
 #: ... and is so many times as high as its next multiples, which those of a pulse train nearly equal.
@@ -86,6 +87,9 @@ def _dead(bins: Array, rate: float, whole: Mask | None) -> Mask:
     dead = np.zeros(bins.size, dtype=bool)
     place = np.arange(bins.size) if whole is None else np.flatnonzero(whole)
     values = bins if whole is None else bins[whole]
+    step = max(int(DEAD * rate / 4), 1)
+    if not np.any(values[1::step] == values[:-1:step][: values[1::step].size]):
+        return dead
     same = np.zeros(values.size + 1, dtype=np.int8)
     same[1:-1] = values[1:] == values[:-1]
     if not same.any():
@@ -107,9 +111,11 @@ def mains_lines(bins: Array, rate: float) -> list[tuple[float, float]]:
     if not np.isfinite(thin).all():
         return []
     n = thin.size
-    amplitude = np.abs(np.fft.rfft((thin - thin.mean()) * (1 - np.cos(2 * np.pi * (np.arange(n) + 0.5) / n)))) * 2 / n
+    transform = np.fft.rfft(thin - thin.mean())
+    amplitude = np.zeros(transform.size)  # behind a Hann window, which is a sum of three neighbours
+    amplitude[1:-1] = np.abs(transform[1:-1] - 0.5 * (transform[:-2] + transform[2:])) * (2 / n)
     width = thin_rate / n  # of a bin
-    level = float(np.median(amplitude[: int(HIGHEST / width)]))
+    level = median(amplitude[: int(HIGHEST / width)])
 
     def near(frequency: float, reach: float) -> slice:
         return slice(max(round((frequency - reach) / width), 1), round((frequency + reach) / width) + 1)
@@ -122,6 +128,8 @@ def mains_lines(bins: Array, rate: float) -> list[tuple[float, float]]:
             band = near(nominal, reach)
             peak = band.start + int(np.argmax(amplitude[band]))
             height = float(amplitude[peak])
+            if height <= 8 * level:
+                continue
             inside = float((amplitude[max(peak - 3, 0) : peak + 4] ** 2).sum())
             beside = near(peak * width, 1.5 + 3 * width)
             outside = float((amplitude[beside] ** 2).sum()) - inside
@@ -129,7 +137,7 @@ def mains_lines(bins: Array, rate: float) -> list[tuple[float, float]]:
                 float(amplitude[near(k * nominal, k * reach)].max()) for k in (2, 3, 4) if k * nominal < 2 * HIGHEST
             ]
             others = sorted(further)[len(further) // 2] if further else 0.0
-            if height > 8 * level and inside > NARROW * outside and height > SINGLE * others:
+            if inside > NARROW * outside and height > SINGLE * others:
                 found.append((_peak(amplitude, peak) * width, height))
     return found
 
@@ -147,33 +155,36 @@ def _without_hum(
     factor = samples.size // bins.size
     bin_rate = rate / factor
     count = max(int(2 * bins.size / bin_rate / PIECE), 3)
-    ends = np.linspace(0, bins.size, count + 1).astype(np.intp)
-    pieces = [(ends[i], ends[min(i + 2, count)]) for i in range(count - 1)]
+    half = bins.size // count
+    pieces = [(i * half, (i + 2) * half if i < count - 2 else bins.size) for i in range(count - 1)]
     rest = bins - np.median(bins[counted])
     use = counted
     for _ in range(3):  # pulses are no part of the baseline that the hum rides on
-        fits = [_hum_of(bins[a:b], use[a:b], bin_rate, a, frequencies) for a, b in pieces]
-        total = _blend(fits, np.arange(bins.size), ends, bin_rate, frequencies)
-        rest = bins - total
+        fits = [_hum_of(bins[a:b], use[a:b], a, half, [f / bin_rate for f in frequencies]) for a, b in pieces]
+        rest = bins - _blend(
+            fits, np.arange(bins.size, dtype=np.float64), half, [(f / bin_rate, 1.0) for f in frequencies]
+        )
         middle = float(np.median(rest[counted]))
         spread = 1.4826 * float(np.median(np.abs(rest[counted] - middle)))
         use = counted & (np.abs(rest - middle) < 2.5 * spread)
-    sinc = [
-        float(np.sinc(f / bin_rate) / np.sinc(f / rate)) for f in frequencies
-    ]  # what the mean over a bin left of it
-    place = (np.arange(samples.size) + 0.5) / factor - 0.5
-    return samples - _blend(fits, place, ends, bin_rate, frequencies, sinc), rest
+    # the mean over a bin left this much of it
+    waves = [(f / bin_rate, float(np.sinc(f / bin_rate) / np.sinc(f / rate))) for f in frequencies]
+    place = (np.arange(samples.size, dtype=np.float64) + 0.5) / factor - 0.5
+    return samples - _blend(fits, place, half, waves), rest
 
 
-def _hum_of(bins: Array, use: Mask, rate: float, first: int, frequencies: list[float]) -> Array:
-    """Complex amplitude and its slope of each line in a piece, shape (lines, 2), by least squares over `use`."""
+def _hum_of(bins: Array, use: Mask, first: int, half: int, frequencies: list[float]) -> Array:
+    """Complex amplitude and its slope of each line in a piece, shape (lines, 2), by least squares over `use`.
+
+    first: place of the piece [bins]; half: half the length of pieces; frequencies [1/bin].
+    """
     place = np.arange(bins.size)[use]
     if place.size < 8 * len(frequencies) + 8:
         return np.zeros((len(frequencies), 2), dtype=complex)
-    u = 2 * place / bins.size - 1
+    u = place / half - 1
     rows = [np.ones(place.size), u, u**2]
     for frequency in frequencies:
-        angle = 2 * np.pi * frequency * (place + first) / rate
+        angle = 2 * np.pi * frequency * (place + first)
         c, s = np.cos(angle), np.sin(angle)
         rows += [c, s, c * u, s * u]
     design = np.array(rows)
@@ -185,27 +196,26 @@ def _hum_of(bins: Array, use: Mask, rate: float, first: int, frequencies: list[f
 def _blend(
     fits: list[Array],
     place: Array,
-    ends: NDArray[np.intp],
-    rate: float,
-    frequencies: list[float],
-    gain: list[float] | None = None,
+    half: float,
+    waves: list[tuple[float, float]],
 ) -> Array:
-    """The hum at places [bins], each piece with a weight that falls to 0 at its ends."""
+    """The hum at places [bins], each piece, of twice `half` bins, with a weight that falls to 0 at its ends.
+
+    waves: frequency [1/bin], and what amplitude is divided by, of each line.
+    """
     count = len(fits)
-    half = float(ends[1] - ends[0])
     total = np.zeros(place.size)
-    position = np.clip(place / half - 1, 0, count - 1)  # middle of piece i is at i
+    position = np.clip(place / half - 1, 0, count - 1)  # the middle of piece i is at i
     lower = np.minimum(position.astype(np.intp), max(count - 2, 0))
     share = position - lower
     upper = np.minimum(lower + 1, count - 1)
     array = np.array(fits)
-    for line, frequency in enumerate(frequencies):
+    for line, (frequency, gain) in enumerate(waves):
         amplitude = np.zeros(place.size, dtype=complex)
         for index, weight in ((lower, 1 - share), (upper, share)):
             u = place / half - 1 - index
             amplitude += weight * (array[index, line, 0] + array[index, line, 1] * u)
-        wave = (amplitude * np.exp(2j * np.pi * frequency / rate * place)).real
-        total += wave if gain is None else wave / gain[line]
+        total += (amplitude * np.exp(2j * np.pi * frequency * place)).real / gain
     return total
 
 
@@ -215,7 +225,7 @@ def _baseline(bins: Array, rate: float, counted: Mask) -> tuple[Array, Array] | 
     count = bins.size // size if size else 0
     if count < 8:
         return None
-    step = max(size // 100, 1)
+    step = max(size // 50, 1)
     blocks = bins[: count * size].reshape(count, size)[:, ::step]
     there = counted[: count * size].reshape(count, size).mean(axis=1) > 0.8
     if np.count_nonzero(there) < 8:
@@ -223,7 +233,9 @@ def _baseline(bins: Array, rate: float, counted: Mask) -> tuple[Array, Array] | 
     ordered = np.sort(blocks[there], axis=1)
     n = ordered.shape[1]
     values = ordered[:, n // 2]
-    scatter = float(np.median(values - ordered[:, n // 6])) / 0.967
+    scatter = median(values - ordered[:, n // 6]) / 0.967
+    if scatter > WIDE * noise_of(bins):  # pulses that last about as long as the pauses: no level is that of the pauses
+        values = 0.5 * (ordered[:, n // 20] + ordered[:, -1 - n // 20])
     error = 1.2533 * scatter / np.sqrt(n)
     times = ((np.arange(count) + 0.5) * size / rate)[there]
     smooth = np.convolve(np.pad(values, 1, mode="edge"), np.full(3, 1 / 3), mode="valid")

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.pulses.matched import turn_times
-from analysis.pulses.regression import Fit, fit_turns
+from analysis.pulses.regression import Fit, fit_turns, median
 
 Array = NDArray[np.float64]
 
@@ -51,15 +51,15 @@ def place_edges(samples: Array, rate: float, fit: Fit, *, width: float, sign: in
     place = (middle + (right - left) / gain) / rate
     phase = numbers - (place - times) * frequency
     heights = x[:, 2 * side - side // 2 : 2 * side + side // 2 + 1].mean(axis=1) - 0.5 * (x[:, 0] + x[:, -1])
-    typical = float(np.median(heights))
+    typical = median(heights)
     use = heights > 0.3 * typical
     missing = int(np.count_nonzero(~use))
-    if np.count_nonzero(use) < 4:
+    if np.count_nonzero(use) < 4 or missing > 0.6 * times.size:
         return None
     for _ in range(4):
         new_fit = fit_turns(times[use], phase[use])
         away = np.abs(phase - new_fit.phase(times))
-        spread = 1.4826 * float(np.median(away[use]))
+        spread = 1.4826 * median(away[use])
         new = (heights > 0.3 * typical) & (away < GROSS * max(spread, 1e-12))
         if np.array_equal(new, use) or np.count_nonzero(new) < 4:
             break

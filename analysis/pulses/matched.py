@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.pulses.regression import Fit, fit_turns
+from analysis.pulses.regression import Fit, fit_turns, median
 
 Array = NDArray[np.float64]
 
@@ -23,8 +23,9 @@ COARSE = 128
 #: A turn farther off than this many standard deviations is no pulse of the top.
 GROSS = 4.5
 ROUNDS = 8
-#: A pulse train exists where it lowers the sum of squares by so many variances of the noise, beyond chance.
-EVIDENCE = 100.0
+#: A pulse train exists where its mean pulse lowers the sum of squares by so many variances of the noise; the best of
+#: all frequencies in noise alone reaches about 100.
+EVIDENCE = 160.0
 #: Harmonics of the pulse are kept as long as on average their power is so many times that of noise.
 NOISY = 3.0
 #: A turn with less of a pulse than this part of the mean one counts as missing.
@@ -67,14 +68,23 @@ class Pieces:
 class Match:
     """What a matched filter found.
 
-    fit: phase against time; turns: so many were used; heights: of all turns, in units of the mean pulse; noise: of a
-    sample; height: of the mean pulse; bound: of the frequency [Hz]; missing, wrong: numbers of turns; pulse, window:
-    the mean pulse.
+    fit: phase against time; turns: so many were used.
+    numbers, heights, shifts, used: of all turns, shape (m,): whole part of the phase, height in units of the mean
+    pulse, what the fit leaves of the phase [turns], whether it was used.
+    evidence: by how many variances of the noise the pulses lower the sum of squares.
+    flat: whether most tops are at the greatest value that occurs.
+    noise, height: of a sample, and of the mean pulse, in the trace's unit.
+    bound: of the frequency [Hz]; missing, wrong: numbers of turns; pulse, window: the mean pulse.
     """
 
     fit: Fit
     turns: int
+    numbers: NDArray[np.int64]
     heights: Array
+    shifts: Array
+    used: NDArray[np.bool_]
+    evidence: float
+    flat: bool
     noise: float
     height: float
     bound: float
@@ -97,7 +107,7 @@ def window_of(bins: Array, phase: Array) -> Window | None:
     ordered = np.sort(profile)
     middle = float(ordered[COARSE // 2])
     away = np.abs(profile - middle)
-    noise = 1.4826 * float(np.median(away))
+    noise = 1.4826 * median(away)
     stands = away > max(0.04 * float(away.max()), min(4 * noise, 0.5 * float(away.max())))
     at = np.flatnonzero(stands)
     if not at.size:
@@ -153,6 +163,8 @@ def _improve(
     samples: Array, rate: float, fit: Fit, window: Window, *, degree: int | None, bad: NDArray[np.bool_] | None
 ) -> Match | None:
     times, numbers, frequency = turn_times(fit, window.middle, samples.size / rate)
+    if times.size < 4 or frequency.min() <= 0:
+        return None
     middle = np.rint(times * rate).astype(np.intp)
     reach = int(np.ceil(window.half * rate / frequency.min()))
     inside = (middle - reach >= 0) & (middle + reach < samples.size)
@@ -181,16 +193,13 @@ def _improve(
 
 def turn_times(fit: Fit, middle: float, duration: float) -> tuple[Array, Array, Array]:
     """Times at which a phase passes (a part of a turn), those phases, and the frequencies there."""
-    polynomial = np.polynomial.polynomial
     first, last = fit.phase(np.array([0.0, duration]))
     numbers = np.arange(np.ceil(first - middle), np.floor(last - middle) + 1) + middle
-    slope = polynomial.polyder(fit.coefficients)
     grid = np.linspace(0.0, duration, 65)
     times = np.interp(numbers, fit.phase(grid), grid)
-    for _ in range(3):
-        rate = polynomial.polyval((times - fit.centre) / fit.half, slope) / fit.half
-        times = times - (fit.phase(times) - numbers) / rate
-    return times, numbers, np.asarray(polynomial.polyval((times - fit.centre) / fit.half, slope) / fit.half)
+    for _ in range(2):  # Newton's from 1e-3 turns: 1e-9, 1e-20
+        times = times - (fit.phase(times) - numbers) / fit.frequency(times)
+    return times, numbers, fit.frequency(times)
 
 
 def learn(x: Array, cell: NDArray[np.intp], valid: NDArray[np.bool_] | None, width: float) -> Pulse:
@@ -221,6 +230,11 @@ def learn(x: Array, cell: NDArray[np.intp], valid: NDArray[np.bool_] | None, wid
     return Pulse(shape, np.fft.irfft(full * turn, TABLE), float(np.angle(around) / (2 * np.pi)) % 1.0)
 
 
+def _flat(x: Array) -> bool:
+    """Whether more than half of the turns reach one and the same greatest value three times or more."""
+    return bool(np.count_nonzero(np.count_nonzero(x == x.max(), axis=1) > 2) > 0.5 * len(x))
+
+
 def _regress(pieces: Pieces, pulse: Pulse, window: Window, degree: int | None) -> Match | None:
     x, cell, valid, times, numbers = pieces.x, pieces.cell, pieces.valid, pieces.times, pieces.numbers
     g, d = pulse.shape[cell], pulse.slope[cell]
@@ -230,12 +244,13 @@ def _regress(pieces: Pieces, pulse: Pulse, window: Window, degree: int | None) -
     else:
         n = np.full(x.shape[0], float(x.shape[1]))
 
-    def product(a: Array, b: Array) -> Array:
-        return np.asarray(np.einsum("ij,ij->i", a, b) - a.sum(axis=1) * b.sum(axis=1) / n)
+    ones = np.ones(x.shape[1])
+    sums = {id(a): a @ ones for a in (x, g, d)}
 
-    gg, gd, dd, xg, xd, xx = (
-        product(g, g), product(g, d), product(d, d), product(x, g), product(x, d), product(x, x)
-    )  # fmt: skip
+    def product(a: Array, b: Array) -> Array:
+        return np.asarray(np.einsum("ij,ij->i", a, b) - sums[id(a)] * sums[id(b)] / n)
+
+    gg, gd, dd, xg, xd, xx = (product(*pair) for pair in ((g, g), (g, d), (d, d), (x, g), (x, d), (x, x)))
     usable = (gg > 0.3 * np.median(gg)) & (dd > 0.3 * np.median(dd)) & (gg * dd > gd**2)
     determinant = np.where(usable, gg * dd - gd**2, 1.0)
     height = np.where(usable, (dd * xg - gd * xd) / determinant, 0.0)
@@ -243,11 +258,14 @@ def _regress(pieces: Pieces, pulse: Pulse, window: Window, degree: int | None) -
     information = np.where(usable, determinant / np.where(usable, gg, 1.0), 0.0)
     rest = xx - height * xg - shift * xd
     freedom = np.maximum(n - 3, 1)
-    noise2 = max(float(np.median(rest / freedom)), 1e-300)
+    noise2 = max(median(rest / freedom), 1e-300)
     height_variance = noise2 / np.where(usable, gg, 1.0)
-    if not usable.any() or float(height[usable] ** 2 @ gg[usable]) / noise2 < EVIDENCE + times.size:
+    evidence = float(height[usable] ** 2 @ gg[usable]) / noise2
+    if not usable.any() or evidence <= 0:
         return None
     mean = float(np.average(height[usable], weights=gg[usable]))
+    if mean**2 * float(gg[usable].sum()) / noise2 < EVIDENCE:
+        return None
     total = float(np.mean((height[usable] - mean) ** 2))
     share = max(0.0, 1 - float(np.mean(height_variance[usable])) / total) if total > 0 else 0.0
     amplitude = mean + share * (height - mean)
@@ -259,7 +277,7 @@ def _regress(pieces: Pieces, pulse: Pulse, window: Window, degree: int | None) -
     for _ in range(4):
         fit = fit_turns(times[use], phase[use], weight[use] / noise2, degree=degree)
         standard = (phase - fit.phase(times)) * np.sqrt(weight / noise2)
-        spread = max(1.4826 * float(np.median(np.abs(standard[use]))), 0.5)
+        spread = max(1.4826 * median(np.abs(standard[use])), 0.5)
         new = usable & (amplitude > 0.03 * mean) & (np.abs(standard) < GROSS * spread)
         if np.array_equal(new, use) or np.count_nonzero(new) < 4:
             break
@@ -269,7 +287,12 @@ def _regress(pieces: Pieces, pulse: Pulse, window: Window, degree: int | None) -
     return Match(
         fit=fit,
         turns=int(np.count_nonzero(use)),
+        numbers=np.floor(numbers - window.middle + 0.5).astype(np.int64),
         heights=height / mean,
+        shifts=phase - fit.phase(times),
+        used=use,
+        evidence=evidence,
+        flat=_flat(x),
         noise=float(np.sqrt(noise2)),
         height=mean * float(np.ptp(pulse.shape)),
         bound=bound,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,18 +50,40 @@ class Fit:
 
     def phase(self, times: Array) -> Array:
         """Phase at times [turns]."""
-        return np.asarray(np.polynomial.polynomial.polyval((times - self.centre) / self.half, self.coefficients))
+        return _polynomial(self.coefficients, (times - self.centre) / self.half)
+
+    def frequency(self, times: Array) -> Array:
+        """Frequency at times [Hz]."""
+        slopes = self.coefficients[1:] * np.arange(1, self.coefficients.size) / self.half
+        return _polynomial(slopes, (times - self.centre) / self.half)
 
     def frequency_and_chirp(self) -> tuple[Estimate, Estimate, float]:
         """Frequency and slope where they are independent, and that time."""
         frequency, chirp, away = _independent(self.coefficients, self.covariance, self.half)
         return frequency, chirp, self.centre + away
 
+    def times(self, factor: float) -> Fit:
+        """The phase multiplied: half or twice the frequency."""
+        return replace(self, coefficients=self.coefficients * factor)
+
     def phase_at(self, time: float, origin: float = 0.0) -> Estimate:
         """Phase at a time, from 0 to 1 [turns], of what passes at a phase of origin."""
         powers = ((time - self.centre) / self.half) ** np.arange(self.coefficients.size)
         value = float(powers @ self.coefficients) - origin
         return Estimate(value - np.floor(value), float(np.sqrt(powers @ self.covariance @ powers)), "turns")
+
+
+def _polynomial(coefficients: Array, u: Array) -> Array:
+    total = np.full(u.shape, coefficients[-1])
+    for each in coefficients[-2::-1]:
+        total *= u
+        total += each
+    return total
+
+
+def median(values: Array) -> float:
+    """The upper middle value; several times faster than numpy's for short arrays."""
+    return float(np.partition(values, values.size // 2)[values.size // 2])
 
 
 def _independent(coefficients: Array, covariance: Array, half: float) -> tuple[Estimate, Estimate, float]:
@@ -101,29 +123,40 @@ def fit_turns(times: Array, turns: Array, weight: Array | None = None, *, degree
     times, turns: shape (n,); weight: of each (1/variance, relative), shape (n,); degree: None: two, or three where it
     differs from two significantly.
     """
-    fit = _fit(times, turns, weight, degree or 2)
-    if degree is None and times.size >= 12:
-        cubic = _fit(times, turns, weight, 3)
+    fit, third = _fit(times, turns, weight, degree or 2)
+    if degree is None and times.size >= 12 and third > CURVED:
+        cubic, _ = _fit(times, turns, weight, 3)
         u = float(np.sqrt(cubic.covariance[3, 3] * max(1.0, 1 / cubic.inflation)))
         if abs(cubic.coefficients[3]) > CURVED * u:
             return cubic
     return fit
 
 
-def _fit(times: Array, turns: Array, weight: Array | None, degree: int) -> Fit:
+def _fit(times: Array, turns: Array, weight: Array | None, degree: int) -> tuple[Fit, float]:
+    """The fit, and how many standard uncertainties the next coefficient would be away from 0, were all white."""
     centre, half = 0.5 * float(times[0] + times[-1]), 0.5 * float(times[-1] - times[0])
     degree = min(degree, times.size - 1)
-    rows = np.vander((times - centre) / half, degree + 1, increasing=True)
-    root = None if weight is None else np.sqrt(weight)
-    scaled = rows if root is None else rows * root[:, None]
-    orthonormal, triangle = np.linalg.qr(scaled)
-    goal = turns if root is None else turns * root
-    coefficients = np.linalg.solve(triangle, orthonormal.T @ goal)
-    inverse = np.linalg.inv(triangle)
-    residuals = turns - rows @ coefficients
-    standard = residuals if root is None else residuals * root
+    u = (times - centre) / half
+    columns = np.empty((times.size, degree + 2))
+    columns[:, 0] = 1.0
+    for k in range(1, degree + 2):
+        columns[:, k] = columns[:, k - 1] * u
+    if weight is not None:
+        root = np.sqrt(weight)
+        columns *= root[:, None]
+        goal = turns * root
+    else:
+        goal = turns
+    orthonormal, triangle = np.linalg.qr(columns)
+    along = orthonormal.T @ goal
+    inverse = np.linalg.inv(triangle[: degree + 1, : degree + 1])
+    coefficients = inverse @ along[: degree + 1]
+    standard = goal - columns[:, : degree + 1] @ coefficients
+    residuals = standard if weight is None else standard / root
+    left = float(standard @ standard) - float(along[-1]) ** 2
+    third = abs(float(along[-1])) / np.sqrt(max(left, 1e-300) / max(times.size - degree - 2, 1))
     variance, inflation, freedom = scatter(standard, degree + 1)
-    return Fit(coefficients, inverse @ inverse.T, centre, half, variance, inflation, freedom, residuals)
+    return Fit(coefficients, inverse @ inverse.T, centre, half, variance, inflation, freedom, residuals), third
 
 
 def scatter(residuals: Array, parameters: int) -> tuple[float, float, float]:
@@ -144,6 +177,8 @@ def scatter(residuals: Array, parameters: int) -> tuple[float, float, float]:
     sizes = np.diff(np.append(starts, n))
     coarse = float((sums**2 / sizes).sum()) / (blocks - parameters)
     ratio = coarse / variance
+    if 0.75 < ratio < 1.3:
+        return variance, 1.0, freedom
     from scipy.special import fdtr
 
     p = float(fdtr(blocks - parameters, freedom, ratio))

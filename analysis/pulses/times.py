@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.errors import NotFinite, ShapesDiffer, TimesNotIncreasing, TooFewPulses
-from analysis.pulses.regression import Fit, fit_turns
+from analysis.pulses.regression import Fit, fit_turns, median
 from analysis.pulses.result import Finding, SpinFrequency
 from analysis.pulses.turns import Numbering, number_turns
 
@@ -98,7 +98,7 @@ def fit_train(times: Array, *, degree: int | None = None) -> Train:
         phase = fit.phase(times)
         whole = np.rint(phase).astype(np.int64)
         away = phase - whole
-        spread = 1.4826 * float(np.median(np.abs(fit.residuals))) + 1e-12
+        spread = 1.4826 * median(np.abs(fit.residuals)) + 1e-12
         near = np.abs(away) < np.clip(GROSS * spread, 1e-9, numbering.tolerance)
         new = _one_a_turn(Numbering(whole, near), np.abs(away))
         if new.size < FEWEST:

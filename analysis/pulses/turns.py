@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.pulses.regression import median
+
 Array = NDArray[np.float64]
 Turns = NDArray[np.int64]
 
@@ -18,6 +20,8 @@ Turns = NDArray[np.int64]
 TOLERANCE = 0.12
 #: Windows are judged, and the first fit is made, by the pulses within this [turns].
 CORE = 0.03
+#: One frequency and slope is good enough if this share of the pulses is near their turns.
+NEARLY = 0.9
 #: Pulses to a window, and pairs of a pulse with as many of its followers.
 WINDOW, FOLLOWERS = 32, 8
 #: Width of a class of periods, as a part of the period.
@@ -34,8 +38,8 @@ SUPPORT = 0.6
 class Numbering:
     """Which turn each pulse belongs to.
 
-    turns: number of the nearest turn, shape (n,); belongs: whether the pulse is one of that turn, shape (n,); tolerance:
-    a pulse farther away than this never is [turns].
+    turns: number of the nearest turn, shape (n,); belongs: whether the pulse is one of that turn, shape (n,);
+    tolerance: a pulse farther away than this never is [turns].
     """
 
     turns: Turns
@@ -51,7 +55,7 @@ def number_turns(times: Array) -> Numbering:
 def _from_intervals(times: Array) -> Numbering | None:
     """Numbers of a list in which nearly each interval is one turn, or several; None where that does not fit."""
     intervals = np.diff(times)
-    period = float(np.median(intervals))
+    period = median(intervals)
     if not period > 0:
         return None
     single = np.abs(intervals / period - 1) < 0.2
@@ -63,16 +67,18 @@ def _from_intervals(times: Array) -> Numbering | None:
     steps = np.diff(frequency * since + 0.5 * slope * since**2)
     whole = np.rint(steps)
     off = np.abs(steps - whole)
-    if off.max() > TOLERANCE + 0.2 * (whole.max() > 8) or whole.min() < 1:
-        return None
-    if np.any(off > 0.25):
-        return None
-    return Numbering(np.concatenate([[0], np.cumsum(whole)]).astype(np.int64), np.ones(times.size, dtype=bool))
+    if off.max() < TOLERANCE and whole.min() >= 1:
+        return Numbering(np.concatenate([[0], np.cumsum(whole)]).astype(np.int64), np.ones(times.size, dtype=bool))
+    phase = frequency * since + 0.5 * slope * since**2
+    phase -= _densest(phase[None, :])[0]
+    turns = np.rint(phase)
+    belongs = np.abs(phase - turns) < TOLERANCE
+    return Numbering(turns.astype(np.int64), belongs) if np.count_nonzero(belongs) > NEARLY * times.size else None
 
 
 def _line(x: Array, y: Array) -> tuple[float, float, float]:
     """Value at, slope about, and place of the mean of x, without what lies off the line."""
-    value, slope, origin = float(np.median(y)), 0.0, float(x.mean())
+    value, slope, origin = median(y), 0.0, float(x.mean())
     keep = np.abs(y / value - 1) < 0.25
     for _ in range(3):
         origin = float(x[keep].mean())
@@ -80,7 +86,7 @@ def _line(x: Array, y: Array) -> tuple[float, float, float]:
         value = float(y[keep].mean())
         slope = float(d @ (y[keep] - value) / (d @ d)) if x[keep].size > 2 else 0.0
         rest = np.abs(y - value - slope * (x - origin))
-        limit = 4 * 1.4826 * float(np.median(rest)) + 1e-9 * abs(value)
+        limit = 4 * 1.4826 * median(rest) + 1e-9 * abs(value)
         new = rest <= limit
         if np.array_equal(new, keep) or np.count_nonzero(new) < 3:
             break
@@ -144,9 +150,9 @@ def _periods(since: Array) -> Array:
     share = np.clip(place - whole, 0, 1)
     flat = whole + np.arange(count)[:, None] * classes
     valid = (differences >= shortest) & (differences <= LONGEST * mean[:, None])
-    votes = np.bincount(flat.ravel(), ((1 - share) * valid).ravel(), count * classes)
-    votes += np.bincount(flat.ravel() + 1, (share * valid).ravel(), count * classes)
-    votes = votes.reshape(count, classes)
+    lower = np.bincount(flat.ravel(), ((1 - share) * valid).ravel(), count * classes)
+    upper = np.bincount(flat.ravel() + 1, (share * valid).ravel(), count * classes)
+    votes = np.asarray((lower + upper).reshape(count, classes), dtype=np.float64)
     votes[:, 1:-1] = votes[:, :-2] + votes[:, 1:-1] + votes[:, 2:]
     votes = _smooth(votes)  # neighbouring windows have nearly the same period
     enough = votes >= SUPPORT * votes.max(axis=1, keepdims=True)
@@ -209,7 +215,7 @@ def _common(times: Array, found: Windows) -> Numbering:
     if found.centre.size >= 4:
         frequency, slope, origin = _line(found.centre, found.frequency)
     else:
-        frequency, slope, origin = float(np.median(found.frequency)), 0.0, float(found.centre.mean())
+        frequency, slope, origin = median(found.frequency), 0.0, float(found.centre.mean())
     since = times - origin
     span = float(times[-1] - times[0])
     for harmonic in (1, 2, 4):  # each twice as sharp as the one before

@@ -204,6 +204,6 @@ def benchmark_simulator(
     heyoka takes part if it is installed: pip install 'levilab\[peers]', in a clone
     pip install -e '.\[peers]'.  Leave the machine alone meanwhile.
     """
-    from levilab.benchmark.command import run_and_tell
+    from levilab.benchmark.simulator.command import run_and_tell
 
     run_and_tell(quick=quick, out=out, as_json=as_json)

@@ -89,7 +89,7 @@ HARD = {
 
 @dataclass(frozen=True)
 class Trace:
-    """samples: shape (n,), or, of a switch, times [s]; frequency: at the middle of the record [Hz]; middle: its time [s]."""
+    """samples: shape (n,), or, of a switch, times [s]; frequency [Hz] at the middle of the record [s]."""
 
     samples: Array
     frequency: float
@@ -160,11 +160,15 @@ def _disturb(case: Case, samples: Array, time: Array, random: Random) -> None:
         at = int(random.integers(time.size // 10, time.size - length - time.size // 10))
         samples[at : at + length] = 0.0
     if case.nan:
-        samples[random.uniform(size=time.size) < case.nan * 2 / 3] = np.nan
-        for _ in range(10):
-            length = round(case.nan / 30 * time.size)
-            at = int(random.integers(time.size - length))
-            samples[at : at + length] = np.nan
+        _lose(case.nan, samples, random)
+
+
+def _lose(share: float, samples: Array, random: Random) -> None:
+    samples[random.uniform(size=samples.size) < share * 2 / 3] = np.nan
+    for _ in range(10):
+        length = round(share / 30 * samples.size)
+        at = int(random.integers(samples.size - length))
+        samples[at : at + length] = np.nan
 
 
 def _switch(frequency: float, duration: float, first: float, random: Random) -> Array:

@@ -9,13 +9,13 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
-from levilab.benchmark import kernel, ours
-from levilab.benchmark.peers import PEERS
+from levilab.benchmark.simulator import kernel, ours
+from levilab.benchmark.simulator.peers import PEERS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from levilab.benchmark.peers import Point
+    from levilab.benchmark.simulator.peers import Point
 
 ROUNDS = 3
 #: What is to be compared: ours, the peer, the error [m], and the ratio that was aimed at.
