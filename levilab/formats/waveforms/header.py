@@ -100,18 +100,18 @@ class Header:
         return (*(() if clock is None else (clock,)), *(column.index for column in self.columns))
 
 
-def read_header(head: Head, columns: Mapping[str, str]) -> Header:
+def read_header(head: Head, dialect: Dialect, columns: Mapping[str, str]) -> Header:
     """Recognise the header of a table of samples.
 
     Args:
         head: the beginning of the file.
+        dialect: of its lines.
         columns: `t` names the column of times where its title is not known.
 
     Raises:
         NoWaveform: it is no table of samples.
         TableError: it is one, and its header is damaged.
     """
-    dialect = dialect_of(head)
     lines = [line.lstrip("#") for line in head.lines[:MOST_LINES]]
     rows = [[field.strip().strip('"').strip() for field in dialect.split(line)] for line in lines]
     for recognise in (_rigol, _titled, _beside, _keyed):

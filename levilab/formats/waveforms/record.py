@@ -47,15 +47,15 @@ def read_record(
         with path.open("rb") as stream:
             magic = stream.read(12)
         if magic[:4] in {b"RIFF", b"RIFX", b"RF64"} and magic[8:] == b"WAVE":
-            return read_wav(path)
+            return read_wav(path).at_rate(rate)
         if magic.startswith(b"\x93NUMPY"):
             return read_npy(path, rate)
         if path.suffix.casefold() in SUFFIXES:
-            return read_scope_binary(path)
+            return read_scope_binary(path).at_rate(rate)
         head = read_head(path)
         if set(columns or ()) - {"t", "time_s"}:
             raise NoWaveform(path, "holds readings: its columns are named")
         dialect = dialect_of(head)
         if dialect.separator is None and all(len(dialect.split(line)) < 2 for line in head.lines[-20:]):
             return read_column(head, dialect, rate, guess=guess)
-        return read_samples(head, columns=columns or {}, rate=rate)
+        return read_samples(head, dialect, columns=columns or {}, rate=rate)

@@ -10,7 +10,7 @@ import numpy as np
 from levilab.formats.columns import TableError, shown
 from levilab.formats.waveforms.header import LONGEST_DOUBTFUL_STEP_S, Header, NoRate, NoWaveform, printed, read_header
 from levilab.formats.waveforms.rows import read_blocks
-from levilab.formats.waveforms.waveform import Signal, Waveform, check_count, check_step
+from levilab.formats.waveforms.waveform import Signal, Waveform, about_rate, check_count, check_step
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from levilab.formats.dialect import Dialect
     from levilab.formats.waveforms.head import Head
     from levilab.formats.waveforms.rows import Block
 
@@ -109,11 +110,12 @@ class _Survey:
     torn: str | None = None
 
 
-def read_samples(head: Head, *, columns: Mapping[str, str], rate: float | None) -> Waveform:
+def read_samples(head: Head, dialect: Dialect, *, columns: Mapping[str, str], rate: float | None) -> Waveform:
     """A table of samples.  The file is read once for its length and its times, and again for each channel.
 
     Args:
         head: the beginning of the file.
+        dialect: of its lines.
         columns: `t` names the column of times.
         rate: samples per second [Hz], in the place of what the file says.
 
@@ -121,7 +123,7 @@ def read_samples(head: Head, *, columns: Mapping[str, str], rate: float | None) 
         NoWaveform: it is no table of samples.
         TableError: it is damaged, or it contradicts itself.
     """
-    path, header = head.path, read_header(head, columns)
+    path, header = head.path, read_header(head, dialect, columns)
     certain = header.certain or rate is not None
     try:
         survey = _look_over(head, header)
@@ -178,14 +180,7 @@ def _times(path: Path, header: Header, survey: _Survey, rate: float | None) -> _
         raise NoRate(path, "does not say its sampling rate: say `rate` in Hz")
     step = 1 / rate if rate is not None else known or 0.0
     number = (survey.clock.first or 0.0) if header.sequence is not None else 0.0
-    return _Times((header.start or 0.0) + number * step, step, tuple(_replaced(path, known, rate)))
-
-
-def _replaced(path: Path, known: float | None, rate: float | None) -> list[str]:
-    """A warning where the given rate is not the file's."""
-    if rate is None or known is None or known <= 0 or abs(known * rate - 1) <= 1e-6:
-        return []
-    return [f"{path.name}: the given rate of {rate:g} Hz takes the place of {1 / known:.9g} Hz in the file"]
+    return _Times((header.start or 0.0) + number * step, step, tuple(about_rate(path, known, rate)))
 
 
 def _check_numbers(path: Path, clock: _Clock) -> None:
@@ -207,7 +202,7 @@ def _printed_times(path: Path, header: Header, survey: _Survey, rate: float | No
     first, last = (clock.first or 0.0) * unit, clock.last * unit
     mean = (last - first) / (n - 1)
     if rate is not None:
-        return _Times(first, 1 / rate, tuple(_replaced(path, header.step.value if header.step else mean, rate)))
+        return _Times(first, 1 / rate, tuple(about_rate(path, header.step.value if header.step else mean, rate)))
     if not mean > 0:
         raise TableError(
             path, f"its times do not increase, from {first:g} s to {last:g} s: sort the rows, or say `rate`"

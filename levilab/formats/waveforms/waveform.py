@@ -102,9 +102,12 @@ class Waveform:
         found = list(self.blocks(wanted))
         return np.concatenate(found) if found else np.zeros(0)
 
-    def with_warnings(self, *warnings: str) -> Waveform:
-        """The same with more to know."""
-        return replace(self, warnings=(*self.warnings, *warnings))
+    def at_rate(self, rate: float | None) -> Waveform:
+        """The same at a rate that is given [Hz], with a warning where it is another than the file's."""
+        if rate is None:
+            return self
+        warnings = (*self.warnings, *about_rate(self.path, self.step, rate))
+        return replace(self, step=1 / rate, step_u=0.0, warnings=warnings)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +118,13 @@ class PulseTimes:
     format: str
     times: Array
     warnings: tuple[str, ...] = ()
+
+
+def about_rate(path: Path, known: float | None, rate: float | None) -> list[str]:
+    """A warning where a given rate [Hz] is not the file's.  known: step of the file [s]."""
+    if rate is None or known is None or known <= 0 or abs(known * rate - 1) <= 1e-6:
+        return []
+    return [f"{path.name}: the given rate of {rate:g} Hz takes the place of {1 / known:.9g} Hz in the file"]
 
 
 def check_step(path: Path, step: float, what: str) -> None:

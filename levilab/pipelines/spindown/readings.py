@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 QUANTITIES = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 #: Length of a window of a record, in which its frequency is one reading [s].
 WINDOW_S = 2.0
-#: A record whose spin falls by less than this part is no spin-down, unless it is named as one.
-LEAST_FALL = 0.02
+#: A record whose spin falls by less than this part is no spin-down: in 6 s, a top that coasts loses twice as much.
+LEAST_FALL = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
     """The frequency in each window of a long record, while the top coasts.
 
     Raises:
-        DoesNotSuit: it is too short for a spin-down.
+        DoesNotSuit: it is too short for a spin-down, or the spin does not fall.
         DataError: there are no pulses in it.
     """
     path = record.path
@@ -108,9 +108,11 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
     except AnalysisError as error:
         raise (DataError if options.guess else DoesNotSuit)(f"{path}: {error}") from error
     first, last = _coasting(track)
-    fall = 1 - track.frequency[last - 1] / track.frequency[first]
-    if not options.guess and not (last - first >= FEWEST and fall > LEAST_FALL):
-        raise DoesNotSuit(f"{path}: the spin in it does not fall")
+    start, end = track.frequency[first], track.frequency[last - 1]
+    if last - first < FEWEST or end > (1 - LEAST_FALL) * start:
+        seen = f"the spin in it goes from {start:.6g} Hz to {end:.6g} Hz in {last - first} windows of {WINDOW_S:g} s"
+        expected = "a falling spin is expected: is the drive still on? `levilab analyze spin` reads it"
+        raise DoesNotSuit(f"{path}: {seen}, {expected}")
     notes = [f"{path.name}: {note.text}" for note in track.notes]
     what = f"{path.name}: a {'list of pulse times' if times is not None else 'record'} of {duration:.3g} s: "
     told = [f"{what}each reading is the frequency in a window of {WINDOW_S:g} s"]

@@ -256,6 +256,12 @@ def test_arrays_need_a_rate_unless_they_hold_pulse_times(tmp_path: Path) -> None
         read_record(path, rate=-1.0)
 
 
+def test_a_given_rate_goes_before_that_of_a_wav(sample_data: Path) -> None:
+    record = waveform(sample_data / "scope-files" / "recording.wav", rate=8000.0)
+    assert record.step == 1 / 8000
+    assert "8000 Hz takes the place of 4000 Hz" in record.warnings[0]
+
+
 @pytest.mark.parametrize("bits", [8, 16, 24, 32])
 def test_wav_of_every_width(bits: int, tmp_path: Path) -> None:
     samples = np.array([0.0, 0.5, -0.5, 0.25] * 8)
@@ -274,8 +280,8 @@ def test_a_file_larger_than_memory_is_read_in_pieces(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Five times as many samples take no more memory, which is less than the larger file's numbers would."""
-    monkeypatch.setattr(head, "PIECE", 1 << 13)
-    monkeypatch.setattr(wav, "BLOCK", 1 << 12)
+    monkeypatch.setattr(head, "PIECE", 1 << 15)
+    monkeypatch.setattr(wav, "BLOCK", 1 << 11)
     peaks = []
     for n in (20_000, 100_000):
         path = tmp_path / f"long.{kind}"

@@ -73,6 +73,15 @@ def test_a_long_record_is_followed_and_feeds_the_drag_laws(tmp_path: Path) -> No
     assert any("frequency in a window of 2 s" in text for text in down.all_warnings)
 
 
+def test_a_top_that_is_held_has_a_spin_and_no_spin_down(tmp_path: Path) -> None:
+    held = write_wav(tmp_path / "held.wav", pulses(30.0 * np.arange(8000) / 1000), 1000)
+    ((row, found),) = analyze_suiting([held], {})
+    assert row.name == "spin"
+    assert found.runs[0].spin.frequency.value == pytest.approx(30, abs=1e-3)
+    with pytest.raises(DoesNotSuit, match="is the drive still on"):
+        analyze_spindowns([held], SpinDownOptions())
+
+
 def test_a_long_list_of_pulse_times_feeds_the_drag_laws(tmp_path: Path) -> None:
     t = np.linspace(0, 30, 30_001)
     times = np.interp(np.arange(1, int(coasting_turns(t)[-1])), coasting_turns(t), t)
