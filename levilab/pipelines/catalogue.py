@@ -21,7 +21,7 @@ from levilab.pipelines.spindown.report import spindown_part
 from levilab.pipelines.spindown.table import spindown_tables
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from pathlib import Path
 
     from levilab.pipelines.part import ReportPart
@@ -143,24 +143,26 @@ def analyze_suiting(paths: Sequence[Path], given: Mapping[str, Any]) -> list[tup
         paths: run folders, data files, folders to search.
         given: options by their names, of any analysis.
     """
-    return _suiting(lambda analysis: analysis.analyze(paths, analysis.options_from(given)))
+    return list(_suiting(lambda analysis: analysis.analyze(paths, analysis.options_from(given))))
 
 
 def recall_suiting(paths: Sequence[Path], given: Mapping[str, Any]) -> tuple[Analysis[Any], Any]:
     """The first analysis that suits, with what it found or had found before.  Raises DataError if none does."""
-    return _suiting(lambda analysis: analysis.recall(paths, analysis.options_from(given)))[0]
+    return next(_suiting(lambda analysis: analysis.recall(paths, analysis.options_from(given))))
 
 
-def _suiting(run: Callable[[Analysis[Any]], Any]) -> list[tuple[Analysis[Any], Any]]:
-    found, errors = [], []
+def _suiting(run: Callable[[Analysis[Any]], Any]) -> Iterator[tuple[Analysis[Any], Any]]:
+    """What suits, one after the other, each carried out when it is asked for."""
+    errors: list[DoesNotSuit] = []
     for analysis in ANALYSES.values():
         try:
-            found.append((analysis, run(analysis)))
+            found = run(analysis)
         except DoesNotSuit as error:
             errors.append(error)
-    if not found:
+        else:
+            yield analysis, found
+    if len(errors) == len(ANALYSES):
         raise errors[0]
-    return found
 
 
 def save(analysis: Analysis[A], found: A, folder: Path | None = None) -> list[Path]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from tokenize import TokenError
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -54,11 +55,18 @@ def read_npy(path: Path, rate: float | None) -> Waveform | PulseTimes:
     return Waveform(path, "NumPy array", 0.0, 1 / rate, len(columns), signals, read, counts)
 
 
+#: What numpy raises for headers of nonsense, which it reads as Python.
+_BROKEN = (
+    ValueError, EOFError, TypeError, SyntaxError, MemoryError, OverflowError, KeyError, AttributeError, TokenError,
+    RecursionError,
+)  # fmt: skip
+
+
 def _load(path: Path) -> NDArray[Any]:
     """The array as it lies in the file, which stays there."""
     try:
         data: NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (ValueError, EOFError, TypeError, SyntaxError, MemoryError, OverflowError, KeyError) as error:
+    except _BROKEN as error:
         raise TableError(path, f"is no NumPy array that can be read ({shown(str(error), 80)}): save it anew") from error
     if data.dtype.kind not in "iuf" or data.dtype.itemsize > 8:
         raise TableError(path, f"holds {data.dtype}, plain numbers are expected: save them with numpy.save")

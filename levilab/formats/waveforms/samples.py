@@ -140,10 +140,12 @@ def read_samples(head: Head, dialect: Dialect, *, columns: Mapping[str, str], ra
     warnings = (*times.warnings, *_about_count(path, header, survey))
 
     def read(signal: int) -> Iterator[Array]:
-        column = header.columns[signal]
+        column, left = header.columns[signal], survey.count  # a last line may be torn in another column
         for block in read_blocks(path, head.encoding, header.dialect, header.first_line, [column.index]):
-            if block.numbers.size:
-                yield block.numbers[:, 0] * column.factor if column.factor != 1 else block.numbers[:, 0]
+            values = block.numbers[:left, 0]
+            left -= len(values)
+            if values.size:
+                yield values * column.factor if column.factor != 1 else values
 
     signals = tuple(Signal(column.name, column.unit) for column in header.columns)
     return Waveform(path, header.format, times.start, times.step, survey.count, signals, read, warnings, times.step_u)

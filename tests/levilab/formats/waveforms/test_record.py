@@ -344,6 +344,21 @@ def test_any_bytes_are_read_or_refused_in_one_line(write: Write, content: bytes,
     read_or_refused(write(magic + content, "a.dat" if magic else "a.bin"), 1000.0)
 
 
+@settings(FEW, max_examples=40)
+@given(
+    name=st.sampled_from([name for name in SCOPE_FILES if not name.startswith("two")]),
+    edits=st.lists(st.tuples(st.integers(0, 400), st.sampled_from(list(b'0.,;-e \n"#x\0'))), min_size=1, max_size=4),
+)
+@example(name="samples-4000hz.npy", edits=[(60, ord("("))])
+def test_a_damaged_header_is_read_or_refused_in_one_line(
+    write: Write, sample_data: Path, name: str, edits: list[tuple[int, int]]
+) -> None:
+    content = bytearray((sample_data / "scope-files" / name).read_bytes()[:2000])
+    for place, byte in edits:
+        content[place] = byte
+    read_or_refused(write(bytes(content), name), None)
+
+
 def test_binary_files_need_the_extra(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "RigolWFM.wfm", None)
     with pytest.raises(TableError, match=r"pip install 'levilab\[scope\]'"):
