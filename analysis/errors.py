@@ -16,13 +16,18 @@ class TooFewReadings(AnalysisError):
 
 
 class TooFewPulses(AnalysisError):
-    """Fewer pulses than a frequency and its slope need; duration [s]: of what was searched."""
+    """Fewer pulses than a frequency and its slope need, or none that return regularly; duration [s]: of the record."""
 
     def __init__(self, *, seen: int, needed: int, duration: float) -> None:
         self.seen, self.needed, self.duration = seen, needed, duration
+        pulses = f"{seen} pulses in {duration:.3g} s"
         super().__init__(
-            f"{seen} pulses in {duration:.3g} s, at least {needed} are needed: "
-            "record longer, or look at the trace: does light reach the detector, is the trigger level inside the pulse?"
+            (
+                f"{pulses}, at least {needed} are needed"
+                if seen < needed
+                else f"{pulses}, and they do not return regularly"
+            )
+            + ": record longer, or look at the trace: does light reach the detector, is the trigger level inside the pulse?"
         )
 
 
@@ -31,7 +36,7 @@ class OnlyHum(TooFewPulses):
 
     def __init__(self, *, seen: int, needed: int, duration: float) -> None:
         super().__init__(seen=seen, needed=needed, duration=duration)
-        text = f"the trace holds hum of the mains and {seen} pulses in {duration:.3g} s, at least {needed} are needed: "
+        text = f"the trace holds hum of the mains, and in {duration:.3g} s no pulses that return regularly: "
         self.args = (text + "shield the detector from lamps, and look at the trace",)
 
 

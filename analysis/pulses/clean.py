@@ -19,9 +19,11 @@ MAINS, STRAYS = (50.0, 60.0), 0.25
 #: Lines are looked for below this, and need a record of so long.
 HIGHEST, SHORTEST = 210.0, 1.0
 #: A line of the mains holds so many times the power of all within 1.5 Hz beside it ...
-NARROW = 1.2
+NARROW = 2.0
 #: ... and is so many times as high as its next multiples, which those of a pulse train nearly equal.
 SINGLE = 2.5
+#: In a third of the record it is at least this part of its height in all of it.
+STAYS = 0.6
 #: Hum is fitted to pieces of so many seconds, half overlapping.
 PIECE = 1.0
 #: The baseline is the median of blocks of this length [s]; it wanders if it leaves this many standard errors.
@@ -127,19 +129,31 @@ def mains_lines(bins: Array, rate: float) -> list[tuple[float, float]]:
             reach = max(STRAYS * multiple, 2 * width)
             band = near(nominal, reach)
             peak = band.start + int(np.argmax(amplitude[band]))
-            height = float(amplitude[peak])
-            if height <= 8 * level:
+            if amplitude[peak] <= 8 * level or not _narrow(amplitude, peak, near(peak * width, 1.5 + 3 * width)):
                 continue
-            inside = float((amplitude[max(peak - 3, 0) : peak + 4] ** 2).sum())
-            beside = near(peak * width, 1.5 + 3 * width)
-            outside = float((amplitude[beside] ** 2).sum()) - inside
-            further = [
-                float(amplitude[near(k * nominal, k * reach)].max()) for k in (2, 3, 4) if k * nominal < 2 * HIGHEST
-            ]
-            others = sorted(further)[len(further) // 2] if further else 0.0
-            if inside > NARROW * outside and height > SINGLE * others:
-                found.append((_peak(amplitude, peak) * width, height))
+            further = [amplitude[near(k * nominal, k * reach)].max() for k in (2, 3, 4) if k * nominal < 2 * HIGHEST]
+            height, place = float(amplitude[peak]), _peak(amplitude, peak) * width
+            if height > SINGLE * sorted(further)[len(further) // 2] and _stays(thin, place / thin_rate, height):
+                found.append((place, height))
     return found
+
+
+def _narrow(amplitude: Array, peak: int, beside: slice) -> bool:
+    inside = float((amplitude[max(peak - 3, 0) : peak + 4] ** 2).sum())
+    return inside > NARROW * (float((amplitude[beside] ** 2).sum()) - inside)
+
+
+def _stays(thin: Array, frequency: float, height: float) -> bool:
+    """Whether a line is as high in the first or the last third of the record: that of a chirped pulse train is not.
+
+    frequency: in parts of the rate.
+    """
+    third = thin.size // 3
+    wave = (1 - np.cos(2 * np.pi * (np.arange(third) + 0.5) / third)) * np.exp(
+        -2j * np.pi * frequency * np.arange(third)
+    )
+    pieces = (thin[:third], thin[-third:])
+    return max(2 / third * abs(complex(wave @ (piece - piece.mean()))) for piece in pieces) > STAYS * height
 
 
 def _peak(amplitude: Array, peak: int) -> float:

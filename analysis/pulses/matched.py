@@ -145,16 +145,17 @@ def match(
         None where there are fewer than four turns, or no pulses.
     """
     result = None
-    for round_ in range(ROUNDS):
-        # the third degree is tried once the places are nearly right
-        found = _improve(samples, rate, fit, window, degree=2 if degree is None and not round_ else degree, bad=bad)
+    for _ in range(ROUNDS):
+        found = _improve(samples, rate, fit, window, degree=degree, bad=bad)
         if found is None:
             return result
         edge = np.array([-1.0, -0.5, 0.0, 0.5, 1.0]) * found.fit.half + found.fit.centre
         change = found.fit.phase(edge) - fit.phase(edge)
         moved = float(np.abs(change - np.rint(change)).max())
         fit, result = found.fit, found
-        if round_ and moved < max(0.1 * float(np.sqrt(fit.covariance[0, 0])), 1e-9):
+        # a shift is found to its square in units of the pulse's flank, about a fifth of half the window
+        left = moved * (moved / (0.2 * window.half)) ** 2
+        if left < max(0.03 * float(np.sqrt(fit.covariance[0, 0])), 1e-9):
             break
     return result
 

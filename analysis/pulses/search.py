@@ -12,7 +12,7 @@ from analysis.pulses.regression import median
 Array = NDArray[np.float64]
 
 #: Widths of the smoothing that are tried, in bins of the shortened trace.
-WIDTHS = (1, 2, 4, 8, 16, 32)
+WIDTHS = (1, 2, 4, 8, 16)
 #: Of this many values the quantiles are taken.
 SAMPLE = 2048
 #: What exceeds so many standard deviations of the noise is an event; more are asked for where pulses have them.

@@ -103,11 +103,10 @@ def fit_train(times: Array, *, degree: int | None = None) -> Train:
         new = _one_a_turn(Numbering(whole, near), np.abs(away))
         if new.size < FEWEST:
             break
-        same = np.array_equal(new, used) and np.array_equal(whole[new], turns[used])
+        if np.array_equal(new, used) and np.ptp(whole[new] - turns[used]) == 0:
+            break
         used, turns = new, whole
         fit = fit_turns(times[used], turns[used].astype(np.float64), degree=degree)
-        if same:
-            break
     if used.size < FEWEST:
         raise TooFewPulses(seen=used.size, needed=FEWEST, duration=float(np.ptp(times)))
     span = int(turns[used[-1]] - turns[used[0]]) + 1

@@ -53,7 +53,7 @@ def mains(frequency: Estimate, chirp: Estimate) -> tuple[Finding, ...]:
     assert frequency.value is not None
     assert chirp.value is not None
     for nominal in [multiple * line for line in MAINS for multiple in (0.5, 1, 2)]:
-        steady = abs(chirp.value) < STEADY * nominal
+        steady = abs(chirp.value) + (chirp.u or 0.0) < STEADY * nominal
         if steady and abs(frequency.value / nominal - 1) < NEAR:
             text = (
                 f"the frequency is {nominal:g} Hz and stays: is it the mains (a lamp, hum), or a drive locked to them?"
