@@ -158,6 +158,8 @@ def _arrivals(signal: Array, turns: Array, spin: SpinFrequency) -> tuple[Array, 
     weight = np.bincount(index, above)
     moment = np.bincount(index, above * off)
     seen = np.flatnonzero(weight > 0.2 * np.median(weight[weight > 0])) if (weight > 0).any() else np.zeros(0, np.intp)
+    number = seen + whole.min()
+    seen = seen[(number - 0.25 >= turns.min()) & (number + 0.25 <= turns.max())]  # the ends may cut a pulse
     frequency = spin.frequency.value or 1.0
     shift = moment[seen] / weight[seen]
     return (seen + whole.min() - (spin.phase.value or 0.0)) / frequency + spin.reference_time, shift / frequency
