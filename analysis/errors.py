@@ -20,14 +20,10 @@ class TooFewPulses(AnalysisError):
 
     def __init__(self, *, seen: int, needed: int, duration: float) -> None:
         self.seen, self.needed, self.duration = seen, needed, duration
-        pulses = f"{seen} pulses in {duration:.3g} s"
+        wanted = f", at least {needed} are needed" if seen < needed else " that do not return regularly"
         super().__init__(
-            (
-                f"{pulses}, at least {needed} are needed"
-                if seen < needed
-                else f"{pulses}, and they do not return regularly"
-            )
-            + ": record longer, or look at the trace: does light reach the detector, is the trigger level inside the pulse?"
+            f"{seen} pulses in {duration:.3g} s{wanted}: record longer, or look at the trace: "
+            "does light reach the detector, is the trigger level inside the pulse?"
         )
 
 

@@ -1,4 +1,4 @@
-"""Make the sample data: four synthetic spin-downs, the ten published lower limits, and files as scopes write them.
+"""Make the sample data: four synthetic spin-downs, the published lower limits, two traces, and files of scopes.
 
 The thesis prints the constants of four spin-downs, C₁ and C₂ of unweighted straight lines, but none of their
 readings.  These readings are made up so that they give those constants: the law of a laminar disc from about
@@ -8,12 +8,17 @@ return the published C₁ and C₂, rounded to 0.01 Hz.  They are not the author
 The files in scope-files/ all hold the same synthetic half second of a tape that passes a phototransistor 30 times a
 second, written as several makers' oscilloscopes would.
 
+The traces are what `levilab acquire trace` writes on the virtual bench; only what changes from run to run, times,
+addresses of software and the like, is left out.
+
 Run it from anywhere: ``python sample_data/make.py``.  It writes the same bytes each time.
 """
 
 import json
 import math
+import shutil
 import struct
+import tempfile
 import wave
 from collections.abc import Callable
 from pathlib import Path
@@ -22,6 +27,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import root
+
+from levilab.acquisition.loop import acquire
+from levilab.acquisition.request import AcquisitionOptions, request_for
+from levilab.present.progress import Mute
 
 HERE = Path(__file__).parent
 NOISE_HZ, STEP_S, DIGIT_HZ = 0.03, 10.0, 0.01
@@ -249,8 +258,48 @@ noise N(0, {NOISE_V:g} V); rounded to {DIGIT_V:g} V.  recording.wav has 2 V at f
 """
 
 
+#: Name → the scene, None for a top that only spins; lines of the bench file; a note.
+TRACES: dict[str, tuple[str | None, str, str]] = {
+    "trace-tape": (None, "records = 5", "the tape of a top that spins down: five records, 10 s apart"),
+    "trace-laser": (
+        "driven",
+        "channels = [1, 3]\nshows = ['tape', 'laser']\ndrive_frequency_hz = 30.0\nrecords = 5\ninterval_s = 2.0",
+        "tape and laser of the thesis's driven top: five records, 2 s apart",
+    ),
+}
+
+
+def write_traces(name: str, scene: str | None, settings: str, note: str) -> None:
+    """A run folder with records of the oscilloscope, acquired on the virtual bench."""
+    with tempfile.TemporaryDirectory() as place:
+        bench = Path(place) / "bench.toml"
+        bench.write_text(f"[trace]\n{settings}\n", encoding="utf-8")
+        options = AcquisitionOptions(
+            mock=True, bench=bench, out=Path(place), seed=1, scene=scene, note=f"SYNTHETIC, {note}"
+        )
+        run = acquire(request_for("trace", options), Mute())
+        count = run.count()
+        shutil.rmtree(HERE / name, ignore_errors=True)
+        shutil.copytree(run.folder, HERE / name, ignore=shutil.ignore_patterns("datapackage.json", "run.lock"))
+    path = HERE / name / "run.json"
+    record = json.loads(path.read_text(encoding="utf-8"))
+    kept = ("limits", "oscilloscope", "generator", "scene", "trace")  # what the run has used
+    record["configuration"] = {key: value for key, value in record["configuration"].items() if key in kept}
+    record |= {"started_utc": None, "ended_utc": None, "time_zero_utc": None, "software": {}}
+    record["command_line"] = ["python", "sample_data/make.py"]
+    record["synthetic_how"] = "SYNTHETIC: " + record["synthetic_how"]
+    text = json.dumps(record, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
+    path.write_text(text, encoding="utf-8", newline="\n")
+    events = HERE / name / "events.jsonl"
+    if events.exists():
+        lines = [json.loads(line) for line in events.read_text(encoding="utf-8").splitlines()]
+        texts = [json.dumps({k: v for k, v in line.items() if k != "utc"}, ensure_ascii=False) for line in lines]
+        events.write_text("".join(f"{line}\n" for line in texts), encoding="utf-8", newline="\n")
+    print(f"{name}: {count} records")
+
+
 def main() -> None:
-    """Write the five run folders and the files of scopes."""
+    """Write the run folders and the files of scopes."""
     write_scope_files(HERE / "scope-files")
     for number, (c1, c2, n) in enumerate(PUBLISHED, start=1):
         t, nu, how = solve(c1, c2, n)
@@ -284,6 +333,8 @@ def main() -> None:
             "synthetic_how": None,
         },
     )
+    for name, how_made in TRACES.items():
+        write_traces(name, *how_made)
 
 
 if __name__ == "__main__":

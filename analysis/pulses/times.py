@@ -92,6 +92,8 @@ def fit_train(times: Array, *, degree: int | None = None) -> Train:
     if np.count_nonzero(numbering.belongs) < FEWEST:
         numbering = Numbering(numbering.turns, np.ones(times.size, dtype=bool))
     used = _one_a_turn(numbering)
+    if used.size < FEWEST:
+        raise TooFewPulses(seen=used.size, needed=FEWEST, duration=float(np.ptp(times)))
     turns = numbering.turns
     fit = fit_turns(times[used], turns[used].astype(np.float64), degree=degree)
     for _ in range(ROUNDS):

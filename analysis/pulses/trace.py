@@ -60,8 +60,8 @@ def spin_of_trace(
 
     >>> turns = (25 - 0.05 * np.arange(10000) / 5000) * np.arange(10000) / 5000
     >>> found = spin_of_trace(np.exp(-3000 * (turns % 1 - 0.5) ** 2), 5000)
-    >>> f"{found.frequency.value:.4f} Hz at {found.reference_time:.2f} s", f"{found.chirp.value:.3f} Hz/s"
-    ('24.9000 Hz at 1.00 s', '-0.100 Hz/s')
+    >>> f"{found.at(1.0).value:.4f} Hz at 1 s", f"{found.chirp.value:.3f} Hz/s"
+    ('24.9000 Hz at 1 s', '-0.100 Hz/s')
     """
     x, bad = _checked(samples, rate)
     factor = max(int(rate // SEARCH_RATE), 1)

@@ -156,13 +156,13 @@ def test_a_new_bench_file_has_a_commented_table_for_each_experiment(levilab, tmp
         step_mm: float = Field(default=0.5, description="from one height to the next")
 
     levilab("bench", "init", "--library", "@levilab")
-    assert (tmp_path / "bench.toml").read_text(encoding="utf-8").endswith(SPIN_TABLE)
+    assert SPIN_TABLE in (tmp_path / "bench.toml").read_text(encoding="utf-8")
     scan = replace(EXPERIMENTS["spin"], name="scan", about="the field along the axis", settings=ScanSettings)
     monkeypatch.setitem(EXPERIMENTS, "scan", scan)
     text = bench_text([], "@py", tables_to_write())
+    assert SPIN_TABLE in text
     assert text.endswith(
-        SPIN_TABLE
-        + """
+        """
 [scan]                          # the field along the axis
 step_mm = 0.5                   # from one height to the next
 """
