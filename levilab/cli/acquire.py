@@ -22,6 +22,7 @@ acquire_app = typer.Typer(no_args_is_help=True, help="Run an experiment on the b
 EXPERIMENT_HELP = {
     "spin": "Spin-down: drive the top up, switch the drive off, count its spin until it falls.",
     "trace": "Records of the oscilloscope: raw codes into the run folder, written as they come.",
+    "field": "Hall scan: the base's flux density on its axis, at one height after the other.",
 }
 _ENDING = "Ctrl-C ends the run after the reading under way; outputs go off and the run is kept."
 

@@ -103,6 +103,7 @@ ANALYSIS_HELP = {
         "Spin frequency and chirp from traces of a detector (WAV, scopes' CSV, .npy), lists of pulse times, runs with "
         "traces."
     ),
+    "field": "The base from a Hall scan: strength, origin, thickness; heights, masses and spins of tops that float.",
 }
 #: The command that stands for no name, and is not listed.
 _EACH = "each"
@@ -143,6 +144,47 @@ def spin(
     _analyze(context, paths, given, save=save, out=out, as_json=as_json)
 
 
+def field(
+    context: typer.Context,
+    paths: Paths,
+    columns: Columns = "",
+    device: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Describes base and top, as sample_data/device.toml does; see levilab top."),
+    ] = None,
+    height: Annotated[
+        float | None,
+        typer.Option(metavar="MM", help="Where the top was seen to float: its moment follows, if its mass is known."),
+    ] = None,
+    height_u: Annotated[
+        float | None,
+        typer.Option(metavar="MM", help="Standard uncertainty of --height.", show_default="that of the scan's heights"),
+    ] = None,
+    free_radii: Annotated[
+        bool, typer.Option("--free-radii", help="Let the scan move the radii, too, within what the calliper says.")
+    ] = False,
+    save: Save = True,
+    out: ResultFolder = None,
+    as_json: Json = False,
+) -> None:
+    """Fit scans of the base's field, and work out what follows."""
+    from levilab.formats.device import read_device
+
+    for name, value, lowest in (("height", height, -1000.0), ("height_u", height_u, 0.0)):
+        if value is not None and not lowest <= value <= 2000.0:
+            raise UsageError(name, f"a number of millimetres from {lowest:g} to 2000 is expected", value=value)
+    if height_u is not None and height is None:
+        raise UsageError("height_u", "goes with `height` alone")
+    given = {
+        "columns": inputs(columns, None, None)["columns"],
+        "device": None if device is None else read_device(device),
+        "height_m": None if height is None else height / 1000,
+        "height_u_m": None if height_u is None else height_u / 1000,
+        "free_radii": free_radii,
+    }
+    _analyze(context, paths, given, save=save, out=out, as_json=as_json)
+
+
 def each(
     context: typer.Context,
     paths: Paths,
@@ -162,7 +204,7 @@ def each(
     _analyze(context, paths, given | {"method": method.value}, save=save, out=out, as_json=as_json)
 
 
-_COMMANDS: dict[str, Callable[..., None]] = {"spindown": spindown, "spin": spin}
+_COMMANDS: dict[str, Callable[..., None]] = {"spindown": spindown, "spin": spin, "field": field}
 for _name, _help in ANALYSIS_HELP.items():
     analyze_app.command(_name, help=_help, epilog=f"Example: levilab analyze {_name} sample_data/")(_COMMANDS[_name])
 analyze_app.command(_EACH, help=_EACH_HELP, hidden=True, epilog="Example: levilab analyze sample_data/")(each)

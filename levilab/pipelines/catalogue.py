@@ -7,6 +7,14 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from levilab.errors import DoesNotSuit, unquoted
+from levilab.pipelines.field.analysis import NEEDS as FIELD_NEEDS
+from levilab.pipelines.field.analysis import FieldAnalysis, analyze_scans
+from levilab.pipelines.field.device import FieldOptions
+from levilab.pipelines.field.document import as_document as field_document
+from levilab.pipelines.field.document import recall_scans
+from levilab.pipelines.field.document import save_result as save_field
+from levilab.pipelines.field.report import field_part
+from levilab.pipelines.field.table import field_tables
 from levilab.pipelines.spin.analysis import NEEDS as SPIN_NEEDS
 from levilab.pipelines.spin.analysis import SpinAnalysis, SpinOptions, analyze_spins
 from levilab.pipelines.spin.document import as_document as spin_document
@@ -109,6 +117,13 @@ def _spin_svg(analysis: SpinAnalysis) -> str:
     return as_svg(spin_figure(analysis))
 
 
+def _field_svg(analysis: FieldAnalysis) -> str:
+    from levilab.pipelines.field.figure import field_figure  # with matplotlib
+    from levilab.present.style import as_svg
+
+    return as_svg(field_figure(analysis))
+
+
 _TABLE: tuple[Analysis[Any], ...] = (
     Analysis[SpinDownAnalysis](
         SPINDOWN_NEEDS,
@@ -131,6 +146,17 @@ _TABLE: tuple[Analysis[Any], ...] = (
         spin_tables,
         _spin_svg,
         spin_part,
+    ),
+    Analysis[FieldAnalysis](
+        FIELD_NEEDS,
+        FieldOptions,
+        analyze_scans,
+        recall_scans,
+        field_document,
+        save_field,
+        field_tables,
+        _field_svg,
+        field_part,
     ),
 )
 ANALYSES = MappingProxyType({analysis.name: analysis for analysis in _TABLE})

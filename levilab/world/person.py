@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from levilab.bench.person import PlaceProbe, ShieldProbe
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -23,5 +25,16 @@ class VirtualPerson:
         return carry_out(self.world, task) if carry_out else ""
 
 
+def _place_probe(world: World, task: Task) -> str:
+    assert isinstance(task, PlaceProbe)
+    world.place_probe(task.height_m)
+    return ""
+
+
+def _shield_probe(world: World, task: Task) -> str:  # noqa: ARG001 - as all deeds are done
+    world.place_probe(None)
+    return ""
+
+
 #: Kind of task → what is done in the world; returns the answer.
-_DEEDS: dict[type[Task], Callable[[World, Task], str]] = {}
+_DEEDS: dict[type[Task], Callable[[World, Task], str]] = {PlaceProbe: _place_probe, ShieldProbe: _shield_probe}
