@@ -1,9 +1,12 @@
-"""Make the sample data: four synthetic spin-downs, the ten published lower limits, oscilloscope records, a scan.
+"""Make the sample data: four synthetic spin-downs, the ten published lower limits, records, a scan, files of scopes.
 
 The thesis prints the constants of four spin-downs, C₁ and C₂ of unweighted straight lines, but none of their
 readings.  These readings are made up so that they give those constants: the law of a laminar disc from about
 40 Hz, a reading each 10 s, noise N(0, 0.03 Hz), start and constant solved for so that the straight lines
 return the published C₁ and C₂, rounded to 0.01 Hz.  They are not the author's data.
+
+The files in scope-files/ all hold the same synthetic half second of a tape that passes a phototransistor 30 times a
+second, written as several makers' oscilloscopes would.
 
 The records and the scan are what `levilab acquire` writes on the virtual bench: their times and what differs between
 computers are left out.
@@ -12,8 +15,12 @@ Run it from anywhere: ``python sample_data/make.py``.  It writes the same bytes 
 """
 
 import json
+import math
 import shutil
+import struct
 import tempfile
+import wave
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -107,6 +114,150 @@ def write(folder: Path, header: str, rows: list[str], record: dict[str, Any]) ->
     (folder / "readings.csv").write_text("\n".join([header, *rows, ""]), encoding="utf-8", newline="\n")
 
 
+# --- the same half second as several scopes write it ---------------------------------------------------
+
+#: Samples per second, their number, and the time of the first [s].
+RATE_HZ, SAMPLES, START_S = 4000, 2000, -0.25
+#: Spin at time 0 [Hz], its rate of change [Hz/s], turns at time 0, and the pulse: part of a turn at half height.
+SPIN_HZ, CHIRP_HZ_S, PHASE, DUTY = 30.0, -0.095, 0.3, 0.03
+#: Light without tape, with tape on top, noise, and the step of an 8-bit scope [V].
+DARK_V, PULSE_V, NOISE_V, DIGIT_V = 0.1, 1.0, 0.02, 0.01
+
+
+def turns(t: Array) -> Array:
+    """Turns of the top since time 0, beginning at PHASE."""
+    return PHASE + SPIN_HZ * t + CHIRP_HZ_S * t**2 / 2
+
+
+def tape() -> tuple[Array, Array]:
+    """Time [s] and signal [V] of the phototransistor."""
+    t = START_S + np.arange(SAMPLES) / RATE_HZ
+    off = (turns(t) + 0.5) % 1 - 0.5
+    pulse = PULSE_V * np.exp(-0.5 * (off / (DUTY / 2.3548)) ** 2)
+    noise = np.random.default_rng(30).normal(0, NOISE_V, SAMPLES)
+    return t, np.round((DARK_V + pulse + noise) / DIGIT_V) * DIGIT_V
+
+
+def pulse_times(n: int = 60) -> Array:
+    """Times at which the tape passes, with a jitter of 20 µs [s]."""
+    k = np.arange(n)
+    t = (-SPIN_HZ + np.sqrt(SPIN_HZ**2 + 2 * CHIRP_HZ_S * (k + 1 - PHASE))) / CHIRP_HZ_S
+    return t + np.random.default_rng(31).normal(0, 20e-6, n)
+
+
+def engineering(x: float, digits: int = 4) -> str:
+    """A number as Keysight writes it: +158.6506E-03."""
+    power = 0 if x == 0 else 3 * math.floor(math.log10(abs(x)) / 3)
+    return f"{x / 10.0**power:+.{digits}f}E{power:+03d}"
+
+
+def rigol(_: Array, u: Array) -> list[str]:
+    """DS1000Z: the samples numbered, start and increment in the second row."""
+    head = ["X,CH1,CH2,Start,Increment,", f"Sequence,Volt,Volt,{START_S:.6e},{1 / RATE_HZ:.6e}"]
+    return head + [f"{k},{x:.2e},{0.02 * (k // 40 % 2):.2e}," for k, x in enumerate(u)]
+
+
+def rigol_screen(_: Array, u: Array) -> list[str]:
+    """DS1000Z, the screen: neither times nor numbers."""
+    return ["CH1,Start,Increment,", f"Volt,{START_S:.6e},{1 / RATE_HZ:.6e}", *(f"{x:.2e}," for x in u)]
+
+
+def rigol_times(t: Array, u: Array) -> list[str]:
+    """DS1000E: times of three digits, no increment."""
+    return ["X,CH1,", "Second,Volt,", *(f"{x:.2E},{y:.2E}," for x, y in zip(t, u, strict=True))]
+
+
+def keysight(t: Array, u: Array) -> list[str]:
+    """DSOX."""
+    return ["x-axis,1", "second,Volt", *(f"{engineering(x)},{engineering(y)}" for x, y in zip(t, u, strict=True))]
+
+
+def siglent(t: Array, u: Array) -> list[str]:
+    """SDS1202X-E: twelve lines of header."""
+    head = [
+        f"Record Length,Analog:{SAMPLES}", f"Sample Interval,Analog:{1 / RATE_HZ:.12f}", "Vertical Units,CH1:V",
+        "Vertical Scale,CH1:0.20", "Vertical Offset,CH1:-0.60000", "Horizontal Units,s", "Horizontal Scale,0.05",
+        "Model Number,SDS1202X-E", "Serial Number,SYNTHETIC", "Software Version,made by sample_data/make.py",
+        "Source,CH1", "Second,Volt",
+    ]  # fmt: skip
+    return head + [f"{x:.11f},{y:.5f}" for x, y in zip(t, u, strict=True)]
+
+
+def siglent_rate(t: Array, u: Array) -> list[str]:
+    """SDS1104X-E: the sample rate in the place of the interval."""
+    head = [f"Record Length,Analog:{SAMPLES}", f"Sample Rate,{RATE_HZ:.1f}", "Vertical Scale,CH1: 0.20",
+            "Vertical Offset,CH1:-0.60000", "Horizontal Scale, 0.050000000", "Second,Volt"]  # fmt: skip
+    return head + [f"{x:.11f},{y:.5f}" for x, y in zip(t, u, strict=True)]
+
+
+def tektronix_beside(t: Array, u: Array) -> list[str]:
+    """TDS2000C: the header beside the first 18 rows."""
+    head = [
+        f"Record Length,{SAMPLES:.6e}", f"Sample Interval,{1 / RATE_HZ:.6e}", "Trigger Point,1.000000000000e+03",
+        ",", ",", ",", "Source,CH1", "Vertical Units,V", "Vertical Scale,2.000000e-01", "Vertical Offset,0.000000e+00",
+        "Horizontal Units,s", "Horizontal Scale,5.000000e-02", "Pt Fmt,Y", "Yzero,0.000000e+00",
+        "Probe Atten,1.000000e+00", "Model Number,TDS2001C", "Serial Number,SYNTHETIC", "Firmware Version,FV:v24.26",
+    ]  # fmt: skip
+    head += [","] * (SAMPLES - len(head))
+    return [f"{key},,{x:018.12f},{y:10.5f}," for key, x, y in zip(head, t, u, strict=True)]
+
+
+def tektronix(t: Array, u: Array) -> list[str]:
+    """MDO3000: a key a line, then TIME and the channel."""
+    head = [
+        "Model,MDO3014", "Firmware Version,1.26", "", "Waveform Type,ANALOG", "Point Format,Y", "Horizontal Units,s",
+        "Horizontal Scale,0.05", "Horizontal Delay,0", f"Sample Interval,{1 / RATE_HZ:g}",
+        f"Record Length,{SAMPLES}", "Gating,0.0% to 100.0%", "Probe Attenuation,1", "Vertical Units,V",
+        "Vertical Offset,0", "Vertical Scale,0.2", "Vertical Position,-3", ",", ",", ",", "Label,", "TIME,CH1",
+    ]  # fmt: skip
+    return head + [f"{x:.7e},{y:g}" for x, y in zip(t, u, strict=True)]
+
+
+def two_columns(t: Array, u: Array) -> list[str]:
+    """A spreadsheet of a German Windows: semicolons, decimal commas, milliseconds and millivolts."""
+    rows = (f"{1e3 * x:.2f};{1e3 * y:.0f}".replace(".", ",") for x, y in zip(t, u, strict=True))
+    return ["Zeit [ms];Spannung [mV]", *rows]
+
+
+#: File → its lines and its line ends.
+TEXTS: dict[str, tuple[Callable[[Array, Array], list[str]], str]] = {
+    "rigol-ds1000z.csv": (rigol, "\n"),
+    "rigol-ds1000z-screen.csv": (rigol_screen, "\n"),
+    "rigol-ds1000e.csv": (rigol_times, "\r\n"),
+    "keysight-dsox.csv": (keysight, "\r\n"),
+    "siglent-sds1202x-e.csv": (siglent, "\n"),
+    "siglent-sds1104x-e.csv": (siglent_rate, "\r\n"),
+    "tektronix-tds2000c.csv": (tektronix_beside, "\n"),
+    "tektronix-mdo3000.csv": (tektronix, "\n"),
+    "two-columns-german.csv": (two_columns, "\r\n"),
+}
+
+
+def write_scope_files(folder: Path) -> None:
+    """The files of scope-files/."""
+    folder.mkdir(exist_ok=True)
+    t, u = tape()
+    for name, (lines, end) in TEXTS.items():
+        (folder / name).write_text(end.join([*lines(t, u), ""]), encoding="utf-8", newline="")
+    np.save(folder / "samples-4000hz.npy", u.astype("<f4"), allow_pickle=False)
+    with wave.open(str(folder / "recording.wav"), "wb") as sound:
+        sound.setparams((1, 2, RATE_HZ, SAMPLES, "NONE", "not compressed"))
+        sound.writeframes(struct.pack(f"<{SAMPLES}h", *np.round(u / 2 * 32767).astype(int)))
+    lines = ["pulse time [s]", *(f"{x:.7f}" for x in pulse_times())]
+    (folder / "pulse-times.txt").write_text("\n".join([*lines, ""]), encoding="utf-8", newline="")
+    (folder / "README.md").write_text(SCOPE_FILES, encoding="utf-8", newline="\n")
+
+
+SCOPE_FILES = f"""SYNTHETIC: none of these files came from an oscilloscope, they were made up by sample_data/make.py.
+
+All but pulse-times.txt hold the same half second of a tape that passes a phototransistor once per turn, {RATE_HZ}
+samples per second: {SPIN_HZ:g} Hz at time 0 of the scopes, which is the middle of the record, falling by
+{-CHIRP_HZ_S:g} Hz per second; pulses of {PULSE_V:g} V, {100 * DUTY:g} % of a turn wide at half height, on {DARK_V:g} V;
+noise N(0, {NOISE_V:g} V); rounded to {DIGIT_V:g} V.  recording.wav has 2 V at full scale.  pulse-times.txt holds
+{len(pulse_times())} passages of the same top from time 0 on, with a jitter of 20 us.
+"""
+
+
 #: Name → the scene, None for a top that only spins; lines of the bench file; a note.
 TRACES: dict[str, tuple[str | None, str, str]] = {
     "trace-tape": (None, "records = 5", "the tape of a top that spins down: five records, 10 s apart"),
@@ -172,7 +323,8 @@ def from_the_virtual_bench(experiment: str, folder: str, seed: int, note: str) -
 
 
 def main() -> None:
-    """Write the run folders."""
+    """Write the run folders and the files of scopes."""
+    write_scope_files(HERE / "scope-files")
     for number, (c1, c2, n) in enumerate(PUBLISHED, start=1):
         t, nu, how = solve(c1, c2, n)
         write(

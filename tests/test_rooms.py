@@ -19,8 +19,8 @@ PACKAGES = ("levilab", "instruments", "analysis", "pyvisa_levilab")
 
 #: What takes so long to load that it is imported where it is used: at least 10 ms, or not everywhere installed.
 HEAVY = {
-    "filelock", "grp", "heyoka", "jinja2", "lmfit", "matplotlib", "numba", "pandas", "pyvisa", "rich", "scipy",
-    "serial", "typst", "uncertainties",
+    "RigolWFM", "filelock", "grp", "heyoka", "jinja2", "lmfit", "matplotlib", "numba", "pandas", "pyvisa", "rich",
+    "scipy", "serial", "typst", "uncertainties",
 }  # fmt: skip
 
 

@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 import typer.core
 
-from levilab.cli.options import Columns, Json, KeepOutliers, Paths, ReadingU, option_names, with_options
+from levilab.cli.options import (
+    Channel,
+    Columns,
+    Json,
+    KeepOutliers,
+    Paths,
+    Rate,
+    ReadingU,
+    option_names,
+    with_options,
+)
 from levilab.cli.output import message, print_json
 from levilab.errors import LevilabError, UsageError
 
 if TYPE_CHECKING:
-    from analysis.spindown.lawfit import Uncertainty as Kind
+    from collections.abc import Callable, Mapping, Sequence
+
     from levilab.pipelines.catalogue import Analysis
-    from levilab.pipelines.sources import Options
 
 
 class AnalyzeGroup(typer.core.TyperGroup):
@@ -66,6 +75,18 @@ class Uncertainty(StrEnum):
     BOOTSTRAP = "bootstrap"
 
 
+class Method(StrEnum):
+    """How the pulses of a trace are found."""
+
+    AUTO = "auto"
+    EDGES = "edges"
+    MATCHED = "matched"
+    LIKELIHOOD = "likelihood"
+
+
+PulseMethod = Annotated[
+    Method, typer.Option("--method", help="How pulses are found: edges is the fastest, likelihood for weak ones.")
+]
 UncertaintyKind = Annotated[
     Uncertainty, typer.Option("--uncertainty", help="profile and bootstrap add 68 % intervals, and take longer.")
 ]
@@ -78,6 +99,10 @@ ANALYSIS_HELP = {
     "spindown": (
         "Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude."
     ),
+    "spin": (
+        "Spin frequency and chirp from traces of a detector (WAV, scopes' CSV, .npy), lists of pulse times, runs with "
+        "traces."
+    ),
     "field": "The base from a Hall scan: strength, origin, thickness; heights, masses and spins of tops that float.",
 }
 #: The command that stands for no name, and is not listed.
@@ -85,10 +110,12 @@ _EACH = "each"
 _EACH_HELP = "Each analysis that suits the runs or data files; --json prints a list where several suit."
 
 
-def analyze_inputs(
+def spindown(
     context: typer.Context,
     paths: Paths,
     columns: Columns = "",
+    channel: Channel = None,
+    rate: Rate = None,
     reading_u: ReadingU = None,
     uncertainty: UncertaintyKind = Uncertainty.COVARIANCE,
     keep_outliers: KeepOutliers = False,
@@ -96,19 +123,28 @@ def analyze_inputs(
     out: ResultFolder = None,
     as_json: Json = False,
 ) -> None:
-    """Carry out the analysis that the command is named after."""
-    from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
-
-    chosen = options(columns, reading_u, uncertainty.value, keep_outliers)
-    if context.info_name == _EACH:
-        results = analyze_suiting(paths, chosen)
-    else:
-        analysis = ANALYSES[str(context.info_name)]
-        results = [(analysis, analysis.analyze(paths, chosen))]
-    _write_and_print(context, results, save=save, out=out, as_json=as_json)
+    """Fit the drag laws."""
+    given = inputs(columns, channel, rate) | spindown_options(reading_u, uncertainty.value, keep_outliers)
+    _analyze(context, paths, given, save=save, out=out, as_json=as_json)
 
 
-def analyze_field(
+def spin(
+    context: typer.Context,
+    paths: Paths,
+    columns: Columns = "",
+    channel: Channel = None,
+    rate: Rate = None,
+    method: PulseMethod = Method.AUTO,
+    save: Save = True,
+    out: ResultFolder = None,
+    as_json: Json = False,
+) -> None:
+    """Find the spin frequency."""
+    given = inputs(columns, channel, rate) | {"method": method.value}
+    _analyze(context, paths, given, save=save, out=out, as_json=as_json)
+
+
+def field(
     context: typer.Context,
     paths: Paths,
     columns: Columns = "",
@@ -132,33 +168,82 @@ def analyze_field(
     as_json: Json = False,
 ) -> None:
     """Fit scans of the base's field, and work out what follows."""
-    from dataclasses import replace
-
     from levilab.formats.device import read_device
-    from levilab.pipelines.catalogue import ANALYSES
 
     for name, value, lowest in (("height", height, -1000.0), ("height_u", height_u, 0.0)):
         if value is not None and not lowest <= value <= 2000.0:
             raise UsageError(name, f"a number of millimetres from {lowest:g} to 2000 is expected", value=value)
     if height_u is not None and height is None:
         raise UsageError("height_u", "goes with `height` alone")
-    chosen = replace(
-        options(columns, None, "covariance", keep_outliers=False),
-        device=None if device is None else read_device(device),
-        height_m=None if height is None else height / 1000,
-        height_u_m=None if height_u is None else height_u / 1000,
-        free_radii=free_radii,
-    )
-    analysis = ANALYSES["field"]
-    _write_and_print(context, [(analysis, analysis.analyze(paths, chosen))], save=save, out=out, as_json=as_json)
+    given = {
+        "columns": inputs(columns, None, None)["columns"],
+        "device": None if device is None else read_device(device),
+        "height_m": None if height is None else height / 1000,
+        "height_u_m": None if height_u is None else height_u / 1000,
+        "free_radii": free_radii,
+    }
+    _analyze(context, paths, given, save=save, out=out, as_json=as_json)
 
 
-#: Analyses with options of their own.
-_OWN_COMMANDS: dict[str, Callable[..., None]] = {"field": analyze_field}
+def each(
+    context: typer.Context,
+    paths: Paths,
+    columns: Columns = "",
+    channel: Channel = None,
+    rate: Rate = None,
+    reading_u: ReadingU = None,
+    uncertainty: UncertaintyKind = Uncertainty.COVARIANCE,
+    keep_outliers: KeepOutliers = False,
+    method: PulseMethod = Method.AUTO,
+    save: Save = True,
+    out: ResultFolder = None,
+    as_json: Json = False,
+) -> None:
+    """Carry out each analysis that suits; an option goes to those that know it."""
+    given = inputs(columns, channel, rate) | spindown_options(reading_u, uncertainty.value, keep_outliers)
+    _analyze(context, paths, given | {"method": method.value}, save=save, out=out, as_json=as_json)
+
+
+_COMMANDS: dict[str, Callable[..., None]] = {"spindown": spindown, "spin": spin, "field": field}
 for _name, _help in ANALYSIS_HELP.items():
-    _command = _OWN_COMMANDS.get(_name, analyze_inputs)
-    analyze_app.command(_name, help=_help, epilog=f"Example: levilab analyze {_name} sample_data/")(_command)
-analyze_app.command(_EACH, help=_EACH_HELP, hidden=True, epilog="Example: levilab analyze sample_data/")(analyze_inputs)
+    analyze_app.command(_name, help=_help, epilog=f"Example: levilab analyze {_name} sample_data/")(_COMMANDS[_name])
+analyze_app.command(_EACH, help=_EACH_HELP, hidden=True, epilog="Example: levilab analyze sample_data/")(each)
+
+
+def inputs(columns: str, channel: str | None, rate: float | None) -> dict[str, Any]:
+    """How inputs are read, from the options of the commands.  Raises UsageError."""
+    from levilab.formats.table import parse_columns
+
+    if rate is not None and not 0 < rate < float("inf"):
+        raise UsageError("rate", "samples per second are expected, a number above 0 [Hz]", value=rate)
+    return {"columns": parse_columns(columns), "channel": channel, "rate": rate}
+
+
+def spindown_options(reading_u: float | None, uncertainty: str, keep_outliers: bool) -> dict[str, Any]:
+    """How to analyze spin-downs, from the options of the commands.  Raises UsageError."""
+    if reading_u is not None and not 0 < reading_u < float("inf"):
+        raise UsageError("reading_u", "a standard uncertainty above 0 [Hz] is expected", value=reading_u)
+    return {"reading_u": reading_u, "uncertainty": uncertainty, "keep_outliers": keep_outliers}
+
+
+def _analyze(
+    context: typer.Context,
+    paths: Sequence[Path],
+    given: Mapping[str, Any],
+    *,
+    save: bool,
+    out: Path | None,
+    as_json: bool,
+) -> None:
+    """Carry out the analysis that the command is named after, or each."""
+    from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
+
+    if context.info_name == _EACH:
+        results = analyze_suiting(paths, given)
+    else:
+        analysis = ANALYSES[str(context.info_name)]
+        results = [(analysis, analysis.analyze(paths, analysis.options_from(given)))]
+    _write_and_print(context, results, save=save, out=out, as_json=as_json)
 
 
 def _write_and_print(
@@ -191,16 +276,6 @@ def _write_and_print(
         message(in_words(text))
     if failures:
         raise failures[0]
-
-
-def options(columns: str, reading_u: float | None, uncertainty: str, keep_outliers: bool) -> Options:
-    """How to analyze, from the options of the commands.  Raises UsageError."""
-    from levilab.formats.table import parse_columns
-    from levilab.pipelines.sources import Options
-
-    if reading_u is not None and not 0 < reading_u < float("inf"):
-        raise UsageError("reading_u", "a standard uncertainty above 0 [Hz] is expected", value=reading_u)
-    return Options(parse_columns(columns), reading_u, cast("Kind", uncertainty), keep_outliers)
 
 
 def _save(analysis: Analysis[Any], found: Any, out: Path | None) -> tuple[LevilabError | None, list[Path]]:

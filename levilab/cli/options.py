@@ -25,6 +25,16 @@ ReadingU = Annotated[
     float | None,
     typer.Option(metavar="HZ", help="Standard uncertainty of every reading; goes before what the data say."),
 ]
+Channel = Annotated[
+    str | None,
+    typer.Option("--channel", metavar="NAME", help="Channel of a record with several, by its name or number."),
+]
+Rate = Annotated[
+    float | None,
+    typer.Option(
+        "--rate", metavar="HZ", help="Samples per second, of files that do not say it, as .npy; goes before the file's."
+    ),
+]
 KeepOutliers = Annotated[bool, typer.Option("--keep-outliers", help="Fit readings that look like miscounts, too.")]
 Paths = Annotated[list[Path], typer.Argument(metavar="PATH…", help="Run folders, data files, or folders to search.")]
 Presets = Annotated[

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from levilab.cli.analyze import options
-from levilab.cli.options import Columns, Json, KeepOutliers, Paths, ReadingU
+from levilab.cli.analyze import inputs, spindown_options
+from levilab.cli.options import Channel, Columns, Json, KeepOutliers, Paths, Rate, ReadingU
 from levilab.cli.output import print_json
 
 
@@ -24,6 +24,8 @@ def report(
         "report.html"
     ),
     columns: Columns = "",
+    channel: Channel = None,
+    rate: Rate = None,
     reading_u: ReadingU = None,
     keep_outliers: KeepOutliers = False,
 ) -> None:
@@ -34,8 +36,8 @@ def report(
     """
     from levilab.report.page import write_report
 
-    chosen = options(columns, reading_u, "covariance", keep_outliers)
-    typer.echo(f"the report is in {write_report(paths, output, chosen)}")
+    given = inputs(columns, channel, rate) | spindown_options(reading_u, "covariance", keep_outliers)
+    typer.echo(f"the report is in {write_report(paths, output, given)}")
 
 
 def runs(

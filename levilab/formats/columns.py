@@ -26,6 +26,10 @@ class TableError(DataError):
         super().__init__(f"{place}: {message}")
 
 
+class NoTable(TableError, DoesNotSuit):
+    """A file that holds no table of text."""
+
+
 class NoSuchColumn(TableError, DoesNotSuit):
     """A table without a quantity that is wanted."""
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from levilab.formats.columns import TableError, shown
+from levilab.formats.columns import NoTable, shown
 from levilab.formats.dialect import Dialect, Line, content, filled, find_dialect, usual
 from levilab.formats.titles import is_unit, known_titles
 
@@ -52,7 +52,7 @@ def sniff(path: Path) -> Layout:
     """Guess how a file writes its table.
 
     Raises:
-        TableError: the file is empty or binary, or nothing in it looks like a table.
+        NoTable: the file is empty or binary, or nothing in it looks like a table.
         OSError: the file cannot be read.
     """
     with path.open("rb") as stream:
@@ -60,21 +60,21 @@ def sniff(path: Path) -> Layout:
         whole = not stream.read(1)
     for mark, what in NO_TABLES:
         if head.startswith(mark):
-            raise TableError(path, f"is {what}; {EXPORT}")
+            raise NoTable(path, f"is {what}; {EXPORT}")
     encoding = _encoding(head)
     text = codecs.getincrementaldecoder(encoding)(errors="replace").decode(head, final=whole)
     if CONTROL.search(text):
-        raise TableError(path, f"is a binary file; {EXPORT}")
+        raise NoTable(path, f"is a binary file; {EXPORT}")
     lines = list(io.StringIO(text, newline=None))
     if not whole and lines and not lines[-1].endswith("\n"):
         lines.pop()
     if not any(line.strip() for line in lines):
-        raise TableError(path, f"is {'empty' if whole else 'one line without end'}; {EXPORT}")
+        raise NoTable(path, f"is {'empty' if whole else 'one line without end'}; {EXPORT}")
     dialect = find_dialect(lines[-SAMPLE:])
     if dialect is None:
         at, line = next((n, line) for n, line in enumerate(lines, 1) if line.strip())
-        raise TableError(path, f"'{shown(line.strip())}' begins no table of at least two columns; {EXPORT}", line=at)
-    return _layout(lines, encoding, dialect, head)
+        raise NoTable(path, f"'{shown(line.strip())}' begins no table of at least two columns; {EXPORT}", line=at)
+    return lay_out(lines, encoding, dialect, head)
 
 
 def _encoding(head: bytes) -> str:
@@ -88,7 +88,8 @@ def _encoding(head: bytes) -> str:
     return "utf-8"
 
 
-def _layout(lines: list[str], encoding: str, dialect: Dialect, head: bytes) -> Layout:
+def lay_out(lines: list[str], encoding: str, dialect: Dialect, head: bytes) -> Layout:
+    """Where a table stands in lines that were read.  head: their bytes, for the offset of the first row."""
     sample = content(lines[-SAMPLE:], dialect, 1 + max(0, len(lines) - SAMPLE))
     rows = [line for line in sample if line.is_row]
     width = usual(row.filled for row in rows)

@@ -59,7 +59,11 @@ class Table:
 
 
 def read_table(
-    path: Path, *, columns: Mapping[str, str] | None = None, quantities: Collection[str] = CANONICAL
+    path: Path,
+    *,
+    columns: Mapping[str, str] | None = None,
+    quantities: Collection[str] = CANONICAL,
+    guess: bool = True,
 ) -> Table:
     """Read a table of text: CSV of any kind, tabs or blanks, decimal point or comma, with or without units.
 
@@ -67,6 +71,7 @@ def read_table(
         path: the file.
         columns: {canonical column, or t, f, u: title in the file or 1-based number}, where titles are not known.
         quantities: canonical columns that are wanted; what stands in others is nobody's concern.
+        guess: whether columns without titles are taken as time, spin frequency and its uncertainty.
 
     Returns:
         At least three rows. Rows with a missed reading (empty, nan, inf, 9.91E37) are left out, with a warning.
@@ -74,9 +79,9 @@ def read_table(
     Raises:
         TableError: there is no such table, or it cannot be understood without doubt.
     """
-    with _file_errors(path):
+    with file_errors(path):
         layout = sniff(path)
-        header, wanted, warnings = _titles(path, layout, columns or {})
+        header, wanted, warnings = _titles(path, layout, columns or {}, guess=guess)
         chosen, doubts = choose_columns(path, header, layout.units, wanted, quantities)
         if not chosen:
             short = [key for key, name in SHORTHANDS.items() if name in quantities and not name.endswith("_u_hz")]
@@ -114,7 +119,7 @@ def read_run_readings(path: Path, channels: Collection[str] = ()) -> Table:
     Raises:
         TableError: it cannot be read, its header is not ours, or a line is damaged.
     """
-    with _file_errors(path):
+    with file_errors(path):
         with path.open("rb") as stream:
             first = stream.readline(LONGEST_HEADER)
         title = first.decode("utf-8-sig", errors="replace")
@@ -164,8 +169,8 @@ def _must_be_file(path: Path) -> None:
 
 
 @contextmanager
-def _file_errors(path: Path) -> Iterator[None]:
-    """Tell in one line what keeps a file from being opened."""
+def file_errors(path: Path) -> Iterator[None]:
+    """Say in one line what keeps a file from being opened."""
     try:
         _must_be_file(path)
         yield
@@ -180,7 +185,7 @@ def _file_errors(path: Path) -> Iterator[None]:
 
 
 def _titles(
-    path: Path, layout: Layout, wanted: Mapping[str, str]
+    path: Path, layout: Layout, wanted: Mapping[str, str], *, guess: bool
 ) -> tuple[tuple[str, ...], Mapping[str, str], list[str]]:
     """The file's titles, or numbers in their place; what to take for what; a warning where that is a guess."""
     if layout.header:
@@ -189,17 +194,17 @@ def _titles(
     if wanted:
         return numbers, wanted, []
     if layout.header_line:
-        raise TableError(
+        raise NoSuchColumn(
             path,
             f"is no header for the {layout.width} columns below: correct it, or say `columns` = t=1,f=2",
             line=layout.header_line,
         )
-    if layout.width > len(TITLES_WITHOUT_HEADER):
-        raise TableError(
+    if layout.width > len(TITLES_WITHOUT_HEADER) or not guess:
+        raise NoSuchColumn(
             path, f"{layout.width} columns and no header; add one, or say `columns` = t=1,f=2", line=layout.first_line
         )
-    guess = dict(zip(TITLES_WITHOUT_HEADER, numbers, strict=False))
-    return numbers, guess, [f"{shown(str(path), 200)}: no header; the columns are taken as {', '.join(guess)}"]
+    taken = dict(zip(TITLES_WITHOUT_HEADER, numbers, strict=False))
+    return numbers, taken, [f"{shown(str(path), 200)}: no header; the columns are taken as {', '.join(taken)}"]
 
 
 def _table(

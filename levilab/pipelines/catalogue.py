@@ -2,30 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from levilab.errors import DoesNotSuit, unquoted
 from levilab.pipelines.field.analysis import NEEDS as FIELD_NEEDS
 from levilab.pipelines.field.analysis import FieldAnalysis, analyze_scans
+from levilab.pipelines.field.device import FieldOptions
 from levilab.pipelines.field.document import as_document as field_document
 from levilab.pipelines.field.document import recall_scans
 from levilab.pipelines.field.document import save_result as save_field
 from levilab.pipelines.field.report import field_part
 from levilab.pipelines.field.table import field_tables
+from levilab.pipelines.spin.analysis import NEEDS as SPIN_NEEDS
+from levilab.pipelines.spin.analysis import SpinAnalysis, SpinOptions, analyze_spins
+from levilab.pipelines.spin.document import as_document as spin_document
+from levilab.pipelines.spin.document import recall_spins
+from levilab.pipelines.spin.document import save_result as save_spin
+from levilab.pipelines.spin.report import spin_part
+from levilab.pipelines.spin.table import spin_tables
 from levilab.pipelines.spindown.analysis import NEEDS as SPINDOWN_NEEDS
-from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
+from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions, analyze_spindowns
 from levilab.pipelines.spindown.document import as_document, recall_spindowns, save_result
 from levilab.pipelines.spindown.report import spindown_part
 from levilab.pipelines.spindown.table import spindown_tables
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from pathlib import Path
 
     from levilab.pipelines.part import ReportPart
-    from levilab.pipelines.sources import Needs, Options, Source
+    from levilab.pipelines.sources import InputOptions, Needs, Source
     from levilab.present.tables import Table
 
 
@@ -68,15 +76,16 @@ class Save(Protocol[A_contra]):
 class Analysis(Generic[A]):
     """One analysis.
 
-    needs: its name, the experiments whose runs suit it, and what a data file must hold;
+    needs: its name, the experiments whose runs suit it, and how it reads runs and data files; options: its own;
     analyze: what lies at the paths; recall: the same, from result.json where it holds; document: the content of
     result.json for a folder; save: see the function of that name; tables: for the terminal; svg: the figure; part: of a
     report.
     """
 
     needs: Needs[Any]
-    analyze: Callable[[Sequence[Path], Options], A]
-    recall: Callable[[Sequence[Path], Options], A]
+    options: type[InputOptions]
+    analyze: Callable[[Sequence[Path], Any], A]
+    recall: Callable[[Sequence[Path], Any], A]
     document: Callable[[A, Path], dict[str, Any]]
     save: Save[A]
     tables: Callable[[A], tuple[Table, ...]]
@@ -88,12 +97,24 @@ class Analysis(Generic[A]):
         """As in `levilab analyze NAME`."""
         return self.needs.analysis
 
+    def options_from(self, given: Mapping[str, Any]) -> InputOptions:
+        """Its options, out of those that were given, some of which belong to other analyses."""
+        own = {field.name for field in fields(self.options)}
+        return self.options(**{name: value for name, value in given.items() if name in own})
+
 
 def _spindown_svg(analysis: SpinDownAnalysis) -> str:
     from levilab.pipelines.spindown.figure import spindown_figure  # with matplotlib
     from levilab.present.style import as_svg
 
     return as_svg(spindown_figure(analysis))
+
+
+def _spin_svg(analysis: SpinAnalysis) -> str:
+    from levilab.pipelines.spin.figure import spin_figure  # with matplotlib
+    from levilab.present.style import as_svg
+
+    return as_svg(spin_figure(analysis))
 
 
 def _field_svg(analysis: FieldAnalysis) -> str:
@@ -106,6 +127,7 @@ def _field_svg(analysis: FieldAnalysis) -> str:
 _TABLE: tuple[Analysis[Any], ...] = (
     Analysis[SpinDownAnalysis](
         SPINDOWN_NEEDS,
+        SpinDownOptions,
         analyze_spindowns,
         recall_spindowns,
         as_document,
@@ -114,8 +136,20 @@ _TABLE: tuple[Analysis[Any], ...] = (
         _spindown_svg,
         spindown_part,
     ),
+    Analysis[SpinAnalysis](
+        SPIN_NEEDS,
+        SpinOptions,
+        analyze_spins,
+        recall_spins,
+        spin_document,
+        save_spin,
+        spin_tables,
+        _spin_svg,
+        spin_part,
+    ),
     Analysis[FieldAnalysis](
         FIELD_NEEDS,
+        FieldOptions,
         analyze_scans,
         recall_scans,
         field_document,
@@ -128,26 +162,33 @@ _TABLE: tuple[Analysis[Any], ...] = (
 ANALYSES = MappingProxyType({analysis.name: analysis for analysis in _TABLE})
 
 
-def analyze_suiting(paths: Sequence[Path], options: Options) -> list[tuple[Analysis[Any], Any]]:
-    """Each analysis that suits what lies at the paths, with what it found.  Raises DataError: none suits, or damage."""
-    return _suiting(lambda analysis: analysis.analyze(paths, options))
+def analyze_suiting(paths: Sequence[Path], given: Mapping[str, Any]) -> list[tuple[Analysis[Any], Any]]:
+    """Each analysis that suits what lies at the paths, with what it found.  Raises DataError: none suits, or damage.
+
+    Args:
+        paths: run folders, data files, folders to search.
+        given: options by their names, of any analysis.
+    """
+    return list(_suiting(lambda analysis: analysis.analyze(paths, analysis.options_from(given))))
 
 
-def recall_suiting(paths: Sequence[Path], options: Options) -> tuple[Analysis[Any], Any]:
+def recall_suiting(paths: Sequence[Path], given: Mapping[str, Any]) -> tuple[Analysis[Any], Any]:
     """The first analysis that suits, with what it found or had found before.  Raises DataError if none does."""
-    return _suiting(lambda analysis: analysis.recall(paths, options))[0]
+    return next(_suiting(lambda analysis: analysis.recall(paths, analysis.options_from(given))))
 
 
-def _suiting(run: Callable[[Analysis[Any]], Any]) -> list[tuple[Analysis[Any], Any]]:
-    found, errors = [], []
+def _suiting(run: Callable[[Analysis[Any]], Any]) -> Iterator[tuple[Analysis[Any], Any]]:
+    """What suits, one after the other, each carried out when it is asked for."""
+    errors: list[DoesNotSuit] = []
     for analysis in ANALYSES.values():
         try:
-            found.append((analysis, run(analysis)))
+            found = run(analysis)
         except DoesNotSuit as error:
             errors.append(error)
-    if not found:
+        else:
+            yield analysis, found
+    if len(errors) == len(ANALYSES):
         raise errors[0]
-    return found
 
 
 def save(analysis: Analysis[A], found: A, folder: Path | None = None) -> list[Path]:
@@ -157,7 +198,7 @@ def save(analysis: Analysis[A], found: A, folder: Path | None = None) -> list[Pa
     inputs, which may be of any kind, to the first row of all.  Every other analysis has its name in its result's.
     """
     run = found.sources[0].run if len(found.sources) == 1 else None
-    rows = [row for row in ANALYSES.values() if run is None or run.record.experiment in row.needs.experiments]
+    rows = [row for row in ANALYSES.values() if run is None or row.needs.take(run)]
     return analysis.save(found, folder, first=rows[0].name == analysis.name)
 
 

@@ -3,41 +3,34 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections import Counter
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, TypeVar
 
 from levilab.errors import DataError, DoesNotSuit
-from levilab.formats.table import Table, read_table
+from levilab.formats.waveforms.header import NoRate
+from levilab.formats.waveforms.record import SEARCHED
 from levilab.runs.run import READINGS, RECORD, Run, find_runs
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-    from pathlib import Path
-
-    from analysis.spindown.lawfit import Uncertainty
-    from levilab.formats.device import Device
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
 
 @dataclass(frozen=True)
-class Options:
-    """How to analyze.
+class InputOptions:
+    """How inputs are read, whatever is done with them; each analysis adds its own options.
 
-    columns: the data file's own names; reading_u: of every reading [Hz], in the place of what the data say;
-    bootstrap_samples, seed: of the bootstrap, where it is asked for.  Of scans of a field: device: what calliper and
-    data sheet say; height_m, height_u_m: where the top was seen to float; free_radii: let the scan move the radii.
+    columns: the data file's own names; channel: of a record with several; rate: samples per second [Hz], in the place
+    of what the file says; guess: whether a file without titles is taken for what it looks like.
     """
 
     columns: Mapping[str, str] | None = None
-    reading_u: float | None = None
-    uncertainty: Uncertainty = "covariance"
-    keep_outliers: bool = False
-    bootstrap_samples: int = 1000
-    seed: int = 0
-    device: Device | None = None
-    height_m: float | None = None
-    height_u_m: float | None = None
-    free_radii: bool = False
+    channel: str | None = None
+    rate: float | None = None
+    guess: bool = True
 
 
 class Readings(Protocol):
@@ -60,19 +53,27 @@ R = TypeVar("R", bound=Readings)
 class Needs(Generic[R]):
     """What an analysis needs of its inputs.
 
-    analysis: its name; experiments: those whose runs suit it; quantities: columns of a data file that it looks at;
-    read: from a table to readings, which raises DataError for what cannot be used.
+    analysis: its name; experiments: those whose runs suit it; read_file, read_run: to readings, which raise DoesNotSuit
+    for what is of another kind and DataError for what cannot be used; data: the file of a run that the readings come
+    from; also: whether a run of any experiment suits; wanted: such runs in words, where the experiment says too little.
     """
 
     analysis: str
     experiments: frozenset[str]
-    quantities: tuple[str, ...]
-    read: Callable[[Table], R]
+    read_file: Callable[[Path, InputOptions], R]
+    read_run: Callable[[Run, InputOptions], R]
+    data: str = READINGS
+    also: Callable[[Run], bool] | None = None
+    wanted: str = ""
 
     @property
     def runs(self) -> str:
         """Which runs suit, in words."""
-        return " or ".join(sorted(self.experiments))
+        return self.wanted or f"{' or '.join(sorted(self.experiments))} run"
+
+    def take(self, run: Run) -> bool:
+        """Whether a run suits."""
+        return run.record.experiment in self.experiments or bool(self.also and self.also(run))
 
 
 @dataclass(frozen=True)
@@ -112,28 +113,28 @@ class Found(Generic[R]):
 # --- finding the inputs --------------------------------------------------------------------------------
 
 
-def collect(paths: Sequence[Path], needs: Needs[R], columns: Callable[[Path], Mapping[str, str] | None]) -> Found[R]:
+def collect(paths: Sequence[Path], needs: Needs[R], options: Callable[[Path], InputOptions]) -> Found[R]:
     """What lies at the paths that suits an analysis, the same data once, and what was passed over.
 
-    A run folder or a file is taken, or refused with a reason; a folder is searched for runs, and what does not
-    suit there is passed over.  Raises DataError.
+    A run folder or a file is taken, or refused with a reason; a folder is searched for runs and data files, and what
+    does not suit there is passed over.  Raises DataError.
 
     Args:
         paths: run folders, data files, folders to search.
         needs: of the analysis.
-        columns: the names of the columns of a data file.
+        options: how an input is read.
     """
     found: list[Source[R]] = []
     warnings: list[str] = []
     remarks: list[str] = []
     for path in paths:
         if path.is_dir() and not (path / RECORD).exists():
-            here = _search(path, needs)
+            here = _search(path, needs, options)
             found += here.sources
             warnings += here.warnings
             remarks += here.remarks
         else:
-            found.append(_one(path, needs, columns))
+            found.append(_one(path, needs, options(path)))
     return Found(_named(_without_copies(found, warnings)), tuple(warnings), tuple(remarks))
 
 
@@ -159,32 +160,32 @@ def _named(sources: Sequence[Source[R]]) -> tuple[Source[R], ...]:
     return tuple(replace(source, name=name) for source, name in zip(sources, names, strict=True))
 
 
-def _one(path: Path, needs: Needs[R], columns: Callable[[Path], Mapping[str, str] | None]) -> Source[R]:
+def _one(path: Path, needs: Needs[R], options: InputOptions) -> Source[R]:
     if not path.exists():
         raise DataError(f"{path}: there is no such file or folder")
     if path.is_dir():
-        return _of_run(Run.load(path), needs)
-    if path.name == READINGS and (path.parent / RECORD).exists():
+        return _of_run(Run.load(path), needs, options)
+    if path.name == needs.data and (path.parent / RECORD).exists():
         try:
-            return _of_run(Run.load(path.parent), needs)
+            return _of_run(Run.load(path.parent), needs, options)
         except DataError:  # its record is damaged; that the readings can be saved is what they are text for
             doubt = f"{path}: its run.json cannot be used, so whether it is SYNTHETIC is not known"
-            source = _of_file(path, needs, columns(path))
+            source = _of_file(path, needs, options)
             return replace(source, warnings=(*source.warnings, doubt))
-    return _of_file(path, needs, columns(path))
+    return _of_file(path, needs, options)
 
 
-def _of_file(path: Path, needs: Needs[R], columns: Mapping[str, str] | None) -> Source[R]:
-    readings = needs.read(read_table(path, columns=columns, quantities=needs.quantities))
+def _of_file(path: Path, needs: Needs[R], options: InputOptions) -> Source[R]:
+    readings = needs.read_file(path, options)
     return Source(path, path, sha256_of(path), None, readings, path.name, readings.warnings)
 
 
-def _of_run(run: Run, needs: Needs[R]) -> Source[R]:
-    if run.record.experiment not in needs.experiments:
+def _of_run(run: Run, needs: Needs[R], options: InputOptions) -> Source[R]:
+    if not needs.take(run):
         kind = run.record.experiment
-        raise DoesNotSuit(f"{run.folder}: holds a {kind} run, {needs.analysis} needs a {needs.runs} run")
-    data = run.folder / READINGS
-    readings = needs.read(run.readings())
+        raise DoesNotSuit(f"{run.folder}: holds a {kind} run, {needs.analysis} needs a {needs.runs}")
+    data = run.folder / needs.data
+    readings = needs.read_run(run, options)
     return Source(run.folder, data, sha256_of(data), run, readings, run.folder.name, readings.warnings)
 
 
@@ -199,31 +200,63 @@ def sha256_of(path: Path) -> str:
         raise DataError(f"{path}: cannot be read ({error.strerror})") from error
 
 
-def _search(root: Path, needs: Needs[R]) -> Found[R]:
-    """The runs below a folder that suit; what is broken or too short is passed over with a warning."""
+def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]) -> Found[R]:
+    """The runs and data files below a folder that suit; what is broken or too short is passed over with a warning."""
     found: list[Source[R]] = []
     broken: list[str] = []
+    remarks: list[str] = []
     others: Counter[str] = Counter()
     for folder in find_runs(root):
+        chosen = options(folder)
         try:
             run = Run.load(folder)
-            if run.record.experiment in needs.experiments:
-                found.append(_of_run(run, needs))
+            if needs.take(run):
+                found.append(_of_run(run, needs, chosen))
             else:
                 others[run.record.experiment] += 1
         except DataError as error:
             broken.append(f"passed over: {error}")
+    files = data_files(root)
+    for file in files:
+        chosen = replace(options(file), guess=False)
+        with _passing_over(broken, remarks):
+            found.append(_of_file(file, needs, chosen))
     if not found:
-        text = f"{root}: {_nothing_found(root, needs, others, broken)}"
+        text = f"{root}: {_nothing_found(needs, others, broken, [file.name for file in files])}"
         raise DataError(text) if broken else DoesNotSuit(text)
     kinds = [f"passed over: {count} {kind} run{'s' * (count > 1)}" for kind, count in sorted(others.items())]
-    return Found(tuple(found), tuple(broken), tuple(kinds))
+    return Found(tuple(found), tuple(broken), (*kinds, *remarks))
 
 
-def _nothing_found(root: Path, needs: Needs[Any], others: Counter[str], broken: list[str]) -> str:
-    files = [path.name for path in sorted(root.iterdir()) if path.suffix.lower() in {".csv", ".txt", ".dat", ".tsv"}]
+@contextmanager
+def _passing_over(broken: list[str], remarks: list[str]) -> Iterator[None]:
+    """Note what is wrong with a data file that nobody named; one of another kind is of no concern."""
+    try:
+        yield
+    except NoRate as error:
+        remarks.append(f"passed over: {error}")
+    except DoesNotSuit:
+        return
+    except DataError as error:
+        broken.append(f"passed over: {error}")
+
+
+def data_files(root: Path) -> list[Path]:
+    """The files at or below a folder that may hold data, by name; those of runs belong to their runs."""
+    found, seen = [], set()
+    for folder, below, files in os.walk(root, followlinks=True):
+        real = os.path.realpath(folder)
+        if real in seen or RECORD in files:
+            below.clear()
+            continue
+        seen.add(real)
+        found += [Path(folder) / name for name in files if Path(name).suffix.casefold() in SEARCHED]
+    return sorted(found)
+
+
+def _nothing_found(needs: Needs[Any], others: Counter[str], broken: list[str], files: list[str]) -> str:
     seen = [f"{count} {kind} run{'s' * (count > 1)}" for kind, count in sorted(others.items())]
     seen += [f"{len(broken)} that cannot be used, as {broken[0].removeprefix('passed over: ')}"] if broken else []
     seen += [f"{len(files)} data file{'s' * (len(files) > 1)}, as {files[0]}"] if files else []
     what = f"found only {'; '.join(seen)}" if seen else "found nothing"
-    return f"no {needs.runs} run to analyze in this folder ({what}); name a run folder or a data file"
+    return f"no {needs.runs} to analyze in this folder ({what}); name a run folder or a data file"

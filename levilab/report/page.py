@@ -6,18 +6,17 @@ Nothing is fetched when it is opened, and everything that a person typed is esca
 from __future__ import annotations
 
 import base64
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from levilab.errors import UsageError, unquoted
 from levilab.files import CannotWrite, replace_atomically
 from levilab.pipelines.catalogue import Analysis, Analyzed, recall_suiting
-from levilab.pipelines.sources import Options
 from levilab.report.inputs import describe
 from levilab.runs.run import utc_now
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
 A = TypeVar("A", bound=Analyzed)
@@ -27,16 +26,17 @@ class UnknownFormat(UsageError):
     """A report in a format that is not written."""
 
 
-def write_report(paths: Sequence[Path], output: Path, options: Options | None = None) -> Path:
+def write_report(paths: Sequence[Path], output: Path, given: Mapping[str, Any] | None = None) -> Path:
     """Report what was found of the inputs at the paths; what has no result yet is analyzed, and nothing is stored.
 
-    Options at their defaults are not given, see `levilab.pipelines.spindown.document.recall_spindowns`.
+    given: options by their names; those at their defaults count as not given, see
+    `levilab.pipelines.spindown.document.recall_spindowns`.
     Raises DataError, UnknownFormat, CannotWrite.
     """
     if output.suffix.lower() not in {".html", ".htm"}:
         expected = "reports are written as HTML, name the file report.html; a browser prints it to PDF"
         raise UnknownFormat("output", expected, value=output)
-    page = render(*recall_suiting(paths, options or Options()))
+    page = render(*recall_suiting(paths, given or {}))
     try:
         output.parent.mkdir(parents=True, exist_ok=True)
         replace_atomically(output, page)

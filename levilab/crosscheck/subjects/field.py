@@ -9,7 +9,7 @@ import numpy as np
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquired, pull_of
 from levilab.formats.device import Device
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.sources import Options
+from levilab.pipelines.field.device import FieldOptions
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import Scene
 from levilab.world.base import drawn_base
@@ -60,12 +60,12 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     ]
 
 
-def _options(top: dict[str, float], **where: float) -> Options:
+def _options(top: dict[str, float], **where: float) -> FieldOptions:
     inertias = {"inertia_transverse_kg_m2": 1.04e-6, "inertia_axial_kg_m2": 1.731314e-6}
-    return Options(device=Device.model_validate({"top": top | inertias}), **where)  # type: ignore[arg-type]
+    return FieldOptions(device=Device.model_validate({"top": top | inertias}), **where)  # type: ignore[arg-type]
 
 
-def _values(folder: Path, options: Options) -> dict[str, Any]:
+def _values(folder: Path, options: FieldOptions) -> dict[str, Any]:
     """What the analysis says of a run, as result.json has it."""
     analysis = ANALYSES["field"]
     values: dict[str, Any] = analysis.document(analysis.analyze([folder], options), folder)["values"]

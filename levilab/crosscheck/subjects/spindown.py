@@ -11,7 +11,6 @@ import numpy as np
 from instruments.clock import VirtualClock
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquired, pull_of
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.sources import Options
 from levilab.simulator.scene import Scene
 from levilab.simulator.single import simulate
 from levilab.simulator.spin import DECAYS
@@ -82,7 +81,7 @@ class Fitted:
 def spindown_of(folder: Path) -> Fitted:
     """The analysis of a run."""
     analysis = ANALYSES["spindown"]
-    (run,) = analysis.document(analysis.analyze([folder], Options()), folder)["runs"]
+    (run,) = analysis.document(analysis.analyze([folder], analysis.options_from({})), folder)["runs"]
     return Fitted({model["name"]: model for model in run["models"]}, run["values"]["start_time"]["value"])
 
 

@@ -11,11 +11,11 @@ from analysis.field.fit import LEARNS_NOTHING, fit_scan
 from analysis.field.floating import FERRITE_PER_K, Floating, follow
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
-from levilab.pipelines.field.device import known_of, known_top, usual
+from levilab.pipelines.field.device import FieldOptions, known_of, known_top, usual
 from levilab.pipelines.field.quantities import SHOWN
-from levilab.pipelines.field.readings import FieldReadings, field_readings
+from levilab.pipelines.field.readings import FieldReadings, read_scan_file, read_scan_run
 from levilab.pipelines.result import Place, place_of
-from levilab.pipelines.sources import Needs, Options, Source, collect
+from levilab.pipelines.sources import Needs, Source, collect
 from levilab.present.numbers import with_uncertainty
 from levilab.runs.run import find_run
 
@@ -31,8 +31,8 @@ FIELD = "field"
 NEEDS = Needs(
     analysis=FIELD,
     experiments=frozenset({"field"}),
-    quantities=("height_m", "height_u_m", "flux_density_t", "flux_density_u_t"),
-    read=field_readings,
+    read_file=read_scan_file,
+    read_run=read_scan_run,
 )
 #: Correlations above this are worth a word.
 _STRONG = 0.9
@@ -42,7 +42,7 @@ _STRONG = 0.9
 class Origin:
     """Where the fit of one run comes from.  options: how it was made; text: for people."""
 
-    options: Options
+    options: FieldOptions
     text: str = "analyzed now"
 
 
@@ -84,7 +84,7 @@ class FieldAnalysis:
 
     sources: tuple[Source[FieldReadings], ...]
     runs: tuple[FieldRun, ...]
-    options: Options
+    options: FieldOptions
     place: Place
     warnings: tuple[str, ...]
     remarks: tuple[str, ...]
@@ -121,10 +121,10 @@ class FieldAnalysis:
         return list(dict.fromkeys(texts))
 
 
-def analyze_scans(paths: Sequence[Path], options: Options) -> FieldAnalysis:
+def analyze_scans(paths: Sequence[Path], options: FieldOptions) -> FieldAnalysis:
     """Fit the field of a ring to every scan found at the paths.  Raises DataError for what cannot be used."""
     paths = [find_run(path) for path in paths]
-    found = collect(paths, NEEDS, lambda _: options.columns)
+    found = collect(paths, NEEDS, lambda _: options)
     runs = tuple(analyze_source(source, options) for source in found.sources)
     return FieldAnalysis(
         sources=found.sources,
@@ -137,7 +137,7 @@ def analyze_scans(paths: Sequence[Path], options: Options) -> FieldAnalysis:
     )
 
 
-def analyze_source(source: Source[FieldReadings], options: Options) -> FieldRun:
+def analyze_source(source: Source[FieldReadings], options: FieldOptions) -> FieldRun:
     """One input fitted, and what follows.  Raises DataError, which names the file."""
     readings = source.readings
     known = known_of(source, options.device)
@@ -164,7 +164,7 @@ def analyze_source(source: Source[FieldReadings], options: Options) -> FieldRun:
     return FieldRun(scan, top, floating, _in_words(scan, floating), every)
 
 
-def about_inputs(sources: Sequence[Source[FieldReadings]], options: Options) -> Iterable[str]:
+def about_inputs(sources: Sequence[Source[FieldReadings]], options: FieldOptions) -> Iterable[str]:
     """What to know of the inputs before using the numbers."""
     synthetic = sum(source.synthetic for source in sources)
     if 0 < synthetic < len(sources):

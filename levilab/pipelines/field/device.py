@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,12 +15,28 @@ from analysis.top import Cylinder, Top, top_of
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.formats.device import BaseTable, Device
+from levilab.pipelines.sources import InputOptions
 from levilab.settings import in_one_line
 
 if TYPE_CHECKING:
     from levilab.formats.device import TopTable
     from levilab.pipelines.field.readings import FieldReadings
-    from levilab.pipelines.sources import Options, Source
+    from levilab.pipelines.sources import Source
+
+
+@dataclass(frozen=True)
+class FieldOptions(InputOptions):
+    """How scans are analyzed.
+
+    device: what calliper and data sheet say; height_m, height_u_m: where the top was seen to float; free_radii: let the
+    scan move the radii.
+    """
+
+    device: Device | None = None
+    height_m: float | None = None
+    height_u_m: float | None = None
+    free_radii: bool = False
+
 
 #: The thesis's top: what is taken where nothing is known, with a warning.
 THESIS = {"transverse": (1.04e-6, "kg m^2"), "axial": (1.731314e-6, "kg m^2"), "moment": (0.714, "A m^2")}
@@ -92,7 +109,7 @@ def parts_of(top: TopTable) -> list[Cylinder]:
     ]
 
 
-def known_top(options: Options, height_u: float | None) -> tuple[KnownTop, list[str]]:
+def known_top(options: FieldOptions, height_u: float | None) -> tuple[KnownTop, list[str]]:
     """What is known of the top, the thesis's where nothing is, and what to know of that.
 
     height_u: standard uncertainty of the scan's heights [m].  Raises ImpossibleCylinder.

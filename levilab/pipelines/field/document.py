@@ -26,6 +26,7 @@ from levilab.pipelines.field.analysis import (
     about_inputs,
     analyze_source,
 )
+from levilab.pipelines.field.device import FieldOptions
 from levilab.pipelines.result import (
     ANEW,
     SCHEMA,
@@ -40,7 +41,7 @@ from levilab.pipelines.result import (
     relative,
 )
 from levilab.pipelines.result import save as save_files
-from levilab.pipelines.sources import Options, Source, collect
+from levilab.pipelines.sources import Source, collect
 from levilab.runs.run import find_run
 from levilab.software import software_versions
 
@@ -149,9 +150,9 @@ class SettingsPart(Part):
     free_radii: bool
 
     @property
-    def options(self) -> Options:
+    def options(self) -> FieldOptions:
         """The same as options."""
-        return Options(
+        return FieldOptions(
             columns=self.columns or None,
             device=self.device,
             height_m=self.height_m,
@@ -213,7 +214,7 @@ def result_of(analysis: FieldAnalysis, place: Place) -> FieldResult:
     return FieldResult.model_validate(finite(document))
 
 
-def _settings(options: Options) -> dict[str, Any]:
+def _settings(options: FieldOptions) -> dict[str, Any]:
     return {
         "columns": dict(options.columns or {}),
         "device": options.device.model_dump(mode="json", exclude_unset=True) if options.device else None,
@@ -281,7 +282,7 @@ def _value(estimate: Estimate) -> dict[str, Any]:
 # --- reading -------------------------------------------------------------------------------------------
 
 
-def recall_scans(paths: Sequence[Path], options: Options) -> FieldAnalysis:
+def recall_scans(paths: Sequence[Path], options: FieldOptions) -> FieldAnalysis:
     """What `analyze` found at the paths, from its result.json; analyzed anew is only what has none that holds.
 
     A result holds as long as the readings are the same bytes, and it was made with the given options.  Options that are
@@ -291,14 +292,14 @@ def recall_scans(paths: Sequence[Path], options: Options) -> FieldAnalysis:
     """
     paths = [find_run(path) for path in paths]
     archive = Archive(paths, FieldResult)
-    defaults = {one.name: one.default for one in fields(Options)}
+    defaults = {one.name: one.default for one in fields(FieldOptions)}
     given = {name: value for name in _OPTIONS if (value := getattr(options, name)) != defaults[name]}
 
-    def columns(path: Path) -> Mapping[str, str] | None:
+    def reading(path: Path) -> FieldOptions:
         earlier = archive.earlier(path, path)
-        return options.columns or (earlier.result.settings.options.columns if earlier else None)
+        return replace(earlier.result.settings.options, **given) if earlier else options
 
-    found = collect(paths, NEEDS, columns)
+    found = collect(paths, NEEDS, reading)
     recalled = [_recalled(source, archive, given) for source in found.sources]
     return FieldAnalysis(
         sources=tuple(source for source, _, _ in recalled),
@@ -319,7 +320,7 @@ def _recalled(
         given = {name: value for name, value in given.items() if name != "columns"}
     earlier = archive.earlier(source.path, source.data, source.sha256)
     if earlier is None:
-        options = Options(**given)
+        options = FieldOptions(**given)
         return (
             source,
             analyze_source(source, options),

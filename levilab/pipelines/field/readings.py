@@ -8,11 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from levilab.formats.columns import TableError
+from levilab.formats.table import read_table
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from numpy.typing import NDArray
 
     from levilab.formats.table import Table
+    from levilab.pipelines.sources import InputOptions
+    from levilab.runs.run import Run
 
     Array = NDArray[np.float64]
 
@@ -86,3 +91,17 @@ def _must_be_in_range(table: Table, values: Array, most: float, what: str, *, un
             f"another one, say so, as `columns` = {column}",
             line=int(table.lines[wrong[0]]),
         )
+
+
+#: Columns of a table that are looked at.
+QUANTITIES = ("height_m", "height_u_m", "flux_density_t", "flux_density_u_t")
+
+
+def read_scan_file(path: Path, options: InputOptions) -> FieldReadings:
+    """The scan in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
+    return field_readings(read_table(path, columns=options.columns, quantities=QUANTITIES, guess=options.guess))
+
+
+def read_scan_run(run: Run, _: InputOptions) -> FieldReadings:
+    """The scan of a run."""
+    return field_readings(run.readings())

@@ -10,29 +10,46 @@ from analysis.spindown.combine import Combined, combine, tilt_demanded
 from analysis.spindown.fit import SpinDown, fit_spin_down
 from levilab.errors import DataError
 from levilab.pipelines.result import Place, place_of
-from levilab.pipelines.sources import Needs, Options, Source, collect
-from levilab.pipelines.spindown.readings import Readings, spin_readings
+from levilab.pipelines.sources import InputOptions, Needs, Source, collect
+from levilab.pipelines.spindown.readings import Readings, read_run_readings, read_spin_file
 from levilab.runs.run import find_run
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from pathlib import Path
 
+    from analysis.spindown.lawfit import Uncertainty
+
 SPINDOWN = "spindown"
-#: The runs that suit, and what is needed of a data file.
+#: The runs and files that suit.
 NEEDS = Needs(
     analysis=SPINDOWN,
     experiments=frozenset({"spin"}),
-    quantities=("time_s", "spin_frequency_hz", "spin_frequency_u_hz"),
-    read=spin_readings,
+    read_file=read_spin_file,
+    read_run=read_run_readings,
 )
+
+
+@dataclass(frozen=True)
+class SpinDownOptions(InputOptions):
+    """How spin-downs are analyzed.
+
+    reading_u: of every reading [Hz], in the place of what the data say; bootstrap_samples, seed: of the bootstrap,
+    where it is asked for.
+    """
+
+    reading_u: float | None = None
+    uncertainty: Uncertainty = "covariance"
+    keep_outliers: bool = False
+    bootstrap_samples: int = 1000
+    seed: int = 0
 
 
 @dataclass(frozen=True)
 class Origin:
     """Where the fits of one run come from.  options: how they were made; text: for people."""
 
-    options: Options
+    options: SpinDownOptions
     text: str = "analyzed now"
 
 
@@ -47,7 +64,7 @@ class SpinDownAnalysis:
     sources: tuple[Source[Readings], ...]
     runs: tuple[SpinDown, ...]
     combined: Combined
-    options: Options
+    options: SpinDownOptions
     place: Place
     warnings: tuple[str, ...]
     remarks: tuple[str, ...]
@@ -77,13 +94,13 @@ class SpinDownAnalysis:
         return list(dict.fromkeys(texts))
 
 
-def analyze_spindowns(paths: Sequence[Path], options: Options) -> SpinDownAnalysis:
+def analyze_spindowns(paths: Sequence[Path], options: SpinDownOptions) -> SpinDownAnalysis:
     """Fit the drag laws to every spin-down found at the paths.
 
     Raises DataError for what cannot be used; the text names the file.
     """
     paths = [find_run(path) for path in paths]
-    found = collect(paths, NEEDS, lambda _: options.columns)
+    found = collect(paths, NEEDS, lambda _: options)
     runs = tuple(fit_source(source, options) for source in found.sources)
     if tilt_demanded(runs):
         runs = tuple(
@@ -102,7 +119,7 @@ def analyze_spindowns(paths: Sequence[Path], options: Options) -> SpinDownAnalys
     )
 
 
-def fit_source(source: Source[Readings], options: Options, *, tilt: bool | None = None) -> SpinDown:
+def fit_source(source: Source[Readings], options: SpinDownOptions, *, tilt: bool | None = None) -> SpinDown:
     """All laws fitted to one input.  Raises DataError, which names the file.
 
     tilt: whether the count has the top's tilt; None: if the readings demand it.
@@ -123,7 +140,7 @@ def fit_source(source: Source[Readings], options: Options, *, tilt: bool | None 
         raise DataError(f"{source.data}: {error}") from error
 
 
-def about_inputs(sources: Sequence[Source[Readings]], options: Options) -> Iterable[str]:
+def about_inputs(sources: Sequence[Source[Readings]], options: SpinDownOptions) -> Iterable[str]:
     """What to know of the inputs before using the numbers."""
     synthetic = sum(source.synthetic for source in sources)
     if 0 < synthetic < len(sources):

@@ -33,12 +33,13 @@ from levilab.pipelines.result import (
     relative,
 )
 from levilab.pipelines.result import save as save_files
-from levilab.pipelines.sources import Found, Options, Source, collect
+from levilab.pipelines.sources import Found, Source, collect
 from levilab.pipelines.spindown.analysis import (
     NEEDS,
     SPINDOWN,
     Origin,
     SpinDownAnalysis,
+    SpinDownOptions,
     about_inputs,
     fit_source,
 )
@@ -221,18 +222,28 @@ class SettingsPart(Part):
     """How the readings were analyzed."""
 
     columns: dict[str, str]
+    channel: str | None = None
+    rate_hz: float | None = Field(default=None, gt=0)
     reading_u_hz: float | None = Field(gt=0)
     uncertainty: Literal["covariance", "profile", "bootstrap"]
     keep_outliers: bool
     bootstrap: BootstrapPart | None
 
     @property
-    def options(self) -> Options:
+    def options(self) -> SpinDownOptions:
         """The same as options."""
         drawn: dict[str, Any] = (
             {"bootstrap_samples": self.bootstrap.samples, "seed": self.bootstrap.seed} if self.bootstrap else {}
         )
-        return Options(self.columns or None, self.reading_u_hz, self.uncertainty, self.keep_outliers, **drawn)
+        return SpinDownOptions(
+            columns=self.columns or None,
+            channel=self.channel,
+            rate=self.rate_hz,
+            reading_u=self.reading_u_hz,
+            uncertainty=self.uncertainty,
+            keep_outliers=self.keep_outliers,
+            **drawn,
+        )
 
 
 class SpinDownResult(Result, _WithLaws):
@@ -285,10 +296,12 @@ def result_of(analysis: SpinDownAnalysis, place: Place) -> SpinDownResult:
     return SpinDownResult.model_validate(finite(document | said))
 
 
-def _settings(options: Options) -> dict[str, Any]:
+def _settings(options: SpinDownOptions) -> dict[str, Any]:
     drawn = {"samples": options.bootstrap_samples, "seed": options.seed}
     return {
         "columns": dict(options.columns or {}),
+        "channel": options.channel,
+        "rate_hz": options.rate,
         "reading_u_hz": options.reading_u,
         "uncertainty": options.uncertainty,
         "keep_outliers": options.keep_outliers,
@@ -407,7 +420,11 @@ def _some(statistics: Statistics, part: type[Part]) -> dict[str, Any]:
 # --- reading -------------------------------------------------------------------------------------------
 
 
-def recall_spindowns(paths: Sequence[Path], options: Options) -> SpinDownAnalysis:
+#: Options that say nothing about runs, whose columns are known.
+_OF_FILES = frozenset({"columns", "channel", "rate"})
+
+
+def recall_spindowns(paths: Sequence[Path], options: SpinDownOptions) -> SpinDownAnalysis:
     """What `analyze` found at the paths, from its result.json; analyzed anew is only what has none that holds.
 
     A result holds as long as the readings are the same bytes, and it was made with the given options.  Options that are
@@ -417,17 +434,17 @@ def recall_spindowns(paths: Sequence[Path], options: Options) -> SpinDownAnalysi
     """
     paths = [find_run(path) for path in paths]
     archive = Archive(paths, SpinDownResult)
-    given = {f.name: getattr(options, f.name) for f in fields(Options) if getattr(options, f.name) != f.default}
+    given = {f.name: getattr(options, f.name) for f in fields(SpinDownOptions) if getattr(options, f.name) != f.default}
 
-    def columns(path: Path) -> Mapping[str, str] | None:
+    def reading(path: Path) -> SpinDownOptions:
         earlier = archive.earlier(path, path)
-        return options.columns or (earlier.result.settings.options.columns if earlier else None)
+        return replace(earlier.result.settings.options, **given) if earlier else options
 
-    found = collect(paths, NEEDS, columns)
+    found = collect(paths, NEEDS, reading)
     place = place_of(paths, found.sources)
     whole = archive.whole(found.sources)
     if all(source.run for source in found.sources):
-        given.pop("columns", None)
+        given = {name: value for name, value in given.items() if name not in _OF_FILES}
     if whole and _holds(whole[1].settings.options, given):
         return _restored(whole[1], whole[0], found, place)
     recalled = [_recalled(source, archive, given) for source in found.sources]
@@ -445,7 +462,7 @@ def recall_spindowns(paths: Sequence[Path], options: Options) -> SpinDownAnalysi
     )
 
 
-def _holds(made_with: Options, given: Mapping[str, Any]) -> bool:
+def _holds(made_with: SpinDownOptions, given: Mapping[str, Any]) -> bool:
     return _settings(replace(made_with, **given)) == _settings(made_with)
 
 
@@ -454,10 +471,10 @@ def _recalled(
 ) -> tuple[Source[Readings], SpinDown, Origin]:
     """One input: what was found of it, or its fit."""
     if source.run:  # the columns of a run are known
-        given = {name: value for name, value in given.items() if name != "columns"}
+        given = {name: value for name, value in given.items() if name not in _OF_FILES}
     earlier = archive.earlier(source.path, source.data, source.sha256)
     if earlier is None:
-        options = Options(**given)
+        options = SpinDownOptions(**given)
         return source, fit_source(source, options), Origin(options, "analyzed for this page: there was no result yet")
     made_with = earlier.result.settings.options
     if earlier.sha256 == source.sha256 and _holds(made_with, given):
@@ -520,7 +537,7 @@ def _mean(value: Value) -> Mean:
     )
 
 
-def _spin_down(part: SpinDownPart, source: Source[Readings], options: Options, file: Path) -> SpinDown:
+def _spin_down(part: SpinDownPart, source: Source[Readings], options: SpinDownOptions, file: Path) -> SpinDown:
     """One run; its curves and what they leave over from the readings."""
     readings = source.readings
     outliers = [one.index for one in part.outliers]

@@ -5,11 +5,31 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.errors import AnalysisError
+from analysis.pulses import phases, track_of_blocks, track_of_times
+from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
-from levilab.formats.table import FEWEST, Table
+from levilab.formats.table import FEWEST, Table, read_table
+from levilab.formats.waveforms.header import NoRate, NoWaveform
+from levilab.formats.waveforms.record import read_record
+from levilab.formats.waveforms.waveform import PulseTimes
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from numpy.typing import NDArray
+
+    from analysis.pulses import Track
+    from levilab.formats.waveforms.waveform import Waveform
+    from levilab.pipelines.sources import InputOptions
+    from levilab.runs.run import Run
+
+#: Columns of a table that are looked at.
+QUANTITIES = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
+#: Length of a window of a record, in which its frequency is one reading [s].
+WINDOW_S = 2.0
+#: A record whose spin falls by less than this part is no spin-down: in 6 s, a top that coasts loses twice as much.
+LEAST_FALL = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +54,80 @@ class Readings:
 
 #: Relative: units and printed digits round in about the tenth digit, but no two runs agree so far in all readings.
 SAME = 1e-9
+
+
+def read_run_readings(run: "Run", _: "InputOptions") -> Readings:
+    """The readings of a run."""
+    return spin_readings(run.readings())
+
+
+def read_spin_file(path: "Path", options: "InputOptions") -> Readings:
+    """The readings in a data file: a table of them, or a long record of a signal or of pulse times.
+
+    Raises:
+        DoesNotSuit: it holds neither.
+        DataError: it cannot be used.
+    """
+    try:
+        record = read_record(path, columns=options.columns, rate=options.rate, guess=options.guess)
+    except NoRate as error:
+        if not options.guess:
+            raise DoesNotSuit(str(error)) from error
+        if path.suffix.casefold() == ".npy":
+            raise
+    except NoWaveform:
+        pass
+    except DataError as error:
+        if not options.guess:  # a damaged record that nobody called a spin-down
+            raise DoesNotSuit(str(error)) from error
+        raise
+    else:
+        return record_readings(record, options)
+    return spin_readings(read_table(path, columns=options.columns, quantities=QUANTITIES, guess=options.guess))
+
+
+def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") -> Readings:
+    """The frequency in each window of a long record, while the top coasts.
+
+    Raises:
+        DoesNotSuit: it is too short for a spin-down, or the spin does not fall.
+        DataError: there are no pulses in it.
+    """
+    path = record.path
+    times = record.times if isinstance(record, PulseTimes) else None
+    duration = record.duration if not isinstance(record, PulseTimes) else float(record.times[-1] - record.times[0])
+    if duration < FEWEST * WINDOW_S:
+        expected = f"a spin-down needs {FEWEST} windows of {WINDOW_S:g} s at least: `levilab analyze spin` reads it"
+        raise DoesNotSuit(f"{path}: lasts {duration:.3g} s, {expected}")
+    try:
+        if isinstance(record, PulseTimes):
+            track = track_of_times(record.times, window=WINDOW_S)
+        else:
+            blocks = record.blocks(options.channel)
+            track = track_of_blocks(blocks, record.rate, start=record.start, window=WINDOW_S)
+    except AnalysisError as error:
+        raise (DataError if options.guess else DoesNotSuit)(f"{path}: {error}") from error
+    first, last = _coasting(track)
+    start, end = track.frequency[first], track.frequency[last - 1]
+    if last - first < FEWEST or end > (1 - LEAST_FALL) * start:
+        seen = f"the spin in it goes from {start:.6g} Hz to {end:.6g} Hz in {last - first} windows of {WINDOW_S:g} s"
+        expected = "a falling spin is expected: is the drive still on? `levilab analyze spin` reads it"
+        raise DoesNotSuit(f"{path}: {seen}, {expected}")
+    notes = [f"{path.name}: {note.text}" for note in track.notes]
+    what = f"{path.name}: a {'list of pulse times' if times is not None else 'record'} of {duration:.3g} s: "
+    told = [f"{what}each reading is the frequency in a window of {WINDOW_S:g} s"]
+    if last - first < len(track.time):
+        span = f"{track.time[first]:.1f} s to {track.time[last - 1]:.1f} s"
+        told.append(f"{path.name}: the top coasts from {span}; the windows before and after are left out")
+    part = slice(first, last)
+    return Readings(track.time[part], track.frequency[part], track.u[part], (*record.warnings, *told, *notes))
+
+
+def _coasting(track: "Track") -> tuple[int, int]:
+    """The windows of the longest phase in which the top coasts, from the first to behind the last; all without one."""
+    coasting = [phase.windows for phase in phases(track) if phase.kind == "coasting"]
+    first, last = max(coasting, key=lambda ends: ends[1] - ends[0], default=(0, len(track.time)))
+    return (first, last) if last - first >= FEWEST else (0, len(track.time))
 
 
 def spin_readings(table: Table, *, fewest: int = FEWEST) -> Readings:

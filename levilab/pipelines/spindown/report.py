@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from analysis.spindown.combine import CombinedLaw, Mean
     from analysis.spindown.fit import SpinDown
-    from levilab.pipelines.sources import Options, Source
-    from levilab.pipelines.spindown.analysis import SpinDownAnalysis
+    from levilab.pipelines.sources import Source
+    from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions
     from levilab.pipelines.spindown.readings import Readings
 
 #: Readings printed in the page; more stay in the run folder.  They stand in blocks side by side.
@@ -159,7 +159,7 @@ def scatter(mean: Mean) -> Estimate | None:
 # --- one input -----------------------------------------------------------------------------------------
 
 
-def _in_words(source: Source[Readings], fit: SpinDown, options: Options) -> tuple[str, ...]:
+def _in_words(source: Source[Readings], fit: SpinDown, options: SpinDownOptions) -> tuple[str, ...]:
     count, outliers = len(source.readings), len(fit.outliers)
     text = f"{count} readings"
     if outliers:
@@ -169,7 +169,7 @@ def _in_words(source: Source[Readings], fit: SpinDown, options: Options) -> tupl
     return f"{text}; {span}", _uncertainty(source, fit, options)
 
 
-def _uncertainty(source: Source[Readings], fit: SpinDown, options: Options) -> str:
+def _uncertainty(source: Source[Readings], fit: SpinDown, options: SpinDownOptions) -> str:
     """How large u of a reading is, and where it comes from."""
     if fit.u is None:
         return "u of a reading: not known, taken from the scatter about each law"
@@ -182,7 +182,7 @@ def _uncertainty(source: Source[Readings], fit: SpinDown, options: Options) -> s
     return f"u of a reading: {size}, {origin or 'from a column of the data'}"
 
 
-def _readings(source: Source[Readings], fit: SpinDown, options: Options) -> Mapping[str, object]:
+def _readings(source: Source[Readings], fit: SpinDown, options: SpinDownOptions) -> Mapping[str, object]:
     """The first readings in blocks; rows of time [s], spin [Hz] and u [Hz]."""
     readings, given_u = source.readings, options.reading_u
     shown = min(len(readings), MOST_READINGS)

@@ -446,8 +446,7 @@ def test_a_real_run_is_gone_on_with_by_the_time_on_the_wall(tmp_path: Path) -> N
 
 
 def test_a_spin_down_in_full_motion_has_the_drag_of_its_scene(tmp_path: Path) -> None:
-    from levilab.pipelines.sources import Options
-    from levilab.pipelines.spindown.analysis import analyze_spindowns
+    from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
     from levilab.simulator import preset
 
     run = acquire(mock(tmp_path, scene="spindown"), Silent())
@@ -457,7 +456,7 @@ def test_a_spin_down_in_full_motion_has_the_drag_of_its_scene(tmp_path: Path) ->
     assert 22.5 < spins.iloc[-1] < 26
     assert run.record.configuration["scene"] == preset("spindown").as_table()
     assert "full motion" in str(run.record.synthetic_how)
-    disc = analyze_spindowns([run.folder], Options()).runs[0].fit("disc").parameters["c32"]
+    disc = analyze_spindowns([run.folder], SpinDownOptions()).runs[0].fit("disc").parameters["c32"]
     # 1.2 % less than the scene's: towards its resonance at 22 Hz the wobble takes part of the energy
     assert disc.value == pytest.approx(0.988 * 2.34e-4, rel=0.008)
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 SAMPLE = str(SAMPLE_DATA / "spin-down-1")
+SCOPE = str(SAMPLE_DATA / "scope-files" / "rigol-ds1000z.csv")
 
 #: The command → what its line says. What stands in "file" is a file, in "bench.toml" a bench that is not there.
 WRONG_USAGE = {
@@ -29,6 +30,8 @@ WRONG_USAGE = {
     f"analyze spindown {SAMPLE} --reading-u nan": "--reading-u nan: ",
     f"analyze spindown {SAMPLE} --columns t": "--columns 't': ",
     f"analyze spindown {SAMPLE} --columns speed=f": "--columns: 'speed' is no quantity",
+    f"analyze spin {SCOPE} --rate -1": "--rate -1: ",
+    f"analyze spin {SCOPE} --channel CH7": "--channel 'CH7': ",
     f"report {SAMPLE} --reading-u inf": "--reading-u inf: ",
     f"report {SAMPLE} --columns t=": "--columns 't=': ",
     f"report {SAMPLE} -o x.docx": "--output x.docx: ",

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     Command = Callable[..., subprocess.CompletedProcess[str]]
 
-COMMANDS = ["", "acquire", "acquire spin", "analyze", "analyze spindown", "report", "simulate", "runs"]
+COMMANDS = ["", "acquire", "acquire spin", "analyze", "analyze spindown", "analyze spin", "report", "simulate", "runs"]
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -81,20 +81,36 @@ def test_no_save_writes_nothing_and_out_writes_there(levilab: Command, tmp_path:
 
 
 def test_an_analysis_need_not_be_named(levilab: Command, sample_data: Path) -> None:
-    runs = [sample_data / "spin-down-1", sample_data / "spin-down-2"]
-    named = levilab("analyze", "spindown", *runs, "--no-save")
-    assert levilab("analyze", *runs, "--no-save").stdout == named.stdout
-    assert levilab("analyze", "--no-save", *runs).stdout == named.stdout
-    assert json.loads(levilab("analyze", *runs, "--no-save", "--json").stdout)["analysis"] == "spindown"
-    assert "Did you mean 'spindown'?" in levilab("analyze", "spindwon", check=2).stderr
+    run = sample_data / "spin-down-1"
+    named = levilab("analyze", "spindown", run, "--no-save")
+    assert levilab("analyze", run, "--no-save").stdout == named.stdout
+    assert levilab("analyze", "--no-save", run).stdout == named.stdout
+    each = json.loads(levilab("analyze", sample_data, "--no-save", "--json").stdout)
+    assert [(one["analysis"], len(one["runs"])) for one in each] == [("spindown", 4), ("spin", 13), ("field", 1)]
+    assert "Did you mean 'spindown'" in levilab("analyze", "spindwon", check=2).stderr
 
 
 def test_options_may_stand_before_the_name_of_an_analysis(levilab: Command, sample_data: Path) -> None:
     named = levilab("analyze", "spindown", sample_data, "--no-save").stdout
     for first in (["--out", "spindown"], ["--out=there"], ["--no-save"], ["--uncertainty", "covariance"]):
         assert levilab("analyze", *first, "spindown", sample_data, "--no-save").stdout == named
-    assert "Did you mean 'spindown'?" in levilab("analyze", "--out", "there", "spindwon", check=2).stderr
+    assert "Did you mean 'spindown'" in levilab("analyze", "--out", "there", "spindwon", check=2).stderr
     assert "spindown: there is no such file" in levilab("analyze", "--no-save", "--", "spindown", check=1).stderr
+
+
+def test_the_spin_of_a_record_is_printed_and_written_beside_it(
+    levilab: Command, sample_data: Path, tmp_path: Path
+) -> None:
+    path = shutil.copy(sample_data / "scope-files" / "rigol-ds1000z.csv", tmp_path)
+    done = levilab("analyze", "spin", path)
+    assert "The spin is 30.0009(4) Hz" in done.stdout
+    assert "--channel chooses another" in " ".join(done.stdout.split())
+    for name in ("rigol-ds1000z.csv.result.spin.json", "rigol-ds1000z.csv.spin.png"):
+        assert (tmp_path / name).stat().st_size > 1000
+    levilab("report", path, "-o", "page.html")
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "as levilab analyze found it" in page
+    assert "30.0009(4)" in page
 
 
 def test_notes_name_options_on_the_terminal_and_quantities_where_stored(

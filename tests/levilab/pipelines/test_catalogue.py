@@ -15,8 +15,7 @@ from levilab.pipelines import catalogue
 from levilab.pipelines.catalogue import ANALYSES, Analysis, analyze_suiting, recall_suiting
 from levilab.pipelines.catalogue import save as save_found
 from levilab.pipelines.result import Archive, save
-from levilab.pipelines.sources import Options
-from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
+from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions, analyze_spindowns
 from levilab.pipelines.spindown.document import SpinDownResult, result_of
 from support.spin_downs import spin_down_csv
 
@@ -66,7 +65,7 @@ def runs(tmp_path: Path, sample_data: Path) -> Path:
 
 def analyzed(*paths: Path) -> dict[str, str]:
     """Name of each result → the analysis that it says it is of."""
-    written = [save_found(row, found)[0] for row, found in analyze_suiting(paths, Options())]
+    written = [save_found(row, found)[0] for row, found in analyze_suiting(paths, {})]
     return {file.name: json.loads(file.read_text(encoding="utf-8"))["analysis"] for file in written}
 
 
@@ -85,7 +84,7 @@ def test_each_analysis_finds_its_own_result_again(tmp_path: Path, runs: Path, na
     spin_down_csv(tmp_path / "my.csv")
     path = runs.parent / name
     analyzed(path)
-    row, recalled = recall_suiting([path], Options())
+    row, recalled = recall_suiting([path], {})
     assert row.name == "spindown"
     assert all(origin.text.startswith("as levilab analyze found it") for origin in recalled.origins)
     archive = Archive([path], SecondResult)
@@ -101,20 +100,20 @@ def test_each_analysis_finds_its_own_result_again(tmp_path: Path, runs: Path, na
 def test_result_json_belongs_to_the_first_row_for_the_experiment(monkeypatch: pytest.MonkeyPatch, runs: Path) -> None:
     field = replace(SPINDOWN, needs=replace(SPINDOWN.needs, analysis="field", experiments=frozenset({"field"})))
     use(monkeypatch, field, second_row("spin"), replace(SPINDOWN, save=save_spindown))
-    found = analyze_spindowns([runs / "run-1"], Options())
+    found = analyze_spindowns([runs / "run-1"], SpinDownOptions())
     rows = catalogue.ANALYSES
     assert save_found(rows["second"], found)[0].name == "result.json"
     assert save_found(rows["spindown"], found)[0].name == "result.spindown.json"
-    together = analyze_spindowns([runs], Options())
+    together = analyze_spindowns([runs], SpinDownOptions())
     assert save_found(rows["second"], together)[0].name == "result.second.json"
 
 
 def test_several_inputs_leave_the_result_of_the_present_run_alone(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(runs / "run-1")
     paths = [Path(), Path("../run-2")]
-    written = save_spindown(analyze_spindowns(paths, Options()), first=True)[0]
+    written = save_spindown(analyze_spindowns(paths, SpinDownOptions()), first=True)[0]
     assert written.resolve() == runs / "result.json"
-    assert SPINDOWN.recall(paths, Options()).origins[1].text.endswith(str(written))
+    assert SPINDOWN.recall(paths, SpinDownOptions()).origins[1].text.endswith(str(written))
 
 
 @pytest.mark.usefixtures("two")
@@ -127,7 +126,7 @@ def test_damage_is_not_passed_over_because_another_analysis_runs(
     use(monkeypatch, SPINDOWN, second)
     (runs / name / "result.json").write_text("{", encoding="utf-8")
     with pytest.raises(DataError, match="is cut off"):
-        recall_suiting([runs / name], Options())
+        recall_suiting([runs / name], {})
 
 
 def test_an_analysis_that_does_not_suit_is_passed_over(
@@ -139,8 +138,8 @@ def test_an_analysis_that_does_not_suit_is_passed_over(
     table = tmp_path / "field.csv"
     table.write_text("time_s,field_t\n0,1\n1,2\n2,3\n", encoding="utf-8")
     for path in (sample_data / "lower-limits", tmp_path / "empty", table):
-        assert [row.name for row, _ in analyze_suiting([path], Options())] == ["second"], path
+        assert [row.name for row, _ in analyze_suiting([path], {})] == ["second"], path
     text = table.read_text(encoding="utf-8").replace("field_t", "spin_frequency_hz")
     table.write_text(text.replace("1,2", "1,two"), encoding="utf-8")
     with pytest.raises(DataError, match="line 3"):
-        analyze_suiting([table], Options())
+        analyze_suiting([table], {})

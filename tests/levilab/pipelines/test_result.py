@@ -14,14 +14,13 @@ from hypothesis import strategies as st
 
 from levilab.errors import DataError
 from levilab.pipelines.result import Place, beside, read_result, save
-from levilab.pipelines.sources import Options
-from levilab.pipelines.spindown.analysis import analyze_spindowns
+from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
 from levilab.pipelines.spindown.document import SpinDownResult, result_of, save_result
 from support.spin_downs import spin_down_csv
 
 
 def saved(*paths: Path) -> list[str]:
-    return [file.name for file in save_result(analyze_spindowns(paths, Options()))]
+    return [file.name for file in save_result(analyze_spindowns(paths, SpinDownOptions()))]
 
 
 def test_results_of_two_files_in_one_folder_stand_side_by_side(tmp_path: Path) -> None:
@@ -72,12 +71,12 @@ def test_the_result_of_a_run_folder_is_result_json_in_it(tmp_path: Path, sample_
     run = shutil.copytree(sample_data / "spin-down-1", tmp_path / "run")
     assert saved(run) == ["result.json", "spindown.png"]
     assert (run / "result.json").is_file()
-    assert analyze_spindowns([run / "readings.csv"], Options()).place.result() == run / "result.json"
+    assert analyze_spindowns([run / "readings.csv"], SpinDownOptions()).place.result() == run / "result.json"
 
 
 def write_result(tmp_path: Path) -> Path:
     """The result of a data file, without its figure."""
-    analysis = analyze_spindowns([spin_down_csv(tmp_path / "my.csv")], Options())
+    analysis = analyze_spindowns([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions())
     return save(result_of(analysis, analysis.place), analysis.place, picture=b"")[0]
 
 

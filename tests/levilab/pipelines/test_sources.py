@@ -11,8 +11,8 @@ import pytest
 
 from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.sources import Options, sha256_of
-from levilab.pipelines.spindown.analysis import analyze_spindowns
+from levilab.pipelines.sources import sha256_of
+from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
 from support.spin_downs import spin_down_csv
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def test_the_same_readings_in_another_file_format_count_once(tmp_path: Path, rew
     first = spin_down_csv(tmp_path / "first.csv")
     second = tmp_path / "second.csv"
     second.write_bytes(rewritten(first.read_text(encoding="utf-8")).encode())
-    analysis = analyze_spindowns([first, second], Options())
+    analysis = analyze_spindowns([first, second], SpinDownOptions())
     assert [source.name for source in analysis.sources] == ["first.csv"]
     assert analysis.warnings == (f"{second}: holds the same readings as {first}, counted once",)
 
@@ -59,7 +59,7 @@ def test_an_export_beside_the_run_counts_once(tmp_path: Path, sample_data: Path)
     run = shutil.copytree(sample_data / "spin-down-1", tmp_path / "run")
     export = tmp_path / "export.csv"
     export.write_text(with_decimal_commas((run / "readings.csv").read_text(encoding="utf-8")), encoding="utf-8")
-    assert len(analyze_spindowns([run, export], Options()).sources) == 1
+    assert len(analyze_spindowns([run, export], SpinDownOptions()).sources) == 1
 
 
 def test_runs_that_differ_in_one_reading_are_two_runs(tmp_path: Path) -> None:
@@ -68,11 +68,11 @@ def test_runs_that_differ_in_one_reading_are_two_runs(tmp_path: Path) -> None:
     time, frequency, u = lines[7].split(",")
     lines[7] = f"{time},{float(frequency) * (1 + 1e-6)!r},{u}"
     (tmp_path / "second.csv").write_text("\n".join([*lines, ""]), encoding="utf-8")
-    assert len(analyze_spindowns([first, tmp_path / "second.csv"], Options()).sources) == 2
+    assert len(analyze_spindowns([first, tmp_path / "second.csv"], SpinDownOptions()).sources) == 2
 
 
 def test_runs_of_another_experiment_are_a_remark_and_no_warning(sample_data: Path) -> None:
-    analysis = analyze_spindowns([sample_data], Options())
+    analysis = analyze_spindowns([sample_data], SpinDownOptions())
     assert "passed over: 1 limit run" in analysis.remarks
     assert not any("passed over" in warning for warning in analysis.all_warnings)
 
@@ -90,6 +90,6 @@ def test_a_pipe_in_the_place_of_readings_is_refused_at_once(tmp_path: Path, samp
         os.mkfifo(pipe)
         for find in (ANALYSES["spindown"].analyze, ANALYSES["spindown"].recall):
             with pytest.raises(DataError, match="pipe"):
-                find(paths, Options())
+                find(paths, SpinDownOptions())
         with pytest.raises(DataError, match="a file is expected"):
             sha256_of(pipe)

@@ -15,8 +15,7 @@ import pytest
 
 from levilab.errors import LevilabError
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.sources import Options
-from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
+from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions, analyze_spindowns
 from levilab.pipelines.spindown.document import recall_spindowns, save_result
 from levilab.report.inputs import _drive
 from levilab.report.page import render as render_found
@@ -49,7 +48,7 @@ class Page(HTMLParser):
 
 @pytest.fixture(scope="module")
 def page() -> Page:
-    return Page(render(analyze_spindowns([SAMPLE_DATA], Options())))
+    return Page(render(analyze_spindowns([SAMPLE_DATA], SpinDownOptions())))
 
 
 def test_nothing_is_fetched_when_the_report_is_opened(page: Page) -> None:
@@ -75,8 +74,8 @@ def changed(run: Path, **entries: object) -> Path:
     return run
 
 
-def text_of(*paths: Path, options: Options | None = None) -> str:
-    return " ".join(Page(render(analyze_spindowns(paths, options or Options()))).text.split())
+def text_of(*paths: Path, options: SpinDownOptions | None = None) -> str:
+    return " ".join(Page(render(analyze_spindowns(paths, options or SpinDownOptions()))).text.split())
 
 
 @pytest.fixture
@@ -117,7 +116,7 @@ def test_what_a_user_typed_is_escaped_wherever_it_stands(tmp_path: Path, run: Pa
     event = json.dumps({"time_s": 1.0, "kind": "fell", "text": evil}) + "\n"
     (tmp_path / "run <b>bold" / "events.jsonl").write_text(event, encoding="utf-8")
     file = spin_down_csv(tmp_path / "<i>my.csv")
-    parsed = Page(render(analyze_spindowns([tmp_path / "run <b>bold", file], Options())))
+    parsed = Page(render(analyze_spindowns([tmp_path / "run <b>bold", file], SpinDownOptions())))
     assert parsed.text.count(evil) >= 14
     assert "run <b>bold" in parsed.text
     assert "<i>my.csv" in parsed.text
@@ -188,14 +187,14 @@ def test_each_run_has_its_own_constants_and_the_scatter_stands_beside_the_mean(p
 
 def test_intervals_are_shown_where_they_were_asked_for(run: Path) -> None:
     assert "68 % interval" not in text_of(run)
-    text = text_of(run, options=Options(uncertainty="profile"))
+    text = text_of(run, options=SpinDownOptions(uncertainty="profile"))
     assert "68 % interval (profile)" in text
     assert re.search(r"\[0\.0002365\d*, 0\.0002371\d*\]|\[0\.0002366\d*, 0\.0002372\d*\]", text)
 
 
 @pytest.mark.parametrize("readings", [3, 20])
 def test_a_law_is_marked_best_only_where_the_readings_decide(tmp_path: Path, readings: int) -> None:
-    analysis = analyze_spindowns([spin_down_csv(tmp_path / "a.csv", n=readings)], Options())
+    analysis = analyze_spindowns([spin_down_csv(tmp_path / "a.csv", n=readings)], SpinDownOptions())
     parsed = Page(render(analysis))
     marked = [attributes for tag, attributes in parsed.tags if tag == "tr" and attributes.get("class") == "best"]
     assert bool(marked) == analysis.combined.verdict.decided
@@ -203,12 +202,12 @@ def test_a_law_is_marked_best_only_where_the_readings_decide(tmp_path: Path, rea
 
 
 def reported(*paths: Path, output: Path, **options: Any) -> str:
-    page = write_report(paths, output, Options(**options)).read_text(encoding="utf-8")
+    page = write_report(paths, output, options).read_text(encoding="utf-8")
     return " ".join(Page(page).text.split())
 
 
 def test_the_report_shows_what_analyze_found_intervals_included(run: Path, tmp_path: Path) -> None:
-    save_result(analyze_spindowns([run], Options(uncertainty="bootstrap", bootstrap_samples=50)))
+    save_result(analyze_spindowns([run], SpinDownOptions(uncertainty="bootstrap", bootstrap_samples=50)))
     result = json.loads((run / "result.json").read_text(encoding="utf-8"))
     low, high = result["models"][2]["parameters"]["c32"]["interval_68"]
     text = reported(run, output=tmp_path / "report.html")
@@ -218,10 +217,10 @@ def test_the_report_shows_what_analyze_found_intervals_included(run: Path, tmp_p
 
 
 def test_the_report_does_not_fit_what_has_a_result(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    analysis = analyze_spindowns([run], Options())
+    analysis = analyze_spindowns([run], SpinDownOptions())
     save_result(analysis)
     monkeypatch.setattr("levilab.pipelines.spindown.document.fit_source", pytest.fail)
-    recalled = render(recall_spindowns([run], Options()))
+    recalled = render(recall_spindowns([run], SpinDownOptions()))
     anew = render(analysis)
     differ = [pair for pair in zip(recalled.split("\n"), anew.split("\n"), strict=True) if pair[0] != pair[1]]
     assert all("Analysis" in here or "written" in here for here, _ in differ)
@@ -231,7 +230,7 @@ def test_the_report_says_what_it_had_to_analyze(run: Path, tmp_path: Path) -> No
     before = sorted(run.rglob("*"))
     assert "analyzed for this page: there was no result yet" in reported(run, output=tmp_path / "report.html")
     assert sorted(run.rglob("*")) == before
-    save_result(analyze_spindowns([run], Options()))
+    save_result(analyze_spindowns([run], SpinDownOptions()))
     text = reported(run, output=tmp_path / "report.html", reading_u=0.05)
     assert f"analyzed for this page: other options than those of {run / 'result.json'}" in text
     assert "u of a reading: 0.05 Hz, as given to the analysis" in text
@@ -255,7 +254,7 @@ def test_nothing_is_folded_away_so_that_all_is_printed(page: Page) -> None:
 
 
 def test_a_report_of_a_data_file_knows_no_instrument_and_says_so(tmp_path: Path) -> None:
-    parsed = Page(render(analyze_spindowns([spin_down_csv(tmp_path / "my.csv")], Options())))
+    parsed = Page(render(analyze_spindowns([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions())))
     assert "my.csv" in parsed.text
     assert "no instruments recorded" in parsed.text
     assert "SYNTHETIC" not in parsed.text
@@ -268,7 +267,7 @@ def test_many_readings_are_cut_in_the_page_and_the_figure_stays_small(tmp_path: 
     nu = 40 * (1 + 2.34e-4 * np.sqrt(2 * np.pi * 40) * t / 2) ** -2 + np.random.default_rng(0).normal(0, 0.03, t.size)
     path = tmp_path / "long.csv"
     np.savetxt(path, np.c_[t, nu], delimiter=",", header="time_s,spin_frequency_hz", comments="")
-    html = render(analyze_spindowns([path], Options(reading_u=0.03)))
+    html = render(analyze_spindowns([path], SpinDownOptions(reading_u=0.03)))
     assert "the first 200 of 20000" in " ".join(Page(html).text.split())
     assert len(html) < 3e6
 

@@ -15,12 +15,12 @@ from levilab.formats.device import Device, DeviceError, read_device
 from levilab.formats.table import parse_columns
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.field.analysis import FieldAnalysis, analyze_scans
+from levilab.pipelines.field.device import FieldOptions
 from levilab.pipelines.field.document import as_document, recall_scans, result_of
 from levilab.pipelines.field.figure import field_figure
 from levilab.pipelines.field.report import field_part
 from levilab.pipelines.field.table import field_tables
 from levilab.pipelines.result import save
-from levilab.pipelines.sources import Options
 from levilab.pipelines.top import calculate_top
 from levilab.report.page import render
 from levilab.world.base import Base
@@ -67,7 +67,7 @@ def csv(path: Path, header: str, *columns: np.ndarray) -> Path:
 
 def test_the_sample_scan_gives_its_truth_back(sample_data: Path, device: Path) -> None:
     """As make.py prints it; 3 u, where the seed was chosen before this was seen."""
-    found = analyze_scans([sample_data / "field-scan"], Options(device=read_device(device)))
+    found = analyze_scans([sample_data / "field-scan"], FieldOptions(device=read_device(device)))
     for name, truth in (("strength", 1.409299e-3), ("origin", 0.811e-3), ("thickness", 14.79e-3)):
         estimate = found.values[name]
         assert estimate.value is not None
@@ -78,7 +78,7 @@ def test_the_sample_scan_gives_its_truth_back(sample_data: Path, device: Path) -
 def test_a_result_holds_what_was_found_and_is_read_not_computed(
     scan: Path, device: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    options = Options(device=read_device(device), height_m=0.0735)
+    options = FieldOptions(device=read_device(device), height_m=0.0735)
     found = analyze_scans([scan], options)
     document = json.loads(keep(found).read_text(encoding="utf-8"))
     assert document["values"]["strength"]["unit"] == "T m"
@@ -86,7 +86,7 @@ def test_a_result_holds_what_was_found_and_is_read_not_computed(
     assert document["models"][0]["name"] == "ring"
     assert document["synthetic"] is True
     monkeypatch.setattr("levilab.pipelines.field.document.analyze_source", None)
-    recalled = recall_scans([scan], Options())
+    recalled = recall_scans([scan], FieldOptions())
     assert recalled.origins[0].text.startswith("as levilab analyze found it")
     assert as_document(recalled, scan) == document
     assert field_tables(recalled) == field_tables(found)
@@ -96,27 +96,27 @@ def test_a_result_holds_what_was_found_and_is_read_not_computed(
 
 
 def test_other_options_are_computed_anew_with_those_of_the_result(scan: Path) -> None:
-    keep(analyze_scans([scan], Options(device=TOP_OF_THESIS)))
-    recalled = recall_scans([scan], Options(free_radii=True))
+    keep(analyze_scans([scan], FieldOptions(device=TOP_OF_THESIS)))
+    recalled = recall_scans([scan], FieldOptions(free_radii=True))
     assert recalled.origins[0].text.startswith("analyzed for this page: other options")
     assert recalled.origins[0].options.device == TOP_OF_THESIS
     assert "inner_radius" in recalled.runs[0].scan.fitted
 
 
 def test_a_result_that_does_not_go_with_the_readings_is_refused(scan: Path) -> None:
-    file = keep(analyze_scans([scan], Options()))
+    file = keep(analyze_scans([scan], FieldOptions()))
     document = json.loads(file.read_text(encoding="utf-8"))
     del document["runs"][0]["models"][0]["parameters"]["origin"]
     file.write_text(json.dumps(document), encoding="utf-8")
     with pytest.raises(DataError, match="each with a value"):
-        recall_scans([scan], Options())
+        recall_scans([scan], FieldOptions())
 
 
 def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(tmp_path: Path, scan: Path) -> None:
     other = shutil.copytree(scan, tmp_path / "other")
     text = (other / "readings.csv").read_text(encoding="utf-8").replace(",0.035,", ",0.0352,")
     (other / "readings.csv").write_text(text, encoding="utf-8")
-    found = analyze_scans([tmp_path], Options())
+    found = analyze_scans([tmp_path], FieldOptions())
     alone = [run.values["strength"] for run in found.runs]
     mean = found.values["strength"]
     assert mean.value == pytest.approx(np.mean([one.value for one in alone]))
@@ -147,7 +147,7 @@ def test_files_of_users_are_read_in_their_units(
     tmp_path: Path, titles: tuple[str, str], z: np.ndarray, b: np.ndarray
 ) -> None:
     path = csv(tmp_path / "hall.csv", titles[0], z, b)
-    options = Options(columns=parse_columns(titles[1]), device=CALLIPER)
+    options = FieldOptions(columns=parse_columns(titles[1]), device=CALLIPER)
     found = analyze_scans([path], options)
     strength = found.values["strength"].value
     assert strength == pytest.approx(
@@ -171,7 +171,7 @@ def test_files_of_users_are_read_in_their_units(
 def test_bad_scans_are_refused_in_one_line(tmp_path: Path, z: np.ndarray, b: np.ndarray, says: str) -> None:
     path = csv(tmp_path / "hall.csv", "z [mm],B [mT]", z, b)
     with pytest.raises(DataError) as caught:
-        analyze_scans([path], Options(device=CALLIPER))
+        analyze_scans([path], FieldOptions(device=CALLIPER))
     assert says in str(caught.value)
     assert str(path) in str(caught.value)
 
@@ -179,20 +179,20 @@ def test_bad_scans_are_refused_in_one_line(tmp_path: Path, z: np.ndarray, b: np.
 def test_a_file_without_its_base_says_what_is_missing(tmp_path: Path) -> None:
     path = csv(tmp_path / "hall.csv", "z [mm],B [mT]", HEIGHTS_MM, FIELD_MT)
     with pytest.raises(DataError, match=r"the radii of the base are not known.*`device`"):
-        analyze_scans([path], Options())
+        analyze_scans([path], FieldOptions())
 
 
 def test_a_file_of_something_else_does_not_suit(tmp_path: Path, sample_data: Path) -> None:
     with pytest.raises(DoesNotSuit, match="needs a field run"):
-        analyze_scans([sample_data / "spin-down-1"], Options())
+        analyze_scans([sample_data / "spin-down-1"], FieldOptions())
     path = csv(tmp_path / "spin.csv", "t,f", HEIGHTS_MM, FIELD_MT)
     with pytest.raises(DoesNotSuit, match=r"no title is known \(height_m, flux_density_t.*z=NAME,b=NAME"):
-        analyze_scans([path], Options())
+        analyze_scans([path], FieldOptions())
 
 
 def test_a_moment_needs_the_mass(scan: Path) -> None:
     with pytest.raises(DataError, match=r"`height` tells the moment of a top only if its mass is known"):
-        analyze_scans([scan], Options(height_m=0.073))
+        analyze_scans([scan], FieldOptions(height_m=0.073))
 
 
 # --- the device file ---

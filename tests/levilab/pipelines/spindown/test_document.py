@@ -12,9 +12,8 @@ import pytest
 
 from levilab.errors import DataError
 from levilab.pipelines.result import save
-from levilab.pipelines.sources import Options
 from levilab.pipelines.spindown import document
-from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
+from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions, analyze_spindowns
 from levilab.pipelines.spindown.document import as_document, recall_spindowns, result_of
 from support.spin_downs import spin_down_csv
 
@@ -28,7 +27,7 @@ def fitted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     names: list[str] = []
     fit = document.fit_source
 
-    def noted(source: Any, options: Options) -> Any:
+    def noted(source: Any, options: SpinDownOptions) -> Any:
         names.append(source.path.name)
         return fit(source, options)
 
@@ -46,7 +45,7 @@ def runs(tmp_path: Path, sample_data: Path) -> Path:
 
 def analyzed(*paths: Path, **options: Any) -> SpinDownAnalysis:
     """The analysis, and its result.json; the figure takes longer than all the rest."""
-    analysis = analyze_spindowns(paths, Options(**options))
+    analysis = analyze_spindowns(paths, SpinDownOptions(**options))
     save(result_of(analysis, analysis.place), analysis.place, picture=b"")
     return analysis
 
@@ -72,7 +71,7 @@ def test_one_run_is_recalled_to_the_last_bit(tmp_path: Path, fitted: list[str], 
     path.write_text(path.read_text(encoding="utf-8").replace("\n50.0,", "\n50.0,1"), encoding="utf-8")  # an outlier
     before = analyzed(path, **options)
     assert before.runs[0].outliers
-    after = recall_spindowns([path], Options())
+    after = recall_spindowns([path], SpinDownOptions())
     assert fitted == []
     assert same(after.runs, before.runs)
     assert after.all_warnings == before.all_warnings
@@ -81,7 +80,7 @@ def test_one_run_is_recalled_to_the_last_bit(tmp_path: Path, fitted: list[str], 
 
 def test_several_runs_are_recalled_to_the_last_bit(runs: Path, fitted: list[str]) -> None:
     before = analyzed(runs)
-    after = recall_spindowns([runs], Options())
+    after = recall_spindowns([runs], SpinDownOptions())
     assert fitted == []
     assert same(after.runs, before.runs)
     assert same(after.combined.fits, before.combined.fits)
@@ -93,7 +92,7 @@ def test_several_runs_are_recalled_to_the_last_bit(runs: Path, fitted: list[str]
 @pytest.mark.parametrize("n", [3, 4, 5, 7])
 def test_results_that_lack_numbers_are_recalled_too(tmp_path: Path, fitted: list[str], n: int) -> None:
     before = analyzed(spin_down_csv(tmp_path / "my.csv", n=n, u=n != 4))
-    after = recall_spindowns([tmp_path / "my.csv"], Options())
+    after = recall_spindowns([tmp_path / "my.csv"], SpinDownOptions())
     assert fitted == []
     assert as_document(after, tmp_path) == as_document(before, tmp_path)
 
@@ -106,7 +105,7 @@ def test_what_is_shown_is_what_stands_in_the_result(tmp_path: Path) -> None:
     result["verdict"] = "As a person wrote it."
     result["runs"][0]["models"][2]["parameters"]["c32"] |= {"value": 1.25e-4, "interval_68": [1.2e-4, 1.3e-4]}
     file.write_text(json.dumps(result), encoding="utf-8")
-    recalled = recall_spindowns([tmp_path / "my.csv"], Options())
+    recalled = recall_spindowns([tmp_path / "my.csv"], SpinDownOptions())
     constant = recalled.runs[0].fit("disc").parameters["c32"]
     assert (constant.value, constant.interval) == (1.25e-4, (1.2e-4, 1.3e-4))
     assert recalled.text == "As a person wrote it."
@@ -116,10 +115,10 @@ def test_a_run_that_changed_is_analyzed_and_no_other(runs: Path, fitted: list[st
     before = analyzed(runs, uncertainty="profile")
     readings = runs / "run-2" / "readings.csv"
     readings.write_text("\n".join(readings.read_text(encoding="utf-8").splitlines()[:-2]) + "\n", encoding="utf-8")
-    after = recall_spindowns([runs], Options())
+    after = recall_spindowns([runs], SpinDownOptions())
     assert fitted == ["run-2"]
     assert same(after.runs[0], before.runs[0])
-    assert same(after.combined.fits, analyze_spindowns([runs], Options()).combined.fits)
+    assert same(after.combined.fits, analyze_spindowns([runs], SpinDownOptions()).combined.fits)
     assert after.runs[1].fit("disc").parameters["c32"].interval  # with the options of the result that held before
     assert "the readings are others than in" in after.origins[1].text
     assert after.origins[0].text.startswith("as levilab analyze found it")
@@ -129,7 +128,7 @@ def test_a_new_run_beside_old_ones_is_the_only_one_analyzed(runs: Path, sample_d
     shutil.move(runs / "run-4", runs.parent / "run-4")
     analyzed(runs)
     shutil.move(runs.parent / "run-4", runs / "run-4")
-    after = recall_spindowns([runs], Options())
+    after = recall_spindowns([runs], SpinDownOptions())
     assert fitted == ["run-4"]
     assert len(after.runs) == 4
     assert "no result yet" in after.origins[3].text
@@ -138,66 +137,66 @@ def test_a_new_run_beside_old_ones_is_the_only_one_analyzed(runs: Path, sample_d
 def test_runs_analyzed_one_by_one_are_combined_without_a_new_fit(runs: Path, fitted: list[str]) -> None:
     for run in sorted(runs.iterdir()):
         analyzed(run)
-    after = recall_spindowns([runs], Options())
+    after = recall_spindowns([runs], SpinDownOptions())
     assert fitted == []
-    assert same(after.combined, analyze_spindowns([runs], Options()).combined)
+    assert same(after.combined, analyze_spindowns([runs], SpinDownOptions()).combined)
 
 
 def test_a_run_is_recalled_from_the_result_of_its_folder(runs: Path, fitted: list[str]) -> None:
     analyzed(runs)
-    after = recall_spindowns([runs / "run-3"], Options())
+    after = recall_spindowns([runs / "run-3"], SpinDownOptions())
     assert fitted == []
-    assert same(after.runs[0], analyze_spindowns([runs / "run-3"], Options()).runs[0])
+    assert same(after.runs[0], analyze_spindowns([runs / "run-3"], SpinDownOptions()).runs[0])
 
 
 @pytest.mark.parametrize("given", [{"reading_u": 0.05}, {"keep_outliers": True}])
 def test_other_options_analyze_anew_with_the_rest_as_before(tmp_path: Path, fitted: list[str], given: Any) -> None:
     path = spin_down_csv(tmp_path / "my.csv")
     analyzed(path, uncertainty="profile")
-    after = recall_spindowns([path], Options(**given))
+    after = recall_spindowns([path], SpinDownOptions(**given))
     assert fitted == ["my.csv"]
-    assert after.origins[0].options == replace(Options(uncertainty="profile"), **given)
+    assert after.origins[0].options == replace(SpinDownOptions(uncertainty="profile"), **given)
     assert "other options than those of" in after.origins[0].text
-    assert recall_spindowns([path], Options()).runs[0].u[0] == 0.03  # type: ignore[index]
+    assert recall_spindowns([path], SpinDownOptions()).runs[0].u[0] == 0.03  # type: ignore[index]
 
 
 def test_the_columns_of_the_result_are_those_of_the_report(tmp_path: Path, fitted: list[str]) -> None:
     path = spin_down_csv(tmp_path / "my.csv", u=False)
     path.write_text(path.read_text(encoding="utf-8").replace("time_s,spin_frequency_hz", "Uhr,Kanal"), encoding="utf-8")
     analyzed(path, columns={"t": "Uhr", "f": "Kanal"})
-    assert recall_spindowns([path], Options()).combined.best == "disc"
+    assert recall_spindowns([path], SpinDownOptions()).combined.best == "disc"
     assert fitted == []
 
 
 def test_names_of_columns_do_not_matter_to_a_run(runs: Path, fitted: list[str]) -> None:
     analyzed(runs)
-    recall_spindowns([runs], Options(columns={"t": "1"}))
-    recall_spindowns([runs / "run-1", runs / "run-2"], Options(columns={"t": "1"}))
+    recall_spindowns([runs], SpinDownOptions(columns={"t": "1"}))
+    recall_spindowns([runs / "run-1", runs / "run-2"], SpinDownOptions(columns={"t": "1"}))
     assert fitted == []
 
 
 def test_nothing_is_written_where_results_are_recalled(runs: Path) -> None:
     analyzed(runs / "run-1")
     before = {path: path.read_bytes() for path in runs.rglob("*") if path.is_file()}
-    recall_spindowns([runs], Options())
+    recall_spindowns([runs], SpinDownOptions())
     assert {path: path.read_bytes() for path in runs.rglob("*") if path.is_file()} == before
 
 
 def test_a_damaged_result_beside_a_run_is_an_error_that_names_it(runs: Path) -> None:
     (runs / "run-2" / "result.json").write_text("{", encoding="utf-8")
     with pytest.raises(DataError, match=r"run-2.result\.json: is cut off"):
-        recall_spindowns([runs], Options())
+        recall_spindowns([runs], SpinDownOptions())
 
 
 def test_a_damaged_result_of_the_folder_is_an_error_that_names_it(runs: Path) -> None:
     (runs / "result.json").write_text("{", encoding="utf-8")
     with pytest.raises(DataError, match=r"runs.result\.json: is cut off"):
-        recall_spindowns([runs], Options())
+        recall_spindowns([runs], SpinDownOptions())
 
 
 def test_a_file_of_that_name_above_the_input_may_be_anything(tmp_path: Path) -> None:
     (tmp_path / "result.json").write_text('{"mine": 1}', encoding="utf-8")
-    assert recall_spindowns([spin_down_csv(tmp_path / "my.csv")], Options()).combined.best == "disc"
+    assert recall_spindowns([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions()).combined.best == "disc"
 
 
 def one_outlier(index: int) -> dict[str, Any]:
@@ -220,7 +219,7 @@ def test_a_result_that_the_readings_belie_is_an_error(tmp_path: Path, entries: d
     result["runs"][0] |= entries
     file.write_text(json.dumps(result), encoding="utf-8")
     with pytest.raises(DataError, match=says) as caught:
-        recall_spindowns([path], Options())
+        recall_spindowns([path], SpinDownOptions())
     assert str(caught.value).startswith(f"{file}: ")
 
 
@@ -232,7 +231,7 @@ def test_a_fit_that_leaves_the_range_of_numbers_is_an_error(tmp_path: Path) -> N
     result["runs"][0]["models"][3]["fit"]["solution"] = [1e308, 0.0, -1e308]
     file.write_text(json.dumps(result), encoding="utf-8")
     with pytest.raises(DataError, match="leave the range of numbers"):
-        recall_spindowns([path], Options())
+        recall_spindowns([path], SpinDownOptions())
 
 
 @pytest.mark.parametrize("text", ['{"mine": 1}', "[1, 2]", "mine", '{"schema": "mine/1"}'])
@@ -241,7 +240,7 @@ def test_another_program_may_have_a_result_in_the_present_folder(
 ) -> None:
     monkeypatch.chdir(runs.parent)
     (runs.parent / "result.json").write_text(text, encoding="utf-8")
-    assert len(recall_spindowns([runs / "run-1", runs / "run-2"], Options()).runs) == 2
+    assert len(recall_spindowns([runs / "run-1", runs / "run-2"], SpinDownOptions()).runs) == 2
 
 
 def test_a_result_of_another_version_in_the_present_folder_is_an_error(
@@ -250,7 +249,7 @@ def test_a_result_of_another_version_in_the_present_folder_is_an_error(
     monkeypatch.chdir(runs.parent)
     (runs.parent / "result.json").write_text('{"schema": "levilab-result/9"}', encoding="utf-8")
     with pytest.raises(DataError, match="levilab-result/9"):
-        recall_spindowns([runs / "run-1", runs / "run-2"], Options())
+        recall_spindowns([runs / "run-1", runs / "run-2"], SpinDownOptions())
 
 
 def test_a_warning_about_an_input_is_recalled_once_however_it_is_named(
@@ -262,5 +261,5 @@ def test_a_warning_about_an_input_is_recalled_once_however_it_is_named(
         path.write_text("\n".join([*lines[1:], ""]), encoding="utf-8")
         analyzed(path)
     monkeypatch.chdir(tmp_path)
-    after = recall_spindowns([path.relative_to(tmp_path) for path in paths], Options())
+    after = recall_spindowns([path.relative_to(tmp_path) for path in paths], SpinDownOptions())
     assert sum("no header" in text for text in after.all_warnings) == 2

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
-from levilab.pipelines.sources import Options
-from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
+from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions, analyze_spindowns
 from levilab.pipelines.spindown.figure import MOST_POINTS, STRAIGHT_LINES, spindown_figure
 from levilab.pipelines.spindown.laws import SHOWN_LAWS
 from levilab.present.style import as_svg
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def analysis_of(*paths: Path, u: float | None = None) -> SpinDownAnalysis:
-    return analyze_spindowns(paths, Options(reading_u=u))
+    return analyze_spindowns(paths, SpinDownOptions(reading_u=u))
 
 
 def panels(figure: Figure) -> tuple[Axes, list[Axes], list[Axes], list[Axes]]:

@@ -1,0 +1,404 @@
+"""What the header of a table of samples says: whose it is, when it starts, its step, its channels.
+
+Headers as the scopes write them (each found in public files):
+
+    Rigol DS1000Z, DS2000, DS4000   X,CH1,CH2,Start,Increment,  /  Sequence,Volt,Volt,-2.0e-03,2.0e-05
+    the same, of the screen         CH1,CH2,Start,Increment,    /  Volt,Volt,-6.0e-02,1.0e-04
+    Rigol DS1000E                   X,CH1,CH2,                  /  Second,Volt,Volt,
+    Keysight DSOX                   x-axis,1,2                  /  second,Volt,Volt
+    Siglent SDS                     Record Length,Analog:14000  …  Source,CH1  /  Second,Volt
+    Tektronix MDO, MSO, TBS         Model,MDO3014               …  TIME,CH1
+    Tektronix TDS                   Record Length,2.5e+03,,-0.02,0.04   the header beside the first 18 rows
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from levilab.formats.columns import NoSuchColumn, TableError, listed, shown
+from levilab.formats.dialect import Dialect, filled, find_dialect
+from levilab.formats.layout import SAMPLE, Layout, lay_out
+from levilab.formats.titles import QUANTITIES, is_unit, plain_unit, read_title, unit_factor
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from levilab.formats.waveforms.head import Head
+
+#: What is read.
+WANTED = "samples beside their times, a scope's CSV, WAV, .npy, or a column of pulse times is expected"
+#: A header ends within so many lines.
+MOST_LINES = 200
+#: Words for volts beside the symbols.
+_VOLTS = frozenset({"volt", "volts", "voltage", "value", "spannung"})
+_TIMES = frozenset({"time", "second", "seconds", "s", "x", "x-axis", "t", "zeit"})
+#: Where a table might as well be one of readings, a coarser step than this makes it one [s]: no top of 20 to 60 turns
+#: a second can be sampled so slowly.
+LONGEST_DOUBTFUL_STEP_S = 0.02
+
+
+class NoWaveform(NoSuchColumn):
+    """A table that holds no samples."""
+
+
+class NoRate(NoWaveform):
+    """Samples whose rate is not known."""
+
+
+@dataclass(frozen=True)
+class Printed:
+    """A number as it stands in a text.  resolution: one unit of its last digit."""
+
+    value: float
+    resolution: float
+
+
+@dataclass(frozen=True)
+class SampleColumn:
+    """A channel.  index: of its column; factor: to its unit."""
+
+    name: str
+    unit: str
+    index: int
+    factor: float = 1.0
+
+
+@dataclass(frozen=True)
+class Header:
+    """What stands above or beside the samples.
+
+    Attributes:
+        format: what wrote it, in words.
+        dialect: of the lines.
+        first_line: 1-based line of the first row.
+        columns: the channels.
+        time: index of the column of printed times, if there is one; time_factor: its unit [s].
+        sequence: index of the column that numbers the samples, if there is one.
+        start, step: time of sample 0 and sampling interval [s], where the header gives them.
+        count: samples that the header announces.
+        certain: whether it can only be samples.
+    """
+
+    format: str
+    dialect: Dialect
+    first_line: int
+    columns: tuple[SampleColumn, ...]
+    time: int | None = None
+    time_factor: float = 1.0
+    sequence: int | None = None
+    start: float | None = None
+    step: Printed | None = None
+    count: int | None = None
+    certain: bool = True
+
+    @property
+    def used(self) -> tuple[int, ...]:
+        """Indices of the columns that are read: of the times or the numbers, then of the channels."""
+        clock = self.time if self.time is not None else self.sequence
+        return (*(() if clock is None else (clock,)), *(column.index for column in self.columns))
+
+
+def read_header(head: Head, dialect: Dialect, columns: Mapping[str, str]) -> Header:
+    """Recognise the header of a table of samples.
+
+    Args:
+        head: the beginning of the file.
+        dialect: of its lines.
+        columns: `t` names the column of times where its title is not known.
+
+    Raises:
+        NoWaveform: it is no table of samples.
+        TableError: it is one, and its header is damaged.
+    """
+    lines = [line.lstrip("#") for line in head.lines[:MOST_LINES]]
+    rows = [[field.strip().strip('"').strip() for field in dialect.split(line)] for line in lines]
+    for recognise in (_rigol, _titled, _beside, _keyed):
+        header = recognise(head, dialect, rows)
+        if header:
+            return header
+    return _plain(head, dialect, columns)
+
+
+def printed(text: str, dialect: Dialect) -> Printed | None:
+    """A number and how finely it is printed; None if it is none.
+
+    >>> printed("-250.0000E-03", Dialect(",", "."))
+    Printed(value=-0.25, resolution=1e-07)
+    """
+    try:
+        value = dialect.number(text)
+    except ValueError:
+        return None
+    mantissa, _, exponent = text.casefold().partition("e")
+    decimals = len(mantissa.strip().partition(dialect.decimal)[2])
+    power = int(exponent) if re.fullmatch(r"[+-]?\d{1,4}\s*", exponent) else 0
+    return Printed(value, float(f"1e{max(min(power - decimals, 300), -300)}"))
+
+
+# --- how its lines are written -------------------------------------------------------------------------
+
+
+def dialect_of(head: Head) -> Dialect:
+    """As of any table; one number a line makes a table, too, here."""
+    sample = head.lines[-SAMPLE:]
+    found = find_dialect(sample)
+    texts = [line.strip() for line in sample if line.strip()]
+    one_comma = [re.fullmatch(r"[+-]?\d+,(\d+)", text) for text in texts]
+    with_comma = [match for match in one_comma if match]
+    if len(with_comma) > 0.9 * len(texts) and any(match[1].startswith("0") and match[1] != "0" for match in with_comma):
+        return Dialect(None, ",")  # "0,0334" alone on a line is a number, no pair of them
+    if found is not None:
+        return found
+    if sum(bool(re.fullmatch(r"[+-]?\d*[.,]?\d+([eE][+-]?\d+)?[,;]?", text)) for text in texts) < 0.5 * len(texts):
+        at, line = next((n, line) for n, line in enumerate(head.lines, 1) if line.strip())
+        raise NoWaveform(head.path, f"'{shown(line.strip())}' begins no table of samples; {WANTED}", line=at)
+    return Dialect(None, "," if any(match for match in one_comma) else ".")
+
+
+def _unit(text: str) -> tuple[str, float]:
+    """The unit of a channel and the factor to it: V for all kinds of volts, else what stands there."""
+    plain = plain_unit(text)
+    if not plain or plain.casefold() in _VOLTS:
+        return "V", 1.0
+    factor = unit_factor(plain, "voltage")
+    return ("V", factor) if factor is not None else (shown(plain, 12), 1.0)
+
+
+def _signal(title: str) -> str:
+    return f"CH{title}" if title.isdecimal() else shown(title)
+
+
+def _is_number(text: str, dialect: Dialect) -> bool:
+    return dialect.kind(text) == "number"
+
+
+def _first_row(rows: Sequence[Sequence[str]], after: int, index: int, dialect: Dialect) -> int | None:
+    """Index of the first row below `after` with a number at `index`."""
+    return next(
+        (k for k in range(after + 1, len(rows)) if index < len(rows[k]) and _is_number(rows[k][index], dialect)), None
+    )
+
+
+def _with_samples(
+    columns: Sequence[SampleColumn], rows: Sequence[Sequence[str]], first: int, dialect: Dialect
+) -> tuple[SampleColumn, ...]:
+    """The channels that were on: those whose first sample is there."""
+    return tuple(c for c in columns if c.index < len(rows[first]) and _is_number(rows[first][c.index], dialect))
+
+
+# --- one vendor's header each --------------------------------------------------------------------------
+
+
+def _rigol(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
+    """Start and increment in the second row, below their titles; the samples numbered or not."""
+    title = [text.casefold() for text in rows[0]] if len(rows) > 1 else []
+    if "start" not in title or "increment" not in title:
+        return None
+    start, step = (
+        printed(rows[1][title.index(key)], dialect) if title.index(key) < len(rows[1]) else None
+        for key in ("start", "increment")
+    )
+    if start is None or step is None:
+        raise TableError(head.path, "has no numbers below Start and Increment: export it anew", line=2)
+    numbered = title[0] in {"x", "sequence"}
+    channels = range(int(numbered), min(title.index("start"), title.index("increment")))
+    first = _first_row(rows, 1, 0, dialect)
+    if first is None or not channels:
+        raise TableError(head.path, "holds a header of Rigol's and no samples: export it anew", line=len(rows))
+    columns = [SampleColumn(_signal(rows[0][k]), *_from_unit(rows[1], k)) for k in channels]
+    return Header(
+        "Rigol CSV" if numbered else "Rigol CSV of the screen",
+        dialect,
+        first + 1,
+        _with_samples(columns, rows, first, dialect),
+        sequence=0 if numbered else None,
+        start=start.value,
+        step=step,
+    )
+
+
+def _from_unit(units: Sequence[str], index: int) -> tuple[str, int, float]:
+    unit, factor = _unit(units[index] if index < len(units) else "")
+    return unit, index, factor
+
+
+def _titled(_: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
+    """A row of titles, below it "second" and units, as Keysight and Rigol's old models write; no increment."""
+    if len(rows) < 3 or len(rows[0]) < 2 or rows[0][0].casefold() not in {"x", "x-axis"}:
+        return None
+    factor = unit_factor(rows[1][0], "time")
+    first = _first_row(rows, 1, 0, dialect)
+    if factor is None or first is None:
+        return None
+    columns = [SampleColumn(_signal(rows[0][k]), *_from_unit(rows[1], k)) for k in range(1, filled(rows[0]))]
+    return Header(
+        "Keysight CSV" if rows[0][0].casefold() == "x-axis" else "Rigol CSV with times",
+        dialect,
+        first + 1,
+        _with_samples(columns, rows, first, dialect),
+        time=0,
+        time_factor=factor,
+    )
+
+
+def _beside(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
+    """Tektronix TDS: the header stands beside the first rows, time and samples in the last columns."""
+    if len(rows) < 2 or rows[0][0].casefold() != "record length" or len(rows[0]) < 5:
+        return None
+    time = filled(rows[0]) - 2
+    if time < 2 or not all(_is_number(text, dialect) for text in rows[0][time : time + 2]):
+        return None
+    keys = _keys(rows)
+    unit, factor = _unit(_value(keys, "vertical units"))
+    return Header(
+        "Tektronix TDS CSV",
+        dialect,
+        1,
+        (SampleColumn(shown(_value(keys, "source") or "CH1"), unit, time + 1, factor),),
+        time=time,
+        time_factor=unit_factor(_value(keys, "horizontal units"), "time") or 1.0,
+        step=_interval(head, keys, dialect),
+        count=_count(keys, dialect),
+    )
+
+
+#: Keys that a scope's header has, one a line.
+_KEYS = frozenset({"record length", "sample interval", "sample rate", "source"})
+
+
+def _keyed(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
+    """A key and its value a line, then the titles, time first: Siglent; Tektronix MDO, MSO, TBS."""
+    titles = next((k for k, row in enumerate(rows) if len(row) > 1 and row[0].casefold() in {"time", "second"}), None)
+    if titles is None:
+        return None
+    keys = _keys(rows[:titles])
+    if not keys.keys() & _KEYS:
+        return None
+    first = _first_row(rows, titles, 0, dialect)
+    if first is None:
+        raise TableError(head.path, "holds the header of a scope and no samples: export it anew", line=len(rows))
+    names = [cell for cell in keys.get("source", ()) if cell]
+    units = [cell.partition(":") for cell in keys.get("vertical units", ()) if cell]
+    columns = []
+    for k in range(1, filled(rows[titles])):
+        title, given = rows[titles][k], units[k - 1] if k <= len(units) else ("", "", "")
+        worded = title.casefold() in _VOLTS or is_unit(title)
+        name = names[k - 1] if k <= len(names) else (given[0] if given[1] else "")
+        unit, factor = _unit((given[2] or given[0]).strip() if given[0] else title if worded else "")
+        columns.append(SampleColumn(_signal(title if not worded else name or f"CH{k}"), unit, k, factor))
+    siglent = any("analog:" in cell.casefold() for cells in keys.values() for cell in cells) or "source" in keys
+    return Header(
+        "Siglent CSV" if siglent else "Tektronix CSV",
+        dialect,
+        first + 1,
+        _with_samples(columns, rows, first, dialect),
+        time=0,
+        step=_interval(head, keys, dialect),
+        count=_count(keys, dialect),
+    )
+
+
+def _keys(rows: Sequence[Sequence[str]]) -> dict[str, Sequence[str]]:
+    return {row[0].rstrip(" =:").casefold(): row[1:] for row in reversed(rows) if row and row[0]}
+
+
+def _value(keys: Mapping[str, Sequence[str]], key: str) -> str:
+    """The value of a key, without the word before a colon: Analog:140000."""
+    cells = keys.get(key, ())
+    return cells[0].rpartition(":")[2].strip() if cells else ""
+
+
+def _interval(head: Head, keys: Mapping[str, Sequence[str]], dialect: Dialect) -> Printed | None:
+    """The sampling interval [s]."""
+    interval, rate = (printed(_value(keys, key), dialect) for key in ("sample interval", "sample rate"))
+    if interval is None and rate is not None and rate.value > 0:
+        interval = Printed(1 / rate.value, rate.resolution / rate.value**2)
+    if interval is not None and not interval.value > 0:
+        raise TableError(head.path, f"its header says a sample interval of {interval.value:g} s: export it anew")
+    return interval
+
+
+def _count(keys: Mapping[str, Sequence[str]], dialect: Dialect) -> int | None:
+    count = printed(_value(keys, "record length"), dialect)
+    return int(count.value) if count and 0 < count.value < 1e15 else None
+
+
+# --- nobody's header in particular ---------------------------------------------------------------------
+
+
+def _plain(head: Head, dialect: Dialect, wanted: Mapping[str, str]) -> Header:
+    """A column of times and others beside it, with titles or without."""
+    layout = lay_out(list(head.lines), head.encoding, dialect, b"")
+    titles = [read_title(text) for text in layout.header]
+    readings = [title.column for title in titles if title.column in QUANTITIES and title.column not in _NO_READINGS]
+    if readings:
+        raise NoWaveform(head.path, f"holds readings ({readings[0]}) and no samples")
+    width = len(layout.header) or layout.width
+    if width < 2:
+        raise NoWaveform(head.path, "has one column and no times beside it")
+    time = _time_column(head, layout, wanted)
+    names = layout.header or tuple("t" if k == time else f"CH{k if k > time else k + 1}" for k in range(width))
+    columns, certain = [], bool(layout.header)
+    for k in range(width):
+        if k != time and names[k]:
+            beneath = layout.units[k] if k < len(layout.units) else ""
+            given = (titles[k].unit if titles else None) or beneath
+            unit, factor = _unit(given)
+            certain = certain and bool(given) and unit == "V"
+            columns.append(SampleColumn(_bare(names[k]), unit, k, factor))
+    rows = [dialect.split(line) for line in head.lines[layout.first_line - 1 :][:MOST_LINES] if not dialect.skips(line)]
+    kept = _with_samples(columns, rows, 0, dialect) if rows else ()
+    if not kept:
+        raise NoWaveform(head.path, f"has no samples beside its times, its columns are {listed(names)}")
+    return Header(
+        "CSV",
+        dialect,
+        layout.first_line,
+        kept,
+        time=time,
+        time_factor=_time_factor(head, layout, time),
+        certain=certain,
+    )
+
+
+#: Quantities whose names also stand above samples.
+_NO_READINGS = ("time_s", "drive_amplitude_v")
+
+
+def _bare(title: str) -> str:
+    """A title without its unit."""
+    return shown(re.sub(r"\s*/?\s*[\[(][^\[\]()]*[\])]$|\s*/\s*\S+$", "", title).strip() or title)
+
+
+def _time_column(head: Head, layout: Layout, wanted: Mapping[str, str]) -> int:
+    """Index of the column of times: as named, by its title, else the first where there are no titles."""
+    name = wanted.get("t") or wanted.get("time_s")
+    folded = [title.casefold() for title in layout.header]
+    if name is not None:
+        if name.casefold() in folded:
+            return folded.index(name.casefold())
+        if name.isdecimal() and 1 <= int(name) <= layout.width:
+            return int(name) - 1
+        raise TableError(head.path, f"has no column '{shown(name)}'; it has {listed(layout.header)}: correct `columns`")
+    if not layout.header:
+        return 0
+    known = [k for k, text in enumerate(layout.header) if read_title(text).column == "time_s" or folded[k] in _TIMES]
+    if len(known) != 1:
+        raise NoWaveform(
+            head.path, f"no title is known to be a time among {listed(layout.header)}: say `columns` = t=NAME"
+        )
+    return known[0]
+
+
+def _time_factor(head: Head, layout: Layout, time: int) -> float:
+    given = read_title(layout.header[time]).unit if layout.header else None
+    beneath = layout.units[time] if time < len(layout.units) else None
+    unit = given or beneath
+    factor = unit_factor(unit, "time") if unit else 1.0
+    if factor is None:
+        raise TableError(
+            head.path, f"'{shown(unit or '')}' is no unit of time: correct the title", line=layout.header_line or None
+        )
+    return factor

@@ -1,0 +1,82 @@
+"""NumPy arrays of samples, whose rate is given beside them, or of pulse times."""
+
+from __future__ import annotations
+
+from tokenize import TokenError
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from levilab.formats.columns import TableError, shown
+from levilab.formats.waveforms.header import NoRate
+from levilab.formats.waveforms.waveform import BLOCK, PulseTimes, Signal, Waveform, check_count, check_step
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+    from typing import Any
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+#: An array with more columns than this lies on its side.
+MOST_CHANNELS = 64
+
+
+def read_npy(path: Path, rate: float | None) -> Waveform | PulseTimes:
+    """An array of samples [V], shape (n,), (n, channels) or (channels, n); without a rate, pulse times [s], shape (n,).
+
+    Raises:
+        NoRate: it holds no pulse times, and no rate is given.
+        TableError: it is damaged.
+        OSError: it cannot be read.
+    """
+    data = _load(path)
+    if rate is None:
+        return _pulse_times(path, data)
+    columns = data.reshape(len(data), -1)
+    columns = columns.T if columns.shape[1] > MOST_CHANNELS else columns
+    check_count(path, len(columns))
+    check_step(path, 1 / rate, "the sampling interval")
+
+    def read(signal: int) -> Iterator[Array]:
+        for k in range(0, len(columns), BLOCK):
+            block = columns[k : k + BLOCK, signal].astype(np.float64)
+            if not bool(np.isfinite(block).all()):
+                raise TableError(path, f"has samples that are no numbers from sample {k} on: cut them off")
+            yield block
+
+    signals = tuple(Signal(f"CH{k + 1}") for k in range(columns.shape[1]))
+    whole = data.dtype.kind != "f"
+    counts = (
+        (f"{path.name}: holds whole numbers, which are taken as V: voltages are in units of a code",) if whole else ()
+    )
+    return Waveform(path, "NumPy array", 0.0, 1 / rate, len(columns), signals, read, counts)
+
+
+#: What numpy raises for headers of nonsense, which it reads as Python.
+_BROKEN = (
+    ValueError, EOFError, TypeError, SyntaxError, MemoryError, OverflowError, KeyError, AttributeError, TokenError,
+    RecursionError,
+)  # fmt: skip
+
+
+def _load(path: Path) -> NDArray[Any]:
+    """The array as it lies in the file, which stays there."""
+    try:
+        data: NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
+    except _BROKEN as error:
+        raise TableError(path, f"is no NumPy array that can be read ({shown(str(error), 80)}): save it anew") from error
+    if data.dtype.kind not in "iuf" or data.dtype.itemsize > 8:
+        raise TableError(path, f"holds {data.dtype}, plain numbers are expected: save them with numpy.save")
+    if data.ndim not in {1, 2} or 0 in data.shape or (data.ndim == 2 and min(data.shape) > MOST_CHANNELS):
+        raise TableError(path, f"has the shape {data.shape}, (samples,) or (samples, channels) is expected: reshape it")
+    return data
+
+
+def _pulse_times(path: Path, data: NDArray[Any]) -> PulseTimes:
+    times = np.array(data, dtype=np.float64)
+    if data.ndim != 1 or not bool(np.isfinite(times).all()) or not bool((np.diff(times) > 0).all()):
+        raise NoRate(path, "does not say its sampling rate: say `rate` in Hz (pulse times would increase throughout)")
+    return PulseTimes(path, "NumPy array of pulse times", times)

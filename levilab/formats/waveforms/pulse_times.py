@@ -1,0 +1,96 @@
+"""Lists of pulse times: one number a line, with a title or without."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from levilab.formats.columns import TableError, shown
+from levilab.formats.titles import is_unit, plain_unit, read_title, unit_factor
+from levilab.formats.waveforms.header import NoRate, NoWaveform
+from levilab.formats.waveforms.rows import read_blocks
+from levilab.formats.waveforms.waveform import PulseTimes, Signal, Waveform, check_count, check_step
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from numpy.typing import NDArray
+
+    from levilab.formats.dialect import Dialect
+    from levilab.formats.waveforms.head import Head
+    from levilab.formats.waveforms.rows import Block
+
+#: Pulses below which there is no frequency.
+FEWEST_PULSES = 4
+#: Lines that may stand above the first number.
+_MOST_TITLES = 20
+
+
+def read_column(head: Head, dialect: Dialect, rate: float | None, *, guess: bool = True) -> PulseTimes | Waveform:
+    """A file with one number a line: times that increase, or with a rate samples.
+
+    Args:
+        head: the beginning of the file.
+        dialect: of its lines.
+        rate: samples per second [Hz], of samples.
+        guess: whether a column without a title of times is taken for times.
+
+    Raises:
+        NoWaveform: it holds something else.
+        TableError: a line is damaged.
+    """
+    path = head.path
+    fields = [dialect.split(line) if not dialect.skips(line) else [] for line in head.lines]
+    rows = (k for k, row in enumerate(fields) if row and dialect.kind(row[0]) == "number")
+    first = next(rows, None)
+    titles = [" ".join(row) for row in fields[:first] if row]
+    if first is None or len(titles) > _MOST_TITLES or any(any(row[1:]) for row in fields[first : first + 100]):
+        raise NoWaveform(path, "holds no samples and no pulse times")
+    blocks = partial(read_blocks, path, head.encoding, dialect, first + 1, [0])
+    if rate is not None:
+        return _samples(head, rate, blocks)
+    if not guess and not any(read_title(text).column == "time_s" or "pulse" in text.casefold() for text in titles):
+        raise NoWaveform(path, "holds one column of numbers, which nothing calls times")
+    factor = _factor(titles)
+    found = list(blocks())
+    times = np.concatenate([block.numbers[:, 0] for block in found]) * factor
+    late = np.flatnonzero(np.diff(times) <= 0)
+    if late.size > max(0.01 * len(times), 3):
+        raise NoRate(path, "holds one column of numbers that do not increase: of samples say the `rate` in Hz")
+    if late.size:
+        k = int(late[0])
+        raise TableError(
+            path, f"pulse {k + 2}, at {times[k + 1]:.9g} s, does not come after the one at {times[k]:.9g} s: correct it"
+        )
+    if len(times) < FEWEST_PULSES:
+        raise NoWaveform(path, f"holds {len(times)} numbers, at least {FEWEST_PULSES} pulse times are needed")
+    told = [f"{path.name}, {block.torn}" for block in found if block.torn]
+    return PulseTimes(path, "list of pulse times", times, tuple(told))
+
+
+def _factor(titles: list[str]) -> float:
+    """Unit of the times [s], by the title or a row of units; seconds without one."""
+    for text in reversed(titles):
+        unit = plain_unit(text) if is_unit(text) else read_title(text).unit or ""
+        factor = unit_factor(unit, "time") if unit else None
+        if factor is not None:
+            return factor
+    return 1.0
+
+
+def _samples(head: Head, rate: float, blocks: Callable[[], Iterator[Block]]) -> Waveform:
+    path = head.path
+    count, torn = 0, None
+    for block in blocks():
+        count += len(block.numbers)
+        torn = torn or block.torn
+    check_count(path, count)
+    check_step(path, 1 / rate, "the sampling interval")
+
+    def read(_: int) -> Iterator[NDArray[np.float64]]:
+        return (block.numbers[:, 0] for block in blocks() if block.numbers.size)
+
+    told = (f"{shown(path.name)}, {torn}",) if torn else ()
+    return Waveform(path, "one column of samples", 0.0, 1 / rate, count, (Signal("CH1"),), read, told)

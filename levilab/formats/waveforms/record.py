@@ -1,0 +1,61 @@
+"""Any file with samples or pulse times, recognised by what it begins with."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from levilab.errors import UsageError
+from levilab.formats.table import file_errors
+from levilab.formats.waveforms.head import read_head
+from levilab.formats.waveforms.header import NoWaveform, dialect_of
+from levilab.formats.waveforms.npy import read_npy
+from levilab.formats.waveforms.pulse_times import read_column
+from levilab.formats.waveforms.samples import read_samples
+from levilab.formats.waveforms.scope_binary import SUFFIXES, read_scope_binary
+from levilab.formats.waveforms.wav import read_wav
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from levilab.formats.waveforms.waveform import PulseTimes, Waveform
+
+#: How names of files end that may hold samples, readings or pulse times, where a folder is searched.
+TEXTS = frozenset({".csv", ".txt", ".dat", ".tsv"})
+SEARCHED = TEXTS | SUFFIXES | {".wav", ".npy"}
+
+
+def read_record(
+    path: Path, *, columns: Mapping[str, str] | None = None, rate: float | None = None, guess: bool = True
+) -> Waveform | PulseTimes:
+    """Samples or pulse times from a file: WAV, NumPy, a scope's CSV or binary file, CSV with times, a column of times.
+
+    Args:
+        path: the file.
+        columns: `t` names the column of times of a table whose titles are not known.
+        rate: samples per second [Hz]; goes before what the file says.
+        guess: whether one column without a title is taken for pulse times.
+
+    Raises:
+        NoWaveform: it is sound perhaps, but holds neither.
+        TableError: it is damaged, contradicts itself, or needs what is missing.
+        UsageError: the rate is none.
+    """
+    if rate is not None and not 0 < rate < 1e15:
+        raise UsageError("rate", "samples per second are expected, a number above 0 [Hz]", value=rate)
+    with file_errors(path):
+        with path.open("rb") as stream:
+            magic = stream.read(12)
+        if magic[:4] in {b"RIFF", b"RIFX", b"RF64"} and magic[8:] == b"WAVE":
+            return read_wav(path).at_rate(rate)
+        if magic.startswith(b"\x93NUMPY"):
+            return read_npy(path, rate)
+        if path.suffix.casefold() in SUFFIXES:
+            return read_scope_binary(path).at_rate(rate)
+        head = read_head(path)
+        if set(columns or ()) - {"t", "time_s"}:
+            raise NoWaveform(path, "holds readings: its columns are named")
+        dialect = dialect_of(head)
+        if dialect.separator is None and all(len(dialect.split(line)) < 2 for line in head.lines[-20:]):
+            return read_column(head, dialect, rate, guess=guess)
+        return read_samples(head, dialect, columns=columns or {}, rate=rate)

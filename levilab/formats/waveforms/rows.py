@@ -1,0 +1,137 @@
+"""The numbers in the rows of a text file, piece by piece: by pandas where every line is plain, else line by line."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from levilab.formats.columns import TableError, shown
+from levilab.formats.dialect import MISSING
+from levilab.formats.waveforms.head import pieces
+from levilab.formats.waveforms.waveform import HIGHEST
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from levilab.formats.dialect import Dialect
+
+    Array = NDArray[np.float64]
+
+#: Rows at the beginning and at the end of a piece whose fields are kept as text.
+ENDS = 40
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Rows in order.
+
+    Attributes:
+        numbers: shape (rows, columns that are used), all finite.
+        line: 1-based line that the piece begins with; text: the piece.
+        torn: a last line that was cut off and is left out, if there is one.
+    """
+
+    numbers: Array
+    line: int
+    text: str
+    torn: str | None = None
+
+    def line_of(self, row: int, dialect: Dialect) -> int:
+        """The line of a row."""
+        rows = (n for n, line in enumerate(self.text.split("\n"), self.line) if not dialect.skips(line))
+        return next(n for k, n in enumerate(rows) if k == row)
+
+    def fields(self, column: int, dialect: Dialect) -> list[str]:
+        """The texts of a column in the first and the last rows."""
+        lines = [line for line in self.text.split("\n") if not dialect.skips(line)]
+        split = [dialect.split(line) for line in (*lines[:ENDS], *lines[-ENDS:])]
+        return [fields[column] for fields in split if column < len(fields)]
+
+
+def read_blocks(path: Path, encoding: str, dialect: Dialect, first_line: int, used: Sequence[int]) -> Iterator[Block]:
+    """The numbers of some columns, in memory that does not grow with the file.
+
+    Raises:
+        TableError: a line is damaged, or a sample is missing.
+        OSError: the file cannot be read.
+    """
+    for line, text, last in pieces(path, encoding, first_line):
+        numbers = _at_once(text, dialect, used)
+        if numbers is None:
+            yield _line_by_line(path, text, line, dialect, used, last=last)
+        else:
+            yield Block(numbers, line, text)
+
+
+def _at_once(text: str, dialect: Dialect, used: Sequence[int]) -> Array | None:
+    """All rows by pandas; None where a line is not plain."""
+    import pandas as pd
+
+    if not text.strip():
+        return np.zeros((0, len(used)))
+    if any(mark in text for mark in dialect.comments):
+        return None
+    try:
+        with warnings.catch_warnings(action="ignore"):
+            frame = pd.read_csv(
+                io.StringIO(text), sep=dialect.separator or r"\s+", decimal=dialect.decimal, header=None,
+                names=list(range(max(used) + 1)), usecols=sorted(set(used)), dtype="float64", index_col=False,
+                skipinitialspace=True, keep_default_na=False,
+            )  # fmt: skip
+    except ValueError:
+        return None
+    numbers: Array = frame[list(used)].to_numpy(dtype=np.float64)
+    return numbers if bool((np.abs(numbers) < HIGHEST).all()) else None
+
+
+def _line_by_line(path: Path, text: str, first: int, dialect: Dialect, used: Sequence[int], *, last: bool) -> Block:
+    rows, torn = [], None
+    lines = text.split("\n")
+    for number, line in enumerate(lines, first):
+        if dialect.skips(line):
+            continue
+        try:
+            rows.append(_row(path, line, number, dialect, used))
+        except TableError:
+            if not (last and number == first + len(lines) - 1):
+                raise
+            torn = f"line {number}: '{shown(line.strip())}' was cut off and is left out"
+    return Block(np.array(rows, dtype=np.float64).reshape(len(rows), len(used)), first, text, torn)
+
+
+def _row(path: Path, text: str, line: int, dialect: Dialect, used: Sequence[int]) -> list[float]:
+    fields = dialect.split(text)
+    if max(used) >= len(fields):
+        raise TableError(
+            path,
+            f"'{shown(text.strip())}' has {len(fields)} field{'s' * (len(fields) != 1)}, {max(used) + 1} are expected: "
+            "complete or remove the line",
+            line=line,
+        )
+    return [_number(path, fields[index], line, dialect) for index in used]
+
+
+def _number(path: Path, text: str, line: int, dialect: Dialect) -> float:
+    missing = text.casefold() in MISSING
+    try:
+        value = float("nan") if missing else dialect.number(text)
+    except ValueError:
+        mark = "comma" if dialect.decimal == "," else "point"
+        raise TableError(
+            path, f"'{shown(text)}' is no number with decimal {mark}: correct it, or remove the line", line=line
+        ) from None
+    if not abs(value) < HIGHEST:
+        raise TableError(
+            path,
+            f"'{shown(text)}' is a missing sample, but samples are evenly spaced: export the record anew, or cut the "
+            "file there",
+            line=line,
+        )
+    return value

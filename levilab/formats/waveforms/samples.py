@@ -1,0 +1,264 @@
+"""Tables of samples as waveforms: the step from the header, checked against the printed times."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from levilab.formats.columns import TableError, shown
+from levilab.formats.waveforms.header import LONGEST_DOUBTFUL_STEP_S, Header, NoRate, NoWaveform, printed, read_header
+from levilab.formats.waveforms.rows import read_blocks
+from levilab.formats.waveforms.waveform import Signal, Waveform, about_rate, check_count, check_step
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from levilab.formats.dialect import Dialect
+    from levilab.formats.waveforms.head import Head
+    from levilab.formats.waveforms.rows import Block
+
+    Array = NDArray[np.float64]
+
+#: Scopes keep times in single precision before they print them: relative rounding, 2⁻²⁴ twice.
+SINGLE = 1.2e-7
+#: A header's step that agrees so far with the printed times is taken as it stands.
+SAME = 1e-7
+#: Units that times are printed in by mistake, against seconds.
+_UNITS = (1e-9, 1e-6, 1e-3, 1e3, 1e6, 1e9)
+
+
+@dataclass
+class _Clock:
+    """The column of times or numbers, as it passes by.
+
+    first, last: its ends; shortest, longest: (difference of neighbours, line of the second); resolution: of the texts;
+    count, means, sums: for a straight line through all of them (Chan, Golub & LeVeque, Am. Stat. 37, 242 (1983)).
+    """
+
+    first: float | None = None
+    last: float = 0.0
+    shortest: tuple[float, int] = (np.inf, 0)
+    longest: tuple[float, int] = (-np.inf, 0)
+    resolution: float = 0.0
+    count: int = 0
+    means: tuple[float, float] = (0.0, 0.0)
+    sums: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def slope(self) -> float:
+        """Of the straight line of least squares through values against their number."""
+        return self.sums[1] / self.sums[0]
+
+    def pass_by(self, header: Header, block: Block) -> None:
+        """Take note of a block."""
+        values = block.numbers[:, 0]
+        if not values.size:
+            return
+        column = header.used[0]
+        texts = [printed(text, header.dialect) for text in block.fields(column, header.dialect)]
+        finest = min((one.resolution for one in texts if one), default=0.0)
+        self.resolution = max(self.resolution, finest)
+        before = values[:1] if self.first is None else np.array([self.last])
+        differences = np.diff(np.concatenate((before, values)))[int(self.first is None) :]
+        if differences.size:
+            offset = int(self.first is None)
+            for k, better in ((int(differences.argmin()), "shortest"), (int(differences.argmax()), "longest")):
+                value, known = float(differences[k]), getattr(self, better)[0]
+                if value < known if better == "shortest" else value > known:
+                    setattr(self, better, (value, block.line_of(k + offset, header.dialect)))
+        self.first = float(values[0]) if self.first is None else self.first
+        self.last = float(values[-1])
+        self._sum_up(values)
+
+    def _sum_up(self, values: Array) -> None:
+        """Add a block to the straight line."""
+        n, m = self.count, len(values)
+        numbers = n + np.arange(m, dtype=np.float64)
+        means = float(numbers.mean()), float(values.mean())
+        off = numbers - means[0]
+        apart = means[0] - self.means[0], means[1] - self.means[1]
+        share = n * m / (n + m)
+        self.sums = (
+            self.sums[0] + float(off @ off) + share * apart[0] ** 2,
+            self.sums[1] + float(off @ (values - means[1])) + share * apart[0] * apart[1],
+        )
+        self.means = self.means[0] + apart[0] * m / (n + m), self.means[1] + apart[1] * m / (n + m)
+        self.count = n + m
+
+
+@dataclass(frozen=True)
+class _Times:
+    """Start, step and its standard uncertainty where rounded times give it [s], and what to know of them."""
+
+    start: float
+    step: float
+    warnings: tuple[str, ...] = ()
+    step_u: float = 0.0
+
+
+@dataclass
+class _Survey:
+    """What one pass over the rows finds.  torn: of a last line that was cut off."""
+
+    count: int = 0
+    clock: _Clock = field(default_factory=_Clock)
+    torn: str | None = None
+
+
+def read_samples(head: Head, dialect: Dialect, *, columns: Mapping[str, str], rate: float | None) -> Waveform:
+    """A table of samples.  The file is read once for its length and its times, and again for each channel.
+
+    Args:
+        head: the beginning of the file.
+        dialect: of its lines.
+        columns: `t` names the column of times.
+        rate: samples per second [Hz], in the place of what the file says.
+
+    Raises:
+        NoWaveform: it is no table of samples.
+        TableError: it is damaged, or it contradicts itself.
+    """
+    path, header = head.path, read_header(head, dialect, columns)
+    certain = header.certain or rate is not None
+    try:
+        survey = _look_over(head, header)
+        times = _times(path, header, survey, rate)
+        check_step(path, times.step, "the sampling interval")
+        check_count(path, survey.count)
+    except TableError as error:
+        if certain:
+            raise
+        raise NoWaveform(path, str(error).partition(": ")[2], line=error.line) from error
+    if not certain and times.step > LONGEST_DOUBTFUL_STEP_S:
+        text = f"its rows are {times.step:g} s apart, which is no sampling of a top that spins: say `rate` if it is"
+        raise NoWaveform(path, text)
+    warnings = (*times.warnings, *_about_count(path, header, survey))
+
+    def read(signal: int) -> Iterator[Array]:
+        column, left = header.columns[signal], survey.count  # a last line may be torn in another column
+        for block in read_blocks(path, head.encoding, header.dialect, header.first_line, [column.index]):
+            values = block.numbers[:left, 0]
+            left -= len(values)
+            if values.size:
+                yield values * column.factor if column.factor != 1 else values
+
+    signals = tuple(Signal(column.name, column.unit) for column in header.columns)
+    return Waveform(path, header.format, times.start, times.step, survey.count, signals, read, warnings, times.step_u)
+
+
+def _about_count(path: Path, header: Header, survey: _Survey) -> Iterator[str]:
+    """What to know of the end of the file."""
+    if survey.torn:
+        yield f"{path.name}, {survey.torn}"
+    if header.count is not None and header.count != survey.count:
+        yield f"{path.name}: its header announces {header.count} samples, it holds {survey.count}"
+
+
+def _look_over(head: Head, header: Header) -> _Survey:
+    survey = _Survey()
+    if not header.columns:
+        raise TableError(head.path, "its header names channels, but none has samples: export a channel that is on")
+    for block in read_blocks(head.path, head.encoding, header.dialect, header.first_line, header.used):
+        survey.count += len(block.numbers)
+        survey.torn = survey.torn or block.torn
+        if header.time is not None or header.sequence is not None:
+            survey.clock.pass_by(header, block)
+    return survey
+
+
+def _times(path: Path, header: Header, survey: _Survey, rate: float | None) -> _Times:
+    """Start and step [s], and what to know of them."""
+    if header.time is not None:
+        return _printed_times(path, header, survey, rate)
+    if header.sequence is not None:
+        _check_numbers(path, survey.clock)
+    known = header.step.value if header.step else None
+    if rate is None and known is None:
+        raise NoRate(path, "does not say its sampling rate: say `rate` in Hz")
+    step = 1 / rate if rate is not None else known or 0.0
+    number = (survey.clock.first or 0.0) if header.sequence is not None else 0.0
+    return _Times((header.start or 0.0) + number * step, step, tuple(about_rate(path, known, rate)))
+
+
+def _check_numbers(path: Path, clock: _Clock) -> None:
+    for difference, line in (clock.shortest, clock.longest):
+        if np.isfinite(difference) and difference != 1:
+            raise TableError(
+                path,
+                f"its samples are numbered, and {difference:g} lies from one to the next, 1 is expected: "
+                "export the record anew",
+                line=line,
+            )
+
+
+def _printed_times(path: Path, header: Header, survey: _Survey, rate: float | None) -> _Times:
+    clock, n = survey.clock, survey.count
+    if clock.first is None or n < 2:
+        check_count(path, n)
+    unit = header.time_factor
+    first, last = (clock.first or 0.0) * unit, clock.last * unit
+    mean = (last - first) / (n - 1)
+    if rate is not None:
+        return _Times(first, 1 / rate, tuple(about_rate(path, header.step.value if header.step else mean, rate)))
+    if not mean > 0:
+        raise TableError(
+            path, f"its times do not increase, from {first:g} s to {last:g} s: sort the rows, or say `rate`"
+        )
+    largest = max(abs(first), abs(last))
+    allowed = max(1.01 * clock.resolution * unit, min(SINGLE * largest, mean / 4)) + 1e-9 * mean
+    _check_even(path, clock, unit, mean, allowed)
+    if header.step is None:
+        return _fitted(path, clock, unit, first=first, mean=mean, allowed=allowed)
+    step, u = header.step.value, 0.505 * header.step.resolution
+    off = abs(mean - step)
+    if off <= u + allowed / (n - 1):
+        return _Times(first, step if off <= SAME * step or u <= allowed / (n - 1) else mean)
+    return _contradiction(path, header, first, mean)
+
+
+#: Relative uncertainty of the step below which nothing is said of it: of a frequency it is 0.03 mHz at 30 Hz.
+_FINE = 1e-6
+
+
+def _fitted(path: Path, clock: _Clock, unit: float, *, first: float, mean: float, allowed: float) -> _Times:
+    """Where times alone give the step: from the ends, or by a straight line where they lost digits."""
+    if allowed / (clock.count - 1) < 1e-3 * _FINE * mean:
+        return _Times(first, mean)
+    step, resolution = clock.slope * unit, clock.resolution * unit
+    alike = max(resolution / step, 1.0)  # neighbours that are rounded to the same time
+    u = resolution * alike**0.5 / clock.count**1.5  # of n rounded times, each ± resolution/√12
+    if u < _FINE * step or clock.longest[0] - clock.shortest[0] < 1e-6 * clock.resolution:  # all differences alike
+        return _Times(first, step)
+    told = f"its printed times have lost digits (one unit of the last is {resolution:g} s, a step {step:.4g} s): the "
+    known = f"{path.name}: {told}sampling rate, and so any frequency, is known to {u / step:.1g} of it"
+    return _Times(first, step, (known,), u)
+
+
+def _check_even(path: Path, clock: _Clock, unit: float, mean: float, allowed: float) -> None:
+    for difference, line in (clock.shortest, clock.longest):
+        if abs(difference * unit - mean) > allowed:
+            raise TableError(
+                path,
+                f"{difference * unit:g} s lie between this sample and the one before, {mean:g} s between the others: "
+                "export the whole record, evenly spaced, or say its `rate`",
+                line=line,
+            )
+
+
+def _contradiction(path: Path, header: Header, first: float, mean: float) -> _Times:
+    """Header and printed times disagree: a unit of the times that only the step shows, else a reason to refuse."""
+    step = header.step.value if header.step else mean
+    factor = next((unit for unit in _UNITS if abs(mean / step / unit - 1) < 1e-3), None)
+    if factor is None:
+        raise TableError(
+            path,
+            f"its header says a sampling interval of {step:.6g} s, its printed times {mean:.6g} s: say which holds, "
+            f"`rate` = {1 / step:.6g} or {1 / mean:.6g}",
+        )
+    told = f"its printed times are {mean:.6g} s apart where its header says {step:.6g} s: the times are taken to be in "
+    return _Times(first / factor, step, (f"{shown(path.name, 200)}: {told}units of {1 / factor:g} s",))

@@ -1,0 +1,92 @@
+"""Binary records of oscilloscopes, through RigolWFM, an extra."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import warnings
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from levilab.formats.columns import TableError, shown
+from levilab.formats.waveforms.waveform import Signal, Waveform, check_count, check_step
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+#: How the names of such files end.
+SUFFIXES = frozenset({".wfm", ".bin", ".isf", ".trc", ".wvf"})
+#: Evenly spaced to this part of a step.
+_EVEN = 0.01
+
+
+def read_scope_binary(path: Path) -> Waveform:
+    """A scope's own file: Rigol, Tektronix, Keysight, Siglent, LeCroy, Rohde & Schwarz, Yokogawa.
+
+    The file is read into memory as a whole: RigolWFM knows no other way.
+
+    Raises:
+        TableError: RigolWFM is not installed, or does not read the file.
+    """
+    try:
+        from RigolWFM.wfm import Wfm  # with matplotlib and requests
+    except ImportError as error:
+        raise TableError(
+            path,
+            "is a scope's binary file, and RigolWFM, which reads it, is not installed: pip install "
+            "'levilab[scope]', or export CSV",
+        ) from error
+    try:
+        with warnings.catch_warnings(action="ignore"), contextlib.redirect_stdout(io.StringIO()) as _, \
+                contextlib.redirect_stderr(io.StringIO()):  # fmt: skip
+            record = Wfm.from_file(str(path))
+            channels = [(c, np.asarray(c.volts, np.float64)) for c in record.channels if c.volts is not None]
+    except Exception as error:
+        what = shown(str(error).strip().split("\n")[0], 80)
+        raise TableError(path, f"is not read by RigolWFM ({what}): export it as CSV") from error
+    channels = [(c, volts) for c, volts in channels if volts.size]
+    if not channels:
+        raise TableError(path, "holds no channel that was on: export it as CSV")
+    first, volts = channels[0]
+    counts = {len(volts) for _, volts in channels}
+    step = float(first.seconds_per_point)
+    if len(counts) > 1:
+        raise TableError(path, f"has channels of {min(counts)} and {max(counts)} samples: export it as CSV")
+    check_count(path, len(volts))
+    check_step(path, step, "the sampling interval")
+    times = np.asarray(first.times, np.float64)
+    start = float(times[0]) if times.size else 0.0
+    samples = [volts for _, volts in channels]
+    if not all(bool(np.isfinite(volts).all()) for volts in samples):
+        raise TableError(path, "has samples that are no numbers: export it as CSV")
+
+    def read(signal: int) -> Iterator[Array]:
+        yield samples[signal]
+
+    signals = tuple(Signal(f"CH{c.channel_number}") for c, _ in channels)
+    told = [*_about_times(path, times, step), *_about_volts(path, f"{record.parser_name} {record.header_name}")]
+    return Waveform(path, "scope's binary file", start, step, len(volts), signals, read, tuple(told))
+
+
+def _about_times(path: Path, times: Array, step: float) -> list[str]:
+    """Whether the times that RigolWFM gives are as far apart as it says."""
+    mean = float(times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else step
+    if abs(mean / step - 1) <= _EVEN:
+        return []
+    told = f"RigolWFM says a sampling interval of {step:g} s and gives times {mean:g} s apart: compare with CSV"
+    return [f"{path.name}: {told}"]
+
+
+def _about_volts(path: Path, model: str) -> list[str]:
+    """What was found wrong with the volts of a family of scopes."""
+    if not any(name in model.casefold() for name in ("1000z", "1054z", "1074z", "1104z")):
+        return []
+    wrong = "a level of 0.02 V came as -0.40 V, with a gain 11 % off"
+    told = f"RigolWFM's volts of a DS1000Z are wrong ({wrong}); times hold, for heights export CSV"
+    return [f"{path.name}: {told}"]

@@ -1,0 +1,114 @@
+"""WAV recordings, as a sound card or a logger writes them."""
+
+from __future__ import annotations
+
+import struct
+import warnings
+import wave
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from levilab.formats.columns import TableError, shown
+from levilab.formats.waveforms.waveform import BLOCK, Signal, Waveform, check_count
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+    from typing import Any
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+#: Samples of integers → (value of silence, full scale).
+_SCALES = {"u1": (128.0, 128.0), "i2": (0.0, 32768.0), "i4": (0.0, 2147483648.0)}
+UNIT = "full scale"
+_ADVICE = "export it anew as PCM or float WAV"
+
+
+def read_wav(path: Path) -> Waveform:
+    """A WAV recording; its samples are in parts of full scale, as the file does not know volts.
+
+    Raises:
+        TableError: it is damaged, or of a kind that is not read.
+        OSError: it cannot be read.
+    """
+    if _bits(path) == 24:  # three bytes are no type of numpy's; the standard library reads such files
+        return _read_three_bytes(path)
+    from scipy.io import wavfile
+
+    try:
+        with warnings.catch_warnings(action="ignore"):  # chunks that are not samples
+            rate, data = wavfile.read(path, mmap=True)
+    except (
+        ValueError,
+        struct.error,
+        EOFError,
+        TypeError,
+        OverflowError,
+        ZeroDivisionError,
+        UnboundLocalError,
+    ) as error:
+        raise TableError(path, f"is no WAV recording that can be read ({shown(str(error), 80)}): {_ADVICE}") from error
+    return _waveform(path, rate, data)
+
+
+def _waveform(path: Path, rate: int, data: NDArray[Any]) -> Waveform:
+    kind = data.dtype.str[1:]
+    if kind not in {*_SCALES, "f4", "f8"}:
+        raise TableError(path, f"has samples of the kind {data.dtype}: {_ADVICE}")
+    if rate <= 0:
+        raise TableError(path, f"says a rate of {rate} Hz: {_ADVICE}")
+    check_count(path, len(data))
+    zero, full = _SCALES.get(kind, (0.0, 1.0))
+    columns = data.reshape(len(data), -1)
+
+    def read(signal: int) -> Iterator[Array]:
+        for k in range(0, len(columns), BLOCK):
+            block = (columns[k : k + BLOCK, signal].astype(np.float64) - zero) / full
+            if not bool(np.isfinite(block).all()):
+                raise TableError(
+                    path, f"has samples that are no numbers from sample {k} on: cut them off, or {_ADVICE}"
+                )
+            yield block
+
+    return Waveform(path, "WAV", 0.0, 1 / rate, len(data), _signals(columns.shape[1]), read)
+
+
+def _signals(channels: int) -> tuple[Signal, ...]:
+    names = {1: ("mono",), 2: ("left", "right")}.get(channels, tuple(f"CH{k + 1}" for k in range(channels)))
+    return tuple(Signal(name, UNIT) for name in names)
+
+
+def _bits(path: Path) -> int:
+    """Bits of a sample, 0 where they are not found; the format is the first chunk of nearly all files."""
+    with path.open("rb") as stream:
+        head = stream.read(4096)
+    place = head.find(b"fmt ")
+    if place < 0 or len(head) < place + 24:
+        return 0
+    return int(struct.unpack_from("<H", head, place + 22)[0])
+
+
+def _read_three_bytes(path: Path) -> Waveform:
+    try:
+        with wave.open(str(path), "rb") as stream:
+            channels, rate, count = stream.getnchannels(), stream.getframerate(), stream.getnframes()
+    except (wave.Error, EOFError, struct.error) as error:
+        raise TableError(path, f"is no WAV recording that can be read ({shown(str(error), 80)}): {_ADVICE}") from error
+    size = 3 * channels
+    count = min(count, path.stat().st_size // size)
+    if rate <= 0:
+        raise TableError(path, f"says a rate of {rate} Hz: {_ADVICE}")
+    check_count(path, count)
+
+    def read(signal: int) -> Iterator[Array]:
+        with wave.open(str(path), "rb") as stream:
+            while frames := stream.readframes(BLOCK):
+                whole = np.frombuffer(frames[: len(frames) // size * size], np.uint8).reshape(-1, channels, 3)
+                three = whole[:, signal].astype(np.int32)
+                value = three[:, 0] | three[:, 1] << 8 | three[:, 2] << 16
+                yield (value - ((value & 0x800000) << 1)) / 8388608.0
+
+    return Waveform(path, "WAV", 0.0, 1 / rate, count, _signals(channels), read)

@@ -1,0 +1,139 @@
+"""What a file with samples or with pulse times says, whoever wrote it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from levilab.errors import UsageError
+from levilab.formats.columns import TableError, listed, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+#: Samples that a block holds at most, where the format leaves the choice.
+BLOCK = 1 << 17
+#: Samples below which there is nothing to analyze.
+FEWEST_SAMPLES = 16
+#: No sampling interval of a laboratory lies outside [s]; beyond, the numbers are no measurement.
+SHORTEST_STEP_S, LONGEST_STEP_S = 1e-15, 1e6
+#: Values beyond are no voltage of a laboratory: scopes write 9.9E37 where a sample is missing.
+HIGHEST = 1e30
+
+
+class NoSuchSignal(UsageError):
+    """A channel that the record does not have."""
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A channel of a record.  unit: V, or what the file says it is."""
+
+    name: str
+    unit: str = "V"
+
+
+@dataclass(frozen=True, eq=False)
+class Waveform:
+    """Evenly spaced samples of one or more channels.
+
+    Attributes:
+        path: the file.
+        format: what wrote it, in words.
+        start: time of the first sample [s].
+        step: from one sample to the next [s]; step_u: its standard uncertainty [s], where it comes from rounded times.
+        count: samples of each channel.
+        signals: the channels.
+        read: from the index of a channel to its samples in order, in blocks, each of shape (m,), in the channel's unit.
+        warnings: what to know before using it.
+    """
+
+    path: Path
+    format: str
+    start: float
+    step: float
+    count: int
+    signals: tuple[Signal, ...]
+    read: Callable[[int], Iterator[Array]]
+    warnings: tuple[str, ...] = ()
+    step_u: float = 0.0
+
+    @property
+    def rate(self) -> float:
+        """Samples per second [Hz]."""
+        return 1 / self.step
+
+    @property
+    def duration(self) -> float:
+        """From the first sample to the last [s]."""
+        return (self.count - 1) * self.step
+
+    def signal(self, wanted: str | None = None) -> int:
+        """Index of a channel by its name, in any case, or its 1-based number; of the first without a name.
+
+        Raises:
+            NoSuchSignal: there is none of that name.
+        """
+        if wanted is None:
+            return 0
+        names = [signal.name.casefold() for signal in self.signals]
+        if wanted.strip().casefold() in names:
+            return names.index(wanted.strip().casefold())
+        if wanted.strip().isdecimal() and 1 <= int(wanted) <= len(names):
+            return int(wanted) - 1
+        has = listed(signal.name for signal in self.signals)
+        raise NoSuchSignal(
+            "channel", f"{shown(str(self.path), 200)} has {has}: name one of them", value=f"'{shown(wanted)}'"
+        )
+
+    def blocks(self, wanted: str | None = None) -> Iterator[Array]:
+        """The samples of a channel in order, in blocks that fit into memory."""
+        return self.read(self.signal(wanted))
+
+    def samples(self, wanted: str | None = None) -> Array:
+        """All samples of a channel, shape (count,)."""
+        found = list(self.blocks(wanted))
+        return np.concatenate(found) if found else np.zeros(0)
+
+    def at_rate(self, rate: float | None) -> Waveform:
+        """The same at a rate that is given [Hz], with a warning where it is another than the file's."""
+        if rate is None:
+            return self
+        warnings = (*self.warnings, *about_rate(self.path, self.step, rate))
+        return replace(self, step=1 / rate, step_u=0.0, warnings=warnings)
+
+
+@dataclass(frozen=True, eq=False)
+class PulseTimes:
+    """Times at which pulses came.  times: shape (n,), increasing [s]; path, format, warnings: as of a waveform."""
+
+    path: Path
+    format: str
+    times: Array
+    warnings: tuple[str, ...] = ()
+
+
+def about_rate(path: Path, known: float | None, rate: float | None) -> list[str]:
+    """A warning where a given rate [Hz] is not the file's.  known: step of the file [s]."""
+    if rate is None or known is None or known <= 0 or abs(known * rate - 1) <= 1e-6:
+        return []
+    return [f"{path.name}: the given rate of {rate:g} Hz takes the place of {1 / known:.9g} Hz in the file"]
+
+
+def check_step(path: Path, step: float, what: str) -> None:
+    """Raise TableError for a sampling interval [s] that is none.  what: where it comes from."""
+    if not SHORTEST_STEP_S <= step <= LONGEST_STEP_S:
+        raise TableError(path, f"{what} is {step:g} s, above 0 is expected: say `rate` in Hz, or correct the file")
+
+
+def check_count(path: Path, count: int) -> None:
+    """Raise TableError for a record of too few samples."""
+    if count < FEWEST_SAMPLES:
+        raise TableError(path, f"holds {count} samples, at least {FEWEST_SAMPLES} are needed: record longer")

@@ -1,0 +1,1 @@
+"""Traces and pulse times → spin frequency."""

@@ -1,0 +1,265 @@
+"""Spin frequencies at some paths, each by itself: nothing is averaged over different tops or times."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from analysis.errors import AnalysisError
+from analysis.pulses import phases, spin_of_times, spin_of_trace, track_of_blocks, track_of_times
+from levilab.errors import DataError
+from levilab.pipelines.result import Place, place_of
+from levilab.pipelines.sources import InputOptions, Needs, Source, collect
+from levilab.pipelines.spin.readings import Records, read_spin_file, read_spin_run
+from levilab.present.numbers import with_uncertainty
+from levilab.runs.run import find_run
+from levilab.runs.traces import INDEX
+from levilab.runs.waveforms import has_traces
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from analysis.pulses import Finding, Phase, SpinFrequency, Track
+    from levilab.formats.waveforms.waveform import Waveform
+
+    Array = NDArray[np.float64]
+
+SPIN = "spin"
+#: The runs and files that suit.
+NEEDS = Needs(
+    analysis=SPIN,
+    experiments=frozenset({"trace"}),
+    read_file=read_spin_file,
+    read_run=read_spin_run,
+    data=INDEX,
+    also=has_traces,
+    wanted="run with traces",
+)
+#: A longer record is cut into windows [s]: a top that coasts loses 3 % of its spin meanwhile, and a parabola of the
+#: phase still holds.
+LONGEST_WHOLE_S = 12.0
+#: Length of a window of a longer record [s].
+WINDOW_S = 2.0
+
+
+@dataclass(frozen=True)
+class SpinOptions(InputOptions):
+    """How pulses are found, see `analysis.pulses.spin_of_trace`."""
+
+    method: Literal["auto", "edges", "matched", "likelihood"] = "auto"
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where the numbers of one input come from.  options: how they were made; text: for people."""
+
+    options: SpinOptions
+    text: str = "analyzed now"
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """Frequency against time.
+
+    time [s], frequency [Hz], u [Hz]: shape (m,), a value for each window or record; phases: (what the top did, from, to
+    [s]); of: what there is a value for, in words.
+    """
+
+    time: Array
+    frequency: Array
+    u: Array
+    phases: tuple[tuple[str, float, float], ...] = ()
+    of: str = "record"
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+
+@dataclass(frozen=True, eq=False)
+class SpinRun:
+    """One input.
+
+    spin: its frequency; of a long record or of several, that of the window or record in the middle; series: all of
+    them; notes: findings.
+    """
+
+    spin: SpinFrequency
+    series: Series
+    notes: tuple[Finding, ...]
+
+
+@dataclass(frozen=True)
+class SpinAnalysis:
+    """Spin frequencies, each by itself.
+
+    runs, origins: one per source; place: where the result belongs; warnings: about the inputs; remarks: what does not
+    belong to the analysis.
+    """
+
+    sources: tuple[Source[Records], ...]
+    runs: tuple[SpinRun, ...]
+    options: SpinOptions
+    place: Place
+    warnings: tuple[str, ...]
+    remarks: tuple[str, ...]
+    origins: tuple[Origin, ...]
+
+    @property
+    def home(self) -> Path:
+        """The folder that the result belongs to."""
+        return self.place.folder
+
+    @property
+    def text(self) -> str:
+        """What the data say, in a few sentences."""
+        texts = [in_a_sentence(run) for run in self.runs]
+        if len(texts) == 1:
+            return texts[0]
+        named = (f"{source.name}: {text}" for source, text in zip(self.sources[:MOST_SENTENCES], texts, strict=False))
+        more = len(texts) - MOST_SENTENCES
+        return " ".join(named) + (f" And {more} more, in the table." if more > 0 else "")
+
+    @property
+    def all_warnings(self) -> list[str]:
+        """Every warning once, an input's with its name where there are several."""
+        several = len(self.runs) > 1
+        texts = list(self.warnings)
+        for source, run in zip(self.sources, self.runs, strict=True):
+            prefix = f"{source.name}: " if several else ""
+            texts += [*source.warnings, *(f"{prefix}{note.text} ({note.name})" for note in run.notes)]
+        return list(dict.fromkeys(texts))
+
+
+#: So many inputs are told of in words.
+MOST_SENTENCES = 4
+
+
+def analyze_spins(paths: Sequence[Path], options: SpinOptions) -> SpinAnalysis:
+    """Find the spin frequency of every record found at the paths.
+
+    Raises DataError for what cannot be used; the text names the file.
+    """
+    paths = [find_run(path) for path in paths]
+    found = collect(paths, NEEDS, lambda _: options)
+    runs, sources, warnings = [], [], list(found.warnings)
+    for source in found.sources:
+        try:
+            runs.append(spin_of_source(source, options))
+            sources.append(source)
+        except DataError as error:
+            if len(found.sources) == 1:
+                raise
+            warnings.append(f"passed over: {error}")
+    if not runs:
+        raise DataError(warnings[-1].removeprefix("passed over: "))
+    return SpinAnalysis(
+        sources=tuple(sources),
+        runs=tuple(runs),
+        options=options,
+        place=place_of(paths, sources),
+        warnings=(*warnings, *about_inputs(sources, options)),
+        remarks=found.remarks,
+        origins=(Origin(options),) * len(runs),
+    )
+
+
+def about_inputs(sources: Sequence[Source[Records]], options: SpinOptions) -> list[str]:
+    """What to know of the inputs before using the numbers."""
+    if options.method != "auto" and all(source.readings.pulses for source in sources):
+        return [f"the method {options.method} was chosen, but a list of pulse times leaves no choice"]
+    return []
+
+
+def spin_of_source(source: Source[Records], options: SpinOptions) -> SpinRun:
+    """The spin of one input.  Raises DataError, which names the file."""
+    records = source.readings
+    try:
+        if records.pulses:
+            return _of_times(records.pulses.times)
+        if len(records.waveforms) == 1:
+            return _of_waveform(records.waveforms[0], records.channel, options)
+        return _of_several(records, options)
+    except AnalysisError as error:
+        raise DataError(f"{source.path}: {error}") from error
+
+
+def _of_times(times: Array) -> SpinRun:
+    if times[-1] - times[0] <= LONGEST_WHOLE_S:
+        return _of_one(spin_of_times(times))
+    return _of_track(track_of_times(times, window=WINDOW_S))
+
+
+def _of_waveform(waveform: Waveform, channel: str, options: SpinOptions) -> SpinRun:
+    if waveform.duration <= LONGEST_WHOLE_S:
+        samples = waveform.samples(channel)
+        spin = spin_of_trace(samples, waveform.rate, start=waveform.start, method=options.method)
+        return _of_one(_with_rate(spin, waveform))
+    blocks = waveform.blocks(channel)
+    return _of_track(
+        track_of_blocks(blocks, waveform.rate, start=waveform.start, window=WINDOW_S, method=options.method)
+    )
+
+
+def _with_rate(spin: SpinFrequency, waveform: Waveform) -> SpinFrequency:
+    """The same with the uncertainty of the sampling rate in that of the frequency."""
+    value, u = spin.frequency.value, spin.frequency.u
+    if waveform.step_u == 0 or value is None or u is None:
+        return spin
+    return replace(spin, frequency=replace(spin.frequency, u=math.hypot(u, value * waveform.step_u / waveform.step)))
+
+
+def _of_several(records: Records, options: SpinOptions) -> SpinRun:
+    """A spin for each record of a run; what has no pulses is left out, unless none has."""
+    spins: list[SpinFrequency] = []
+    missed: AnalysisError | None = None
+    for waveform in records.waveforms:
+        try:
+            samples = waveform.samples()
+            spins.append(spin_of_trace(samples, waveform.rate, start=waveform.start, method=options.method))
+        except AnalysisError as error:
+            missed = error
+    if not spins:
+        assert missed
+        raise missed
+    series = Series(*_columns(spins), of="record")
+    names = dict.fromkeys(note.name for spin in spins for note in spin.notes)
+    notes = tuple(next(note for spin in spins for note in spin.notes if note.name == name) for name in names)
+    return SpinRun(spins[len(spins) // 2], series, notes)
+
+
+def _of_one(spin: SpinFrequency) -> SpinRun:
+    return SpinRun(spin, Series(*_columns([spin])), spin.notes)
+
+
+def _of_track(track: Track) -> SpinRun:
+    middle = int(np.abs(track.time - 0.5 * (track.time[0] + track.time[-1])).argmin())
+    series = Series(track.time, track.frequency, track.u, tuple(map(_phase, phases(track))), of="window")
+    return SpinRun(track.spins[middle], series, track.notes)
+
+
+def _phase(phase: Phase) -> tuple[str, float, float]:
+    return phase.kind, phase.start, phase.end
+
+
+def _columns(spins: Sequence[SpinFrequency]) -> tuple[Array, Array, Array]:
+    rows = [(spin.reference_time, spin.frequency.value, spin.frequency.u) for spin in spins]
+    time, frequency, u = np.array(rows, dtype=np.float64).T
+    return time, frequency, u
+
+
+def in_a_sentence(run: SpinRun) -> str:
+    """What the data say of one input."""
+    spin, series = run.spin, run.series
+    at = f"{with_uncertainty(spin.frequency)} at {spin.reference_time:.4g} s"
+    if len(series) == 1:
+        return f"The spin is {at}, its slope {with_uncertainty(spin.chirp)}."
+    ends = f"{series.frequency[0]:.3f} Hz at {series.time[0]:.1f} s to {series.frequency[-1]:.3f} Hz"
+    told = ", ".join(f"{kind} {start:.1f} to {end:.1f} s" for kind, start, end in series.phases[:6])
+    phases_told = f"; {told}" if told else ""
+    return f"The spin goes from {ends} at {series.time[-1]:.1f} s ({len(series)} {series.of}s{phases_told}); {at}."

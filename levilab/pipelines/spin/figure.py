@@ -1,0 +1,284 @@
+"""Spin frequencies → their figure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from levilab.present.numbers import short_name, with_uncertainty
+from levilab.present.style import STYLE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from analysis.pulses import SpinFrequency
+    from levilab.formats.waveforms.waveform import Waveform
+    from levilab.pipelines.sources import Source
+    from levilab.pipelines.spin.analysis import SpinAnalysis, SpinRun
+    from levilab.pipelines.spin.readings import Records
+
+    Array = NDArray[np.float64]
+
+#: Inputs that are drawn, and points of a panel.
+MOST_INPUTS, MOST_POINTS = 3, 4000
+#: Turns of the trace that are shown, and the longest part of it that is folded [s].
+TURNS_SHOWN, LONGEST_FOLDED_S = 6, 12.0
+BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
+#: Bins of the folded pulse.
+BINS = 240
+
+
+@dataclass(frozen=True, eq=False)
+class _Excerpt:
+    """Samples about the reference time: time [s], signal [unit], turns; arrivals and residuals of the pulses [s]."""
+
+    time: Array
+    signal: Array
+    turns: Array
+    unit: str
+    arrivals: Array
+    residuals: Array
+
+
+def spin_figure(analysis: SpinAnalysis) -> Figure:
+    """For each input its trace with the turns found in it, all turns laid over each other, residuals, and frequency."""
+    shown = list(zip(analysis.sources, analysis.runs, strict=True))[:MOST_INPUTS]
+    height = 6.4
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(10, height * len(shown)))
+        for k, (source, run) in enumerate(shown):
+            top = 1 - k / len(shown)
+            size = 1 / len(shown)
+            panels = [
+                figure.add_axes((x, top - size * (1 - y), 0.405, size * 0.335))
+                for y in (0.53, 0.075) for x in (0.075, 0.575)
+            ]  # fmt: skip
+            _title(figure, top - 0.035 * size, analysis, source, run)
+            _draw(panels, source, run)
+        more = len(analysis.runs) - len(shown)
+        if more > 0:
+            figure.text(0.985, 1 - 0.02 / len(shown), f"{more} more inputs are not drawn", ha="right", fontsize=8)
+    return figure
+
+
+def _title(figure: Figure, y: float, analysis: SpinAnalysis, source: Source[Records], run: SpinRun) -> None:
+    spin = run.spin
+    made_up = "  (SYNTHETIC)" if source.synthetic else ""
+    name = f"{_drawable(short_name(source.name))}: " if len(analysis.runs) > 1 else ""
+    text = f"{name}spin {with_uncertainty(spin.frequency)} at {spin.reference_time:.4g} s{made_up}"
+    figure.text(0.02, y, text, fontsize=11, va="center")
+
+
+def _drawable(name: str) -> str:
+    text = name if len(name) <= 40 else name[:39] + "…"
+    return text.replace("\\", "\\\\").replace("$", r"\$")
+
+
+def _draw(panels: list[Axes], source: Source[Records], run: SpinRun) -> None:
+    excerpt = _excerpt(source.readings, run.spin)
+    if source.readings.pulses:
+        _draw_intervals(panels[0], excerpt)
+        _draw_phases_of_pulses(panels[1], excerpt, run.spin)
+    else:
+        _draw_trace(panels[0], excerpt, run.spin)
+        _draw_folded(panels[1], excerpt)
+    _draw_residuals(panels[2], excerpt, run.spin)
+    _draw_series(panels[3], run)
+
+
+# --- what is drawn -------------------------------------------------------------------------------------
+
+
+def turns_of(spin: SpinFrequency, time: Array) -> Array:
+    """Turns at given times [s] since the pulse before the reference time: along the slope."""
+    away = time - spin.reference_time
+    values = spin.phase.value, spin.frequency.value, spin.chirp.value
+    phase, frequency, chirp = (value or 0.0 for value in values)
+    turns: Array = phase + frequency * away + chirp * away**2 / 2
+    return turns
+
+
+def _excerpt(records: Records, spin: SpinFrequency) -> _Excerpt:
+    """The part about the reference time to which the numbers belong."""
+    if records.pulses:
+        times = records.pulses.times
+        near = _near(times, spin)
+        turns = turns_of(spin, times[near])
+        residuals = (turns - np.rint(turns)) / (spin.frequency.value or 1.0)
+        return _Excerpt(times[near], np.zeros(near.sum()), turns, "", times[near], residuals)
+    waveform = min(records.waveforms, key=lambda w: abs(w.start + w.duration / 2 - spin.reference_time))
+    first = 0
+    if waveform.duration > LONGEST_FOLDED_S:
+        first = max(int((spin.reference_time - 1.0 - waveform.start) * waveform.rate), 0)
+    count = waveform.count if waveform.duration <= LONGEST_FOLDED_S else int(2.0 * waveform.rate)
+    channel = records.channel if len(records.waveforms) == 1 else None
+    signal = _part(waveform, channel, first, count)
+    time = waveform.start + (first + np.arange(len(signal), dtype=np.float64)) * waveform.step
+    turns = turns_of(spin, time)
+    arrivals, residuals = _arrivals(signal, turns, spin)
+    unit = waveform.signals[waveform.signal(channel)].unit
+    return _Excerpt(time, signal, turns, unit, arrivals, residuals)
+
+
+def _near(times: Array, spin: SpinFrequency) -> NDArray[np.bool_]:
+    if times[-1] - times[0] <= LONGEST_FOLDED_S:
+        return np.ones(len(times), dtype=bool)
+    return np.abs(times - spin.reference_time) <= 1.0
+
+
+def _part(waveform: Waveform, channel: str | None, first: int, count: int) -> Array:
+    """Samples from one number on, read in blocks."""
+    kept: list[Array] = []
+    seen = 0
+    for block in waveform.blocks(channel):
+        low, high = max(first - seen, 0), min(first + count - seen, len(block))
+        if high > low:
+            kept.append(block[low:high])
+        seen += len(block)
+        if seen >= first + count:
+            break
+    return np.concatenate(kept)
+
+
+def _arrivals(signal: Array, turns: Array, spin: SpinFrequency) -> tuple[Array, Array]:
+    """Times of pulses [s] and how far they are from the fit [s]: the centre of what rises out of the noise."""
+    base, height = _levels(signal, turns)
+    level = (signal - base) / height
+    noise = 1.4826 * float(np.nanmedian(np.abs(level)))  # most of a turn is between the pulses
+    above = np.clip(level - min(max(4 * noise, 0.1), 0.5), 0.0, 1.0)
+    whole = np.rint(turns)
+    off = turns - whole
+    above[~np.isfinite(above) | (np.abs(off) > 0.25)] = 0.0
+    index = (whole - whole.min()).astype(np.intp)
+    weight = np.bincount(index, above)
+    moment = np.bincount(index, above * off)
+    seen = np.flatnonzero(weight > 0.2 * np.median(weight[weight > 0])) if (weight > 0).any() else np.zeros(0, np.intp)
+    number = seen + whole.min()
+    seen = seen[(number - 0.25 >= turns.min()) & (number + 0.25 <= turns.max())]  # the ends may cut a pulse
+    frequency = spin.frequency.value or 1.0
+    shift = moment[seen] / weight[seen]
+    return (seen + whole.min() - (spin.phase.value or 0.0)) / frequency + spin.reference_time, shift / frequency
+
+
+def _levels(signal: Array, turns: Array) -> tuple[float, float]:
+    """The level between pulses and the height of a pulse, which may be negative."""
+    folded = _fold(signal, turns)[1]
+    base = float(np.nanmedian(folded))
+    k = len(folded) // 2
+    middle = folded[k - 3 : k + 4]
+    peak = float(np.nanmax(middle)) if np.nanmax(middle) - base > base - np.nanmin(middle) else float(np.nanmin(middle))
+    return base, (peak - base) or 1.0
+
+
+def _fold(signal: Array, turns: Array) -> tuple[Array, Array]:
+    """Mean signal against the part of a turn, −½ to ½."""
+    off = turns - np.rint(turns)
+    good = np.isfinite(signal)
+    bins = np.clip(((off[good] + 0.5) * BINS).astype(np.intp), 0, BINS - 1)
+    count = np.bincount(bins, minlength=BINS)
+    total = np.bincount(bins, signal[good], minlength=BINS)
+    with np.errstate(invalid="ignore"):
+        return (np.arange(BINS) + 0.5) / BINS - 0.5, total / np.where(count, count, np.nan)
+
+
+# --- the panels ----------------------------------------------------------------------------------------
+
+
+def _thin(n: int) -> slice:
+    return slice(None, None, max(n // MOST_POINTS, 1))
+
+
+def _draw_trace(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:
+    """A few turns about the reference time, and where the fit has the pulses."""
+    frequency = spin.frequency.value or 1.0
+    half = TURNS_SHOWN / 2 / frequency
+    near = np.abs(excerpt.time - spin.reference_time) <= half
+    if not near.any():
+        near = excerpt.time <= excerpt.time[0] + 2 * half
+    axes.plot(excerpt.time[near], excerpt.signal[near], color="black", linewidth=0.8)
+    turns = excerpt.turns[near]
+    for turn in np.arange(np.ceil(turns.min()), np.floor(turns.max()) + 1):
+        at = np.interp(turn, turns, excerpt.time[near])
+        axes.axvline(at, color=VERMILION, linewidth=1, alpha=0.7, zorder=1)
+    axes.set(xlabel="time  [s]", ylabel=f"signal  [{excerpt.unit}]")
+    axes.locator_params(axis="x", nbins=6)
+    axes.set_title("The trace, and the turns found in it", loc="left")
+
+
+def _draw_folded(axes: Axes, excerpt: _Excerpt) -> None:
+    """All turns over each other."""
+    part = _thin(len(excerpt.turns))
+    off = excerpt.turns - np.rint(excerpt.turns)
+    style: Any = {"marker": ".", "markersize": 2, "linestyle": "none", "color": BLUE, "alpha": 0.4, "rasterized": True}
+    axes.plot(off[part], excerpt.signal[part], **style)
+    phase, mean = _fold(excerpt.signal, excerpt.turns)
+    good = np.isfinite(mean)
+    axes.plot(phase[good], mean[good], color="black", linewidth=1)
+    axes.axvline(0, color=VERMILION, linewidth=1, alpha=0.7, zorder=1)
+    turns = int(np.ptp(np.rint(excerpt.turns))) + 1
+    axes.set(xlabel="part of a turn", ylabel=f"signal  [{excerpt.unit}]", xlim=(-0.5, 0.5))
+    axes.set_title(f"{turns} turns laid over each other, and their mean", loc="left")
+
+
+def _draw_intervals(axes: Axes, excerpt: _Excerpt) -> None:
+    style: Any = {"marker": ".", "markersize": 4, "linestyle": "none", "color": "black"}
+    axes.plot(excerpt.time[1:], 1e3 * np.diff(excerpt.time), **style)
+    axes.set(xlabel="time  [s]", ylabel="interval  [ms]")
+    axes.set_title("Intervals between pulses", loc="left")
+
+
+def _draw_phases_of_pulses(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:
+    axes.hist(1e6 * excerpt.residuals, bins=30, color=BLUE, alpha=0.6)
+    axes.axvline(0, color=VERMILION, linewidth=1)
+    axes.set(xlabel="time of a pulse − fit  [µs]", ylabel="pulses")
+    axes.set_title(f"Scatter of a pulse's time: {1e6 * spin.scatter:.3g} µs", loc="left")
+
+
+def _draw_residuals(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:
+    """What the pulses' times leave over: noise about zero, without a shape."""
+    axes.axhline(0, color=VERMILION, linewidth=1)
+    limit = 6 * 1e6 * max(spin.scatter, float(np.median(np.abs(excerpt.residuals))) if len(excerpt.residuals) else 0.0)
+    values = 1e6 * excerpt.residuals
+    inside = np.abs(values) <= limit
+    style: Any = {"linestyle": "none", "color": "black", "markersize": 4}
+    axes.plot(excerpt.arrivals[inside], values[inside], marker=".", **style)
+    edges = excerpt.arrivals[~inside], np.clip(values[~inside], -limit, limit)
+    axes.plot(*edges, marker="x", **style | {"color": "red"}, label="beyond the panel")
+    if (~inside).any():
+        axes.legend(loc="upper right")
+    if limit > 0:
+        axes.set_ylim(-1.1 * limit, 1.1 * limit)
+    axes.set(xlabel="time  [s]", ylabel="time of a pulse − fit  [µs]")
+    axes.set_title("Residuals of the pulses' times", loc="left")
+
+
+def _draw_series(axes: Axes, run: SpinRun) -> None:
+    """Frequency against time: of windows or records, or along the slope of the only one."""
+    series, spin = run.series, run.spin
+    if len(series) == 1:
+        half = 0.5 * spin.pulses / (spin.frequency.value or 1.0)
+        t = np.linspace(spin.reference_time - half, spin.reference_time + half, 50)
+        along = [spin.at(float(x)) for x in t]
+        nu = np.array([one.value for one in along], dtype=np.float64)
+        u = np.array([one.u if one.u is not None else np.nan for one in along])
+        axes.fill_between(t, nu - u, nu + u, color=BLUE, alpha=0.25, linewidth=0)
+        axes.plot(t, nu, color=BLUE)
+        axes.plot(spin.reference_time, spin.frequency.value or 0.0, "o", color="black", markersize=5)
+        axes.set_title("Frequency along the slope, ± u", loc="left")
+    else:
+        axes.errorbar(series.time, series.frequency, series.u, color=BLUE, fmt=".", markersize=3, elinewidth=0.8)
+        colours = {"coasting": GREEN, "held": VERMILION, "speeding-up": "#E69F00"}
+        for kind, start, end in series.phases:
+            if kind in colours:
+                known = axes.get_legend_handles_labels()[1]
+                axes.axvspan(start, end, color=colours[kind], alpha=0.12, label=None if kind in known else kind)
+        if axes.get_legend_handles_labels()[1]:
+            axes.legend(loc="best")
+        axes.set_title(f"Frequency of {len(series)} {series.of}s", loc="left")
+    axes.ticklabel_format(axis="y", useOffset=False)
+    axes.set(xlabel="time  [s]", ylabel="spin frequency ν  [Hz]")

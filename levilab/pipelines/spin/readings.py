@@ -1,0 +1,92 @@
+"""What the analysis of a spin reads: records of a detector's signal, or times of pulses."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from levilab.errors import DataError, DoesNotSuit
+from levilab.formats.waveforms.record import read_record
+from levilab.formats.waveforms.waveform import PulseTimes, Waveform
+from levilab.runs.waveforms import run_waveforms
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from levilab.pipelines.sources import InputOptions
+    from levilab.runs.run import Run
+
+
+@dataclass(frozen=True, eq=False)
+class Records:
+    """One input.
+
+    waveforms: one for a file, one a record for a run, none for a list of times; channel: its name; pulses: the list;
+    origin: the file or folder.
+    """
+
+    origin: Path
+    waveforms: tuple[Waveform, ...]
+    channel: str
+    pulses: PulseTimes | None
+    warnings: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return sum(waveform.count for waveform in self.waveforms) + (len(self.pulses.times) if self.pulses else 0)
+
+    def same_as(self, other: Records) -> bool:
+        """Whether it is the same input: nothing is averaged, so a copy by another name does no harm."""
+        return self.origin.resolve() == other.origin.resolve()
+
+    @property
+    def kind(self) -> str:
+        """What it is, in words."""
+        if self.pulses:
+            return self.pulses.format
+        if len(self.waveforms) > 1:
+            return f"{len(self.waveforms)} records of an oscilloscope"
+        return self.waveforms[0].format
+
+
+def read_spin_file(path: Path, options: InputOptions) -> Records:
+    """A data file.
+
+    Raises:
+        DoesNotSuit: it holds neither samples nor pulse times.
+        DataError: it cannot be used.
+    """
+    record = read_record(path, columns=options.columns, rate=options.rate, guess=options.guess)
+    if isinstance(record, PulseTimes):
+        return Records(path, (), "", record, record.warnings)
+    chosen = record.signals[record.signal(options.channel)].name
+    warnings = list(record.warnings)
+    if options.channel is None and len(record.signals) > 1:
+        names = ", ".join(signal.name for signal in record.signals)
+        warnings.append(f"{path.name}: has the channels {names}; {chosen} is analyzed, `channel` chooses another")
+    return Records(path, (record,), chosen, None, tuple(warnings))
+
+
+def read_spin_run(run: Run, options: InputOptions) -> Records:
+    """The records of a run: of one channel, the one with the most records unless it is named.
+
+    Raises:
+        DoesNotSuit: the run keeps none.
+        DataError: one is damaged, or none is of the channel.
+    """
+    found = run_waveforms(run)
+    if not found:
+        raise DoesNotSuit(f"{run.folder}: keeps no record of an oscilloscope")
+    names = Counter(waveform.signals[0].name for waveform in found)
+    chosen = options.channel or names.most_common(1)[0][0]
+    of_channel = tuple(w for w in found if w.signals[0].name.casefold() == chosen.casefold())
+    if not of_channel:
+        raise DataError(
+            f"{run.folder}: has no record of {chosen!r}, but of {', '.join(names)}: name one with `channel`"
+        )
+    warnings = []
+    if options.channel is None and len(names) > 1:
+        warnings.append(
+            f"{run.folder.name}: has records of {', '.join(names)}; {chosen} is analyzed, `channel` chooses another"
+        )
+    return Records(run.folder, of_channel, chosen, None, tuple(warnings))

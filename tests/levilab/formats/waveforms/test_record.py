@@ -1,0 +1,400 @@
+"""Samples out of files: every vendor's header, their traps, what is refused and how, and memory that does not grow."""
+
+from __future__ import annotations
+
+import codecs
+import sys
+import tracemalloc
+import types
+import wave
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from levilab.errors import DataError, DoesNotSuit, UsageError
+from levilab.formats.columns import TableError
+from levilab.formats.waveforms import head, wav
+from levilab.formats.waveforms.header import NoWaveform
+from levilab.formats.waveforms.record import read_record
+from levilab.formats.waveforms.waveform import PulseTimes, Waveform
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    Write = Callable[..., Path]
+
+FEW = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+#: Of the sample files, which sample_data/make.py writes from one signal.
+STEP, COUNT, START = 2.5e-4, 2000, -0.25
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    def file(content: str | bytes, name: str = "data.csv") -> Path:
+        path = tmp_path / name
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return path
+
+    return file
+
+
+def waveform(path: Path, **given: Any) -> Waveform:
+    record = read_record(path, **given)
+    assert isinstance(record, Waveform)
+    return record
+
+
+#: Sample file → what is said of its origin, start, and the name and unit of its first channel.
+SCOPE_FILES = {
+    "rigol-ds1000z.csv": ("Rigol CSV", START, "CH1", "V"),
+    "rigol-ds1000z-screen.csv": ("Rigol CSV of the screen", START, "CH1", "V"),
+    "keysight-dsox.csv": ("Keysight CSV", START, "CH1", "V"),
+    "siglent-sds1202x-e.csv": ("Siglent CSV", START, "CH1", "V"),
+    "siglent-sds1104x-e.csv": ("Siglent CSV", START, "CH1", "V"),
+    "tektronix-tds2000c.csv": ("Tektronix TDS CSV", START, "CH1", "V"),
+    "tektronix-mdo3000.csv": ("Tektronix CSV", START, "CH1", "V"),
+    "two-columns-german.csv": ("CSV", START, "Spannung", "V"),
+    "samples-4000hz.npy": ("NumPy array", 0.0, "CH1", "V"),
+    "recording.wav": ("WAV", 0.0, "mono", "full scale"),
+}
+
+
+@pytest.mark.parametrize("name", SCOPE_FILES)
+def test_a_record_reads_the_same_whoever_wrote_it(name: str, sample_data: Path) -> None:
+    written = np.load(sample_data / "scope-files" / "samples-4000hz.npy").astype(np.float64)
+    record = waveform(sample_data / "scope-files" / name, rate=4000.0 if name.endswith(".npy") else None)
+    origin, start, channel, unit = SCOPE_FILES[name]
+    assert (record.format, record.count, record.warnings) == (origin, COUNT, ())
+    assert (record.signals[0].name, record.signals[0].unit) == (channel, unit)
+    assert record.step == pytest.approx(STEP, rel=1e-12)
+    assert record.start == pytest.approx(start, abs=1e-12)
+    scale = 2.0 if unit == "full scale" else 1.0
+    step = 2 / 32768 if unit == "full scale" else 1e-6  # of a 16-bit WAV, and of single precision
+    np.testing.assert_allclose(scale * record.samples(), written, atol=step, rtol=0)
+
+
+def test_times_that_lost_digits_give_the_step_by_a_line_and_say_so(sample_data: Path) -> None:
+    record = waveform(sample_data / "scope-files" / "rigol-ds1000e.csv")
+    assert record.step == pytest.approx(STEP, rel=9e-5)  # what the warning says
+    assert "is known to 9e-05 of it" in record.warnings[0]
+    ends = (0.25 - -0.25) / (COUNT - 1)
+    assert abs(record.step - STEP) < abs(ends - STEP) / 5  # first and last time alone are far off
+
+
+def rows(n: int = 20, first: int = 0) -> str:
+    return "".join(f"{k},{k % 5}.5,\n" for k in range(first, first + n))
+
+
+@pytest.mark.parametrize(
+    ("text", "start", "step", "channels"),
+    [
+        ("X,CH1,Start,Increment,\nSequence,Volt,-1.4e-03,2e-06,\n" + rows(first=22), -1.356e-3, 2e-6, "CH1 V"),
+        ("X,CH1,CH2,Start,Increment\nSequence,mV,Volt,0,1e-3\n" + rows(), 0.0, 1e-3, "CH1 V"),  # CH2 was off
+        ("CH1,CH2,Start,Increment,\nVolt,Volt,-6e-02,1e-04\n" + "0.5,1.5,\n" * 20, -0.06, 1e-4, "CH1 V, CH2 V"),
+        ("Source,CH3\nSecond,Volt\n" + "".join(f"{k / 1000:.11f},1\n" for k in range(20)), 0.0, 1e-3, "CH3 V"),
+        ('"Record Length",20,"Points",0.0,1\n"Sample Interval",1e-3,s,0.001,2\n'
+         + "".join(f",,,{k / 1000},1\n" for k in range(2, 20)), 0.0, 1e-3, "CH1 V"),
+        ("#Model,MDO3014\n#Sample Interval,4e-09\n#Record Length,20\n#TIME,D1,D0\n"
+         + "".join(f"{k * 4e-9:.7e},1,0\n" for k in range(20)), 0.0, 4e-9, "D1 V, D0 V"),
+        ("x-axis,1,2\nsecond,Volt,Ampere\n" + "".join(f"{k}.0E-03,1,2\n" for k in range(20)),
+         0.0, 1e-3, "CH1 V, CH2 Ampere"),
+        ("t,CH1\n" + "".join(f"{k / 1000},1\n" for k in range(20)), 0.0, 1e-3, "CH1 V"),
+        ("".join(f"{k / 1000},1\n" for k in range(20)), 0.0, 1e-3, "CH1 V"),
+        ("t/us\tu/mV\n" + "".join(f"{k}\t1\n" for k in range(20)), 0.0, 1e-6, "u V"),
+    ],
+)  # fmt: skip
+def test_headers_with_their_variants(tmp_path: Path, text: str, start: float, step: float, channels: str) -> None:
+    path = tmp_path / "data.csv"
+    path.write_text(text, encoding="utf-8")
+    record = waveform(path)
+    assert (record.start, record.step) == (pytest.approx(start, abs=1e-15), pytest.approx(step, rel=1e-9))
+    assert ", ".join(f"{signal.name} {signal.unit}" for signal in record.signals) == channels
+    assert record.count == 20
+
+
+def test_times_in_single_precision_are_even_enough(write: Write) -> None:
+    """As a DS1102E prints them: -5.9999997e-04, -5.9800001e-04."""
+    times = (np.arange(300) * 2e-6 - 6e-4).astype(np.float32)
+    text = "X,CH1,\nSecond,Volt,\n" + "".join(f"{t:.7e},1.0,\n" for t in times.tolist())
+    record = waveform(write(text))
+    assert record.step == pytest.approx(2e-6, rel=1e-6)
+    assert record.warnings == ()
+
+
+SIGLENT = "Record Length,Analog:{n}\nSample Interval,Analog:{step}\nHorizontal Units,{unit}\nSource,CH1\nSecond,Volt\n"
+
+
+def siglent(step: str, printed: float, *, unit: str = "s", digits: int = 11, count: int = 20) -> str:
+    above = SIGLENT.format(n=count, step=step, unit=unit)
+    return above + "".join(f"{k * printed:.{digits}f},{k % 5}\n" for k in range(20))
+
+
+def test_the_step_comes_from_the_header_where_times_lost_digits(write: Write) -> None:
+    record = waveform(write(siglent("0.000012340000", 1.234e-5, digits=4)))
+    assert record.step == 1.234e-5
+    assert record.warnings == ()
+
+
+def test_times_in_microseconds_below_a_header_in_seconds_are_told(write: Write) -> None:
+    record = waveform(write(siglent("2e-6", 2.0, unit="us")))
+    assert record.step == 2e-6
+    assert "are taken to be in units of 1e-06 s" in record.warnings[0]
+
+
+def test_a_header_that_its_times_contradict_is_refused_with_both(write: Write) -> None:
+    path = write(siglent("2e-5", 4e-5))
+    with pytest.raises(TableError, match=r"interval of 2e-05 s.*4e-05 s.*`rate` = 50000 or 25000"):
+        read_record(path)
+    assert waveform(path, rate=25000.0).step == 4e-5
+
+
+def test_a_record_shorter_than_announced_is_told(write: Write) -> None:
+    assert waveform(write(siglent("1e-3", 1e-3, count=99))).warnings == (
+        "data.csv: its header announces 99 samples, it holds 20",
+    )
+
+
+PLAIN = "t [s];u [mV]\n" + "".join(f"{k / 1000:.4f};{100 * k}\n".replace(".", ",") for k in range(20))
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        PLAIN.replace("\n", "\r\n").encode(),
+        PLAIN.replace("\n", ";;\n").encode(),
+        PLAIN.encode() + b"\0" * 5000,
+        codecs.BOM_UTF16_LE + PLAIN.encode("utf-16-le"),
+        PLAIN.encode("utf-16-le"),
+        PLAIN.encode("utf-16-be"),
+        ("\ufeff" + PLAIN).encode(),
+        PLAIN.replace("u [mV]", "Höhe U [mV]").encode("latin-1"),
+        PLAIN.replace("\n", "\n\n").encode(),
+    ],
+    ids=["CRLF", "trailing", "NUL", "UTF-16", "UTF-16 LE bare", "UTF-16 BE bare", "BOM", "Latin-1", "blank lines"],
+)
+def test_the_way_a_file_is_written_does_not_matter(content: bytes, write: Write) -> None:
+    record = waveform(write(content))
+    np.testing.assert_allclose(record.samples(), 0.1 * np.arange(20), rtol=1e-12)
+    assert (record.step, record.signals[0].unit) == (pytest.approx(1e-3), "V")
+
+
+def test_a_torn_last_line_is_left_out_and_told(write: Write) -> None:
+    record = waveform(write(PLAIN + "0,02"))
+    assert record.count == 20
+    assert "line 22: '0,02' was cut off" in record.warnings[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (PLAIN.replace("0,0100;1000\n", ""), "line 12: 0.002 s lie between this sample and the one before"),
+        (PLAIN.replace("0,0100;1000", "0,010;9,91E37"), "line 12: '9,91E37' is a missing sample"),
+        (PLAIN.replace("0,0100;1000", "0,010;high"), "line 12: 'high' is no number with decimal comma"),
+        ("X,CH1,Start,Increment\nSequence,Volt,x,y\n" + rows(), "no numbers below Start and Increment"),
+        ("X,CH1,Start,Increment\nSequence,Volt,0,1e-3\n" + rows(20) + rows(20, 30), "1 is expected"),
+        ("X,CH1,Start,Increment\nSequence,Volt,0,1e-3\n" + rows(5), "holds 5 samples, at least 16"),
+    ],
+)
+def test_a_damaged_record_is_refused_with_its_line(text: str, says: str, write: Write) -> None:
+    with pytest.raises(TableError) as caught:
+        read_record(write(text))
+    assert says in str(caught.value)
+    assert not isinstance(caught.value, DoesNotSuit)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "time_s,spin_frequency_hz\n0,40\n10,39\n20,38\n",
+        "0,40\n10,39\n20,38\n",
+        "t;CH1\n0;40\n10;39\n20;38\n",
+        "hello\n",
+    ],
+)
+def test_readings_are_no_samples(text: str, write: Write) -> None:
+    with pytest.raises(NoWaveform):
+        read_record(write(text))
+
+
+def test_a_channel_is_chosen_by_name_or_number(sample_data: Path) -> None:
+    record = waveform(sample_data / "scope-files" / "rigol-ds1000z.csv")
+    assert [record.signal(wanted) for wanted in (None, "ch2", "2", "CH1")] == [0, 1, 1, 0]
+    assert record.samples("CH2").max() == 0.02
+    with pytest.raises(UsageError, match="has 'CH1', 'CH2'"):
+        record.samples("CH3")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0.1\n0.2\n0.35\n0.4\n",
+        "t [ms]\n100\n200\n350\n400\n",
+        "0,1\r\n0,2\r\n0,35\r\n0,4\r\n0,0\n".replace("0,0\n", "1,05\n"),
+    ],
+)
+def test_a_column_of_times_is_a_list_of_pulses(text: str, write: Write) -> None:
+    record = read_record(write(text, "pulses.txt"))
+    assert isinstance(record, PulseTimes)
+    np.testing.assert_allclose(record.times[:4], [0.1, 0.2, 0.35, 0.4], rtol=1e-12)
+
+
+def test_arrays_need_a_rate_unless_they_hold_pulse_times(tmp_path: Path) -> None:
+    path = tmp_path / "a.npy"
+    np.save(path, np.sin(np.arange(40.0)).reshape(2, 20))
+    with pytest.raises(TableError, match="say `rate` in Hz"):
+        read_record(path)
+    np.save(path, np.arange(5.0))
+    assert isinstance(read_record(path), PulseTimes)
+    np.save(path, np.array([{}]), allow_pickle=True)
+    with pytest.raises(TableError, match="save it anew"):
+        read_record(path)
+    with pytest.raises(UsageError, match="rate"):
+        read_record(path, rate=-1.0)
+
+
+def test_a_given_rate_goes_before_that_of_a_wav(sample_data: Path) -> None:
+    record = waveform(sample_data / "scope-files" / "recording.wav", rate=8000.0)
+    assert record.step == 1 / 8000
+    assert "8000 Hz takes the place of 4000 Hz" in record.warnings[0]
+
+
+@pytest.mark.parametrize("bits", [8, 16, 24, 32])
+def test_wav_of_every_width(bits: int, tmp_path: Path) -> None:
+    samples = np.array([0.0, 0.5, -0.5, 0.25] * 8)
+    codes = np.round(samples * 2 ** (bits - 1)).astype(np.int64) + (128 if bits == 8 else 0)
+    both = np.repeat(codes, 2)  # two channels
+    with wave.open(str(tmp_path / "a.wav"), "wb") as stream:
+        stream.setparams((2, bits // 8, 1000, 32, "NONE", ""))
+        stream.writeframes(b"".join(int(c).to_bytes(bits // 8, "little", signed=bits > 8) for c in both))
+    record = waveform(tmp_path / "a.wav")
+    assert [signal.name for signal in record.signals] == ["left", "right"]
+    np.testing.assert_array_equal(record.samples("right"), samples)
+
+
+@pytest.mark.parametrize("kind", ["csv", "wav"])
+def test_a_file_larger_than_memory_is_read_in_pieces(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Five times as many samples take no more memory, which is less than the larger file's numbers would."""
+    monkeypatch.setattr(head, "PIECE", 1 << 15)
+    monkeypatch.setattr(wav, "BLOCK", 1 << 11)
+    peaks = []
+    for n in (20_000, 100_000):
+        path = tmp_path / f"long.{kind}"
+        if kind == "csv":
+            text = "X,CH1,Start,Increment\nSequence,Volt,0,1e-4\n" + "".join(f"{k},0.125\n" for k in range(n))
+            path.write_text(text, encoding="utf-8")
+        else:
+            with wave.open(str(path), "wb") as sound:
+                sound.setparams((1, 2, 10_000, n, "NONE", ""))
+                sound.writeframes(bytes(2 * n))
+        next(waveform(path).blocks())  # pandas and scipy are loaded
+        tracemalloc.start()
+        try:
+            record = waveform(path)
+            assert sum(len(block) for block in record.blocks()) == n == record.count
+            peaks.append(tracemalloc.get_traced_memory()[1])
+        finally:
+            tracemalloc.stop()
+    assert peaks[1] < 1.25 * peaks[0]
+    assert peaks[1] < (2 if kind == "csv" else 1) * 8 * 100_000  # the numbers of two columns, of one
+
+
+def read_or_refused(path: Path, rate: float | None) -> Waveform | PulseTimes | None:
+    """What is read, or None for a known failure of one line that names the file."""
+    told = ""
+    try:
+        return read_record(path, rate=rate)
+    except DataError as error:
+        told = str(error)
+    assert "\n" not in told
+    assert told.startswith(str(path))
+    return None
+
+
+@FEW
+@given(st.text(alphabet=st.sampled_from("0123456789.,;-+eE\t\n\r \"'#%xXtuV:[]\0é"), max_size=400))
+@example("X,CH1,Start,Increment\n")
+@example("Record Length,1,,1,1\n")
+@example("Second,Volt\n1,1\n")
+@example("#TIME,CH1\n#Source,1\n")
+@example("x-axis,1\nsecond,Volt\n1\n")
+@example("Source,CH1\nSecond,Volt\n" + "1,1\n" * 20)
+@example("0\n" * 20)
+def test_any_text_is_read_or_refused_in_one_line(write: Write, text: str) -> None:
+    path = write(text)
+    for rate in (None, 1000.0):
+        record = read_or_refused(path, rate)
+        if record is not None:
+            length = record.count if isinstance(record, Waveform) else len(record.times)
+            read = record.samples() if isinstance(record, Waveform) else record.times
+            assert len(read) == length
+            assert np.isfinite(read).all()
+
+
+@FEW
+@given(
+    st.binary(max_size=120), st.sampled_from([b"", b"RIFF\x24\0\0\0WAVEfmt ", b"\x93NUMPY\x01\0", b"RF64\0\0\0\0WAVE"])
+)
+def test_any_bytes_are_read_or_refused_in_one_line(write: Write, content: bytes, magic: bytes) -> None:
+    read_or_refused(write(magic + content, "a.dat" if magic else "a.bin"), 1000.0)
+
+
+@settings(FEW, max_examples=40)
+@given(
+    name=st.sampled_from([name for name in SCOPE_FILES if not name.startswith("two")]),
+    edits=st.lists(st.tuples(st.integers(0, 400), st.sampled_from(list(b'0.,;-e \n"#x\0'))), min_size=1, max_size=4),
+)
+@example(name="samples-4000hz.npy", edits=[(60, ord("("))])
+def test_a_damaged_header_is_read_or_refused_in_one_line(
+    write: Write, sample_data: Path, name: str, edits: list[tuple[int, int]]
+) -> None:
+    content = bytearray((sample_data / "scope-files" / name).read_bytes()[:2000])
+    for place, byte in edits:
+        content[place] = byte
+    read_or_refused(write(bytes(content), name), None)
+
+
+def test_binary_files_need_the_extra(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "RigolWFM.wfm", None)
+    with pytest.raises(TableError, match=r"pip install 'levilab\[scope\]'"):
+        read_record(write(b"\xa5\xa5\0\0", "a.wfm"))
+
+
+class FakeChannel:
+    """What RigolWFM gives of a channel (1.6.0, channel.py)."""
+
+    def __init__(self, number: int, volts: Any) -> None:
+        self.channel_number, self.volts, self.seconds_per_point = number, volts, 1e-3
+        self.times = np.arange(20) * 1e-3 - 0.01
+
+
+class FakeRecord:
+    """What RigolWFM gives of a file."""
+
+    parser_name, header_name = "wfm1000z", "DS1054Z"
+
+    def __init__(self, channels: list[FakeChannel]) -> None:
+        self.channels = channels
+
+    @classmethod
+    def from_file(cls, name: str) -> FakeRecord:
+        if "broken" in name:
+            raise KeyError(name)
+        sys.stdout.write("reading")
+        return cls([FakeChannel(1, np.linspace(0, 1, 20)), FakeChannel(2, None)])
+
+
+def test_binary_files_are_read_by_rigolwfm(write: Write, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+    monkeypatch.setitem(sys.modules, "RigolWFM", types.ModuleType("RigolWFM"))
+    monkeypatch.setitem(sys.modules, "RigolWFM.wfm", types.SimpleNamespace(Wfm=FakeRecord))  # type: ignore[arg-type]
+    record = waveform(write(b"\xa5\xa5\0\0", "a.wfm"))
+    assert (record.start, record.step, record.count, len(record.signals)) == (-0.01, 1e-3, 20, 1)
+    assert "volts of a DS1000Z are wrong" in record.warnings[0]
+    assert capsys.readouterr().out == ""
+    with pytest.raises(TableError, match="export it as CSV"):
+        read_record(write(b"", "broken.bin"))

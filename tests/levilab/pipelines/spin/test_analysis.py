@@ -1,0 +1,211 @@
+"""Records and pulse times at some paths: against closed forms, from all kinds of inputs, and what is passed over."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from instruments.drivers.oscilloscope import Trace
+from levilab.errors import DataError, DoesNotSuit
+from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
+from levilab.pipelines.catalogue import save as save_found
+from levilab.pipelines.spin.analysis import SpinOptions, analyze_spins
+from levilab.pipelines.spin.document import as_document, recall_spins
+from levilab.pipelines.spin.figure import spin_figure
+from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
+from levilab.runs.run import Run, RunRecord, utc_now
+from levilab.runs.waveforms import run_waveforms
+from levilab.runs.writer import RunWriter
+from support.detector import C32, RELEASE_HZ, coasting_turns, coasting_wav, pulses, write_wav
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def true_frequency(name: str, time: float) -> float:
+    """Of the sample files, as sample_data/make.py makes them: 30 Hz at time 0 of the scopes, 0.25 s into WAV, .npy."""
+    from_middle = time - 0.25 if name.endswith((".wav", ".npy")) else time
+    return 30.0 - 0.095 * from_middle
+
+
+def test_every_sample_file_gives_the_spin_that_it_was_made_with(sample_data: Path) -> None:
+    analysis = analyze_spins([sample_data / "scope-files"], SpinOptions(rate=None))
+    assert len(analysis.runs) == 11  # the array needs a rate
+    for source, run in zip(analysis.sources, analysis.runs, strict=True):
+        frequency, chirp = run.spin.frequency, run.spin.chirp
+        truth = true_frequency(source.name, run.spin.reference_time)
+        assert frequency.value == pytest.approx(truth, abs=4 * frequency.u), source.name
+        assert chirp.value == pytest.approx(-0.095, abs=4 * chirp.u), source.name
+        assert frequency.u < 1.2 * 3e-3, source.name
+    assert [remark for remark in analysis.remarks if "samples-4000hz.npy" in remark]
+
+
+def test_options_reach_the_file_and_the_method(sample_data: Path) -> None:
+    array = sample_data / "scope-files" / "samples-4000hz.npy"
+    (run,) = analyze_spins([array], SpinOptions(rate=4000.0, method="edges")).runs
+    assert run.spin.method == "edges"
+    assert run.spin.frequency.value == pytest.approx(true_frequency("x.npy", run.spin.reference_time), abs=0.01)
+    two = sample_data / "scope-files" / "rigol-ds1000z.csv"
+    other = analyze_spins([two], SpinOptions(channel="2")).runs[0].spin
+    assert other.frequency.value == pytest.approx(50, abs=0.01)  # 40 samples high, 40 low, at 4000 a second
+    assert any(
+        "CH1 is analyzed, `channel` chooses another" in text
+        for text in analyze_spins([two], SpinOptions()).all_warnings
+    )
+
+
+def test_a_long_record_is_followed_and_feeds_the_drag_laws(tmp_path: Path) -> None:
+    path = coasting_wav(tmp_path / "long.wav")
+    (run,) = analyze_spins([path], SpinOptions()).runs
+    assert len(run.series) == 15  # windows of 2 s
+    omega = ((2 * np.pi * RELEASE_HZ) ** -0.5 + C32 * run.series.time / 2) ** -2
+    pulls = (run.series.frequency - omega / (2 * np.pi)) / run.series.u
+    assert np.abs(pulls).max() < 4.5
+    assert [kind for kind, _, _ in run.series.phases] == ["coasting"]
+    down = analyze_spindowns([path], SpinDownOptions())
+    disc = down.runs[0].fit("disc").parameters["c32"]
+    assert disc.value == pytest.approx(C32, abs=4 * disc.u)
+    assert disc.u < 1e-3 * C32
+    assert any("frequency in a window of 2 s" in text for text in down.all_warnings)
+
+
+def test_a_top_that_is_held_has_a_spin_and_no_spin_down(tmp_path: Path) -> None:
+    held = write_wav(tmp_path / "held.wav", pulses(30.0 * np.arange(8000) / 1000), 1000)
+    ((row, found),) = analyze_suiting([held], {})
+    assert row.name == "spin"
+    assert found.runs[0].spin.frequency.value == pytest.approx(30, abs=1e-3)
+    with pytest.raises(DoesNotSuit, match="is the drive still on"):
+        analyze_spindowns([held], SpinDownOptions())
+
+
+def test_a_long_list_of_pulse_times_feeds_the_drag_laws(tmp_path: Path) -> None:
+    t = np.linspace(0, 30, 30_001)
+    times = np.interp(np.arange(1, int(coasting_turns(t)[-1])), coasting_turns(t), t)
+    path = tmp_path / "pulses.csv"
+    path.write_text("pulse time [s]\n" + "".join(f"{x:.7f}\n" for x in times), encoding="utf-8")
+    disc = analyze_spindowns([path], SpinDownOptions()).runs[0].fit("disc").parameters["c32"]
+    assert disc.value == pytest.approx(C32, rel=1e-3)
+    assert len(analyze_spins([path], SpinOptions()).runs[0].series) == 15
+
+
+def test_a_record_that_is_too_short_is_no_spin_down(sample_data: Path) -> None:
+    with pytest.raises(DoesNotSuit, match=r"lasts 0\.5 s, a spin-down needs 3 windows of 2 s"):
+        analyze_spindowns([sample_data / "scope-files" / "recording.wav"], SpinDownOptions())
+
+
+@pytest.fixture
+def traced(tmp_path: Path) -> Path:
+    """A run with three records of the light at 30, 29 and 28 Hz."""
+    channels = [{"name": "time_s", "unit": "s", "source": "a test"}]
+    record = RunRecord(experiment="trace", status="running", started_utc=utc_now(), channels=channels)
+    with RunWriter.create(tmp_path / "runs", record, tell=lambda _: None) as writer:
+        for k in range(3):
+            t = -0.2 + np.arange(1600) / 4000
+            codes = np.round(pulses((30 - k) * t, seed=k) / 0.01).astype(np.uint8)
+            trace = Trace(codes, dt_s=2.5e-4, t0_s=-0.2, volts_per_code=0.01, offset_v=0.0, channel=1)
+            writer.trace(10.0 * k, trace, "light")
+        writer.finish("finished")
+    return writer.folder
+
+
+def test_the_traces_of_a_run_are_read_in_volts_on_its_clock(traced: Path) -> None:
+    waveform = run_waveforms(Run.load(traced))[1]
+    assert (waveform.start, waveform.step, waveform.count) == (pytest.approx(9.8), 2.5e-4, 1600)
+    assert waveform.samples().max() == pytest.approx(1.1, abs=0.1)
+    analysis = analyze_spins([traced], SpinOptions())
+    series = analysis.runs[0].series
+    assert series.frequency == pytest.approx([30, 29, 28], abs=0.01)
+    assert series.time == pytest.approx([0, 10, 20], abs=0.05)
+    document = as_document(analysis, traced)
+    assert document["inputs"][0]["path"] == "traces.jsonl"
+    assert save_found(ANALYSES["spin"], analysis)[0] == traced / "result.json"
+
+
+def test_the_result_says_what_the_interface_promises(sample_data: Path, tmp_path: Path) -> None:
+    path = shutil.copy(sample_data / "scope-files" / "keysight-dsox.csv", tmp_path)
+    analysis = analyze_spins([tmp_path / "keysight-dsox.csv"], SpinOptions())
+    written = save_found(ANALYSES["spin"], analysis)[0]
+    assert written.name == "keysight-dsox.csv.result.spin.json"
+    result = json.loads(written.read_text(encoding="utf-8"), parse_constant=pytest.fail)
+    assert result["values"]["frequency"]["unit"] == "Hz"
+    assert result["values"]["chirp"]["unit"] == "Hz/s"
+    assert result["values"]["reference_time"]["value"] == analysis.runs[0].spin.reference_time
+    assert result["values"]["bound"]["value"] > 0
+    assert result["method"] == result["runs"][0]["method"] == "matched"
+    recalled = recall_spins([tmp_path / "keysight-dsox.csv"], SpinOptions())
+    assert recalled.origins[0].text.startswith("as levilab analyze found it")
+    assert as_document(recalled, tmp_path) == result
+    anew = recall_spins([tmp_path / "keysight-dsox.csv"], SpinOptions(method="edges"))
+    assert "other options" in anew.origins[0].text
+    written.write_text(
+        written.read_text(encoding="utf-8").replace('"method": "matched"', '"method": "guessed"'), encoding="utf-8"
+    )
+    with pytest.raises(DataError, match="guessed"):
+        recall_spins([tmp_path / "keysight-dsox.csv"], SpinOptions())
+    assert path
+
+
+def test_findings_are_notes_with_their_names(tmp_path: Path) -> None:
+    t = np.arange(4000) / 1000
+    turns = 30 * t
+    signal = np.where(np.isin(np.rint(turns), (20, 21, 50)), 0.1, pulses(turns))  # three turns without their pulse
+    analysis = analyze_spins([write_wav(tmp_path / "a.wav", signal, 1000)], SpinOptions())
+    assert analysis.runs[0].spin.missing == 3
+    assert any(text.endswith("(missing)") for text in analysis.all_warnings)
+
+
+def test_a_record_without_pulses_is_refused_in_one_line(tmp_path: Path) -> None:
+    path = write_wav(tmp_path / "dark.wav", np.full(4000, 0.1), 1000)
+    with pytest.raises(DataError, match=r"dark\.wav: 0 pulses in 4 s, at least 4 are needed"):
+        analyze_spins([path], SpinOptions())
+
+
+def test_each_analysis_takes_its_own_out_of_a_folder(sample_data: Path, tmp_path: Path) -> None:
+    root = shutil.copytree(sample_data, tmp_path / "data")
+    for name, text in {
+        "notes.txt": "hello\n",
+        "field.csv": "z [mm];B [mT]\n1;2\n3;4\n",
+        "no titles.csv": "0,40\n9,39\n",
+    }.items():
+        (root / name).write_text(text, encoding="utf-8")
+    coasting_wav(root / "long.wav", seconds=10)
+    found = {row.name: analysis for row, analysis in analyze_suiting([root], {})}
+    down, spin = found["spindown"], found["spin"]
+    assert [source.name for source in down.sources][:2] == ["spin-down-1", "spin-down-2"]
+    assert [source.name for source in down.sources][4:] == ["long.wav"]
+    assert len(spin.sources) == 14  # eleven files, the long one, two runs with traces
+    quiet = [text for each in (down, spin) for text in (*each.warnings, *each.remarks)]
+    assert not [text for text in quiet if any(name in text for name in ("notes", "field.csv", "no titles"))]
+    assert [text for text in down.remarks if "npy" in text] == []
+
+
+def test_what_is_damaged_is_a_note_of_the_analysis_that_it_belongs_to(sample_data: Path, tmp_path: Path) -> None:
+    shutil.copy(sample_data / "scope-files" / "recording.wav", tmp_path)
+    cut = (sample_data / "scope-files" / "siglent-sds1202x-e.csv").read_text(encoding="utf-8")
+    (tmp_path / "cut.csv").write_text(cut.replace("-0.20000000000,", "-0.20000000000,x "), encoding="utf-8")
+    ((row, found),) = analyze_suiting([tmp_path], {})
+    assert row.name == "spin"
+    assert len(found.runs) == 1
+    assert [text for text in found.warnings if "cut.csv, line 213: " in text]
+
+
+@pytest.mark.parametrize("what", ["trace", "times", "long", "many"])
+def test_the_figure_shows_the_trace_the_turns_the_residuals_and_the_frequency(
+    what: str, sample_data: Path, tmp_path: Path
+) -> None:
+    files: dict[str, Any] = {
+        "trace": [sample_data / "scope-files" / "recording.wav"],
+        "times": [sample_data / "scope-files" / "pulse-times.txt"],
+        "long": [coasting_wav(tmp_path / "long.wav", seconds=14, rate=4000)] if what == "long" else [],
+        "many": [sample_data / "scope-files"],
+    }
+    figure = spin_figure(analyze_spins(files[what], SpinOptions()))
+    panels = figure.get_axes()
+    assert len(panels) == (12 if what == "many" else 4)
+    residuals = np.concatenate([np.asarray(line.get_ydata(), float) for line in panels[2].get_lines()[1:]])
+    assert len(residuals) > 10
+    assert np.abs(residuals).max() < 200  # µs: a fifth of a pulse's width
