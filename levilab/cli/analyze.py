@@ -77,6 +77,7 @@ ANALYSIS_HELP = {
     "spindown": (
         "Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude."
     ),
+    "limit": "Limits of the spin, lower and upper: mean, scatter, trend and outliers, beside the window of the top.",
 }
 #: The command that stands for no name, and is not listed.
 _EACH = "each"

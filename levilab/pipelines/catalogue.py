@@ -7,6 +7,11 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from levilab.errors import DoesNotSuit, unquoted
+from levilab.pipelines.limit.analysis import NEEDS as LIMIT_NEEDS
+from levilab.pipelines.limit.analysis import LimitAnalysis, analyze_limits
+from levilab.pipelines.limit.document import limit_document, recall_limits, save_limits
+from levilab.pipelines.limit.report import limit_part
+from levilab.pipelines.limit.table import limit_tables
 from levilab.pipelines.spindown.analysis import NEEDS as SPINDOWN_NEEDS
 from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
 from levilab.pipelines.spindown.document import as_document, recall_spindowns, save_result
@@ -89,6 +94,13 @@ def _spindown_svg(analysis: SpinDownAnalysis) -> str:
     return as_svg(spindown_figure(analysis))
 
 
+def _limit_svg(analysis: LimitAnalysis) -> str:
+    from levilab.pipelines.limit.figure import limit_figure  # with matplotlib
+    from levilab.present.style import as_svg
+
+    return as_svg(limit_figure(analysis))
+
+
 _TABLE: tuple[Analysis[Any], ...] = (
     Analysis[SpinDownAnalysis](
         SPINDOWN_NEEDS,
@@ -99,6 +111,16 @@ _TABLE: tuple[Analysis[Any], ...] = (
         spindown_tables,
         _spindown_svg,
         spindown_part,
+    ),
+    Analysis[LimitAnalysis](
+        LIMIT_NEEDS,
+        analyze_limits,
+        recall_limits,
+        limit_document,
+        save_limits,
+        limit_tables,
+        _limit_svg,
+        limit_part,
     ),
 )
 ANALYSES = MappingProxyType({analysis.name: analysis for analysis in _TABLE})
