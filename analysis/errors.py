@@ -15,6 +15,27 @@ class TooFewReadings(AnalysisError):
         super().__init__(f"{seen} usable readings, at least {needed} are needed: record longer or more often")
 
 
+class TooFewPulses(AnalysisError):
+    """Fewer pulses than a frequency and its slope need, or none that return regularly; duration [s]: of the record."""
+
+    def __init__(self, *, seen: int, needed: int, duration: float) -> None:
+        self.seen, self.needed, self.duration = seen, needed, duration
+        wanted = f", at least {needed} are needed" if seen < needed else " that do not return regularly"
+        super().__init__(
+            f"{seen} pulses in {duration:.3g} s{wanted}: record longer, or look at the trace: "
+            "does light reach the detector, is the trigger level inside the pulse?"
+        )
+
+
+class OnlyHum(TooFewPulses):
+    """Hum of the mains, and too few pulses or none."""
+
+    def __init__(self, *, seen: int, needed: int, duration: float) -> None:
+        super().__init__(seen=seen, needed=needed, duration=duration)
+        text = f"the trace holds hum of the mains, and in {duration:.3g} s no pulses that return regularly: "
+        self.args = (text + "shield the detector from lamps, and look at the trace",)
+
+
 class ShapesDiffer(AnalysisError):
     """Two columns of one table that do not have the same length, or are no columns at all."""
 

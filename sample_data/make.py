@@ -1,4 +1,4 @@
-"""Make the sample data: synthetic spin-downs and upper limits, and the ten published lower limits, as run folders.
+"""Make the sample data: synthetic spin-downs, upper limits and traces, and the ten published lower limits.
 
 The thesis prints the constants of four spin-downs, C₁ and C₂ of unweighted straight lines, but none of their
 readings.  These readings are made up so that they give those constants: the law of a laminar disc from about
@@ -8,10 +8,15 @@ return the published C₁ and C₂, rounded to 0.01 Hz.  They are not the author
 The upper limits are made up, too: a normal law about what the simulated bench gives (docs/experiments/limit.md), once
 of a sound top and once of one whose washers slip under the tape.
 
+The traces are what `levilab acquire trace` writes on the virtual bench; only what changes from run to run, times,
+addresses of software and the like, is left out.
+
 Run it from anywhere: ``python sample_data/make.py``.  It writes the same bytes each time.
 """
 
 import json
+import shutil
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +25,9 @@ from numpy.typing import NDArray
 from scipy.optimize import root
 
 from analysis.locked import slip_of
+from levilab.acquisition.loop import acquire
+from levilab.acquisition.request import AcquisitionOptions, request_for
+from levilab.present.progress import Mute
 
 HERE = Path(__file__).parent
 NOISE_HZ, STEP_S, DIGIT_HZ = 0.03, 10.0, 0.01
@@ -162,8 +170,48 @@ def write(folder: Path, header: str, rows: list[str], record: dict[str, Any]) ->
     (folder / "readings.csv").write_text("\n".join([header, *rows, ""]), encoding="utf-8", newline="\n")
 
 
+#: Name → the scene, None for a top that only spins; lines of the bench file; a note.
+TRACES: dict[str, tuple[str | None, str, str]] = {
+    "trace-tape": (None, "records = 5", "the tape of a top that spins down: five records, 10 s apart"),
+    "trace-laser": (
+        "driven",
+        "channels = [1, 3]\nshows = ['tape', 'laser']\ndrive_frequency_hz = 30.0\nrecords = 5\ninterval_s = 2.0",
+        "tape and laser of the thesis's driven top: five records, 2 s apart",
+    ),
+}
+
+
+def write_traces(name: str, scene: str | None, settings: str, note: str) -> None:
+    """A run folder with records of the oscilloscope, acquired on the virtual bench."""
+    with tempfile.TemporaryDirectory() as place:
+        bench = Path(place) / "bench.toml"
+        bench.write_text(f"[trace]\n{settings}\n", encoding="utf-8")
+        options = AcquisitionOptions(
+            mock=True, bench=bench, out=Path(place), seed=1, scene=scene, note=f"SYNTHETIC, {note}"
+        )
+        run = acquire(request_for("trace", options), Mute())
+        count = run.count()
+        shutil.rmtree(HERE / name, ignore_errors=True)
+        shutil.copytree(run.folder, HERE / name, ignore=shutil.ignore_patterns("datapackage.json", "run.lock"))
+    path = HERE / name / "run.json"
+    record = json.loads(path.read_text(encoding="utf-8"))
+    kept = ("limits", "oscilloscope", "generator", "scene", "trace")  # what the run has used
+    record["configuration"] = {key: value for key, value in record["configuration"].items() if key in kept}
+    record |= {"started_utc": None, "ended_utc": None, "time_zero_utc": None, "software": {}}
+    record["command_line"] = ["python", "sample_data/make.py"]
+    record["synthetic_how"] = "SYNTHETIC: " + record["synthetic_how"]
+    text = json.dumps(record, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
+    path.write_text(text, encoding="utf-8", newline="\n")
+    events = HERE / name / "events.jsonl"
+    if events.exists():
+        lines = [json.loads(line) for line in events.read_text(encoding="utf-8").splitlines()]
+        texts = [json.dumps({k: v for k, v in line.items() if k != "utc"}, ensure_ascii=False) for line in lines]
+        events.write_text("".join(f"{line}\n" for line in texts), encoding="utf-8", newline="\n")
+    print(f"{name}: {count} records")
+
+
 def main() -> None:
-    """Write the seven run folders."""
+    """Write the run folders."""
     for number, (c1, c2, n) in enumerate(PUBLISHED, start=1):
         t, nu, how = solve(c1, c2, n)
         write(
@@ -199,6 +247,8 @@ def main() -> None:
     )
     upper_limits("upper-limits", seed=1, loose=False)
     upper_limits("loose-washers", seed=2, loose=True)
+    for name, how_made in TRACES.items():
+        write_traces(name, *how_made)
 
 
 if __name__ == "__main__":

@@ -96,7 +96,7 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
         request = _on_the_virtual_bench(request, options)
     else:
         wiring = described_wiring(config)
-        for kind in EXPERIMENTS[experiment].instruments:
+        for kind in EXPERIMENTS[experiment].kinds(settings_of(config, experiment)):
             wiring.described(kind)
     if run:
         _check_readings(run, request)
@@ -209,8 +209,13 @@ def _on_the_virtual_bench(request: AcquisitionRequest, options: AcquisitionOptio
 
     if scene is None:
         return _with_a_spinning_top(request, drawn(seed), clock)
+    if run is None:
+        settings = settings_of(config, request.experiment).for_scene(scene)
+        settings.check(request.experiment, config.limits)
+        config = with_settings(config, request.experiment, settings)
     return replace(
         request,
+        config=config,
         wiring=lambda: virtual_wiring(scene_world(scene, clock, options.tell, seed=seed), config.limits),
         synthetic_how=HOW.format(top=_IN_MOTION.format(name=scene.name)),
         scene=scene.as_table(),

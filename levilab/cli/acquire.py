@@ -25,6 +25,7 @@ EXPERIMENT_HELP = {
         "Limits of the spin, top after top: where a free top falls, or with --set limit.which=upper where a driven one "
         "is lost."
     ),
+    "trace": "Records of the oscilloscope: raw codes into the run folder, written as they come.",
 }
 _ENDING = "Ctrl-C ends the run after the reading under way; outputs go off and the run is kept."
 

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from levilab.errors import LeftRange
-from levilab.simulator.kernels.motion import ARM, TIME
+from levilab.simulator.kernels.motion import ARM, TIME, L, N, R, V
 from levilab.simulator.keys import SceneError
 from levilab.simulator.single import simulate
 from levilab.simulator.start import start_of
 from levilab.world.timeline import History
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from levilab.simulator.scene import Scene
     from levilab.simulator.trajectory import Trajectory
@@ -41,7 +41,9 @@ class _Up:
     """A piece of a top's life.
 
     scene: with the drive; state: where it begins, shape (18,); step: of the integration [s]; times [s], turns of the
-    tape and, as part of them, turns of the washers that it is on beside the top, shape (n,) each.
+    tape and, as part of them, turns of the washers that it is on beside the top then, shape (n,) each; stem:
+    displacement of the stem along x [m] and its rate [m/s] then, shape (2, n); lift: height of the rim towards x above
+    the base [m] then, shape (n,).
     """
 
     scene: Scene
@@ -50,6 +52,8 @@ class _Up:
     times: Array
     turns: Array
     slips: Array
+    stem: NDArray[np.float32]
+    lift: NDArray[np.float32]
 
     @property
     def start(self) -> float:
@@ -68,17 +72,18 @@ class Flight:
     """A top from time 0 on; before, and after it has fallen, there is none.
 
     scene: its drive is left out, `change` tells of drives; again_s: so long after a fall the top is put back to where
-    the scene starts, None: it is not [s].  Raises SceneError for a scene without motion.
+    the scene starts, None: it is not [s]; stem_height_m: of the place on the stem that is looked at, above the centre
+    of mass [m].  Raises SceneError for a scene without motion.
     """
 
-    def __init__(self, scene: Scene, again_s: float | None = None) -> None:
+    def __init__(self, scene: Scene, again_s: float | None = None, *, stem_height_m: float = 0.03) -> None:
         if scene.observed != "motion":
             raise SceneError(f"observed = {scene.observed}: a scene for the bench is expected to have motion")
         transverse, axial = scene.top.moment_tilt
         self._scene = scene.changed(
             {"drive.waveform": "off", "drive.off_s": None, "top.moment_tilt": [transverse or _HARDLY, axial]}
         )
-        self._again_s = again_s
+        self._again_s, self._stem_height = again_s, stem_height_m
         self._pieces: History[_Up | _Down] = History(-math.inf, _Down(-math.inf))
         self._step: float | None = None
         # what comes next: a top in this state, or none until a new one is put there; and when [s]
@@ -133,6 +138,54 @@ class Flight:
                 turns[part], up[part] = np.interp(times[part], piece.times, piece.turns), True
         return turns, up
 
+    def tape(self, times: Array) -> tuple[Array, Array, Array]:
+        """What is to be known of the light, shape (n,) each, as the times.
+
+        Turns as above; their rate [Hz], 0 without a top; height of the rim above the base where the fixed spot is [m].
+        """
+        self.look(float(times.max(initial=0.0)))
+        turns, rate, lift = np.zeros_like(times), np.zeros_like(times), np.zeros_like(times)
+        for piece, part in self._pieces.pieces(times):
+            if isinstance(piece, _Up):
+                turns[part], rate[part] = np.interp(times[part], piece.times, piece.turns), _rate(piece)
+                lift[part] = np.interp(times[part], piece.times, piece.lift)
+        return turns, rate, lift
+
+    def first_lift(self) -> float:
+        """The mean of this height over the first second without a drive, in which a top bobs once or more [m]."""
+        self.look(0.0)
+        piece = self._pieces.at(0.0)
+        return float(piece.lift.mean()) if isinstance(piece, _Up) else self._scene.start.position_m[2]
+
+    def passages(self, place: Callable[[float], float], start: float, stop: float) -> Array:
+        """When the tape's turn has a place in [0, 1) between two times [s], increasing, shape (n,) [s].
+
+        place: given the rate of turns [Hz].
+        """
+        self.look(stop)
+        found = [np.empty(0)]
+        for piece, end in self._pieces.between(start, stop):
+            if isinstance(piece, _Up) and piece.times.size > 1:
+                turns, at = piece.turns, place(_rate(piece))
+                whole = np.arange(math.floor(turns[0]) - 1, math.ceil(turns[-1]) + 1) + at
+                whole = whole[(whole >= turns[0]) & (whole < turns[-1])]
+                times = np.interp(whole, turns, piece.times)
+                found.append(times[(times >= start) & (times < min(stop, end))])
+        return np.concatenate(found)
+
+    def stem(self, times: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Displacement of the stem along x [m], and whether there is a top; shape (n,) each, as the times.
+
+        Between two states a cubic goes through both displacements with their rates: of the nutation, 42 Hz, it misses
+        5e-4 of the amplitude.
+        """
+        self.look(float(times.max(initial=0.0)))
+        place, up = np.zeros_like(times), np.zeros(times.shape, dtype=np.bool_)
+        for piece, part in self._pieces.pieces(times):
+            if isinstance(piece, _Up):
+                place[part], up[part] = _cubic(times[part], piece.times, *piece.stem), True
+        return place, up
+
     # --- as far as somebody looks ---
 
     def look(self, until: float) -> None:
@@ -160,8 +213,8 @@ class Flight:
         # of the states only the first is kept: a bench may run for hours
         slips = self._slip + _slips(motion)
         self._slip = float(slips[-1])
-        step, times = motion.accuracy.step, motion.time.copy()
-        self._pieces.append(begin, _Up(self._scene, state, step, times, _turns(motion) + slips, slips))
+        seen = (motion.time.copy(), _turns(motion) + slips, slips, _stem(motion, self._stem_height), _lift(motion))
+        self._pieces.append(begin, _Up(self._scene, state, motion.accuracy.step, *seen))
         if motion.fell is not None:
             self._fall(motion.fell.time)
         else:
@@ -214,3 +267,42 @@ def _turns(motion: Trajectory) -> Array:
     arm, place = motion.states[:, ARM], motion.position
     spot = np.arctan2(-place[:, 1], motion.scene.top.magnet_radius_m - place[:, 0])
     return np.asarray(np.unwrap(np.arctan2(arm[:, 1], arm[:, 0]) - spot) / (2 * np.pi))
+
+
+def _rate(piece: _Up) -> float:
+    """The mean rate of turns in a piece [Hz], which wobble and drag change by some per cent of it."""
+    if piece.times.size < 2:
+        return 1.0
+    return float((piece.turns[-1] - piece.turns[0]) / (piece.times[-1] - piece.times[0]))
+
+
+def _lift(motion: Trajectory) -> NDArray[np.float32]:
+    """Height of the rim towards x above the base, shape (n,) [m]: it bobs with the top and is tilted with it."""
+    return np.asarray(motion.position[:, 2] - motion.scene.top.magnet_radius_m * motion.axis[:, 0], dtype=np.float32)
+
+
+def _stem(motion: Trajectory, height: float) -> NDArray[np.float32]:
+    """Displacement of the stem along x and its rate at a height above the centre of mass, shape (2, n) [m, m/s].
+
+    Single precision: a displacement of 5 mm is right to 0.5 nm.
+    """
+    states = motion.states
+    axis = states[:, N]
+    rate = (
+        states[:, L][:, 1] * axis[:, 2] - states[:, L][:, 2] * axis[:, 1]
+    ) / motion.scene.top.inertia_transverse_kg_m2
+    moving = states[:, V][:, 0] + height * rate
+    return np.asarray([states[:, R][:, 0] + height * axis[:, 0], moving], dtype=np.float32)
+
+
+def _cubic(times: Array, nodes: Array, values: NDArray[np.float32], rates: NDArray[np.float32]) -> Array:
+    """The cubic Hermite interpolation of values [u] and their rates [u/s] at nodes [s], shape (n,)."""
+    if nodes.size < 2:
+        return np.full_like(times, values[0])
+    k = np.clip(np.searchsorted(nodes, times, side="right") - 1, 0, nodes.size - 2)
+    span = nodes[k + 1] - nodes[k]
+    s = (times - nodes[k]) / span
+    low, high, left, right = values[k], values[k + 1], rates[k] * span, rates[k + 1] * span
+    return np.asarray(
+        low + s * (left + s * (3 * (high - low) - 2 * left - right + s * (2 * (low - high) + left + right)))
+    )

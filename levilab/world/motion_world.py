@@ -1,7 +1,8 @@
 """A world in full motion: the top of a scene, simulated as far as somebody looks, under the drive of the bench.
 
 The light is that of a tape which passes a fixed spot on the top's rim.  So the wobble of the top is seen in it: where
-it stands 1 mm aside, its tape comes a hundredth of a turn early or late.
+it stands 1 mm aside, its tape comes a hundredth of a turn early or late.  The laser's beam beside the stem is cut as
+the stem goes round.
 """
 
 from __future__ import annotations
@@ -17,11 +18,12 @@ from levilab.simulator.field import flux_density
 from levilab.simulator.model import base_field
 from levilab.world.coil import Coil
 from levilab.world.flight import Flight
-from levilab.world.light import Tape
+from levilab.world.light import Laser, Tape
 from levilab.world.spin_world import KEPT_S
 
 if TYPE_CHECKING:
     from instruments.clock import Clock
+    from instruments.virtual.counter.edges import Thresholds
     from instruments.virtual.generator.channel import Output
     from levilab.simulator.scene import Scene
 
@@ -50,8 +52,8 @@ class MotionWorld:
 
     The generator takes the place of the scene's drive, whose direction is the coil's; its offset moves nothing.
     again_s: see Flight; seed: of the light's noise, and of the place of the tape on the rim (0: where the transverse
-    part of the moment points): who switches a drive on after a pulse meets the moment there.  Raises SceneError for a
-    scene without motion.
+    part of the moment points): who switches a drive on after a pulse meets the moment there; tape, laser: how the lamp
+    and the beam are set up.  Raises SceneError for a scene without motion.
 
     >>> from instruments.clock import VirtualClock
     >>> from levilab.simulator import preset
@@ -62,13 +64,21 @@ class MotionWorld:
     """
 
     def __init__(
-        self, scene: Scene, clock: Clock, *, tape: Tape | None = None, again_s: float | None = None, seed: int = 0
+        self,
+        scene: Scene,
+        clock: Clock,
+        *,
+        tape: Tape | None = None,
+        laser: Laser | None = None,
+        again_s: float | None = None,
+        seed: int = 0,
     ) -> None:
         self.clock = clock
-        self._tape, self._seed = tape or Tape(), seed
-        self._coil, self._flight = Coil(), Flight(scene, again_s)
+        self._tape, self._laser, self._seed = tape or Tape(), laser or Laser(), seed
+        self._coil, self._flight = Coil(), Flight(scene, again_s, stem_height_m=self._laser.height_m)
         self._tape_at = float(np.random.default_rng(seed).uniform()) if seed else 0.0
         self._told = 0.0  # the last time that a change was told for [s]
+        self._aim_m = self._flight.first_lift()  # where the lens looks
         probe = np.array([[0.0, 0.0, PROBE_M]])
         self._probe_t = float(flux_density(base_field(scene), probe)[0, 2])
 
@@ -114,8 +124,36 @@ class MotionWorld:
     def light(self, start: float, step: float, n: int) -> Array:
         """The phototransistor's voltage; see World."""
         self._forget()
-        turns, up = self._flight.turns(start + step * np.arange(n, dtype=np.float64))
-        return self._tape.light(turns + self._tape_at, up, start, self._seed)
+        times = start + step * np.arange(n, dtype=np.float64)
+        return self._clean(times) + self._tape.noise_at(times, self._seed)
+
+    def _clean(self, times: Array) -> Array:
+        turns, rate, lift = self._flight.tape(times)
+        return self._tape.clean(turns + self._tape_at, rate, times, self._tape.height(lift - self._aim_m))
+
+    def crossings(self, start: float, stop: float, triggers: Thresholds) -> Array | None:
+        """See World: the pieces of the motion are asked when the tape has the place at which the trigger fires."""
+        self._forget()
+        around = 2e-4  # noise, and a pulse of another height, move a crossing by less
+        passed = self._flight.passages(lambda _: (0.5 - self._tape_at) % 1.0, start, stop)
+        least = float(self._tape.height(self._flight.tape(passed)[2] - self._aim_m).min(initial=1.0))
+
+        def place(rate: float) -> float:
+            offset = self._tape.offset(triggers, rate, least)
+            unknown.append(offset is None)
+            return (0.5 + (offset or 0.0) - self._tape_at) % 1.0
+
+        unknown: list[bool] = []
+        near = self._flight.passages(place, start - around, stop + around)
+        if any(unknown):
+            return None
+        found = self._tape.crossing(near, self._clean, triggers.fire, self._seed)
+        return np.asarray(found[(found >= start) & (found < stop)])
+
+    def laser(self, start: float, step: float, n: int) -> Array:
+        """The voltage of the laser's phototransistor; see World."""
+        self._forget()
+        return self._laser.voltage(start + step * np.arange(n, dtype=np.float64), self._flight.stem, self._seed)
 
     def coil_field(self, start: float, step: float, n: int) -> Array:
         """The coil's field; see World."""

@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from instruments.virtual.generator.voltage import fundamental
 from levilab.simulator.spin import DECAYS
 from levilab.world.coil import Coil
-from levilab.world.light import Tape
+from levilab.world.light import Laser, Tape
 from levilab.world.timeline import History
 
 if TYPE_CHECKING:
     from instruments.clock import Clock
+    from instruments.virtual.counter.edges import Thresholds
     from instruments.virtual.generator.channel import Output
 
 Array = NDArray[np.float64]
@@ -28,6 +29,10 @@ Array = NDArray[np.float64]
 #: Nobody asks for what is longer ago [s]: the counters look 12 000 s ahead and leave 2500 s out, the scopes look 600 s
 #: back.
 KEPT_S = 15_000.0
+
+#: When the turn number is looked at to find pulses [s], and how far beyond the times that are asked for: noise and the
+#: jitter may move a pulse across their ends.
+_LOOK_S, _AROUND_S = 0.01, 0.02
 
 #: Flux density [T] of the thesis's base on its axis at 7.2 cm.
 BASE_FIELD = 0.0190937938
@@ -43,6 +48,12 @@ class World(Protocol):
 
     def light(self, start: float, step: float, n: int) -> Array:
         """The phototransistor's voltage at start + step·k, shape (n,) [V]."""
+
+    def crossings(self, start: float, stop: float, triggers: Thresholds) -> Array | None:
+        """When a trigger fires in the light from start to stop [s], shape (m,); None: only the light itself can say."""
+
+    def laser(self, start: float, step: float, n: int) -> Array:
+        """The voltage of the phototransistor behind the stem at start + step·k, shape (n,) [V]."""
 
     def drive(self, time: float, output: Output) -> None:
         """From this time on the coil's field is this: a generator's output, amplitude and offset in T."""
@@ -65,10 +76,10 @@ class SpinScene:
     fall_hz: spin at which the top falls; later_falls_hz: the same of tops that are floated later, by their number from
     1 on, and again from the first of them; none: as the first top; lock_torque: the greatest angular acceleration per
     tesla of drive [rad s⁻² T⁻¹], the dipole's transverse part over I₃, half of it because half of a field along one
-    line turns with the top; tape: what the phototransistor sees; jitter: scatter of a pulse's
-    place, in turns, 1σ (0.0212 makes 0.03 Hz of a reading over 1 s); base_field_t: the base's field at the probe,
-    which stands where the top would float, 7.2 cm above the thesis's base; again_s: so long
-    after a fall somebody has put the top back, None: nobody does [s].
+    line turns with the top; tape: what the phototransistor sees; laser: the beam beside the stem; jitter: scatter of a
+    pulse's place, in turns, 1σ (0.0212 makes 0.03 Hz of a reading over 1 s); base_field_t: the base's field at the
+    probe, which stands where the top would float, 7.2 cm above the thesis's base; again_s: so long after a fall
+    the top is put back, None: it is not [s].
     """
 
     start_hz: float = 30.0
@@ -78,6 +89,7 @@ class SpinScene:
     later_falls_hz: tuple[float, ...] = ()
     lock_torque: float = 0.03 * 0.714 / 2 / 1.731314e-6
     tape: Tape = field(default_factory=Tape)
+    laser: Laser = field(default_factory=Laser)
     jitter: float = 0.03 / math.sqrt(2)
     base_field_t: float = BASE_FIELD
     again_s: float | None = None
@@ -255,10 +267,42 @@ class SpinWorld:
 
     def light(self, start: float, step: float, n: int) -> Array:
         """The phototransistor's voltage; see :class:`World`."""
-        spin, angle = self.motion(start + step * np.arange(n, dtype=np.float64))
+        times = start + step * np.arange(n, dtype=np.float64)
+        return self._clean(times) + self.scene.tape.noise_at(times, self.scene.seed)
+
+    def _clean(self, times: Array) -> Array:
+        spin, angle = self.motion(times)
         turns = angle / (2 * math.pi)
-        late = self._jitter[np.floor(turns).astype(np.int64) % self._jitter.size]
-        return self.scene.tape.light(turns - late, spin > 0, start, self.scene.seed)
+        return self.scene.tape.clean(turns - self._late(np.floor(turns)), spin / (2 * math.pi), times)
+
+    def _late(self, turn: Array) -> Array:
+        """How late the pulse of each turn comes [turns]."""
+        return np.asarray(self._jitter[turn.astype(np.int64) % self._jitter.size])
+
+    def crossings(self, start: float, stop: float, triggers: Thresholds) -> Array | None:
+        """See :class:`World`: the motion is asked when the turn number has the place at which the trigger fires.
+
+        That needs a look each 10 ms, some for each pulse, and no trace.
+        """
+        times = np.arange(start - _AROUND_S, stop + _AROUND_S + _LOOK_S, _LOOK_S)
+        spin, angle = self.motion(times)
+        turns, rate = angle / (2 * math.pi), float(spin.max()) / (2 * math.pi)
+        offset = self.scene.tape.offset(triggers, rate)
+        if offset is None:
+            return None
+        whole = np.arange(math.floor(turns[0]) - 1.0, math.ceil(turns[-1]) + 1.0)
+        place = whole + 0.5 + self._late(whole) + offset
+        found = np.interp(place, turns, times)[(place > turns[0]) & (place < turns[-1])]
+        found = self.scene.tape.crossing(found, self._clean, triggers.fire, self.scene.seed)
+        spin, _ = self.motion(found)
+        return np.asarray(found[(found >= start) & (found < stop) & (spin > 0)])
+
+    def laser(self, start: float, step: float, n: int) -> Array:
+        """The voltage of the laser's phototransistor; see :class:`World`.
+
+        A top that only spins has its stem at rest on the axis: the beam is steady, and nothing is to be counted.
+        """
+        return self.scene.laser.steady(start + step * np.arange(n, dtype=np.float64), self.scene.seed)
 
     def coil_field(self, start: float, step: float, n: int) -> Array:
         """The coil's field; see :class:`World`."""

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
+from instruments.virtual.counter.edges import Thresholds, crossings
 from instruments.virtual.generator.channel import Burst, Output
 from instruments.virtual.generator.voltage import fundamental
 from levilab.errors import LeftRange, SimulationError
@@ -247,7 +248,7 @@ def test_the_drive_takes_hold_of_the_top():
 
 
 def test_the_light_is_one_pulse_a_turn_and_dark_without_a_top():
-    top = world(tape=Tape(noise=0.0))
+    top = world(tape=Tape(noise=0.0, view_m=1.0))  # a view so wide that every pulse has its whole height
     light = top.light(0.0, 1e-5, 100_000)
     assert (light.min(), light.max()) == pytest.approx((0.1, 1.2), abs=0.01)
     rises, falls = (np.flatnonzero(np.diff((light > 0.65).astype(int)) == sign) for sign in (1, -1))
@@ -255,6 +256,29 @@ def test_the_light_is_one_pulse_a_turn_and_dark_without_a_top():
     # 3 % of a turn; the wobble makes it 4 % longer or shorter
     np.testing.assert_allclose((falls[1:-1] - rises[1:-1]) * 1e-5, 0.03 / 30.0, rtol=0.06)
     assert np.all(top.light(-1.0, 1e-4, 1000) == 0.1)
+
+
+def test_a_pulse_is_lower_while_the_tape_bobs_out_of_the_lenss_view():
+    light = world(tape=Tape(noise=0.0, view_m=0.005)).light(0.0, 2e-5, 100_000)
+    starts = np.flatnonzero((light[1:] > 0.3) & (light[:-1] <= 0.3))
+    tops = np.array([k + np.argmax(light[k : k + 100]) for k in starts])
+    motion = simulate(TILTED, 2.0, rate=2000.0)
+    rim = motion.position[:, 2] - TILTED.top.magnet_radius_m * motion.axis[:, 0]
+    height = np.exp(-2 * ((np.interp(2e-5 * tops, motion.time, rim) - rim[motion.time < 1.0].mean()) / 0.005) ** 2)
+    # the pole takes (τ/σ)²/2 = 7e-4 of a pulse; states are 2.5 ms apart: 2.8 % of the rim's 0.4 mm at 30 Hz
+    np.testing.assert_allclose(light[tops], 0.1 + 1.1 * height, atol=0.01)
+    assert np.ptp(light[tops]) > 0.2  # IC1 bobs by 2 mm
+
+
+def test_the_times_of_the_pulses_are_those_that_the_light_shows():
+    top = world(FALLING.changed({"start.spin_hz": 21.0}), again_s=1.0, seed=5, tape=Tape(noise=0.0, view_m=1.0))
+    top.drive(0.7, Output("SIN", 21.0, 4e-4, 0.0))
+    seen = 5e-5 * crossings(top.light(0.0, 5e-5, 80_000), 0.6, 0.04)
+    said = np.concatenate([top.crossings(a, a + 0.37, Thresholds(0.6, 0.56)) for a in 0.37 * np.arange(11)])
+    assert said.size > 20
+    np.testing.assert_allclose(said[said < 4.0], seen, atol=2e-6)  # straight between samples
+    narrow = world(tape=Tape(view_m=0.003))
+    assert narrow.crossings(0.0, 1.0, Thresholds(0.6, 0.56)) is None  # IC1 bobs half out of the lens's view
 
 
 def test_the_seed_chooses_where_on_the_rim_the_tape_is():
@@ -330,3 +354,28 @@ def test_the_tape_is_on_the_washers_where_they_are_loose():
     # beside the spin: the wobble, a few hundredths of a turn
     assert turns[-1] - turns[0] == pytest.approx(washers, abs=0.15)
     assert top - washers > 0.3
+
+
+# --- the laser ---
+
+
+def test_the_stem_is_where_the_simulated_top_has_it():
+    motion = simulate(TILTED, 2.7, tolerance=1e-9, rate=317.0)
+    place, up = Flight(TILTED, stem_height_m=0.02).stem(motion.time)
+    assert up.all()
+    # 6e-4 of the nutation's 0.4 mm, and 1e-7 m where a piece ends
+    np.testing.assert_allclose(place, motion.position[:, 0] + 0.02 * motion.axis[:, 0], atol=6e-7)
+
+
+def test_the_laser_is_cut_once_a_turn_of_the_thesiss_driven_top():
+    top = world(preset("driven"))
+    top.drive(0.0, Output("SIN", 30.0, 4e-4, 0.0, phase=90.0))
+    cuts = crossings(top.laser(1.0, 5e-5, 200_000), 0.6, 0.04)
+    # at the drive's 30 Hz, but for an edge at either end; the spin swings by 0.4 Hz about it
+    assert cuts.size == pytest.approx(300, abs=1)
+
+
+def test_without_a_top_the_beam_is_steady():
+    fallen = world(FALLING)
+    voltage = fallen.laser(10.0, 1e-4, 10_000)
+    assert np.ptp(voltage) < 0.06  # twelve standard deviations of the noise
