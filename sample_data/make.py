@@ -1,4 +1,4 @@
-"""Make the sample data: synthetic spin-downs, upper limits and traces, and the ten published lower limits.
+"""Make the sample data: synthetic spin-downs, upper limits, records and a scan, and the ten published lower limits.
 
 The thesis prints the constants of four spin-downs, C₁ and C₂ of unweighted straight lines, but none of their
 readings.  These readings are made up so that they give those constants: the law of a laminar disc from about
@@ -8,8 +8,8 @@ return the published C₁ and C₂, rounded to 0.01 Hz.  They are not the author
 The upper limits are made up, too: a normal law about what the simulated bench gives (docs/experiments/limit.md), once
 of a sound top and once of one whose washers slip under the tape.
 
-The traces are what `levilab acquire trace` writes on the virtual bench; only what changes from run to run, times,
-addresses of software and the like, is left out.
+The records and the scan are what `levilab acquire` writes on the virtual bench: their times and what differs between
+computers are left out.
 
 Run it from anywhere: ``python sample_data/make.py``.  It writes the same bytes each time.
 """
@@ -210,6 +210,30 @@ def write_traces(name: str, scene: str | None, settings: str, note: str) -> None
     print(f"{name}: {count} records")
 
 
+def from_the_virtual_bench(experiment: str, folder: str, seed: int, note: str) -> None:
+    """A run of the virtual bench, without what would differ from one making to the next."""
+    with tempfile.TemporaryDirectory() as out:
+        run = acquire(request_for(experiment, AcquisitionOptions(mock=True, out=Path(out), seed=seed)), Mute())
+        header, *rows = (run.folder / "readings.csv").read_text(encoding="utf-8").splitlines()
+    record = run.record
+    write(
+        HERE / folder,
+        header,
+        rows,
+        {
+            "experiment": experiment,
+            "started_utc": None,
+            "channels": record.channels,
+            "configuration": {experiment: record.configuration[experiment]},
+            "seed": seed,
+            "note": note,
+            "synthetic": True,
+            "synthetic_how": f"SYNTHETIC: {record.synthetic_how}; made by sample_data/make.py",
+        },
+    )
+    print(f"{folder}: {record.synthetic_how}")
+
+
 def main() -> None:
     """Write the run folders."""
     for number, (c1, c2, n) in enumerate(PUBLISHED, start=1):
@@ -249,6 +273,7 @@ def main() -> None:
     upper_limits("loose-washers", seed=2, loose=True)
     for name, how_made in TRACES.items():
         write_traces(name, *how_made)
+    from_the_virtual_bench("field", "field-scan", 11, "a base as in device.toml, heights set by hand to 0.2 mm")
 
 
 if __name__ == "__main__":

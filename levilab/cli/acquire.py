@@ -26,6 +26,7 @@ EXPERIMENT_HELP = {
         "is lost."
     ),
     "trace": "Records of the oscilloscope: raw codes into the run folder, written as they come.",
+    "field": "Hall scan: the base's flux density on its axis, at one height after the other.",
 }
 _ENDING = "Ctrl-C ends the run after the reading under way; outputs go off and the run is kept."
 

@@ -120,7 +120,8 @@ class Tape:
     def crossing(self, near: Array, clean: Callable[[Array], Array], level: float, seed: int) -> Array:
         """When the voltage crosses a level [V], from times near that [s]; clean: the voltage then.
 
-        Where the voltage does not change there is no crossing, so there may be fewer than times.  Newton's method on the clean voltage; noise then moves the crossing by what it is over the slope.
+        Where the voltage does not change there is no crossing, so there may be fewer than times.
+        Newton's method on the clean voltage; noise then moves the crossing by what it is over the slope.
         """
         for _ in range(2):
             three = near + np.array([[-_CLOSE_S], [0.0], [_CLOSE_S]])

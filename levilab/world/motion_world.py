@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Where the magnetometer's probe stands: about where a top floats [m above the base].
+#: Where the magnetometer's probe stands at first: about where a top floats [m above the base].
 PROBE_M = 0.072
 
 #: A drive that is faster than this moves no top, but would make the steps short [Hz].
@@ -79,8 +79,8 @@ class MotionWorld:
         self._tape_at = float(np.random.default_rng(seed).uniform()) if seed else 0.0
         self._told = 0.0  # the last time that a change was told for [s]
         self._aim_m = self._flight.first_lift()  # where the lens looks
-        probe = np.array([[0.0, 0.0, PROBE_M]])
-        self._probe_t = float(flux_density(base_field(scene), probe)[0, 2])
+        self._base = base_field(scene)
+        self.place_probe(PROBE_M)
 
     def drive(self, time: float, output: Output) -> None:
         """From this time on the coil's field is this; see World."""
@@ -162,3 +162,8 @@ class MotionWorld:
     def flux_density(self, time: float) -> float:
         """The base's field where the probe stands; the coil's lies across it, and the top's is left out."""
         return self._probe_t
+
+    def place_probe(self, height_m: float | None) -> None:
+        """Put the probe there, exactly; see World."""
+        place = np.array([[0.0, 0.0, height_m or 0.0]])
+        self._probe_t = 0.0 if height_m is None else float(flux_density(self._base, place)[0, 2])

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from instruments.virtual.generator.voltage import fundamental
 from levilab.simulator.spin import DECAYS
+from levilab.world.base import Base, Stand, drawn_base
 from levilab.world.coil import Coil
 from levilab.world.light import Laser, Tape
 from levilab.world.timeline import History
@@ -33,9 +34,6 @@ KEPT_S = 15_000.0
 #: When the turn number is looked at to find pulses [s], and how far beyond the times that are asked for: noise and the
 #: jitter may move a pulse across their ends.
 _LOOK_S, _AROUND_S = 0.01, 0.02
-
-#: Flux density [T] of the thesis's base on its axis at 7.2 cm.
-BASE_FIELD = 0.0190937938
 
 
 class World(Protocol):
@@ -65,7 +63,10 @@ class World(Protocol):
         """The coil's field at start + step·k, shape (n,) [T]."""
 
     def flux_density(self, time: float) -> float:
-        """What a magnetometer's probe at the place of the top sees, along the base's axis [T]."""
+        """What a magnetometer's probe sees, along the base's axis [T]."""
+
+    def place_probe(self, height_m: float | None) -> None:
+        """Put the magnetometer's probe on the axis, so high above the base, or (None) into its zero-gauss chamber."""
 
 
 @dataclass(frozen=True)
@@ -77,9 +78,9 @@ class SpinScene:
     1 on, and again from the first of them; none: as the first top; lock_torque: the greatest angular acceleration per
     tesla of drive [rad s⁻² T⁻¹], the dipole's transverse part over I₃, half of it because half of a field along one
     line turns with the top; tape: what the phototransistor sees; laser: the beam beside the stem; jitter: scatter of a
-    pulse's place, in turns, 1σ (0.0212 makes 0.03 Hz of a reading over 1 s); base_field_t: the base's field at the
-    probe, which stands where the top would float, 7.2 cm above the thesis's base; again_s: so long after a fall
-    the top is put back, None: it is not [s].
+    pulse's place, in turns, 1σ (0.0212 makes 0.03 Hz of a reading over 1 s); base: the magnet below it; stand:
+    where the probe is at first, about where a top floats; again_s: so long after a fall the top is put back, None: it
+    is not [s].
     """
 
     start_hz: float = 30.0
@@ -91,7 +92,8 @@ class SpinScene:
     tape: Tape = field(default_factory=Tape)
     laser: Laser = field(default_factory=Laser)
     jitter: float = 0.03 / math.sqrt(2)
-    base_field_t: float = BASE_FIELD
+    base: Base = field(default_factory=Base)
+    stand: Stand = field(default_factory=Stand)
     again_s: float | None = None
     seed: int = 0
 
@@ -109,7 +111,7 @@ def drawn(seed: int, scene: SpinScene | None = None) -> SpinScene:
     """The scene of one run: constants and fall scattered as between the thesis's runs, by the seed.
 
     The four published constants scatter by 2 %, the ten published lower limits by 0.25 Hz, whether they are of several
-    runs or of one.
+    runs or of one; the base is `drawn_base`'s, and a probe is put in its place to 0.2 mm.
     """
     scene = scene or SpinScene()
     scatter = np.random.default_rng(seed).standard_normal(1 + _SERIES)
@@ -118,6 +120,8 @@ def drawn(seed: int, scene: SpinScene | None = None) -> SpinScene:
         constants=tuple(c * (1 + 0.02 * float(scatter[0])) for c in scene.constants),
         fall_hz=scene.fall_hz + 0.25 * float(scatter[1]),
         later_falls_hz=tuple((scene.fall_hz + 0.25 * scatter[2:]).tolist()),
+        base=drawn_base(seed),
+        stand=replace(scene.stand, scatter_m=2e-4, seed=seed),
         seed=seed,
     )
 
@@ -150,7 +154,7 @@ class SpinWorld:
         self.scene, self.clock = scene, clock
         self._decay = DECAYS[scene.drag]
         self._jitter = np.random.default_rng((scene.seed, 1)).standard_normal(1 << 16) * scene.jitter
-        self._coil = Coil()
+        self._coil, self._stand, self._probe_t = Coil(), scene.stand, scene.stand.sees(scene.base)
         self._drive_spin, self._hold = 0.0, 0.0  # [rad/s], [rad/s²]
         self._told = 0.0  # the last time that a change was told for [s]
         first = _Stretch(0.0, 2 * math.pi * scene.start_hz, 0.0, "coasts")
@@ -310,4 +314,9 @@ class SpinWorld:
 
     def flux_density(self, time: float) -> float:
         """The base's field; the coil's lies across the axis, and the probe does not see it."""
-        return self.scene.base_field_t
+        return self._probe_t
+
+    def place_probe(self, height_m: float | None) -> None:
+        """Put the probe there; see :class:`World`."""
+        self._stand = self._stand.at(height_m)
+        self._probe_t = self._stand.sees(self.scene.base)

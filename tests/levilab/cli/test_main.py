@@ -81,12 +81,11 @@ def test_no_save_writes_nothing_and_out_writes_there(levilab: Command, tmp_path:
 
 
 def test_an_analysis_need_not_be_named(levilab: Command, sample_data: Path) -> None:
-    run = sample_data / "spin-down-1"
-    named = levilab("analyze", "spindown", run, "--no-save")
-    assert levilab("analyze", run, "--no-save").stdout == named.stdout
-    assert levilab("analyze", "--no-save", run).stdout == named.stdout
-    found = json.loads(levilab("analyze", sample_data, "--no-save", "--json").stdout)
-    assert [one["analysis"] for one in found] == ["spindown", "limit"]
+    runs = [sample_data / "spin-down-1", sample_data / "spin-down-2"]
+    named = levilab("analyze", "spindown", *runs, "--no-save")
+    assert levilab("analyze", *runs, "--no-save").stdout == named.stdout
+    assert levilab("analyze", "--no-save", *runs).stdout == named.stdout
+    assert json.loads(levilab("analyze", *runs, "--no-save", "--json").stdout)["analysis"] == "spindown"
     assert "Did you mean 'spindown'?" in levilab("analyze", "spindwon", check=2).stderr
 
 

@@ -12,10 +12,11 @@ from instruments.virtual.generator.channel import Burst, Output
 from instruments.virtual.generator.voltage import fundamental
 from levilab.errors import LeftRange, SimulationError
 from levilab.simulator import SceneError, preset, simulate
+from levilab.world.base import Base
 from levilab.world.flight import RATE, Flight
 from levilab.world.light import Tape
 from levilab.world.motion_world import MotionWorld
-from levilab.world.spin_world import BASE_FIELD, KEPT_S
+from levilab.world.spin_world import KEPT_S
 
 TURN = 2 * math.pi
 TILTED = preset("tilted")
@@ -295,9 +296,13 @@ def test_the_noise_is_as_large_as_asked_for_and_another_with_another_seed():
 
 
 def test_the_probe_sees_the_field_of_the_scenes_base():
-    assert world().flux_density(0.0) == pytest.approx(BASE_FIELD, rel=1e-8)
-    twice = TILTED.changed({"base.strength_t_m": 2 * TILTED.base.strength_t_m})
-    assert world(twice).flux_density(5.0) == pytest.approx(2 * BASE_FIELD, rel=1e-8)
+    assert world().flux_density(0.0) == pytest.approx(0.0190937938, rel=1e-8)
+    twice = world(TILTED.changed({"base.strength_t_m": 2 * TILTED.base.strength_t_m}))
+    assert twice.flux_density(5.0) == pytest.approx(2 * 0.0190937938, rel=1e-8)
+    twice.place_probe(0.05)
+    assert twice.flux_density(5.0) == pytest.approx(2 * Base().flux_density(0.05), rel=1e-12)
+    twice.place_probe(None)
+    assert twice.flux_density(5.0) == 0.0
 
 
 @pytest.mark.parametrize(
