@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 from typing import TYPE_CHECKING, Any
 
 from pydantic import Field, create_model
 
 from levilab.acquisition.experiment import CounterSettings, Experiment
-from levilab.acquisition.experiments import field, spin, trace
+from levilab.acquisition.experiments import field, limit, spin, trace
 from levilab.bench.config import BenchConfig
 from levilab.bench.template import Setting, SettingsTable
 
@@ -18,7 +19,8 @@ if TYPE_CHECKING:
 
 #: Name → experiment.
 EXPERIMENTS: dict[str, Experiment[Any]] = {
-    experiment.name: experiment for experiment in (spin.EXPERIMENT, trace.EXPERIMENT, field.EXPERIMENT)
+    experiment.name: experiment
+    for experiment in (spin.EXPERIMENT, trace.EXPERIMENT, field.EXPERIMENT, limit.EXPERIMENT)
 }
 
 _TABLES: dict[str, Any] = {
@@ -38,9 +40,9 @@ def tables_to_write() -> tuple[SettingsTable, ...]:
 
 
 def _settings_to_write(settings: type[ExperimentSettings]) -> Iterator[Setting]:
-    """Its own settings before those that it inherits."""
-    inherited = {name for base in settings.__bases__ for name in getattr(base, "model_fields", {})}
-    for name in sorted(settings.model_fields, key=lambda name: name in inherited):
+    """Its own settings, those that it changes included, before those that it inherits, the nearest first."""
+    names = dict.fromkeys(name for one in settings.__mro__ for name in inspect.get_annotations(one))
+    for name in (name for name in names if name in settings.model_fields):
         field = settings.model_fields[name]
         default = field.get_default(call_default_factory=True)
         example = field.examples[0] if default is None and field.examples else default

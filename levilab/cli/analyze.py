@@ -104,6 +104,7 @@ ANALYSIS_HELP = {
         "traces."
     ),
     "field": "The base from a Hall scan: strength, origin, thickness; heights, masses and spins of tops that float.",
+    "limit": "Limits of the spin, lower and upper: mean, scatter, trend and outliers, beside the window of the top.",
 }
 #: The command that stands for no name, and is not listed.
 _EACH = "each"
@@ -185,6 +186,20 @@ def field(
     _analyze(context, paths, given, save=save, out=out, as_json=as_json)
 
 
+def limit(
+    context: typer.Context,
+    paths: Paths,
+    columns: Columns = "",
+    reading_u: ReadingU = None,
+    save: Save = True,
+    out: ResultFolder = None,
+    as_json: Json = False,
+) -> None:
+    """Find the mean and the scatter of limits."""
+    given = inputs(columns, None, None) | {"reading_u": positive_u(reading_u)}
+    _analyze(context, paths, given, save=save, out=out, as_json=as_json)
+
+
 def each(
     context: typer.Context,
     paths: Paths,
@@ -204,7 +219,7 @@ def each(
     _analyze(context, paths, given | {"method": method.value}, save=save, out=out, as_json=as_json)
 
 
-_COMMANDS: dict[str, Callable[..., None]] = {"spindown": spindown, "spin": spin, "field": field}
+_COMMANDS: dict[str, Callable[..., None]] = {"spindown": spindown, "spin": spin, "field": field, "limit": limit}
 for _name, _help in ANALYSIS_HELP.items():
     analyze_app.command(_name, help=_help, epilog=f"Example: levilab analyze {_name} sample_data/")(_COMMANDS[_name])
 analyze_app.command(_EACH, help=_EACH_HELP, hidden=True, epilog="Example: levilab analyze sample_data/")(each)
@@ -219,11 +234,16 @@ def inputs(columns: str, channel: str | None, rate: float | None) -> dict[str, A
     return {"columns": parse_columns(columns), "channel": channel, "rate": rate}
 
 
-def spindown_options(reading_u: float | None, uncertainty: str, keep_outliers: bool) -> dict[str, Any]:
-    """How to analyze spin-downs, from the options of the commands.  Raises UsageError."""
+def positive_u(reading_u: float | None) -> float | None:
+    """The uncertainty of a reading [Hz].  Raises UsageError for one that is not positive."""
     if reading_u is not None and not 0 < reading_u < float("inf"):
         raise UsageError("reading_u", "a standard uncertainty above 0 [Hz] is expected", value=reading_u)
-    return {"reading_u": reading_u, "uncertainty": uncertainty, "keep_outliers": keep_outliers}
+    return reading_u
+
+
+def spindown_options(reading_u: float | None, uncertainty: str, keep_outliers: bool) -> dict[str, Any]:
+    """How to analyze spin-downs, from the options of the commands.  Raises UsageError."""
+    return {"reading_u": positive_u(reading_u), "uncertainty": uncertainty, "keep_outliers": keep_outliers}
 
 
 def _analyze(

@@ -15,6 +15,11 @@ from levilab.pipelines.field.document import recall_scans
 from levilab.pipelines.field.document import save_result as save_field
 from levilab.pipelines.field.report import field_part
 from levilab.pipelines.field.table import field_tables
+from levilab.pipelines.limit.analysis import NEEDS as LIMIT_NEEDS
+from levilab.pipelines.limit.analysis import LimitAnalysis, LimitOptions, analyze_limits
+from levilab.pipelines.limit.document import limit_document, recall_limits, save_limits
+from levilab.pipelines.limit.report import limit_part
+from levilab.pipelines.limit.table import limit_tables
 from levilab.pipelines.spin.analysis import NEEDS as SPIN_NEEDS
 from levilab.pipelines.spin.analysis import SpinAnalysis, SpinOptions, analyze_spins
 from levilab.pipelines.spin.document import as_document as spin_document
@@ -124,6 +129,13 @@ def _field_svg(analysis: FieldAnalysis) -> str:
     return as_svg(field_figure(analysis))
 
 
+def _limit_svg(analysis: LimitAnalysis) -> str:
+    from levilab.pipelines.limit.figure import limit_figure  # with matplotlib
+    from levilab.present.style import as_svg
+
+    return as_svg(limit_figure(analysis))
+
+
 _TABLE: tuple[Analysis[Any], ...] = (
     Analysis[SpinDownAnalysis](
         SPINDOWN_NEEDS,
@@ -157,6 +169,17 @@ _TABLE: tuple[Analysis[Any], ...] = (
         field_tables,
         _field_svg,
         field_part,
+    ),
+    Analysis[LimitAnalysis](
+        LIMIT_NEEDS,
+        LimitOptions,
+        analyze_limits,
+        recall_limits,
+        limit_document,
+        save_limits,
+        limit_tables,
+        _limit_svg,
+        limit_part,
     ),
 )
 ANALYSES = MappingProxyType({analysis.name: analysis for analysis in _TABLE})

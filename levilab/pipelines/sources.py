@@ -186,7 +186,8 @@ def _of_run(run: Run, needs: Needs[R], options: InputOptions) -> Source[R]:
         raise DoesNotSuit(f"{run.folder}: holds a {kind} run, {needs.analysis} needs a {needs.runs}")
     data = run.folder / needs.data
     readings = needs.read_run(run, options)
-    return Source(run.folder, data, sha256_of(data), run, readings, run.folder.name, readings.warnings)
+    warnings = (*readings.warnings, *run.warnings())
+    return Source(run.folder, data, sha256_of(data), run, readings, run.folder.name, warnings)
 
 
 def sha256_of(path: Path) -> str:

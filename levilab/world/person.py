@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from levilab.bench.person import PlaceProbe, ShieldProbe
+from levilab.bench.person import FloatTop, PlaceProbe, ShieldProbe
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,6 +25,12 @@ class VirtualPerson:
         return carry_out(self.world, task) if carry_out else ""
 
 
+def _float_top(world: World, task: Task) -> str:
+    assert isinstance(task, FloatTop)
+    world.float_top(task.number)
+    return ""
+
+
 def _place_probe(world: World, task: Task) -> str:
     assert isinstance(task, PlaceProbe)
     world.place_probe(task.height_m)
@@ -37,4 +43,8 @@ def _shield_probe(world: World, task: Task) -> str:  # noqa: ARG001 - as all dee
 
 
 #: Kind of task → what is done in the world; returns the answer.
-_DEEDS: dict[type[Task], Callable[[World, Task], str]] = {PlaceProbe: _place_probe, ShieldProbe: _shield_probe}
+_DEEDS: dict[type[Task], Callable[[World, Task], str]] = {
+    PlaceProbe: _place_probe,
+    ShieldProbe: _shield_probe,
+    FloatTop: _float_top,
+}

@@ -143,6 +143,7 @@ drive_frequency_hz = 40.0       # drive the top up to this,
 ramp_hz_per_s = 0.05            # no faster than it can follow
 drive_amplitude_vpp = 10.0
 drive_waveform = "SIN"          # SIN, SQU or TRI
+hold_s = 20.0                   # hold it there, and compare its spin with the drive
 interval_s = 10.0               # then read every so often,
 gate_s = 1.0                    # counting for so long
 trigger_level_v = 0.6           # half way between dark and the pulse of the tape

@@ -86,7 +86,12 @@ def test_an_analysis_need_not_be_named(levilab: Command, sample_data: Path) -> N
     assert levilab("analyze", run, "--no-save").stdout == named.stdout
     assert levilab("analyze", "--no-save", run).stdout == named.stdout
     each = json.loads(levilab("analyze", sample_data, "--no-save", "--json").stdout)
-    assert [(one["analysis"], len(one["runs"])) for one in each] == [("spindown", 4), ("spin", 13), ("field", 1)]
+    assert [(one["analysis"], len(one["runs"])) for one in each] == [
+        ("spindown", 4),
+        ("spin", 13),
+        ("field", 1),
+        ("limit", 3),
+    ]
     assert "Did you mean 'spindown'" in levilab("analyze", "spindwon", check=2).stderr
 
 
@@ -147,7 +152,7 @@ def test_two_files_in_a_folder_have_a_result_each_that_the_report_reads(levilab:
 def test_what_does_not_belong_to_the_analysis_is_a_message_and_no_warning(levilab: Command, sample_data: Path) -> None:
     done = levilab("analyze", "spindown", sample_data, "--no-save")
     assert "passed over" not in done.stdout
-    assert "passed over: 1 limit run\n" in done.stderr
+    assert "passed over: 3 limit runs\n" in done.stderr
     assert "time [s]" in done.stdout
 
 
