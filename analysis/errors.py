@@ -84,3 +84,13 @@ class NothingToCombine(AnalysisError):
             f"{runs} runs have no drag law in common, at least one run and one law were expected: "
             "fit the same laws to each run"
         )
+
+
+class NoRange(AnalysisError):
+    """Points that all lie at one drive frequency [Hz]."""
+
+    def __init__(self, *, at: float, seen: int) -> None:
+        self.at, self.seen = at, seen
+        super().__init__(
+            f"all {seen} points are at a drive frequency of {at:g} Hz, a line needs several: sweep the drive"
+        )

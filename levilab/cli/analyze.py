@@ -68,6 +68,9 @@ class Uncertainty(StrEnum):
 UncertaintyKind = Annotated[
     Uncertainty, typer.Option("--uncertainty", help="profile and bootstrap add 68 % intervals, and take longer.")
 ]
+Orthogonal = Annotated[
+    bool, typer.Option("--orthogonal", help="precession: let the uncertainty of the drive's frequency count, too.")
+]
 Save = Annotated[bool, typer.Option(help="Write the result and figures beside the run.")]
 ResultFolder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Write them there instead.")]
 
@@ -76,6 +79,9 @@ ResultFolder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=
 ANALYSIS_HELP = {
     "spindown": (
         "Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude."
+    ),
+    "precession": (
+        "Precession against drive: slope and intercept, tested against a locked top, and what 1.05 would take."
     ),
 }
 #: The command that stands for no name, and is not listed.
@@ -90,6 +96,7 @@ def analyze_inputs(
     reading_u: ReadingU = None,
     uncertainty: UncertaintyKind = Uncertainty.COVARIANCE,
     keep_outliers: KeepOutliers = False,
+    orthogonal: Orthogonal = False,
     save: Save = True,
     out: ResultFolder = None,
     as_json: Json = False,
@@ -97,7 +104,7 @@ def analyze_inputs(
     """Carry out the analysis that the command is named after."""
     from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
 
-    chosen = options(columns, reading_u, uncertainty.value, keep_outliers)
+    chosen = options(columns, reading_u, uncertainty.value, keep_outliers, orthogonal=orthogonal)
     if context.info_name == _EACH:
         results = analyze_suiting(paths, chosen)
     else:
@@ -143,14 +150,16 @@ def _write_and_print(
         raise failures[0]
 
 
-def options(columns: str, reading_u: float | None, uncertainty: str, keep_outliers: bool) -> Options:
+def options(
+    columns: str, reading_u: float | None, uncertainty: str, keep_outliers: bool, *, orthogonal: bool = False
+) -> Options:
     """How to analyze, from the options of the commands.  Raises UsageError."""
     from levilab.formats.table import parse_columns
     from levilab.pipelines.sources import Options
 
     if reading_u is not None and not 0 < reading_u < float("inf"):
         raise UsageError("reading_u", "a standard uncertainty above 0 [Hz] is expected", value=reading_u)
-    return Options(parse_columns(columns), reading_u, cast("Kind", uncertainty), keep_outliers)
+    return Options(parse_columns(columns), reading_u, cast("Kind", uncertainty), keep_outliers, orthogonal=orthogonal)
 
 
 def _save(analysis: Analysis[Any], found: Any, out: Path | None) -> tuple[LevilabError | None, list[Path]]:

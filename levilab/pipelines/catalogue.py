@@ -7,6 +7,13 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from levilab.errors import DoesNotSuit, unquoted
+from levilab.pipelines.precession.analysis import NEEDS as PRECESSION_NEEDS
+from levilab.pipelines.precession.analysis import PrecessionAnalysis, analyze_precessions
+from levilab.pipelines.precession.document import as_document as precession_document
+from levilab.pipelines.precession.document import recall_precessions
+from levilab.pipelines.precession.document import save_result as save_precession
+from levilab.pipelines.precession.report import precession_part
+from levilab.pipelines.precession.table import precession_tables
 from levilab.pipelines.spindown.analysis import NEEDS as SPINDOWN_NEEDS
 from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
 from levilab.pipelines.spindown.document import as_document, recall_spindowns, save_result
@@ -89,6 +96,13 @@ def _spindown_svg(analysis: SpinDownAnalysis) -> str:
     return as_svg(spindown_figure(analysis))
 
 
+def _precession_svg(analysis: PrecessionAnalysis) -> str:
+    from levilab.pipelines.precession.figure import precession_figure  # with matplotlib
+    from levilab.present.style import as_svg
+
+    return as_svg(precession_figure(analysis))
+
+
 _TABLE: tuple[Analysis[Any], ...] = (
     Analysis[SpinDownAnalysis](
         SPINDOWN_NEEDS,
@@ -99,6 +113,16 @@ _TABLE: tuple[Analysis[Any], ...] = (
         spindown_tables,
         _spindown_svg,
         spindown_part,
+    ),
+    Analysis[PrecessionAnalysis](
+        PRECESSION_NEEDS,
+        analyze_precessions,
+        recall_precessions,
+        precession_document,
+        save_precession,
+        precession_tables,
+        _precession_svg,
+        precession_part,
     ),
 )
 ANALYSES = MappingProxyType({analysis.name: analysis for analysis in _TABLE})

@@ -23,7 +23,8 @@ class Options:
     """How to analyze.
 
     columns: the data file's own names; reading_u: of every reading [Hz], in the place of what the data say;
-    bootstrap_samples, seed: of the bootstrap, where it is asked for.
+    bootstrap_samples, seed: of the bootstrap, where it is asked for; orthogonal: a line with uncertainties along both
+    axes.
     """
 
     columns: Mapping[str, str] | None = None
@@ -32,6 +33,7 @@ class Options:
     keep_outliers: bool = False
     bootstrap_samples: int = 1000
     seed: int = 0
+    orthogonal: bool = False
 
 
 class Readings(Protocol):
