@@ -143,6 +143,10 @@ class ScpiInstrument:
         rows = (row for owner in reversed(cls.__mro__) for row in vars(owner).values())
         return [row for row in rows if isinstance(row, Setting)]
 
+    def header_in_use(self, header: str) -> str:
+        """The header of a declared setting as it is sent; with several inputs, that of the input in use."""
+        return header
+
     def close(self) -> None:
         """Give the instrument back."""
         self.transport.close()
@@ -192,7 +196,7 @@ class Setting(Generic[T]):
         """Ask the instrument.  Raises BadAnswer."""
         if instrument is None:
             return self
-        question = f"{self.header}?"
+        question = f"{instrument.header_in_use(self.header)}?"
         answer = instrument.transport.query(question)
         form = self.form or instrument.NUMBER
         try:
@@ -203,7 +207,7 @@ class Setting(Generic[T]):
     def __set__(self, instrument: ScpiInstrument, value: T) -> None:
         """Check, send, and read the error queue."""
         self._check(instrument.transport.address, value)
-        instrument.command(f"{self.header} {self._spell(value)}")
+        instrument.command(f"{instrument.header_in_use(self.header)} {self._spell(value)}")
         instrument.set_to[self.full_name] = self._canonical(value)
 
     def differs(self, asked: T, answered: T) -> bool:

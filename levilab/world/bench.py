@@ -47,8 +47,8 @@ Maker = Callable[["World"], VirtualInstrument]
 
 
 def at_the_light(model: Callable[..., VirtualInstrument]) -> Maker:
-    """A counter: its input 1 is connected to the phototransistor."""
-    return lambda world: model(world.clock, signal=world.light)
+    """A counter: its input 1 is connected to the phototransistor that sees the tape, 2 to the laser's."""
+    return lambda world: model(world.clock, signal=world.light, second=world.laser)
 
 
 def at_the_coil(model: Callable[..., VirtualInstrument]) -> Maker:
@@ -57,8 +57,13 @@ def at_the_coil(model: Callable[..., VirtualInstrument]) -> Maker:
 
 
 def scope_signals(world: World) -> dict[int, Callable[[float, float, int], Array]]:
-    """What an oscilloscope is connected to: channel 1 to the phototransistor, channel 2 to the generator's output."""
-    return {1: world.light, 2: lambda start, step, n: world.coil_field(start, step, n) / COIL_T_PER_V}
+    """What an oscilloscope is connected to.
+
+    Channel 1 sees the tape's phototransistor, 2 the generator's output, 3 the laser's phototransistor; one with two
+    channels has no input left for the laser.
+    """
+    drive = lambda start, step, n: world.coil_field(start, step, n) / COIL_T_PER_V  # noqa: E731
+    return {1: world.light, 2: drive, 3: world.laser}
 
 
 def at_light_and_coil(model: Callable[..., VirtualInstrument]) -> Maker:

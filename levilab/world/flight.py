@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from levilab.errors import LeftRange
-from levilab.simulator.kernels.motion import ARM, TIME
+from levilab.simulator.kernels.motion import ARM, TIME, L, N, R, V
 from levilab.simulator.keys import SceneError
 from levilab.simulator.single import simulate
 from levilab.simulator.start import start_of
@@ -41,7 +41,7 @@ class _Up:
     """A piece of a top's life.
 
     scene: with the drive; state: where it begins, shape (18,); step: of the integration [s]; times [s] and turns of the
-    tape then, shape (n,).
+    tape then, shape (n,); stem: displacement of the stem along x [m] and its rate [m/s] then, shape (2, n).
     """
 
     scene: Scene
@@ -49,6 +49,7 @@ class _Up:
     step: float
     times: Array
     turns: Array
+    stem: NDArray[np.float32]
 
     @property
     def start(self) -> float:
@@ -67,17 +68,18 @@ class Flight:
     """A top from time 0 on; before, and after it has fallen, there is none.
 
     scene: its drive is left out, `change` tells of drives; again_s: so long after a fall the top is put back to where
-    the scene starts, None: it is not [s].  Raises SceneError for a scene without motion.
+    the scene starts, None: it is not [s]; stem_height_m: of the place on the stem that is looked at, above the centre
+    of mass [m].  Raises SceneError for a scene without motion.
     """
 
-    def __init__(self, scene: Scene, again_s: float | None = None) -> None:
+    def __init__(self, scene: Scene, again_s: float | None = None, *, stem_height_m: float = 0.03) -> None:
         if scene.observed != "motion":
             raise SceneError(f"observed = {scene.observed}: a scene for the bench is expected to have motion")
         transverse, axial = scene.top.moment_tilt
         self._scene = scene.changed(
             {"drive.waveform": "off", "drive.off_s": None, "top.moment_tilt": [transverse or _HARDLY, axial]}
         )
-        self._again_s = again_s
+        self._again_s, self._stem_height = again_s, stem_height_m
         self._pieces: History[_Up | _Down] = History(-math.inf, _Down(-math.inf))
         self._step: float | None = None
         # what comes next: a top in this state, or none until a new one is put there; and when [s]
@@ -123,6 +125,19 @@ class Flight:
                 turns[part], up[part] = np.interp(times[part], piece.times, piece.turns), True
         return turns, up
 
+    def stem(self, times: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Displacement of the stem along x [m], and whether there is a top; shape (n,) each, as the times.
+
+        Between two states a cubic goes through both displacements with their rates: of the nutation, 42 Hz, it misses
+        5e-4 of the amplitude.
+        """
+        self.look(float(times.max(initial=0.0)))
+        place, up = np.zeros_like(times), np.zeros(times.shape, dtype=np.bool_)
+        for piece, part in self._pieces.pieces(times):
+            if isinstance(piece, _Up):
+                place[part], up[part] = _cubic(times[part], piece.times, *piece.stem), True
+        return place, up
+
     # --- as far as somebody looks ---
 
     def look(self, until: float) -> None:
@@ -147,7 +162,8 @@ class Flight:
             self._fall(begin)
             return
         # of the states only the first is kept: a bench may run for hours
-        self._pieces.append(begin, _Up(self._scene, state, motion.accuracy.step, motion.time.copy(), _turns(motion)))
+        seen = (motion.time.copy(), _turns(motion), _stem(motion, self._stem_height))
+        self._pieces.append(begin, _Up(self._scene, state, motion.accuracy.step, *seen))
         if motion.fell is not None:
             self._fall(motion.fell.time)
         else:
@@ -188,3 +204,30 @@ def _turns(motion: Trajectory) -> Array:
     arm, place = motion.states[:, ARM], motion.position
     spot = np.arctan2(-place[:, 1], motion.scene.top.magnet_radius_m - place[:, 0])
     return np.asarray(np.unwrap(np.arctan2(arm[:, 1], arm[:, 0]) - spot) / (2 * np.pi))
+
+
+def _stem(motion: Trajectory, height: float) -> NDArray[np.float32]:
+    """Displacement of the stem along x and its rate at a height above the centre of mass, shape (2, n) [m, m/s].
+
+    Single precision: a displacement of 5 mm is right to 0.5 nm.
+    """
+    states = motion.states
+    axis = states[:, N]
+    rate = (
+        states[:, L][:, 1] * axis[:, 2] - states[:, L][:, 2] * axis[:, 1]
+    ) / motion.scene.top.inertia_transverse_kg_m2
+    moving = states[:, V][:, 0] + height * rate
+    return np.asarray([states[:, R][:, 0] + height * axis[:, 0], moving], dtype=np.float32)
+
+
+def _cubic(times: Array, nodes: Array, values: NDArray[np.float32], rates: NDArray[np.float32]) -> Array:
+    """The cubic Hermite interpolation of values [u] and their rates [u/s] at nodes [s], shape (n,)."""
+    if nodes.size < 2:
+        return np.full_like(times, values[0])
+    k = np.clip(np.searchsorted(nodes, times, side="right") - 1, 0, nodes.size - 2)
+    span = nodes[k + 1] - nodes[k]
+    s = (times - nodes[k]) / span
+    low, high, left, right = values[k], values[k + 1], rates[k] * span, rates[k + 1] * span
+    return np.asarray(
+        low + s * (left + s * (3 * (high - low) - 2 * left - right + s * (2 * (low - high) + left + right)))
+    )

@@ -1,7 +1,8 @@
 """A world in full motion: the top of a scene, simulated as far as somebody looks, under the drive of the bench.
 
 The light is that of a tape which passes a fixed spot on the top's rim.  So the wobble of the top is seen in it: where
-it stands 1 mm aside, its tape comes a hundredth of a turn early or late.
+it stands 1 mm aside, its tape comes a hundredth of a turn early or late.  The laser's beam beside the stem is cut as
+the stem goes round.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from levilab.simulator.field import flux_density
 from levilab.simulator.model import base_field
 from levilab.world.coil import Coil
 from levilab.world.flight import Flight
-from levilab.world.light import Tape
+from levilab.world.light import Laser, Tape
 from levilab.world.spin_world import KEPT_S
 
 if TYPE_CHECKING:
@@ -50,8 +51,8 @@ class MotionWorld:
 
     The generator takes the place of the scene's drive, whose direction is the coil's; its offset moves nothing.
     again_s: see Flight; seed: of the light's noise, and of the place of the tape on the rim (0: where the transverse
-    part of the moment points): who switches a drive on after a pulse meets the moment there.  Raises SceneError for a
-    scene without motion.
+    part of the moment points): who switches a drive on after a pulse meets the moment there; tape, laser: how the lamp
+    and the beam are set up.  Raises SceneError for a scene without motion.
 
     >>> from instruments.clock import VirtualClock
     >>> from levilab.simulator import preset
@@ -62,11 +63,18 @@ class MotionWorld:
     """
 
     def __init__(
-        self, scene: Scene, clock: Clock, *, tape: Tape | None = None, again_s: float | None = None, seed: int = 0
+        self,
+        scene: Scene,
+        clock: Clock,
+        *,
+        tape: Tape | None = None,
+        laser: Laser | None = None,
+        again_s: float | None = None,
+        seed: int = 0,
     ) -> None:
         self.clock = clock
-        self._tape, self._seed = tape or Tape(), seed
-        self._coil, self._flight = Coil(), Flight(scene, again_s)
+        self._tape, self._laser, self._seed = tape or Tape(), laser or Laser(), seed
+        self._coil, self._flight = Coil(), Flight(scene, again_s, stem_height_m=self._laser.height_m)
         self._tape_at = float(np.random.default_rng(seed).uniform()) if seed else 0.0
         self._told = 0.0  # the last time that a change was told for [s]
         probe = np.array([[0.0, 0.0, PROBE_M]])
@@ -112,6 +120,11 @@ class MotionWorld:
         self._forget()
         turns, up = self._flight.turns(start + step * np.arange(n, dtype=np.float64))
         return self._tape.light(turns + self._tape_at, up, start, self._seed)
+
+    def laser(self, start: float, step: float, n: int) -> Array:
+        """The voltage of the laser's phototransistor; see World."""
+        self._forget()
+        return self._laser.voltage(start + step * np.arange(n, dtype=np.float64), self._flight.stem, self._seed)
 
     def coil_field(self, start: float, step: float, n: int) -> Array:
         """The coil's field; see World."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from instruments.virtual.generator.voltage import fundamental
 from levilab.simulator.spin import DECAYS
 from levilab.world.coil import Coil
-from levilab.world.light import Tape
+from levilab.world.light import Laser, Tape
 from levilab.world.timeline import History
 
 if TYPE_CHECKING:
@@ -44,6 +44,9 @@ class World(Protocol):
     def light(self, start: float, step: float, n: int) -> Array:
         """The phototransistor's voltage at start + step·k, shape (n,) [V]."""
 
+    def laser(self, start: float, step: float, n: int) -> Array:
+        """The voltage of the phototransistor behind the stem at start + step·k, shape (n,) [V]."""
+
     def drive(self, time: float, output: Output) -> None:
         """From this time on the coil's field is this: a generator's output, amplitude and offset in T."""
 
@@ -61,10 +64,10 @@ class SpinScene:
     start_hz: the spin at time 0, given by hand; drag: a name in DECAYS, with its constants;
     fall_hz: spin at which the top falls; lock_torque: the greatest angular acceleration per tesla of drive
     [rad s⁻² T⁻¹], the dipole's transverse part over I₃, half of it because half of a field along one line
-    turns with the top; tape: what the phototransistor sees; jitter: scatter of a pulse's
-    place, in turns, 1σ (0.0212 makes 0.03 Hz of a reading over 1 s); base_field_t: the base's field at the probe,
-    which stands where the top would float, 7.2 cm above the thesis's base; again_s: so long
-    after a fall somebody has put the top back, None: nobody does [s].
+    turns with the top; tape: what the phototransistor sees; laser: the beam beside the stem; jitter: scatter of a
+    pulse's place, in turns, 1σ (0.0212 makes 0.03 Hz of a reading over 1 s); base_field_t: the base's field at the
+    probe, which stands where the top would float, 7.2 cm above the thesis's base; again_s: so long after a fall
+    the top is put back, None: it is not [s].
     """
 
     start_hz: float = 30.0
@@ -73,6 +76,7 @@ class SpinScene:
     fall_hz: float = 21.86
     lock_torque: float = 0.03 * 0.714 / 2 / 1.731314e-6
     tape: Tape = field(default_factory=Tape)
+    laser: Laser = field(default_factory=Laser)
     jitter: float = 0.03 / math.sqrt(2)
     base_field_t: float = BASE_FIELD
     again_s: float | None = None
@@ -231,6 +235,13 @@ class SpinWorld:
         turns = angle / (2 * math.pi)
         late = self._jitter[np.floor(turns).astype(np.int64) % self._jitter.size]
         return self.scene.tape.light(turns - late, spin > 0, start, self.scene.seed)
+
+    def laser(self, start: float, step: float, n: int) -> Array:
+        """The voltage of the laser's phototransistor; see :class:`World`.
+
+        A top that only spins has its stem at rest on the axis: the beam is steady, and nothing is to be counted.
+        """
+        return self.scene.laser.steady(start + step * np.arange(n, dtype=np.float64), self.scene.seed)
 
     def coil_field(self, start: float, step: float, n: int) -> Array:
         """The coil's field; see :class:`World`."""

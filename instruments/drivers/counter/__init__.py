@@ -17,8 +17,11 @@ if TYPE_CHECKING:
 class Counter(Instrument, Protocol):
     """What every counter offers."""
 
-    def prepare(self, *, gate_s: float, trigger_level_v: float) -> None:
-        """Measure frequency at input 1, rising edges, over a gate [s], at a fixed trigger level [V]."""
+    def prepare(self, *, gate_s: float, trigger_level_v: float, channel: int = 1) -> None:
+        """Measure frequency over a gate [s], rising edges, at a fixed trigger level [V].
+
+        channel: the input, 1 or 2 (A or B).  Raises OutOfRange for one that it does not have.
+        """
 
     def frequency(self) -> float | None:
         """One reading [Hz]; None when no signal crossed the trigger level.  Takes the gate time and more."""

@@ -46,12 +46,12 @@ class Keysight53230A(ReciprocalCounter):
     slope = Setting("INP1:SLOP1", str, choices=("POSitive", "NEGative"))
     measurement_timeout = Setting("SYST:TIM", float, unit="s", low=0.01, high=2000.0)
 
-    def prepare(self, *, gate_s: float, trigger_level_v: float) -> None:
+    def prepare(self, *, gate_s: float, trigger_level_v: float, channel: int = 1) -> None:
         """Set the counter up; see :class:`Counter`.
 
         CONFigure comes first, it resets the gate and the trigger.
         """
-        self.command("CONF:FREQ (@1)")
+        self._choose(channel)
         self._unsent_end = ()
         self.command("SENS:FREQ:GATE:SOUR TIME")
         self.gate = gate_s

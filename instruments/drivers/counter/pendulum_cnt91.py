@@ -52,9 +52,9 @@ class PendulumCNT91(ReciprocalCounter):
     time_stamps = Setting("FORM:TINF", bool)
     statistics = Setting("CALC:AVER:STAT", bool)
 
-    def prepare(self, *, gate_s: float, trigger_level_v: float) -> None:
+    def prepare(self, *, gate_s: float, trigger_level_v: float, channel: int = 1) -> None:
         """Set the counter up; see :class:`Counter`."""
-        self.command("CONF:FREQ (@1)")
+        self._choose(channel)
         self.free_running = False
         self.statistics = False
         self.command("FORM ASC")

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 READINGS_AT_ONCE = 1000
 #: Readings that are waited for with one question: so long, at most [s].  VISA waits for 49 days and no longer.
 LONGEST_WAIT_S = 30 * 86400.0
+#: The inputs that count slow pulses: 1 and 2, which the CNT-91 has as A and B on its front.
+CHANNELS = (1, 2)
 #: The impedances of an input [ohm], printed short (regular expression, without a sign).
 IMPEDANCES = r"50|1000000|5\.0{1,9}E\+01|1\.0{1,9}E\+06"
 
@@ -31,12 +33,28 @@ class ReciprocalCounter(ScpiInstrument):
     MOST: ClassVar[int] = 1_000_000
     EMPTY_IS_NONE: ClassVar[bool] = False
 
+    #: The input in use, which prepare() chooses.
+    channel = 1
+
     #: How long the counter may work on one reading [s]; prepare() sets it.
     _patience = 3.0
     #: Whether it says so itself when there is no signal; prepare() sets it up to do so.
     _gives_up = False
     #: The commands that end the series for which the counter is still set up; none, if it is not.
     _unsent_end: tuple[str, ...] = ()
+
+    def header_in_use(self, header: str) -> str:
+        """See the base; the settings are declared with the header of input 1."""
+        return header.replace("INP1:", f"INP{self.channel}:")
+
+    def _choose(self, channel: int) -> None:
+        """Measure frequency at this input from now on.  Raises OutOfRange."""
+        if channel not in CHANNELS:
+            raise OutOfRange(self.transport.address, "channel", channel, " or ".join(map(str, CHANNELS)))
+        if channel != self.channel:
+            self.set_to.clear()  # what was set is the other input's
+        self.channel = channel
+        self.command(f"CONF:FREQ (@{channel})")
 
     def frequency(self) -> float | None:
         """One reading [Hz], or None; see :class:`Counter`.  Raises CommandRefused if an error was waiting."""

@@ -23,18 +23,18 @@ from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
 from support.conversation import CLEAR, NO_ERROR, SILENCE, accepted, conversation
 
 
-def preparation(gate, level, timeout):
+def preparation(gate, level, timeout, channel=1):
     return accepted(
-        "CONF:FREQ (@1)",
+        f"CONF:FREQ (@{channel})",
         "SENS:FREQ:GATE:SOUR TIME",
         f"SENS:FREQ:GATE:TIME {gate}",
-        "INP1:COUP DC",
-        "INP1:IMP 1000000.0",
-        "INP1:PROB 1.0",
-        "INP1:RANG 5.0",
-        "INP1:LEV:AUTO OFF",
-        f"INP1:LEV1 {level}",
-        "INP1:SLOP1 POS",
+        f"INP{channel}:COUP DC",
+        f"INP{channel}:IMP 1000000.0",
+        f"INP{channel}:PROB 1.0",
+        f"INP{channel}:RANG 5.0",
+        f"INP{channel}:LEV:AUTO OFF",
+        f"INP{channel}:LEV1 {level}",
+        f"INP{channel}:SLOP1 POS",
         f"SYST:TIM {timeout}",
         "FORM ASC,15",
     )
@@ -43,6 +43,20 @@ def preparation(gate, level, timeout):
 def test_the_counter_is_prepared_with_direct_coupling_and_a_fixed_level():
     with conversation(Keysight53230A, *preparation("1.0", "0.6", "3.0")) as counter:
         counter.prepare(gate_s=1.0, trigger_level_v=0.6)
+
+
+def test_the_other_input_is_set_up_with_its_own_suffix():
+    # Programmer's Reference, INPut[{1|2}]:..., CONFigure:FREQuency (@2)
+    asked = [("INP2:LEV1?", "+6.00000000000000E-001")]
+    with conversation(Keysight53230A, *preparation("1.0", "0.6", "3.0", channel=2), *asked) as counter:
+        counter.prepare(gate_s=1.0, trigger_level_v=0.6, channel=2)
+        assert counter.trigger_level == 0.6
+
+
+@pytest.mark.parametrize("driver", [Keysight53230A, PendulumCNT91])
+def test_an_input_that_counts_no_slow_pulses_is_refused(driver):
+    with conversation(driver) as counter, pytest.raises(OutOfRange, match="channel = 3 is refused"):
+        counter.prepare(gate_s=1.0, trigger_level_v=0.6, channel=3)
 
 
 @pytest.mark.parametrize(("gate", "patience"), [(0.1, 1.2), (1.0, 3.0), (10.0, 21.0)])
@@ -167,21 +181,22 @@ def test_a_series_longer_than_the_memory_is_refused(driver, count):
 NONE_WRONG = ("SYST:ERR?", '0,"No error"')
 
 
-def test_the_cnt91_is_prepared_with_direct_coupling_a_fixed_level_and_a_time_out():
+@pytest.mark.parametrize("channel", [1, 2])
+def test_the_cnt91_is_prepared_with_direct_coupling_a_fixed_level_and_a_time_out(channel):
     lines = accepted(
-        "CONF:FREQ (@1)",
+        f"CONF:FREQ (@{channel})",
         "INIT:CONT OFF",
         "CALC:AVER:STAT OFF",
         "FORM ASC",
         "FORM:TINF OFF",
         "ACQ:APER 10.0",
-        "INP1:COUP DC",
-        "INP1:IMP 1000000.0",
-        "INP1:ATT 1.0",
-        "INP1:FILT OFF",
-        "INP1:LEV:AUTO OFF",
-        "INP1:LEV 0.6",
-        "INP1:SLOP POS",
+        f"INP{channel}:COUP DC",
+        f"INP{channel}:IMP 1000000.0",
+        f"INP{channel}:ATT 1.0",
+        f"INP{channel}:FILT OFF",
+        f"INP{channel}:LEV:AUTO OFF",
+        f"INP{channel}:LEV 0.6",
+        f"INP{channel}:SLOP POS",
         "ARM:SOUR IMM",
         "TRIG:COUN 1",
         "ARM:COUN 1",
@@ -189,7 +204,7 @@ def test_the_cnt91_is_prepared_with_direct_coupling_a_fixed_level_and_a_time_out
         "SYST:TOUT ON",
     )
     with conversation(PendulumCNT91, *lines, NONE_WRONG, ("READ?", "+2.5000000000000E+01")) as counter:
-        counter.prepare(gate_s=10.0, trigger_level_v=0.6)
+        counter.prepare(gate_s=10.0, trigger_level_v=0.6, channel=channel)
         assert counter.frequency() == 25.0
     assert counter.transport.waited[-1] == 21.0
 
@@ -236,12 +251,17 @@ def light(start, step, n):
     return 0.1 + 1.1 * np.exp(-0.5 * (((25.0 * times) % 1.0 - 0.5) / sigma) ** 2) * (times < 1000.0)
 
 
+def faster_light(start, step, n):
+    """The same at 40 Hz."""
+    return light(1.6 * start, 1.6 * step, n)
+
+
 @pytest.fixture(params=PAIRS, ids=["53230A", "CNT-91"])
 def bench(request):
     """A driver, and the clock of its virtual instrument."""
     driver, virtual = request.param
     clock = VirtualClock()
-    library = library_for(Bus({ADDRESS: virtual(clock, signal=light)}))
+    library = library_for(Bus({ADDRESS: virtual(clock, signal=light, second=faster_light)}))
     counter = driver(VisaTransport(ADDRESS, library=library))
     yield counter, clock
     counter.close()
@@ -258,6 +278,16 @@ def test_a_gate_longer_than_the_transports_time_out_is_waited_for(bench, gate):
     # at each end of the gate an edge may be misplaced by interpolation, by microseconds
     assert counter.frequency() == pytest.approx(25.0, rel=1e-5 / gate)
     assert gate <= clock.now() - before <= gate + 0.2
+
+
+def test_each_input_counts_its_own_signal(bench):
+    counter, _ = bench
+    for channel, hertz in ((2, 40.0), (1, 25.0), (2, 40.0)):
+        counter.prepare(gate_s=0.1, trigger_level_v=0.6, channel=channel)
+        assert counter.frequency() == pytest.approx(hertz, rel=1e-4)
+        np.testing.assert_allclose(counter.readings(3), hertz, rtol=1e-4)
+        assert counter.settings()["trigger_level_v"] == 0.6
+        assert not counter.unlike(counter.settings())
 
 
 def test_a_dark_room_is_no_reading_and_no_error(bench):

@@ -1,11 +1,17 @@
 """The virtual bench for programs that are not ours."""
 
+import numpy as np
 import pytest
+import pyvisa
 import serial
 
+from instruments.drivers.counter.keysight_53230a import Keysight53230A
+from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
+from instruments.links.visa import VisaTransport
 from instruments.virtual.bench import serial_line
+from instruments.virtual.bench.visa_library import library_for
 from levilab.bench.config import ConfigError
-from levilab.world.bench import MODELS, VIRTUAL, plug_in_serial, virtual_bus
+from levilab.world.bench import MODELS, VIRTUAL, own_world, plug_in_serial, virtual_bus
 
 LINE = {"baudrate": 57600, "bytesize": 7, "parity": "O", "timeout": 1.0}
 
@@ -55,3 +61,20 @@ def test_what_there_is_not_is_told_with_what_there_is():
         virtual_bus(models={"counter": "DVM"})
     with pytest.raises(ConfigError, match="no virtual 'piano': known are counter"):
         virtual_bus(models={"piano": "1"})
+
+
+@pytest.mark.parametrize("counter", ["53230A", "CNT-91"])
+def test_the_laser_is_at_the_counters_second_input_and_channel_three(counter):
+    world = own_world()
+    pulses = lambda start, step, n: 0.65 + 0.5 * np.sin(2 * np.pi * 33.0 * (start + step * np.arange(n)))  # noqa: E731
+    world.laser = pulses
+    library = library_for(virtual_bus(world, models={"counter": counter}))
+    bench = pyvisa.ResourceManager(library)
+    driver = PendulumCNT91 if counter == "CNT-91" else Keysight53230A
+    device = driver(VisaTransport(VIRTUAL["counter"].address, library=library))
+    device.prepare(gate_s=0.5, trigger_level_v=0.6, channel=2)
+    assert device.frequency() == pytest.approx(33.0, abs=1e-3)
+    scope = bench.open_resource(VIRTUAL["oscilloscope"].address)
+    scope.write(":CHAN3:DISP ON;:CHAN3:SCAL 0.5;:TIM:SCAL 0.02;:TRIG:EDG:SOUR CHAN3;:TRIG:EDG:LEV 0.6")
+    assert float(scope.query(":MEAS:ITEM? FREQ,CHAN3")) == pytest.approx(33.0, rel=0.02)
+    bench.close()

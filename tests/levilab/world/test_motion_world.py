@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
+from instruments.virtual.counter.edges import crossings
 from instruments.virtual.generator.channel import Burst, Output
 from instruments.virtual.generator.voltage import fundamental
 from levilab.errors import LeftRange, SimulationError
@@ -306,3 +307,28 @@ def test_a_top_whose_numbers_leave_their_range_has_hit_the_base(monkeypatch):
     monkeypatch.setattr("levilab.world.flight.simulate", hits)
     _, up = flight.turns(np.array([0.5]))
     assert not up.any()
+
+
+# --- the laser ---
+
+
+def test_the_stem_is_where_the_simulated_top_has_it():
+    motion = simulate(TILTED, 2.7, tolerance=1e-9, rate=317.0)
+    place, up = Flight(TILTED, stem_height_m=0.02).stem(motion.time)
+    assert up.all()
+    # 6e-4 of the nutation's 0.4 mm, and 1e-7 m where a piece ends
+    np.testing.assert_allclose(place, motion.position[:, 0] + 0.02 * motion.axis[:, 0], atol=6e-7)
+
+
+def test_the_laser_is_cut_once_a_turn_of_the_thesiss_driven_top():
+    top = world(preset("driven"))
+    top.drive(0.0, Output("SIN", 30.0, 4e-4, 0.0, phase=90.0))
+    cuts = crossings(top.laser(1.0, 5e-5, 200_000), 0.6, 0.04)
+    # at the drive's 30 Hz, but for an edge at either end; the spin swings by 0.4 Hz about it
+    assert cuts.size == pytest.approx(300, abs=1)
+
+
+def test_without_a_top_the_beam_is_steady():
+    fallen = world(FALLING)
+    voltage = fallen.laser(10.0, 1e-4, 10_000)
+    assert np.ptp(voltage) < 0.06  # twelve standard deviations of the noise

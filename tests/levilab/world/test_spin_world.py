@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from instruments.clock import VirtualClock
+from instruments.virtual.counter.edges import crossings
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.generator.channel import Burst, Output
 from instruments.virtual.generator.voltage import fundamental, voltage
@@ -587,3 +588,14 @@ def test_a_top_that_falls_is_put_back_where_somebody_does_so():
 
 def test_else_it_lies_there():
     assert world(SpinScene()).motion(np.array([1e5]))[0] == 0
+
+
+# --- the laser ---
+
+
+def test_a_top_that_only_spins_does_not_cut_the_laser():
+    top = world(SpinScene(seed=3))
+    voltage = top.laser(5.0, 5e-5, 20_000)
+    assert voltage.mean() == pytest.approx(0.65, abs=1e-3)
+    assert crossings(voltage, 0.6, 0.04).size == crossings(voltage, 0.65, 0.04).size == 0
+    np.testing.assert_array_equal(top.laser(5.0, 5e-5, 500), voltage[:500])
