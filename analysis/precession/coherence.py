@@ -167,4 +167,5 @@ def _drift(times: Array, turns: Array, mean: complex) -> tuple[float, float]:
     s_tt = float(np.sum(off**2))
     slope = float(np.sum(off * phases)) / s_tt
     left = phases - phases.mean() - slope * off
-    return slope, math.sqrt(float(np.sum(left**2)) / (times.size - 2) / s_tt)
+    # pulses that are faster than the drive come earlier and earlier on it
+    return -slope, math.sqrt(float(np.sum(left**2)) / (times.size - 2) / s_tt)
