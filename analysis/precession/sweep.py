@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.errors import NotFinite, NotPositive, ShapesDiffer
-from analysis.precession.line import FEWEST, Line, fit_line, fit_orthogonal, influence
+from analysis.precession.line import FEWEST, NO_FIT, Line, fit_line, fit_orthogonal, influence
 from analysis.precession.miscounts import Miscount, Robust, find_miscounts, robust_line
 from analysis.precession.power import Power, what_it_takes
 
@@ -284,6 +284,11 @@ def _doubts(fit: SweepFit, sweep: Sweep, found: list[Miscount]) -> list[str]:
         texts.append(
             f"the points scatter {line.scale:.2g} times as much as their u says (p = {line.p_fit:.1g}): "
             "all uncertainties are enlarged by that"
+        )
+    if line.chi_square is not None and line.p_fit is not None and 1 - line.p_fit < NO_FIT:
+        texts.append(
+            "the points scatter much less than their u says: the swing of a locked top about the drive is in it, and "
+            "comes back to where it was"
         )
     if fit.p_locked is None:
         texts.append("the points lie on the line to the last digit: without their u nothing can be tested; give it")

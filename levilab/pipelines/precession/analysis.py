@@ -287,7 +287,7 @@ def _about_power(power: Power) -> str:
     told = f"a slope of {power.slope:g} from 1"
     if power.enough:
         return (
-            f"These points tell {told} with a probability of {_at_most(power.now)}; the smallest difference that they "
+            f"These points tell {told} with a probability of {at_most(power.now)}; the smallest difference that they "
             f"tell in nine cases of ten is {plain(power.smallest_difference, 2)}. A range of "
             f"{plain(power.range_needed_hz, 2)} Hz, or a u of {plain(power.u_needed_hz, 2)} Hz a point, would do."
         )
@@ -299,6 +299,6 @@ def _about_power(power: Power) -> str:
     )
 
 
-def _at_most(probability: float) -> str:
+def at_most(probability: float) -> str:
     """A probability, never shown as certainty."""
     return "more than 0.999" if probability > 0.999 else f"{math.floor(1000 * probability) / 1000:.3f}"

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from analysis.uncertainty import Estimate
-from levilab.pipelines.precession.analysis import intercept_of, slope_of
+from levilab.pipelines.precession.analysis import at_most, intercept_of, slope_of
 from levilab.present.numbers import plain, without_unit
 from levilab.present.tables import Row, Table, table
 
@@ -78,7 +78,7 @@ def power_table(fit: SweepFit) -> Table:
         return table("", (), ())
     needed = "> 10⁶" if power.points_needed is None else str(power.points_needed)
     rows = [
-        ("probability of telling it", plain(power.now), "0.9"),
+        ("probability of telling it", at_most(power.now), "0.9"),
         (
             "u of the slope",
             plain(fit.line.u_slope),
