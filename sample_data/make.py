@@ -6,9 +6,15 @@ readings.  These readings are made up so that they give those constants: the law
 return the published C₁ and C₂, rounded to 0.01 Hz.  They are not the author's data.
 
 Run it from anywhere: ``python sample_data/make.py``.  It writes the same bytes each time.
+
+``python sample_data/make.py --full-motion`` makes the sweep of the drive, too: ``levilab acquire precession --mock``
+with records of the phase, its top simulated in full motion.  Its last digits depend on the processor.
 """
 
 import json
+import shutil
+import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -98,6 +104,42 @@ def write(folder: Path, header: str, rows: list[str], record: dict[str, Any]) ->
     (folder / "readings.csv").write_text("\n".join([header, *rows, ""]), encoding="utf-8", newline="\n")
 
 
+def precession_sweep() -> None:
+    """A sweep of the drive on the virtual bench, without the times of the day at which it was made."""
+    from levilab.acquisition.loop import acquire
+    from levilab.acquisition.request import AcquisitionOptions, request_for
+    from levilab.present.progress import to_stderr
+
+    folder, seed = HERE / "precession-sweep", 1
+    with tempfile.TemporaryDirectory() as out:
+        bench = Path(out) / "bench.toml"
+        bench.write_text("[precession]\nrecord_s = 6.0\n", encoding="utf-8")
+        options = AcquisitionOptions(mock=True, bench=bench, out=Path(out), seed=seed)
+        run = acquire(request_for("precession", options), to_stderr())
+        readings = run.readings().frame.round(6)
+        write(
+            folder,
+            ",".join(readings.columns),
+            [",".join(f"{value:.10g}" for value in row) for row in readings.to_numpy().tolist()],
+            {
+                "experiment": "precession",
+                "started_utc": None,
+                "channels": run.record.channels,
+                "configuration": {name: run.record.configuration[name] for name in ("precession", "scene")},
+                "seed": seed,
+                "note": "a sweep from 44 Hz down to 28 Hz",
+                "synthetic": True,
+                "synthetic_how": f"SYNTHETIC: {run.record.synthetic_how}; made by sample_data/make.py --full-motion",
+            },
+        )
+        events = [{key: value for key, value in event.items() if key != "utc"} for event in run.events()]
+        lines = [json.dumps(event, ensure_ascii=False, sort_keys=True) + "\n" for event in events]
+        (folder / "events.jsonl").write_text("".join(lines), encoding="utf-8", newline="\n")
+        shutil.copytree(run.folder / "traces", folder / "traces", dirs_exist_ok=True)
+        shutil.copy(run.folder / "traces.jsonl", folder)
+    print("precession-sweep")
+
+
 def main() -> None:
     """Write the five run folders."""
     for number, (c1, c2, n) in enumerate(PUBLISHED, start=1):
@@ -136,3 +178,5 @@ def main() -> None:
 
 if __name__ == "__main__":
     main()
+    if "--full-motion" in sys.argv[1:]:
+        precession_sweep()

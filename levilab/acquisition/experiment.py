@@ -63,9 +63,9 @@ S = TypeVar("S", bound=ExperimentSettings)
 class Experiment(Generic[S]):
     """An experiment.
 
-    about: one line; instruments: the kinds that it needs; settings: its table in the bench file; channels: the columns
-    that it writes, given its settings; run: carries it out; mock_scene: the scene of a mock unless another is asked
-    for, None: a top that only spins.
+    about: one line; instruments: the kinds that it needs, in any case; settings: its table in the bench file; channels:
+    the columns that it writes, given its settings; run: carries it out; mock_scene: the scene of a mock unless another
+    is asked for, None: a top that only spins; more_instruments: the kinds that it needs besides, given its settings.
     """
 
     name: str
@@ -75,3 +75,8 @@ class Experiment(Generic[S]):
     channels: Callable[[S], tuple[Channel, ...]]
     run: Callable[[Session[S]], None]
     mock_scene: str | None = None
+    more_instruments: Callable[[S], tuple[str, ...]] = lambda _: ()
+
+    def instruments_for(self, settings: S) -> tuple[str, ...]:
+        """The kinds that it needs with these settings."""
+        return (*self.instruments, *self.more_instruments(settings))

@@ -93,7 +93,7 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
         request = _on_the_virtual_bench(request, options)
     else:
         wiring = described_wiring(config)
-        for kind in EXPERIMENTS[experiment].instruments:
+        for kind in EXPERIMENTS[experiment].instruments_for(settings_of(config, experiment)):
             wiring.described(kind)
     if run:
         _check_readings(run, request)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import Field, create_model
 
 from levilab.acquisition.experiment import CounterSettings, Experiment
-from levilab.acquisition.experiments import spin
+from levilab.acquisition.experiments import precession, spin
 from levilab.bench.config import BenchConfig
 from levilab.bench.template import Setting, SettingsTable
 
@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from levilab.acquisition.experiment import ExperimentSettings
 
 #: Name → experiment.
-EXPERIMENTS: dict[str, Experiment[Any]] = {experiment.name: experiment for experiment in (spin.EXPERIMENT,)}
+EXPERIMENTS: dict[str, Experiment[Any]] = {
+    experiment.name: experiment for experiment in (spin.EXPERIMENT, precession.EXPERIMENT)
+}
 
 _TABLES: dict[str, Any] = {
     experiment.name: (experiment.settings, Field(default_factory=experiment.settings))

@@ -21,6 +21,7 @@ acquire_app = typer.Typer(no_args_is_help=True, help="Run an experiment on the b
 #: Experiment → what its command does.  The table of experiments itself takes too long to import for a help page.
 EXPERIMENT_HELP = {
     "spin": "Spin-down: drive the top up, switch the drive off, count its spin until it falls.",
+    "precession": "Precession: sweep the drive, and count at each frequency how often the stem cuts a laser beam.",
 }
 _ENDING = "Ctrl-C ends the run after the reading under way; outputs go off and the run is kept."
 

@@ -40,6 +40,8 @@ NEEDS = Needs(
     ),
     read=sweep_readings,
 )
+#: A record that is kept at the moment of a reading is that reading's [s].
+_AT_ONCE_S = 0.01
 #: Slopes of runs that differ with less probability than this are named.
 DIFFERENT_P = 0.01
 
@@ -228,7 +230,7 @@ def _coherences(source: Source[Readings]) -> tuple[tuple[PointCoherence, ...], t
         if (laser.channel, drive.channel) != ("laser", "drive"):
             continue
         # a record is kept before its point's reading is
-        point = int(np.searchsorted(source.readings.time, laser.time_s))
+        point = int(np.searchsorted(source.readings.time, laser.time_s - _AT_ONCE_S))
         if point >= len(source.readings):
             continue
         try:
