@@ -239,3 +239,14 @@ def thesis_limit(field: AxialField, top: Symmetric, height: float) -> float:
     """The thesis's own estimate √(mg/I₃·|φ₁/φ₂|)/2π [Hz]; it lacks the factor 2√(I₁/I₃)."""
     b, slope = (float(value) for value in field(np.array([height]))[:2, 0])
     return math.sqrt(top.mass * top.gravity / top.axial * abs(b / slope)) / (2 * math.pi)
+
+
+def wobble_resonance(field: AxialField, top: Symmetric, height: float) -> float:
+    """√(P/(I₃ − I₁)) in turns per second: at this spin a moment that is not along the axis tilts the top without end.
+
+    A transverse part δ of the moment makes it lean by δ P/((I₃ − I₁)ω² − P), once per turn.  NaN where there is none:
+    of a long top, or where the field rights it.
+    """
+    p = -float(top.stiffness(field, np.array([height]))[0, 0])
+    inertia = top.axial - top.transverse
+    return math.sqrt(p / inertia) / (2 * math.pi) if p > 0 and inertia > 0 else math.nan

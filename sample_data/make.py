@@ -1,9 +1,12 @@
-"""Make the sample data: four synthetic spin-downs and the ten published lower limits, as run folders.
+"""Make the sample data: synthetic spin-downs and upper limits, and the ten published lower limits, as run folders.
 
 The thesis prints the constants of four spin-downs, C₁ and C₂ of unweighted straight lines, but none of their
 readings.  These readings are made up so that they give those constants: the law of a laminar disc from about
 40 Hz, a reading each 10 s, noise N(0, 0.03 Hz), start and constant solved for so that the straight lines
 return the published C₁ and C₂, rounded to 0.01 Hz.  They are not the author's data.
+
+The upper limits are made up, too: a normal law about what the simulated bench gives (docs/experiments/limit.md), once
+of a sound top and once of one whose washers slip under the tape.
 
 Run it from anywhere: ``python sample_data/make.py``.  It writes the same bytes each time.
 
@@ -21,6 +24,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import root
+
+from analysis.locked import slip_of
 
 HERE = Path(__file__).parent
 NOISE_HZ, STEP_S, DIGIT_HZ = 0.03, 10.0, 0.01
@@ -85,6 +90,65 @@ def solve(c1: float, c2: float, n: int) -> tuple[Array, Array, dict[str, float]]
     raise RuntimeError(f"no seed gives C1 = {c1}, C2 = {c2}")
 
 
+#: Upper limits: mean and scatter of the simulated bench (sine of 0.4 mT, creep of 0.1 Hz/s), tops, creep and how often
+#: the top is looked at; axial inertia, drag, and the coupling of the loose washers, which all the drag acts on.
+UPPER_HZ, UPPER_SCATTER_HZ, TOPS, CREEP_HZ_S, LOOK_S = 67.0, 2.0, 8, 0.1, 2.0
+AXIAL_KG_M2, DRAG, COUPLING_N_M_S = 1.731314e-6, 2.34e-4, 1e-6
+HELD_HZ, COUNTS, COUNT_SCATTER_HZ = 30.0, 40, 0.08
+UPPER_CHANNELS = [
+    {"name": "time_s", "unit": "s", "source": "made up, when the top was lost"},
+    {"name": "spin_frequency_hz", "unit": "Hz", "source": "made up, spin up to which the top followed the drive"},
+    {"name": "spin_frequency_u_hz", "unit": "Hz", "source": "the drive's step between two looks, over the root of 12"},
+    {"name": "spin_seen_hz", "unit": "Hz", "source": "made up, the last one counted of the held top"},
+    {"name": "drive_frequency_hz", "unit": "Hz", "source": "made up, the last one at which the top was held"},
+    {"name": "drive_amplitude_v", "unit": "V", "source": "made up, half of peak to peak"},
+]
+UPPER_HOW = (
+    "SYNTHETIC: upper limits drawn from a normal law about 67 Hz with a scatter of 2 Hz, as the simulated bench gives "
+    "with a sine of 0.4 mT and a creep of 0.1 Hz/s; {washers}; made by sample_data/make.py"
+)
+
+
+def upper_limits(name: str, seed: int, *, loose: bool) -> None:
+    """A run of upper limits.  loose: the washers slip, and the tape on them turns slower than the top."""
+    random = np.random.default_rng(seed)
+    rows, events, time = [], [], 0.0
+    step = CREEP_HZ_S * LOOK_S
+    for _ in range(TOPS):
+        limit = float(random.normal(UPPER_HZ, UPPER_SCATTER_HZ))
+        held = HELD_HZ + step * np.floor((limit - HELD_HZ) / step)
+        time += 60.0 + (held - HELD_HZ) / CREEP_HZ_S
+        for drive, seconds in ((HELD_HZ, time - (held - HELD_HZ) / CREEP_HZ_S), (float(held), time)):
+            counts = drive - slip_hz(drive) * loose + random.normal(0, COUNT_SCATTER_HZ, COUNTS)
+            slip = slip_of(counts.round(3).tolist(), drive)
+            text = f"held at {drive:.2f} Hz: counted {slip.spin:.3f} Hz, {slip.difference:+.3f} Hz beside the drive"
+            events.append({"time_s": round(seconds, 1), "kind": "held", "text": text})
+            if slip.warning:
+                events.append({"time_s": round(seconds, 1), "kind": "warning", "text": slip.warning})
+        middle = held + step / 2
+        text = f"the drive lost the top at {middle:.2f} Hz"
+        events.append({"time_s": round(time, 1), "kind": "lock lost", "text": text})
+        rows.append(f"{time:.1f},{middle:.2f},{step / 12**0.5:.4f},{counts[-1]:.3f},{held:.2f},5")
+    how = f"washers that slip by I3 C omega^1.5/k, k = {COUPLING_N_M_S:g} N m s" if loose else "sound washers"
+    record = {
+        "experiment": "limit",
+        "started_utc": None,
+        "channels": UPPER_CHANNELS,
+        "configuration": {"limit": {"which": "upper"}},
+        "note": "a locked top whose washers are loose" if loose else "how far the drive takes the top",
+        "synthetic": True,
+        "synthetic_how": UPPER_HOW.format(washers=how),
+    }
+    write(HERE / name, ",".join(channel["name"] for channel in UPPER_CHANNELS), rows, record)
+    lines = [json.dumps(event, ensure_ascii=False) + "\n" for event in events]
+    (HERE / name / "events.jsonl").write_text("".join(lines), encoding="utf-8", newline="\n")
+
+
+def slip_hz(spin_hz: float) -> float:
+    """By how much washers turn slower than the top that drags them along, against the drag of a disc [Hz]."""
+    return float(AXIAL_KG_M2 * DRAG * (2 * np.pi * spin_hz) ** 1.5 / COUPLING_N_M_S / (2 * np.pi))
+
+
 def write(folder: Path, header: str, rows: list[str], record: dict[str, Any]) -> None:
     """A run folder."""
     folder.mkdir(exist_ok=True)
@@ -141,7 +205,7 @@ def precession_sweep() -> None:
 
 
 def main() -> None:
-    """Write the five run folders."""
+    """Write the seven run folders."""
     for number, (c1, c2, n) in enumerate(PUBLISHED, start=1):
         t, nu, how = solve(c1, c2, n)
         write(
@@ -172,8 +236,11 @@ def main() -> None:
             "note": "the ten lower limits as published in the thesis: mean 21.86, s 0.25, s.e. 0.08 Hz",
             "synthetic": False,
             "synthetic_how": None,
+            "configuration": {"limit": {"which": "lower"}},
         },
     )
+    upper_limits("upper-limits", seed=1, loose=False)
+    upper_limits("loose-washers", seed=2, loose=True)
 
 
 if __name__ == "__main__":

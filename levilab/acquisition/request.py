@@ -19,12 +19,13 @@ from levilab.bench.wiring import described_wiring
 from levilab.errors import LevilabError, UsageError
 from levilab.runs.run import Run, find_run
 from levilab.settings import in_one_line
+from levilab.simulator.keys import parsed
 from levilab.simulator.scene import SceneError, read_scene, scene_of
 from levilab.world.bench import VIRTUAL, scene_world, virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld, drawn
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from levilab.bench.person import Person
     from levilab.simulator.scene import Scene
@@ -58,6 +59,7 @@ class AcquisitionOptions:
         wire_log: keeps all bytes on the wire.
         person: carries out what the experiment asks of a person at a real bench.
         tell: called with a line about what takes long before it begins.
+        settings: of experiments, as "limit.which=upper"; they go before those of the bench file.
     """
 
     mock: bool = False
@@ -71,6 +73,7 @@ class AcquisitionOptions:
     wire_log: bool = False
     person: Person = ask_no_person
     tell: Callable[[str], None] = lambda _: None
+    settings: tuple[str, ...] = ()
 
 
 def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequest:
@@ -106,6 +109,8 @@ def _check_options(options: AcquisitionOptions, run: Run | None, *, virtual: boo
     for name in ("seed", "scene"):
         if getattr(options, name) is not None and (run or not options.mock):
             raise UsageError(name, f"goes with `mock`, and not with `resume`: a run keeps its {name}")
+    if options.settings and run:
+        raise UsageError("settings", "goes with a new run: a resumed run keeps its settings")
     if options.realtime and not virtual:
         raise UsageError("realtime", "goes with `mock`: a real bench always keeps to the wall clock")
 
@@ -117,7 +122,25 @@ def _configuration(options: AcquisitionOptions, run: Run | None, *, virtual: boo
         described = read_bench(options.bench or Path("bench.toml"), Configuration)
         places = {kind: getattr(described, kind) for kind in ("visa_library", "limits", *VIRTUAL)}
         config = config.model_copy(update=places) if run else described
-    return config
+    return _with_given_settings(config, options.settings)
+
+
+def _with_given_settings(config: BenchConfig, settings: Sequence[str]) -> BenchConfig:
+    """The configuration with some of the experiments' settings changed.  Raises UsageError."""
+    if not settings:
+        return config
+    table = config.model_dump(mode="json")
+    for setting in settings:
+        key, equals, text = setting.partition("=")
+        name, dot, field = key.strip().partition(".")
+        if not (equals and dot and name in EXPERIMENTS):
+            expected = f"EXPERIMENT.KEY=VALUE is expected, with {', '.join(EXPERIMENTS)}, as limit.which=upper"
+            raise UsageError("settings", expected, value=setting)
+        table[name][field] = parsed(f"{field}={text}")[1]
+    try:
+        return Configuration.model_validate(table)
+    except ValidationError as error:
+        raise UsageError("settings", in_one_line(error)) from error
 
 
 def _as_it_was(run: Run) -> BenchConfig:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from instruments.errors import InstrumentError, SettingsLost
 from levilab.bench.person import ask_no_person
 from levilab.errors import LevilabError
-from levilab.runs.run import utc_now
+from levilab.runs.run import WARNING, utc_now
 from levilab.settings import Settings
 
 if TYPE_CHECKING:
@@ -119,7 +119,7 @@ class Session(Generic[S]):
         else:
             self.zero = self.bench.clock.now() - self.earlier.run.elapsed()
         count = len(self.rows)
-        self.event("resumed", f"resumed after {count} reading{'s' * (count != 1)}, without driving again")
+        self.event("resumed", f"resumed after {count} reading{'s' * (count != 1)}")
 
     @contextlib.contextmanager
     def _replay(self) -> Iterator[None]:
@@ -155,6 +155,10 @@ class Session(Generic[S]):
 
     def _write_event(self, kind: str, text: str, **data: Any) -> None:
         self.writer.event(None if self.zero is None else self.now(), kind, text, **data)
+
+    def warn(self, text: str) -> None:
+        """Write down and show what to know before the readings are used; every result of the run repeats it."""
+        self.event(WARNING, text)
 
     def progress(self, text: str, share: float) -> None:
         """Show how far the bench is on the way to the first reading.  share: from 0 to 1."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import Field, create_model
 
 from levilab.acquisition.experiment import CounterSettings, Experiment
-from levilab.acquisition.experiments import precession, spin
+from levilab.acquisition.experiments import limit, precession, spin
 from levilab.bench.config import BenchConfig
 from levilab.bench.template import Setting, SettingsTable
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 #: Name → experiment.
 EXPERIMENTS: dict[str, Experiment[Any]] = {
-    experiment.name: experiment for experiment in (spin.EXPERIMENT, precession.EXPERIMENT)
+    experiment.name: experiment for experiment in (spin.EXPERIMENT, limit.EXPERIMENT, precession.EXPERIMENT)
 }
 
 _TABLES: dict[str, Any] = {

@@ -22,7 +22,9 @@ class PlaceProbe(Task):
 
 @dataclass(frozen=True)
 class FloatTop(Task):
-    """The top is to be spun by hand and to float."""
+    """The top is to be spun by hand and to float.  number: how many tops of the series came before."""
+
+    number: int = 0
 
 
 #: Carries out a task and returns the answer, empty where none is asked for.

@@ -21,6 +21,10 @@ acquire_app = typer.Typer(no_args_is_help=True, help="Run an experiment on the b
 #: Experiment → what its command does.  The table of experiments itself takes too long to import for a help page.
 EXPERIMENT_HELP = {
     "spin": "Spin-down: drive the top up, switch the drive off, count its spin until it falls.",
+    "limit": (
+        "Limits of the spin, top after top: where a free top falls, or with --set limit.which=upper where a driven one "
+        "is lost."
+    ),
     "precession": "Precession: sweep the drive, and count at each frequency how often the stem cuts a laser beam.",
 }
 _ENDING = "Ctrl-C ends the run after the reading under way; outputs go off and the run is kept."
@@ -54,6 +58,12 @@ def acquire_experiment(
     yes: Annotated[
         bool, typer.Option("--yes", help="Ask the person at the bench nothing: all is as the experiment wants it.")
     ] = False,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help="Change a setting of the experiment, as limit.which=upper; repeatable."
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Carry out the experiment that the command is named after."""
@@ -74,6 +84,7 @@ def acquire_experiment(
         wire_log=wire_log,
         person=ask_no_person if yes else _ask,
         tell=message,
+        settings=tuple(settings or ()),
     )
     experiment = str(context.info_name)
     run = acquire(request_for(experiment, options), to_stderr())

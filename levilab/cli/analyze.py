@@ -80,6 +80,7 @@ ANALYSIS_HELP = {
     "spindown": (
         "Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude."
     ),
+    "limit": "Limits of the spin, lower and upper: mean, scatter, trend and outliers, beside the window of the top.",
     "precession": (
         "Precession against drive: slope and intercept, tested against a locked top, and what 1.05 would take."
     ),

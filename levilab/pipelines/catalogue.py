@@ -7,6 +7,11 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from levilab.errors import DoesNotSuit, unquoted
+from levilab.pipelines.limit.analysis import NEEDS as LIMIT_NEEDS
+from levilab.pipelines.limit.analysis import LimitAnalysis, analyze_limits
+from levilab.pipelines.limit.document import limit_document, recall_limits, save_limits
+from levilab.pipelines.limit.report import limit_part
+from levilab.pipelines.limit.table import limit_tables
 from levilab.pipelines.precession.analysis import NEEDS as PRECESSION_NEEDS
 from levilab.pipelines.precession.analysis import PrecessionAnalysis, analyze_precessions
 from levilab.pipelines.precession.document import as_document as precession_document
@@ -96,6 +101,13 @@ def _spindown_svg(analysis: SpinDownAnalysis) -> str:
     return as_svg(spindown_figure(analysis))
 
 
+def _limit_svg(analysis: LimitAnalysis) -> str:
+    from levilab.pipelines.limit.figure import limit_figure  # with matplotlib
+    from levilab.present.style import as_svg
+
+    return as_svg(limit_figure(analysis))
+
+
 def _precession_svg(analysis: PrecessionAnalysis) -> str:
     from levilab.pipelines.precession.figure import precession_figure  # with matplotlib
     from levilab.present.style import as_svg
@@ -113,6 +125,16 @@ _TABLE: tuple[Analysis[Any], ...] = (
         spindown_tables,
         _spindown_svg,
         spindown_part,
+    ),
+    Analysis[LimitAnalysis](
+        LIMIT_NEEDS,
+        analyze_limits,
+        recall_limits,
+        limit_document,
+        save_limits,
+        limit_tables,
+        _limit_svg,
+        limit_part,
     ),
     Analysis[PrecessionAnalysis](
         PRECESSION_NEEDS,

@@ -181,7 +181,8 @@ def _of_run(run: Run, needs: Needs[R]) -> Source[R]:
         raise DoesNotSuit(f"{run.folder}: holds a {kind} run, {needs.analysis} needs a {needs.runs} run")
     data = run.folder / READINGS
     readings = needs.read(run.readings())
-    return Source(run.folder, data, sha256_of(data), run, readings, run.folder.name, readings.warnings)
+    warnings = (*readings.warnings, *run.warnings())
+    return Source(run.folder, data, sha256_of(data), run, readings, run.folder.name, warnings)
 
 
 def sha256_of(path: Path) -> str:

@@ -26,6 +26,22 @@ class Show(Protocol):
         """The end."""
 
 
+class Mute:
+    """Shows nothing."""
+
+    def preparing(self, text: str, fraction: float) -> None:
+        """Nothing."""
+
+    def reading(self, text: str, elapsed: float, remaining: float) -> None:
+        """Nothing."""
+
+    def message(self, text: str) -> None:
+        """Nothing."""
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
 class Lines:
     """One line a reading, for logs, pipes and tests."""
 

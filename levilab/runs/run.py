@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import json
 import os
+import re
+from collections import Counter
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -34,6 +36,10 @@ READINGS, STATES, EVENTS, RECORD, LOCK, WIRE, PACKAGE = (
     "wire.log",
     "datapackage.json",
 )
+
+#: The kind of an event that says what to know before the readings are used.
+WARNING = "warning"
+_NUMBERS = re.compile(r"[\d.]+(\(\d+\))?")
 
 Status = Literal["running", "finished", "interrupted", "failed"]
 
@@ -137,6 +143,20 @@ class Run:
         path = self.folder / EVENTS
         lines = path.read_text(encoding="utf-8", errors="replace").split("\n") if path.is_file() else []
         return [event for line in lines if (event := _event(line))]
+
+    def warnings(self) -> tuple[str, ...]:
+        """What the experiment warned of while it ran, each once."""
+        return _warnings_of(self.events())
+
+
+def _warnings_of(events: list[dict[str, Any]]) -> tuple[str, ...]:
+    """Each warning once; of those that differ in their numbers alone the first, and how many there are."""
+    texts = [str(event["text"]) for event in events if event["kind"] == WARNING]
+    alike = Counter(_NUMBERS.sub("#", text) for text in texts)
+    firsts = {_NUMBERS.sub("#", text): text for text in reversed(texts)}
+    return tuple(
+        f"{firsts[kind]} (the first of {n} such warnings)" if n > 1 else firsts[kind] for kind, n in alike.items()
+    )
 
 
 def _event(line: str) -> dict[str, Any] | None:

@@ -40,8 +40,9 @@ _HARDLY = 1e-17
 class _Up:
     """A piece of a top's life.
 
-    scene: with the drive; state: where it begins, shape (18,); step: of the integration [s]; times [s] and turns of the
-    tape then, shape (n,); stem: displacement of the stem along x [m] and its rate [m/s] then, shape (2, n).
+    scene: with the drive; state: where it begins, shape (18,); step: of the integration [s]; times [s], turns of the
+    tape and, as part of them, turns of the washers that it is on beside the top, shape (n,) each; stem: displacement of
+    the stem along x [m] and its rate [m/s] then, shape (2, n).
     """
 
     scene: Scene
@@ -49,6 +50,7 @@ class _Up:
     step: float
     times: Array
     turns: Array
+    slips: Array
     stem: NDArray[np.float32]
 
     @property
@@ -85,6 +87,7 @@ class Flight:
         # what comes next: a top in this state, or none until a new one is put there; and when [s]
         self._state: Array | None = self._begin(0.0)
         self._known = 0.0
+        self._slip = 0.0  # of the washers then [turns]
 
     def prepare(self) -> None:
         """Have the simulator's code compiled, or brought from the disk, for whatever drive may come."""
@@ -103,11 +106,19 @@ class Flight:
         now = self._pieces.at(time)
         if isinstance(now, _Up):
             self._pieces.cut(time)
+            self._slip = float(np.interp(time, now.times, now.slips))
             self._state, self._known = _later(now, time), time
         else:
             self._pieces.cut(math.nextafter(time, math.inf))
             self._wait(now.start)
         self._scene = self._scene.changed({f"drive.{key}": value for key, value in drive.items()})
+
+    def put_back(self, time: float) -> None:
+        """At this time the top is put back to where the scene starts, if it is down."""
+        self.look(time)
+        if isinstance(self._pieces.at(time), _Down):
+            self._pieces.cut(math.nextafter(time, math.inf))
+            self._state, self._step, self._known = self._begin(time), None, time
 
     def forget(self, before: float) -> None:
         """Nobody will ask for times before this one [s]."""
@@ -151,6 +162,7 @@ class Flight:
         """The state of a top that is put there at this time, shape (18,)."""
         state = start_of(self._scene)
         state[TIME] = time
+        self._slip = 0.0
         return state
 
     def _live(self, state: Array) -> None:
@@ -162,7 +174,9 @@ class Flight:
             self._fall(begin)
             return
         # of the states only the first is kept: a bench may run for hours
-        seen = (motion.time.copy(), _turns(motion), _stem(motion, self._stem_height))
+        slips = self._slip + _slips(motion)
+        self._slip = float(slips[-1])
+        seen = (motion.time.copy(), _turns(motion) + slips, slips, _stem(motion, self._stem_height))
         self._pieces.append(begin, _Up(self._scene, state, motion.accuracy.step, *seen))
         if motion.fell is not None:
             self._fall(motion.fell.time)
@@ -197,6 +211,18 @@ def _later(piece: _Up, time: float) -> Array:
         state = motion.states[-1].copy()
     state[TIME] = time
     return state
+
+
+def _slips(motion: Trajectory) -> Array:
+    """Turns of the washers beside the top since the first sample, shape (n,): slower, so negative; 0 if none are loose.
+
+    The trapezium rule: a slip changes in seconds, and the samples are 2.5 ms apart.
+    """
+    if motion.scene.washers.inertia_kg_m2 == 0:
+        return np.zeros(motion.time.size)
+    rate = motion.washer_spin_hz - motion.spin_hz
+    steps = np.diff(motion.time) * (rate[1:] + rate[:-1]) / 2
+    return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def _turns(motion: Trajectory) -> Array:

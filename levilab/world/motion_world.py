@@ -90,6 +90,10 @@ class MotionWorld:
             self._flight.change(time, drive)
             self._told = time
 
+    def float_top(self, number: int) -> None:
+        """Put the top back to where the scene starts; see World."""
+        self._flight.put_back(self.clock.now())
+
     def keep_up(self) -> None:
         """Work the motion out up to now, so that nobody has to wait for hours of it."""
         self._forget()

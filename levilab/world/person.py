@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from levilab.bench.person import FloatTop
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -23,5 +25,11 @@ class VirtualPerson:
         return carry_out(self.world, task) if carry_out else ""
 
 
+def _float_top(world: World, task: Task) -> str:
+    assert isinstance(task, FloatTop)
+    world.float_top(task.number)
+    return ""
+
+
 #: Kind of task → what is done in the world; returns the answer.
-_DEEDS: dict[type[Task], Callable[[World, Task], str]] = {}
+_DEEDS: dict[type[Task], Callable[[World, Task], str]] = {FloatTop: _float_top}

@@ -50,6 +50,9 @@ class World(Protocol):
     def drive(self, time: float, output: Output) -> None:
         """From this time on the coil's field is this: a generator's output, amplitude and offset in T."""
 
+    def float_top(self, number: int) -> None:
+        """Spin the top by hand and let it float, if it is down.  number: how many tops came before."""
+
     def coil_field(self, start: float, step: float, n: int) -> Array:
         """The coil's field at start + step·k, shape (n,) [T]."""
 
@@ -62,9 +65,10 @@ class SpinScene:
     """A top that only spins.  Defaults: the thesis's device and what its spin-downs showed.
 
     start_hz: the spin at time 0, given by hand; drag: a name in DECAYS, with its constants;
-    fall_hz: spin at which the top falls; lock_torque: the greatest angular acceleration per tesla of drive
-    [rad s⁻² T⁻¹], the dipole's transverse part over I₃, half of it because half of a field along one line
-    turns with the top; tape: what the phototransistor sees; laser: the beam beside the stem; jitter: scatter of a
+    fall_hz: spin at which the top falls; later_falls_hz: the same of tops that are floated later, by their number from
+    1 on, and again from the first of them; none: as the first top; lock_torque: the greatest angular acceleration per
+    tesla of drive [rad s⁻² T⁻¹], the dipole's transverse part over I₃, half of it because half of a field along one
+    line turns with the top; tape: what the phototransistor sees; laser: the beam beside the stem; jitter: scatter of a
     pulse's place, in turns, 1σ (0.0212 makes 0.03 Hz of a reading over 1 s); base_field_t: the base's field at the
     probe, which stands where the top would float, 7.2 cm above the thesis's base; again_s: so long after a fall
     the top is put back, None: it is not [s].
@@ -74,6 +78,7 @@ class SpinScene:
     drag: str = "disc"
     constants: tuple[float, ...] = (2.34e-4,)
     fall_hz: float = 21.86
+    later_falls_hz: tuple[float, ...] = ()
     lock_torque: float = 0.03 * 0.714 / 2 / 1.731314e-6
     tape: Tape = field(default_factory=Tape)
     laser: Laser = field(default_factory=Laser)
@@ -82,18 +87,29 @@ class SpinScene:
     again_s: float | None = None
     seed: int = 0
 
+    def fall_of(self, number: int) -> float:
+        """The spin at which a top falls [Hz].  number: how many tops came before."""
+        later = self.later_falls_hz
+        return later[(number - 1) % len(later)] if number and later else self.fall_hz
+
+
+#: Tops of one series whose falls are drawn.
+_SERIES = 100
+
 
 def drawn(seed: int, scene: SpinScene | None = None) -> SpinScene:
     """The scene of one run: constants and fall scattered as between the thesis's runs, by the seed.
 
-    The four published constants scatter by 2 %, the ten published lower limits by 0.25 Hz.
+    The four published constants scatter by 2 %, the ten published lower limits by 0.25 Hz, whether they are of several
+    runs or of one.
     """
     scene = scene or SpinScene()
-    scatter = np.random.default_rng(seed).standard_normal(2)
+    scatter = np.random.default_rng(seed).standard_normal(1 + _SERIES)
     return replace(
         scene,
         constants=tuple(c * (1 + 0.02 * float(scatter[0])) for c in scene.constants),
         fall_hz=scene.fall_hz + 0.25 * float(scatter[1]),
+        later_falls_hz=tuple((scene.fall_hz + 0.25 * scatter[2:]).tolist()),
         seed=seed,
     )
 
@@ -103,7 +119,7 @@ class _Stretch:
     """A piece of the top's life under one rule.
 
     start [s]; spin [rad/s] and angle [rad] at its start; rule: "coasts" by the law of drag, "pulled" with
-    the constant acceleration [rad/s²] to the drive's frequency, "locked" to it, or "fallen".
+    the constant acceleration [rad/s²] to the drive's frequency, "locked" to it, or "fallen"; number: of the top.
     """
 
     start: float
@@ -111,6 +127,7 @@ class _Stretch:
     angle: float
     rule: str
     acceleration: float = 0.0
+    number: int = 0
 
 
 class SpinWorld:
@@ -154,6 +171,16 @@ class SpinWorld:
         if not fallen:
             self._go_on(now)
 
+    def float_top(self, number: int) -> None:
+        """Spin the top by hand; see :class:`World`."""
+        time = self.clock.now()
+        self._put_back_until(time)
+        now = self._stretches.at(time)
+        if now.rule == "fallen":
+            self._stretches.cut(math.nextafter(time, math.inf))
+            spin = 2 * math.pi * self.scene.start_hz
+            self._go_on(_Stretch(time, spin, now.angle, "coasts", number=number))
+
     def keep_up(self) -> None:
         """Nothing takes long here; see :class:`World`."""
         self._forget()
@@ -171,7 +198,8 @@ class SpinWorld:
             if begin > time:
                 return
             self._forget()
-            self._go_on(_Stretch(begin, 2 * math.pi * self.scene.start_hz, fallen.angle, "coasts"))
+            spin = 2 * math.pi * self.scene.start_hz
+            self._go_on(_Stretch(begin, spin, fallen.angle, "coasts", number=fallen.number + 1))
 
     def _state(self, time: float) -> _Stretch:
         """The stretch that would begin now, before a rule is chosen for it."""
@@ -181,7 +209,7 @@ class SpinWorld:
 
     def _go_on(self, now: _Stretch) -> None:
         """Lay down the future from this state on, as it is without a further change."""
-        fall, hold, drive_spin = 2 * math.pi * self.scene.fall_hz, self._hold, self._drive_spin
+        fall, hold, drive_spin = 2 * math.pi * self.scene.fall_of(now.number), self._hold, self._drive_spin
         if now.spin <= fall:
             self._lay(replace(now, rule="fallen", spin=0.0))
             return
@@ -194,7 +222,7 @@ class SpinWorld:
             self._lay(replace(now, rule="coasts"))
             lasts = float(self._decay.elapsed(now.spin, fall, *self.scene.constants))
             angle = now.angle + float(self._decay.turned(now.spin, fall, *self.scene.constants))
-            self._lay(_Stretch(now.start + lasts, 0.0, angle, "fallen"))
+            self._lay(_Stretch(now.start + lasts, 0.0, angle, "fallen", number=now.number))
 
     def _lock(self, now: _Stretch, drive_spin: float, hold: float, drag: float) -> None:
         missing = drive_spin - now.spin
@@ -203,7 +231,7 @@ class SpinWorld:
         angle = now.angle + (now.spin + drive_spin) / 2 * lasts
         if lasts > 0:
             self._lay(replace(now, rule="pulled", acceleration=acceleration))
-        self._lay(_Stretch(now.start + lasts, drive_spin, angle, "locked"))
+        self._lay(_Stretch(now.start + lasts, drive_spin, angle, "locked", number=now.number))
 
     def _lay(self, stretch: _Stretch) -> None:
         self._stretches.append(stretch.start, stretch)

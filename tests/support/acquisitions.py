@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
     from levilab.world.spin_world import World
 
-#: Counts before the drive is off: the spin at first, every 10 s of the 201 on the way up, and at the end of it.
-BEFORE = 22
+#: Counts before the drive is off: the spin at first, every 10 s of the 201 on the way up, at the end of it, 20 held.
+BEFORE = 42
 
 
 class Silent:

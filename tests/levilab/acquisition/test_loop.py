@@ -17,7 +17,8 @@ from instruments.drivers.counter.keysight_53230a import Keysight53230A
 from instruments.drivers.generator.keysight_33500b import Keysight33500B
 from instruments.errors import InstrumentError, NoAnswer
 from instruments.virtual.bench.visa_library import library_for
-from levilab.acquisition.experiments.spin import SpinSettings, is_plausible, time_left
+from levilab.acquisition.counting import is_plausible
+from levilab.acquisition.experiments.spin import SpinSettings, time_left
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import Configuration
@@ -63,13 +64,16 @@ def test_a_spin_down_is_read_every_ten_seconds_until_the_top_falls(tmp_path: Pat
     assert 21 < frame["spin_frequency_hz"].iloc[-1] < 24
     assert (frame["spin_frequency_u_hz"] == 0.03).all()
     assert outputs[-1] is False
-    assert [event["kind"] for event in run.events()] == ["drive on", "locked", "drive off", "asked again", "fell"]
+    assert [event["kind"] for event in run.events()] == [
+        *("drive on", "locked", "held", "drive off"),
+        *("asked again", "fell"),
+    ]
 
 
 def test_the_readings_follow_the_law_of_the_world_within_their_uncertainty(tmp_path: Path) -> None:
-    """χ² over 40 runs about the true curve: only the gate's finite length (2e-5 Hz) and the start come between."""
+    """χ² over 15 runs about the true curve: only the gate's finite length (2e-5 Hz) and the start come between."""
     chi_square, n = 0.0, 0
-    for seed in range(40):
+    for seed in range(15):
         frame = acquire(mock(tmp_path, seed), Silent()).readings().frame
         scene = drawn(seed)
         c = scene.constants[0]
@@ -173,7 +177,7 @@ def test_ctrl_c_twice_breaks_through_an_exchange_and_outputs_are_off_all_the_sam
     assert outputs[-1] is False
 
 
-@pytest.mark.parametrize("when", [0, 1, 2, 11, 20, 21, 22, 30, 39, 40])
+@pytest.mark.parametrize("when", [0, 1, 2, 11, 21, 41, 42, 50, 59, 60])
 def test_an_exception_at_any_moment_leaves_outputs_off_and_the_readings_so_far(
     tmp_path: Path, outputs: list[bool], monkeypatch: pytest.MonkeyPatch, when: int
 ) -> None:
@@ -275,17 +279,17 @@ def test_a_signal_while_connecting_never_lets_the_drive_on(
 
 
 def test_the_time_of_a_reading_is_the_middle_of_its_gate(tmp_path: Path) -> None:
-    """At 40 Hz and 0.1 Hz/s a time stamp that is half a gate off would be 0.05 Hz off; the mean of 40 runs tells."""
+    """At 40 Hz and 0.1 Hz/s a time stamp that is half a gate off would be 0.05 Hz off; the mean of 15 runs tells."""
     off = []
-    for seed in range(40):
+    for seed in range(15):
         world = SpinWorld(drawn(seed), VirtualClock())
         frame = acquire(in_world(mock(tmp_path, seed), world), Silent()).readings().frame
         released = [stretch for stretch in world._stretches if stretch.rule == "coasts"][-1].start
         spin, _ = world.motion(released + frame["time_s"].to_numpy()[:8])
         off += list(frame["spin_frequency_hz"].to_numpy()[:8] - spin / (2 * np.pi))
-    # 320 readings of 0.03 Hz: 0.0017 Hz; 5 ms between the drive's end and time zero: 0.0005 Hz; the reciprocal
+    # 120 readings of 0.03 Hz: 0.0027 Hz; 5 ms between the drive's end and time zero: 0.0005 Hz; the reciprocal
     # counter's own bias near whole numbers of periods: a few mHz
-    assert abs(np.mean(off)) < 0.008
+    assert abs(np.mean(off)) < 0.012
 
 
 def test_errors_that_an_earlier_program_left_are_not_ours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -402,7 +406,7 @@ def test_what_a_resumed_virtual_run_goes_through_again_is_not_shown(tmp_path: Pa
     record = half.record.model_copy(update={"status": "interrupted"})
     (half.folder / "run.json").write_text(record.as_json(), encoding="utf-8")
     acquire(mock(tmp_path, None, resume=half.folder), first)
-    assert not any("drive" in text for text in first.messages if "without driving again" not in text)
+    assert not any("drive" in text for text in first.messages)
 
 
 def test_a_wire_log_that_cannot_be_written_does_not_keep_the_output_on(
@@ -451,7 +455,7 @@ def test_a_spin_down_in_full_motion_has_the_drag_of_its_scene(tmp_path: Path) ->
     from levilab.simulator import preset
 
     run = acquire(mock(tmp_path, scene="spindown"), Silent())
-    assert [event["kind"] for event in run.events()][-4:] == ["locked", "drive off", "asked again", "fell"]
+    assert [event["kind"] for event in run.events()][-4:] == ["held", "drive off", "asked again", "fell"]
     spins = run.readings().frame["spin_frequency_hz"]
     assert spins.iloc[0] == pytest.approx(40, abs=0.6)  # it swings about the drive
     assert 22.5 < spins.iloc[-1] < 26

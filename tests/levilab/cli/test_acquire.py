@@ -9,30 +9,32 @@ from typer.testing import CliRunner
 
 from levilab.acquisition import loop
 from levilab.acquisition.session import ExperimentFailed
+from levilab.bench.person import Task, ask_no_person
 from levilab.cli.acquire import _ask
 from levilab.cli.main import app
 
 
 def test_the_person_is_asked_on_the_terminal(monkeypatch, capsys):
     monkeypatch.setattr("sys.stdin", io.StringIO("6.1 cm\n"))
-    assert _ask("How high is the probe?") == "6.1 cm\n"
+    assert _ask(Task("How high is the probe?")) == "6.1 cm\n"
     assert capsys.readouterr().err == "How high is the probe?  [Enter]\n"
 
 
 def test_a_question_without_a_terminal_ends_with_what_to_do(monkeypatch):
     monkeypatch.setattr("sys.stdin", io.StringIO(""))
     with pytest.raises(ExperimentFailed, match="standard input is closed"):
-        _ask("How high is the probe?")
+        _ask(Task("How high is the probe?"))
 
 
-def test_the_command_hands_the_person_over(monkeypatch, tmp_path):
+@pytest.mark.parametrize(("words", "person"), [((), _ask), (("--yes",), ask_no_person)])
+def test_the_command_hands_the_person_over(monkeypatch, tmp_path, words, person):
     class Stopped(Exception):
         pass
 
     asked = []
 
     def acquire(request, show):
-        asked.append(request.person)
+        asked.append(request.wiring().person)
         raise Stopped
 
     bench = tmp_path / "bench.toml"
@@ -43,6 +45,6 @@ def test_the_command_hands_the_person_over(monkeypatch, tmp_path):
     monkeypatch.setattr(loop, "acquire", acquire)
     with pytest.raises(Stopped):
         CliRunner().invoke(
-            app, ["acquire", "spin", "--bench", str(bench), "--out", str(tmp_path)], catch_exceptions=False
+            app, ["acquire", "spin", "--bench", str(bench), "--out", str(tmp_path), *words], catch_exceptions=False
         )
-    assert asked == [_ask]
+    assert asked == [person]

@@ -48,17 +48,17 @@ def test_the_version_is_printed(levilab: Command) -> None:
     assert levilab("--version").stdout == f"levilab {version('levilab')}\n"
 
 
-def test_acquire_analyze_report_and_list_from_an_empty_folder(levilab: Command, tmp_path: Path) -> None:
-    acquired = levilab("acquire", "spin", "--mock", "--note", "one")
+def test_acquire_analyze_report_and_list_from_an_empty_folder(levilab_process: Command, tmp_path: Path) -> None:
+    acquired = levilab_process("acquire", "spin", "--mock", "--note", "one")
     assert acquired.stdout.startswith("finished: ")
     assert "s left" in acquired.stderr
-    analyzed = levilab("analyze", "spindown", "runs")
+    analyzed = levilab_process("analyze", "spindown", "runs")
     assert "What the data say" in analyzed.stdout
     (run,) = (tmp_path / "runs").iterdir()
     assert {"result.json", "spindown.png"} <= {path.name for path in run.iterdir()}
-    assert "report.html" in levilab("report", "runs").stdout
+    assert "report.html" in levilab_process("report", "runs").stdout
     assert (tmp_path / "report.html").stat().st_size > 10_000
-    listed = levilab("runs").stdout
+    listed = levilab_process("runs").stdout
     assert "finished" in listed
     assert "one" in listed
 

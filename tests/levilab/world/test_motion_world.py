@@ -282,7 +282,7 @@ def test_the_probe_sees_the_field_of_the_scenes_base():
 )
 def test_a_bench_that_runs_for_hours_lets_go_what_nobody_asks_for(look):
     top = world(FALLING, again_s=60.0)
-    for _ in range(48):
+    for _ in range(24):
         top.clock.sleep(3600.0)
         look(top)
     kept = len(top._flight._pieces)
@@ -307,6 +307,30 @@ def test_a_top_whose_numbers_leave_their_range_has_hit_the_base(monkeypatch):
     monkeypatch.setattr("levilab.world.flight.simulate", hits)
     _, up = flight.turns(np.array([0.5]))
     assert not up.any()
+
+
+def test_a_top_that_fell_is_put_back_to_where_its_scene_starts():
+    clock = VirtualClock()
+    world = MotionWorld(FALLING, clock)
+    clock.sleep(1.0)
+    assert world.light(1.0, 1e-3, 1000).max() < 0.6
+    world.float_top(1)
+    again = world.light(1.0, 1e-3, 300)
+    first = MotionWorld(FALLING, VirtualClock()).light(0.0, 1e-3, 300)
+    assert again.max() > 0.6
+    assert np.allclose(again, first, atol=0.1)  # but for the noise of the light, of 10 mV
+
+
+def test_the_tape_is_on_the_washers_where_they_are_loose():
+    scene = preset("loose-washers")
+    times = np.arange(0.0, 4.0, 1 / RATE)
+    turns = np.unwrap(Flight(scene).turns(times)[0], period=1.0)
+    motion = simulate(scene.changed({"drive.waveform": "off"}), 4.0, rate=RATE)
+    washers = np.trapezoid(motion.washer_spin_hz, motion.time)
+    top = np.trapezoid(motion.spin_hz, motion.time)
+    # beside the spin: the wobble, a few hundredths of a turn
+    assert turns[-1] - turns[0] == pytest.approx(washers, abs=0.15)
+    assert top - washers > 0.3
 
 
 # --- the laser ---

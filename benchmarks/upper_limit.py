@@ -1,0 +1,278 @@
+"""What limits the highest spin that a drive can give to a top, in full motion (docs/experiments/limit.md).
+
+    python benchmarks/upper_limit.py            # about 6 CPU minutes; writes results/upper_limit.json and .png
+    python benchmarks/upper_limit.py --draw     # the figure from the kept results
+
+The top of the scene `spindown` (24.3 g, moment tilted by 1.8°, drag of a laminar disc), locked to the drive at 45 Hz
+with three angles between them.  The drive creeps up in steps of a second until the top falls, or is 1 Hz beside the
+drive.
+
+Against it stands the balance of torques.  A drive of amplitude B (of its first harmonic) accelerates the spin by no
+more than α = δ|μ|B/2I₃, half of it because half of a field along one line turns with the top, δ being the part of the
+moment across the axis.  The top leans in step with its moment, which adds δ/((ν/ν_r)² − 1) to δ, with the resonance
+ν_r = 22 Hz.  Drag takes C ω^(3/2), the creep 2π dν/dt.
+
+Where the drive is strong enough, two things are left: the upper edge of the linear window, and below it a resonance of
+the slow motions.  Sideways the top has two slow modes that turn forwards; where their frequencies differ by that of the
+motion up and down, the three exchange energy, and the swing stays larger afterwards.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from analysis.stability import modes, wobble_resonance
+from levilab.simulator import preset, simulate
+from levilab.simulator.equilibrium import stability_of
+from levilab.simulator.kernels.motion import TIME
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from levilab.simulator.scene import Scene
+
+RESULTS = Path(__file__).parent / "results"
+TOP = preset("spindown")
+#: Where the creep begins [Hz], how far it goes, the length of a step [s], and the angles of the drive then [turns].
+FROM_HZ, TO_HZ, STEP_S, ANGLES = 45.0, 95.0, 1.0, (0.5, 0.625, 0.75)
+HELD_WITHIN_HZ = 1.0
+#: First harmonic of a wave of amplitude 1.
+HARMONIC = {"sine": 1.0, "square": 4 / math.pi}
+#: Amplitudes [T], creeps [Hz/s] and masses [kg] that are tried; the usual ones.
+AMPLITUDES = (1.5e-4, 2e-4, 2.5e-4, 3e-4, 3.5e-4, 4e-4, 6e-4, 8e-4)
+CREEPS = (0.02, 0.05, 0.1, 0.2, 0.4)
+MASSES = (0.0240, 0.0241, 0.0242, 0.0243, 0.0244, 0.0245, 0.0246, 0.0247)
+FIELD_T, STRONG_T, CREEP, FAST = 4e-4, 8e-4, 0.05, 0.1
+
+
+@dataclass(frozen=True)
+class Loss:
+    """How a creep ended: the drive then [Hz], "lock" or "top"; on the way, second by second, drives [Hz] and swings.
+
+    aside: largest distance from the axis; up_and_down: highest minus lowest place [m].
+    """
+
+    drive: float
+    how: str
+    drives: list[float]
+    aside: list[float]
+    up_and_down: list[float]
+
+
+def creep_up(scene: Scene, waveform: str, field: float, rate: float, *, turns: float, start: float = FROM_HZ) -> Loss:
+    """Raise the drive of a locked top until it is lost.
+
+    field: the drive's amplitude [T]; rate [Hz/s]; turns: its phase at the start.
+    """
+    scene, state, time, step = scene.changed({"start.spin_hz": start}), None, 0.0, None
+    drives: list[float] = []
+    aside: list[float] = []
+    up_and_down: list[float] = []
+    for k in range(round((TO_HZ - start) / (rate * STEP_S)) + 1):
+        drive = start + k * rate * STEP_S
+        driven = scene.changed(
+            {
+                "drive.waveform": waveform,
+                "drive.amplitude_t": field,
+                "drive.frequency_hz": drive,
+                "drive.phase_rad": 2 * math.pi * ((turns - drive * time) % 1.0),
+            }
+        )
+        # the step of the first second holds for twice the spin, too, if it is halved
+        step = step or simulate(driven, STEP_S, tolerance=1e-6, rate=None).accuracy.step / 2
+        motion = simulate(driven, STEP_S, tolerance=1e-6, rate=100.0, start=state, step=step)
+        drives.append(drive)
+        aside.append(float(np.hypot(motion.position[:, 0], motion.position[:, 1]).max()))
+        up_and_down.append(float(np.ptp(motion.position[:, 2])))
+        if motion.fell is not None:
+            return Loss(drive, "top", drives, aside, up_and_down)
+        if abs(float(motion.spin_hz.mean()) - drive) > HELD_WITHIN_HZ:
+            return Loss(drive, "lock", drives, aside, up_and_down)
+        state, time, turns = motion.states[-1], float(motion.states[-1, TIME]), turns + drive * STEP_S
+    return Loss(TO_HZ, "held", drives, aside, up_and_down)
+
+
+def window_edge(scene: Scene) -> float:
+    """The upper edge of the linear window [Hz]."""
+    floating = stability_of(scene).floating
+    return floating.spins[0][1] if floating else math.nan
+
+
+def resonance_of_three(scene: Scene) -> float:
+    """The spin [Hz] at which the two slow forward modes differ by the frequency of the motion up and down."""
+    found = stability_of(scene)
+    assert found.floating is not None
+    height = found.floating.height
+
+    def off(spin: float) -> float:
+        slow, fast = modes(found.field, found.top, height, spin).real[1:3]
+        return float(fast - slow) - found.vertical
+
+    return float(brentq(off, 40.0, found.floating.spins[0][1] - 0.01))
+
+
+def balance(scene: Scene, waveform: str, field: float, rate: float) -> float:
+    """The spin [Hz] at which drag and creep take all that the drive can give."""
+    top, found = scene.top, stability_of(scene)
+    assert found.floating is not None
+    resonance = wobble_resonance(found.field, found.top, found.floating.height)
+    across = top.moment_tilt[0] * abs(top.moment_a_m2)
+    most = HARMONIC[waveform] * across * field / (2 * top.inertia_axial_kg_m2)
+
+    def left(spin: float) -> float:
+        wobble = 1 / ((spin / resonance) ** 2 - 1)
+        return most * (1 + wobble) - scene.drag.constants[0] * (2 * math.pi * spin) ** 1.5 - 2 * math.pi * rate
+
+    lowest = 1.2 * resonance  # nearer to it the wobble is no small addition
+    return float(brentq(left, lowest, 500.0)) if left(lowest) > 0 else math.nan
+
+
+def study() -> dict[str, Any]:
+    """All creeps; each entry has the waveform, field, creep, mass, and per angle the drive at the loss and how."""
+    entries: list[dict[str, Any]] = []
+
+    def entry(subject: str, waveform: str, field: float, rate: float, mass: float) -> None:
+        scene = TOP.changed({"top.mass_kg": mass})
+        losses = [creep_up(scene, waveform, field, rate, turns=angle) for angle in ANGLES]
+        entries.append(
+            {
+                "subject": subject,
+                "waveform": waveform,
+                "field_t": field,
+                "creep_hz_per_s": rate,
+                "mass_kg": mass,
+                "lost_at_hz": [round(loss.drive, 3) for loss in losses],
+                "how": [loss.how for loss in losses],
+                "balance_hz": balance(scene, waveform, field, rate),
+                "window_hz": window_edge(scene),
+                "resonance_hz": resonance_of_three(scene),
+            }
+        )
+        print(entries[-1], flush=True)
+
+    usual = TOP.top.mass_kg
+    for waveform in HARMONIC:
+        for field in AMPLITUDES:
+            entry("amplitude", waveform, field, CREEP, usual)
+    for waveform, field in (("sine", FIELD_T), ("square", FIELD_T), ("square", STRONG_T)):
+        for rate in CREEPS:
+            entry("creep", waveform, field, rate, usual)
+    for mass in MASSES:
+        entry("mass", "square", STRONG_T, FAST, mass)
+    swings = {}
+    for field, rate in ((FIELD_T, 0.02), (FIELD_T, CREEP), (STRONG_T, FAST), (STRONG_T, 0.2)):
+        loss = creep_up(TOP, "square", field, rate, turns=ANGLES[0])
+        swings[f"{rate:g} Hz/s, {1e3 * field:.1f} mT"] = {
+            "drive_hz": np.round(loss.drives, 3).tolist(),
+            "aside_m": np.round(loss.aside, 6).tolist(),
+            "up_and_down_m": np.round(loss.up_and_down, 6).tolist(),
+            "how": loss.how,
+        }
+    return {"entries": entries, "swings": swings}
+
+
+# --- figure ---
+
+_COLOURS = {("sine", False): "#0072B2", ("square", False): "#D55E00", ("square", True): "#009E73"}
+_MARKERS = {"lock": "o", "top": "v", "held": "^"}
+
+
+def draw(results: dict[str, Any], path: Path) -> None:
+    """Four panels: amplitude, creep, mass, and the swing on the way up."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+    from levilab.present.style import STYLE, save_png
+
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(10.5, 8.5), layout="constrained")
+        (amplitude, creep), (mass, swing) = figure.subplots(2, 2)
+        _draw_losses(amplitude, results, "amplitude", "field_t", 1e3)
+        amplitude.set_xlabel("amplitude of the drive  [mT]")
+        amplitude.set_title(f"A weak drive loses the top: drag is stronger ({CREEP:g} Hz/s)", loc="left")
+        _draw_losses(creep, results, "creep", "creep_hz_per_s", 1.0)
+        creep.set(xlabel="creep  [Hz/s]", xscale="log")
+        creep.set_xticks(CREEPS, [f"{rate:g}" for rate in CREEPS])
+        creep.minorticks_off()
+        creep.set_title("A fast creep takes torque, a slow one gives the swing time", loc="left")
+        _draw_losses(mass, results, "mass", "mass_kg", 1e3)
+        mass.set_xlabel("mass of the top  [g]")
+        mass.set_title(f"A strong drive reaches the edge of the window (0.8 mT, {FAST:g} Hz/s)", loc="left")
+        for axes in (amplitude, creep, mass):
+            axes.set_ylabel("drive when the top is lost  [Hz]")
+            axes.axhline(61, color="grey", linewidth=0.8)
+            axes.annotate(
+                "thesis 61 Hz", (0.99, 61), xycoords=("axes fraction", "data"), ha="right", va="bottom", color="grey"
+            )
+        _draw_swings(swing, results)
+        handles = [
+            Line2D([], [], color=_COLOURS["sine", False], label="balance of torques, sine"),
+            Line2D([], [], color=_COLOURS["square", False], label="the same, square (0.4 mT)"),
+            Line2D([], [], color=_COLOURS["square", True], label="the same, square of 0.8 mT"),
+            Line2D([], [], color="black", linestyle="--", label="upper edge of the linear window"),
+            Line2D([], [], color="#CC79A7", linestyle=":", label="resonance of three slow motions"),
+            Line2D([], [], color="grey", marker="o", linestyle="none", label="simulated: the drive lost the top"),
+            Line2D([], [], color="grey", marker="v", linestyle="none", label="simulated: the top fell"),
+        ]
+        figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=8)
+    save_png(figure, path)
+
+
+def _draw_losses(axes: Axes, results: dict[str, Any], subject: str, key: str, factor: float) -> None:
+    chosen = [one for one in results["entries"] if one["subject"] == subject]
+    for (waveform, strong), colour in _COLOURS.items():
+        mine = [
+            one
+            for one in chosen
+            if one["waveform"] == waveform and (one["field_t"] == STRONG_T and subject != "amplitude") == strong
+        ]
+        if not mine:
+            continue
+        x = factor * np.array([one[key] for one in mine])
+        axes.plot(x, [one["balance_hz"] for one in mine], color=colour, linewidth=1)
+        for value, one in zip(x, mine, strict=True):
+            for lost, how in zip(one["lost_at_hz"], one["how"], strict=True):
+                axes.plot(value, lost, color=colour, marker=_MARKERS[how], markersize=5, alpha=0.7, linestyle="none")
+    x = factor * np.array([one[key] for one in chosen])
+    order = np.argsort(x)
+    for name, colour, dashes in (("window_hz", "black", "--"), ("resonance_hz", "#CC79A7", ":")):
+        axes.plot(
+            x[order], np.array([one[name] for one in chosen])[order], color=colour, linestyle=dashes, linewidth=1.2
+        )
+    axes.set_ylim(43, 97)
+
+
+def _draw_swings(axes: Axes, results: dict[str, Any]) -> None:
+    colours = ("#0072B2", "#D55E00", "#009E73", "#000000")
+    for (name, one), colour in zip(results["swings"].items(), colours, strict=False):
+        axes.plot(one["drive_hz"], 1e3 * np.array(one["aside_m"]), color=colour, linewidth=1, label=name)
+        axes.plot(
+            one["drive_hz"], 1e3 * np.array(one["up_and_down_m"]), color=colour, linewidth=0.8, linestyle=(0, (1, 1))
+        )
+    axes.set(xlabel="drive  [Hz]", ylabel="swing  [mm]", yscale="log", ylim=(0.1, 30))
+    axes.set_title("The swing on the way up: aside (lines), up and down (dots)", loc="left")
+    axes.axvline(window_edge(TOP), color="black", linestyle="--", linewidth=1.2)
+    axes.axvline(resonance_of_three(TOP), color="#CC79A7", linestyle=":", linewidth=1.2)
+    axes.legend(loc="upper left")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--draw", action="store_true", help="draw the kept results, simulate nothing")
+    kept = RESULTS / "upper_limit.json"
+    if not parser.parse_args().draw:
+        kept.write_text(json.dumps(study(), indent=1) + "\n", encoding="utf-8")
+    draw(json.loads(kept.read_text(encoding="utf-8")), RESULTS / "upper_limit.png")
+
+
+if __name__ == "__main__":
+    main()

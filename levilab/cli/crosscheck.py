@@ -1,0 +1,47 @@
+"""The cross-check.  Heavy imports happen inside the command."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from levilab.cli import exit_codes
+from levilab.cli.options import Json
+from levilab.cli.output import message
+
+
+def add_to(app: typer.Typer) -> None:
+    """Make the command known to the application."""
+    app.command(epilog="Example: levilab crosscheck spindown --trials 100")(crosscheck)
+
+
+def crosscheck(
+    subjects: Annotated[
+        list[str] | None, typer.Argument(metavar="[SUBJECT]…", help="What is checked.", show_default="everything")
+    ] = None,
+    trials: Annotated[
+        int | None, typer.Option(min=2, metavar="N", help="How many trials of each.", show_default="40")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the first trial; the next have the next.")] = 0,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write crosscheck.json and .png there.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Check the analyses: simulate, acquire through the real drivers, analyze, and compare with the truth, many times.
+
+    A pull is (estimate − truth)/u.  Where estimates and uncertainties are right, pulls have the mean 0 and the standard
+    deviation 1, and 68 % of the truths lie within u.  Ends with 1 where they do not.
+    """
+    from levilab.crosscheck import command
+
+    checked = command.check(subjects or [], trials, seed)
+    if as_json:
+        typer.echo(command.as_json(checked))
+    else:
+        command.print_checked(checked)
+    if out is not None:
+        for path in command.write(checked, out):
+            message(f"wrote {path}")
+    if not all(one.holds for one in checked):
+        raise typer.Exit(exit_codes.FAILED)

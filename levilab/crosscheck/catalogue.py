@@ -1,0 +1,10 @@
+"""The subjects of a cross-check: a row each."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+
+from levilab.crosscheck.subjects import motion, spindown
+
+#: Name → subject.
+SUBJECTS = MappingProxyType({subject.name: subject for subject in (spindown.SUBJECT, motion.SUBJECT)})

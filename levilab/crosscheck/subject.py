@@ -1,0 +1,72 @@
+"""What a cross-check is made of: subjects, their trials, and the pulls of these."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from levilab.acquisition.loop import acquire
+from levilab.acquisition.request import AcquisitionOptions, request_for
+from levilab.errors import LevilabError
+from levilab.present.progress import Mute
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from levilab.acquisition.loop import AcquisitionRequest
+    from levilab.runs.run import Run
+
+
+class TrialFailed(LevilabError):
+    """A trial that came to no estimate."""
+
+
+@dataclass(frozen=True)
+class Pull:
+    """An estimate beside the truth.
+
+    quantity: its name; estimate, u, truth: in the quantity's unit.
+    """
+
+    quantity: str
+    estimate: float
+    u: float
+    truth: float
+
+    @property
+    def value(self) -> float:
+        """How far off the estimate is, in its own standard uncertainty."""
+        return (self.estimate - self.truth) / self.u
+
+
+@dataclass(frozen=True)
+class Subject:
+    """One way from a world whose numbers are known to what the analysis says of them.
+
+    name: on the command line; about: one line; trial: from a seed and an empty folder to pulls, which raises
+    LevilabError or an instrument's error where it comes to none; trials: how many unless another number is asked for.
+    """
+
+    name: str
+    about: str
+    trial: Callable[[int, Path], list[Pull]]
+    trials: int = 40
+
+
+def acquired(
+    experiment: str, seed: int, folder: Path, change: Callable[[AcquisitionRequest], AcquisitionRequest]
+) -> Run:
+    """A finished run of a mock experiment.  change: puts it into a world of known numbers.  Raises TrialFailed."""
+    request = request_for(experiment, AcquisitionOptions(mock=True, out=folder, seed=seed))
+    run = acquire(change(request), Mute())
+    if run.status != "finished":
+        raise TrialFailed(f"{run.folder.name}: the run is {run.status}")
+    return run
+
+
+def pull_of(quantity: str, entry: dict[str, Any] | None, truth: float) -> Pull:
+    """The pull of a quantity as result.json has it.  Raises TrialFailed where it holds no value or no uncertainty."""
+    if not entry or entry["value"] is None or not entry["u"]:
+        raise TrialFailed(f"{quantity}: the analysis gives no value with an uncertainty")
+    return Pull(quantity, entry["value"], entry["u"], truth)

@@ -1,0 +1,126 @@
+"""The spin-down of a top that only spins: the law of drag, its constants and the fall."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from instruments.clock import VirtualClock
+from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquired, pull_of
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.sources import Options
+from levilab.simulator.scene import Scene
+from levilab.simulator.single import simulate
+from levilab.simulator.spin import DECAYS
+from levilab.world.bench import virtual_wiring
+from levilab.world.spin_world import SpinScene, SpinWorld
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from levilab.acquisition.loop import AcquisitionRequest
+
+#: Law of drag → its constants (SI) for about 0.3 %/s at 30 Hz, their names in result.json, the exponent of its power.
+LAWS: dict[str, tuple[tuple[float, ...], tuple[str, ...], float | None]] = {
+    "stokes": ((3.2e-3,), ("c1",), 1.0),
+    "newton": ((1.72e-5,), ("c2",), 2.0),
+    "disc": ((2.34e-4,), ("c32",), 1.5),
+    "mixed": ((1.6e-3, 0.86e-5), ("c1", "c2"), None),
+}
+#: The spin at which the drive goes off [Hz].
+START_HZ = 40.0
+#: States of the simulated spin per second, for the moment of the fall.
+RATE = 10.0
+
+
+def trial(seed: int, folder: Path) -> list[Pull]:
+    """One spin-down: drag, fall and scatter of the pulses are drawn by the seed."""
+    random = np.random.default_rng((seed, 2))
+    law = sorted(LAWS)[int(random.integers(len(LAWS)))]
+    usual, names, exponent = LAWS[law]
+    scene = SpinScene(
+        start_hz=float(random.uniform(28.0, 33.0)),
+        drag=law,
+        constants=tuple(c * float(random.uniform(0.8, 1.2)) for c in usual),
+        fall_hz=float(random.uniform(21.4, 22.4)),
+        jitter=SpinScene.jitter * float(random.uniform(0.5, 2.0)),
+        seed=seed,
+    )
+    run = acquired("spin", seed, folder, lambda request: _in_world(request, scene))
+    found = spindown_of(run.folder)
+    models = found.models
+    pulls = [
+        pull_of(f"{law} {name}", models[law]["parameters"][name], truth)
+        for name, truth in zip(names, scene.constants, strict=True)
+    ]
+    spin = DECAYS[law].after(2 * math.pi * START_HZ, found.start_time, *scene.constants) / (2 * math.pi)
+    pulls.append(pull_of("start frequency", models[law]["parameters"]["start_frequency"], float(spin)))
+    if exponent is not None:
+        pulls.append(pull_of("exponent", models["power"]["parameters"]["exponent"], exponent))
+    pulls.append(_fall(found, law, names, scene))
+    return pulls
+
+
+def _in_world(request: AcquisitionRequest, scene: SpinScene) -> AcquisitionRequest:
+    return replace(request, wiring=lambda: virtual_wiring(SpinWorld(scene, VirtualClock()), request.config.limits))
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What the analysis says of a run, as result.json has it.
+
+    models: by the names of the laws; start_time: of the first reading, to which the start frequency belongs [s].
+    """
+
+    models: dict[str, dict[str, Any]]
+    start_time: float
+
+
+def spindown_of(folder: Path) -> Fitted:
+    """The analysis of a run."""
+    analysis = ANALYSES["spindown"]
+    (run,) = analysis.document(analysis.analyze([folder], Options()), folder)["runs"]
+    return Fitted({model["name"]: model for model in run["models"]}, run["values"]["start_time"]["value"])
+
+
+def _fall(found: Fitted, law: str, names: tuple[str, ...], scene: SpinScene) -> Pull:
+    """When the top falls, by the fitted law in the simulator, beside the world's own moment [s]."""
+    model = found.models[law]
+    parameters = model["parameters"]
+    order = ("start_frequency", *names)
+    values = np.array([parameters[name]["value"] for name in order])
+    step = np.array([parameters[name]["u"] for name in order])
+
+    def fall_time(numbers: Any) -> float:
+        constants = tuple(map(float, numbers[1:]))
+        return found.start_time + fall_of_spin(law, constants, float(numbers[0]), scene.fall_hz)
+
+    middle = fall_time(values)
+    slope = np.array([fall_time(values + row) - middle for row in np.diag(step)]) / step
+    covariance = np.array(model["covariance"], dtype=np.float64)
+    u = math.sqrt(float(slope @ covariance @ slope))
+    truth = DECAYS[law].elapsed(2 * math.pi * START_HZ, 2 * math.pi * scene.fall_hz, *scene.constants)
+    return Pull("fall", middle, u, float(truth))
+
+
+def fall_of_spin(law: str, constants: tuple[float, ...], start_hz: float, fall_hz: float) -> float:
+    """When a simulated spin under this law comes down to that of the fall [s].  Raises TrialFailed."""
+    scene = Scene(observed="spin").changed(
+        {"drag.law": law, "drag.coefficient": list(constants) if len(constants) > 1 else constants[0],
+         "start.spin_hz": start_hz}
+    )  # fmt: skip
+    motion = simulate(scene, 600.0, rate=RATE)
+    spins = np.asarray(motion.spin_hz)
+    if not spins.min() < fall_hz:
+        raise TrialFailed(f"the fitted law {law} lets the top spin above {fall_hz:g} Hz for 600 s")
+    return float(np.interp(-fall_hz, -spins, motion.time))
+
+
+SUBJECT = Subject(
+    "spindown",
+    "the spin-down of a top that only spins: constants of the drag, its exponent, the fall",
+    trial,
+)

@@ -1,0 +1,55 @@
+"""What a cross-check found, as a table."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from levilab.crosscheck.study import COVERAGE
+from levilab.present.tables import Row, Table, table
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from levilab.crosscheck.study import Checked, Spread
+
+_NUMBERS = ("trials", "mean pull", "s.d. of pulls", "within 1 u", "u/value")
+
+
+def crosscheck_table(checked: Sequence[Checked]) -> Table:
+    """A row a quantity; the parentheses hold the standard errors that so few trials leave."""
+    return table(
+        "Pulls: (estimate − truth)/u; wanted are 0, 1 and 68 %",
+        ("", "quantity", *_NUMBERS, "as wanted"),
+        _rows(checked),
+        numbers=_NUMBERS,
+    )
+
+
+def _rows(checked: Sequence[Checked]) -> Iterator[Row]:
+    for one in checked:
+        for k, spread in enumerate(one.spreads):
+            cells = _cells(spread)
+            yield Row((one.subject.name if k == 0 else "", *cells), "together" if k == 0 else "")
+
+
+def _cells(spread: Spread) -> tuple[str, ...]:
+    n = spread.n
+    return (
+        spread.quantity,
+        str(n),
+        f"{spread.mean:+.2f} ± {1 / math.sqrt(n):.2f}",
+        "–" if math.isnan(spread.deviation) else f"{spread.deviation:.2f} ± {1 / math.sqrt(2 * n):.2f}",
+        f"{100 * spread.coverage:.0f} ± {100 * math.sqrt(COVERAGE * (1 - COVERAGE) / n):.0f} %",
+        f"{100 * spread.relative_u:.2g} %",
+        "yes" if spread.holds else "NO",
+    )
+
+
+def failures_in_words(checked: Sequence[Checked]) -> list[str]:
+    """A line for each reason for which trials came to no estimate."""
+    return [
+        f"{one.subject.name}: {count} of {one.trials} trials came to no estimate: {reason}"
+        for one in checked
+        for reason, count in sorted(one.failures.items(), key=lambda item: -item[1])
+    ]

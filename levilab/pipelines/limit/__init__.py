@@ -1,0 +1,1 @@
+"""Limits of the spin: lower and upper, top after top."""

@@ -1,0 +1,80 @@
+"""What a table of limits must fulfil before an analysis may trust it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from levilab.errors import DoesNotSuit
+from levilab.formats.columns import TableError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from levilab.formats.table import Table
+
+    Array = NDArray[np.float64]
+
+#: Limits that differ by more than this part of their mean are none of one top: most likely a spin-down.
+_MOST_SPREAD = 0.25
+#: Relative: units and printed digits round in about the tenth digit.
+_SAME = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class LimitReadings:
+    """Limits of the spin, one a repetition, each array of shape (n,).
+
+    Attributes:
+        limit: spin at which the top was lost [Hz].
+        u: standard uncertainties [Hz], None where they are not known.
+        warnings: about the table.
+    """
+
+    limit: Array
+    u: Array | None
+    warnings: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.limit)
+
+    def same_as(self, other: LimitReadings) -> bool:
+        """Whether these are the same limits, but for the rounding of another unit in the file."""
+        return len(self) == len(other) and bool(np.allclose(self.limit, other.limit, rtol=_SAME, atol=0))
+
+
+def limit_readings(table: Table) -> LimitReadings:
+    """The limits of a run or of a data file.
+
+    Args:
+        table: with `spin_frequency_hz`, one row a repetition.
+
+    Raises:
+        TableError: a column is missing, there is no row, or a limit or an uncertainty is not positive; the line of the
+            file is named.
+        DoesNotSuit: the spins differ so much that they are no limits.
+    """
+    limit = table.column("spin_frequency_hz")
+    if not limit.size:
+        raise TableError(table.path, "holds no limit: at least one repetition is needed")
+    has_u = "spin_frequency_u_hz" in table.frame.columns
+    u = table.column("spin_frequency_u_hz") if has_u else None
+    _must_be_positive(table, limit, "the limit", "Hz, but a spinning top is above 0: remove the row")
+    if u is not None:
+        _must_be_positive(table, u, "the uncertainty", "Hz, but must be above 0: correct it or remove the column")
+    spread = float(np.ptp(limit) / limit.mean())
+    if spread > _MOST_SPREAD:
+        raise DoesNotSuit(
+            f"{table.path}: its spins differ by {100 * spread:.0f} % of their mean, so they are no limits of one top: "
+            "one row a repetition is expected"
+        )
+    return LimitReadings(limit, u, table.warnings)
+
+
+def _must_be_positive(table: Table, values: Array, what: str, advice: str) -> None:
+    wrong = np.flatnonzero(values <= 0)
+    if wrong.size:
+        i = int(wrong[0])
+        raise TableError(table.path, f"{what} is {values[i]:.9g} {advice}", line=int(table.lines[i]))

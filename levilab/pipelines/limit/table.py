@@ -1,0 +1,64 @@
+"""Limits → tables, for the terminal and the report."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from levilab.present.numbers import plain, short_name, without_unit
+from levilab.present.tables import Row, Table, table
+
+if TYPE_CHECKING:
+    from levilab.pipelines.limit.analysis import LimitAnalysis, Limits
+
+HEADS = ("limits", "tops", "mean [Hz]", "scatter [Hz]", "trend [Hz/top]", "outliers")
+
+
+def limit_tables(analysis: LimitAnalysis) -> tuple[Table, ...]:
+    """The runs, and theory beside them.  Each fits a terminal of 80 columns."""
+    return runs_table(analysis), theory_table(analysis)
+
+
+def runs_table(analysis: LimitAnalysis) -> Table:
+    """The statistics, run by run and of each kind together."""
+    total, synthetic = len(analysis.runs), sum(source.synthetic for source in analysis.sources)
+    made_up = "" if not synthetic else ", SYNTHETIC" if synthetic == total else f", {synthetic} of them SYNTHETIC"
+    rows = [
+        Row((f"{short_name(source.name)} ({run.which})", *_cells(run)))
+        for source, run in zip(analysis.sources, analysis.runs, strict=True)
+    ]
+    rows += [
+        Row((f"all {group.which} ones", *_cells(group)), "together") for group in analysis.groups if len(group.runs) > 1
+    ]
+    return table(f"Limits of the spin, {total} run{'s' * (total > 1)}{made_up}", HEADS, rows, numbers=["tops"])
+
+
+def _cells(limits: Limits) -> tuple[str, ...]:
+    found = limits.statistics
+    outliers = ", ".join(str(i + 1) for i in found.outliers) or "none"
+    return (
+        str(found.n),
+        without_unit(found.mean),
+        without_unit(found.scatter) if found.scatter else "—",
+        without_unit(found.trend) if found.trend else "—",
+        outliers if found.trend else "—",
+    )
+
+
+def theory_table(analysis: LimitAnalysis) -> Table:
+    """What theory says, and how far the mean is from it."""
+    rows = [
+        Row(
+            (
+                f"{one.name}",
+                f"{one.expected:.2f}",
+                without_unit(one.difference),
+                plain(one.p, 2),
+                "—" if one.agrees is None else "yes" if one.agrees else "no",
+            )
+        )
+        for group in analysis.groups
+        for one in group.comparisons
+    ]
+    devices = " and ".join(dict.fromkeys(group.device.name for group in analysis.groups if group.device))
+    heads = ("theory", "[Hz]", "mean − theory [Hz]", "p", "agrees")
+    return table(f"Beside theory, for {devices or 'no top'}", heads, rows)

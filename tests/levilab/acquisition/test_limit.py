@@ -1,0 +1,166 @@
+"""The limits on the virtual bench: against the falls that its world draws, and every way out."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from instruments.clock import VirtualClock
+from levilab.acquisition.experiments.limit import LimitSettings
+from levilab.acquisition.loop import AcquisitionRequest, acquire
+from levilab.acquisition.request import AcquisitionOptions, request_for
+from levilab.acquisition.session import ExperimentFailed
+from levilab.acquisition.table import Configuration, settings_of, with_settings
+from levilab.bench.config import ConfigError
+from levilab.errors import UsageError
+from levilab.pipelines.sources import Options
+from levilab.pipelines.spindown.analysis import analyze_spindowns
+from levilab.world.spin_world import SpinScene, SpinWorld, drawn
+from support.acquisitions import Impatient, Silent, in_world
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from levilab.runs.run import Run
+
+#: From 30 Hz down to where a top falls within a minute, not held for long.
+QUICK = ("limit.drive_frequency_hz=24", "limit.ramp_hz_per_s=0.3", "limit.hold_s=1")
+#: A drive of 0.2 mT.
+WEAK = ("limit.which=upper", "limit.drive_amplitude_vpp=5", "limit.hold_s=1", "limit.creep_hz_per_s=0.05")
+
+
+def mock(out: Path, *settings: str, seed: int | None = 1, **changes: Any) -> AcquisitionRequest:
+    options = AcquisitionOptions(mock=True, out=out, seed=seed, settings=settings, **changes)
+    return request_for("limit", options)
+
+
+def kinds(run: Run) -> list[str]:
+    return [event["kind"] for event in run.events()]
+
+
+def test_the_lower_limits_are_those_of_the_world_within_their_uncertainty(tmp_path: Path) -> None:
+    run = acquire(mock(tmp_path, *QUICK, "limit.repetitions=20"), Silent())
+    frame, scene = run.readings().frame, drawn(1)
+    truth = np.array([scene.fall_of(number) for number in range(20)])
+    pulls = (frame["spin_frequency_hz"] - truth) / frame["spin_frequency_u_hz"]
+    assert abs(pulls.mean()) < 0.7  # 3 standard errors of 20
+    assert pulls.std() == pytest.approx(1, abs=0.5)  # 3 of a standard deviation
+    assert np.corrcoef(frame["spin_frequency_hz"], truth)[0, 1] > 0.85
+    assert frame["spin_frequency_u_hz"].between(0.02, 0.1).all()
+    assert (frame["spin_seen_hz"] > frame["spin_frequency_hz"] - 0.3).all()
+    assert kinds(run).count("asked the person") == 19  # the first one floats already
+    assert kinds(run).count("fell") == 20
+    assert run.record.instruments["generator"]["settings_end"]["output"] is False
+
+
+def test_the_upper_limit_is_where_drag_takes_all_that_the_drive_can_give(tmp_path: Path) -> None:
+    """In the idealised world the drive gives α, the disc takes C ω^1.5, the creep the rest."""
+    run = acquire(mock(tmp_path, *WEAK, "limit.repetitions=1"), Silent())
+    (limit,) = run.readings().frame["spin_frequency_hz"]
+    most, c = 0.03 * 0.714 / 2 / 1.731314e-6 * 2e-4, drawn(1).constants[0]
+    ends = [((most - left) / c) ** (2 / 3) / 2 / math.pi for left in (2 * math.pi * 0.05, 0.0)]
+    # lost is a top that is 1 Hz beside: at 0.05 Hz/s, of which most is made up for, that takes less than 2 Hz of creep
+    assert ends[0] - 0.5 < limit < ends[1]
+    assert kinds(run)[-1] == "held"
+    assert "lock lost" in kinds(run)
+    assert "warning" not in kinds(run)
+
+
+def test_a_top_that_falls_under_the_drive_is_said_to_have_fallen(tmp_path: Path) -> None:
+    class Falling(SpinWorld):
+        """The top falls as soon as the drive is above 36 Hz."""
+
+        def light(self, start: float, step: float, n: int) -> Any:
+            dark = np.full(n, self.scene.tape.dark)
+            return dark if self._drive_spin > 2 * math.pi * 36 else super().light(start, step, n)
+
+    settings = ("limit.which=upper", "limit.creep_hz_per_s=0.2", "limit.hold_s=0", "limit.repetitions=1")
+    run = acquire(in_world(mock(tmp_path, *settings), Falling(SpinScene(), VirtualClock())), Silent())
+    (limit,) = run.readings().frame["spin_frequency_hz"]
+    assert limit == pytest.approx(36, abs=0.5)  # looked at each 2 s, 0.4 Hz
+    assert "top lost" in kinds(run)
+    assert "lock lost" not in kinds(run)
+
+
+def test_an_interrupted_series_goes_on_with_the_next_top(tmp_path: Path) -> None:
+    half = acquire(mock(tmp_path, *QUICK, "limit.repetitions=4"), Impatient(2))
+    assert half.status == "interrupted"
+    assert half.record.instruments["generator"]["settings_end"]["output"] is False
+    before = half.readings().frame["spin_frequency_hz"].tolist()
+    run = acquire(mock(tmp_path, seed=None, resume=half.folder), Silent())
+    limits = run.readings().frame["spin_frequency_hz"].tolist()
+    assert limits[:2] == before
+    truth = [drawn(1).fall_of(number) for number in range(4)]
+    assert np.allclose(limits, truth, rtol=0, atol=0.25)  # 4 standard uncertainties
+
+
+def test_a_top_that_is_not_floated_ends_the_series_in_a_line(tmp_path: Path) -> None:
+    settings = LimitSettings(float_s=5.0)
+    config = with_settings(Configuration(), "limit", settings)
+    request = AcquisitionRequest("limit", config, wiring=NotImplemented, out=tmp_path, synthetic_how="a test")
+
+    class Unfloatable(SpinWorld):
+        def float_top(self, number: int) -> None: ...
+
+    with pytest.raises(ExperimentFailed, match=r"no light pulses .* \(limit\.trigger_level_v in the bench file\)"):
+        acquire(in_world(request, Unfloatable(SpinScene(start_hz=5.0), VirtualClock())), Silent())
+
+
+def test_a_series_ends_when_its_time_is_over(tmp_path: Path) -> None:
+    run = acquire(mock(tmp_path, *QUICK, "limit.longest_s=60"), Silent())
+    assert kinds(run)[-1] == "longest"
+    assert run.status == "finished"
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        ("limit.which=middle", "limit.which = 'middle': Input should be 'lower' or 'upper'"),
+        ("limit.repetitions=0", "greater than 0"),
+        ("limit.wich=upper", "limit.wich is no key known here"),
+        ("which=upper", "EXPERIMENT.KEY=VALUE is expected"),
+        ("limit.which", "as limit.which=upper"),
+    ],
+)
+def test_settings_on_the_command_line_that_cannot_be_are_refused(tmp_path: Path, settings: str, says: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        mock(tmp_path, settings)
+    assert caught.value.name == "settings"
+    assert says in str(caught.value)
+
+
+def test_a_drive_beyond_the_bench_is_refused_before_it_begins(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"limit\.highest_hz = 120 is more than this bench allows"):
+        mock(tmp_path, "limit.which=upper", "limit.highest_hz=120")
+    with pytest.raises(ConfigError, match=r"limit\.highest_hz = 25: more than limit\.drive_frequency_hz = 30"):
+        mock(tmp_path, "limit.which=upper", "limit.highest_hz=25")
+
+
+def test_settings_on_the_command_line_go_before_the_bench_files(tmp_path: Path) -> None:
+    bench = tmp_path / "bench.toml"
+    bench.write_text("[limit]\nrepetitions = 3\nhold_s = 7.0\n", encoding="utf-8")
+    request = mock(tmp_path, "limit.repetitions=5", bench=bench)
+    chosen = settings_of(request.config, "limit")
+    assert (chosen.repetitions, chosen.hold_s) == (5, 7.0)
+    half = acquire(mock(tmp_path, *QUICK, "limit.repetitions=2"), Impatient(1))
+    with pytest.raises(UsageError, match="a resumed run keeps its settings"):
+        mock(tmp_path, "limit.repetitions=5", seed=None, resume=half.folder)
+
+
+def test_loose_washers_are_warned_of_in_the_run_and_in_its_result(tmp_path: Path) -> None:
+    """In full motion; the slip is that of the washers' drag against their coupling, I₃ C ω^1.5/k."""
+    given = ("spin.drive_frequency_hz=30.2", "spin.longest_s=21")
+    options = AcquisitionOptions(mock=True, out=tmp_path, seed=1, scene="loose-washers", settings=given)
+    show = Silent()
+    run = acquire(request_for("spin", options), show)
+    (held,) = [event for event in run.events() if event["kind"] == "held"]
+    slip = 1.731314e-6 * 2.34e-4 * (2 * math.pi * 30.2) ** 1.5 / 1e-6 / (2 * math.pi)
+    assert held["drive_frequency_hz"] - held["spin_frequency_hz"] == pytest.approx(slip, abs=0.02)
+    (warning,) = [event["text"] for event in run.events() if event["kind"] == "warning"]
+    assert "LOOSE WASHERS, the tape slips by 0.1" in warning
+    assert warning in show.messages
+    assert warning in json.loads(json.dumps(analyze_spindowns([run.folder], Options()).all_warnings))

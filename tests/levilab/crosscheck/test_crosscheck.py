@@ -1,0 +1,93 @@
+"""The cross-check: it must notice an estimate that is off, and an uncertainty that is too small or too large."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from levilab.crosscheck.catalogue import SUBJECTS
+from levilab.crosscheck.figure import crosscheck_figure
+from levilab.crosscheck.study import crosscheck
+from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
+from levilab.crosscheck.table import crosscheck_table, failures_in_words
+from levilab.present.style import as_png
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+
+def made_up(off: float = 0.0, scale: float = 1.0) -> Subject:
+    """Estimates of 5 that are off by so many u, and whose scatter is so many times u."""
+
+    def trial(seed: int, folder: Path) -> list[Pull]:
+        if seed % 50 == 49:
+            raise TrialFailed("the top fell")
+        noise = np.random.default_rng(seed).standard_normal()
+        return [Pull("five", 5 + 0.1 * (off + scale * noise), 0.1, 5.0)]
+
+    return Subject("made-up", "five", trial)
+
+
+def of(subject: Subject, trials: int = 400):
+    return crosscheck(subject, trials, 0, lambda _: None)
+
+
+def test_true_estimates_pass():
+    found = of(made_up())
+    (spread,) = found.spreads
+    assert found.holds
+    assert spread.n == 392
+    assert spread.relative_u == pytest.approx(0.02, rel=0.02)
+    assert found.failures == {"the top fell": 8}
+
+
+@pytest.mark.parametrize(("off", "scale"), [(0.4, 1.0), (-0.4, 1.0), (0.0, 1.4), (0.0, 0.7)])
+def test_estimates_that_are_off_or_too_sure_do_not_pass(off, scale):
+    assert not of(made_up(off, scale)).holds
+
+
+def test_the_table_and_the_notes_show_what_failed():
+    found = [of(made_up(0.5))]
+    (row,) = crosscheck_table(found).rows
+    assert row.cells[0:3] == ("made-up", "five", "392")
+    assert row.cells[-1] == "NO"
+    assert failures_in_words(found) == ["made-up: 8 of 400 trials came to no estimate: the top fell"]
+    assert as_png(crosscheck_figure(found)).startswith(b"\x89PNG")
+
+
+def test_a_value_without_an_uncertainty_is_no_pull():
+    with pytest.raises(TrialFailed, match="c32: the analysis gives no value with an uncertainty"):
+        pull_of("c32", {"value": 1.0, "u": None}, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "seed", "quantities"),
+    [
+        ("spindown", 1, {"newton c2", "start frequency", "exponent", "fall"}),
+        ("motion", 1, {"disc c32", "exponent", "fall"}),
+    ],
+)
+def test_a_trial_goes_through_drivers_and_analysis(tmp_path, name, seed, quantities):
+    pulls = SUBJECTS[name].trial(seed, tmp_path)
+    assert {pull.quantity for pull in pulls} == quantities
+    # a wrong truth or a slip in its unit would be thousands of u away
+    assert max(abs(pull.value) for pull in pulls) < 15
+    (run,) = tmp_path.iterdir()
+    assert (run / "readings.csv").exists()
+
+
+def test_the_command_prints_writes_and_judges(levilab: Callable[..., object], tmp_path, monkeypatch):
+    monkeypatch.setattr("levilab.crosscheck.command.SUBJECTS", {"good": made_up(), "bad": made_up(2.0)})
+    done = levilab("crosscheck", "good", "--trials", "40", "--out", "kept")
+    assert "five" in done.stdout
+    document = json.loads((tmp_path / "kept/crosscheck.json").read_text(encoding="utf-8"))
+    assert document["subjects"][0]["holds"] is True
+    assert (tmp_path / "kept/crosscheck.png").stat().st_size > 5000
+    failed = levilab("crosscheck", "bad", "--json", "--trials", "40", check=1)
+    assert json.loads(failed.stdout)["subjects"][0]["quantities"][0]["mean"] > 1.5
+    refused = levilab("crosscheck", "nonsense", check=2)
+    assert refused.stderr == "levilab: subjects nonsense: known are good, bad\n"

@@ -1,0 +1,112 @@
+"""Limits from runs and files: the published statistics, theory beside them, result.json and back."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from typing import TYPE_CHECKING
+
+import pytest
+
+from levilab.errors import DataError, DoesNotSuit
+from levilab.formats.columns import TableError
+from levilab.pipelines.catalogue import analyze_suiting
+from levilab.pipelines.limit.analysis import LOWER_EDGE, RESONANCE, UPPER_EDGE, analyze_limits
+from levilab.pipelines.limit.document import limit_document, recall_limits, save_limits
+from levilab.pipelines.limit.table import limit_tables
+from levilab.pipelines.sources import Options
+from levilab.report.page import write_report
+from support.spin_downs import spin_down_csv
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def test_the_published_limits_give_the_published_statistics(sample_data: Path) -> None:
+    analysis = analyze_limits([sample_data / "lower-limits"], Options())
+    values = limit_document(analysis, sample_data)["values"]
+    assert round(values["mean"]["value"], 2) == 21.86
+    assert round(values["scatter"]["value"], 2) == 0.25
+    assert round(values["standard_error"]["value"], 2) == 0.08
+    assert analysis.all_warnings == []
+
+
+def test_theory_beside_them_is_that_of_the_thesis_top(sample_data: Path) -> None:
+    """PHYSICS: window 21.65 to 80.6 Hz at z = 7.30 cm, computed there from the quartic; resonance 22.1 Hz."""
+    (lower, upper) = analyze_limits([sample_data], Options()).groups
+    expected = {one.name: one.expected for group in (lower, upper) for one in group.comparisons}
+    assert expected == pytest.approx({LOWER_EDGE: 21.65, RESONANCE: 22.1, UPPER_EDGE: 80.6}, abs=0.06)
+    assert "0.21 Hz above the lower edge of the linear window" in lower.text
+    assert "The top was lost by the drive 16 times." in upper.text
+
+
+def test_both_kinds_together_have_values_of_both(sample_data: Path, tmp_path: Path) -> None:
+    analysis = analyze_limits([sample_data], Options())
+    document = limit_document(analysis, tmp_path)
+    assert {"lower_mean", "upper_mean", "upper_standard_error"} <= document["values"].keys()
+    assert [run["which"] for run in document["runs"]] == ["upper", "lower", "upper"]
+    assert [group["repetitions"] for group in document["groups"]] == [10, 16]
+    (warning,) = analysis.all_warnings  # spin-downs in the same folder are a remark
+    assert "LOOSE WASHERS" in warning
+    assert warning.endswith("(the first of 16 such warnings)")
+    assert analysis.remarks == ("passed over: 4 spin runs",)
+
+
+def test_what_was_written_is_what_a_report_shows(sample_data: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(sample_data / "loose-washers", tmp_path / "run")
+    analysis = analyze_limits([folder], Options())
+    assert [file.name for file in save_limits(analysis)] == ["result.json", "limit.png"]
+    again = recall_limits([folder], Options())
+    assert again.origins[0].startswith("as levilab analyze found it")
+    assert again.groups == analysis.groups
+    assert again.all_warnings == analysis.all_warnings
+    assert limit_tables(again) == limit_tables(analysis)
+    page = write_report([folder], tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "LOOSE WASHERS" in page
+    assert analysis.groups[0].text.split(".")[0] in page
+    other = recall_limits([folder], Options(reading_u=0.5))  # other options than the result's
+    assert other.origins[0].startswith("analyzed for this page")
+
+
+def test_a_result_that_is_damaged_is_an_error(sample_data: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(sample_data / "lower-limits", tmp_path / "run")
+    document = limit_document(analyze_limits([folder], Options()), folder)
+    document["runs"][0]["which"] = "middle"
+    (folder / "result.json").write_text(json.dumps(document), encoding="utf-8")
+    with pytest.raises(DataError, match=r"result\.json: runs\.0\.which = 'middle'"):
+        recall_limits([folder], Options())
+
+
+def test_a_file_of_ones_own_needs_nothing_but_the_spins(tmp_path: Path) -> None:
+    file = tmp_path / "my.csv"
+    file.write_text("top,f [Hz]\n1,80.1\n2,80.3\n3,79.9\n", encoding="utf-8")
+    (group,) = analyze_limits([file], Options()).groups
+    assert (group.which, group.statistics.n) == ("upper", 3)  # by the nearer edge of the window
+
+
+def test_a_spin_down_is_no_limit_and_runs_without_limits_are_told(tmp_path: Path, sample_data: Path) -> None:
+    file = spin_down_csv(tmp_path / "my.csv")
+    assert [row.name for row, _ in analyze_suiting([file], Options())] == ["spindown"]
+    with pytest.raises(DoesNotSuit, match="no limits of one top"):
+        analyze_limits([file], Options())
+    empty = shutil.copytree(sample_data / "lower-limits", tmp_path / "run")
+    (empty / "readings.csv").write_text("spin_frequency_hz\n", encoding="utf-8")
+    with pytest.raises(TableError, match="at least one repetition is needed"):
+        analyze_limits([empty], Options())
+    (empty / "readings.csv").write_text("spin_frequency_hz\n21.9\n-1\n", encoding="utf-8")
+    with pytest.raises(TableError, match="line 3: the limit is -1 Hz"):
+        analyze_limits([empty], Options())
+
+
+def test_a_scene_that_was_measured_is_the_one_compared_with(sample_data: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(sample_data / "lower-limits", tmp_path / "run")
+    record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    record["configuration"]["scene"] = {"name": "mine", "top": {"mass_kg": 0.025}}
+    (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
+    (run,) = analyze_limits([folder], Options()).runs
+    assert run.device
+    assert run.device.name == "the scene mine, 25 g"
+    record["configuration"]["scene"]["top"]["mass_kg"] = 0.03  # floats nowhere
+    (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
+    with pytest.raises(DataError, match=r"configuration\.scene: no spin keeps this top up"):
+        analyze_limits([folder], Options())
