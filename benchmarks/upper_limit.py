@@ -270,7 +270,7 @@ def main() -> None:
     parser.add_argument("--draw", action="store_true", help="draw the kept results, simulate nothing")
     kept = RESULTS / "upper_limit.json"
     if not parser.parse_args().draw:
-        kept.write_text(json.dumps(study(), indent=1) + "\n", encoding="utf-8")
+        kept.write_text(json.dumps(study()) + "\n", encoding="utf-8")
     draw(json.loads(kept.read_text(encoding="utf-8")), RESULTS / "upper_limit.png")
 
 

@@ -19,13 +19,12 @@ Array = NDArray[np.float64]
 FEWEST_PULSES = 5
 #: Rayleigh's p below which pulses are held for locked.
 LOCKED_P = 1e-3
-#: Locked pulses stay within this part of a turn; a locked top swings by a quarter of it.
-_STAYS = 0.5
+#: The phase of a locked top swings like a pendulum, by less than this [turns]; one that drifts leaves it some time.
+_STAYS = 1.0
+#: Phases are means over this [s]: short against the swing of a locked top, some seconds.
+_WINDOW_S = 0.4
 #: Part of the signal's height by which it must fall back before a pulse can begin anew: noise makes no pulses.
 _HYSTERESIS = 0.25
-#: A drift is looked for up to this [Hz].
-_WIDEST_HZ = 2.0
-_GOLDEN = (math.sqrt(5) - 1) / 2
 
 
 @dataclass(frozen=True)
@@ -37,9 +36,10 @@ class Coherence:
         length: of the mean vector: 1 where all come at one phase of the drive, about 1/√pulses where they come anyhow.
         phase_rad: of the mean vector on the drive.
         p_random: how probable so long a vector is for pulses at random (Rayleigh).
-        drift_hz, u_drift_hz: frequency of the pulses − frequency of the drive: their phase against time.  Its u holds
-            where the phases scatter independently of one another; a locked top swings about the drive within some
-            seconds, which a short record shows as a drift.
+        drift_hz, u_drift_hz: frequency of the pulses − frequency of the drive: the slope of their phase, and its u from
+            the scatter about it; a locked top swings about the drive within some seconds, which a short record shows as
+            a drift.
+        excursion_turns: from the lowest to the highest phase, of means over some tenths of a second.
         drive_hz: frequency of the drive in the same record.
         duration_s: from the first pulse to the last.
     """
@@ -52,11 +52,12 @@ class Coherence:
     u_drift_hz: float
     drive_hz: float
     duration_s: float
+    excursion_turns: float
 
     @property
     def locked(self) -> bool:
-        """Whether the pulses follow the drive: no chance, and no drift by half a turn within the record."""
-        return self.p_random < LOCKED_P and abs(self.drift_hz) * self.duration_s < _STAYS
+        """Whether the pulses follow the drive: by no chance, and their phase stays within one turn."""
+        return self.p_random < LOCKED_P and self.excursion_turns < _STAYS
 
 
 def coherence(pulse_times: Array, drive: Array, dt: float, drive_frequency: float, start: float = 0.0) -> Coherence:
@@ -78,7 +79,7 @@ def coherence(pulse_times: Array, drive: Array, dt: float, drive_frequency: floa
     turns = frequency * (pulse_times - start) + phase / (2 * np.pi)
     vectors = np.exp(2j * np.pi * turns)
     mean = complex(vectors.mean())
-    drift, u_drift = _drift(pulse_times, turns)
+    drift, u_drift, excursion = _course(pulse_times, turns)
     return Coherence(
         pulses=pulse_times.size,
         length=min(abs(mean), 1.0),
@@ -88,6 +89,7 @@ def coherence(pulse_times: Array, drive: Array, dt: float, drive_frequency: floa
         u_drift_hz=u_drift,
         drive_hz=frequency,
         duration_s=float(pulse_times[-1] - pulse_times[0]),
+        excursion_turns=excursion,
     )
 
 
@@ -164,27 +166,24 @@ def _crossing(signal: Array, level: float, k: int) -> float:
     return k + (level - float(signal[k])) / rise if rise else float(k)
 
 
-def _drift(times: Array, turns: Array) -> tuple[float, float]:
-    """Frequency of the pulses beside the drive's, and its u [Hz].
+def _course(times: Array, turns: Array) -> tuple[float, float, float]:
+    """How the phase goes on: its slope and the u of it [Hz], and from its lowest to its highest [turns].
 
-    It is where the mean vector is longest if its phase may turn evenly meanwhile: the most probable one for phases that
-    scatter by von Mises' law, and a doubled or missing pulse does not upset it as it does a phase that is counted on.
-    u = σ √12/(2π T √n), σ² = −2 ln(length).
+    The phase of the mean vector, window by window: a doubled or missing pulse does not upset it as it does a phase that
+    is counted on from pulse to pulse.
     """
-    span, off = float(np.ptp(times)), times - times.mean()
-    widest = max(_WIDEST_HZ, 4 / span)
-    tried = np.linspace(-widest, widest, 2 * math.ceil(4 * widest * span) + 1)
-
-    def length(drift: float) -> float:
-        # pulses that are faster than the drive come earlier and earlier on it
-        return float(abs(np.mean(np.exp(2j * np.pi * (turns + drift * off)))))
-
-    lengths = np.array([length(float(drift)) for drift in tried])
-    k = int(np.clip(np.argmax(lengths), 1, tried.size - 2))
-    low, best, high = tried[k - 1 : k + 2].tolist()
-    for _ in range(40):  # golden sections: to 1e-8 of the step
-        left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-        low, high = (low, right) if length(left) > length(right) else (left, high)
-    best = (low + high) / 2
-    scatter = math.sqrt(-2 * math.log(min(length(best), 1 - 1e-12)))
-    return best, scatter * math.sqrt(12 / times.size) / (2 * math.pi * span)
+    span = float(np.ptp(times))
+    windows = max(4, min(times.size // FEWEST_PULSES, math.ceil(span / _WINDOW_S)))
+    number = np.minimum(((times - times[0]) / span * windows).astype(np.int64), windows - 1)
+    vectors = np.exp(2j * np.pi * turns)
+    sums = np.bincount(number, vectors.real) + 1j * np.bincount(number, vectors.imag)
+    filled = np.bincount(number) > 0
+    phase = np.unwrap(np.angle(sums[filled])) / (2 * np.pi)
+    middle = (np.flatnonzero(filled) + 0.5) * span / windows
+    off = middle - middle.mean()
+    s_tt = float(np.sum(off**2))
+    slope = float(np.sum(off * phase)) / s_tt
+    left = phase - phase.mean() - slope * off
+    u = math.sqrt(float(np.sum(left**2)) / max(phase.size - 2, 1) / s_tt)
+    # pulses that are faster than the drive come earlier and earlier on it
+    return -slope, u, float(np.ptp(phase))

@@ -69,6 +69,10 @@ class DriveSettings(CounterSettings):
 D = TypeVar("D", bound=DriveSettings)
 
 
+class DidNotFollow(ExperimentFailed):
+    """The drive did not bring the top to where it should."""
+
+
 class NotHeld(Exception):
     """The top does not spin with the drive; what is seen instead.  spin [Hz]: None where no light pulses are seen."""
 
@@ -103,7 +107,7 @@ def drive_up_and_let_go(session: Session[D]) -> None:
 
 
 def drive_up(session: Session[D]) -> None:
-    """Let the drive take hold of the top, raise it, and hold it.  Raises ExperimentFailed."""
+    """Let the drive take hold of the top, raise it, and hold it.  Raises DidNotFollow; ExperimentFailed in the dark."""
     settings = session.settings
     seen = ""
     for tries, later in enumerate(_TURNS_LATER, 1):
@@ -128,9 +132,9 @@ def drive_up(session: Session[D]) -> None:
     raise _did_not_follow(session, seen)
 
 
-def _did_not_follow(session: Session[D], seen: str) -> ExperimentFailed:
+def _did_not_follow(session: Session[D], seen: str) -> DidNotFollow:
     name = session.writer.record.experiment
-    return ExperimentFailed(
+    return DidNotFollow(
         f"the top did not follow the drive to {session.settings.drive_frequency_hz:g} Hz ({seen}): ramp slower "
         f"({name}.ramp_hz_per_s) or drive harder ({name}.drive_amplitude_vpp)"
     )

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 S = TypeVar("S", bound=Settings)
 
-#: Longest sleep between two checks for Ctrl-C [s].
+#: Longest sleep between two checks for Ctrl-C [s], by the clock on the wall: one that jumps sleeps through at once.
 _NAP_S = 0.2
 #: Pauses [s] before the tries to reach an instrument again, half a minute in all.
 REOPENING_S = (0.0, 1.0, 2.0, 4.0, 8.0, 16.0)
@@ -92,13 +92,15 @@ class Session(Generic[S]):
 
     def wait(self, duration: float) -> None:
         """Let bench time pass [s].  Raises Interrupted if the end was asked for."""
-        end = self.bench.clock.now() + duration
+        clock = self.bench.clock
+        end = clock.now() + duration
         while True:
             self.stop.check()
-            left = end - self.bench.clock.now()
+            left = end - clock.now()
             if left <= 0:
                 return
-            self.bench.clock.sleep(min(left, _NAP_S))
+            wall = clock.wall_duration(left)
+            clock.sleep(left * _NAP_S / wall if wall > _NAP_S else left)
 
     def begin(self, start: Callable[[], None]) -> None:
         """Bring the top to where reading begins: that moment is time zero.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from typing import TYPE_CHECKING, Any
 
 from pydantic import Field, create_model
@@ -38,9 +39,9 @@ def tables_to_write() -> tuple[SettingsTable, ...]:
 
 
 def _settings_to_write(settings: type[ExperimentSettings]) -> Iterator[Setting]:
-    """Its own settings before those that it inherits."""
-    inherited = {name for base in settings.__bases__ for name in getattr(base, "model_fields", {})}
-    for name in sorted(settings.model_fields, key=lambda name: name in inherited):
+    """Its own settings, those that it changes included, before those that it inherits, the nearest first."""
+    names = dict.fromkeys(name for one in settings.__mro__ for name in inspect.get_annotations(one))
+    for name in (name for name in names if name in settings.model_fields):
         field = settings.model_fields[name]
         default = field.get_default(call_default_factory=True)
         example = field.examples[0] if default is None and field.examples else default

@@ -126,6 +126,10 @@ NASTY = (
 # --- what must hold ---
 
 
+#: An entry of the error queue (IEEE 488.2, 8.7.8): a number, and a string in which quotes are doubled.
+ENTRY = re.compile(r'[+-]\d+,"(?:[ !#-~]|"")*"')
+
+
 class Bench:
     """One instrument, a program's link to it, and the watch over both."""
 
@@ -148,6 +152,7 @@ class Bench:
     def check(self):
         device, session = self.device, self.session
         assert len(device.parser.errors) <= device.queue_size
+        assert all(map(ENTRY.fullmatch, device.parser.errors))
         assert len(device.parser._known) <= 20_000
         assert len(session._framer._buffer) <= LONGEST_LINE + (1 << 26)
         assert not math.isnan(device._ready)

@@ -235,7 +235,7 @@ class _OnTheBus:
         held = self._held[1] if self._held and self._held[0] is session else b""
         self._held = ()
         if delivery.now is None:
-            return replace(answer, ready=answer.ready + LATE) if delivery.later is not None else None
+            return answer._replace(ready=answer.ready + LATE) if delivery.later is not None else None
         if delivery.later is not None and session.stream:
             self._held = (session, delivery.later)
         if held:
@@ -244,7 +244,7 @@ class _OnTheBus:
             session.lost_after = len(delivery.now)
         # on a stream nothing but a line feed is an end
         complete = answer.complete and delivery.marked and (delivery.now == answer.data or not session.stream)
-        return replace(answer, data=held + delivery.now, complete=complete)
+        return answer._replace(data=held + delivery.now, complete=complete)
 
 
 class Tapped:

@@ -7,7 +7,7 @@ onto the wire, so they are the same for the PyVISA backend, for a serial line an
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from instruments.ieee488 import NOT_A_NUMBER
@@ -56,7 +56,7 @@ LATE, AWAY = 10.0, 5.0
 
 def _data(change: Callable[[bytes], bytes]) -> Act:
     """A fault that changes nothing but the bytes."""
-    return lambda _, answer: replace(answer, data=change(answer.data))
+    return lambda _, answer: answer._replace(data=change(answer.data))
 
 
 def _in_single_bytes(session: Session, answer: Answer) -> Answer:
@@ -65,7 +65,7 @@ def _in_single_bytes(session: Session, answer: Answer) -> Answer:
 
 
 def _cut(_: Session, answer: Answer) -> Answer:
-    return replace(answer, data=answer.data[: len(answer.data) // 2], complete=False)
+    return answer._replace(data=answer.data[: len(answer.data) // 2], complete=False)
 
 
 def _disconnected(session: Session, answer: Answer) -> Answer:
@@ -116,7 +116,7 @@ def _relabelled(data: bytes, more: int) -> bytes:
 #: What becomes of an answer, by the name of the fault.
 FAULTS: dict[str, Act] = {
     "no answer": lambda *_: None,
-    "late answer": lambda _, answer: replace(answer, ready=answer.ready + LATE),
+    "late answer": lambda _, answer: answer._replace(ready=answer.ready + LATE),
     "single bytes": _in_single_bytes,
     "two answers at once": _data(lambda data: data * 2),
     "garbage before": _data(lambda data: b"\x7f~#!" + data),

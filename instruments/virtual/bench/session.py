@@ -15,7 +15,7 @@ from instruments.virtual.core.parser import LONGEST_ANSWER, ScpiError
 from instruments.virtual.core.steps import Work, at_once
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from instruments.virtual.core.device import Answer, VirtualInstrument
     from instruments.virtual.core.steps import Steps
@@ -100,7 +100,6 @@ class Session:
     _rest: memoryview = _NOTHING
     _complete: bool = True
     _asked: bool = False  # something was sent since the last answer was read
-    _clears: int = 0
 
     def __post_init__(self) -> None:
         self._framer = Framer(blocks=self.device.takes_blocks)
@@ -109,73 +108,59 @@ class Session:
         """Bytes for the instrument; it works on every message that they complete.  end: marked by the interface."""
         with self.lock:
             for message in self.messages(data, end=end):
-                if message is not None:
-                    at_once(self._run(message))
+                if message:
+                    at_once(self._run(message, self.device.work))
 
-    def slices(self, data: bytes, *, end: bool = True) -> Iterator[None]:
-        """Do what write() does, in slices: the bus is locked while one is worked on, and free between them.
+    def messages(self, data: bytes, *, end: bool = True) -> Iterator[str]:
+        """The messages that these bytes complete, for begin().
 
-        Closing the iterator drops the rest, and so does a device clear.
+        Some are empty, where the work may be interrupted: a million line feeds take a second to be cut apart.
         """
-        for message in self.messages(data, end=end):
-            if message is None:
-                yield
-            else:
-                yield from self.work_on(message)
+        self._check_link()
+        for start in range(0, max(1, len(data)), _PIECE):
+            if start:
+                yield ""
+            stop = start + _PIECE
+            marked = end and not self.stream and stop >= len(data)
+            for message in self._framer.feed(data[start:stop], marked=marked):
+                if isinstance(message, Overrun):
+                    with self.lock:
+                        self.device.parser.report(ScpiError(-363))
+                elif message:
+                    yield message
 
-    def messages(self, data: bytes, *, end: bool = True) -> Generator[str | None, None, None]:
-        """The messages that these bytes complete, for work_on(); none are left after a device clear.
-
-        Yields None between pieces: a million line feeds take a second to be cut apart.
-        """
+    def begin(self, message: str) -> Work[None]:
+        """Let the instrument take a message, to work on it with go_on(); the one that it works on still comes first."""
         with self.lock:
             self._check_link()
-        clears = self._clears
-        for message in self._cut_apart(data, end=end and not self.stream):
-            if isinstance(message, Overrun):
-                with self.lock:
-                    self.device.parser.report(ScpiError(-363))
-            elif message != "":
-                yield message
-            if clears != self._clears:
-                return
+            work = self.device.work = Work(self._run(message, self.device.work))
+            return work
 
-    def work_on(self, message: str) -> Steps[None]:
-        """Let the instrument work on a message, in slices."""
-        return self._sliced(self._run(message))
+    def catch_up(self) -> Work[None]:
+        """What has gone on in the instrument while nobody asked, to be worked out with go_on()."""
+        return Work(self.device.catch_up())
 
-    def catch_up(self) -> Iterator[None]:
-        """What has gone on in the instrument while nobody asked, in slices."""
-        return self._sliced(self.device.catch_up())
+    def go_on(self, work: Work[None]) -> bool:
+        """Work for a slice; whether there is more to do.  The bus is locked meanwhile, and free between slices."""
+        with self.lock:
+            end = time.monotonic() + SLICE
+            while work.step() and time.monotonic() < end:
+                pass
+        if work.error:
+            raise work.error
+        return not work.done
 
-    def _sliced(self, steps: Steps[None]) -> Steps[None]:
-        work = Work(steps)
-        try:
-            while not work.done:
-                with self.lock:
-                    end = time.monotonic() + SLICE
-                    while work.step() and time.monotonic() < end:
-                        pass
-                if work.error:
-                    raise work.error
-                if not work.done:
-                    yield
-        finally:
-            with self.lock:
-                work.give_up()
+    def give_up(self, work: Work[None]) -> None:
+        """No more of this work."""
+        with self.lock:
+            work.give_up()
 
-    def _cut_apart(self, data: bytes, *, end: bool) -> Iterator[str | Overrun | None]:
-        """See messages().  END takes the place of a line feed if there is none (IEEE 488.2, 7.5)."""
-        if end and not data.endswith(b"\n"):
-            data += b"\n"
-        for start in range(0, len(data), _PIECE):
-            if start:
-                yield None
-            yield from self._framer.feed(data[start : start + _PIECE])
-        if end and self._framer.begun:  # that line feed was a byte of a block
-            yield from self._framer.feed(b"\n")
-
-    def _run(self, message: str) -> Steps[None]:
+    def _run(self, message: str, before: Work[None] | None) -> Steps[None]:
+        if before and not before.done:
+            if self.cut_off_by(message):
+                before.give_up()
+            while before.step():
+                yield
         self._drop_what_is_abandoned()
         if not self.stream and (self._answers or self._rest):
             self.device.parser.report(ScpiError(-410))
@@ -238,7 +223,7 @@ class Session:
             if math.isfinite(timeout):  # for ever is no time to jump to
                 clock.sleep(timeout)
             return None
-        clock.sleep(max(0.0, ready - clock.now()))
+        clock.sleep(ready - clock.now())
         return self.take(count, until=until)
 
     def take(self, count: int, *, until: bytes = b"") -> tuple[bytes, bool]:
@@ -287,7 +272,6 @@ class Session:
     def clear(self) -> None:
         """Device clear: what is under way in either direction is dropped, settings stay."""
         with self.lock:
-            self._clears += 1
             self._framer.clear()
             self._answers.clear()
             self._rest = _NOTHING

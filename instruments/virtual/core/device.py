@@ -5,25 +5,23 @@ An answer may take long to be worked out, so an instrument works on a message in
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from instruments.virtual.core.parameters import at_most_one, boolean, choice, limit, none, nr3, number, one
 from instruments.virtual.core.parser import Command, Parser
 from instruments.virtual.core.status import OPERATION_COMPLETE, Status
-from instruments.virtual.core.steps import Work, at_once
+from instruments.virtual.core.steps import at_once
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from instruments.clock import Clock
-    from instruments.virtual.core.steps import Steps
+    from instruments.virtual.core.steps import Steps, Work
 
 Value = float | str | bool
 
 
-@dataclass(frozen=True)
-class Answer:
+class Answer(NamedTuple):
     """What an instrument says: the bytes, and when they are ready [s].
 
     epoch: of the measurement they come from; complete: whether its end is among them.
@@ -56,7 +54,8 @@ class VirtualInstrument:
         self.status = Status()
         self.epoch = 0
         self._ready = 0.0
-        self._work: Work[Answer | None] | None = None
+        #: On the message that came last, if it is worked on in slices: it may not be done yet.
+        self.work: Work[None] | None = None
         self.parser = Parser(queue_size=self.queue_size, no_error=self.no_error, noted=self.status.note_error)
         self.parser.commands = (*self._common(), *self.table())
         self.settings |= self._defaults
@@ -66,30 +65,7 @@ class VirtualInstrument:
         return at_once(self.steps(message))
 
     def steps(self, message: str) -> Steps[Answer | None]:
-        """Do what execute() does, in steps; a message that the instrument still works on comes first."""
-        if self._work and self.cut_off_by(message):
-            self._work.give_up()
-        while self._work and self._work.step():
-            yield
-        answered = self._answered(message)
-        try:
-            next(answered)
-        except StopIteration as end:  # as nearly every message is: at once
-            answer: Answer | None = end.value
-            return answer
-        work = self._work = Work(answered)
-        try:
-            yield
-            while work.step():
-                yield
-        finally:
-            work.give_up()
-        if work.error:
-            raise work.error
-        return work.result
-
-    def _answered(self, message: str) -> Steps[Answer | None]:
-        yield from self.catch_up()
+        """Do what execute() does, in steps."""
         self._begin_message()
         return self._answer((yield from self.parser.steps(message)))
 
@@ -98,7 +74,7 @@ class VirtualInstrument:
         return False
 
     def catch_up(self) -> Steps[None]:
-        """Work out what has happened in the instrument since the last message."""
+        """Work out what has happened in the instrument since the last message, where anything happens in between."""
         yield from ()
 
     def _begin_message(self) -> None:
@@ -111,8 +87,8 @@ class VirtualInstrument:
 
     def abandon(self) -> None:
         """What is under way is given up, and what has not been read yet is lost."""
-        if self._work:
-            self._work.give_up()
+        if self.work:
+            self.work.give_up()
         self.epoch += 1
         self._ready = self.clock.now()
 

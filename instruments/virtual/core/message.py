@@ -10,12 +10,8 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from instruments.virtual.core.steps import at_once
-
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from instruments.virtual.core.steps import Steps
 
 #: White space is every control character and the space (IEEE 488.2, 7.4.1.2), and no other sign of Latin-1.
 _BLANK, _DIGITS = "".join(map(chr, range(0x21))), re.compile("[0-9]+")
@@ -27,15 +23,40 @@ _SPECIAL = re.compile(r"[\"'();,]|(?<![^\x00-\x20,])#[1-9]")
 _AT_A_STRETCH = 1000
 
 
+def read_units(message: str) -> Iterator[tuple[str, list[str]] | None]:
+    """The units of a compound message: the full header of each, and its parameters.
+
+    Yields None where the work may be interrupted: between units, and now and then in one of many signs.
+
+    >>> list(read_units("SOUR:FREQ 40;*OPC?;VOLT 1,2"))
+    [('SOUR:FREQ', ['40']), None, ('*OPC?', []), None, ('SOUR:VOLT', ['1', '2'])]
+    """
+    path, first = "", True
+    for unit in split_units(message):
+        if unit is None or (unit and not first):
+            yield None
+        if not unit:
+            continue
+        first = False
+        header, rest, path = read_unit(unit, path)
+        parameters: list[str] = []
+        for parameter in split_parameters(rest):
+            if parameter is None:
+                yield None
+            else:
+                parameters.append(parameter)
+        yield header, parameters
+
+
 def split_units(message: str) -> Iterator[str | None]:
     """The units of a compound message: split at semicolons outside of quotes and blocks.
 
-    Yields None now and then in a message of many signs: there the work may be interrupted.
+    Yields None now and then in a message of many signs, where the work may be interrupted; an empty unit is "".
 
     >>> list(split_units('FREQ 40; DISP:TEXT "a;b"'))
     ['FREQ 40', 'DISP:TEXT "a;b"']
     """
-    return (unit for unit in _split(message, ";") if unit != "")
+    return _split(message, ";")
 
 
 def read_unit(unit: str, path: str) -> tuple[str, str, str]:
@@ -53,26 +74,17 @@ def read_unit(unit: str, path: str) -> tuple[str, str, str]:
     return full, rest, full.rpartition(":")[0] + ":" if ":" in full else ""
 
 
-def split_parameters(text: str) -> list[str]:
+def split_parameters(text: str) -> Iterator[str | None]:
     """The parameters of a unit: split at commas outside of quotes, parentheses and blocks.
 
-    >>> split_parameters("25, MAX, (@1,2)")
+    Yields None where the work may be interrupted, as split_units() does.
+
+    >>> list(split_parameters("25, MAX, (@1,2)"))
     ['25', 'MAX', '(@1,2)']
-    >>> split_parameters("ARB1,#13,;,")
+    >>> list(split_parameters("ARB1,#13,;,"))
     ['ARB1', '#13,;,']
     """
-    return at_once(split_parameters_in_steps(text))
-
-
-def split_parameters_in_steps(text: str) -> Steps[list[str]]:
-    """Do what split_parameters() does, in steps."""
-    parameters: list[str] = []
-    for parameter in _split(text, ",") if text.strip(_BLANK) else ():
-        if parameter is None:
-            yield
-        else:
-            parameters.append(parameter)
-    return parameters
+    return _split(text, ",") if text.strip(_BLANK) else iter(())
 
 
 def _split(text: str, separator: str) -> Iterator[str | None]:
@@ -100,7 +112,9 @@ def _split(text: str, separator: str) -> Iterator[str | None]:
 
 
 def _piece(text: str, start: int, end: int, block_end: int) -> str:
-    kept = max(start, min(block_end, end))
+    if block_end <= start:
+        return text[start:end].strip(_BLANK)
+    kept = min(block_end, end)
     return (text[start:kept] + text[kept:end].rstrip(_BLANK)).lstrip(_BLANK)
 
 
@@ -141,13 +155,17 @@ class Framer:
     _quote: bytes = b""
     _dropping: bool = False
 
-    def feed(self, data: bytes) -> list[str | Overrun]:
-        """The messages that these bytes complete; Overrun in the place of one that was too long."""
-        self._buffer += data
+    def feed(self, data: bytes, *, marked: bool = False) -> list[str | Overrun]:
+        """The messages that these bytes complete; Overrun in the place of one that was too long.
+
+        marked: the interface says that a message ends with them; that takes the place of a line feed if there is none
+        (IEEE 488.2, 7.5).
+        """
+        self._buffer += data if not marked or data.endswith(b"\n") else data + b"\n"
         messages: list[str | Overrun] = []
         while (end := self._end_of_message()) is not None:
             if not self._dropping:
-                text = bytes(self._buffer[: self._block_end]) + self._buffer[self._block_end : end].rstrip(_BLANK_BYTES)
+                text = self._buffer[: self._block_end] + self._buffer[self._block_end : end].rstrip(_BLANK_BYTES)
                 messages.append(text.lstrip(_BLANK_BYTES).decode("latin-1"))
             self._forget(end + 1)
         if len(self._buffer) > max(self._block_end, 0) + LONGEST_LINE:
@@ -155,6 +173,8 @@ class Framer:
                 messages.append(Overrun())
             self._forget(len(self._buffer))
             self._dropping = True
+        if marked and self.begun:  # that line feed was a byte of a block
+            messages += self.feed(b"\n")
         return messages
 
     @property

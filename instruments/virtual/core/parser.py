@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING
 
-from instruments.virtual.core.message import read_unit, split_parameters_in_steps, split_units
+from instruments.virtual.core.message import read_units
 from instruments.virtual.core.steps import at_once
 
 if TYPE_CHECKING:
@@ -120,15 +120,14 @@ class Parser:
     def steps(self, message: str) -> Steps[str | None]:
         """Do what run() does, in steps: a message may be interrupted after each of its units."""
         answers: list[str] = []
-        length, path = 0, ""
-        for k, unit in enumerate(split_units(message)):
-            if k:
-                yield
+        length = 0
+        for unit in read_units(message):
             if unit is None:
+                yield
                 continue
-            header, rest, path = read_unit(unit, path)
+            header, parameters = unit
             try:
-                answer = self._act(header)((yield from split_parameters_in_steps(rest)))
+                answer = self._act(header)(parameters)
                 if answer is not None and not isinstance(answer, str):
                     answer = yield from answer
             except ScpiError as error:
@@ -151,12 +150,13 @@ class Parser:
         return act
 
     def _find(self, name: str) -> Command:
-        if name not in self._known:
-            found = next((command for command in self.commands if command.header.fullmatch(name)), None)
-            if found is None:  # unknown headers are not remembered: they could be any number
+        known = self._known.get(name)
+        if known is None:
+            known = next((command for command in self.commands if command.header.fullmatch(name)), None)
+            if known is None:  # unknown headers are not remembered: they could be any number
                 raise ScpiError(-113, name[:40])
-            self._known[name] = found
-        return self._known[name]
+            self._known[name] = known
+        return known
 
     def report(self, error: ScpiError) -> None:
         """Put an entry into the error queue; when it is full its last entry says so."""

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from instruments.clock import Clock
+    from instruments.virtual.core.device import Answer
     from instruments.virtual.core.steps import Steps
     from instruments.virtual.counter.edges import Array, Input, Signal
     from instruments.virtual.counter.run import Run
@@ -77,6 +78,11 @@ class VirtualCounter(VirtualInstrument):
     def cut_off_by(self, message: str) -> bool:
         """See the base: ABORt does."""
         return bool(_ABORT.fullmatch(message))
+
+    def steps(self, message: str) -> Steps[Answer | None]:
+        """Run one message, after what has gone on until it came."""
+        yield from self.catch_up()
+        return (yield from super().steps(message))
 
     def status_byte(self, *, message_available: bool = False) -> int:
         """The status byte; see the base."""

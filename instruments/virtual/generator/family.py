@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ class Waveform:
     bursts: bool = True
     sweeps: bool = True
 
-    @property
+    @cached_property
     def short(self) -> str:
         """What a query answers."""
         return "".join(c for c in self.word if not c.islower())

@@ -6,9 +6,8 @@ Source: IVI-6.1; section numbers are revision 2.0's.
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from instruments.virtual.servers.station import Disconnected
 
@@ -79,8 +78,7 @@ class LockAnswer(IntEnum):
     ERROR = 3
 
 
-@dataclass(frozen=True)
-class Message:
+class Message(NamedTuple):
     """What stands in a header, and the payload."""
 
     type: int

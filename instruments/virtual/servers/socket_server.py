@@ -58,23 +58,16 @@ async def converse(station: Station, wire: Wire) -> None:
     async def receive() -> None:
         while data := await wire.read():
             await received.put(data)
-        await link.linger(delivered)  # a client that sends no more may still want to read: printf '*IDN?\n' | nc
-
-    async def delivered() -> None:
-        await received.join()
-        await link.quiet()
+        await link.linger(received.join)  # a client that sends no more may still want to read: printf '*IDN?\n' | nc
 
     async def work() -> None:
         while True:
             await link.write(await received.get())
-            await link.quiet()
+            while await link.answered(given_up=link.quiet):
+                await wire.write(link.take(CHUNK)[0])
             received.task_done()
 
-    async def answer() -> None:
-        while await link.answered():
-            await wire.write(link.take(CHUNK)[0])
-
     try:
-        await first_of(receive(), work(), answer())
+        await first_of(receive(), work())
     finally:
         link.close()

@@ -5,7 +5,8 @@ the other clients have their turn; its answers are waited for without that lock,
 happens to the instrument meanwhile is looked at.
 
 An instrument takes the next message when it is done with the last one, and the clients take turns, a message each: a
-flood of commands holds up the client that sends it, not the others.
+flood of commands holds up the client that sends it, not the others.  What they have sent waits in the instrument's
+station, which gives the turns.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import asyncio
 import contextlib
 import logging
 import socket
+from collections import deque
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -23,12 +25,12 @@ from instruments.virtual.bench.session import LinkLost
 from instruments.virtual.core.parser import ScpiError
 
 if TYPE_CHECKING:
-    from collections.abc import Coroutine, Generator, Iterable
+    from collections.abc import Coroutine, Iterator
 
     from instruments.virtual.bench.bus import Bus
     from instruments.virtual.bench.session import Session
     from instruments.virtual.core.device import VirtualInstrument
-    from instruments.virtual.core.steps import Steps
+    from instruments.virtual.core.steps import Work
 
 log = logging.getLogger(__name__)
 
@@ -53,53 +55,166 @@ class Disconnected(Exception):
 
 
 @dataclass(eq=False)
-class Station:
-    """One instrument of a bus, as its servers see it.
+class Job:
+    """What a client has sent at a time: messages for the instrument, one after the other.
 
-    at_work: held by the client whose message the instrument takes or works on; working: whether it works on that
-    message still.
+    message: the next one, or the one that the instrument works on; empty where there is none before others have had
+    their turn, None after the last one.  work: on that message.
     """
+
+    link: Link
+    messages: Iterator[str]
+    message: str | None = None
+    work: Work[None] | None = None
+
+    def next_message(self) -> bool:
+        """Turn to the next message; whether there is one."""
+        self.message, self.work = next(self.messages, None), None
+        return self.message is not None
+
+    def may_have_turn(self) -> bool:
+        """Whether the instrument may take the message now."""
+        link = self.link
+        if link.station.working:
+            return link.session.cut_off_by(self.message or "") and not link.kept_out()
+        if self.work or not link.session.stream:  # the servers of the other protocols have waited for the lock
+            return True
+        return not link.kept_out() and not link.answers_wait()  # they follow each other: the last one goes first
+
+    def work_for_a_slice(self) -> bool:
+        """Let the instrument work on the message; whether it is done with it."""
+        if not self.message:
+            return True
+        if self.work is None:
+            self.work = self.link.session.begin(self.message)
+        return not self.link.session.go_on(self.work)
+
+
+@dataclass(eq=False)
+class Station:
+    """One instrument of a bus, as its servers see it: what its clients have sent waits here for its turn."""
 
     bus: Bus
     device: VirtualInstrument
-    at_work: asyncio.Lock = field(default_factory=asyncio.Lock)
-    working: bool = False
-    _stirred: asyncio.Event = field(default_factory=asyncio.Event)
+    _jobs: deque[Job] = field(default_factory=deque)  # in the order of their turns
+    _under_way: Job | None = None  # whose message the instrument works on
+    _free: float = 0.0  # when the instrument takes the next message [s]
+    _next_turn: asyncio.TimerHandle | None = None
+    _stirred: asyncio.Future[None] | None = None  # what stirred() waits for
+
+    @property
+    def working(self) -> bool:
+        """Whether the instrument works on a message."""
+        return self._under_way is not None
+
+    # --- turns ---
+
+    def add(self, job: Job) -> None:
+        """Let the instrument work on this, in turn: now, if nothing else is to be done."""
+        self._jobs.append(job)
+        self._give_turn()
+
+    def jobs(self) -> Iterator[Job]:
+        """What is worked on, and what waits."""
+        if self._under_way:
+            yield self._under_way
+        yield from self._jobs
+
+    def drop(self, link: Link) -> None:
+        """Nothing more of what this client has sent."""
+        if self._under_way and self._under_way.link is link:
+            if self._under_way.work:
+                link.session.give_up(self._under_way.work)
+            self._under_way = None
+        self._jobs = deque(job for job in self._jobs if job.link is not link)
+
+    def _give_turn(self) -> None:
+        """Work for a slice on the message under way, or on that of the client whose turn it is, and come again."""
+        wait = 0.0 if self._under_way else self.wall_duration_until(self._free)
+        if wait == 0.0:
+            job = self._choose()
+            if job:
+                self._work_for_a_slice(job)
+            else:
+                wait = _LOOK_AGAIN
+        self._come_again(wait)
+
+    def _come_again(self, wait: float) -> None:
+        """Give the next turn after a while [s], if anything waits for one."""
+        if self._next_turn:
+            self._next_turn.cancel()
+            self._next_turn = None
+        if self._under_way or self._jobs:
+            self._next_turn = asyncio.get_running_loop().call_later(wait, self._give_turn)
+
+    def _choose(self) -> Job | None:
+        """What is worked on now: what is under way, unless it is cut off, or the first that may have its turn."""
+        job = next((job for job in self._jobs if job.may_have_turn()), None)
+        if job:
+            self._jobs.remove(job)
+            if self._under_way:  # it has been cut off; the messages that came with it have their turn
+                self._jobs.appendleft(self._under_way)
+            self._under_way = job
+        return self._under_way
+
+    def _work_for_a_slice(self, job: Job) -> None:
+        try:
+            if not job.work_for_a_slice():
+                return
+            if job.message:
+                job.link.messages_done += 1
+                self._free = self.device.clock.now() + self.device.pace
+            if job.next_message():
+                self._jobs.append(job)
+        except Exception as error:  # noqa: BLE001 - the instrument or the link has failed; raised where its client waits
+            job.link.error = error
+        self._under_way = None
+        self._wake()
+
+    # --- waiting ---
+
+    def wall_duration_until(self, instant: float) -> float:
+        """How long until this time of the bench [s] by the clock on the wall; a clock that jumps is there at once."""
+        clock = self.device.clock
+        missing = instant - clock.now()
+        if missing <= 0:
+            return 0.0
+        if (wait := clock.wall_duration(missing)) > _NO_WAIT:
+            return wait
+        if clock.jumps:
+            clock.sleep(missing)
+        return 0.0
 
     def stir(self) -> None:
-        """Something happened to the instrument: whoever waits for it looks again."""
-        self._stirred.set()
-        self._stirred = asyncio.Event()
+        """Something happened to the instrument: all that waits for it looks again."""
+        self._wake()
+        # a turn that is due stays: a client that stirs without end would put it off
+        if self._next_turn and self._next_turn.when() > asyncio.get_running_loop().time():
+            self._come_again(0.0)
 
-    async def passes(self, duration: float) -> None:
-        """Wait until so much time has passed on the bench [s]; the other clients have their turn in any case."""
-        clock = self.device.clock
-        end = clock.now() + duration
-        while (wait := clock.wall_duration(end - clock.now())) > _NO_WAIT:
-            await asyncio.sleep(wait)
-        if clock.jumps:
-            clock.sleep(end - clock.now())
-        await asyncio.sleep(0)
+    def _wake(self) -> None:
+        if self._stirred:
+            self._stirred.set_result(None)
+            self._stirred = None
 
     async def stirred(self, within: float | None) -> None:
         """Wait until something happens, at most so long by the clock on the wall [s]."""
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(within):
-                await self._stirred.wait()
+        if self._stirred is None:
+            self._stirred = asyncio.get_running_loop().create_future()
+        await asyncio.wait([self._stirred], timeout=within)
 
 
 class Link:
     """One client's link to an instrument; whatever is done with it raises LinkLost when a fault has cut it.
 
     session: see :class:`instruments.virtual.bench.session.Session`; to be used from the event loop only;
-    messages_done: how many messages the instrument has worked on.
+    messages_done: how many messages the instrument has worked on; error: that ended the work on one of them.
     """
 
     def __init__(self, station: Station, *, stream: bool = False) -> None:
         self.station, self.closed, self.messages_done = station, False, 0
         self.session = self._new(stream=stream)
-        self._messages: Generator[str | None, None, None] | None = None
-        self._work: asyncio.Task[None] | None = None
+        self.error: Exception | None = None
 
     def _new(self, *, stream: bool) -> Session:
         return self.station.bus.session(self.station.device, stream=stream)
@@ -119,72 +234,29 @@ class Link:
         The instrument goes on with them when this has returned.  Returns False if they were not taken within this
         time [s].
         """
-        if self.cut_off_by(data, end=end):
-            await self._work_on(self.session.messages(data, end=end))
-            return True
-        if not await self.finished(within, given_up=given_up):
+        if not self.cut_off_by(data, end=end) and not await self.finished(within, given_up=given_up):
             return False
-        if self._work:
-            self._work.result()  # the instrument, or the link, may have failed
-        self._messages = self.session.messages(data, end=end)
-        self._work = asyncio.ensure_future(self._work_on(self._messages))
-        await asyncio.sleep(0)  # where no other client has its turn the first slice is done now
+        self._raise_error()
+        job = Job(self, self.session.messages(data, end=end))
+        if job.next_message():
+            self.station.add(job)
         return True
+
+    def _raise_error(self) -> None:
+        if self.error:
+            raise self.error
 
     def cut_off_by(self, data: bytes, *, end: bool = True) -> bool:
         """Whether these bytes end what the instrument works on; see Session.cut_off_by."""
-        return self._may_cut_off() and self.session.cut_off_by_bytes(data, end=end)
+        return self.station.working and not self.kept_out() and self.session.cut_off_by_bytes(data, end=end)
 
-    def _may_cut_off(self) -> bool:
-        return self.station.working and not self.kept_out()
-
-    async def _work_on(self, messages: Iterable[str | None]) -> None:
-        try:
-            for message in messages:
-                if message is None:
-                    await asyncio.sleep(0)
-                    continue
-                await self._let_in()
-                if self._may_cut_off() and self.session.cut_off_by(message):
-                    await self._finish(self.session.work_on(message))
-                else:
-                    await self._in_turn(message)
-        finally:
-            self.station.stir()
-
-    async def _in_turn(self, message: str) -> None:
-        """Let the instrument take a message when it is done with those of the other clients, and wait until it is."""
-        station, taken = self.station, False
-        if self.session.stream:  # answers follow each other: the last one is delivered first
-            await self._delivered()
-        while not taken and not self.closed:
-            await self._let_in()
-            async with station.at_work:
-                if self.session.stream and self.kept_out():  # the lock was given to another client meanwhile
-                    continue
-                taken = station.working = True
-                try:
-                    await self._finish(self.session.work_on(message))
-                finally:
-                    station.working = False
-                self.messages_done += 1
-                station.stir()
-                await station.passes(station.device.pace)
-
-    async def _let_in(self) -> None:
-        """On a stream, wait for the lock here; the servers of the other protocols have done that."""
-        if self.session.stream:
-            await self.turn()
-
-    @staticmethod
-    async def _finish(slices: Steps[None]) -> None:
-        with contextlib.closing(slices):
-            for _ in slices:
-                await asyncio.sleep(0)  # the others' turn
+    def busy(self) -> bool:
+        """Whether the instrument has not yet worked on everything."""
+        return any(job.link is self for job in self.station.jobs())
 
     async def finished(self, within: float | None = None, *, given_up: Callable[[], bool] = lambda: False) -> bool:
         """Wait until the instrument has worked on everything; whether that is so within this time [s]."""
-        return await self._comes(lambda: self._work is None or self._work.done(), within, given_up)
+        return await self._comes(lambda: not self.busy(), within, given_up)
 
     async def linger(self, ended: Callable[[], Awaitable[object]]) -> None:
         """Wait for the end of what a client has sent that says no more, as long as the instrument goes on with it.
@@ -202,17 +274,11 @@ class Link:
     def _answers_later(self) -> bool:
         return self.session.stream and 0 < (self.due() or 0.0) < INFINITY
 
-    def _drop_work(self) -> None:
-        if self._work is not None:
-            self._work.cancel()
-        if self._messages is not None:
-            self._messages.close()
-        self._work = self._messages = None
-
     async def caught_up(self) -> None:
         """Let the instrument do what has gone on while nobody asked."""
-        for _ in self.session.catch_up():
-            await asyncio.sleep(0)
+        work = self.session.catch_up()
+        while self.session.go_on(work):
+            await asyncio.sleep(0)  # the others' turn
 
     def trigger(self) -> None:
         """The interface's trigger message."""
@@ -221,7 +287,7 @@ class Link:
 
     def clear(self) -> None:
         """Device clear; a client that is kept out clears what is its own, and the instrument works on."""
-        self._drop_work()
+        self.station.drop(self)
         if self.kept_out():
             self.session = self._new(stream=self.session.stream)
         else:
@@ -236,7 +302,7 @@ class Link:
     def close(self) -> None:
         """The client is gone, and its lock with it."""
         self.closed = True
-        self._drop_work()
+        self.station.drop(self)
         self.session.close()
         self.station.stir()
 
@@ -244,20 +310,17 @@ class Link:
 
     def due(self) -> float | None:
         """How long until bytes are there [s] by the clock on the wall; None: none are under way."""
-        if self._work and self._work.done():
-            self._work.result()  # the instrument, or the link, may have failed
+        self._raise_error()
         instant = self.session.ready()
         if instant is None:
             return None
-        clock = self.station.device.clock
-        missing = max(0.0, instant - clock.now())
-        if missing >= INFINITY:  # it never comes
-            return missing
-        if (wait := clock.wall_duration(missing)) > _NO_WAIT:
-            return wait
-        if clock.jumps:
-            clock.sleep(missing)
-        return 0.0
+        return instant if instant >= INFINITY else self.station.wall_duration_until(instant)
+
+    def answers_wait(self) -> bool:
+        """Whether answers are under way, or wait to be taken."""
+        with contextlib.suppress(LinkLost):
+            return self.session.ready() is not None
+        return False
 
     async def answered(self, within: float | None = None, *, given_up: Callable[[], bool] = lambda: False) -> bool:
         """Wait until bytes are there; whether they are, within this time by the clock on the wall [s].
@@ -279,15 +342,9 @@ class Link:
         self.station.stir()
         return taken
 
-    async def quiet(self) -> None:
-        """Wait until the instrument has nothing to do, and no answer is under way."""
-        while await self.finished() and self.due() is not None:
-            await self._delivered()
-
-    async def _delivered(self) -> None:
-        """Wait until no answer is under way."""
-        while (due := self.due()) is not None:
-            await self.station.stirred(due or None)
+    def quiet(self) -> bool:
+        """Whether the instrument has nothing to do for this client, and no answer is under way."""
+        return not self.busy() and self.due() is None
 
     def status_byte(self, *, unread: bool = False) -> int:
         """What a serial poll gives.  unread: an answer is on its way to the client, and not read yet."""

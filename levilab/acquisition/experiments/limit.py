@@ -13,6 +13,7 @@ from analysis.locked import slip_of
 from levilab.acquisition.counting import FreeTop, Missed, prepare_counter, spin_now
 from levilab.acquisition.driving import (
     RAMP_STEP_S,
+    DidNotFollow,
     DriveSettings,
     NotHeld,
     compare_with_drive,
@@ -28,11 +29,15 @@ from levilab.bench.person import FloatTop
 from levilab.runs.channel import Channel
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from levilab.acquisition.session import Row, Session
     from levilab.bench.config import Limits
 
 #: A top that a person was asked for is looked for so often [s].
 _LOOK_S = 2.0
+#: A top that the drive does not take up is given up after so many falls.
+_MOST_FALLS = 3
 #: The tape of a creeping top is compared with the drive by so many counts, so far below the limit [Hz]: nearer to it
 #: the top may already fall behind.
 _COMPARED, _BELOW_HZ = 20, 5.0
@@ -87,12 +92,28 @@ def run(session: Session[LimitSettings]) -> None:
     session.begin(lambda: None)
     measure = _lower if settings.which == "lower" else _upper
     for number in range(len(session.rows), settings.repetitions):
-        _have_a_top(session, number)
-        row = measure(session)
+        row = _with_a_top(session, number, measure)
         if row is None:
             return
         left = settings.repetitions - number - 1
         session.keep(row, left * session.now() / (number + 1))
+
+
+def _with_a_top(
+    session: Session[LimitSettings], number: int, measure: Callable[[Session[LimitSettings]], Row | None]
+) -> Row | None:
+    """The limit of a top; one that the drive does not take up falls after a while, and is floated again."""
+    falls = 0
+    while True:
+        _have_a_top(session, number)
+        try:
+            return measure(session)
+        except DidNotFollow as failed:
+            fell = spin_now(session) is None
+            falls += fell
+            if falls == _MOST_FALLS:
+                raise
+            session.event("once more", f"{failed}; it {'fell' if fell else 'is still up'}, once more")
 
 
 def _have_a_top(session: Session[LimitSettings], number: int) -> None:
@@ -262,7 +283,7 @@ def _limit_of_loss(
 
 EXPERIMENT = Experiment(
     name="limit",
-    about="the lowest spin, where a free top falls, or the highest that a drive can hold; again and again",
+    about="the lowest spin of a free top, or the highest that a drive can hold, top after top",
     instruments=("counter", "generator"),
     settings=LimitSettings,
     channels=channels,

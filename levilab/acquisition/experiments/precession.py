@@ -69,7 +69,7 @@ class PrecessionSettings(DriveSettings):
     )
     laser_trigger_level_v: float = Field(default=0.65, description="half way between the beam free and cut")
     clocks_u: PositiveFloat = Field(
-        default=2e-5, description="the generator's clock by the counter's, standard uncertainty, relative"
+        default=2e-5, description="how well the clocks agree, relative standard uncertainty"
     )
     record_s: NonNegativeFloat = Field(
         default=0.0, le=60.0, description="a scope's record at each, for the phase, 6 or more; 0: none"

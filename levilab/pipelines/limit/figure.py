@@ -99,8 +99,8 @@ def _draw_limits(axes: Axes, analysis: LimitAnalysis, group: Limits) -> None:
 
 def _upper_title(group: Limits) -> str:
     lock, top = group.ends.get("lock lost", 0), group.ends.get("top lost", 0)
-    how = f" (the drive lost it {lock} ×, it fell {top} ×)" if lock or top else ""
-    return f"Upper limit: how far the top follows the drive{how}"
+    how = f" (lost by the drive {lock} ×, fell {top} ×)" if lock or top else ""
+    return f"Upper limit of a driven top{how}"
 
 
 def _limits(analysis: LimitAnalysis, group: Limits) -> Array:

@@ -123,9 +123,10 @@ def coherence_table(run: PrecessionRun, name: str = "") -> Table:
             f"{one.coherence.length:.4f}",
             f"{math.degrees(one.coherence.phase_rad):.0f}",
             without_unit(Estimate(one.coherence.drift_hz, one.coherence.u_drift_hz, "Hz")),
+            f"{one.coherence.excursion_turns:.2f}",
             "yes" if one.coherence.locked else "no",
         )
         for one in run.coherences
     ]
-    heads = ("ν_d [Hz]", "pulses", "mean vector", "phase [°]", "drift [Hz]", "locked")
-    return table(f"Phase of the laser's pulses on the drive{name}", heads, rows, numbers=heads[:5])
+    heads = ("ν_d [Hz]", "pulses", "mean vector", "phase [°]", "drift [Hz]", "turns", "locked")
+    return table(f"Phase of the laser's pulses on the drive{name}", heads, rows, numbers=heads[:6])

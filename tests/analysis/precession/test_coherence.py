@@ -36,12 +36,20 @@ def test_the_mean_vector_of_jittering_pulses_is_that_of_their_distribution():
 
 
 def test_pulses_beside_the_drives_frequency_drift():
-    found = coherence(pulses(DRIVE_HZ + 0.15, jitter=0.02), DRIVE, DT, 30.0)
-    assert found.drift_hz == pytest.approx(0.15, abs=3 * found.u_drift_hz)
+    found = coherence(pulses(DRIVE_HZ + 0.3, jitter=0.02), DRIVE, DT, 30.0)
+    assert found.drift_hz == pytest.approx(0.3, abs=3 * found.u_drift_hz)
     assert not found.locked
     assert coherence(pulses(DRIVE_HZ + 1.0), DRIVE, DT, 30.0).p_random > 0.1
     with pytest.raises(TooFewReadings):
         coherence(np.arange(4.0), DRIVE, DT, 30.0)
+
+
+def test_a_locked_top_may_swing_far_about_its_drive():
+    regular = pulses(DRIVE_HZ)
+    swinging = regular + 0.3 * np.sin(2 * np.pi * 0.27 * regular) / DRIVE_HZ  # by ±0.3 of a turn, in 3.7 s
+    found = coherence(swinging, DRIVE, DT, 30.0)
+    assert found.locked
+    assert found.excursion_turns == pytest.approx(0.6, abs=0.05)
 
 
 def test_a_doubled_and_a_missing_pulse_do_not_look_like_a_drift():

@@ -86,6 +86,24 @@ def test_a_top_that_falls_under_the_drive_is_said_to_have_fallen(tmp_path: Path)
     assert "lock lost" not in kinds(run)
 
 
+def test_a_top_that_the_drive_does_not_take_up_is_floated_again(tmp_path: Path) -> None:
+    class Unwilling(SpinWorld):
+        """The first top cannot be held."""
+
+        def float_top(self, number: int) -> None:
+            self.scene = SpinScene()
+            super().float_top(number)
+
+    world = Unwilling(SpinScene(lock_torque=1.0), VirtualClock())
+    run = acquire(in_world(mock(tmp_path, "limit.repetitions=1"), world), Silent())
+    assert kinds(run).count("once more") >= 1
+    assert kinds(run).count("asked the person") == 1
+    assert run.count() == 1
+    never = in_world(mock(tmp_path, "limit.repetitions=1"), SpinWorld(SpinScene(lock_torque=1.0), VirtualClock()))
+    with pytest.raises(ExperimentFailed, match="did not follow the drive to 30 Hz"):
+        acquire(never, Silent())
+
+
 def test_an_interrupted_series_goes_on_with_the_next_top(tmp_path: Path) -> None:
     half = acquire(mock(tmp_path, *QUICK, "limit.repetitions=4"), Impatient(2))
     assert half.status == "interrupted"

@@ -143,6 +143,7 @@ drive_frequency_hz = 40.0       # drive the top up to this,
 ramp_hz_per_s = 0.05            # no faster than it can follow
 drive_amplitude_vpp = 10.0
 drive_waveform = "SIN"          # SIN, SQU or TRI
+hold_s = 20.0                   # hold it there, and compare its spin with the drive
 interval_s = 10.0               # then read every so often,
 gate_s = 1.0                    # counting for so long
 trigger_level_v = 0.6           # half way between dark and the pulse of the tape
@@ -156,13 +157,13 @@ def test_a_new_bench_file_has_a_commented_table_for_each_experiment(levilab, tmp
         step_mm: float = Field(default=0.5, description="from one height to the next")
 
     levilab("bench", "init", "--library", "@levilab")
-    assert (tmp_path / "bench.toml").read_text(encoding="utf-8").endswith(SPIN_TABLE)
+    assert SPIN_TABLE in (tmp_path / "bench.toml").read_text(encoding="utf-8")
     scan = replace(EXPERIMENTS["spin"], name="scan", about="the field along the axis", settings=ScanSettings)
     monkeypatch.setitem(EXPERIMENTS, "scan", scan)
     text = bench_text([], "@py", tables_to_write())
+    assert SPIN_TABLE in text
     assert text.endswith(
-        SPIN_TABLE
-        + """
+        """
 [scan]                          # the field along the axis
 step_mm = 0.5                   # from one height to the next
 """

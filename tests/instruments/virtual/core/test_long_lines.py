@@ -70,7 +70,7 @@ def test_a_long_line_is_worked_on_and_the_next_is_answered(text):
 @pytest.mark.parametrize("text", LONG.values(), ids=LONG)
 def test_a_long_line_is_cut_apart(text):
     assert sum(len(message) for message in Framer().feed(text.encode() + b"\n")) == len(text)
-    assert len(split_parameters(text)) <= MANY
+    assert sum(1 for parameter in split_parameters(text) if parameter is not None) <= MANY
     assert sum(1 for unit in split_units(text) if unit) <= MANY
 
 

@@ -1,5 +1,6 @@
 """Where a message ends: streams cut anywhere give the same messages, blocks may hold any byte, nothing grows."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -33,7 +34,7 @@ def test_a_block_reaches_its_command_byte_for_byte(data):
     (message,) = Framer().feed(b"DATA:ARB name," + block(data) + b";*OPC? \r\n")
     first, second = split_units(message)
     assert second == "*OPC?"
-    assert split_parameters(first.partition(" ")[2]) == ["name", block(data).decode("latin-1")]
+    assert list(split_parameters(first.partition(" ")[2])) == ["name", block(data).decode("latin-1")]
 
 
 @given(pieces=st.lists(st.binary(max_size=60), max_size=30))
@@ -52,6 +53,16 @@ def test_a_line_without_end_is_dropped_and_told_once():
         assert len(framer._buffer) <= 2 * LONGEST_LINE
     assert [type(one) for one in told] == [Overrun]
     assert framer.feed(b"x\n*IDN?\n") == ["*IDN?"]
+
+
+@pytest.mark.parametrize(
+    ("sent", "message"),
+    [(b"*IDN?", "*IDN?"), (b"*IDN?\r\n", "*IDN?"), (b"D #12ab", "D #12ab"), (b"D #12a\n", "D #12a\n")],
+)
+def test_a_mark_of_the_interface_ends_a_message_as_a_line_feed_does(sent, message):
+    framer = Framer()
+    assert framer.feed(sent, marked=True) == [message]
+    assert not framer.begun
 
 
 def test_a_block_that_says_that_it_is_endless_is_a_line():

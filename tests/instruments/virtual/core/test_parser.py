@@ -1,11 +1,7 @@
 """The parser of the virtual instruments: SCPI as programs write it, and whatever else they send."""
 
-import re
-
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from instruments.clock import VirtualClock
 from instruments.virtual.core.device import VirtualInstrument, answers
@@ -293,38 +289,3 @@ def test_clear_drops_a_half_sent_message_and_unread_answers(generator):
 def test_an_answer_takes_its_time_on_the_clock_of_the_bench(generator):
     assert ask(generator, "*OPC?") == "1"
     assert generator.clock.now() == pytest.approx(generator.pace, abs=1e-12)
-
-
-# --- whatever else is sent ---
-
-#: An entry of IEEE 488.2: a number, and a string in which quotes are doubled.
-ENTRY = re.compile(r'[+-]\d+,"(?:[ !#-~]|"")*"')
-
-#: Pieces of messages: any order of them is nearer to the parser's corners than any text.
-HEADERS = (
-    *("FREQ", "SOUR1:FREQ:CW", "VOLT", "FUNC", "OUTP1", "OUTP:LOAD", "INP1:LEV:AUTO", "CONF:FREQ", "READ", "ABOR"),
-    *("SENS:FREQ:GATE:TIME", "SYST:ERR", "SYST:TIM", "*RST", "*CLS", "*IDN", "*OPC"),
-)
-PARAMETERS = ("MIN", "MAX", "DEF", "INF", "ON", "SQUare", "40", "-1e-7", "1e999", "kHz", "M", "(@1)")
-MARKS = (*"?;:,()\"'\\# \t\n\xb5", ";:", "(@", "\r\n")
-PIECES = st.sampled_from(HEADERS + PARAMETERS + MARKS)
-MESSAGES = st.one_of(
-    st.binary(),
-    st.text().map(str.encode),
-    st.lists(PIECES, max_size=30).map(lambda all_: "".join(all_).encode("latin-1")),
-)
-
-
-@settings(deadline=None, max_examples=300)
-@given(messages=st.lists(MESSAGES, max_size=25))
-def test_nothing_that_is_sent_breaks_an_instrument(messages):
-    clock = VirtualClock()
-    for device in (Virtual33500B(clock), Virtual53230A(clock, signal=no_light)):
-        for message in messages:
-            send(device, message)
-            queue = device.parser.errors
-            assert len(queue) <= 20
-            assert all(ENTRY.fullmatch(entry) for entry in queue)
-        send(device, b"\n")
-        cable(device).clear()
-        assert ask(device, "*CLS;*IDN?") == device.identity

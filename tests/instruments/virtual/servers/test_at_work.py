@@ -63,7 +63,7 @@ class Served:
         return resource
 
     def at_work(self):
-        return self.counter._work is not None and not self.counter._work.done
+        return self.counter.work is not None and not self.counter.work.done
 
     def ask_for_ever(self, way):
         """A client whose question is worked on without end."""
@@ -81,7 +81,9 @@ def serving(counter, clock):
 
 
 @pytest.fixture
-def served():
+def served(monkeypatch):
+    monkeypatch.setattr("instruments.virtual.bench.session.SLICE", 1e-3)  # a turn more often costs the test less
+    monkeypatch.setattr("instruments.virtual.servers.station.LINGER", 0.05)  # the work here never ends
     clock = WallClock()
     with serving(BusyCounter(clock), clock) as served:
         yield served  # the end of the server does not wait for the counter: it would wait for ever
@@ -213,6 +215,20 @@ def test_one_long_line_leaves_the_others_their_turn(monkeypatch):
     assert asyncio.run(turns_meanwhile()) >= 25_000
 
 
+def test_a_flood_of_triggers_does_not_keep_the_instrument_from_its_work(monkeypatch):
+    bench = Bench(monkeypatch)
+
+    async def trigger_meanwhile():
+        assert await bench.link().write(b"*RST;" * 100)
+        other = bench.link()
+        for _ in range(200):
+            other.trigger()
+            await asyncio.sleep(0)
+
+    asyncio.run(trigger_meanwhile())
+    assert bench.counter.resets == 100
+
+
 def test_empty_lines_leave_the_others_their_turn(monkeypatch):
     bench = Bench(monkeypatch)
 
@@ -220,7 +236,7 @@ def test_empty_lines_leave_the_others_their_turn(monkeypatch):
         link = bench.link()
         assert await link.write(b"\n" * (1 << 20))
         turns = 0
-        while not link._work.done():
+        while link.busy():
             await asyncio.sleep(0)
             turns += 1
         return turns
@@ -310,13 +326,13 @@ def test_a_message_that_comes_in_process_waits_for_the_one_before(monkeypatch):
     monkeypatch.setattr("instruments.virtual.bench.session.SLICE", -1.0)  # a slice is one step
     counter = Virtual53230A(VirtualClock(), signal=pulses)
     bus = Bus({COUNTER: counter})
-    slices = bus.open(COUNTER).slices(b"SAMP:COUN 2000;:READ?")
-    next(slices)
-    other = bus.open(COUNTER)
+    asking, other = bus.open(COUNTER), bus.open(COUNTER)
+    work = asking.begin("SAMP:COUN 2000;:READ?")
+    assert asking.go_on(work)
     other.write(b"SAMP:COUN?")
-    assert counter._work.done
+    assert not asking.go_on(work)
     assert other.read(100, 1e9)[0] == b"+2000\n"
-    assert list(slices) == []
+    assert asking.read(1 << 20, 1e9)[0].count(b",") == 1999
 
 
 def test_a_counter_that_was_not_asked_for_long_catches_up_in_slices(monkeypatch):
@@ -326,5 +342,8 @@ def test_a_counter_that_was_not_asked_for_long_catches_up_in_slices(monkeypatch)
     session = Bus({COUNTER: counter}).open(COUNTER)
     session.write(b"INP1:LEV:AUTO OFF;:INP1:LEV1 0.6;:INP1:COUP DC;:SAMP:COUN 1000000;:INIT")
     clock.sleep(1000.0)
-    assert sum(1 for _ in session.catch_up()) > 1
+    work = session.catch_up()
+    assert session.go_on(work)
+    while session.go_on(work):
+        pass
     assert counter._memory.held > 5000
