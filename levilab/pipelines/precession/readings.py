@@ -63,7 +63,10 @@ def sweep_readings(table: Table) -> Readings:
     """
     drive, precession = table.column("drive_frequency_hz"), table.column("precession_frequency_hz")
     if drive.size < FEWEST:
-        raise TableError(table.path, f"holds {drive.size} points, at least {FEWEST} are needed: sweep further")
+        raise TableError(
+            table.path,
+            f"holds {drive.size} point{'s' * (drive.size != 1)}, at least {FEWEST} are needed: sweep further",
+        )
     if drive.size > MOST_POINTS:
         raise TableError(
             table.path,
