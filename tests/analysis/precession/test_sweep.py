@@ -38,6 +38,8 @@ def test_the_median_line_has_the_median_of_all_slopes():
     robust = robust_line(DRIVE, precession)
     assert robust.slope.value == pytest.approx(np.median(slopes), rel=1e-12)
     assert robust.intercept.value == pytest.approx(np.median(precession - np.median(slopes) * DRIVE), rel=1e-9)
+    interval = stats.theilslopes(precession, DRIVE, alpha=0.6827)
+    assert robust.slope.interval == (pytest.approx(interval.low_slope), pytest.approx(interval.high_slope))
 
 
 @pytest.mark.parametrize(
@@ -70,6 +72,16 @@ def test_a_point_that_no_miscount_explains_stays_in_the_line():
 def test_noise_alone_is_no_miscount():
     fits = [fit_sweep(sweep(counted(seed), gate_s=2.0)) for seed in range(100)]
     assert all(point.used for fit in fits for point in fit.points)
+
+
+def test_counts_that_are_mostly_alike_have_a_line():
+    drive = np.array([30.0, 30.0, 30.0, 36.0, 30.0])
+    exact = fit_sweep(Sweep(drive, drive))
+    assert exact.line.slope == pytest.approx(1)
+    assert exact.p_locked is None
+    assert "nothing can be tested" in exact.warnings[-1]
+    many = np.append(np.full(2000, 30.0), [36.0, 37.0])
+    assert robust_line(many, many).slope.value == pytest.approx(1)
 
 
 # --- power ---
