@@ -15,6 +15,27 @@ class TooFewReadings(AnalysisError):
         super().__init__(f"{seen} usable readings, at least {needed} are needed: record longer or more often")
 
 
+class TooFewPulses(AnalysisError):
+    """Fewer pulses than a frequency and its slope need, or none that return regularly; duration [s]: of the record."""
+
+    def __init__(self, *, seen: int, needed: int, duration: float) -> None:
+        self.seen, self.needed, self.duration = seen, needed, duration
+        wanted = f", at least {needed} are needed" if seen < needed else " that do not return regularly"
+        super().__init__(
+            f"{seen} pulses in {duration:.3g} s{wanted}: record longer, or look at the trace: "
+            "does light reach the detector, is the trigger level inside the pulse?"
+        )
+
+
+class OnlyHum(TooFewPulses):
+    """Hum of the mains, and too few pulses or none."""
+
+    def __init__(self, *, seen: int, needed: int, duration: float) -> None:
+        super().__init__(seen=seen, needed=needed, duration=duration)
+        text = f"the trace holds hum of the mains, and in {duration:.3g} s no pulses that return regularly: "
+        self.args = (text + "shield the detector from lamps, and look at the trace",)
+
+
 class ShapesDiffer(AnalysisError):
     """Two columns of one table that do not have the same length, or are no columns at all."""
 
@@ -94,3 +115,78 @@ class NoRange(AnalysisError):
         super().__init__(
             f"all {seen} points are at a drive frequency of {at:g} Hz, a line needs several: sweep the drive"
         )
+
+
+class TooFewHeights(AnalysisError):
+    """A scan at too few heights to tell strength, origin and background apart.  lowest, highest: of those seen [m]."""
+
+    def __init__(self, *, seen: int, needed: int, lowest: float, highest: float) -> None:
+        self.seen, self.needed, self.lowest, self.highest = seen, needed, lowest, highest
+        span = f" (from {1e3 * lowest:.4g} to {1e3 * highest:.4g} mm)" if seen else ""
+        where = f" (all at {1e3 * lowest:.4g} mm)" if seen == 1 else span
+        super().__init__(
+            f"readings at {seen} height{'s' * (seen != 1)}{where}, at least {needed} are needed: "
+            "scan on, from below to above the place where the top floats"
+        )
+
+
+class FieldStandsStill(AnalysisError):
+    """A flux density that is the same at several heights.  low, high: of these heights [m]; value: of all [T]."""
+
+    def __init__(self, *, low: float, high: float, value: float) -> None:
+        self.low, self.high, self.value = low, high, value
+        super().__init__(
+            f"the flux density stays at {1e3 * value:.6g} mT from {1e3 * low:.4g} to {1e3 * high:.4g} mm, where it "
+            "must change: the probe is saturated, or not moved; choose a larger range or leave these readings out"
+        )
+
+
+class FieldTurnsOver(AnalysisError):
+    """A flux density that changes its sign where that of a ring does not.
+
+    low, high: heights between which it does [m]; reversal: where the base's own changes its sign [m].
+    """
+
+    def __init__(self, *, low: float, high: float, reversal: float) -> None:
+        self.low, self.high, self.reversal = low, high, reversal
+        super().__init__(
+            f"the flux density changes its sign between {1e3 * low:.4g} and {1e3 * high:.4g} mm, this base's does so "
+            f"at about {1e3 * reversal:.3g} mm: was the probe turned over in between, or not on the axis?"
+        )
+
+
+class NoField(AnalysisError):
+    """A scan in which the probe sees nothing of a base.  largest: of its readings, background_u: of their zero [T]."""
+
+    def __init__(self, *, largest: float, background_u: float) -> None:
+        self.largest, self.background_u = largest, background_u
+        super().__init__(
+            f"the flux density is nowhere above {1e3 * largest:.3g} mT, which zero and background alone may make "
+            f"(u = {1e3 * background_u:.2g} mT): is the base there, and was the probe zeroed in its chamber?"
+        )
+
+
+class ImpossibleRing(AnalysisError):
+    """Radii that no ring has."""
+
+    def __init__(self, *, inner: float, outer: float) -> None:
+        self.inner, self.outer = inner, outer
+        super().__init__(
+            f"inner radius {inner:g} m, outer radius {outer:g} m: 0 < inner < outer is expected; correct the radii"
+        )
+
+
+class NotFitted(AnalysisError):
+    """A search that did not end."""
+
+    def __init__(self, *, what: str, advice: str) -> None:
+        self.what = what
+        super().__init__(f"{what}: the fit did not converge; {advice}")
+
+
+class ImpossibleCylinder(AnalysisError):
+    """A part of a top with a value that no cylinder has."""
+
+    def __init__(self, *, part: str, quantity: str, seen: float, expected: str) -> None:
+        self.part, self.quantity, self.seen, self.expected = part, quantity, seen, expected
+        super().__init__(f"part {part}: {quantity} = {seen:g}, {expected} is expected: correct it")

@@ -106,8 +106,8 @@ def windows(field: AxialField, top: Symmetric, low: float, high: float) -> tuple
     places = [low] * bool(inside[0]) + [_edge(field, top, z[i], z[i + 1]) for i in edges] + [high] * bool(inside[-1])
     found = []
     for a, b in zip(places[::2], places[1::2], strict=True):
-        masses = [floating_mass(field, top, h) for h in np.linspace(a, b, 200)]
-        found.append(Window(a, b, min(masses), max(masses)))
+        masses = _masses(field, top, np.linspace(a, b, 200))
+        found.append(Window(a, b, float(masses.min()), float(masses.max())))
     return tuple(found)
 
 
@@ -125,9 +125,13 @@ def _sizes(field: AxialField, z: float) -> Array:
 
 def floating_mass(field: AxialField, top: Symmetric, height: float) -> float:
     """The mass [kg] that floats at a height: |μ||B′|/g; infinite where nothing weighs."""
+    return float(_masses(field, top, np.array([height]))[0])
+
+
+def _masses(field: AxialField, top: Symmetric, heights: Array) -> Array:
     if top.gravity == 0:
-        return math.inf
-    return abs(top.moment * float(field(np.array([height]))[1, 0])) / top.gravity
+        return np.full(heights.shape, math.inf)
+    return np.asarray(np.abs(top.moment * field(heights)[1]) / top.gravity)
 
 
 def reduced_mass(mass: float, top: Symmetric, radius: float, strength: float) -> float:

@@ -1,4 +1,4 @@
-"""Make the sample data: synthetic spin-downs and upper limits, and the ten published lower limits, as run folders.
+"""Make the sample data: spin-downs, limits, oscilloscope records, a scan and, on demand, a sweep, as run folders.
 
 The thesis prints the constants of four spin-downs, C₁ and C₂ of unweighted straight lines, but none of their
 readings.  These readings are made up so that they give those constants: the law of a laminar disc from about
@@ -7,6 +7,9 @@ return the published C₁ and C₂, rounded to 0.01 Hz.  They are not the author
 
 The upper limits are made up, too: a normal law about what the simulated bench gives (docs/experiments/limit.md), once
 of a sound top and once of one whose washers slip under the tape.
+
+The records and the scan are what `levilab acquire` writes on the virtual bench: their times and what differs between
+computers are left out.
 
 Run it from anywhere: ``python sample_data/make.py``.  It writes the same bytes each time.
 
@@ -26,6 +29,9 @@ from numpy.typing import NDArray
 from scipy.optimize import root
 
 from analysis.locked import slip_of
+from levilab.acquisition.loop import acquire
+from levilab.acquisition.request import AcquisitionOptions, request_for
+from levilab.present.progress import Mute
 
 HERE = Path(__file__).parent
 NOISE_HZ, STEP_S, DIGIT_HZ = 0.03, 10.0, 0.01
@@ -170,16 +176,12 @@ def write(folder: Path, header: str, rows: list[str], record: dict[str, Any]) ->
 
 def precession_sweep() -> None:
     """A sweep of the drive on the virtual bench, without the times of the day at which it was made."""
-    from levilab.acquisition.loop import acquire
-    from levilab.acquisition.request import AcquisitionOptions, request_for
-    from levilab.present.progress import to_stderr
-
     folder, seed = HERE / "precession-sweep", 1
     with tempfile.TemporaryDirectory() as out:
         bench = Path(out) / "bench.toml"
         bench.write_text("[precession]\nrecord_s = 6.0\n", encoding="utf-8")
         options = AcquisitionOptions(mock=True, bench=bench, out=Path(out), seed=seed)
-        run = acquire(request_for("precession", options), to_stderr())
+        run = acquire(request_for("precession", options), Mute())
         readings = run.readings().frame.round(6)
         write(
             folder,
@@ -204,8 +206,72 @@ def precession_sweep() -> None:
     print("precession-sweep")
 
 
+#: Name → the scene, None for a top that only spins; lines of the bench file; a note.
+TRACES: dict[str, tuple[str | None, str, str]] = {
+    "trace-tape": (None, "records = 5", "the tape of a top that spins down: five records, 10 s apart"),
+    "trace-laser": (
+        "driven",
+        "channels = [1, 3]\nshows = ['tape', 'laser']\ndrive_frequency_hz = 30.0\nrecords = 5\ninterval_s = 2.0",
+        "tape and laser of the thesis's driven top: five records, 2 s apart",
+    ),
+}
+
+
+def write_traces(name: str, scene: str | None, settings: str, note: str) -> None:
+    """A run folder with records of the oscilloscope, acquired on the virtual bench."""
+    with tempfile.TemporaryDirectory() as place:
+        bench = Path(place) / "bench.toml"
+        bench.write_text(f"[trace]\n{settings}\n", encoding="utf-8")
+        options = AcquisitionOptions(
+            mock=True, bench=bench, out=Path(place), seed=1, scene=scene, note=f"SYNTHETIC, {note}"
+        )
+        run = acquire(request_for("trace", options), Mute())
+        count = run.count()
+        shutil.rmtree(HERE / name, ignore_errors=True)
+        shutil.copytree(run.folder, HERE / name, ignore=shutil.ignore_patterns("datapackage.json", "run.lock"))
+    path = HERE / name / "run.json"
+    record = json.loads(path.read_text(encoding="utf-8"))
+    kept = ("limits", "oscilloscope", "generator", "scene", "trace")  # what the run has used
+    record["configuration"] = {key: value for key, value in record["configuration"].items() if key in kept}
+    record |= {"started_utc": None, "ended_utc": None, "time_zero_utc": None, "software": {}}
+    record["command_line"] = ["python", "sample_data/make.py"]
+    record["synthetic_how"] = "SYNTHETIC: " + record["synthetic_how"]
+    text = json.dumps(record, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
+    path.write_text(text, encoding="utf-8", newline="\n")
+    events = HERE / name / "events.jsonl"
+    if events.exists():
+        lines = [json.loads(line) for line in events.read_text(encoding="utf-8").splitlines()]
+        texts = [json.dumps({k: v for k, v in line.items() if k != "utc"}, ensure_ascii=False) for line in lines]
+        events.write_text("".join(f"{line}\n" for line in texts), encoding="utf-8", newline="\n")
+    print(f"{name}: {count} records")
+
+
+def from_the_virtual_bench(experiment: str, folder: str, seed: int, note: str) -> None:
+    """A run of the virtual bench, without what would differ from one making to the next."""
+    with tempfile.TemporaryDirectory() as out:
+        run = acquire(request_for(experiment, AcquisitionOptions(mock=True, out=Path(out), seed=seed)), Mute())
+        header, *rows = (run.folder / "readings.csv").read_text(encoding="utf-8").splitlines()
+    record = run.record
+    write(
+        HERE / folder,
+        header,
+        rows,
+        {
+            "experiment": experiment,
+            "started_utc": None,
+            "channels": record.channels,
+            "configuration": {experiment: record.configuration[experiment]},
+            "seed": seed,
+            "note": note,
+            "synthetic": True,
+            "synthetic_how": f"SYNTHETIC: {record.synthetic_how}; made by sample_data/make.py",
+        },
+    )
+    print(f"{folder}: {record.synthetic_how}")
+
+
 def main() -> None:
-    """Write the seven run folders."""
+    """Write the run folders."""
     for number, (c1, c2, n) in enumerate(PUBLISHED, start=1):
         t, nu, how = solve(c1, c2, n)
         write(
@@ -241,6 +307,9 @@ def main() -> None:
     )
     upper_limits("upper-limits", seed=1, loose=False)
     upper_limits("loose-washers", seed=2, loose=True)
+    for name, how_made in TRACES.items():
+        write_traces(name, *how_made)
+    from_the_virtual_bench("field", "field-scan", 11, "a base as in device.toml, heights set by hand to 0.2 mm")
 
 
 if __name__ == "__main__":

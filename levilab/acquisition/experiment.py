@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from levilab.acquisition.session import Session
     from levilab.bench.config import Limits
     from levilab.runs.channel import Channel
+    from levilab.simulator.scene import Scene
 
 
 class ExperimentSettings(Settings):
@@ -27,6 +28,10 @@ class ExperimentSettings(Settings):
 
     def check(self, table: str, limits: Limits) -> None:
         """Raise ConfigError for what the bench does not allow.  table: the name of these settings in the bench file."""
+
+    def for_scene(self, scene: Scene) -> Self:
+        """These settings for a virtual bench whose top is a scene's: what was not set may suit it better."""
+        return self
 
 
 class CounterSettings(ExperimentSettings):
@@ -63,9 +68,10 @@ S = TypeVar("S", bound=ExperimentSettings)
 class Experiment(Generic[S]):
     """An experiment.
 
-    about: one line; instruments: the kinds that it needs, in any case; settings: its table in the bench file; channels:
-    the columns that it writes, given its settings; run: carries it out; mock_scene: the scene of a mock unless another
-    is asked for, None: a top that only spins; more_instruments: the kinds that it needs besides, given its settings.
+    about: one line; instruments: the kinds that it needs; settings: its table in the bench file; channels: the columns
+    that it writes, given its settings; run: carries it out; also_needs: the kinds of instrument that it needs only
+    with some settings, given these; mock_scene: the scene of a mock unless another is asked
+    for, None: a top that only spins.
     """
 
     name: str
@@ -75,8 +81,8 @@ class Experiment(Generic[S]):
     channels: Callable[[S], tuple[Channel, ...]]
     run: Callable[[Session[S]], None]
     mock_scene: str | None = None
-    more_instruments: Callable[[S], tuple[str, ...]] = lambda _: ()
+    also_needs: Callable[[S], tuple[str, ...]] = lambda _: ()
 
-    def instruments_for(self, settings: S) -> tuple[str, ...]:
-        """The kinds that it needs with these settings."""
-        return (*self.instruments, *self.more_instruments(settings))
+    def kinds(self, settings: S) -> tuple[str, ...]:
+        """The kinds of instrument that it needs with these settings."""
+        return (*self.instruments, *self.also_needs(settings))

@@ -103,7 +103,7 @@ def _at_the_bench(
     earlier = _earlier(request)
     log = writer.wire if request.wire_log else None
     wiring = request.wiring()
-    with open_bench(wiring, experiment.instruments_for(settings), log=log, check=stop.check) as bench:
+    with open_bench(wiring, experiment.kinds(settings), log=log, check=stop.check) as bench:
         session: Session[Any] = Session(
             bench,
             settings,

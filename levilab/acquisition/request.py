@@ -31,12 +31,17 @@ if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
 
 HOW = (
-    "acquired on the virtual bench: the drivers are the real ones, the instruments wire-level models, the top {top}, "
+    "acquired on the virtual bench: the drivers are the real ones, the instruments wire-level models, {what}, "
     "and no real top was measured"
 )
 _ANEW = "correct it or start anew"
-_SPIN_ONLY = "a spin that decays by the {law}; drag and fall were drawn by the seed"
-_IN_MOTION = "that of the scene {name}, simulated in full motion"
+_SPIN_ONLY = "the top a spin that decays by the {law}; drag and fall were drawn by the seed"
+_BASE = (
+    "the base a ring of strength {strength_t_m:.6e} T m, radii {inner_radius_m:.6f} and {outer_radius_m:.6f} m, "
+    "thickness {thickness_m:.6f} m, its middle at {origin_m:+.6f} m, in a background of {background_t:+.3e} T, all "
+    "drawn by the seed"
+)
+_IN_MOTION = "the top that of the scene {name}, simulated in full motion"
 
 
 class CannotResume(LevilabError):
@@ -96,7 +101,7 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
         request = _on_the_virtual_bench(request, options)
     else:
         wiring = described_wiring(config)
-        for kind in EXPERIMENTS[experiment].instruments_for(settings_of(config, experiment)):
+        for kind in EXPERIMENTS[experiment].kinds(settings_of(config, experiment)):
             wiring.described(kind)
     if run:
         _check_readings(run, request)
@@ -209,10 +214,15 @@ def _on_the_virtual_bench(request: AcquisitionRequest, options: AcquisitionOptio
 
     if scene is None:
         return _with_a_spinning_top(request, drawn(seed), clock)
+    if run is None:
+        settings = settings_of(config, request.experiment).for_scene(scene)
+        settings.check(request.experiment, config.limits)
+        config = with_settings(config, request.experiment, settings)
     return replace(
         request,
+        config=config,
         wiring=lambda: virtual_wiring(scene_world(scene, clock, options.tell, seed=seed), config.limits),
-        synthetic_how=HOW.format(top=_IN_MOTION.format(name=scene.name)),
+        synthetic_how=HOW.format(what=_IN_MOTION.format(name=scene.name)),
         scene=scene.as_table(),
     )
 
@@ -229,8 +239,16 @@ def _with_a_spinning_top(
         request,
         config=config,
         wiring=lambda: virtual_wiring(SpinWorld(scene, clock()), config.limits),
-        synthetic_how=HOW.format(top=_SPIN_ONLY.format(law=_law_in_words(scene))),
+        synthetic_how=HOW.format(what=_world_in_words(scene, request.experiment)),
     )
+
+
+def _world_in_words(scene: SpinScene, experiment: str) -> str:
+    """What of the world an experiment measures."""
+    if "magnetometer" in EXPERIMENTS[experiment].instruments:
+        base = scene.base
+        return _BASE.format(**vars(base))
+    return _SPIN_ONLY.format(law=_law_in_words(scene))
 
 
 def _law_in_words(scene: SpinScene) -> str:

@@ -102,11 +102,12 @@ class Session(Generic[S]):
             wall = clock.wall_duration(left)
             clock.sleep(left * _NAP_S / wall if wall > _NAP_S else left)
 
-    def begin(self, start: Callable[[], None]) -> None:
+    def begin(self, start: Callable[[], None], *, resumed: str = "without driving again") -> None:
         """Bring the top to where reading begins: that moment is time zero.
 
         A resumed run is taken up where it was left, without starting again: a real top has gone on meanwhile; the one
         of a virtual bench is started once more, which is no event of the run, and left alone up to the last reading.
+        resumed: how it goes on, for the event of a resumed run.
         """
         if self.earlier is None:
             start()
@@ -121,7 +122,7 @@ class Session(Generic[S]):
         else:
             self.zero = self.bench.clock.now() - self.earlier.run.elapsed()
         count = len(self.rows)
-        self.event("resumed", f"resumed after {count} reading{'s' * (count != 1)}")
+        self.event("resumed", f"resumed after {count} reading{'s' * (count != 1)}, {resumed}")
 
     @contextlib.contextmanager
     def _replay(self) -> Iterator[None]:

@@ -21,6 +21,11 @@ class PlaceProbe(Task):
 
 
 @dataclass(frozen=True)
+class ShieldProbe(Task):
+    """The magnetometer's probe is to lie in its zero-gauss chamber."""
+
+
+@dataclass(frozen=True)
 class FloatTop(Task):
     """The top is to be spun by hand and to float.  number: how many tops of the series came before."""
 

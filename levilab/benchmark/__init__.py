@@ -1,1 +1,1 @@
-"""Speed against error: the simulator and other integrators on one motion, in one run."""
+"""Speed against error: our simulator and our pulse analysis, each beside what others would use."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -80,6 +81,7 @@ ANALYSIS_HELP = {
     "spindown": (
         "Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude."
     ),
+    "field": "The base from a Hall scan: strength, origin, thickness; heights, masses and spins of tops that float.",
     "limit": "Limits of the spin, lower and upper: mean, scatter, trend and outliers, beside the window of the top.",
     "precession": (
         "Precession against drive: slope and intercept, tested against a locked top, and what 1.05 would take."
@@ -114,8 +116,56 @@ def analyze_inputs(
     _write_and_print(context, results, save=save, out=out, as_json=as_json)
 
 
+def analyze_field(
+    context: typer.Context,
+    paths: Paths,
+    columns: Columns = "",
+    device: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Describes base and top, as sample_data/device.toml does; see levilab top."),
+    ] = None,
+    height: Annotated[
+        float | None,
+        typer.Option(metavar="MM", help="Where the top was seen to float: its moment follows, if its mass is known."),
+    ] = None,
+    height_u: Annotated[
+        float | None,
+        typer.Option(metavar="MM", help="Standard uncertainty of --height.", show_default="that of the scan's heights"),
+    ] = None,
+    free_radii: Annotated[
+        bool, typer.Option("--free-radii", help="Let the scan move the radii, too, within what the calliper says.")
+    ] = False,
+    save: Save = True,
+    out: ResultFolder = None,
+    as_json: Json = False,
+) -> None:
+    """Fit scans of the base's field, and work out what follows."""
+    from dataclasses import replace
+
+    from levilab.formats.device import read_device
+    from levilab.pipelines.catalogue import ANALYSES
+
+    for name, value, lowest in (("height", height, -1000.0), ("height_u", height_u, 0.0)):
+        if value is not None and not lowest <= value <= 2000.0:
+            raise UsageError(name, f"a number of millimetres from {lowest:g} to 2000 is expected", value=value)
+    if height_u is not None and height is None:
+        raise UsageError("height_u", "goes with `height` alone")
+    chosen = replace(
+        options(columns, None, "covariance", keep_outliers=False),
+        device=None if device is None else read_device(device),
+        height_m=None if height is None else height / 1000,
+        height_u_m=None if height_u is None else height_u / 1000,
+        free_radii=free_radii,
+    )
+    analysis = ANALYSES["field"]
+    _write_and_print(context, [(analysis, analysis.analyze(paths, chosen))], save=save, out=out, as_json=as_json)
+
+
+#: Analyses with options of their own.
+_OWN_COMMANDS: dict[str, Callable[..., None]] = {"field": analyze_field}
 for _name, _help in ANALYSIS_HELP.items():
-    analyze_app.command(_name, help=_help, epilog=f"Example: levilab analyze {_name} sample_data/")(analyze_inputs)
+    _command = _OWN_COMMANDS.get(_name, analyze_inputs)
+    analyze_app.command(_name, help=_help, epilog=f"Example: levilab analyze {_name} sample_data/")(_command)
 analyze_app.command(_EACH, help=_EACH_HELP, hidden=True, epilog="Example: levilab analyze sample_data/")(analyze_inputs)
 
 

@@ -10,7 +10,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from levilab.cli import crosscheck, exit_codes, report, simulate
+from levilab.cli import crosscheck, exit_codes, report, simulate, top
 from levilab.cli.acquire import acquire_app
 from levilab.cli.analyze import analyze_app
 from levilab.cli.bench import bench_app
@@ -31,6 +31,7 @@ app.add_typer(bench_app, name="bench")
 report.add_to(app)
 simulate.add_to(app)
 crosscheck.add_to(app)
+top.add_to(app)
 
 
 def _print_version(asked: bool) -> None:

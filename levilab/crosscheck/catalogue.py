@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
-from levilab.crosscheck.subjects import motion, spindown
+from levilab.crosscheck.subjects import field, motion, spindown
 
 #: Name → subject.
-SUBJECTS = MappingProxyType({subject.name: subject for subject in (spindown.SUBJECT, motion.SUBJECT)})
+SUBJECTS = MappingProxyType({subject.name: subject for subject in (spindown.SUBJECT, motion.SUBJECT, field.SUBJECT)})

@@ -8,7 +8,13 @@ from pathlib import Path
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.titles import CANONICAL, COMPANIONS, UNITS, Title, dimension, implied_unit, read_title, unit_factor
 
-SHORTHANDS = {"t": "time_s", "f": "spin_frequency_hz", "u": "spin_frequency_u_hz"}
+SHORTHANDS = {
+    "t": "time_s",
+    "f": "spin_frequency_hz",
+    "u": "spin_frequency_u_hz",
+    "z": "height_m",
+    "b": "flux_density_t",
+}
 
 
 class TableError(DataError):
@@ -100,7 +106,9 @@ def _wanted_columns(
     for key, title in wanted.items():
         name = SHORTHANDS.get(key, key)
         if name not in CANONICAL:
-            raise TableError(path, f"`columns` cannot set '{shown(key)}'; it sets t, f, u or {', '.join(CANONICAL)}")
+            raise TableError(
+                path, f"`columns` cannot set '{shown(key)}'; it sets {', '.join(SHORTHANDS)} or {', '.join(CANONICAL)}"
+            )
         index = _find(header, title.strip())
         if index is None and (with_unit := re.fullmatch(r"(.+?)\s*\[([^\[\]]+)\]\s*", title)):
             index = _find(header, with_unit[1].strip())

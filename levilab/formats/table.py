@@ -79,10 +79,14 @@ def read_table(
         header, wanted, warnings = _titles(path, layout, columns or {})
         chosen, doubts = choose_columns(path, header, layout.units, wanted, quantities)
         if not chosen:
-            known = "time_s, spin_frequency_hz, t, f [Hz], rpm …"
+            short = [key for key, name in SHORTHANDS.items() if name in quantities and not name.endswith("_u_hz")]
+            known = ", ".join(
+                [*(name for name in quantities if name not in COMPANIONS), "t, f [Hz], rpm, z [mm], B [mT] …"]
+            )
             raise NoSuchColumn(
                 path,
-                f"no title is known ({known}) among {listed(header)}: say `columns` = t=NAME,f=NAME",
+                f"no title is known ({known}) among {listed(header)}: say `columns` = "
+                + ",".join(f"{key}=NAME" for key in short[:2]),
                 line=layout.header_line or layout.first_line,
             )
         rows = read_rows(path, layout, chosen)
@@ -145,7 +149,7 @@ def parse_columns(text: str) -> dict[str, str]:
         raise ColumnsError("columns", expected, value=f"'{shown(text)}'")
     unknown = [name for name in found if name not in {*SHORTHANDS, *CANONICAL}]
     if unknown:
-        what = f"'{shown(unknown[0])}' is no quantity known here; t, f and u are, as t=Zeit,f=3"
+        what = f"'{shown(unknown[0])}' is no quantity known here; {', '.join(SHORTHANDS)} are, as t=Zeit,f=3"
         raise ColumnsError("columns", what)
     return found
 

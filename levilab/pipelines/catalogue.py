@@ -7,6 +7,13 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from levilab.errors import DoesNotSuit, unquoted
+from levilab.pipelines.field.analysis import NEEDS as FIELD_NEEDS
+from levilab.pipelines.field.analysis import FieldAnalysis, analyze_scans
+from levilab.pipelines.field.document import as_document as field_document
+from levilab.pipelines.field.document import recall_scans
+from levilab.pipelines.field.document import save_result as save_field
+from levilab.pipelines.field.report import field_part
+from levilab.pipelines.field.table import field_tables
 from levilab.pipelines.limit.analysis import NEEDS as LIMIT_NEEDS
 from levilab.pipelines.limit.analysis import LimitAnalysis, analyze_limits
 from levilab.pipelines.limit.document import limit_document, recall_limits, save_limits
@@ -101,6 +108,13 @@ def _spindown_svg(analysis: SpinDownAnalysis) -> str:
     return as_svg(spindown_figure(analysis))
 
 
+def _field_svg(analysis: FieldAnalysis) -> str:
+    from levilab.pipelines.field.figure import field_figure  # with matplotlib
+    from levilab.present.style import as_svg
+
+    return as_svg(field_figure(analysis))
+
+
 def _limit_svg(analysis: LimitAnalysis) -> str:
     from levilab.pipelines.limit.figure import limit_figure  # with matplotlib
     from levilab.present.style import as_svg
@@ -125,6 +139,16 @@ _TABLE: tuple[Analysis[Any], ...] = (
         spindown_tables,
         _spindown_svg,
         spindown_part,
+    ),
+    Analysis[FieldAnalysis](
+        FIELD_NEEDS,
+        analyze_scans,
+        recall_scans,
+        field_document,
+        save_field,
+        field_tables,
+        _field_svg,
+        field_part,
     ),
     Analysis[LimitAnalysis](
         LIMIT_NEEDS,

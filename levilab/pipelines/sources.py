@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from analysis.spindown.lawfit import Uncertainty
+    from levilab.formats.device import Device
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,8 @@ class Options:
 
     columns: the data file's own names; reading_u: of every reading [Hz], in the place of what the data say;
     bootstrap_samples, seed: of the bootstrap, where it is asked for; orthogonal: a line with uncertainties along both
-    axes.
+    axes.  Of scans of a field: device: what calliper and data sheet say; height_m, height_u_m: where the top was seen
+    to float; free_radii: let the scan move the radii.
     """
 
     columns: Mapping[str, str] | None = None
@@ -34,6 +36,10 @@ class Options:
     bootstrap_samples: int = 1000
     seed: int = 0
     orthogonal: bool = False
+    device: Device | None = None
+    height_m: float | None = None
+    height_u_m: float | None = None
+    free_radii: bool = False
 
 
 class Readings(Protocol):

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 class Listed:
     """One run in the list.  length_s: from the first to the last reading or state; problem: why it cannot be read.
 
-    states, scene: of a simulation, 0 and empty for what was measured.
+    states, scene: of a simulation, 0 and empty for what was measured; records: of the oscilloscope, where each has a
+    reading.
     """
 
     path: str
@@ -36,11 +37,14 @@ class Listed:
     problem: str = ""
     states: int = 0
     scene: str = ""
+    records: int = 0
 
     @property
     def size(self) -> str:
         """How much there is, in words where it is not readings."""
-        return f"{self.states} states" if self.states else str(self.readings)
+        if self.states:
+            return f"{self.states} states"
+        return f"{self.records} records" if self.records else str(self.readings)
 
 
 def list_runs(root: Path) -> list[Listed]:
@@ -71,6 +75,7 @@ def _listed(folder: Path) -> Listed:
         note=run.record.note,
         states=int(_number(simulation, "states")),
         scene=str(_table(run.record.configuration, "scene").get("name", "")),
+        records=len(frame) if frame is not None and "record" in frame else 0,
     )
 
 

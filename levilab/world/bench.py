@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from instruments.clock import VirtualClock
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from instruments.clock import Clock
+    from instruments.virtual.counter.edges import Thresholds
     from levilab.simulator.scene import Scene
     from levilab.world.spin_world import Array, World
 
@@ -46,9 +48,24 @@ COIL_T_PER_V = 0.4e-3 / 5.0
 Maker = Callable[["World"], VirtualInstrument]
 
 
+@dataclass(frozen=True)
+class Light:
+    """The light of a world as the signal of a counter, which has the times of its edges without a trace."""
+
+    world: World
+
+    def __call__(self, start: float, step: float, n: int) -> Array:
+        """See `World.light`."""
+        return self.world.light(start, step, n)
+
+    def crossings(self, start: float, stop: float, triggers: Thresholds) -> Array | None:
+        """See `World.crossings`."""
+        return self.world.crossings(start, stop, triggers)
+
+
 def at_the_light(model: Callable[..., VirtualInstrument]) -> Maker:
     """A counter: its input 1 is connected to the phototransistor that sees the tape, 2 to the laser's."""
-    return lambda world: model(world.clock, signal=world.light, second=world.laser)
+    return lambda world: model(world.clock, signal=Light(world), second=world.laser)
 
 
 def at_the_coil(model: Callable[..., VirtualInstrument]) -> Maker:

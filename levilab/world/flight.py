@@ -17,7 +17,7 @@ from levilab.simulator.start import start_of
 from levilab.world.timeline import History
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from levilab.simulator.scene import Scene
     from levilab.simulator.trajectory import Trajectory
@@ -42,7 +42,8 @@ class _Up:
 
     scene: with the drive; state: where it begins, shape (18,); step: of the integration [s]; times [s], turns of the
     tape and, as part of them, turns of the washers that it is on beside the top, shape (n,) each; stem: displacement of
-    the stem along x [m] and its rate [m/s] then, shape (2, n).
+    the stem along x [m] and its rate [m/s] then, shape (2, n); lift: height of the rim towards x above the base [m]
+    then, shape (n,).
     """
 
     scene: Scene
@@ -52,6 +53,7 @@ class _Up:
     turns: Array
     slips: Array
     stem: NDArray[np.float32]
+    lift: NDArray[np.float32]
 
     @property
     def start(self) -> float:
@@ -136,6 +138,41 @@ class Flight:
                 turns[part], up[part] = np.interp(times[part], piece.times, piece.turns), True
         return turns, up
 
+    def tape(self, times: Array) -> tuple[Array, Array, Array]:
+        """What is to be known of the light, shape (n,) each, as the times.
+
+        Turns as above; their rate [Hz], 0 without a top; height of the rim above the base where the fixed spot is [m].
+        """
+        self.look(float(times.max(initial=0.0)))
+        turns, rate, lift = np.zeros_like(times), np.zeros_like(times), np.zeros_like(times)
+        for piece, part in self._pieces.pieces(times):
+            if isinstance(piece, _Up):
+                turns[part], rate[part] = np.interp(times[part], piece.times, piece.turns), _rate(piece)
+                lift[part] = np.interp(times[part], piece.times, piece.lift)
+        return turns, rate, lift
+
+    def first_lift(self) -> float:
+        """The mean of this height over the first second without a drive, in which a top bobs once or more [m]."""
+        self.look(0.0)
+        piece = self._pieces.at(0.0)
+        return float(piece.lift.mean()) if isinstance(piece, _Up) else self._scene.start.position_m[2]
+
+    def passages(self, place: Callable[[float], float], start: float, stop: float) -> Array:
+        """When the tape's turn has a place in [0, 1) between two times [s], increasing, shape (n,) [s].
+
+        place: given the rate of turns [Hz].
+        """
+        self.look(stop)
+        found = [np.empty(0)]
+        for piece, end in self._pieces.between(start, stop):
+            if isinstance(piece, _Up) and piece.times.size > 1:
+                turns, at = piece.turns, place(_rate(piece))
+                whole = np.arange(math.floor(turns[0]) - 1, math.ceil(turns[-1]) + 1) + at
+                whole = whole[(whole >= turns[0]) & (whole < turns[-1])]
+                times = np.interp(whole, turns, piece.times)
+                found.append(times[(times >= start) & (times < min(stop, end))])
+        return np.concatenate(found)
+
     def stem(self, times: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Displacement of the stem along x [m], and whether there is a top; shape (n,) each, as the times.
 
@@ -176,7 +213,8 @@ class Flight:
         # of the states only the first is kept: a bench may run for hours
         slips = self._slip + _slips(motion)
         self._slip = float(slips[-1])
-        seen = (motion.time.copy(), _turns(motion) + slips, slips, _stem(motion, self._stem_height))
+        stem = _stem(motion, self._stem_height)
+        seen = (motion.time.copy(), _turns(motion) + slips, slips, stem, _lift(motion))
         self._pieces.append(begin, _Up(self._scene, state, motion.accuracy.step, *seen))
         if motion.fell is not None:
             self._fall(motion.fell.time)
@@ -230,6 +268,18 @@ def _turns(motion: Trajectory) -> Array:
     arm, place = motion.states[:, ARM], motion.position
     spot = np.arctan2(-place[:, 1], motion.scene.top.magnet_radius_m - place[:, 0])
     return np.asarray(np.unwrap(np.arctan2(arm[:, 1], arm[:, 0]) - spot) / (2 * np.pi))
+
+
+def _rate(piece: _Up) -> float:
+    """The mean rate of turns in a piece [Hz], which wobble and drag change by some per cent of it."""
+    if piece.times.size < 2:
+        return 1.0
+    return float((piece.turns[-1] - piece.turns[0]) / (piece.times[-1] - piece.times[0]))
+
+
+def _lift(motion: Trajectory) -> NDArray[np.float32]:
+    """Height of the rim towards x above the base, shape (n,) [m]: it bobs with the top and is tilted with it."""
+    return np.asarray(motion.position[:, 2] - motion.scene.top.magnet_radius_m * motion.axis[:, 0], dtype=np.float32)
 
 
 def _stem(motion: Trajectory, height: float) -> NDArray[np.float32]:

@@ -13,10 +13,14 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from instruments.virtual.counter.edges import Thresholds
+
 Array = NDArray[np.float64]
 
 #: The laser's light is worked out so often [s]: of a wobble at 42 Hz a straight line in between misses 6e-4.
 GRID_S = 2.5e-4
+#: Nothing against a pulse [s].
+_CLOSE_S = 1e-6
 #: Noise is drawn so often [s].
 NOISE_S = 5e-6
 #: Of erfcc in Numerical Recipes, from the constant on.
@@ -36,28 +40,104 @@ _ERFC = (
 
 @dataclass(frozen=True)
 class Tape:
-    """A strip of tape under a lamp.
+    """A strip of white tape on the rim, a lamp beside it, a lens, and a phototransistor on which the lens shows it.
 
-    width: of its light pulse, FWHM in turns; dark, bright: voltage without and at the tape [V]; noise: of the voltage,
-    1σ [V].
+    width: of its light pulse, FWHM in turns; dark, bright: voltage without the tape, and at a tape in the middle of
+    what the lens shows [V], which differ by the gain; saturation: greatest voltage [V]; bandwidth_hz: of the
+    phototransistor, one pole; view_m: how far above or below the middle the tape has 1/e² of its light; ripple: of the
+    lamp's light at twice the frequency of the mains, in parts of it; noise: of the voltage, 1σ [V].
     """
 
     width: float = 0.03
     dark: float = 0.1
     bright: float = 1.2
+    saturation: float = 4.8
+    bandwidth_hz: float = 10e3
+    view_m: float = 0.010
+    ripple: float = 0.0
+    mains_hz: float = 50.0
     noise: float = 0.01
 
-    def light(self, turns: Array, spinning: NDArray[np.bool_], start: float, seed: int) -> Array:
-        """The phototransistor's voltage, shape (n,) [V]: a Gaussian pulse in the middle of every turn.
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of the pulse in turns."""
+        return self.width / math.sqrt(8 * math.log(2))
 
-        turns: since the tape was opposite to the lamp; spinning: where there is a top; start: the time of the first
-        [s], with the seed that of the noise.
+    @property
+    def delay(self) -> float:
+        """Time constant of the phototransistor [s]: so much later comes a pulse that is long against it."""
+        return 1 / (2 * math.pi * self.bandwidth_hz)
+
+    def height(self, lift: Array) -> Array:
+        """The share of the pulse that a tape has so far above the middle of what the lens shows [m], shape (n,)."""
+        return np.asarray(np.exp(-2 * (lift / self.view_m) ** 2))
+
+    def pulse(self, turns: Array, rate: Array) -> Array:
+        """The pulses behind the phototransistor's pole, shape (n,): a Gaussian of height 1 in the middle of every turn.
+
+        turns: since the tape was opposite to the lamp; rate: of turns [Hz], 0: there is no top.  A Gaussian behind a
+        pole is an exponentially modified one, √(π/2) q exp(−u²/2) erfcx((q − u)/√2) at u σ behind its middle, q = σ/τ.
         """
-        sigma = self.width / np.sqrt(8 * np.log(2))
+        late = self.delay * np.maximum(rate, 0.0)
         place = turns - np.floor(turns) - 0.5
-        pulse = np.exp(-0.5 * (place / sigma) ** 2) * spinning
-        noise = np.random.default_rng((seed, round(start * 1e6) % (1 << 63))).standard_normal(turns.size) * self.noise
-        return np.asarray(self.dark + (self.bright - self.dark) * pulse + noise)
+        answer = np.zeros(turns.shape)
+        tail = 6 * self.sigma + 16 * float(late.max(initial=0.0))
+        for turns_ago in range(1 + math.floor(tail + 0.5)):  # what is left of the pulses before
+            behind = place + turns_ago
+            near = np.flatnonzero((behind > -6 * self.sigma) & (behind < tail) & (rate > 0))
+            answer[near] += _behind_a_pole(behind[near] / self.sigma, self.sigma / late[near])
+        return answer
+
+    def clean(self, turns: Array, rate: Array, times: Array, height: Array | float = 1.0) -> Array:
+        """The voltage without its noise at these times [s], shape (n,) [V]; height: see above."""
+        light = self.dark + (self.bright - self.dark) * height * self.pulse(turns, rate)
+        if self.ripple:
+            light = light * (1 + self.ripple * np.sin(4 * math.pi * self.mains_hz * times))
+        return np.minimum(light, self.saturation)
+
+    def noise_at(self, times: Array, seed: int) -> Array:
+        """What is to be added to it, shape (n,) [V]."""
+        return self.noise * noise(times, (seed, 1))
+
+    # --- the times of the pulses, without a trace ---
+
+    def offset(self, triggers: Thresholds, rate: float, least: float = 1.0) -> float | None:
+        """Where a trigger fires about the middle of a turn [turns], to 1e-3 of a turn.
+
+        rate: of turns [Hz]; least: height of the lowest pulse.  None where it does not fire once a turn for certain, or
+        nobody can say where without a trace: a level in the noise, near the top of a pulse or above saturation, a
+        hysteresis smaller than the noise, ripple, a phototransistor slower than the pulse.
+        """
+        margin, share = 5 * self.noise, (triggers.fire - self.dark) / (self.bright - self.dark)
+        low, high = min(triggers.fire, triggers.arm), max(triggers.fire, triggers.arm)
+        top = min(self.dark + (self.bright - self.dark) * least * 0.9, self.saturation)
+        behind = self.delay * rate
+        certain = low > self.dark + margin and high < top - margin and high - low > 3.9 * self.noise
+        if not certain or self.ripple or not behind < 0.3 * self.sigma < 0.03:
+            return None
+        return behind - triggers.sign * self.sigma * math.sqrt(-2 * math.log(share))
+
+    def crossing(self, near: Array, clean: Callable[[Array], Array], level: float, seed: int) -> Array:
+        """When the voltage crosses a level [V], from times near that [s], shape (n,) [s]; clean: the voltage then.
+
+        Newton's method on the clean voltage; noise then moves the crossing by what it is over the slope.
+        """
+        for _ in range(2):
+            three = near + np.array([[-_CLOSE_S], [0.0], [_CLOSE_S]])
+            before, here, after = clean(three.T.ravel()).reshape(-1, 3).T
+            slope = (after - before) / (2 * _CLOSE_S)
+            near = near - (here - level) / slope
+        return near - self.noise_at(near, seed) / slope
+
+
+def _behind_a_pole(u: Array, q: Array) -> Array:
+    """A Gaussian exp(−u²/2) behind a pole whose time constant is 1/q of its σ, shape (n,)."""
+    z = (q - u) / math.sqrt(2)
+    t = 1 / (1 + 0.5 * np.abs(z))
+    scaled = np.exp(-0.5 * u * u) * t * np.exp(np.polynomial.polynomial.polyval(t, _ERFC))
+    # erfc(z) = 2 − erfc(−z) behind the pulse
+    tail = 2 * np.exp(np.minimum(q * (0.5 * q - u), 0.0)) - scaled
+    return np.asarray(math.sqrt(math.pi / 2) * q * np.where(z < 0, tail, scaled))
 
 
 @dataclass(frozen=True)

@@ -23,12 +23,13 @@ from levilab.world.spin_world import KEPT_S
 
 if TYPE_CHECKING:
     from instruments.clock import Clock
+    from instruments.virtual.counter.edges import Thresholds
     from instruments.virtual.generator.channel import Output
     from levilab.simulator.scene import Scene
 
 Array = NDArray[np.float64]
 
-#: Where the magnetometer's probe stands: about where a top floats [m above the base].
+#: Where the magnetometer's probe stands at first: about where a top floats [m above the base].
 PROBE_M = 0.072
 
 #: A drive that is faster than this moves no top, but would make the steps short [Hz].
@@ -77,8 +78,9 @@ class MotionWorld:
         self._coil, self._flight = Coil(), Flight(scene, again_s, stem_height_m=self._laser.height_m)
         self._tape_at = float(np.random.default_rng(seed).uniform()) if seed else 0.0
         self._told = 0.0  # the last time that a change was told for [s]
-        probe = np.array([[0.0, 0.0, PROBE_M]])
-        self._probe_t = float(flux_density(base_field(scene), probe)[0, 2])
+        self._aim_m = self._flight.first_lift()  # where the lens looks
+        self._base = base_field(scene)
+        self.place_probe(PROBE_M)
 
     def drive(self, time: float, output: Output) -> None:
         """From this time on the coil's field is this; see World."""
@@ -122,8 +124,31 @@ class MotionWorld:
     def light(self, start: float, step: float, n: int) -> Array:
         """The phototransistor's voltage; see World."""
         self._forget()
-        turns, up = self._flight.turns(start + step * np.arange(n, dtype=np.float64))
-        return self._tape.light(turns + self._tape_at, up, start, self._seed)
+        times = start + step * np.arange(n, dtype=np.float64)
+        return self._clean(times) + self._tape.noise_at(times, self._seed)
+
+    def _clean(self, times: Array) -> Array:
+        turns, rate, lift = self._flight.tape(times)
+        return self._tape.clean(turns + self._tape_at, rate, times, self._tape.height(lift - self._aim_m))
+
+    def crossings(self, start: float, stop: float, triggers: Thresholds) -> Array | None:
+        """See World: the pieces of the motion are asked when the tape has the place at which the trigger fires."""
+        self._forget()
+        around = 2e-4  # noise, and a pulse of another height, move a crossing by less
+        passed = self._flight.passages(lambda _: (0.5 - self._tape_at) % 1.0, start, stop)
+        least = float(self._tape.height(self._flight.tape(passed)[2] - self._aim_m).min(initial=1.0))
+
+        def place(rate: float) -> float:
+            offset = self._tape.offset(triggers, rate, least)
+            unknown.append(offset is None)
+            return (0.5 + (offset or 0.0) - self._tape_at) % 1.0
+
+        unknown: list[bool] = []
+        near = self._flight.passages(place, start - around, stop + around)
+        if any(unknown):
+            return None
+        found = self._tape.crossing(near, self._clean, triggers.fire, self._seed)
+        return np.asarray(found[(found >= start) & (found < stop)])
 
     def laser(self, start: float, step: float, n: int) -> Array:
         """The voltage of the laser's phototransistor; see World."""
@@ -137,3 +162,8 @@ class MotionWorld:
     def flux_density(self, time: float) -> float:
         """The base's field where the probe stands; the coil's lies across it, and the top's is left out."""
         return self._probe_t
+
+    def place_probe(self, height_m: float | None) -> None:
+        """Put the probe there, exactly; see World."""
+        place = np.array([[0.0, 0.0, height_m or 0.0]])
+        self._probe_t = 0.0 if height_m is None else float(flux_density(self._base, place)[0, 2])

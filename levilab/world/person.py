@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from levilab.bench.person import FloatTop
+from levilab.bench.person import FloatTop, PlaceProbe, ShieldProbe
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -31,5 +31,20 @@ def _float_top(world: World, task: Task) -> str:
     return ""
 
 
+def _place_probe(world: World, task: Task) -> str:
+    assert isinstance(task, PlaceProbe)
+    world.place_probe(task.height_m)
+    return ""
+
+
+def _shield_probe(world: World, task: Task) -> str:  # noqa: ARG001 - as all deeds are done
+    world.place_probe(None)
+    return ""
+
+
 #: Kind of task → what is done in the world; returns the answer.
-_DEEDS: dict[type[Task], Callable[[World, Task], str]] = {FloatTop: _float_top}
+_DEEDS: dict[type[Task], Callable[[World, Task], str]] = {
+    FloatTop: _float_top,
+    PlaceProbe: _place_probe,
+    ShieldProbe: _shield_probe,
+}

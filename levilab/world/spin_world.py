@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 
 from instruments.virtual.generator.voltage import fundamental
 from levilab.simulator.spin import DECAYS
+from levilab.world.base import Base, Stand, drawn_base
 from levilab.world.coil import Coil
 from levilab.world.light import Laser, Tape
 from levilab.world.timeline import History
 
 if TYPE_CHECKING:
     from instruments.clock import Clock
+    from instruments.virtual.counter.edges import Thresholds
     from instruments.virtual.generator.channel import Output
 
 Array = NDArray[np.float64]
@@ -29,8 +31,9 @@ Array = NDArray[np.float64]
 #: back.
 KEPT_S = 15_000.0
 
-#: Flux density [T] of the thesis's base on its axis at 7.2 cm.
-BASE_FIELD = 0.0190937938
+#: When the turn number is looked at to find pulses [s], and how far beyond the times that are asked for: noise and the
+#: jitter may move a pulse across their ends.
+_LOOK_S, _AROUND_S = 0.01, 0.02
 
 
 class World(Protocol):
@@ -43,6 +46,9 @@ class World(Protocol):
 
     def light(self, start: float, step: float, n: int) -> Array:
         """The phototransistor's voltage at start + step·k, shape (n,) [V]."""
+
+    def crossings(self, start: float, stop: float, triggers: Thresholds) -> Array | None:
+        """When a trigger fires in the light from start to stop [s], shape (m,); None: only the light itself can say."""
 
     def laser(self, start: float, step: float, n: int) -> Array:
         """The voltage of the phototransistor behind the stem at start + step·k, shape (n,) [V]."""
@@ -57,7 +63,10 @@ class World(Protocol):
         """The coil's field at start + step·k, shape (n,) [T]."""
 
     def flux_density(self, time: float) -> float:
-        """What a magnetometer's probe at the place of the top sees, along the base's axis [T]."""
+        """What a magnetometer's probe sees, along the base's axis [T]."""
+
+    def place_probe(self, height_m: float | None) -> None:
+        """Put the magnetometer's probe on the axis, so high above the base, or (None) into its zero-gauss chamber."""
 
 
 @dataclass(frozen=True)
@@ -69,9 +78,9 @@ class SpinScene:
     1 on, and again from the first of them; none: as the first top; lock_torque: the greatest angular acceleration per
     tesla of drive [rad s⁻² T⁻¹], the dipole's transverse part over I₃, half of it because half of a field along one
     line turns with the top; tape: what the phototransistor sees; laser: the beam beside the stem; jitter: scatter of a
-    pulse's place, in turns, 1σ (0.0212 makes 0.03 Hz of a reading over 1 s); base_field_t: the base's field at the
-    probe, which stands where the top would float, 7.2 cm above the thesis's base; again_s: so long after a fall
-    the top is put back, None: it is not [s].
+    pulse's place, in turns, 1σ (0.0212 makes 0.03 Hz of a reading over 1 s); base: the magnet below it; stand: where
+    the probe is at first, about where a top floats; again_s: so long after a fall the top is put back, None: it is not
+    [s].
     """
 
     start_hz: float = 30.0
@@ -83,7 +92,8 @@ class SpinScene:
     tape: Tape = field(default_factory=Tape)
     laser: Laser = field(default_factory=Laser)
     jitter: float = 0.03 / math.sqrt(2)
-    base_field_t: float = BASE_FIELD
+    base: Base = field(default_factory=Base)
+    stand: Stand = field(default_factory=Stand)
     again_s: float | None = None
     seed: int = 0
 
@@ -101,7 +111,7 @@ def drawn(seed: int, scene: SpinScene | None = None) -> SpinScene:
     """The scene of one run: constants and fall scattered as between the thesis's runs, by the seed.
 
     The four published constants scatter by 2 %, the ten published lower limits by 0.25 Hz, whether they are of several
-    runs or of one.
+    runs or of one; the base is `drawn_base`'s, and a probe is put in its place to 0.2 mm.
     """
     scene = scene or SpinScene()
     scatter = np.random.default_rng(seed).standard_normal(1 + _SERIES)
@@ -110,6 +120,8 @@ def drawn(seed: int, scene: SpinScene | None = None) -> SpinScene:
         constants=tuple(c * (1 + 0.02 * float(scatter[0])) for c in scene.constants),
         fall_hz=scene.fall_hz + 0.25 * float(scatter[1]),
         later_falls_hz=tuple((scene.fall_hz + 0.25 * scatter[2:]).tolist()),
+        base=drawn_base(seed),
+        stand=replace(scene.stand, scatter_m=2e-4, seed=seed),
         seed=seed,
     )
 
@@ -142,7 +154,7 @@ class SpinWorld:
         self.scene, self.clock = scene, clock
         self._decay = DECAYS[scene.drag]
         self._jitter = np.random.default_rng((scene.seed, 1)).standard_normal(1 << 16) * scene.jitter
-        self._coil = Coil()
+        self._coil, self._stand, self._probe_t = Coil(), scene.stand, scene.stand.sees(scene.base)
         self._drive_spin, self._hold = 0.0, 0.0  # [rad/s], [rad/s²]
         self._told = 0.0  # the last time that a change was told for [s]
         first = _Stretch(0.0, 2 * math.pi * scene.start_hz, 0.0, "coasts")
@@ -259,10 +271,35 @@ class SpinWorld:
 
     def light(self, start: float, step: float, n: int) -> Array:
         """The phototransistor's voltage; see :class:`World`."""
-        spin, angle = self.motion(start + step * np.arange(n, dtype=np.float64))
+        times = start + step * np.arange(n, dtype=np.float64)
+        return self._clean(times) + self.scene.tape.noise_at(times, self.scene.seed)
+
+    def _clean(self, times: Array) -> Array:
+        spin, angle = self.motion(times)
         turns = angle / (2 * math.pi)
-        late = self._jitter[np.floor(turns).astype(np.int64) % self._jitter.size]
-        return self.scene.tape.light(turns - late, spin > 0, start, self.scene.seed)
+        return self.scene.tape.clean(turns - self._late(np.floor(turns)), spin / (2 * math.pi), times)
+
+    def _late(self, turn: Array) -> Array:
+        """How late the pulse of each turn comes [turns]."""
+        return np.asarray(self._jitter[turn.astype(np.int64) % self._jitter.size])
+
+    def crossings(self, start: float, stop: float, triggers: Thresholds) -> Array | None:
+        """See :class:`World`: the motion is asked when the turn number has the place at which the trigger fires.
+
+        That needs a look each 10 ms, some for each pulse, and no trace.
+        """
+        times = np.arange(start - _AROUND_S, stop + _AROUND_S + _LOOK_S, _LOOK_S)
+        spin, angle = self.motion(times)
+        turns, rate = angle / (2 * math.pi), float(spin.max()) / (2 * math.pi)
+        offset = self.scene.tape.offset(triggers, rate)
+        if offset is None:
+            return None
+        whole = np.arange(math.floor(turns[0]) - 1.0, math.ceil(turns[-1]) + 1.0)
+        place = whole + 0.5 + self._late(whole) + offset
+        found = np.interp(place, turns, times)[(place > turns[0]) & (place < turns[-1])]
+        found = self.scene.tape.crossing(found, self._clean, triggers.fire, self.scene.seed)
+        spin, _ = self.motion(found)
+        return np.asarray(found[(found >= start) & (found < stop) & (spin > 0)])
 
     def laser(self, start: float, step: float, n: int) -> Array:
         """The voltage of the laser's phototransistor; see :class:`World`.
@@ -277,4 +314,9 @@ class SpinWorld:
 
     def flux_density(self, time: float) -> float:
         """The base's field; the coil's lies across the axis, and the probe does not see it."""
-        return self.scene.base_field_t
+        return self._probe_t
+
+    def place_probe(self, height_m: float | None) -> None:
+        """Put the probe there; see :class:`World`."""
+        self._stand = self._stand.at(height_m)
+        self._probe_t = self._stand.sees(self.scene.base)

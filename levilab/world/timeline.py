@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_left, bisect_right
 from typing import TYPE_CHECKING, Generic, TypeVar
 
@@ -61,6 +62,11 @@ class History(Generic[T]):
         stale = bisect_right(self._starts, before) - 1
         if stale >= _AT_ONCE:
             del self._starts[:stale], self._items[:stale]
+
+    def between(self, start: float, stop: float) -> Iterator[tuple[T, float]]:
+        """What holds at some time from start to stop, with the time at which it ends."""
+        low, high = max(bisect_right(self._starts, start) - 1, 0), bisect_left(self._starts, stop)
+        yield from zip(self._items[low:high], [*self._starts[low + 1 : high + 1], math.inf], strict=False)
 
     def pieces(self, times: Array) -> Iterator[tuple[T, slice]]:
         """What holds at these times, shape (n,), piece by piece: an item and which of the times are its."""

@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-#: The voltage at an input: (start [s], step [s], n) → shape (n,) [V].
+#: The voltage at an input: (start [s], step [s], n) → shape (n,) [V].  One may have a method `crossings` beside, which
+#: gives the times at which a trigger fires: (start [s], stop [s], thresholds) → shape (m,) [s], or None if only the
+#: voltage can tell.
 Signal = Callable[[float, float, int], Array]
 
 #: Samples per second with which the models look at the light.  A pulse of 3 % of a turn at 60 Hz lasts
@@ -124,6 +126,7 @@ class EdgeFinder:
     def __init__(self, signal: Signal, entry: Input, start: float) -> None:
         self._signal, self._entry, self._start = signal, entry, start
         self._samples = 0
+        self._ask: Callable[[float, float, Thresholds], Array | None] | None = getattr(signal, "crossings", None)
         self._stride = _SHORTEST
         self._last: Array = np.empty(0)
         self._armed = False
@@ -161,14 +164,31 @@ class EdgeFinder:
         count = min(max(wish, self._stride), _LONGEST, left)
         if count <= 0:
             return False
+        times = self._crossings(count)
+        if times is None:
+            times = self._crossings_seen(count)
+        # darkness is looked through in ever longer pieces
+        self._stride = _SHORTEST if times.size else min(2 * self._stride, _LONGEST)
+        self._times = np.concatenate((self._times, times))
+        self._samples += count
+        return True
+
+    def _crossings(self, count: int) -> Array | None:
+        """What a signal itself says of its edges in so many samples, None if it cannot."""
+        if self._ask is None:
+            return None
+        begin = self._start + max(self._samples - 1, 0) / RATE
+        times = self._ask(begin, self._start + (self._samples + count - 1) / RATE, self._triggers)
+        if times is not None:
+            self._last, self._armed = np.empty(0), False
+        return times
+
+    def _crossings_seen(self, count: int) -> Array:
+        """The edges in so many samples of the voltage."""
         voltage = self._signal(self._start + self._samples / RATE, 1 / RATE, count)
         joined = self._triggers.sign * np.concatenate((self._last, voltage))
         sign = self._triggers.sign
         places, self._armed = _fires(joined, sign * self._triggers.fire, sign * self._triggers.arm, armed=self._armed)
         times = self._start + (self._samples - self._last.size + places) / RATE
-        # darkness is looked through in ever longer pieces
-        self._stride = _SHORTEST if times.size else min(2 * self._stride, _LONGEST)
-        self._times = np.concatenate((self._times, times))
         self._last = voltage[-1:]
-        self._samples += count
-        return True
+        return times

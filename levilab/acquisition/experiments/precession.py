@@ -111,7 +111,7 @@ class PrecessionSettings(DriveSettings):
                 )
 
 
-def more_instruments(settings: PrecessionSettings) -> tuple[str, ...]:
+def also_needs(settings: PrecessionSettings) -> tuple[str, ...]:
     """The oscilloscope is needed for records only."""
     return ("oscilloscope",) if settings.record_s else ()
 
@@ -152,7 +152,7 @@ def run(session: Session[PrecessionSettings]) -> None:
             "the virtual bench has no person who could change the counter's cable (precession.laser_input = 1): take 2"
         )
     prepare_counter(session)
-    session.begin(lambda: None)
+    session.begin(lambda: None, resumed="the top is driven up anew")
     place = _Place(_points_done(session.rows, settings.sweep))
     while place.next < len(settings.sweep) and place.lost < _MOST_LOST and not _is_over(session):
         try:
@@ -391,5 +391,5 @@ EXPERIMENT = Experiment(
     channels=channels,
     run=run,
     mock_scene="precession",
-    more_instruments=more_instruments,
+    also_needs=also_needs,
 )

@@ -213,9 +213,9 @@ class SettingsPart(Part):
     @property
     def options(self) -> Options:
         """The same as options."""
-        drawn: dict[str, Any] = {}
-        if self.bootstrap:
-            drawn = {"bootstrap_samples": self.bootstrap.samples, "seed": self.bootstrap.seed}
+        drawn: dict[str, Any] = (
+            {"bootstrap_samples": self.bootstrap.samples, "seed": self.bootstrap.seed} if self.bootstrap else {}
+        )
         return Options(self.columns or None, self.reading_u_hz, self.uncertainty, self.keep_outliers, **drawn)
 
 

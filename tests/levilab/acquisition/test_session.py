@@ -22,8 +22,9 @@ from levilab.bench.person import PlaceProbe
 from levilab.errors import DataError
 from levilab.runs.channel import Channel
 from levilab.runs.run import Run
+from levilab.world.base import Base
 from levilab.world.bench import virtual_wiring
-from levilab.world.spin_world import BASE_FIELD, SpinScene, SpinWorld
+from levilab.world.spin_world import SpinScene, SpinWorld
 from support.acquisitions import Silent
 
 if TYPE_CHECKING:
@@ -100,7 +101,8 @@ def test_an_experiment_of_another_shape_writes_what_it_declares(request_of_a_sca
     frame = run.readings().frame
     assert list(frame) == [channel.name for channel in CHANNELS]  # light_v is a name of this experiment alone
     assert frame["height_m"].tolist() == [0.05, 0.06, 0.07]
-    assert frame["flux_density_t"].to_numpy() == pytest.approx(BASE_FIELD, rel=1e-3)
+    field = [Base().flux_density(height) for height in (0.05, 0.06, 0.07)]  # the person has moved the probe
+    assert frame["flux_density_t"].to_numpy() == pytest.approx(field, rel=1e-3)
     assert frame["light_v"].between(0.0, 1.3).all()
 
 

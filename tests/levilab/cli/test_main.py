@@ -81,11 +81,11 @@ def test_no_save_writes_nothing_and_out_writes_there(levilab: Command, tmp_path:
 
 
 def test_an_analysis_need_not_be_named(levilab: Command, sample_data: Path) -> None:
-    run = sample_data / "spin-down-1"
-    named = levilab("analyze", "spindown", run, "--no-save")
-    assert levilab("analyze", run, "--no-save").stdout == named.stdout
-    assert levilab("analyze", "--no-save", run).stdout == named.stdout
-    assert json.loads(levilab("analyze", run, "--no-save", "--json").stdout)["analysis"] == "spindown"
+    runs = [sample_data / "spin-down-1", sample_data / "spin-down-2"]
+    named = levilab("analyze", "spindown", *runs, "--no-save")
+    assert levilab("analyze", *runs, "--no-save").stdout == named.stdout
+    assert levilab("analyze", "--no-save", *runs).stdout == named.stdout
+    assert json.loads(levilab("analyze", *runs, "--no-save", "--json").stdout)["analysis"] == "spindown"
     assert "Did you mean 'spindown'?" in levilab("analyze", "spindwon", check=2).stderr
 
 
@@ -131,7 +131,7 @@ def test_two_files_in_a_folder_have_a_result_each_that_the_report_reads(levilab:
 def test_what_does_not_belong_to_the_analysis_is_a_message_and_no_warning(levilab: Command, sample_data: Path) -> None:
     done = levilab("analyze", "spindown", sample_data, "--no-save")
     assert "passed over" not in done.stdout
-    assert done.stderr == "passed over: 3 limit runs\npassed over: 1 precession run\n"
+    assert "passed over: 3 limit runs\n" in done.stderr
     assert "time [s]" in done.stdout
 
 

@@ -69,6 +69,20 @@ def test_a_value_without_an_uncertainty_is_no_pull():
     [
         ("spindown", 1, {"newton c2", "start frequency", "exponent", "fall"}),
         ("motion", 1, {"disc c32", "exponent", "fall"}),
+        (
+            "field",
+            1,
+            {
+                "strength",
+                "origin",
+                "background",
+                "lowest height",
+                "mass to set",
+                "fastest spin",
+                "moment",
+                "mass by height",
+            },
+        ),
     ],
 )
 def test_a_trial_goes_through_drivers_and_analysis(tmp_path, name, seed, quantities):

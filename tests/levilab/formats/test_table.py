@@ -243,7 +243,7 @@ def test_an_unreadable_file_is_told(error, words, table_file, monkeypatch):
 
 
 def test_a_missing_column_is_told_with_those_there_are(table_file):
-    with pytest.raises(TableError, match=r"height_m; it has 't', 'f': say `columns` = height_m=NAME"):
+    with pytest.raises(TableError, match=r"height_m; it has 't', 'f': say `columns` = z=NAME"):
         read_table(table_file(GOOD)).column("height_m")
 
 

@@ -5,8 +5,8 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import erf
 
-from instruments.virtual.counter.edges import crossings
-from levilab.world.light import Laser, error_function, low_pass, noise
+from instruments.virtual.counter.edges import Thresholds, crossings
+from levilab.world.light import Laser, Tape, error_function, low_pass, noise
 
 TURN = 2 * np.pi
 
@@ -32,6 +32,55 @@ def test_a_pole_answers_a_step_exponentially_however_coarse_the_samples():
     times = step * np.arange(1, 11)
     expected = 1 - tau / step * np.exp(-(times - step) / tau) * -np.expm1(-step / tau)
     np.testing.assert_allclose(low_pass(signal, step, corner)[3:], expected, rtol=1e-12)
+
+
+# --- the tape ---
+
+
+@pytest.mark.parametrize("bandwidth", [10e3, 400.0, 15.0])
+def test_a_pulse_behind_the_phototransistor_is_the_convolution(bandwidth):
+    tape, hertz = Tape(bandwidth_hz=bandwidth), 30.0
+    tau = 1 / (TURN * bandwidth)
+    turns = np.linspace(-0.5, 0.499, 60)
+
+    def behind(turn):
+        late = lambda s: np.exp(-0.5 * ((((turn - hertz * s) % 1) - 0.5) / tape.sigma) ** 2) * np.exp(-s / tau) / tau  # noqa: E731
+        stops = [s for k in range(-1, 5) if (s := (turn - 0.5 + k) / hertz) > 0]
+        reach = 14 * tau
+        return quad(late, 0, reach, points=[s for s in stops if s < reach] or None, limit=200, epsabs=1e-9)[0]
+
+    expected = [behind(turn) for turn in turns]
+    # the error function's 1.2e-7, times q; and what a fourteenth part of 15 Hz leaves behind, e^-14
+    np.testing.assert_allclose(tape.pulse(turns, np.full(60, hertz)), expected, atol=3e-6)
+
+
+def test_a_pulse_is_as_long_as_the_tape_is_wide_and_comes_late_by_the_pole():
+    tape = Tape(width=0.05)
+    turns = np.linspace(0, 1, 1_000_001)
+    bright = np.flatnonzero(tape.pulse(turns, np.full(turns.shape, 40.0)) > 0.5)
+    # late by τ; the pole makes it longer by (τ/σ)²/2, 4e-4
+    assert np.ptp(bright) * 1e-6 == pytest.approx(0.05, rel=1e-3)
+    assert bright.mean() * 1e-6 == pytest.approx(0.5 + 40.0 * tape.delay, abs=2e-6)
+
+
+def test_the_voltage_saturates_and_has_the_lamps_ripple():
+    turns = np.full(2001, 0.5)
+    times = np.linspace(0.0, 0.1, 2001)
+    at_rest = {"bandwidth_hz": 1e9, "noise": 0.0}
+    bright = Tape(saturation=1.0, **at_rest).clean(turns, np.ones(2001), times)
+    np.testing.assert_allclose(bright, 1.0)
+    rippled = Tape(ripple=0.2, **at_rest).clean(turns, np.ones(2001), times)
+    np.testing.assert_allclose(rippled, 1.2 * (1 + 0.2 * np.sin(TURN * 100.0 * times)), rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("tape", "fire"),
+    [(Tape(), 0.12), (Tape(), 1.17), (Tape(noise=0.02), 0.6), (Tape(ripple=0.1), 0.6), (Tape(bandwidth_hz=50.0), 0.6)],
+    ids=["in the noise", "at the top", "much noise", "ripple", "slow"],
+)
+def test_where_a_trigger_fires_is_not_said_where_only_the_trace_can(tape, fire):
+    assert tape.offset(Thresholds(fire, fire - 0.04), 30.0) is None
+    assert Tape().offset(Thresholds(0.6, 0.56), 30.0) is not None
 
 
 # --- noise ---

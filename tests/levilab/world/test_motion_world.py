@@ -7,15 +7,16 @@ import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
-from instruments.virtual.counter.edges import crossings
+from instruments.virtual.counter.edges import Thresholds, crossings
 from instruments.virtual.generator.channel import Burst, Output
 from instruments.virtual.generator.voltage import fundamental
 from levilab.errors import LeftRange, SimulationError
 from levilab.simulator import SceneError, preset, simulate
+from levilab.world.base import Base
 from levilab.world.flight import RATE, Flight
 from levilab.world.light import Tape
 from levilab.world.motion_world import MotionWorld
-from levilab.world.spin_world import BASE_FIELD, KEPT_S
+from levilab.world.spin_world import KEPT_S
 
 TURN = 2 * math.pi
 TILTED = preset("tilted")
@@ -248,7 +249,7 @@ def test_the_drive_takes_hold_of_the_top():
 
 
 def test_the_light_is_one_pulse_a_turn_and_dark_without_a_top():
-    top = world(tape=Tape(noise=0.0))
+    top = world(tape=Tape(noise=0.0, view_m=1.0))  # a view so wide that every pulse has its whole height
     light = top.light(0.0, 1e-5, 100_000)
     assert (light.min(), light.max()) == pytest.approx((0.1, 1.2), abs=0.01)
     rises, falls = (np.flatnonzero(np.diff((light > 0.65).astype(int)) == sign) for sign in (1, -1))
@@ -256,6 +257,29 @@ def test_the_light_is_one_pulse_a_turn_and_dark_without_a_top():
     # 3 % of a turn; the wobble makes it 4 % longer or shorter
     np.testing.assert_allclose((falls[1:-1] - rises[1:-1]) * 1e-5, 0.03 / 30.0, rtol=0.06)
     assert np.all(top.light(-1.0, 1e-4, 1000) == 0.1)
+
+
+def test_a_pulse_is_lower_while_the_tape_bobs_out_of_the_lenss_view():
+    light = world(tape=Tape(noise=0.0, view_m=0.005)).light(0.0, 2e-5, 100_000)
+    starts = np.flatnonzero((light[1:] > 0.3) & (light[:-1] <= 0.3))
+    tops = np.array([k + np.argmax(light[k : k + 100]) for k in starts])
+    motion = simulate(TILTED, 2.0, rate=2000.0)
+    rim = motion.position[:, 2] - TILTED.top.magnet_radius_m * motion.axis[:, 0]
+    height = np.exp(-2 * ((np.interp(2e-5 * tops, motion.time, rim) - rim[motion.time < 1.0].mean()) / 0.005) ** 2)
+    # the pole takes (τ/σ)²/2 = 7e-4 of a pulse; states are 2.5 ms apart: 2.8 % of the rim's 0.4 mm at 30 Hz
+    np.testing.assert_allclose(light[tops], 0.1 + 1.1 * height, atol=0.01)
+    assert np.ptp(light[tops]) > 0.2  # IC1 bobs by 2 mm
+
+
+def test_the_times_of_the_pulses_are_those_that_the_light_shows():
+    top = world(FALLING.changed({"start.spin_hz": 21.0}), again_s=1.0, seed=5, tape=Tape(noise=0.0, view_m=1.0))
+    top.drive(0.7, Output("SIN", 21.0, 4e-4, 0.0))
+    seen = 5e-5 * crossings(top.light(0.0, 5e-5, 80_000), 0.6, 0.04)
+    said = np.concatenate([top.crossings(a, a + 0.37, Thresholds(0.6, 0.56)) for a in 0.37 * np.arange(11)])
+    assert said.size > 20
+    np.testing.assert_allclose(said[said < 4.0], seen, atol=2e-6)  # straight between samples
+    narrow = world(tape=Tape(view_m=0.003))
+    assert narrow.crossings(0.0, 1.0, Thresholds(0.6, 0.56)) is None  # IC1 bobs half out of the lens's view
 
 
 def test_the_seed_chooses_where_on_the_rim_the_tape_is():
@@ -272,9 +296,13 @@ def test_the_noise_is_as_large_as_asked_for_and_another_with_another_seed():
 
 
 def test_the_probe_sees_the_field_of_the_scenes_base():
-    assert world().flux_density(0.0) == pytest.approx(BASE_FIELD, rel=1e-8)
-    twice = TILTED.changed({"base.strength_t_m": 2 * TILTED.base.strength_t_m})
-    assert world(twice).flux_density(5.0) == pytest.approx(2 * BASE_FIELD, rel=1e-8)
+    assert world().flux_density(0.0) == pytest.approx(0.0190937938, rel=1e-8)
+    twice = world(TILTED.changed({"base.strength_t_m": 2 * TILTED.base.strength_t_m}))
+    assert twice.flux_density(5.0) == pytest.approx(2 * 0.0190937938, rel=1e-8)
+    twice.place_probe(0.05)
+    assert twice.flux_density(5.0) == pytest.approx(2 * Base().flux_density(0.05), rel=1e-12)
+    twice.place_probe(None)
+    assert twice.flux_density(5.0) == 0.0
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from instruments.clock import VirtualClock
-from instruments.virtual.counter.edges import crossings
+from instruments.virtual.counter.edges import Thresholds, crossings
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.generator.channel import Burst, Output
 from instruments.virtual.generator.voltage import fundamental, voltage
@@ -243,6 +243,24 @@ def test_light_depends_on_what_is_asked_and_on_nothing_else():
     np.testing.assert_array_equal(top.light(5.0, 5e-5, 2_000), first)
     # a shorter look is the beginning of a longer one
     np.testing.assert_array_equal(top.light(5.0, 5e-5, 500), first[:500])
+
+
+@pytest.mark.parametrize(("tape", "close"), [(Tape(noise=0.0), 2e-6), (Tape(), 6e-5)], ids=["quiet", "noisy"])
+@pytest.mark.parametrize("triggers", [Thresholds(0.6, 0.56), Thresholds(0.3, 0.34, -1.0)], ids=["rising", "falling"])
+def test_the_times_of_the_pulses_are_those_that_the_light_shows(tape, close, triggers):
+    top = world(replace(drawn(3), tape=tape, again_s=5.0))
+    drive(top, 10.0, "SIN", 30.5, FIELD)  # coasts, is pulled and held, and coasts again
+    off(top, 12.0)
+    fall = next(t for t in np.arange(12.0, 300.0, 0.5) if spin_hz(top, t) == 0.0)
+    for start, length in ((9.0, 4.0), (fall - 2.0, 8.0)):
+        sign = triggers.sign
+        voltage = top.light(start, 5e-5, round(length / 5e-5))
+        seen = start + 5e-5 * crossings(sign * voltage, sign * triggers.fire, 0.04)
+        said = top.crossings(start, start + length, triggers)
+        # straight between samples: 1 µs; noise: four times 10 mV over the slope of 0.7 V in 1 ms
+        np.testing.assert_allclose(said, seen, atol=close)
+        parts = [top.crossings(start + k * length / 7, start + (k + 1) * length / 7, triggers) for k in range(7)]
+        np.testing.assert_allclose(np.concatenate(parts), said, atol=1e-9)
 
 
 def test_the_same_seed_makes_the_same_light_and_another_seed_another():

@@ -62,3 +62,33 @@ def test_edges_found_in_pieces_are_those_of_the_whole(voltage, level, hysteresis
         found.append((edge.count, edge.time))
     assert [count for count, _ in found] == list(range(len(whole)))
     np.testing.assert_allclose([time * RATE for _, time in found], whole, rtol=1e-12, atol=1e-9)
+
+
+def test_a_signal_that_knows_its_edges_is_not_sampled_while_it_does():
+    edges = np.arange(0.01, 4.0, 0.04)
+
+    class Known:
+        sampled = 0
+
+        def __call__(self, start, step, n):
+            self.sampled += n
+            return np.sin(2 * np.pi * ((start + step * np.arange(n) - 0.01) / 0.04))
+
+        def crossings(self, start, stop, triggers):
+            return edges[(edges >= start) & (edges < stop)] if stop < 2.0 else None
+
+    signal = Known()
+    finder = EdgeFinder(signal, Input(0.0, 0.1, 0.02), 0.0)
+    found, at = [], 0.0
+    while at < 3.0:
+        if (edge := finder.find(at)) is None:
+            assert signal.sampled == 0 or finder.reached > 1.9
+            finder.look(at, 4.0)
+        else:
+            found.append(edge)
+            at = edge.time + 1e-6
+    assert signal.sampled > 0
+    assert [edge.count for edge in found] == list(range(len(found)))
+    np.testing.assert_allclose(
+        [edge.time for edge in found], edges[: len(found)], atol=2e-6
+    )  # straight between samples

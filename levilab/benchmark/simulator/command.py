@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
-from levilab.benchmark.work_precision import Comparison, as_document, compare
+from levilab.benchmark.simulator.work_precision import Comparison, as_document, compare
 from levilab.files import CannotWrite, replace_atomically
 from levilab.present.terminal import new_table, terminal
 
@@ -31,7 +31,7 @@ def run_and_tell(*, quick: bool, out: Path | None, as_json: bool) -> None:
 
 def _write(found: Comparison, document: str, out: Path) -> None:
     # matplotlib, which a benchmark that is not written does not need
-    from levilab.benchmark.figure import work_precision_figure
+    from levilab.benchmark.simulator.figure import work_precision_figure
     from levilab.present.style import save_png
 
     try:

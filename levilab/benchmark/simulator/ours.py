@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from levilab.benchmark import motion
-from levilab.benchmark.peers import Point, best_time, error_of
+from levilab.benchmark.simulator import motion
+from levilab.benchmark.simulator.peers import Point, best_time, error_of
 from levilab.simulator.kernels.lanes import LANES, advance_many, numbers_of
 from levilab.simulator.model import model_of
 from levilab.simulator.problem import Problem

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 import numba
 import numpy as np
 
-from levilab.benchmark import motion
-from levilab.benchmark.peers import best_time
+from levilab.benchmark.simulator import motion
+from levilab.benchmark.simulator.peers import best_time
 from levilab.simulator.schemes import SCHEMES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from levilab.benchmark.peers import Point
+    from levilab.benchmark.simulator.peers import Point
 
 #: Floating-point operations in a stage (a drift and a kick of an aligned top in the field to r²), counted in the
 #: machine code of the loop: 57 multiplications, 52 fused multiply-adds as two each, 7 additions, 2 divisions, 2 roots.

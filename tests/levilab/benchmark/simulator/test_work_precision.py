@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from levilab.benchmark import motion
-from levilab.benchmark.command import print_comparison
-from levilab.benchmark.kernel import Rate
-from levilab.benchmark.ours import problem
-from levilab.benchmark.peers import PEERS, Peer, Point
-from levilab.benchmark.work_precision import Comparison, as_document, best_speed, ratios
+from levilab.benchmark.simulator import motion
+from levilab.benchmark.simulator.command import print_comparison
+from levilab.benchmark.simulator.kernel import Rate
+from levilab.benchmark.simulator.ours import problem
+from levilab.benchmark.simulator.peers import PEERS, Peer, Point
+from levilab.benchmark.simulator.work_precision import Comparison, as_document, best_speed, ratios
 from levilab.simulator.single import simulate
 
 POINTS = (

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from levilab.present.style import STYLE
 
 if TYPE_CHECKING:
-    from levilab.benchmark.work_precision import Comparison
+    from levilab.benchmark.simulator.work_precision import Comparison
 
 #: Methods that are drawn: colour, marker, line, name beside the line.
 LINES = {

@@ -6,16 +6,16 @@ import math
 import platform
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
-from levilab.benchmark import kernel, ours
-from levilab.benchmark.peers import PEERS
+from levilab.benchmark.machine import processor, version_of
+from levilab.benchmark.simulator import kernel, ours
+from levilab.benchmark.simulator.peers import PEERS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from levilab.benchmark.peers import Point
+    from levilab.benchmark.simulator.peers import Point
 
 ROUNDS = 3
 #: What is to be compared: ours, the peer, the error [m], and the ratio that was aimed at.
@@ -128,7 +128,7 @@ def as_document(found: Comparison) -> dict[str, Any]:
         "motion": "undriven, IC1, 30 Hz, 25.26 g, 5 s; error: largest component of the place at the end",
         "measured_utc": datetime.now(UTC).isoformat(timespec="seconds"),
         "machine": {"processor": processor(), "system": platform.system(), "python": platform.python_version()},
-        "software": {name: _version(name) for name in ("levilab", "numba", "numpy", "scipy", "heyoka")},
+        "software": {name: version_of(name) for name in ("levilab", "numba", "numpy", "scipy", "heyoka")},
         "points": [
             {"method": p.method, "setting": p.setting, "error_m": _finite(p.error), "simulated_s_per_s": p.speed}
             for p in found.points
@@ -148,22 +148,6 @@ def as_document(found: Comparison) -> dict[str, Any]:
         "kernel": {name: asdict(rate) for name, rate in found.rates.items()},
         "missing": list(found.missing),
     }
-
-
-def processor() -> str:
-    """The processor's name, as far as the system tells it."""
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as file:  # noqa: PTH123 - no file of ours
-            return next(line.partition(":")[2].strip() for line in file if line.startswith("model name"))
-    except (OSError, StopIteration):
-        return platform.processor() or platform.machine()
-
-
-def _version(name: str) -> str | None:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return None
 
 
 def _finite(value: float) -> float | None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from levilab.benchmark import motion
+from levilab.benchmark.simulator import motion
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

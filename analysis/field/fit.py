@@ -1,0 +1,525 @@
+"""A scan of the base's field on its axis → strength, origin, thickness, with what the calliper says beside.
+
+The readings are fitted with the closed form of `analysis.field.ring` and a background that is the same everywhere (the
+probe's zero, the earth's field).  What the calliper and the instrument's data sheet say are Gaussian residuals beside
+those of the readings, so that the covariance holds all that is known.  An uncertainty of height counts by the slope of
+the field there (effective variance: Orear, Am. J. Phys. 50, 912 (1982)).
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analysis.errors import (
+    FieldStandsStill,
+    FieldTurnsOver,
+    ImpossibleRing,
+    NoField,
+    NotFinite,
+    NotFitted,
+    NotPositive,
+    ShapesDiffer,
+    TooFewHeights,
+)
+from analysis.field.ring import Ring, on_axis, reversal, slopes
+from analysis.least_squares import solve
+from analysis.residuals import durbin_watson, gross_errors, runs_test_p, studentised
+from analysis.uncertainty import Estimate, curvature
+
+Array = NDArray[np.float64]
+
+#: The parameters in the order of the covariance, and their units.
+UNITS: Mapping[str, str] = {
+    "strength": "T m",
+    "origin": "m",
+    "thickness": "m",
+    "background": "T",
+    "inner_radius": "m",
+    "outer_radius": "m",
+}
+PARAMETERS = tuple(UNITS)
+_RADII = ("inner_radius", "outer_radius")
+#: Strength, origin, thickness and background: fewer heights tell nothing of the model.
+FEWEST_HEIGHTS = 4
+#: Heights closer than this are one [m]: no stand is set better.
+_SAME_HEIGHT = 1e-5
+#: The effective variance follows the slope; after so many turns it has settled to 1e-6.
+_MOST_TURNS = 8
+#: A field below so many u of the background is none.
+_NO_FIELD = 5.0
+#: A χ² less probable than this: the model, or the stated uncertainty, is wrong.
+NO_FIT = 1e-3
+#: A χ² so far below its expectation: what the stated uncertainties hold is mostly common to all readings.
+_TOO_GOOD = 1e-4
+#: What the scan leaves of the calliper's uncertainty when it says nothing of a quantity, and how far apart two may lie.
+LEARNS_NOTHING, APART = 0.9, 3.0
+#: Where no prior says how thick the ring is, the search begins at this part of its inner radius.
+_START_THICKNESS = 0.3
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is known before the scan.  value; u: standard uncertainty, 0: it is exact."""
+
+    value: float
+    u: float
+
+
+@dataclass(frozen=True)
+class Known:
+    """What calliper and data sheet say.
+
+    inner_radius, outer_radius [m]; origin: height of the middle of the thickness, thickness [m], None: not known;
+    background: what all readings are off by [T]; gain_u: relative standard uncertainty of the instrument's scale.
+    """
+
+    inner_radius: Prior
+    outer_radius: Prior
+    origin: Prior | None = None
+    thickness: Prior | None = None
+    background: Prior = Prior(0.0, 5e-5)
+    gain_u: float = 0.0
+
+    def prior(self, name: str) -> Prior | None:
+        """Of a parameter; None where nothing is known."""
+        found: Prior | None = getattr(self, name, None)
+        return found
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """How well the model fits.
+
+    n: readings; n_parameters: fitted; rms_residual [T]; chi_square: of readings and priors, None where no uncertainty
+    of the readings was given; degrees_of_freedom: readings and priors less parameters; durbin_watson, runs_test_p: of
+    the residuals in the order of the heights.
+    """
+
+    n: int
+    n_parameters: int
+    rms_residual: float
+    chi_square: float | None
+    degrees_of_freedom: int
+    durbin_watson: float | None
+    runs_test_p: float | None
+
+    @property
+    def reduced_chi_square(self) -> float | None:
+        """χ² per degree of freedom."""
+        return self.chi_square / self.degrees_of_freedom if self.chi_square and self.degrees_of_freedom else None
+
+
+@dataclass(frozen=True, eq=False)
+class FieldScan:
+    """A scan and its fit.
+
+    Attributes:
+        parameters: name → estimate, those of PARAMETERS.
+        covariance: in the order of PARAMETERS, shape (6, 6).
+        fitted: the parameters that the scan could move; radii that are held have the calliper's uncertainty, which the
+            others' hold, too.
+        known: what was known before.
+        statistics: how well the model fits.
+        height: of the readings, rising [m], shape (n,).
+        flux_density: of the readings [T], shape (n,).
+        u: of a reading against the model, that of its height included [T], shape (n,).
+        warnings: what to know before using the numbers.
+    """
+
+    parameters: Mapping[str, Estimate]
+    covariance: Array
+    fitted: tuple[str, ...]
+    known: Known
+    statistics: Statistics
+    height: Array
+    flux_density: Array
+    u: Array
+    warnings: tuple[str, ...] = field(default=())
+
+    @cached_property
+    def values(self) -> Array:
+        """The parameters in their order, shape (6,)."""
+        return np.array([self.parameters[name].value for name in PARAMETERS], dtype=float)
+
+    @property
+    def ring(self) -> Ring:
+        """The base."""
+        return _ring(self.values)
+
+    def model(self, height: Array) -> Array:
+        """Flux density as fitted, background included, at heights of shape (n,) [T]."""
+        return np.asarray(on_axis(self.ring, height)[0] + self.values[3])
+
+    @property
+    def residuals(self) -> Array:
+        """Reading less model [T], shape (n,)."""
+        return self.flux_density - self.model(self.height)
+
+    def correlation(self, one: str, other: str) -> float:
+        """Of two parameters."""
+        i, j = PARAMETERS.index(one), PARAMETERS.index(other)
+        size = math.sqrt(self.covariance[i, i] * self.covariance[j, j])
+        return float(self.covariance[i, j]) / size if size else 0.0
+
+    def learned(self, name: str) -> float | None:
+        """What is left of the uncertainty that a parameter had before the scan, 0 to 1; None where there was none."""
+        prior, u = self.known.prior(name), self.parameters[name].u
+        return None if prior is None or not prior.u or u is None else u / prior.u
+
+
+def _ring(values: Array) -> Ring:
+    strength, origin, thickness, _, inner, outer = (float(value) for value in values)
+    return Ring(strength, origin, thickness, inner, outer)
+
+
+def fit_scan(
+    height: ArrayLike,
+    flux_density: ArrayLike,
+    known: Known,
+    u: ArrayLike | None = None,
+    height_u: ArrayLike | float = 0.0,
+    *,
+    free_radii: bool = False,
+) -> FieldScan:
+    """Fit the field of a ring to a scan.
+
+    Args:
+        height: of the probe on the axis, in any order [m], shape (n,).
+        flux_density: along the axis, either sign [T], shape (n,).
+        known: what calliper and data sheet say.
+        u: standard uncertainty of each reading without what is common to all (`known` holds that) [T], shape (n,).
+            None: unknown, then all count alike and their scatter about the model stands for it.
+        height_u: standard uncertainty of each height without what is common to all [m].
+        free_radii: let the scan move the radii, too, within what the calliper says.
+
+    Raises:
+        ShapesDiffer, NotFinite, NotPositive: no numbers to fit.
+        ImpossibleRing: radii that no ring has.
+        TooFewHeights: fewer than four.
+        NoField: nothing above the background.
+        FieldStandsStill: the probe is saturated.
+        FieldTurnsOver: the probe was turned over.
+        NotFitted: the search did not end.
+    """
+    inner, outer = known.inner_radius.value, known.outer_radius.value
+    if not 0 < inner < outer < math.inf:
+        raise ImpossibleRing(inner=inner, outer=outer)
+    z, b, u_b, u_z = _checked(height, flux_density, u, height_u)
+    _refuse_bad_scans(z, b, known)
+    problem = _Problem(z, b, u_b, u_z, known, _free(known, free_radii=free_radii))
+    values, sigma = problem.solve()
+    return _described(problem, values, sigma)
+
+
+# --- what cannot be fitted ---
+
+
+def _checked(
+    height: ArrayLike, flux_density: ArrayLike, u: ArrayLike | None, height_u: ArrayLike | float
+) -> tuple[Array, Array, Array | None, Array]:
+    """All columns in the order of the heights."""
+    z = np.asarray(height, dtype=float)
+    columns = {"height": z, "flux density": np.asarray(flux_density, dtype=float)}
+    columns["uncertainty of height"] = np.broadcast_to(np.asarray(height_u, dtype=float), z.shape)
+    if u is not None:
+        columns["uncertainty"] = np.broadcast_to(np.asarray(u, dtype=float), z.shape)
+    for quantity, values in columns.items():
+        if values.shape != z.shape or z.ndim != 1:
+            raise ShapesDiffer(quantity=quantity, seen=values.shape, expected=z.shape)
+        if not np.isfinite(values).all():
+            index = int(np.flatnonzero(~np.isfinite(values))[0])
+            raise NotFinite(quantity=quantity, index=index, value=float(values[index]))
+    for quantity, allowed in (("uncertainty of height", columns["uncertainty of height"] >= 0),) + (
+        () if u is None else (("uncertainty", columns["uncertainty"] > 0),)
+    ):
+        if not allowed.all():
+            index = int(np.flatnonzero(~allowed)[0])
+            raise NotPositive(quantity=quantity, unit="", index=index, value=float(columns[quantity][index]))
+    order = np.argsort(z, kind="stable")
+    u_b = columns["uncertainty"][order] if u is not None else None
+    return z[order], columns["flux density"][order], u_b, columns["uncertainty of height"][order]
+
+
+def _refuse_bad_scans(z: Array, b: Array, known: Known) -> None:
+    starts = np.flatnonzero(np.diff(z, prepend=-np.inf) > _SAME_HEIGHT)
+    if starts.size < FEWEST_HEIGHTS:
+        lowest, highest = (float(z[0]), float(z[-1])) if z.size else (math.nan, math.nan)
+        raise TooFewHeights(seen=starts.size, needed=FEWEST_HEIGHTS, lowest=lowest, highest=highest)
+    distinct = z[starts]
+    mean = np.array([part.mean() for part in np.split(b, starts[1:])])
+    if np.abs(b).max() < _NO_FIELD * known.background.u:
+        raise NoField(largest=float(np.abs(b).max()), background_u=known.background.u)
+    _refuse_plateau(distinct, mean)
+    # the reversal is known as well as the origin is; the field near it is small, and may have either sign
+    origin = known.origin or Prior(0.0, 0.05)
+    ring = Ring(1.0, origin.value, 0.0, known.inner_radius.value, known.outer_radius.value)
+    surely = reversal(ring) + 3 * origin.u + (known.thickness.value if known.thickness else 0.0) / 2
+    weak = 3 * known.background.u + abs(known.background.value)
+    strong = np.flatnonzero(np.abs(mean) > weak)
+    for i, j in pairwise(strong.tolist()):
+        if mean[i] * mean[j] < 0 and distinct[i] > surely:
+            raise FieldTurnsOver(low=float(distinct[i]), high=float(distinct[j]), reversal=reversal(ring))
+
+
+def _refuse_plateau(z: Array, b: Array) -> None:
+    """Three heights in succession with one and the same value, the largest of the scan: no magnet makes that."""
+    same = (b[1:] == b[:-1]) & (np.abs(b[1:]) == np.abs(b).max())
+    for i in range(len(same) - 1):
+        if same[i] and same[i + 1]:
+            last = i + 2 + next((k for k, one in enumerate(same[i + 2 :]) if not one), len(same) - i - 2)
+            raise FieldStandsStill(low=float(z[i]), high=float(z[last]), value=float(b[i]))
+
+
+# --- the fit ---
+
+
+def _free(known: Known, *, free_radii: bool) -> tuple[str, ...]:
+    """What the search moves: all but what is exact, and the radii only on request."""
+    wanted = PARAMETERS if free_radii else PARAMETERS[:-2]
+    priors = {name: known.prior(name) for name in wanted}
+    return tuple(name for name, prior in priors.items() if prior is None or prior.u > 0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """What is minimised.  z [m], b [T], u_b [T] or None, u_z [m]: the readings; free: the parameters that move."""
+
+    z: Array
+    b: Array
+    u_b: Array | None
+    u_z: Array
+    known: Known
+    free: tuple[str, ...]
+
+    @property
+    def indices(self) -> list[int]:
+        return [PARAMETERS.index(name) for name in self.free]
+
+    def priors(self) -> list[tuple[int, Prior]]:
+        """Index among all parameters, and what was known, of those that move."""
+        found = ((PARAMETERS.index(name), self.known.prior(name)) for name in self.free)
+        return [(index, prior) for index, prior in found if prior]
+
+    def model(self, values: Array) -> Array:
+        return np.asarray(on_axis(_ring(values), self.z)[0] + values[3])
+
+    def slopes(self, values: Array) -> Array:
+        """Of the model, by all parameters, shape (6, n)."""
+        by_ring = slopes(_ring(values), self.z)
+        return np.vstack([by_ring[:3], np.ones_like(self.z), by_ring[3:]])
+
+    def sigma(self, values: Array) -> Array:
+        """Of each reading against the model [T], shape (n,)."""
+        by_height = on_axis(_ring(values), self.z)[1] * self.u_z
+        u_b = self._scatter(values) if self.u_b is None else self.u_b
+        return np.asarray(np.hypot(u_b, by_height))
+
+    def _scatter(self, values: Array) -> Array:
+        """Where no uncertainty was given: the scatter about the model, but no less than rounding."""
+        left = self.b - self.model(values)
+        freedom = max(len(self.b) - len(self.free) + len(self.priors()), 1)
+        size = math.sqrt(float(left @ left) / freedom)
+        return np.full(len(self.b), max(size, 1e-9 * float(np.abs(self.b).max())))
+
+    def start(self) -> Array:
+        """The calliper's values; where it has none, the origin of the best fit of the strength alone."""
+        known = self.known
+        thickness = known.thickness.value if known.thickness else _START_THICKNESS * known.inner_radius.value
+        spread = np.linspace(-1, 1, 41) * known.outer_radius.value
+        origins = [known.origin.value] if known.origin else [float(origin) for origin in spread]
+        radii = known.inner_radius.value, known.outer_radius.value
+        best = (math.inf, np.zeros(6))
+        for origin in origins:
+            unit = on_axis(Ring(1.0, origin, thickness, *radii), self.z)[0]
+            strength = float(unit @ self.b / (unit @ unit))
+            left = self.b - strength * unit
+            values = np.array([strength, origin, thickness, known.background.value, *radii])
+            best = min(best, (float(left @ left), values), key=lambda one: one[0])
+        return best[1]
+
+    def solve(self) -> tuple[Array, Array]:
+        """The parameters, and the uncertainty of each reading at them."""
+        values = self.start()
+        scale = self._scale(values)
+        for _ in range(_MOST_TURNS):
+            sigma = self.sigma(values)
+            before, values = values, self._turn(values, sigma, scale)
+            if np.all(np.abs(values - before) <= 1e-7 * scale):
+                break
+        values[2] = abs(values[2])  # the field does not change with its sign
+        return values, self.sigma(values)
+
+    def _scale(self, start: Array) -> Array:
+        """Of each parameter, a step that the field answers to."""
+        lengths = 0.1 * self.known.inner_radius.value
+        return np.array([abs(start[0]) or 1e-3, lengths, lengths, 1e-4, lengths, lengths])
+
+    def _turn(self, values: Array, sigma: Array, scale: Array) -> Array:
+        moved, priors, steps = self.indices, self.priors(), scale[self.indices]
+
+        def whole(q: Array) -> Array:
+            every = values.copy()
+            every[moved] = q * steps
+            return every
+
+        def residual(q: Array) -> Array:
+            every = whole(q)
+            known = [(every[index] - prior.value) / prior.u for index, prior in priors]
+            return np.concatenate([(self.model(every) - self.b) / sigma, known])
+
+        def gradient(q: Array) -> Array:
+            return self.weighted(whole(q), sigma)[moved] * steps[:, None]
+
+        found, ended = solve(residual, gradient, values[moved] / steps)
+        if not ended or not np.isfinite(found).all():
+            raise NotFitted(what="flux density against height", advice="are heights and radii of one base, in metres?")
+        return whole(found)
+
+    def weighted(self, values: Array, sigma: Array) -> Array:
+        """Slopes of all residuals by all parameters, shape (6, n + priors)."""
+        known = np.zeros((6, len(self.priors())))
+        for column, (index, prior) in enumerate(self.priors()):
+            known[index, column] = 1 / prior.u
+        return np.hstack([self.slopes(values) / sigma, known])
+
+
+# --- what was found ---
+
+
+def _described(problem: _Problem, values: Array, sigma: Array) -> FieldScan:
+    known, free, moved = problem.known, problem.free, problem.indices
+    jacobian = problem.weighted(values, sigma)
+    found = curvature(jacobian[moved])
+    if found.covariance is None:
+        raise NotFitted(what="flux density against height", advice="the readings do not tell the parameters apart")
+    statistics = _statistics(problem, values, sigma)
+    factor, warnings = _misfit(statistics)
+    covariance = _whole_covariance(jacobian, found.covariance * factor, moved, known)
+    covariance[0, 0] += (known.gain_u * values[0]) ** 2
+    u = np.sqrt(np.diagonal(covariance))
+    parameters = {
+        name: Estimate(float(value), float(size), unit)
+        for (name, unit), value, size in zip(UNITS.items(), values, u, strict=True)
+    }
+    scan = FieldScan(parameters, covariance, free, known, statistics, problem.z, problem.b, sigma)
+    leverage = found.leverage[: len(problem.z)]
+    return replace(scan, warnings=(*warnings, *_doubts(scan), *_outliers(scan, leverage)))
+
+
+def _statistics(problem: _Problem, values: Array, sigma: Array) -> Statistics:
+    left, priors = problem.b - problem.model(values), problem.priors()
+    pulls = sum(((values[index] - prior.value) / prior.u) ** 2 for index, prior in priors)
+    n, n_free = len(left), len(problem.free)
+    return Statistics(
+        n=n,
+        n_parameters=n_free,
+        rms_residual=float(np.sqrt(np.mean(left**2))),
+        chi_square=None if problem.u_b is None else float(np.sum((left / sigma) ** 2) + pulls),
+        degrees_of_freedom=n + len(priors) - n_free,
+        durbin_watson=durbin_watson(left / sigma),
+        runs_test_p=runs_test_p(left),
+    )
+
+
+def _misfit(statistics: Statistics) -> tuple[float, list[str]]:
+    """By what the variances grow because the model leaves more than the uncertainties explain, and a warning."""
+    from scipy.special import chdtr, chdtrc
+
+    reduced = statistics.reduced_chi_square
+    if reduced is None or statistics.chi_square is None:
+        return 1.0, []
+    if float(chdtrc(statistics.degrees_of_freedom, statistics.chi_square)) < NO_FIT:
+        text = (
+            f"the fit leaves more than the stated uncertainties explain (χ²/dof = {reduced:.3g}): all uncertainties "
+            f"are enlarged by {math.sqrt(reduced):.3g}; is the probe on the axis, and are the radii right?"
+        )
+        return reduced, [text]
+    if float(chdtr(statistics.degrees_of_freedom, statistics.chi_square)) < _TOO_GOOD:
+        text = (
+            f"the readings scatter far less than their stated uncertainties (χ²/dof = {reduced:.2g}): what is common "
+            "to all of them, such as the scale of the instrument, belongs into gain_u and background_u_t"
+        )
+        return 1.0, [text]
+    return 1.0, []
+
+
+def _whole_covariance(jacobian: Array, free: Array, moved: list[int], known: Known) -> Array:
+    """Of all parameters: what is held moves those that are fitted by as much as the calliper leaves open."""
+    whole = np.zeros((6, 6))
+    whole[np.ix_(moved, moved)] = free
+    held = [k for k, name in enumerate(PARAMETERS) if k not in moved and (prior := known.prior(name)) and prior.u > 0]
+    for k in held:
+        prior = known.prior(PARAMETERS[k])
+        assert prior is not None
+        shift = np.zeros(6)  # of all parameters, per unit of the one that is held
+        shift[moved] = -free @ (jacobian[moved] @ jacobian[k])
+        shift[k] = 1.0
+        whole += prior.u**2 * np.outer(shift, shift)
+    return whole
+
+
+_WORDS = {
+    "origin": "origin", "thickness": "thickness", "inner_radius": "inner radius", "outer_radius": "outer radius",
+    "background": "background",
+}  # fmt: skip
+#: In which unit a parameter is written, and how many of them one of its own is.
+_SHOWN = {"m": ("mm", 1e3), "T": ("µT", 1e6)}
+
+
+def _doubts(scan: FieldScan) -> list[str]:
+    """Where scan and calliper contradict each other, and where the height is not of one base."""
+    texts = []
+    for name in scan.fitted:
+        prior, found = scan.known.prior(name), scan.parameters[name]
+        if prior is None or found.value is None or found.u is None:
+            continue
+        unit, times = _SHOWN[found.unit]
+        if abs(found.value - prior.value) > APART * prior.u:
+            texts.append(
+                f"the scan wants {_WORDS[name]} = {times * found.value:.4g} {unit}, which lies "
+                f"{abs(found.value - prior.value) / prior.u:.1f} u from the stated {times * prior.value:.4g} {unit} "
+                f"(u = {times * prior.u:.2g} {unit}): measure it again, and where the heights are counted from"
+            )
+    low, strength = scan.parameters["strength"].value, scan.parameters["strength"].u
+    if low is not None and strength is not None and abs(low) < 3 * strength:
+        texts.append("the strength is not significantly different from zero: was the probe near the base?")
+    return texts
+
+
+def _outliers(scan: FieldScan, leverage: Array) -> list[str]:
+    if scan.statistics.n - scan.statistics.n_parameters < 3:
+        return []
+    scaled = scan.residuals / scan.u
+    found = gross_errors(
+        studentised(scaled, leverage, scan.statistics.n_parameters, 1e-9), scan.statistics.n_parameters
+    )
+    return [
+        f"the reading at {1e3 * scan.height[i]:.4g} mm lies {abs(scaled[i]):.1f} u off the others: "
+        "measure that height again"
+        for i in found
+    ]
+
+
+def restore_scan(
+    height: ArrayLike,
+    flux_density: ArrayLike,
+    known: Known,
+    u: ArrayLike | None,
+    height_u: ArrayLike | float,
+    *,
+    fitted: tuple[str, ...],
+    parameters: Mapping[str, Estimate],
+    covariance: Array,
+    statistics: Statistics,
+    warnings: tuple[str, ...],
+) -> FieldScan:
+    """A fit that was made before, with the readings that it was made of; see `fit_scan`."""
+    z, b, u_b, u_z = _checked(height, flux_density, u, height_u)
+    values = np.array([parameters[name].value for name in PARAMETERS], dtype=float)
+    sigma = _Problem(z, b, u_b, u_z, known, fitted).sigma(values)
+    return FieldScan(parameters, covariance, fitted, known, statistics, z, b, sigma, warnings)

@@ -1,0 +1,250 @@
+"""What follows from a scan of the base for the tops that float there: heights, masses, spins, and the moment.
+
+The theory is that of `analysis.stability`; the top's magnet is a point or a disc (`analysis.field.magnet`).  All that
+is known, parameters of the scan and those of the top, goes through it once as it is and once beside for each
+uncertainty; the slopes carry the whole covariance to the results.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.field.fit import FieldScan
+from analysis.field.magnet import Disc, axial_field, stiffnesses
+from analysis.field.ring import Ring
+from analysis.stability import AxialField, Symmetric, Window, equilibria, windows
+from analysis.uncertainty import Estimate, propagate
+
+Array = NDArray[np.float64]
+
+#: Remanence of hard ferrite per kelvin (IEC 60404-8-1: −0.2 %/K); base and top, each of it, lose so much.
+FERRITE_PER_K = -0.002
+#: Tops are looked for from a tenth of the inner radius to four outer radii above the upper face, as in the simulator.
+_LOW, _HIGH = 0.1, 4.0
+#: A window is looked for around the one before it, by so many times its width on either side.
+_AROUND = 2.0
+
+#: The results in the order of their covariance, and their units.
+RESULTS: Mapping[str, str] = {
+    "lowest_height": "m",
+    "highest_height": "m",
+    "lightest_mass": "kg",
+    "heaviest_mass": "kg",
+    "mass_to_set": "kg",
+    "height_at_mass": "m",
+    "height_per_mass": "m/kg",
+    "slowest_spin": "Hz",
+    "fastest_spin": "Hz",
+    "moment": "A m^2",
+    "mass_to_add": "kg",
+}
+#: What is put in beside the parameters of the ring.
+_OF_TOP = ("mass", "transverse", "axial", "moment", "height")
+
+
+@dataclass(frozen=True, eq=False)
+class KnownTop:
+    """What is known of the top.
+
+    transverse, axial: I₁, I₃ [kg m²]; moment: its size [A m²]; mass [kg]; height: where it floats, on the scale of the
+    scan's heights [m]; with mass and height the moment follows from them.  covariance: of mass, I₁ and I₃, where they
+    come from the same parts, shape (3, 3).
+    """
+
+    transverse: Estimate
+    axial: Estimate
+    moment: Estimate | None = None
+    mass: Estimate | None = None
+    height: Estimate | None = None
+    gravity: float = 9.82
+    covariance: Array | None = None
+    magnet: Disc | None = None
+
+    @property
+    def weighed(self) -> bool:
+        """Whether the moment follows from weight and height."""
+        return self.height is not None and self.mass is not None
+
+
+@dataclass(frozen=True)
+class Floating:
+    """What follows.
+
+    values: name → estimate, of RESULTS; the heights and masses of the window far above the base, the spins of a top of
+    mass_to_set, floating at height_at_mass; height_per_mass: how it moves with the mass; moment and mass_to_add only
+    where the top's mass is known, and for the moment its height.  warnings: what to know.
+    """
+
+    values: Mapping[str, Estimate]
+    warnings: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> float:
+        value = self.values[name].value
+        assert value is not None
+        return value
+
+
+class FloatsNowhere(Exception):
+    """No top floats high above this base, or none of these inertias spins stably."""
+
+
+def follow(scan: FieldScan, top: KnownTop) -> Floating | None:
+    """What follows from a scan for a top; None where no top floats over such a base.
+
+    Raises ValueError for a top of which neither the moment nor mass and height are known.
+    """
+    if top.moment is None and not top.weighed:
+        raise ValueError("a moment, or mass and height, is needed")
+    values, covariance = _together(scan, top)
+    evaluate = _evaluator(top)
+    try:
+        found = evaluate(values)
+        u = _carried(evaluate, values, found, covariance)
+    except FloatsNowhere:
+        return None
+    estimates = {
+        name: Estimate(float(value), float(size) if math.isfinite(size) else None, unit)
+        for (name, unit), value, size in zip(RESULTS.items(), found, u, strict=True)
+        if math.isfinite(value)
+    }
+    floating = Floating(estimates)
+    return replace(floating, warnings=tuple(_doubts(floating, top)))
+
+
+def _together(scan: FieldScan, top: KnownTop) -> tuple[Array, Array]:
+    """Strength, origin, thickness, radii, then mass, I₁, I₃, moment, height; NaN and 0 where nothing is known."""
+    ring = [0, 1, 2, 4, 5]
+    known = [getattr(top, name) for name in _OF_TOP]
+    if top.weighed:
+        known[3] = None
+    values = np.array([*scan.values[ring], *(math.nan if one is None else one.value for one in known)], dtype=float)
+    covariance = np.zeros((10, 10))
+    covariance[:5, :5] = scan.covariance[np.ix_(ring, ring)]
+    covariance[range(5, 10), range(5, 10)] = [((one.u or 0.0) if one else 0.0) ** 2 for one in known]
+    if top.covariance is not None:
+        covariance[5:8, 5:8] = top.covariance
+    return values, covariance
+
+
+#: Step of the differences, in standard uncertainties: of a slope 1e-4 is lost to curvature, and less to rounding.
+_STEP = 0.01
+
+
+def _carried(evaluate: Callable[[Array], Array], values: Array, found: Array, covariance: Array) -> Array:
+    """Standard uncertainties of the results, to first order, shape (results,)."""
+    u = np.sqrt(np.diagonal(covariance))
+    moved = np.flatnonzero(u > 0)
+    slopes = np.zeros((len(RESULTS), len(values)))
+    for k in moved:
+        step = np.zeros_like(values)
+        step[k] = _STEP * u[k]
+        slopes[:, k] = (evaluate(values + step) - found) / step[k]
+    sizes = np.full(len(RESULTS), np.nan)
+    for row, line in enumerate(slopes):
+        if np.isfinite(line).all():
+            sizes[row] = propagate(covariance, line[None])[1][0]
+    return sizes
+
+
+def floating_top(ring: Ring, top: KnownTop) -> Symmetric:
+    """The top as the theory takes it, its mass 1 kg; the moment stands against the field high above the ring.
+
+    Raises FloatsNowhere where the field has no slope at the height from which the moment follows.
+    """
+    field, moment = axial_field(ring, top.magnet), math.nan
+    if top.mass is not None and top.height is not None:
+        weight, slope = (top.mass.value or 0.0) * top.gravity, float(field(np.array([top.height.value]))[1, 0])
+        moment = weight / abs(slope) if slope else math.inf
+    elif top.moment is not None:
+        moment = top.moment.value or math.nan
+    if not math.isfinite(moment):
+        raise FloatsNowhere
+    # high above the base the field has the sign of the strength
+    moment = -math.copysign(moment, ring.strength)
+    stiffness = None if top.magnet is None else stiffnesses(ring, top.magnet, moment)
+    inertias = float(top.transverse.value or 0.0), float(top.axial.value or 0.0)
+    return Symmetric(1.0, *inertias, moment, top.gravity, stiffness)
+
+
+def floating_spins(ring: Ring, top: KnownTop, mass: float, window: tuple[float, float]) -> tuple[float, float] | None:
+    """The slowest and the fastest spin [Hz] of a top of this mass [kg] that floats in a window of heights [m].
+
+    None where it does not.
+    """
+    field, body = axial_field(ring, top.magnet), replace(floating_top(ring, top), mass=mass)
+    stable = [place for place in equilibria(field, body, *window) if place.stable and place.spins]
+    return stable[-1].spins[0] if stable else None
+
+
+def _range(ring: Ring) -> tuple[float, float]:
+    face = ring.origin + ring.thickness / 2
+    return face + _LOW * ring.inner_radius, face + _HIGH * ring.outer_radius
+
+
+def _evaluator(top: KnownTop) -> Callable[[Array], Array]:
+    """The results as a function of all that is put in; a window is looked for near that of the first call."""
+    near: list[Window] = []
+
+    def evaluate(values: Array) -> Array:
+        ring = Ring(*(float(value) for value in values[:5]))
+        given = dict(zip(_OF_TOP, values[5:].tolist(), strict=True))
+        body = floating_top(ring, _with_values(top, given))
+        field = axial_field(ring, top.magnet)
+        window = _upper_window(field, body, ring, near)
+        near[:] = [window]
+        middle = (window.light + window.heavy) / 2
+        body = replace(body, mass=middle)
+        place = next(iter(equilibria(field, body, window.low, window.high)), None)
+        if place is None or not place.spins:
+            raise FloatsNowhere
+        bend = float(field(np.array([place.height]))[2, 0])
+        per_mass = -top.gravity / abs(body.moment * bend)
+        moment = abs(body.moment) if top.weighed else math.nan
+        return np.array([
+            window.low, window.high, window.light, window.heavy, middle, place.height, per_mass,
+            *place.spins[0], moment, middle - given["mass"],
+        ])  # fmt: skip
+
+    return evaluate
+
+
+def _with_values(top: KnownTop, values: Mapping[str, float]) -> KnownTop:
+    known = {name: replace(one, value=values[name]) for name in _OF_TOP if (one := getattr(top, name)) is not None}
+    return replace(top, **known)
+
+
+def _upper_window(field: AxialField, top: Symmetric, ring: Ring, near: list[Window]) -> Window:
+    """The window farthest above the base."""
+    if near:
+        margin = _AROUND * (near[0].high - near[0].low)
+        low, high = near[0].low - margin, near[0].high + margin
+    else:
+        low, high = _range(ring)
+    found = windows(field, top, low, high)
+    lifted = [w for w in found if top.moment * float(field(np.array([(w.low + w.high) / 2]))[1, 0]) > 0]
+    if not lifted:
+        raise FloatsNowhere
+    return lifted[-1]
+
+
+def _doubts(found: Floating, top: KnownTop) -> list[str]:
+    texts = []
+    if top.height is not None and top.height.value is not None:
+        height = top.height.value
+        low, high = found["lowest_height"], found["highest_height"]
+        if not low <= height <= high:
+            texts.append(
+                f"the top is said to float at {1e3 * height:.4g} mm, by this scan tops float from {1e3 * low:.4g} to "
+                f"{1e3 * high:.4g} mm: are both counted from the same zero?"
+            )
+    width = found["heaviest_mass"] - found["lightest_mass"]
+    u = found.values["mass_to_set"].u
+    if u is not None and u > width / 4:
+        texts.append(
+            f"the mass to set is known to {1e3 * u:.2g} g only, and the window is {1e3 * width:.2g} g wide: "
+            "try masses about it; the height at which one floats tells the moment"
+        )
+    return texts

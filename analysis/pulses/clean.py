@@ -1,0 +1,259 @@
+"""What is no pulse is taken off a trace: hum of the mains, a baseline that wanders, times without a signal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.pulses.regression import median
+from analysis.pulses.result import Finding
+from analysis.pulses.search import WIDE, noise_of, shorten
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+#: Mains and its multiples [Hz], and how far from nominal a grid strays [Hz].
+MAINS, STRAYS = (50.0, 60.0), 0.25
+#: Lines are looked for below this, and need a record of so long.
+HIGHEST, SHORTEST = 210.0, 1.0
+#: A line of the mains holds so many times the power of all within 1.5 Hz beside it ...
+NARROW = 2.0
+#: ... and is so many times as high as its next multiples, which those of a pulse train nearly equal.
+SINGLE = 2.5
+#: In a third of the record it is at least this part of its height in all of it.
+STAYS = 0.6
+#: Hum is fitted to pieces of so many seconds, half overlapping.
+PIECE = 1.0
+#: The baseline is the median of blocks of this length [s]; it wanders if it leaves this many standard errors.
+BLOCK, WANDERS = 0.1, 6.0
+#: A detector whose signal stays the same for so long is dead [s].
+DEAD = 0.3
+
+
+@dataclass(frozen=True)
+class Clean:
+    """samples and the shortened bins without what is no pulse; bad: samples that do not count, None: all do."""
+
+    samples: Array
+    bins: Array
+    bad: Mask | None
+    notes: tuple[Finding, ...]
+
+
+def clean(samples: Array, rate: float, bins: Array, bad: Mask | None) -> Clean:
+    """Take off what is there; a trace without any of it comes back as it is.
+
+    samples: shape (n,); rate: of them [1/s]; bins: means of n // len(bins) samples; bad: which samples are no numbers.
+    """
+    factor = samples.size // bins.size
+    bin_rate = rate / factor
+    notes: list[Finding] = []
+    counted = np.ones(bins.size, dtype=bool)
+    whole = None
+    if bad is not None:
+        share = shorten(bad.astype(np.float64), factor)
+        whole = share == 0
+        counted = whole  # the others hold a value that was put in
+        notes.append(Finding("not-finite", f"{np.count_nonzero(bad)} samples are no finite numbers and do not count"))
+    dead = _dead(bins, bin_rate, whole)
+    if dead.any():
+        notes.append(Finding("gap", f"the signal is constant for {np.count_nonzero(dead) / bin_rate:.3g} s in all"))
+        counted = counted & ~dead
+        long = np.zeros(samples.size, dtype=bool)
+        long[: bins.size * factor] = np.repeat(dead, factor)
+        bad = long if bad is None else bad | long
+    if np.count_nonzero(counted) < 64:
+        return Clean(samples, bins, bad, tuple(notes))
+    if not counted.all():
+        bins = np.interp(np.arange(bins.size), np.flatnonzero(counted), bins[counted])
+    lines = mains_lines(bins, bin_rate)
+    if lines:
+        names = " and ".join(f"{amplitude:.2g} at {frequency:.5g} Hz" for frequency, amplitude in lines)
+        notes.append(Finding("hum", f"hum of amplitude {names} was taken off"))
+        samples, bins = _without_hum(samples, rate, bins, counted, [frequency for frequency, _ in lines])
+    steps = _baseline(bins, bin_rate, counted)
+    if steps is not None:
+        times, values = steps
+        notes.append(Finding("wander", f"the baseline wanders by {np.ptp(values):.2g} and was taken off"))
+        samples = samples - np.interp(np.arange(samples.size) / rate, times, values)
+        bins = bins - np.interp((np.arange(bins.size) + 0.5) / bin_rate, times, values)
+    if not counted.all():
+        bins = np.where(counted, bins, np.median(bins[counted]))
+    return Clean(samples, bins, bad, tuple(notes))
+
+
+def _dead(bins: Array, rate: float, whole: Mask | None) -> Mask:
+    """Bins in runs of one and the same value that last too long; whole: those with all their samples."""
+    dead = np.zeros(bins.size, dtype=bool)
+    place = np.arange(bins.size) if whole is None else np.flatnonzero(whole)
+    values = bins if whole is None else bins[whole]
+    step = max(int(DEAD * rate / 4), 1)
+    if not np.any(values[1::step] == values[:-1:step][: values[1::step].size]):
+        return dead
+    same = np.zeros(values.size + 1, dtype=np.int8)
+    same[1:-1] = values[1:] == values[:-1]
+    if not same.any():
+        return dead
+    change = np.flatnonzero(np.diff(same))
+    for first, last in zip(place[change[::2]], place[change[1::2]], strict=True):
+        if last - first > DEAD * rate:
+            dead[first : last + 1] = True
+    return dead
+
+
+def mains_lines(bins: Array, rate: float) -> list[tuple[float, float]]:
+    """Frequencies [Hz] and amplitudes of hum; a top that turns in step with the mains is none."""
+    duration = bins.size / rate
+    if duration < SHORTEST:
+        return []
+    thin = shorten(bins, max(int(rate / (4 * HIGHEST)), 1))
+    thin_rate = rate * thin.size / bins.size
+    if not np.isfinite(thin).all():
+        return []
+    n = thin.size
+    transform = np.fft.rfft(thin - thin.mean())
+    amplitude = np.zeros(transform.size)  # behind a Hann window, which is a sum of three neighbours
+    amplitude[1:-1] = np.abs(transform[1:-1] - 0.5 * (transform[:-2] + transform[2:])) * (2 / n)
+    width = thin_rate / n  # of a bin
+    level = median(amplitude[: int(HIGHEST / width)])
+
+    def near(frequency: float, reach: float) -> slice:
+        return slice(max(round((frequency - reach) / width), 1), round((frequency + reach) / width) + 1)
+
+    found: list[tuple[float, float]] = []
+    for mains in MAINS:
+        for multiple in range(1, int(HIGHEST / mains) + 1):
+            nominal = mains * multiple
+            reach = max(STRAYS * multiple, 2 * width)
+            band = near(nominal, reach)
+            peak = band.start + int(np.argmax(amplitude[band]))
+            if amplitude[peak] <= 8 * level or not _narrow(amplitude, peak, near(peak * width, 1.5 + 3 * width)):
+                continue
+            further = [amplitude[near(k * nominal, k * reach)].max() for k in (2, 3, 4) if k * nominal < 2 * HIGHEST]
+            height, place = float(amplitude[peak]), _peak(amplitude, peak) * width
+            if height > SINGLE * sorted(further)[len(further) // 2] and _stays(thin, place / thin_rate, height):
+                found.append((place, height))
+    return found
+
+
+def _narrow(amplitude: Array, peak: int, beside: slice) -> bool:
+    inside = float((amplitude[max(peak - 3, 0) : peak + 4] ** 2).sum())
+    return inside > NARROW * (float((amplitude[beside] ** 2).sum()) - inside)
+
+
+def _stays(thin: Array, frequency: float, height: float) -> bool:
+    """Whether a line is as high in the first or the last third of the record: that of a chirped pulse train is not.
+
+    frequency: in parts of the rate.
+    """
+    third = thin.size // 3
+    wave = (1 - np.cos(2 * np.pi * (np.arange(third) + 0.5) / third)) * np.exp(
+        -2j * np.pi * frequency * np.arange(third)
+    )
+    pieces = (thin[:third], thin[-third:])
+    return max(2 / third * abs(complex(wave @ (piece - piece.mean()))) for piece in pieces) > STAYS * height
+
+
+def _peak(amplitude: Array, peak: int) -> float:
+    """The place of a line between the bins: parabola through the logarithms."""
+    a, b, c = np.log(amplitude[peak - 1 : peak + 2] + 1e-300)
+    return peak + float(0.5 * (a - c) / (a - 2 * b + c))
+
+
+def _without_hum(
+    samples: Array, rate: float, bins: Array, counted: Mask, frequencies: list[float]
+) -> tuple[Array, Array]:
+    """Samples and bins less the hum, whose amplitude and phase may change along the record."""
+    factor = samples.size // bins.size
+    bin_rate = rate / factor
+    count = max(int(2 * bins.size / bin_rate / PIECE), 3)
+    half = bins.size // count
+    pieces = [(i * half, (i + 2) * half if i < count - 2 else bins.size) for i in range(count - 1)]
+    rest = bins - np.median(bins[counted])
+    use = counted
+    for _ in range(3):  # pulses are no part of the baseline that the hum rides on
+        fits = [_hum_of(bins[a:b], use[a:b], a, half, [f / bin_rate for f in frequencies]) for a, b in pieces]
+        rest = bins - _blend(
+            fits, np.arange(bins.size, dtype=np.float64), half, [(f / bin_rate, 1.0) for f in frequencies]
+        )
+        middle = float(np.median(rest[counted]))
+        spread = 1.4826 * float(np.median(np.abs(rest[counted] - middle)))
+        use = counted & (np.abs(rest - middle) < 2.5 * spread)
+    # the mean over a bin left this much of it
+    waves = [(f / bin_rate, float(np.sinc(f / bin_rate) / np.sinc(f / rate))) for f in frequencies]
+    place = (np.arange(samples.size, dtype=np.float64) + 0.5) / factor - 0.5
+    return samples - _blend(fits, place, half, waves), rest
+
+
+def _hum_of(bins: Array, use: Mask, first: int, half: int, frequencies: list[float]) -> Array:
+    """Complex amplitude and its slope of each line in a piece, shape (lines, 2), by least squares over `use`.
+
+    first: place of the piece [bins]; half: half the length of pieces; frequencies [1/bin].
+    """
+    place = np.arange(bins.size)[use]
+    if place.size < 8 * len(frequencies) + 8:
+        return np.zeros((len(frequencies), 2), dtype=complex)
+    u = place / half - 1
+    rows = [np.ones(place.size), u, u**2]
+    for frequency in frequencies:
+        angle = 2 * np.pi * frequency * (place + first)
+        c, s = np.cos(angle), np.sin(angle)
+        rows += [c, s, c * u, s * u]
+    design = np.array(rows)
+    normal = design @ design.T
+    found = np.linalg.solve(normal + 1e-9 * np.trace(normal) * np.eye(len(rows)), design @ bins[use])[3:].reshape(-1, 4)
+    return np.asarray(found[:, ::2] - 1j * found[:, 1::2])
+
+
+def _blend(
+    fits: list[Array],
+    place: Array,
+    half: float,
+    waves: list[tuple[float, float]],
+) -> Array:
+    """The hum at places [bins], each piece, of twice `half` bins, with a weight that falls to 0 at its ends.
+
+    waves: frequency [1/bin], and what amplitude is divided by, of each line.
+    """
+    count = len(fits)
+    total = np.zeros(place.size)
+    position = np.clip(place / half - 1, 0, count - 1)  # the middle of piece i is at i
+    lower = np.minimum(position.astype(np.intp), max(count - 2, 0))
+    share = position - lower
+    upper = np.minimum(lower + 1, count - 1)
+    array = np.array(fits)
+    for line, (frequency, gain) in enumerate(waves):
+        amplitude = np.zeros(place.size, dtype=complex)
+        for index, weight in ((lower, 1 - share), (upper, share)):
+            u = place / half - 1 - index
+            amplitude += weight * (array[index, line, 0] + array[index, line, 1] * u)
+        total += (amplitude * np.exp(2j * np.pi * frequency * place)).real / gain
+    return total
+
+
+def _baseline(bins: Array, rate: float, counted: Mask) -> tuple[Array, Array] | None:
+    """Times [s] and values of the baseline where it wanders; None where it does not."""
+    size = int(BLOCK * rate)
+    count = bins.size // size if size else 0
+    if count < 8:
+        return None
+    step = max(size // 50, 1)
+    blocks = bins[: count * size].reshape(count, size)[:, ::step]
+    there = counted[: count * size].reshape(count, size).mean(axis=1) > 0.8
+    if np.count_nonzero(there) < 8:
+        return None
+    ordered = np.sort(blocks[there], axis=1)
+    n = ordered.shape[1]
+    values = ordered[:, n // 2]
+    scatter = median(values - ordered[:, n // 6]) / 0.967
+    if scatter > WIDE * noise_of(bins):  # pulses that last about as long as the pauses: no level is that of the pauses
+        values = 0.5 * (ordered[:, n // 20] + ordered[:, -1 - n // 20])
+    error = 1.2533 * scatter / np.sqrt(n)
+    times = ((np.arange(count) + 0.5) * size / rate)[there]
+    smooth = np.convolve(np.pad(values, 1, mode="edge"), np.full(3, 1 / 3), mode="valid")
+    wander = float(np.ptp(smooth))
+    if wander < WANDERS * error or wander < 0.02 * float(ordered[:, -1].mean() - ordered[:, 0].mean()):
+        return None
+    return times, values

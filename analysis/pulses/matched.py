@@ -1,0 +1,304 @@
+"""Matched filter: the mean pulse, learned from the trace, placed at each turn, and the places regressed on turn number.
+
+A phase that is nearly right is improved: at each turn a piece of the trace is fitted by pulse, slope of the pulse and
+a constant. The slope's share is the turn's shift, which is regressed with the weight that it deserves; the pulse is
+learned anew; and so on until nothing moves. To first order that is the maximum of the likelihood.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.pulses.regression import Fit, fit_turns, median
+
+Array = NDArray[np.float64]
+
+#: Points of the pulse's table: a place is off by at most 1/8192 of the window.
+TABLE = 4096
+#: Bins of a coarse profile of the whole turn.
+COARSE = 128
+#: A turn farther off than this many standard deviations is no pulse of the top.
+GROSS = 4.5
+ROUNDS = 8
+#: A pulse train exists where its mean pulse lowers the sum of squares by so many variances of the noise; the best of
+#: all frequencies in noise alone reaches about 100.
+EVIDENCE = 160.0
+#: Harmonics of the pulse are kept as long as on average their power is so many times that of noise.
+NOISY = 3.0
+#: A turn with less of a pulse than this part of the mean one counts as missing.
+FAINT = 0.3
+
+
+@dataclass(frozen=True)
+class Window:
+    """Where in a turn the pulse is: phase of its middle and half the width [turns]."""
+
+    middle: float
+    half: float
+
+
+@dataclass(frozen=True)
+class Pulse:
+    """The mean pulse and its slope per turn, as tables over the window; where its middle is in it, from 0 to 1."""
+
+    shape: Array
+    slope: Array
+    middle: float
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Pieces of the trace, one a turn.
+
+    x: samples, and cell: their places in the pulse's table, of shape (turns, n); valid: which of them count, None: all;
+    times [s] and numbers [turns]: where the middle of the window should be, of shape (turns,).
+    """
+
+    x: Array
+    cell: NDArray[np.intp]
+    valid: NDArray[np.bool_] | None
+    times: Array
+    numbers: Array
+
+
+@dataclass(frozen=True)
+class Match:
+    """What a matched filter found.
+
+    fit: phase against time; turns: so many were used.
+    numbers, heights, shifts, used: of all turns, shape (m,): whole part of the phase, height in units of the mean
+    pulse, what the fit leaves of the phase [turns], whether it was used.
+    evidence: by how many variances of the noise the pulses lower the sum of squares.
+    flat: whether most tops are at the greatest value that occurs.
+    noise, height: of a sample, and of the mean pulse, in the trace's unit.
+    bound: of the frequency [Hz]; missing, wrong: numbers of turns; pulse, window: the mean pulse.
+    """
+
+    fit: Fit
+    turns: int
+    numbers: NDArray[np.int64]
+    heights: Array
+    shifts: Array
+    used: NDArray[np.bool_]
+    evidence: float
+    flat: bool
+    noise: float
+    height: float
+    bound: float
+    missing: int
+    wrong: int
+    pulse: Pulse
+    window: Window
+
+    @property
+    def origin(self) -> float:
+        """Phase of the fit at which the middle of a pulse passes [turns]."""
+        return self.window.middle + (self.pulse.middle - 0.5) * 2 * self.window.half
+
+
+def window_of(bins: Array, phase: Array) -> Window | None:
+    """Where in the turn the trace stands out; bins and their phases of shape (n,); None where it nowhere does."""
+    place = ((phase - np.floor(phase)) * COARSE).astype(np.intp)
+    counts = np.bincount(place, minlength=COARSE)
+    profile = np.bincount(place, bins, COARSE) / np.maximum(counts, 1)
+    ordered = np.sort(profile)
+    middle = float(ordered[COARSE // 2])
+    away = np.abs(profile - middle)
+    noise = 1.4826 * median(away)
+    stands = away > max(0.04 * float(away.max()), min(4 * noise, 0.5 * float(away.max())))
+    at = np.flatnonzero(stands)
+    if not at.size:
+        return None
+    gaps = np.diff(np.append(at, at[0] + COARSE))
+    widest = int(np.argmax(gaps))
+    first = int(at[(widest + 1) % at.size])
+    length = COARSE - int(gaps[widest]) + 1
+    half = min((0.5 * length + max(3.0, 0.3 * length)) / COARSE, 0.5)
+    if half > 0.35:
+        half = 0.5
+    return Window(((first + 0.5 * length) / COARSE) % 1.0, half)
+
+
+def match(
+    samples: Array,
+    rate: float,
+    fit: Fit,
+    window: Window,
+    *,
+    bad: NDArray[np.bool_] | None = None,
+    degree: int | None = None,
+) -> Match | None:
+    """Improve a phase.
+
+    Args:
+        samples: shape (n,).
+        rate: samples per second.
+        fit: a phase that is nearly right, of times from the first sample.
+        window: where in the turn the pulse is.
+        bad: samples that are no numbers, shape (n,).
+        degree: of the phase; None: 2, or 3 where that differs significantly.
+
+    Returns:
+        None where there are fewer than four turns, or no pulses.
+    """
+    result = None
+    for _ in range(ROUNDS):
+        found = _improve(samples, rate, fit, window, degree=degree, bad=bad)
+        if found is None:
+            return result
+        edge = np.array([-1.0, -0.5, 0.0, 0.5, 1.0]) * found.fit.half + found.fit.centre
+        change = found.fit.phase(edge) - fit.phase(edge)
+        moved = float(np.abs(change - np.rint(change)).max())
+        fit, result = found.fit, found
+        # a shift is found to its square in units of the pulse's flank, about a fifth of half the window
+        left = moved * (moved / (0.2 * window.half)) ** 2
+        if left < max(0.03 * float(np.sqrt(fit.covariance[0, 0])), 1e-9):
+            break
+    return result
+
+
+def _improve(
+    samples: Array, rate: float, fit: Fit, window: Window, *, degree: int | None, bad: NDArray[np.bool_] | None
+) -> Match | None:
+    times, numbers, frequency = turn_times(fit, window.middle, samples.size / rate)
+    if times.size < 4 or frequency.min() <= 0:
+        return None
+    middle = np.rint(times * rate).astype(np.intp)
+    reach = int(np.ceil(window.half * rate / frequency.min()))
+    inside = (middle - reach >= 0) & (middle + reach < samples.size)
+    times, numbers, frequency, middle = times[inside], numbers[inside], frequency[inside], middle[inside]
+    if times.size < 4:
+        return None
+    offsets = np.arange(-reach, reach + 1)
+    index = middle[:, None] + offsets
+    x = samples[index]
+    per_sample = frequency / rate
+    place = (offsets * per_sample[:, None] + ((middle - times * rate) * per_sample)[:, None]) / (2 * window.half) + 0.5
+    valid = None
+    if window.half < 0.5 or bad is not None:
+        outside = (place < 0) | (place >= 1)
+        if bad is not None:
+            outside |= bad[index]
+        valid = ~outside
+    cell = (
+        np.clip((place * TABLE).astype(np.intp), 0, TABLE - 1)
+        if window.half < 0.5
+        else (place * TABLE).astype(np.intp) % TABLE
+    )
+    pulse = learn(x, cell, valid, 2 * window.half)
+    return _regress(Pieces(x, cell, valid, times, numbers), pulse, window, degree)
+
+
+def turn_times(fit: Fit, middle: float, duration: float) -> tuple[Array, Array, Array]:
+    """Times at which a phase passes (a part of a turn), those phases, and the frequencies there."""
+    first, last = fit.phase(np.array([0.0, duration]))
+    numbers = np.arange(np.ceil(first - middle), np.floor(last - middle) + 1) + middle
+    grid = np.linspace(0.0, duration, 65)
+    times = np.interp(numbers, fit.phase(grid), grid)
+    for _ in range(2):  # Newton's from 1e-3 turns: 1e-9, 1e-20
+        times = times - (fit.phase(times) - numbers) / fit.frequency(times)
+    return times, numbers, fit.frequency(times)
+
+
+def learn(x: Array, cell: NDArray[np.intp], valid: NDArray[np.bool_] | None, width: float) -> Pulse:
+    """The mean pulse from pieces x and their places in the table, both of shape (turns, n); width: of it [turns]."""
+    # bins hold four samples or more, and are no finer than the samples: missing pulses would leave a comb at those
+    most = min(x.size / 4, 1.5 * x.shape[1])
+    if valid is not None:
+        x, cell = x[valid], cell[valid]
+    x, cell = x.ravel(), cell.ravel()
+    bins = int(2 ** np.clip(np.floor(np.log2(most)), 4, 10))
+    place = cell // (TABLE // bins)
+    counts = np.maximum(np.bincount(place, minlength=bins), 1)
+    mean = np.bincount(place, x, bins) / counts
+    square = np.bincount(place, x * x, bins) / counts
+    noise = float(np.maximum(square - mean**2, 0).mean())
+    mean = mean - mean.mean()
+    spectrum = np.fft.rfft(mean)
+    power = np.abs(spectrum) ** 2
+    floor = noise * bins * bins / x.size + 1e-300
+    h = np.arange(spectrum.size)
+    last = int(np.argmax(np.cumsum(np.minimum(power / floor, 1e6)[1:] - NOISY))) + 1
+    gain = np.where(h <= last, np.maximum(1 - floor / np.maximum(power, 1e-300), 0.0), 0.0) / np.sinc(h / bins)
+    full = np.zeros(TABLE // 2 + 1, dtype=complex)
+    full[: spectrum.size] = spectrum * gain * np.exp(1j * np.pi * h / TABLE - 1j * np.pi * h / bins) * (TABLE / bins)
+    turn = np.arange(full.size) * 2j * np.pi / width
+    shape = np.fft.irfft(full, TABLE)
+    around = np.exp(2j * np.pi * (np.arange(TABLE) + 0.5) / TABLE) @ shape**2
+    return Pulse(shape, np.fft.irfft(full * turn, TABLE), float(np.angle(around) / (2 * np.pi)) % 1.0)
+
+
+def _flat(x: Array) -> bool:
+    """Whether more than half of the turns reach one and the same greatest value three times or more."""
+    return bool(np.count_nonzero(np.count_nonzero(x == x.max(), axis=1) > 2) > 0.5 * len(x))
+
+
+def _regress(pieces: Pieces, pulse: Pulse, window: Window, degree: int | None) -> Match | None:
+    x, cell, valid, times, numbers = pieces.x, pieces.cell, pieces.valid, pieces.times, pieces.numbers
+    g, d = pulse.shape[cell], pulse.slope[cell]
+    if valid is not None:
+        x, g, d = np.where(valid, x, 0.0), g * valid, d * valid
+        n = np.maximum(valid.sum(axis=1), 1).astype(np.float64)
+    else:
+        n = np.full(x.shape[0], float(x.shape[1]))
+
+    ones = np.ones(x.shape[1])
+    sums = {id(a): a @ ones for a in (x, g, d)}
+
+    def product(a: Array, b: Array) -> Array:
+        return np.asarray(np.einsum("ij,ij->i", a, b) - sums[id(a)] * sums[id(b)] / n)
+
+    gg, gd, dd, xg, xd, xx = (product(*pair) for pair in ((g, g), (g, d), (d, d), (x, g), (x, d), (x, x)))
+    usable = (gg > 0.3 * np.median(gg)) & (dd > 0.3 * np.median(dd)) & (gg * dd > gd**2)
+    determinant = np.where(usable, gg * dd - gd**2, 1.0)
+    height = np.where(usable, (dd * xg - gd * xd) / determinant, 0.0)
+    shift = np.where(usable, (gg * xd - gd * xg) / determinant, 0.0)
+    information = np.where(usable, determinant / np.where(usable, gg, 1.0), 0.0)
+    rest = xx - height * xg - shift * xd
+    freedom = np.maximum(n - 3, 1)
+    noise2 = max(median(rest / freedom), 1e-300)
+    height_variance = noise2 / np.where(usable, gg, 1.0)
+    evidence = float(height[usable] ** 2 @ gg[usable]) / noise2
+    if not usable.any() or evidence <= 0:
+        return None
+    mean = float(np.average(height[usable], weights=gg[usable]))
+    if mean**2 * float(gg[usable].sum()) / noise2 < EVIDENCE:
+        return None
+    total = float(np.mean((height[usable] - mean) ** 2))
+    share = max(0.0, 1 - float(np.mean(height_variance[usable])) / total) if total > 0 else 0.0
+    amplitude = mean + share * (height - mean)
+    use = usable & (amplitude > 0.03 * mean)
+    if np.count_nonzero(use) < 4:
+        return None
+    weight = amplitude**2 * information
+    phase = numbers + np.divide(shift, amplitude, out=np.zeros_like(shift), where=use)
+    for _ in range(4):
+        fit = fit_turns(times[use], phase[use], weight[use] / noise2, degree=degree)
+        standard = (phase - fit.phase(times)) * np.sqrt(weight / noise2)
+        spread = max(1.4826 * median(np.abs(standard[use])), 0.5)
+        new = usable & (amplitude > 0.03 * mean) & (np.abs(standard) < GROSS * spread)
+        if np.array_equal(new, use) or np.count_nonzero(new) < 4:
+            break
+        use = new
+    bound = float(np.sqrt(fit.unit_covariance[1, 1])) / fit.half
+    good = usable & (amplitude > 0.03 * mean)
+    return Match(
+        fit=fit,
+        turns=int(np.count_nonzero(use)),
+        numbers=np.floor(numbers - window.middle + 0.5).astype(np.int64),
+        heights=height / mean,
+        shifts=phase - fit.phase(times),
+        used=use,
+        evidence=evidence,
+        flat=_flat(x),
+        noise=float(np.sqrt(noise2)),
+        height=mean * float(np.ptp(pulse.shape)),
+        bound=bound,
+        missing=int(np.count_nonzero(~usable | (height < FAINT * mean))),
+        wrong=int(np.count_nonzero(good & ~use)),
+        pulse=pulse,
+        window=window,
+    )

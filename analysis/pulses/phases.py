@@ -1,0 +1,105 @@
+"""A record cut into its phases: speeding up, held, coasting, nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from analysis.pulses.track import Track
+
+Array = NDArray[np.float64]
+Kind = Literal["speeding-up", "held", "coasting", "nothing"]
+
+#: A frequency that changes by less than this part of itself in a second is held; a top that coasts loses 3e-3.
+STILL = 6e-4
+#: The slope is that of so many neighbouring windows.
+NEIGHBOURS = 3
+#: A phase shorter than so many windows belongs to what is before it.
+SHORTEST = 2
+
+
+@dataclass(frozen=True)
+class Phase:
+    """What the top did from start to end [s], and between which windows of the track (first, last + 1)."""
+
+    kind: Kind
+    start: float
+    end: float
+    windows: tuple[int, int]
+
+
+def phases(track: Track, *, still: float = STILL) -> tuple[Phase, ...]:
+    """Cut a track into phases.
+
+    Args:
+        track: of `track_of_times` or `track_of_blocks`.
+        still: relative slope [1/s] below which a top counts as held at its frequency, as by a drive that it follows.
+    """
+    kinds = _kinds(track, still)
+    found: list[Phase] = []
+    first = 0
+    for i in range(1, len(kinds) + 1):
+        if i == len(kinds) or kinds[i] != kinds[first] or _gap_before(track, i):
+            found.append(Phase(kinds[first], _edge(track, first, -1), _edge(track, i - 1, 1), (first, i)))
+            first = i
+    for start, end in track.empty:
+        at = int(np.searchsorted(track.time, start))
+        found.append(Phase("nothing", start, end, (at, at)))
+    return tuple(_touching(sorted(found, key=lambda phase: phase.start)))
+
+
+def _kinds(track: Track, still: float) -> list[Kind]:
+    slope = np.array([_slope(track, i) for i in range(track.time.size)]) / track.frequency
+    kinds: list[Kind] = ["speeding-up" if s > still else "coasting" if s < -still else "held" for s in slope]
+    first = 0
+    while first < len(kinds):
+        end = first
+        while end < len(kinds) and kinds[end] == kinds[first]:
+            end += 1
+        if end - first < SHORTEST and first > 0:
+            kinds[first:end] = [kinds[first - 1]] * (end - first)
+        first = end
+    return kinds
+
+
+def _slope(track: Track, i: int) -> float:
+    """Slope of the frequency at a window from its neighbours [Hz/s]."""
+    reach = NEIGHBOURS // 2
+    near = np.arange(max(i - reach, 0), min(i + reach + 1, track.time.size))
+    if near.size < 2:
+        return float(track.chirp[i])
+    away = track.time[near] - track.time[near].mean()
+    return float(away @ track.frequency[near] / (away @ away))
+
+
+def _gap_before(track: Track, i: int) -> bool:
+    return any(track.time[i - 1] < start < track.time[i] for start, _ in track.empty)
+
+
+def _edge(track: Track, i: int, side: int) -> float:
+    """The time half-way to the next window, or as far beyond the last one."""
+    j = i + side
+    if 0 <= j < track.time.size:
+        return float(0.5 * (track.time[i] + track.time[j]))
+    if track.time.size == 1:
+        return float(track.time[0])
+    back = track.time[i] - track.time[i - side]
+    return float(track.time[i] + 0.5 * back)
+
+
+def _touching(found: list[Phase]) -> list[Phase]:
+    """Phases that end where an empty time begins."""
+    result = []
+    for i, phase in enumerate(found):
+        start, end = phase.start, phase.end
+        if phase.kind != "nothing":
+            if i and found[i - 1].kind == "nothing":
+                start = found[i - 1].end
+            if i + 1 < len(found) and found[i + 1].kind == "nothing":
+                end = found[i + 1].start
+        result.append(Phase(phase.kind, start, end, phase.windows))
+    return result

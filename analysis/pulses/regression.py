@@ -1,0 +1,187 @@
+"""Turn number against time: a polynomial of degree two or three, and what its residuals say of its uncertainty."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.uncertainty import Estimate
+
+Array = NDArray[np.float64]
+
+#: The slope's own change is fitted where it differs from 0 by so many standard uncertainties.
+CURVED = 4.0
+#: Residuals are grouped into so many blocks to see whether neighbours resemble each other.
+BLOCKS = 50
+#: Blocks scatter more, or less, than single residuals where chance would do it with less than this probability.
+WHITE, ALTERNATING = 0.01, 0.001
+
+
+@dataclass(frozen=True)
+class Fit:
+    """phase(t) = Σ coefficients[k] uᵏ, u = (t − centre)/half.
+
+    Attributes:
+        coefficients: [turns], shape (p,).
+        unit_covariance: of them for residuals of unit variance and unit weight, shape (p, p).
+        centre: [s].
+        half: half the length [s].
+        variance: of a residual of unit weight [turns²].
+        inflation: factor on variance because neighbours resemble each other (below 1: they alternate).
+        freedom: degrees of freedom of variance x inflation.
+        residuals: [turns], shape (n,).
+    """
+
+    coefficients: Array
+    unit_covariance: Array
+    centre: float
+    half: float
+    variance: float
+    inflation: float
+    freedom: float
+    residuals: Array
+
+    @property
+    def covariance(self) -> Array:
+        """Of the coefficients, such that one standard uncertainty covers 68.27 %."""
+        return np.asarray(self.unit_covariance * self.variance * self.inflation * _student(self.freedom) ** 2)
+
+    def phase(self, times: Array) -> Array:
+        """Phase at times [turns]."""
+        return _polynomial(self.coefficients, (times - self.centre) / self.half)
+
+    def frequency(self, times: Array) -> Array:
+        """Frequency at times [Hz]."""
+        slopes = self.coefficients[1:] * np.arange(1, self.coefficients.size) / self.half
+        return _polynomial(slopes, (times - self.centre) / self.half)
+
+    def frequency_and_chirp(self) -> tuple[Estimate, Estimate, float]:
+        """Frequency and slope where they are independent, and that time."""
+        frequency, chirp, away = _independent(self.coefficients, self.covariance, self.half)
+        return frequency, chirp, self.centre + away
+
+    def times(self, factor: float) -> Fit:
+        """The phase multiplied: half or twice the frequency."""
+        return replace(self, coefficients=self.coefficients * factor)
+
+    def phase_at(self, time: float, origin: float = 0.0) -> Estimate:
+        """Phase at a time, from 0 to 1 [turns], of what passes at a phase of origin."""
+        powers = ((time - self.centre) / self.half) ** np.arange(self.coefficients.size)
+        value = float(powers @ self.coefficients) - origin
+        return Estimate(value - np.floor(value), float(np.sqrt(powers @ self.covariance @ powers)), "turns")
+
+
+def _polynomial(coefficients: Array, u: Array) -> Array:
+    total = np.full(u.shape, coefficients[-1])
+    for each in coefficients[-2::-1]:
+        total *= u
+        total += each
+    return total
+
+
+def median(values: Array) -> float:
+    """The upper middle value; several times faster than numpy's for short arrays."""
+    return float(np.partition(values, values.size // 2)[values.size // 2])
+
+
+def _independent(coefficients: Array, covariance: Array, half: float) -> tuple[Estimate, Estimate, float]:
+    u, size = 0.0, coefficients.size
+    for _ in range(5):  # with a third degree the slope at the time changes with the time
+        d1, d2 = _derivatives(u, size)
+        together, slope = float(d1 @ covariance @ d2), float(d2 @ covariance @ d2)
+        step = together / slope if slope > 0 else 0.0
+        u = float(np.clip(u - step, -1, 1))
+        if abs(step) < 1e-12:
+            break
+    d1, d2 = _derivatives(u, size)
+    frequency = Estimate(float(d1 @ coefficients) / half, float(np.sqrt(d1 @ covariance @ d1)) / half, "Hz")
+    chirp = Estimate(float(d2 @ coefficients) / half**2, float(np.sqrt(d2 @ covariance @ d2)) / half**2, "Hz/s")
+    return frequency, chirp, u * half
+
+
+def _derivatives(u: float, size: int) -> tuple[Array, Array]:
+    k = np.arange(size)
+    d1 = np.where(k > 0, k * u ** np.maximum(k - 1, 0), 0.0)
+    d2 = np.where(k > 1, k * (k - 1) * u ** np.maximum(k - 2, 0), 0.0)
+    return d1, d2
+
+
+def _student(freedom: float) -> float:
+    """What a standard deviation from so few degrees of freedom is multiplied by so that it covers 68.27 %."""
+    if freedom > 200:
+        return 1.0
+    from scipy.special import stdtrit
+
+    return float(stdtrit(max(freedom, 1.0), 0.8413447460685429))
+
+
+def fit_turns(times: Array, turns: Array, weight: Array | None = None, *, degree: int | None = None) -> Fit:
+    """Fit the phase.
+
+    times, turns: shape (n,); weight: of each (1/variance, relative), shape (n,); degree: None: two, or three where it
+    differs from two significantly.
+    """
+    fit, third = _fit(times, turns, weight, degree or 2)
+    if degree is None and times.size >= 12 and third > CURVED:
+        cubic, _ = _fit(times, turns, weight, 3)
+        u = float(np.sqrt(cubic.covariance[3, 3] * max(1.0, 1 / cubic.inflation)))
+        if abs(cubic.coefficients[3]) > CURVED * u:
+            return cubic
+    return fit
+
+
+def _fit(times: Array, turns: Array, weight: Array | None, degree: int) -> tuple[Fit, float]:
+    """The fit, and how many standard uncertainties the next coefficient would be away from 0, were all white."""
+    centre, half = 0.5 * float(times[0] + times[-1]), 0.5 * float(times[-1] - times[0])
+    degree = min(degree, times.size - 1)
+    u = (times - centre) / half
+    columns = np.empty((times.size, degree + 2))
+    columns[:, 0] = 1.0
+    for k in range(1, degree + 2):
+        columns[:, k] = columns[:, k - 1] * u
+    if weight is not None:
+        root = np.sqrt(weight)
+        columns *= root[:, None]
+        goal = turns * root
+    else:
+        goal = turns
+    orthonormal, triangle = np.linalg.qr(columns)
+    along = orthonormal.T @ goal
+    inverse = np.linalg.inv(triangle[: degree + 1, : degree + 1])
+    coefficients = inverse @ along[: degree + 1]
+    standard = goal - columns[:, : degree + 1] @ coefficients
+    residuals = standard if weight is None else standard / root
+    left = float(standard @ standard) - float(along[-1]) ** 2
+    third = abs(float(along[-1])) / np.sqrt(max(left, 1e-300) / max(times.size - degree - 2, 1))
+    variance, inflation, freedom = scatter(standard, degree + 1)
+    return Fit(coefficients, inverse @ inverse.T, centre, half, variance, inflation, freedom, residuals), third
+
+
+def scatter(residuals: Array, parameters: int) -> tuple[float, float, float]:
+    """Variance of residuals, the factor by which blocks of neighbours scatter more or less, degrees of freedom.
+
+    residuals: standardised, shape (n,); parameters: of the fit.  What matters for a frequency is how
+    residuals scatter over times as long as the record, not from one to the next.
+    """
+    n = residuals.size
+    freedom = max(n - parameters, 1)
+    variance = float(residuals @ residuals) / freedom
+    each = -(-n // BLOCKS)
+    blocks = -(-n // each)
+    if each < 2 or blocks < parameters + 6 or variance <= 0:
+        return variance, 1.0, freedom
+    starts = np.arange(0, n, each)
+    sums = np.add.reduceat(residuals, starts)
+    sizes = np.diff(np.append(starts, n))
+    coarse = float((sums**2 / sizes).sum()) / (blocks - parameters)
+    ratio = coarse / variance
+    if 0.75 < ratio < 1.3:
+        return variance, 1.0, freedom
+    from scipy.special import fdtr
+
+    p = float(fdtr(blocks - parameters, freedom, ratio))
+    if ALTERNATING < p < 1 - WHITE:
+        return variance, 1.0, freedom
+    return variance, ratio, blocks - parameters

@@ -1,0 +1,67 @@
+"""What a pulse analysis finds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from analysis.uncertainty import Estimate
+
+Method = Literal["edges", "matched", "likelihood"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that a user has to know: a short name that stays, and a sentence.
+
+    Names: fell-back, missing, doubled, wrong, half, double, mains, hum, clipped, gap, not-finite, spikes, wander,
+    curved, correlated, few-pulses, unsteady.
+    """
+
+    name: str
+    text: str
+
+
+@dataclass(frozen=True)
+class SpinFrequency:
+    """The spin frequency of a top at one time, and its slope.
+
+    Attributes:
+        frequency: at the reference time [Hz].
+        chirp: its slope there [Hz/s]; independent of the frequency.
+        phase: there [turns], from 0 to 1; the middle of a pulse passes at 0.
+        reference_time: [s]; the middle of the record, moved a little where pulses are missing on one side.
+        method: that found it.
+        bound: Cramér–Rao bound of the frequency [Hz], for the noise and the pulse as estimated; None for lists of
+            times, where it is the uncertainty itself.
+        pulses: so many were used.
+        missing: turns without a pulse.
+        doubled: pulses beyond one a turn.
+        scatter: standard deviation of one pulse's time [s].
+        snr_db: 20 log₁₀ of the pulse's height over the noise of a sample; None for lists of times.
+        notes: findings.
+    """
+
+    frequency: Estimate
+    chirp: Estimate
+    phase: Estimate
+    reference_time: float
+    method: Method
+    bound: float | None
+    pulses: int
+    missing: int
+    doubled: int
+    scatter: float
+    snr_db: float | None
+    notes: tuple[Finding, ...] = ()
+
+    def at(self, time: float) -> Estimate:
+        """The frequency at another time [s], along the slope."""
+        away = time - self.reference_time
+        frequency, chirp = self.frequency, self.chirp
+        assert frequency.value is not None
+        assert chirp.value is not None
+        value = frequency.value + chirp.value * away
+        u = None if frequency.u is None or chirp.u is None else math.hypot(frequency.u, chirp.u * away)
+        return Estimate(value, u, "Hz")

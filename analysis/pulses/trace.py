@@ -1,0 +1,238 @@
+"""Spin frequency from a trace of the detector's signal."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analysis.errors import NotPositive, OnlyHum, ShapesDiffer, TooFewPulses
+from analysis.pulses import traps
+from analysis.pulses.clean import Clean, clean
+from analysis.pulses.edges import Edges, place_edges
+from analysis.pulses.likelihood import search
+from analysis.pulses.matched import Match, match, window_of
+from analysis.pulses.regression import median
+from analysis.pulses.result import Finding, Method, SpinFrequency
+from analysis.pulses.search import Events, find_events, shorten
+from analysis.pulses.times import FEWEST, Train, fit_train
+
+if TYPE_CHECKING:
+    from analysis.pulses.regression import Fit
+
+Array = NDArray[np.float64]
+Choice = Literal["auto", "edges", "matched", "likelihood"]
+
+#: Samples per second of the shortened trace in which pulses are searched for.
+SEARCH_RATE = 2500.0
+#: Fewer edges than this have to stand out of the noise so many times, or they may be noise.
+FEW, CLEAR = 16, 3.0
+#: Pulses that last longer than this part of a turn are placed by their edges alone.
+WIDE = 0.2
+#: The matched filter is not trusted where more than these parts of the turns have no pulse, or one at a wrong place.
+MOST_MISSING, MOST_WRONG = 0.5, 0.15
+
+
+def spin_of_trace(
+    samples: ArrayLike,
+    rate: float,
+    *,
+    start: float = 0.0,
+    method: Choice = "auto",
+    degree: int | None = None,
+) -> SpinFrequency:
+    """Frequency and chirp of a top from evenly sampled light pulses.
+
+    Args:
+        samples: shape (n,), any unit; NaN where there is none.
+        rate: samples per second [1/s].
+        start: time of the first sample [s].
+        method: "edges" is the fastest; "matched" the most precise where pulses stand out; "likelihood" for weak or hard
+            traces; "auto" is matched, and likelihood where that does not do: a note says so.
+        degree: of the phase in time; None: 2, or 3 where the slope itself changes significantly.
+
+    Raises:
+        TooFewPulses: fewer than four pulses were found, or none that return regularly.
+        OnlyHum: that, and the trace holds hum of the mains.
+        ShapesDiffer, NotPositive.
+
+    >>> turns = (25 - 0.05 * np.arange(10000) / 5000) * np.arange(10000) / 5000
+    >>> found = spin_of_trace(np.exp(-3000 * (turns % 1 - 0.5) ** 2), 5000)
+    >>> f"{found.at(1.0).value:.4f} Hz at 1 s", f"{found.chirp.value:.3f} Hz/s"
+    ('24.9000 Hz at 1 s', '-0.100 Hz/s')
+    """
+    x, bad = _checked(samples, rate)
+    factor = max(int(rate // SEARCH_RATE), 1)
+    cleaned = clean(x, rate, shorten(x, factor), bad)
+    trace = Trace(cleaned, rate, rate / factor)
+    try:
+        if method == "edges":
+            return _by_edges(trace, start)
+        found, doubled, used, why = _by_pulse(trace, method, degree)
+    except TooFewPulses as error:
+        if any(note.name == "hum" for note in cleaned.notes):
+            raise OnlyHum(seen=error.seen, needed=error.needed, duration=error.duration) from None
+        raise
+    found, trap = _without_trap(trace, found, degree)
+    return _result(found, doubled, start, method=used, origin=found.origin, notes=(*why, *trap, *cleaned.notes))
+
+
+class Trace:
+    """A trace that was cleaned, with the rates of its samples and bins [1/s]."""
+
+    def __init__(self, cleaned: Clean, rate: float, bin_rate: float) -> None:
+        self.samples, self.bins, self.bad = cleaned.samples, cleaned.bins, cleaned.bad
+        self.notes = cleaned.notes
+        self.rate, self.bin_rate = rate, bin_rate
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return self.samples.size / self.rate
+
+    def too_few(self, seen: int) -> TooFewPulses:
+        """The error of a trace without enough pulses."""
+        return TooFewPulses(seen=seen, needed=FEWEST, duration=self.duration)
+
+    def match(self, fit: Fit, degree: int | None) -> Match | None:
+        """The matched filter from a phase that is about right; None where there are no pulses."""
+        middles = (np.arange(self.bins.size, dtype=np.float64) + 0.5) / self.bin_rate - 0.5 / self.rate
+        window = window_of(self.bins, fit.phase(middles))
+        if window is None:
+            return None
+        return match(self.samples, self.rate, fit, window, bad=self.bad, degree=degree)
+
+
+def _events(trace: Trace) -> tuple[Events, Train]:
+    """What stands out, numbered.  Raises TooFewPulses."""
+    events = find_events(trace.bins, trace.bin_rate)
+    if events.times.size < FEWEST:
+        raise trace.too_few(events.times.size)
+    return events, fit_train(events.times - 0.5 / trace.rate)  # a bin's centre is that of its samples
+
+
+def _by_edges(trace: Trace, start: float) -> SpinFrequency:
+    events, train = _events(trace)
+    if events.width * train.fit.coefficients[1] / train.fit.half > WIDE:
+        return _result(
+            Edges(train.fit, train.used.size, math.nan, math.nan, math.nan, train.missing, 0),
+            train.doubled, start, method="edges", origin=0.0, notes=trace.notes,
+        )  # fmt: skip
+    edges = place_edges(trace.samples, trace.rate, train.fit, width=events.width, sign=events.sign)
+    if edges is None or (edges.turns < FEW and edges.height < CLEAR * edges.noise):
+        raise trace.too_few(train.used.size)
+    return _result(edges, train.doubled, start, method="edges", origin=0.0, notes=trace.notes)
+
+
+def _by_pulse(trace: Trace, method: Choice, degree: int | None) -> tuple[Match, int, Method, tuple[Finding, ...]]:
+    """The match, the number of pulses beside the turns' own, which method found it, and why not the other.
+
+    Raises TooFewPulses.
+    """
+    found, doubled, seen, why = None, 0, 0, "no pulses stand out that return regularly"
+    try:
+        _, train = _events(trace)
+        doubled, seen = train.doubled, train.used.size
+        found = trace.match(train.fit, degree)
+    except TooFewPulses as error:
+        seen = error.seen
+    if method == "matched":
+        if found is None:
+            raise trace.too_few(seen)
+        return found, doubled, "matched", ()
+    if found is not None and method == "auto":
+        why = _doubt(found)
+        if not why:
+            return found, doubled, "matched", ()
+    fit = search(trace.bins, trace.bin_rate)
+    other = None if fit is None else trace.match(fit, degree)
+    if other is None or (found is not None and found.evidence > other.evidence):
+        other = found
+    if other is None or _doubt(other).startswith("the frequency"):
+        raise trace.too_few(seen)
+    notes = (
+        () if method == "likelihood" else (Finding("fell-back", f"{why}: the greatest likelihood was searched for"),)
+    )
+    return other, doubled, "likelihood", notes
+
+
+def _doubt(found: Match) -> str:
+    """Why a match is not to be trusted; empty if it is."""
+    turns = found.heights.size
+    sweep = abs(found.fit.frequency_and_chirp()[1].value or 0.0) * found.fit.half
+    if sweep > 0.5 * found.fit.coefficients[1] / found.fit.half:
+        return f"the frequency would change by {2 * sweep:.3g} Hz"
+    if found.missing > MOST_MISSING * turns:
+        return f"{found.missing} of {turns} turns have no pulse"
+    if found.wrong > MOST_WRONG * turns:
+        return f"{found.wrong} of {turns} pulses are not at their place"
+    return ""
+
+
+def _without_trap(trace: Trace, found: Match, degree: int | None) -> tuple[Match, tuple[Finding, ...]]:
+    """The match at half or twice the frequency if that is the top's, and what is to be said of it."""
+    if traps.repeats(found):
+        twice = trace.match(found.fit.times(2.0), degree)
+        if twice is not None and not traps.alternates(twice):
+            return twice, (
+                Finding("half", "two equal pulses a turn: half the frequency fitted too, and was not taken"),
+            )
+    if why := traps.alternates(found):
+        half = trace.match(found.fit.times(0.5), degree)
+        if half is not None:
+            return half, (
+                Finding("double", f"every second pulse {why}: two marks a turn, twice the frequency was not taken"),
+            )
+    return found, ()
+
+
+def _checked(samples: ArrayLike, rate: float) -> tuple[Array, NDArray[np.bool_] | None]:
+    x = np.ascontiguousarray(samples, dtype=np.float64)
+    if x.ndim != 1:
+        raise ShapesDiffer(quantity="samples", seen=x.shape, expected=(x.size,))
+    if not (math.isfinite(rate) and rate > 0):
+        raise NotPositive(quantity="sample rate", unit="1/s", index=0, value=rate)
+    if x.size < 64:
+        raise TooFewPulses(seen=0, needed=FEWEST, duration=x.size / rate)
+    with np.errstate(invalid="ignore", over="ignore"):
+        if math.isfinite(float(np.einsum("i->", x))):
+            return x, None
+    bad = ~np.isfinite(x)
+    if bad.all():
+        raise TooFewPulses(seen=0, needed=FEWEST, duration=x.size / rate)
+    return np.where(bad, np.median(x[~bad]), x), bad if bad.any() else None
+
+
+def _result(
+    found: Match | Edges, doubled: int, start: float, *, method: Method, origin: float, notes: tuple[Finding, ...]
+) -> SpinFrequency:
+    fit = found.fit
+    frequency, chirp, reference = fit.frequency_and_chirp()
+    assert frequency.value is not None
+    more = [*notes, *traps.mains(frequency, chirp)]
+    if isinstance(found, Match) and found.flat:
+        more.append(Finding("clipped", "the tops of the pulses are flat: the detector or the converter is saturated"))
+    if found.missing:
+        more.append(Finding("missing", f"{found.missing} turns have no pulse"))
+    if found.wrong:
+        more.append(Finding("wrong", f"{found.wrong} pulses are not at their place and were left out"))
+    if fit.coefficients.size > 3:
+        more.append(Finding("curved", "the slope itself changes: a third degree was fitted"))
+    if fit.inflation != 1:
+        more.append(Finding("correlated", f"neighbouring turns resemble each other: variance x {fit.inflation:.2g}"))
+    return SpinFrequency(
+        frequency=frequency,
+        chirp=chirp,
+        phase=fit.phase_at(reference, origin),
+        reference_time=start + reference,
+        method=method,
+        bound=None if math.isnan(found.bound) else found.bound,
+        pulses=found.turns,
+        missing=found.missing,
+        doubled=doubled,
+        scatter=1.4826 * median(np.abs(fit.residuals)) / frequency.value,
+        snr_db=20 * math.log10(found.height / found.noise) if found.height / found.noise > 0 else None,
+        notes=tuple(more),
+    )

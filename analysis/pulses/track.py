@@ -1,0 +1,197 @@
+"""A long record in windows: frequency against time, with the turns counted through the whole record."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analysis.errors import NotPositive, TooFewPulses
+from analysis.pulses.result import Finding, SpinFrequency
+from analysis.pulses.times import FEWEST, checked_times, spin_of_times
+from analysis.pulses.trace import Choice, spin_of_trace
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+Array = NDArray[np.float64]
+
+#: Length of a window [s], unless given: sixty turns of a Levitron, in which its slope changes by less than 1 %.
+WINDOW = 2.0
+#: Turns between two windows are certain where their number is known to this, as a standard uncertainty [turns].
+CERTAIN = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Frequency against time; all arrays of shape (m,), one value for each window in which there are pulses.
+
+    Attributes:
+        time: where frequency and slope are independent [s], about the middle of the window.
+        frequency: [Hz].
+        u: its standard uncertainty [Hz].
+        chirp: its slope [Hz/s].
+        chirp_u: standard uncertainty of that [Hz/s].
+        turns: turns since the first window, counted through as long as `connected` holds.
+        turns_u: standard uncertainty of the fraction of a turn [turns].
+        connected: whether the number of turns since the window before is certain; the first is not.
+        pulses: used in each window.
+        spins: what was found in each window.
+        empty: (start, end) of windows without pulses [s].
+    """
+
+    time: Array
+    frequency: Array
+    u: Array
+    chirp: Array
+    chirp_u: Array
+    turns: Array
+    turns_u: Array
+    connected: NDArray[np.bool_]
+    pulses: NDArray[np.int64]
+    spins: tuple[SpinFrequency, ...]
+    empty: tuple[tuple[float, float], ...]
+
+    @property
+    def notes(self) -> tuple[Finding, ...]:
+        """Findings of the windows, each name once, with the number of windows."""
+        windows: dict[str, list[str]] = {}
+        for spin in self.spins:
+            for note in spin.notes:
+                windows.setdefault(note.name, []).append(note.text)
+        return tuple(
+            Finding(name, f"{texts[0]}" + (f" (and in {len(texts) - 1} more windows)" if len(texts) > 1 else ""))
+            for name, texts in windows.items()
+        )
+
+
+def track_of_times(pulse_times: ArrayLike, *, window: float = WINDOW) -> Track:
+    """Follow the frequency through a long list of pulse times.
+
+    Args:
+        pulse_times: shape (n,), increasing [s].
+        window: length of a window [s].
+
+    Raises:
+        TooFewPulses: no window has enough of them.
+        NotFinite, TimesNotIncreasing, ShapesDiffer, NotPositive.
+    """
+    times = checked_times(pulse_times)
+    _check_window(window)
+    count = max(round((times[-1] - times[0]) / window), 1)
+    ends = np.linspace(times[0], times[-1], count + 1)
+    cuts = np.searchsorted(times, ends)
+    cuts[-1] = times.size
+
+    def spins() -> Iterator[SpinFrequency | tuple[float, float]]:
+        for i in range(count):
+            piece = times[cuts[i] : cuts[i + 1]]
+            try:
+                yield spin_of_times(piece)
+            except TooFewPulses:
+                yield float(ends[i]), float(ends[i + 1])
+
+    return _connect(spins(), times.size, float(times[-1] - times[0]))
+
+
+def track_of_blocks(
+    blocks: Iterable[ArrayLike], rate: float, *, start: float = 0.0, window: float = WINDOW, method: Choice = "auto"
+) -> Track:
+    """Follow the frequency through a long trace that comes in blocks, of which one window at a time is held.
+
+    Args:
+        blocks: each of shape (n,), any lengths, one after the other without a gap; a file read in pieces, for example.
+        rate: samples per second.
+        start: time of the first sample [s].
+        window: length of a window [s].
+        method: as of `spin_of_trace`.
+
+    Raises:
+        TooFewPulses: no window has enough of them.
+        NotPositive, ShapesDiffer.
+    """
+    if not (math.isfinite(rate) and rate > 0):
+        raise NotPositive(quantity="sample rate", unit="1/s", index=0, value=rate)
+    _check_window(window)
+    size = max(round(window * rate), 16)
+    total = 0
+
+    def spins() -> Iterator[SpinFrequency | tuple[float, float]]:
+        nonlocal total
+        for piece in _pieces(blocks, size):
+            begin = start + total / rate
+            total += piece.size
+            try:
+                yield spin_of_trace(piece, rate, start=begin, method=method)
+            except TooFewPulses:
+                yield begin, start + total / rate
+
+    return _connect(spins(), 0, size / rate)
+
+
+def _pieces(blocks: Iterable[ArrayLike], size: int) -> Iterator[Array]:
+    """The same samples in pieces of one size; the last has up to one and a half."""
+    held: list[Array] = []
+    count = 0
+    for block in blocks:
+        held.append(np.asarray(block, dtype=np.float64).ravel())
+        count += held[-1].size
+        if count >= 2 * size:
+            joined = np.concatenate(held)
+            whole = (count - size) // size * size
+            for first in range(0, whole, size):
+                yield joined[first : first + size]
+            held, count = [joined[whole:]], count - whole
+    if count:
+        joined = np.concatenate(held)
+        if count > 1.5 * size:
+            yield joined[:size]
+            joined = joined[size:]
+        yield joined
+
+
+def _check_window(window: float) -> None:
+    if not (math.isfinite(window) and window > 0):
+        raise NotPositive(quantity="window", unit="s", index=0, value=window)
+
+
+def _connect(found: Iterable[SpinFrequency | tuple[float, float]], seen: int, duration: float) -> Track:
+    spins: list[SpinFrequency] = []
+    empty: list[tuple[float, float]] = []
+    for each in found:
+        if isinstance(each, SpinFrequency):
+            spins.append(each)
+        elif empty and empty[-1][1] == each[0]:
+            empty[-1] = empty[-1][0], each[1]
+        else:
+            empty.append(each)
+    if not spins:
+        raise TooFewPulses(seen=seen, needed=FEWEST, duration=duration)
+    numbers = np.array(
+        [
+            (s.reference_time, s.frequency.value, s.frequency.u, s.chirp.value, s.chirp.u, s.phase.value, s.phase.u)
+            for s in spins
+        ],
+        dtype=np.float64,
+    )
+    time, frequency, u, chirp, chirp_u, phase, phase_u = numbers.T
+    step = np.diff(time)
+    # the mean of two parabolas, each from one side: exact for a third degree
+    ahead = 0.5 * (frequency[1:] + frequency[:-1]) * step + (chirp[:-1] - chirp[1:]) * step**2 / 12
+    ahead_u = np.sqrt(
+        (u[1:] ** 2 + u[:-1] ** 2) * step**2 / 4
+        + (chirp_u[1:] ** 2 + chirp_u[:-1] ** 2) * step**4 / 144
+        + phase_u[1:] ** 2
+        + phase_u[:-1] ** 2
+    )
+    fraction = np.diff(phase)
+    off = ahead - fraction - np.rint(ahead - fraction)
+    certain = (ahead_u < CERTAIN) & (np.abs(off) < 0.25)
+    turns = phase[0] + np.concatenate([[0.0], np.cumsum(np.rint(ahead - fraction) + fraction)])
+    return Track(
+        time, frequency, u, chirp, chirp_u, turns, phase_u, np.concatenate([[False], certain]),
+        np.array([s.pulses for s in spins]), tuple(spins), tuple(empty),
+    )  # fmt: skip

@@ -1,0 +1,252 @@
+"""The Hall scan: flux density on the base's axis, at one height after the other."""
+
+from __future__ import annotations
+
+import math
+import re
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
+from pydantic_core import PydanticCustomError
+
+from instruments.errors import InstrumentError
+from levilab.acquisition.experiment import Experiment, ExperimentSettings
+from levilab.acquisition.session import ExperimentFailed
+from levilab.bench.config import ConfigError
+from levilab.bench.person import PlaceProbe, ShieldProbe
+from levilab.runs.channel import Channel
+
+if TYPE_CHECKING:
+    from typing import Self
+
+    from levilab.acquisition.session import Row, Session
+    from levilab.bench.config import Limits
+
+#: More heights than anybody has the patience for: a step in the wrong unit.
+_MOST_HEIGHTS = 1000
+#: As many as the model has parameters of its own.
+_FEWEST_HEIGHTS = 4
+#: A height that is typed lies within the stand [m].
+_LOWEST_M, _HIGHEST_M = -1.0, 2.0
+#: How a person types a height.
+_TYPED = re.compile(r"([+-]?\d+(?:[.,]\d+)?)\s*(mm|cm|m)?", re.IGNORECASE)
+_METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+#: Before the first height there is only a guess of how long one takes [s].
+_USUAL_S = 10.0
+
+
+class FieldSettings(ExperimentSettings):
+    """Heights, readings, and what calliper and data sheets say beside: the analysis reads that from the run.
+
+    Heights are counted as the person counts them; base_origin_m is the height of the middle of the ring magnet's
+    thickness on that scale.
+    """
+
+    lowest_m: float = Field(default=0.03, description="put the probe at this height,")
+    highest_m: float = Field(default=0.11, description="go on up to this one")
+    step_m: PositiveFloat = Field(default=0.005, description="in such steps;")
+    readings: PositiveInt = Field(default=10, ge=2, description="at each, so many readings,")
+    interval_s: PositiveFloat = Field(default=0.2, description="one every so often,")
+    settle_s: NonNegativeFloat = Field(default=1.0, description="after a pause for the filter")
+    range_t: NonNegativeFloat = Field(default=0.035, description="in this range; 0: as the instrument chooses")
+    height_u_m: NonNegativeFloat = Field(default=2e-4, description="standard uncertainty of setting a height")
+    gain_u: NonNegativeFloat = Field(
+        default=0.0012, description="of the magnetometer's scale, relative (0.2 % of reading: 0.2 %/√3)"
+    )
+    background_u_t: NonNegativeFloat = Field(
+        default=5e-5, description="of what all readings are off by: zero, earth's field"
+    )
+    base_inner_radius_m: PositiveFloat = Field(default=0.030, description="the ring magnet by the calliper,")
+    base_inner_radius_u_m: NonNegativeFloat = 1e-4
+    base_outer_radius_m: PositiveFloat = 0.055
+    base_outer_radius_u_m: NonNegativeFloat = 1e-4
+    base_thickness_m: NonNegativeFloat = 0.015
+    base_thickness_u_m: NonNegativeFloat = 2e-4
+    base_origin_m: float = Field(default=0.0, description="its middle, where heights are counted from")
+    base_origin_u_m: NonNegativeFloat = 1e-3
+
+    @property
+    def heights_m(self) -> list[float]:
+        """Where the probe is put, one after the other [m]."""
+        return [round(self.lowest_m + k * self.step_m, 9) for k in range(self._count)]
+
+    @property
+    def _count(self) -> int:
+        # the last step may be missed by rounding
+        return math.floor((self.highest_m - self.lowest_m) / self.step_m + 1e-6) + 1
+
+    @model_validator(mode="after")
+    def _heights_make_a_scan(self) -> Self:
+        if not _FEWEST_HEIGHTS <= (self._count if math.isfinite(self.highest_m / self.step_m) else 0) <= _MOST_HEIGHTS:
+            raise PydanticCustomError(
+                "heights",
+                "lowest_m = {low}, highest_m = {high} and step_m = {step} make {count} heights, {least} to {most} are "
+                "expected",
+                {
+                    "low": f"{self.lowest_m:g}",
+                    "high": f"{self.highest_m:g}",
+                    "step": f"{self.step_m:g}",
+                    "count": str(max(self._count, 0)),
+                    "least": str(_FEWEST_HEIGHTS),
+                    "most": str(_MOST_HEIGHTS),
+                },
+            )
+        return self
+
+    def check(self, table: str, limits: Limits) -> None:
+        """Raise ConfigError for radii that no ring has, and heights that no stand reaches."""
+        if self.base_inner_radius_m >= self.base_outer_radius_m:
+            raise ConfigError(
+                f"{table}.base_inner_radius_m = {self.base_inner_radius_m:g} must be less than "
+                f"{table}.base_outer_radius_m = {self.base_outer_radius_m:g}"
+            )
+        for name in ("lowest_m", "highest_m"):
+            if not _LOWEST_M <= getattr(self, name) <= _HIGHEST_M:
+                raise ConfigError(
+                    f"{table}.{name} = {getattr(self, name):g}: heights from {_LOWEST_M:g} to {_HIGHEST_M:g} m are "
+                    "expected; is it in metres?"
+                )
+
+
+def channels(settings: FieldSettings) -> tuple[Channel, ...]:
+    """The uncertainties of all that is known, and that of the mean alone: only the latter is a reading's own."""
+    return (
+        Channel("time_s", "s", "bench clock, from the zero of the probe"),
+        Channel("height_m", "m", "of the probe on the axis, as the person set or typed it"),
+        Channel("height_u_m", "m", "standard uncertainty of setting a height, from the configuration"),
+        Channel("flux_density_t", "T", f"mean of {settings.readings} readings of the magnetometer"),
+        Channel("flux_density_u_t", "T", "standard uncertainty: scatter, scale and zero of the instrument"),
+        Channel("flux_density_mean_u_t", "T", "the part of it from the scatter and the last digit, each reading's own"),
+    )
+
+
+def run(session: Session[FieldSettings]) -> None:
+    """Zero the probe, then measure at one height after the other; a resumed run goes on at the next one."""
+    heights = session.settings.heights_m
+    _set_up(session)
+    _zero(session)
+    session.begin(lambda: session.progress("probe zeroed", 1.0))
+    done, since = len(session.rows), session.now()
+    for k in range(done, len(heights)):
+        height = _place(session, heights[k], f"{k + 1} of {len(heights)}")
+        row = _measure(session, height)
+        each = (session.now() - since) / (k + 1 - done) or _USUAL_S
+        session.keep(row, time_left_s=each * (len(heights) - k - 1))
+    session.event("scanned", f"{len(session.rows)} heights are measured")
+
+
+def _set_up(session: Session[FieldSettings]) -> None:
+    session.bench.magnetometer.prepare(range_t=session.settings.range_t or None)
+    if session.settings.range_t:  # else the instrument itself changes its range on the way
+        session.bench.record_settings("magnetometer")
+
+
+def _zero(session: Session[FieldSettings]) -> None:
+    """Zero the probe in its chamber.  Each start does that: the instrument may have been off meanwhile."""
+    session.ask(ShieldProbe("Put the probe into its zero-gauss chamber."))
+    session.wait(session.settings.settle_s)
+    while True:
+        try:
+            session.bench.magnetometer.zero()
+        except InstrumentError as error:
+            session.reconnect("magnetometer", error, lambda: _set_up(session))
+        else:
+            return
+
+
+# --- the heights ---
+
+
+def _place(session: Session[FieldSettings], height: float, which: str) -> float:
+    """Have the probe put at a height; returns the one at which it stands [m]."""
+    text = (
+        f"Height {which}: put the probe on the axis at {1e3 * height:.1f} mm "
+        "(if it stands at another height, type that one in mm)."
+    )
+    while True:
+        answer = session.ask(PlaceProbe(text, height))
+        if not answer:
+            return height
+        typed = typed_height(answer)
+        if typed is not None:
+            session.event("another height", f"the probe stands at {1e3 * typed:.2f} mm", height_m=typed)
+            return typed
+        session.event("not understood", f"{answer[:40]!r} is no height: a number in mm is expected, as 61.5")
+
+
+def typed_height(answer: str) -> float | None:
+    """A height as a person types it, in mm where no unit is said [m]; None for what is none.
+
+    >>> typed_height("61,5"), typed_height("6.15 cm"), typed_height("high")
+    (0.0615, 0.0615, None)
+    """
+    match = _TYPED.fullmatch(answer.strip())
+    if match is None:
+        return None
+    height = float(match[1].replace(",", ".")) * _METRES[(match[2] or "mm").lower()]
+    return round(height, 9) if _LOWEST_M <= height <= _HIGHEST_M else None
+
+
+# --- the readings ---
+
+
+def _measure(session: Session[FieldSettings], height: float) -> Row:
+    """The mean of the readings at a height; a magnetometer that fails is set up anew, and the height read anew."""
+    while True:
+        try:
+            session.wait(session.settings.settle_s)
+            begin = session.now()
+            values = [_read(session, height) for _ in range(session.settings.readings)]
+            session.check_settings("magnetometer")
+        except InstrumentError as error:
+            session.reconnect("magnetometer", error, lambda: _set_up(session))
+        else:
+            return {"time_s": (begin + session.now()) / 2, "height_m": height} | _mean(session.settings, values)
+
+
+def _read(session: Session[FieldSettings], height: float) -> float:
+    """One reading [T], after the interval.  Raises ExperimentFailed beyond the range."""
+    session.wait(session.settings.interval_s)
+    flux_density = session.bench.magnetometer.flux_density()
+    if flux_density is None:
+        limit = session.settings.range_t
+        seen = f"beyond the range of {1e3 * limit:g} mT" if limit else "beyond what the probe can measure"
+        raise ExperimentFailed(
+            f"the flux density at {1e3 * height:.1f} mm is {seen}: choose a larger one (field.range_t in the bench "
+            "file), or begin higher up (field.lowest_m)"
+        )
+    return flux_density
+
+
+def _mean(settings: FieldSettings, values: list[float]) -> Row:
+    """Mean and standard uncertainties [T]; readings that all show the same digits are known to half of the last one."""
+    n = len(values)
+    mean = sum(values) / n
+    scatter = math.sqrt(sum((value - mean) ** 2 for value in values) / (n - 1) / n)
+    own = math.hypot(scatter, _digit(values) / math.sqrt(12))
+    whole = math.hypot(own, settings.gain_u * mean, settings.background_u_t)
+    return {
+        "height_u_m": settings.height_u_m,
+        "flux_density_t": mean,
+        "flux_density_u_t": whole,
+        "flux_density_mean_u_t": own,
+    }
+
+
+def _digit(values: list[float]) -> float:
+    """The last digit that the instrument shows [T]: the smallest step between readings, else that of six digits."""
+    different = sorted(set(values))
+    steps = [b - a for a, b in pairwise(different)]
+    largest = max(abs(value) for value in values)
+    return min(steps) if steps else 10.0 ** (math.floor(math.log10(largest)) - 5) if largest else 1e-7
+
+
+EXPERIMENT = Experiment(
+    name="field",
+    about="the base's flux density on its axis, at one height after the other",
+    instruments=("magnetometer",),
+    settings=FieldSettings,
+    channels=channels,
+    run=run,
+)

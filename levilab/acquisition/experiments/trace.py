@@ -1,0 +1,259 @@
+"""Records of the oscilloscope: raw codes into the run folder, written as they come."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated, Literal, Self
+
+import numpy as np
+from pydantic import AfterValidator, Field, PositiveFloat, PositiveInt
+
+from instruments.drivers.oscilloscope import NeverTriggered
+from instruments.errors import InstrumentError, OutOfRange
+from levilab.acquisition.experiment import Experiment, ExperimentSettings
+from levilab.acquisition.session import ExperimentFailed
+from levilab.bench.config import ConfigError
+from levilab.runs.channel import Channel
+
+if TYPE_CHECKING:
+    from instruments.drivers.oscilloscope import Trace
+    from levilab.acquisition.session import Row, Session
+    from levilab.bench.config import Limits
+    from levilab.simulator.scene import Scene
+
+#: A signal that moves by fewer codes than this is none: nothing is plugged in, or it is far too small for the scale.
+_FEWEST_CODES = 3
+#: A record of which more than this share lies beyond the screen is worth a warning.
+_CLIPPED_SHARE = 1e-3
+
+
+def _distinct(channels: tuple[int, ...]) -> tuple[int, ...]:
+    if len(set(channels)) < len(channels):
+        raise ValueError("each channel is expected once")
+    return channels
+
+
+class TraceSettings(ExperimentSettings):
+    """Records of one or several channels, all with one scaling, at an interval.
+
+    drive_frequency_hz: without it the generator is not needed and not touched.
+    """
+
+    channels: Annotated[tuple[PositiveInt, ...], Field(min_length=1), AfterValidator(_distinct)] = Field(
+        default=(1,), description="channels of the oscilloscope to record,"
+    )
+    shows: tuple[str, ...] = Field(default=("tape",), description="what each of them shows")
+    duration_s: PositiveFloat = Field(default=0.5, description="a record is at least so long")
+    points: PositiveInt = Field(default=6000, description="and has at least so many points")
+    volts_per_division: PositiveFloat = 0.2
+    offset_v: float = Field(default=0.65, description="voltage in the middle of the screen")
+    coupling: Literal["DC", "AC"] = Field(default="DC", description="DC or AC")
+    trigger_channel: PositiveInt | None = Field(
+        default=None, description="the first of the channels, if not given", examples=[1]
+    )
+    trigger_level_v: float = Field(default=0.65, description="half way between dark and the pulse")
+    trigger_slope: Literal["rising", "falling", "either"] = Field(
+        default="rising", description="rising, falling or either"
+    )
+    trigger_patience_s: PositiveFloat = Field(default=5.0, description="give up where no trigger comes for so long")
+    records: PositiveInt = Field(default=10, description="so many records,")
+    interval_s: PositiveFloat = Field(default=10.0, description="one every so often, or as fast as it goes")
+    drive_frequency_hz: PositiveFloat | None = Field(
+        default=None, description="drive meanwhile; needs the generator", examples=[30.0]
+    )
+    drive_amplitude_vpp: PositiveFloat = 10.0
+
+    @property
+    def trigger_source(self) -> int:
+        """The channel that triggers."""
+        return self.trigger_channel or self.channels[0]
+
+    def label(self, channel: int) -> str:
+        """What a channel shows, as it stands beside its traces."""
+        k = self.channels.index(channel)
+        return self.shows[k] if k < len(self.shows) else f"channel {channel}"
+
+    def check(self, table: str, limits: Limits) -> None:
+        """Raise ConfigError for a drive that the bench does not allow."""
+        frequency = self.drive_frequency_hz
+        if frequency is None:
+            return
+        for name, wanted, limit in (
+            ("drive_amplitude_vpp", self.drive_amplitude_vpp, limits.drive_amplitude_vpp),
+            ("drive_frequency_hz", frequency, limits.drive_frequency_hz),
+        ):
+            if wanted > limit:
+                raise ConfigError(
+                    f"{table}.{name} = {wanted:g} is more than this bench allows, limits.{name} = {limit:g}"
+                )
+        if frequency < limits.drive_lowest_hz:
+            raise ConfigError(
+                f"{table}.drive_frequency_hz = {frequency:g} is less than this bench allows, "
+                f"limits.drive_lowest_hz = {limits.drive_lowest_hz:g}"
+            )
+
+    def for_scene(self, scene: Scene) -> Self:
+        """See the base: the laser beside the tape, and the scene's drive, where neither was set."""
+        changes: dict[str, object] = {}
+        if not {"channels", "shows"} & self.model_fields_set:
+            changes |= {"channels": (1, 3), "shows": ("tape", "laser")}
+        if "drive_frequency_hz" not in self.model_fields_set and scene.drive.waveform != "off":
+            changes["drive_frequency_hz"] = scene.drive.frequency_hz
+        return self.model_copy(update=changes)
+
+
+def channels(settings: TraceSettings) -> tuple[Channel, ...]:
+    """A row of readings.csv for each record."""
+    trigger = f"oscilloscope, channel {settings.trigger_source}, which triggers"
+    if settings.trigger_source not in settings.channels:
+        trigger = f"oscilloscope, channel {settings.channels[0]}"
+    return (
+        Channel("time_s", "s", "bench clock when the record was complete, from the moment the first was asked for"),
+        Channel("record", "", "number of the record, in traces.jsonl those of all its channels one after the other"),
+        Channel("lowest_v", "V", trigger),
+        Channel("highest_v", "V", trigger),
+    )
+
+
+def also_needs(settings: TraceSettings) -> tuple[str, ...]:
+    """The generator, if the top is to be driven."""
+    return ("generator",) if settings.drive_frequency_hz else ()
+
+
+def run(session: Session[TraceSettings]) -> None:
+    """Take record after record; those that a resumed run has are kept."""
+    settings = session.settings
+    _prepare_scope(session)
+    _drive(session)
+    session.begin(lambda: None, resumed=f"the next record is number {len(session.rows) + 1}")
+    while len(session.rows) < settings.records:
+        _take_records(session)
+
+
+def _take_records(session: Session[TraceSettings]) -> None:
+    """Records at the interval until there are all, or one is lost with the oscilloscope."""
+    settings = session.settings
+    for _ in session.readings_every(settings.interval_s, math.inf):
+        if traces := _take(session):
+            _keep(session, traces)
+        if len(session.rows) >= settings.records:
+            return
+
+
+# --- setting up ---
+
+
+def _prepare_scope(session: Session[TraceSettings], sweep: str = "normal") -> None:
+    settings = session.settings
+    session.bench.oscilloscope.prepare(
+        channels=settings.channels,
+        duration_s=settings.duration_s,
+        points=settings.points,
+        volts_per_division=settings.volts_per_division,
+        offset_v=settings.offset_v,
+        coupling=settings.coupling,
+        trigger_level_v=settings.trigger_level_v,
+        trigger_slope=settings.trigger_slope,
+        trigger_source=settings.trigger_source,
+        sweep=sweep,
+    )
+
+
+def _drive(session: Session[TraceSettings]) -> None:
+    """Switch the drive on, if there is to be one."""
+    settings = session.settings
+    if settings.drive_frequency_hz is None:
+        return
+    session.stop.check()  # the drive does not go on once the end was asked for
+    session.bench.generator.prepare(
+        waveform="SIN", frequency_hz=settings.drive_frequency_hz, amplitude_vpp=settings.drive_amplitude_vpp
+    )
+    session.event("drive on", f"drive on at {settings.drive_frequency_hz:g} Hz")
+    session.bench.generator.output = True
+
+
+# --- records ---
+
+
+def _take(session: Session[TraceSettings]) -> list[Trace]:
+    """The traces of one record, one a channel; none where the oscilloscope was lost and is set up anew.
+
+    Raises ExperimentFailed where no trigger comes.
+    """
+    settings, scope = session.settings, session.bench.oscilloscope
+    try:
+        scope.acquire(timeout_s=settings.trigger_patience_s)
+        return [scope.trace(channel) for channel in settings.channels]
+    except NeverTriggered as never:
+        raise ExperimentFailed(_why_no_trigger(session)) from never
+    except OutOfRange:
+        raise
+    except InstrumentError as error:
+        session.reconnect("oscilloscope", error, lambda: _prepare_scope(session))
+        return []
+
+
+def _why_no_trigger(session: Session[TraceSettings]) -> str:
+    """What the signal is instead: a record without a trigger shows it."""
+    settings, count = session.settings, len(session.rows)
+    where = f"at {settings.trigger_level_v:g} V on channel {settings.trigger_source}"
+    said = f"no trigger {where} within {settings.trigger_patience_s:g} s, after {count} of {settings.records} records"
+    try:
+        _prepare_scope(session, sweep="auto")
+        session.bench.oscilloscope.acquire(timeout_s=settings.trigger_patience_s)
+        low, high = _range(session.bench.oscilloscope.trace(_shown(settings)))
+    except (InstrumentError, ValueError):
+        return f"{said}, and no record without one: is the signal there?"
+    level = settings.trigger_level_v
+    if settings.trigger_source not in settings.channels:
+        return f"{said}: is the signal plugged in there, and does it cross this level (trace.trigger_level_v)?"
+    advice = "is the top up and lit?" if low < level < high or high - low < 0.1 else "set trace.trigger_level_v between"
+    return f"{said}: the signal there lies between {low:.2f} and {high:.2f} V; {advice}"
+
+
+def _shown(settings: TraceSettings) -> int:
+    """The channel whose range is told: the one that triggers, if it is recorded."""
+    return settings.trigger_source if settings.trigger_source in settings.channels else settings.channels[0]
+
+
+def _range(trace: Trace) -> tuple[float, float]:
+    """The lowest and the highest voltage of a trace [V].  Raises ValueError where it has no sample."""
+    volts = trace.volts[~np.isnan(trace.volts)]
+    return float(volts.min()), float(volts.max())
+
+
+def _keep(session: Session[TraceSettings], traces: list[Trace]) -> None:
+    """The traces, then the row that says that they are there."""
+    settings, number = session.settings, len(session.rows) + 1
+    now = session.now()
+    for trace in traces:
+        session.keep_trace(trace, settings.label(trace.channel))
+        if problem := _problem(trace, settings):
+            session.event("look at the scale", f"record {number}: {problem}", record=number, channel=trace.channel)
+    shown = next(trace for trace in traces if trace.channel == _shown(settings))
+    low, high = _range(shown)
+    row: Row = {"time_s": now, "record": number, "lowest_v": low, "highest_v": high}
+    session.keep(row, (settings.records - number) * settings.interval_s)
+
+
+def _problem(trace: Trace, settings: TraceSettings) -> str:
+    """What is wrong with the scale of a trace, empty if nothing is."""
+    codes = trace.codes if trace.none is None else trace.codes[trace.codes != trace.none]
+    what = f"channel {trace.channel} ({settings.label(trace.channel)})"
+    if not codes.size or int(codes.max()) - int(codes.min()) < _FEWEST_CODES:
+        return f"{what} shows nothing: is it plugged in, and on?"
+    clipped = float(trace.clipped.mean())
+    if clipped > _CLIPPED_SHARE:
+        return f"{what} is beyond the screen for {100 * clipped:.2g} % of it: raise trace.volts_per_division"
+    return ""
+
+
+EXPERIMENT = Experiment(
+    name="trace",
+    about="records of the oscilloscope, raw codes, written as they come",
+    instruments=("oscilloscope",),
+    settings=TraceSettings,
+    channels=channels,
+    run=run,
+    also_needs=also_needs,
+)

@@ -1,0 +1,70 @@
+"""`levilab benchmark estimators`: measures, prints two tables, writes JSON and the figure."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from typing import TYPE_CHECKING
+
+from levilab.benchmark.estimators.study import OURS, Study, as_document, study
+from levilab.files import CannotWrite, replace_atomically
+from levilab.present.terminal import new_table, terminal
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def run_and_tell(*, trials: int, out: Path | None, as_json: bool) -> None:
+    """The whole command.  Raises CannotWrite."""
+    found = study(trials=trials, tell=lambda text: print(f"measuring {text}", file=sys.stderr))  # noqa: T201
+    document = json.dumps(as_document(found), indent=2, allow_nan=False)
+    if as_json:
+        print(document)  # noqa: T201
+    else:
+        print_study(found)
+    if out is not None:
+        _write(found, document, out)
+
+
+def _write(found: Study, document: str, out: Path) -> None:
+    # matplotlib, which a benchmark that is not written does not need
+    from levilab.benchmark.estimators.figure import estimators_figure
+    from levilab.present.style import save_png
+
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        replace_atomically(out / "estimators.json", document + "\n")
+        save_png(estimators_figure(found), out / "estimators.png")
+    except OSError as error:
+        raise CannotWrite(
+            f"{out}: the result cannot be written ({error.strerror or error}): choose another place"
+        ) from None
+    print(f"wrote {out / 'estimators.json'} and {out / 'estimators.png'}", file=sys.stderr)  # noqa: T201
+
+
+def print_study(found: Study) -> None:
+    """RMSE over the bound by method and SNR; and the hard cases."""
+    console = terminal()
+    columns = [f"{snr:g} dB" for snr in dict.fromkeys(score.snr_db for score in found.scores)]
+    title = f"RMSE of the frequency over the Cramér–Rao bound, {found.trials} traces each (failures)"
+    shown = new_table(title, "", *columns, "MS/s", numbers=(*columns, "MS/s"))
+    for name in dict.fromkeys(score.name for score in found.scores):
+        scores = [score for score in found.scores if score.name == name]
+        cells = [_ratio(score.rmse_over_bound) + (f" ({score.failures})" if name in OURS else "") for score in scores]
+        speeds = [1e-6 * (score.samples_per_s or math.nan) for score in scores]
+        shown.add_row(name, *cells, f"{min(speeds):.0f} to {max(speeds):.0f}")
+    console.print(shown)
+    numbers = ("failures", "covered", "RMSE / bound", "ms a trace")
+    shown = new_table(f"Hard cases at 20 dB, {found.trials} traces each, the default", "", *numbers, numbers=numbers)
+    for score in found.hard:
+        covered = "–" if score.coverage is None else f"{100 * score.coverage:.1f} %"
+        ratio = "–" if math.isnan(score.rmse_over_bound) else f"{score.rmse_over_bound:.2f}"
+        shown.add_row(score.name, str(score.failures), covered, ratio, f"{score.median_ms:.1f}")
+    console.print(shown)
+    if found.hard:
+        console.print(f"covered: 1σ intervals that hold the truth, ± {100 * found.hard[0].coverage_error:.1f} %")
+
+
+def _ratio(value: float) -> str:
+    return f"{value:.2f}" if value < 10 else f"{float(f'{value:.2g}'):,.0f}".replace(",", " ")

@@ -1,0 +1,214 @@
+"""Many traces of each kind, and what the estimates of their frequency are worth."""
+
+from __future__ import annotations
+
+import math
+import platform
+import time
+from collections import Counter
+from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.errors import AnalysisError
+from analysis.pulses import spin_of_times, spin_of_trace
+from levilab.benchmark.estimators.peers import PEERS
+from levilab.benchmark.estimators.traces import DURATION, DUTY, HARD, RATE, Case, Trace, make
+from levilab.benchmark.machine import processor, version_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from analysis.pulses.trace import Choice
+
+Array = NDArray[np.float64]
+
+#: Signal to noise of the study [dB].
+SNR = (0.0, 5.0, 10.0, 20.0, 30.0, 40.0)
+OURS: dict[str, Choice] = {"default": "auto", "fast": "edges", "maximum likelihood": "likelihood"}
+#: An estimate this many standard deviations off is a failure.
+FAILURE = 10.0
+#: What was aimed at: method, lowest SNR [dB], RMSE over the bound, samples per CPU second.
+AIMS = (
+    ("default", 5.0, 1.10, 40e6),
+    ("fast", 10.0, 1.25, 120e6),
+    ("maximum likelihood", 0.0, 1.10, RATE * DURATION / 0.1),
+)
+
+
+def bound(snr: float) -> float:
+    """The Cramér–Rao bound of the frequency at the middle [Hz] of the study's traces: PHYSICS §5, closed form.
+
+    σ_f² = 12 σ²/(N G T²), G = A²√π/(2 s), s = duty/2.3548.
+    """
+    steepness = math.sqrt(math.pi) / (2 * DUTY / math.sqrt(8 * math.log(2)))
+    return math.sqrt(12 / (RATE * DURATION * steepness * DURATION**2)) * 10 ** (-snr / 20)
+
+
+@dataclass
+class Trials:
+    """Estimates of one method: errors [Hz], uncertainties and bounds [Hz], CPU times [s]; and what failed."""
+
+    errors: list[float] = field(default_factory=list)
+    u: list[float] = field(default_factory=list)
+    bounds: list[float] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+    refused: int = 0
+    notes: Counter[str] = field(default_factory=Counter)
+
+
+@dataclass(frozen=True)
+class Score:
+    """What one method's estimates are worth on one kind of trace.
+
+    Attributes:
+        name: of the method, or of the hard case.
+        snr_db: of the traces.
+        trials: so many.
+        failures: refused, or off by more than ten standard deviations: the bound's where it is the closed form;
+            elsewhere the estimate's own, or the scatter of the trials, whichever is smaller.
+        rmse_hz, rmse_over_bound: of those that did not fail; the bound is the closed form, or of hard cases the median
+            of what the estimates state for their own pulse and noise.
+        coverage: share of one-sigma intervals that hold the truth.
+        best_ms, median_ms: CPU time of a trace [ms].
+        samples_per_s: by the best time.
+        notes: how often each finding was named.
+    """
+
+    name: str
+    snr_db: float
+    trials: int
+    failures: int
+    rmse_hz: float
+    rmse_over_bound: float
+    coverage: float | None
+    best_ms: float
+    median_ms: float
+    samples_per_s: float | None
+    notes: dict[str, int]
+
+    @property
+    def coverage_error(self) -> float:
+        """Standard error of a coverage of 0.68 from so many trials."""
+        return math.sqrt(0.6827 * 0.3173 / self.trials)
+
+
+@dataclass(frozen=True)
+class Study:
+    """All scores: by method and SNR, and of the default on the hard cases."""
+
+    trials: int
+    scores: tuple[Score, ...]
+    hard: tuple[Score, ...]
+
+
+def study(*, trials: int, tell: Callable[[str], None] = lambda _: None) -> Study:
+    """Carry it all out, with seeds that stay; tell: is called with what is under way."""
+    scores: list[Score] = []
+    for snr in SNR:
+        tell(f"{snr:g} dB, {trials} traces")
+        scores += _at(snr, trials)
+    hard = []
+    for name, case in HARD.items():
+        tell(f"{name}, {trials} traces")
+        hard.append(hard_case(name, case, trials))
+    return Study(trials, tuple(scores), tuple(hard))
+
+
+def _at(snr: float, trials: int) -> list[Score]:
+    """All methods on the same traces, one after the other on each."""
+    found = {name: Trials() for name in (*OURS, *PEERS)}
+    random = np.random.default_rng([2026, round(snr)])
+    for number in range(-1, trials):  # the first is not counted: caches, imports
+        trace = make(Case(snr=snr), random)
+        for name, method in OURS.items():
+            _try(found[name], trace, number, method)
+        for name, estimate in PEERS.items():
+            begin = time.process_time()
+            value = estimate(trace.samples, RATE)
+            if number >= 0:
+                found[name].seconds.append(time.process_time() - begin)
+                found[name].errors.append(value - trace.frequency)
+    return [_score(name, snr, each, bound(snr)) for name, each in found.items()]
+
+
+def hard_case(name: str, case: Case, trials: int) -> Score:
+    """The default on one kind of hard trace."""
+    found = Trials()
+    random = np.random.default_rng([2026, list(HARD).index(name) + 100])
+    for number in range(-1, trials):
+        _try(found, make(case, random), number, "auto", times=case.bounces)
+    return _score(name, case.snr, found, None)
+
+
+def _try(found: Trials, trace: Trace, number: int, method: Choice, *, times: bool = False) -> None:
+    begin = time.process_time()
+    try:
+        spin = spin_of_times(trace.samples) if times else spin_of_trace(trace.samples, RATE, method=method)
+    except AnalysisError:
+        found.refused += number >= 0
+        return
+    seconds = time.process_time() - begin
+    if number < 0:
+        return
+    assert spin.frequency.value is not None
+    assert spin.frequency.u is not None
+    found.errors.append(spin.frequency.value - trace.truth(spin.reference_time))
+    found.u.append(spin.frequency.u)
+    found.bounds.append(spin.bound or math.nan)
+    found.seconds.append(seconds)
+    found.notes.update(note.name for note in spin.notes)
+
+
+def _score(name: str, snr: float, found: Trials, limit: float | None) -> Score:
+    errors = np.array(found.errors)
+    trials = errors.size + found.refused
+    if limit is None:
+        limit = float(np.median(found.bounds))
+        scatter = 1.4826 * float(np.median(np.abs(errors)))
+        wrong = np.abs(errors) > FAILURE * np.minimum(np.array(found.u), scatter)
+    else:
+        wrong = np.abs(errors) > FAILURE * limit
+    right = errors[~wrong] if found.u and not wrong.all() else errors
+    rmse = float(np.sqrt(np.mean(right**2)))
+    seconds = np.array(found.seconds)
+    traced = not math.isnan(limit)
+    return Score(
+        name=name,
+        snr_db=snr,
+        trials=trials,
+        failures=int(np.count_nonzero(wrong)) + found.refused,
+        rmse_hz=rmse,
+        rmse_over_bound=rmse / limit,
+        coverage=float(np.mean(np.abs(errors) < np.array(found.u))) if found.u else None,
+        best_ms=1e3 * float(seconds.min()),
+        median_ms=1e3 * float(np.median(seconds)),
+        samples_per_s=RATE * DURATION / float(seconds.min()) if traced and name != "5 pulses only" else None,
+        notes=dict(sorted(found.notes.items())),
+    )
+
+
+def as_document(found: Study) -> dict[str, Any]:
+    """Everything, with units in the names."""
+    return {
+        "schema": "levilab-benchmark-estimators/1",
+        "traces": "Gaussian pulse of 3 % duty, 29.5 to 30.5 Hz, -0.1 Hz/s, 20 kS/s, 10 s; hard cases at 20 dB",
+        "measured_utc": datetime.now(UTC).isoformat(timespec="seconds"),
+        "machine": {"processor": processor(), "system": platform.system(), "python": platform.python_version()},
+        "software": {name: version_of(name) for name in ("levilab", "numpy", "scipy")},
+        "trials": found.trials,
+        "methods": [_row(score) for score in found.scores],
+        "hard_cases": [_row(score) for score in found.hard],
+        "aims": [
+            {"method": name, "from_snr_db": snr, "rmse_over_bound": ratio, "samples_per_s": speed}
+            for name, snr, ratio, speed in AIMS
+        ],
+    }
+
+
+def _row(score: Score) -> dict[str, Any]:
+    row = asdict(score) | {"coverage_standard_error": score.coverage_error}
+    return {key: None if isinstance(value, float) and not math.isfinite(value) else value for key, value in row.items()}

@@ -1,0 +1,35 @@
+"""The calculator for the top.  Heavy imports happen inside the command."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from levilab.cli.options import Json
+from levilab.cli.output import print_json
+
+
+def add_to(app: typer.Typer) -> None:
+    """Make the command known to the application."""
+    app.command(epilog="Example: levilab top sample_data/device.toml")(top)
+
+
+def top(
+    device: Annotated[
+        Path, typer.Argument(metavar="FILE", help="Describes the top's parts, as sample_data/device.toml does.")
+    ],
+    as_json: Json = False,
+) -> None:
+    """Mass and moments of inertia of a top from its parts, taken as cylinders, with uncertainties."""
+    from levilab.pipelines.top import calculate_top, top_document, top_table, top_text
+
+    found = calculate_top(device)
+    if as_json:
+        print_json(top_document(found), sort_keys=True)
+        return
+    from levilab.present.terminal import draw, terminal  # with rich
+
+    terminal().print(draw(top_table(found)))
+    typer.echo(top_text(found))

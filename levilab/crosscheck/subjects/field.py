@@ -1,0 +1,79 @@
+"""The Hall scan of a base that is drawn: its strength and place, and what follows for the tops above it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquired, pull_of
+from levilab.formats.device import Device
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.sources import Options
+from levilab.simulator.equilibrium import stability_of
+from levilab.simulator.scene import Scene
+from levilab.world.base import drawn_base
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+#: The true moment [A m²], and how well it is stated, relative; how well a mass [kg] and a height [m] are measured.
+MOMENT, MOMENT_U, MASS_U, HEIGHT_U = 0.714, 0.01, 1e-5, 2e-4
+
+
+def trial(seed: int, folder: Path) -> list[Pull]:
+    """One scan: the base, the heights that the person misses, and what is said of the top are drawn by the seed.
+
+    The truths of heights, masses, and spins are the simulator's, whose field is another formula.
+    """
+    run = acquired("field", seed, folder, lambda request: request)
+    base, by = drawn_base(seed), np.random.default_rng((seed, 4)).standard_normal(3)
+    scene = Scene().changed(
+        {
+            "base.field": "exact",
+            "base.inner_radius_m": base.inner_radius_m,
+            "base.outer_radius_m": base.outer_radius_m,
+            "base.strength_t_m": base.strength_t_m,
+            "base.thickness_m": base.thickness_m,
+            "base.origin_m": base.origin_m,
+        }
+    )
+    window = stability_of(scene).lifted[-1]
+    mass = (window.light + window.heavy) / 2
+    floating = stability_of(scene.changed({"top.mass_kg": mass})).floating
+    if floating is None:
+        raise TrialFailed("no top floats above the base that was drawn")
+    stated = {"moment_a_m2": MOMENT * (1 + MOMENT_U * float(by[0])), "moment_u_a_m2": MOMENT * MOMENT_U}
+    weighed = {"mass_kg": mass + MASS_U * float(by[1]), "mass_u_kg": MASS_U}
+    found = _values(run.folder, _options(stated))
+    height = floating.height + HEIGHT_U * float(by[2])
+    by_height = _values(run.folder, _options(weighed, height_m=height, height_u_m=HEIGHT_U))
+    return [
+        pull_of("strength", found["strength"], base.strength_t_m),
+        pull_of("origin", found["origin"], base.origin_m),
+        pull_of("background", found["background"], base.background_t),
+        pull_of("lowest height", found["lowest_height"], window.low),
+        pull_of("mass to set", found["mass_to_set"], mass),
+        pull_of("fastest spin", found["fastest_spin"], floating.spins[0][1]),
+        pull_of("moment", by_height["moment"], MOMENT),
+        pull_of("mass by height", by_height["mass_to_set"], mass),
+    ]
+
+
+def _options(top: dict[str, float], **where: float) -> Options:
+    inertias = {"inertia_transverse_kg_m2": 1.04e-6, "inertia_axial_kg_m2": 1.731314e-6}
+    return Options(device=Device.model_validate({"top": top | inertias}), **where)  # type: ignore[arg-type]
+
+
+def _values(folder: Path, options: Options) -> dict[str, Any]:
+    """What the analysis says of a run, as result.json has it."""
+    analysis = ANALYSES["field"]
+    values: dict[str, Any] = analysis.document(analysis.analyze([folder], options), folder)["values"]
+    return values
+
+
+SUBJECT = Subject(
+    "field",
+    "the Hall scan of a base: strength, place, and the tops that float there",
+    trial,
+)

@@ -1,0 +1,1 @@
+"""Scans of the base's field: strength, origin, thickness, and what follows for the tops that float there."""

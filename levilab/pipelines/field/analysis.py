@@ -1,0 +1,282 @@
+"""Scans of the base's field at some paths: each by itself and together."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from analysis.errors import AnalysisError
+from analysis.field.fit import LEARNS_NOTHING, fit_scan
+from analysis.field.floating import FERRITE_PER_K, Floating, follow
+from analysis.uncertainty import Estimate
+from levilab.errors import DataError
+from levilab.pipelines.field.device import known_of, known_top, usual
+from levilab.pipelines.field.quantities import SHOWN
+from levilab.pipelines.field.readings import FieldReadings, field_readings
+from levilab.pipelines.result import Place, place_of
+from levilab.pipelines.sources import Needs, Options, Source, collect
+from levilab.present.numbers import with_uncertainty
+from levilab.runs.run import find_run
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+    from pathlib import Path
+
+    from analysis.field.fit import FieldScan
+    from analysis.field.floating import KnownTop
+
+FIELD = "field"
+#: The runs that suit, and what is needed of a data file.
+NEEDS = Needs(
+    analysis=FIELD,
+    experiments=frozenset({"field"}),
+    quantities=("height_m", "height_u_m", "flux_density_t", "flux_density_u_t"),
+    read=field_readings,
+)
+#: Correlations above this are worth a word.
+_STRONG = 0.9
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where the fit of one run comes from.  options: how it was made; text: for people."""
+
+    options: Options
+    text: str = "analyzed now"
+
+
+@dataclass(frozen=True, eq=False)
+class FieldRun:
+    """One scan.
+
+    scan: its fit; top: of which top what follows is; floating: what follows, None where no top floats; text: what it
+    says, in a few sentences; warnings: what to know before using the numbers.
+    """
+
+    scan: FieldScan
+    top: KnownTop
+    floating: Floating | None
+    text: str
+    warnings: tuple[str, ...]
+
+    @property
+    def values(self) -> dict[str, Estimate]:
+        """All that was found, by name."""
+        return {**self.scan.parameters, **(self.floating.values if self.floating else {})}
+
+
+@dataclass(frozen=True)
+class Mean(Estimate):
+    """A mean over scans.  scatter: of one from another; runs: how many."""
+
+    scatter: float = 0.0
+    runs: int = 1
+
+
+@dataclass(frozen=True)
+class FieldAnalysis:
+    """Scans, each by itself and together.
+
+    runs, origins: one per source; place: where the result belongs; warnings: about the inputs; remarks: what does not
+    belong to the analysis.
+    """
+
+    sources: tuple[Source[FieldReadings], ...]
+    runs: tuple[FieldRun, ...]
+    options: Options
+    place: Place
+    warnings: tuple[str, ...]
+    remarks: tuple[str, ...]
+    origins: tuple[Origin, ...]
+
+    @property
+    def home(self) -> Path:
+        """The folder that the result belongs to."""
+        return self.place.folder
+
+    @property
+    def values(self) -> Mapping[str, Estimate]:
+        """Of one scan what it says; of several means over them."""
+        return self.runs[0].values if len(self.runs) == 1 else means([run.values for run in self.runs])
+
+    @property
+    def text(self) -> str:
+        """What the data say, in a few sentences."""
+        if len(self.runs) == 1:
+            return self.runs[0].text
+        strength = self.values["strength"]
+        agree = _scatter_in_words(strength)
+        return f"{len(self.runs)} scans: {_shown('strength', strength)} in the mean; {agree}. {_advice(self.values)}"
+
+    @property
+    def all_warnings(self) -> list[str]:
+        """Every warning once, a run's with its name where there are several runs."""
+        several = len(self.runs) > 1
+        texts = list(self.warnings)
+        common = set.intersection(*(set(run.warnings) for run in self.runs))
+        for source, run in zip(self.sources, self.runs, strict=True):
+            prefix = f"{source.name}: " if several else ""
+            texts += [text if text in common else prefix + text for text in (*source.warnings, *run.warnings)]
+        return list(dict.fromkeys(texts))
+
+
+def analyze_scans(paths: Sequence[Path], options: Options) -> FieldAnalysis:
+    """Fit the field of a ring to every scan found at the paths.  Raises DataError for what cannot be used."""
+    paths = [find_run(path) for path in paths]
+    found = collect(paths, NEEDS, lambda _: options.columns)
+    runs = tuple(analyze_source(source, options) for source in found.sources)
+    return FieldAnalysis(
+        sources=found.sources,
+        runs=runs,
+        options=options,
+        place=place_of(paths, found.sources),
+        warnings=(*found.warnings, *about_inputs(found.sources, options)),
+        remarks=found.remarks,
+        origins=(Origin(options),) * len(runs),
+    )
+
+
+def analyze_source(source: Source[FieldReadings], options: Options) -> FieldRun:
+    """One input fitted, and what follows.  Raises DataError, which names the file."""
+    readings = source.readings
+    known = known_of(source, options.device)
+    try:
+        top, warnings = known_top(options, usual(readings.height_u))
+        scan = fit_scan(
+            readings.height,
+            readings.flux_density,
+            known,
+            readings.u,
+            0.0 if readings.height_u is None else readings.height_u,
+            free_radii=options.free_radii,
+        )
+        floating = follow(scan, top)
+    except AnalysisError as error:
+        raise DataError(f"{source.data}: {error}") from error
+    if floating is None:
+        warnings = ["no top of this kind floats above this base at any mass and spin: are radii and inertias right?"]
+    if readings.u is None:
+        warnings.append("no uncertainty of the readings is given: their scatter about the fit stands for it")
+    if readings.height_u is None:
+        warnings.append("no uncertainty of the heights is given: they are taken as exact")
+    every = (*scan.warnings, *warnings, *(floating.warnings if floating else ()))
+    return FieldRun(scan, top, floating, _in_words(scan, floating), every)
+
+
+def about_inputs(sources: Sequence[Source[FieldReadings]], options: Options) -> Iterable[str]:
+    """What to know of the inputs before using the numbers."""
+    synthetic = sum(source.synthetic for source in sources)
+    if 0 < synthetic < len(sources):
+        yield (
+            f"{synthetic} of {len(sources)} inputs are SYNTHETIC, the others are not known to be: "
+            "a mean over both says nothing about a real base"
+        )
+    if options.columns and all(source.run for source in sources):
+        yield "names of columns were given, but none of the inputs is a data file"
+
+
+def means(runs: Sequence[Mapping[str, Estimate]]) -> dict[str, Mean]:
+    """Unweighted means over scans, of the quantities that all of them have.
+
+    What calliper and data sheet leave open is common to all scans, and no mean makes it smaller: u is that of one scan,
+    or s/√N where the scans scatter more.
+    """
+    names = [name for name in runs[0] if all(name in run for run in runs)]
+    found = {}
+    for name in names:
+        values = [run[name].value or 0.0 for run in runs]
+        sizes = [run[name].u or 0.0 for run in runs]
+        n, mean = len(values), sum(values) / len(values)
+        scatter = math.sqrt(sum((value - mean) ** 2 for value in values) / (n - 1))
+        u = max(math.sqrt(sum(size**2 for size in sizes) / n), scatter / math.sqrt(n))
+        found[name] = Mean(mean, u, runs[0][name].unit, scatter=scatter, runs=n)
+    return found
+
+
+# --- in words ------------------------------------------------------------------------------------------
+
+
+def _shown(name: str, estimate: Estimate) -> str:
+    return with_uncertainty(SHOWN[name].of(estimate))
+
+
+def _scatter_in_words(strength: Estimate) -> str:
+    assert isinstance(strength, Mean)
+    share = 100 * strength.scatter / abs(strength.value or 1.0)
+    return f"one differs from another by {share:.2g} %"
+
+
+def _in_words(scan: FieldScan, floating: Floating | None) -> str:
+    base = (
+        f"The base has ρ = {_shown('strength', scan.parameters['strength'])}, its middle at "
+        f"{_shown('origin', scan.parameters['origin'])}; its field points {_pole(scan)} above it."
+    )
+    parts = [base, _learned_in_words(scan)]
+    parts.append(_advice(floating.values) if floating else "No top floats above it.")
+    return " ".join(part for part in parts if part)
+
+
+def _pole(scan: FieldScan) -> str:
+    return "up" if scan.values[0] > 0 else "down (by the sign of the probe)"
+
+
+def _learned_in_words(scan: FieldScan) -> str:
+    """What the scan can tell, and what it cannot."""
+    words = {
+        "origin": "origin",
+        "thickness": "thickness",
+        "inner_radius": "inner radius",
+        "outer_radius": "outer radius",
+    }
+    of_calliper = [
+        words[name] for name in scan.fitted if name in words and (scan.learned(name) or 0.0) > LEARNS_NOTHING
+    ]
+    said = []
+    if of_calliper:
+        said.append(f"The scan does not tell {_and(of_calliper)} better than the calliper.")
+    pairs = [
+        (one, other)
+        for k, one in enumerate(scan.fitted)
+        for other in scan.fitted[k + 1 :]
+        if abs(scan.correlation(one, other)) > _STRONG
+    ]
+    said += [
+        f"{one.replace('_', ' ').capitalize()} and {other.replace('_', ' ')} can hardly be told apart "
+        f"(correlation {scan.correlation(one, other):.2f})."
+        for one, other in pairs
+    ]
+    return " ".join(said)
+
+
+def _and(words: Sequence[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def _advice(values: Mapping[str, Estimate]) -> str:
+    """Which mass to set, and what to mind."""
+    if "mass_to_set" not in values:
+        return ""
+    shown = {name: _shown(name, value) for name, value in values.items() if name in SHOWN}
+    per_mass = SHOWN["height_per_mass"].of(values["height_per_mass"]).value or 0.0
+    mass = values["mass_to_set"].value or 0.0
+    per_kelvin = 2 * FERRITE_PER_K * mass * 1e3
+    tops = (
+        f"Tops float from {shown['lowest_height']} to {shown['highest_height']} if they weigh {shown['lightest_mass']} "
+        f"to {shown['heaviest_mass']}. Set {shown['mass_to_set']}: such a top floats at {shown['height_at_mass']}, "
+        f"0.1 g more lowers it by {abs(per_mass):.2f} mm, and it must spin at {shown['slowest_spin']} to "
+        f"{shown['fastest_spin']}."
+    )
+    texts = [tops]
+    if "moment" in values:
+        texts.append(f"From the height at which it floats its moment is {shown['moment']}.")
+    if "mass_to_add" in values:
+        add = values["mass_to_add"].value or 0.0
+        word = "add" if add > 0 else "take off"
+        amount = with_uncertainty(SHOWN["mass_to_add"].of(Estimate(abs(add), values["mass_to_add"].u, "kg")))
+        texts.append(f"To this top {word} {amount}." if add > 0 else f"From this top {word} {amount}.")
+    texts.append(
+        f"Ferrite loses 0.2 % of its strength per kelvin, base and top alike: 1 K warmer, and the mass to set is "
+        f"{abs(per_kelvin):.2f} g less."
+    )
+    return " ".join(texts)

@@ -1,0 +1,149 @@
+"""From what calliper, data sheet and scales say, in the run and in a file, to what an analysis takes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from analysis.field.fit import Known, Prior
+from analysis.field.floating import KnownTop
+from analysis.field.magnet import Disc
+from analysis.top import Cylinder, Top, top_of
+from analysis.uncertainty import Estimate
+from levilab.errors import DataError
+from levilab.formats.device import BaseTable, Device
+from levilab.settings import in_one_line
+
+if TYPE_CHECKING:
+    from levilab.formats.device import TopTable
+    from levilab.pipelines.field.readings import FieldReadings
+    from levilab.pipelines.sources import Options, Source
+
+#: The thesis's top: what is taken where nothing is known, with a warning.
+THESIS = {"transverse": (1.04e-6, "kg m^2"), "axial": (1.731314e-6, "kg m^2"), "moment": (0.714, "A m^2")}
+#: What a run says of the base begins with this in the settings of its experiment.
+_OF_BASE = "base_"
+
+
+def known_of(source: Source[FieldReadings], device: Device | None) -> Known:
+    """What is known of the base and the instrument: what the file says, else the run.  Raises DataError."""
+    run = source.run.record.configuration.get("field", {}) if source.run else {}
+    of_run = run if isinstance(run, dict) else {}
+    base = _base(source, of_run, device)
+    if base.inner_radius_m is None or base.outer_radius_m is None:
+        raise DataError(
+            f"{source.path}: the radii of the base are not known: write [base] with inner_radius_m and outer_radius_m "
+            "into a file, as sample_data/device.toml, and give it to levilab analyze field with `device`"
+        )
+    told = device.magnetometer if device else None
+    gain = told.gain_u if told and told.gain_u is not None else _number(of_run, "gain_u", 0.0)
+    background = (
+        told.background_u_t
+        if told and told.background_u_t is not None
+        else _number(of_run, "background_u_t", Known.background.u)
+    )
+    return Known(
+        Prior(base.inner_radius_m, base.inner_radius_u_m),
+        Prior(base.outer_radius_m, base.outer_radius_u_m),
+        None if base.origin_m is None else Prior(base.origin_m, base.origin_u_m),
+        None if base.thickness_m is None else Prior(base.thickness_m, base.thickness_u_m),
+        Prior(0.0, background),
+        gain if source.readings.has_own_u or device else 0.0,
+    )
+
+
+def _base(source: Source[FieldReadings], of_run: dict[str, Any], device: Device | None) -> BaseTable:
+    """The run's, and over it what the file sets."""
+    table = {key.removeprefix(_OF_BASE): value for key, value in of_run.items() if key.startswith(_OF_BASE)}
+    given = device.base.model_dump(exclude_unset=True) if device else {}
+    try:
+        return BaseTable.model_validate(table | given)
+    except ValidationError as error:
+        raise DataError(f"{source.path}: configuration.field in run.json: base_{in_one_line(error)}") from error
+
+
+def _number(table: dict[str, Any], key: str, default: float) -> float:
+    value = table.get(key, default)
+    return float(value) if isinstance(value, int | float) and value >= 0 else default
+
+
+# --- the top ---
+
+
+def parts_of(top: TopTable) -> list[Cylinder]:
+    """The parts as cylinders."""
+    return [
+        Cylinder(
+            part.name,
+            part.mass_kg,
+            part.outer_radius_m,
+            part.inner_radius_m,
+            part.height_m,
+            part.offset_m,
+            part.mass_u_kg,
+            part.outer_radius_u_m,
+            part.inner_radius_u_m,
+            part.height_u_m,
+            part.offset_u_m,
+        )
+        for part in top.parts
+    ]
+
+
+def known_top(options: Options, height_u: float | None) -> tuple[KnownTop, list[str]]:
+    """What is known of the top, the thesis's where nothing is, and what to know of that.
+
+    height_u: standard uncertainty of the scan's heights [m].  Raises ImpossibleCylinder.
+    """
+    device = options.device or Device()
+    table, warnings = device.top, []
+    made = top_of(parts_of(table)) if table.parts else None
+    moment = _estimate(table.moment_a_m2, table.moment_u_a_m2, "A m^2")
+    mass = made.mass if made else _estimate(table.mass_kg, table.mass_u_kg, "kg")
+    height = None
+    if options.height_m is not None:
+        u = options.height_u_m if options.height_u_m is not None else height_u
+        height = Estimate(options.height_m, u or 0.0, "m")
+        if mass is None:
+            raise DataError(
+                "`height` tells the moment of a top only if its mass is known: write [top] with mass_kg or its parts "
+                "into a file, as sample_data/device.toml, and give it with `device`"
+            )
+    transverse, axial, missing = _inertias(table, made)
+    if moment is None and height is None:
+        moment = Estimate(THESIS["moment"][0], 0.0, "A m^2")
+        missing = [*missing, "moment"]
+    if missing:
+        warnings.append(
+            f"of the top the {' and the '.join(missing)} are not known, those of the thesis's top are taken: what "
+            "follows is of that top; describe yours in a file and give it with `device`"
+        )
+    magnet = Disc(table.magnet_radius_m, table.magnet_height_m or 0.0) if table.magnet_radius_m else None
+    if magnet is None:
+        warnings.append(
+            "the top's magnet is taken for a point: one of 14 mm radius feels about 4 % more force at 73 mm, and its "
+            "lowest height lies 3 mm lower; give magnet_radius_m and magnet_height_m with `device`"
+        )
+    covariance = made.covariance if made else None
+    return KnownTop(transverse, axial, moment, mass, height, device.gravity_m_s2, covariance, magnet), warnings
+
+
+def _inertias(table: TopTable, made: Top | None) -> tuple[Estimate, Estimate, list[str]]:
+    if made:
+        return made.transverse, made.axial, []
+    transverse = _estimate(table.inertia_transverse_kg_m2, table.inertia_transverse_u_kg_m2, "kg m^2")
+    axial = _estimate(table.inertia_axial_kg_m2, table.inertia_axial_u_kg_m2, "kg m^2")
+    if transverse and axial:
+        return transverse, axial, []
+    return Estimate(THESIS["transverse"][0], 0.0, "kg m^2"), Estimate(THESIS["axial"][0], 0.0, "kg m^2"), ["inertias"]
+
+
+def _estimate(value: float | None, u: float, unit: str) -> Estimate | None:
+    return None if value is None else Estimate(value, u, unit)
+
+
+def usual(values: np.ndarray | None) -> float | None:
+    """The median; None where there are none."""
+    return None if values is None else float(np.median(values))

@@ -1,0 +1,88 @@
+"""What a table of readings must fulfil before it is taken for a scan of a field."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from levilab.formats.columns import TableError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from levilab.formats.table import Table
+
+    Array = NDArray[np.float64]
+
+#: A stand is no higher [m], and no probe measures more [T]: beyond, the unit is another one.
+_HIGHEST_M, _STRONGEST_T = 2.0, 35.0
+#: No permanent magnet makes more [T]: beyond, the unit is most likely another one.
+_STRONGEST_MAGNET_T = 2.0
+#: Relative: units and printed digits round in about the tenth digit.
+_SAME = 1e-9
+#: The column of the uncertainty that is each reading's own, which runs of levilab have.
+OWN_U = "flux_density_mean_u_t"
+
+
+@dataclass(frozen=True, eq=False)
+class FieldReadings:
+    """Flux density against height, each array of shape (n,).
+
+    height [m], flux_density [T]; height_u [m], u [T]: standard uncertainties, None where not given; has_own_u: whether
+    u is each reading's own, without what is common to all.
+    """
+
+    height: Array
+    flux_density: Array
+    height_u: Array | None
+    u: Array | None
+    has_own_u: bool
+    warnings: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.height)
+
+    def same_as(self, other: FieldReadings) -> bool:
+        """Whether heights and flux densities are the same, but for the rounding of another unit in the file."""
+        pairs = ((self.height, other.height), (self.flux_density, other.flux_density))
+        return len(self) == len(other) and all(
+            bool(np.allclose(a, b, rtol=_SAME, atol=_SAME * float(np.abs(b).max()))) for a, b in pairs
+        )
+
+
+def field_readings(table: Table) -> FieldReadings:
+    """The readings of a scan.  Raises TableError, which names the line where there is one."""
+    height, flux_density = table.column("height_m"), table.column("flux_density_t")
+    if not len(height):
+        raise TableError(table.path, "holds no readings yet: scan at least four heights")
+    _must_be_in_range(table, height, _HIGHEST_M, "a height", unit="m", column="z=NAME [mm]")
+    _must_be_in_range(table, flux_density, _STRONGEST_T, "a flux density", unit="T", column="b=NAME [mT]")
+    columns = table.frame.columns
+    own = OWN_U in columns
+    u_name = OWN_U if own else "flux_density_u_t"
+    height_u = table.column("height_u_m") if "height_u_m" in columns else None
+    u = table.column(u_name) if u_name in columns else None
+    for values, what, lowest in ((height_u, "the uncertainty of a height", 0.0), (u, "an uncertainty", 1e-12)):
+        if values is not None and (wrong := np.flatnonzero(values < lowest)).size:
+            seen, line = float(values[wrong[0]]), int(table.lines[wrong[0]])
+            raise TableError(table.path, f"{what} is {seen:g}, more than 0 is expected: correct it", line=line)
+    strongest = float(np.abs(flux_density).max())
+    doubts = (
+        [f"{table.path.name}: {strongest:.3g} T is more than a permanent magnet makes; say the unit, as b=NAME [mT]"]
+        if strongest > _STRONGEST_MAGNET_T
+        else []
+    )
+    return FieldReadings(height, flux_density, height_u, u, own, (*table.warnings, *doubts))
+
+
+def _must_be_in_range(table: Table, values: Array, most: float, what: str, *, unit: str, column: str) -> None:
+    wrong = np.flatnonzero(np.abs(values) > most)
+    if wrong.size:
+        raise TableError(
+            table.path,
+            f"{what} of {values[wrong[0]]:.6g} {unit} cannot be, up to {most:g} {unit} is expected: if the unit is "
+            f"another one, say so, as `columns` = {column}",
+            line=int(table.lines[wrong[0]]),
+        )

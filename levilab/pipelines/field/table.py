@@ -1,0 +1,101 @@
+"""Scans of a field → tables."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from analysis.field.fit import LEARNS_NOTHING
+from levilab.pipelines.field.quantities import SHOWN
+from levilab.present.numbers import plain, short_name, with_uncertainty, without_unit
+from levilab.present.tables import Row, Table, table
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from analysis.field.fit import FieldScan
+    from analysis.uncertainty import Estimate
+    from levilab.pipelines.field.analysis import FieldAnalysis
+
+#: What is shown of several scans, a row each.
+_BY_RUN = ("strength", "origin", "lightest_mass", "heaviest_mass", "mass_to_set")
+
+
+def field_tables(analysis: FieldAnalysis) -> tuple[Table, ...]:
+    """The scans, the base, and what follows.  Each fits a terminal of 80 columns."""
+    if len(analysis.runs) > 1:
+        return scans_table(analysis), by_run_table(analysis), follows_table(analysis.values)
+    return scans_table(analysis), base_table(analysis.runs[0].scan), follows_table(analysis.values)
+
+
+def scans_table(analysis: FieldAnalysis) -> Table:
+    """What was measured, and how well the model fits."""
+    total, synthetic = len(analysis.runs), sum(source.synthetic for source in analysis.sources)
+    made_up = "" if not synthetic else ", SYNTHETIC" if synthetic == total else f", {synthetic} of them SYNTHETIC"
+    rows = []
+    for source, run in zip(analysis.sources, analysis.runs, strict=True):
+        scan, statistics = run.scan, run.scan.statistics
+        rows.append(
+            (
+                short_name(source.name),
+                str(statistics.n),
+                f"{1e3 * scan.height[0]:.1f} … {1e3 * scan.height[-1]:.1f}",
+                f"{1e3 * scan.flux_density[0]:.3f} → {1e3 * scan.flux_density[-1]:.3f}",
+                plain(1e6 * statistics.rms_residual),
+                plain(statistics.reduced_chi_square),
+                plain(statistics.runs_test_p, 2),
+            )
+        )
+    heads = ("scan", "readings", "heights [mm]", "field [mT]", "rms [µT]", "χ²/dof", "order p")
+    numbers = ("readings", "rms [µT]", "χ²/dof", "order p")
+    return table(f"Field of the base, {total} scan{'s' * (total > 1)}{made_up}", heads, rows, numbers=numbers)
+
+
+def base_table(scan: FieldScan) -> Table:
+    """What the scan says of the base, beside what was known before."""
+    rows = []
+    for name, estimate in scan.parameters.items():
+        prior = scan.known.prior(name)
+        before = "" if prior is None else _prior(name, prior.value, prior.u, estimate)
+        rows.append((SHOWN[name].words, with_uncertainty(SHOWN[name].of(estimate)), before, _learned(scan, name)))
+    return table("The base", ("", "found", "known before", "what the scan adds"), rows)
+
+
+def _prior(name: str, value: float, u: float, like: Estimate) -> str:
+    return with_uncertainty(SHOWN[name].of(replace(like, value=value, u=u)))
+
+
+def _learned(scan: FieldScan, name: str) -> str:
+    """What the scan adds to what was known."""
+    left = scan.learned(name)
+    if name not in scan.fitted:
+        return "held"
+    if left is None:
+        return "all of it"
+    return "nothing" if left > LEARNS_NOTHING else f"u is {100 * left:.0f} % of what it was"
+
+
+def follows_table(values: Mapping[str, Estimate]) -> Table:
+    """What follows for the tops that float there."""
+    names = [name for name in SHOWN if name in values and name not in _OF_BASE]
+    rows = [(SHOWN[name].words, with_uncertainty(SHOWN[name].of(values[name]))) for name in names]
+    return table("What follows for a top", ("", ""), rows or [("no top floats above this base", "")])
+
+
+_OF_BASE = ("strength", "origin", "thickness", "background", "inner_radius", "outer_radius")
+
+
+def by_run_table(analysis: FieldAnalysis) -> Table:
+    """The main results, scan by scan, and their means."""
+    heads = ["scan", *(f"{SHOWN[name].words}\n[{SHOWN[name].unit}]" for name in _BY_RUN)]
+    rows = [
+        Row((short_name(source.name), *_cells(run.values)))
+        for source, run in zip(analysis.sources, analysis.runs, strict=True)
+    ]
+    if len(analysis.runs) > 1:
+        rows.append(Row(("mean", *_cells(analysis.values)), "together"))
+    return table("Scan by scan", heads, rows)
+
+
+def _cells(values: Mapping[str, Estimate]) -> list[str]:
+    return [without_unit(SHOWN[name].of(values[name])) if name in values else "—" for name in _BY_RUN]

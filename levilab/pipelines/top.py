@@ -1,0 +1,105 @@
+"""The calculator for the top: a device's parts → mass and moments of inertia, for people and for programs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from analysis.errors import AnalysisError
+from analysis.top import Cylinder, Top, top_of
+from analysis.uncertainty import Estimate
+from levilab.errors import DataError
+from levilab.files import finite
+from levilab.formats.device import read_device
+from levilab.pipelines.field.device import parts_of
+from levilab.present.numbers import with_uncertainty
+from levilab.present.tables import Row, Table, table
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+SCHEMA = "levilab-top/1"
+
+
+@dataclass(frozen=True, eq=False)
+class Calculated:
+    """A top from its parts.  alone: each part as if it were the whole top."""
+
+    parts: tuple[Cylinder, ...]
+    alone: tuple[Top, ...]
+    top: Top
+
+    @property
+    def values(self) -> dict[str, Estimate]:
+        """The results by name."""
+        return {
+            "mass": self.top.mass,
+            "inertia_transverse": self.top.transverse,
+            "inertia_axial": self.top.axial,
+            "centre_of_mass": self.top.centre,
+        }
+
+
+def calculate_top(path: Path) -> Calculated:
+    """The top that a device file describes by its parts.  Raises DataError."""
+    parts = tuple(parts_of(read_device(path).top))
+    if not parts:
+        raise DataError(
+            f"{path}: has no [[top.parts]]: describe each part of the top as a cylinder, as in sample_data/device.toml"
+        )
+    try:
+        return Calculated(parts, tuple(top_of([part]) for part in parts), top_of(parts))
+    except AnalysisError as error:
+        raise DataError(f"{path}: {error}") from error
+
+
+def top_table(found: Calculated) -> Table:
+    """The parts, each about the centre of mass of itself, and the whole."""
+    rows = [Row((part.name, *_cells(alone))) for part, alone in zip(found.parts, found.alone, strict=True)]
+    rows.append(Row(("the top", *_cells(found.top)), "together"))
+    heads = ("part", "mass", "I₁, across", "I₃, about the axis", "centre")
+    return table("The top from its parts", heads, rows)
+
+
+def _cells(top: Top) -> tuple[str, ...]:
+    shown = ((top.mass, 1e3, "g"), (top.transverse, 1e7, "g cm²"), (top.axial, 1e7, "g cm²"), (top.centre, 1e3, "mm"))
+    return tuple(with_uncertainty(_in(estimate, factor, unit)) for estimate, factor, unit in shown)
+
+
+def _in(estimate: Estimate, factor: float, unit: str) -> Estimate:
+    value, u = (None if one is None else factor * one for one in (estimate.value, estimate.u))
+    return Estimate(value, u, unit)
+
+
+def top_text(found: Calculated) -> str:
+    """What to mind, and how a scene takes the top."""
+    top = found.top
+    ratio = (top.axial.value or 0.0) / (top.transverse.value or 1.0)
+    kind = "flat, as a Levitron's" if ratio > 1 else "long: a Levitron's is flat, with I₃ > I₁"
+    keys = {
+        "top.mass_kg": top.mass.value,
+        "top.inertia_transverse_kg_m2": top.transverse.value,
+        "top.inertia_axial_kg_m2": top.axial.value,
+    }
+    settings = " ".join(f"--set {key}={value:.6g}" for key, value in keys.items())
+    return f"I₃/I₁ = {ratio:.3g}: the top is {kind}.\nFor a scene: {settings}"
+
+
+def top_document(found: Calculated) -> dict[str, Any]:
+    """The same in SI; covariance: of mass, inertia_transverse and inertia_axial."""
+
+    def values(estimates: dict[str, Estimate]) -> dict[str, Any]:
+        return {name: {"value": one.value, "u": one.u, "unit": one.unit} for name, one in estimates.items()}
+
+    document: dict[str, Any] = finite(
+        {
+            "schema": SCHEMA,
+            "values": values(found.values),
+            "covariance": found.top.covariance.tolist(),
+            "parts": [
+                {"name": part.name, "values": values(Calculated((part,), (alone,), alone).values)}
+                for part, alone in zip(found.parts, found.alone, strict=True)
+            ],
+        }
+    )
+    return document

@@ -1,0 +1,165 @@
+"""Fits of a scan: scatter over fixed seeds, what calliper and scan each say, and scans that are refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.errors import (
+    FieldStandsStill,
+    FieldTurnsOver,
+    ImpossibleRing,
+    NoField,
+    NotFinite,
+    NotPositive,
+    ShapesDiffer,
+    TooFewHeights,
+)
+from analysis.field.fit import PARAMETERS, Known, Prior, fit_scan
+from analysis.field.ring import Ring, on_axis
+
+Z = np.arange(0.030, 0.1101, 0.005)
+U_B, U_Z = 2e-6, 2e-4
+KNOWN = Known(Prior(0.030, 1e-4), Prior(0.055, 1e-4), Prior(0.0, 1e-3), Prior(0.015, 2e-4), Prior(0.0, 5e-5))
+TRUTH = Ring(1.43e-3, 0.0008, 0.0151, 0.0301, 0.0549)
+
+
+def scan(seed=0, ring=TRUTH, background=2e-5, u_b=U_B, u_z=U_Z):
+    random = np.random.default_rng(seed)
+    heights = Z + u_z * random.standard_normal(Z.size)
+    return on_axis(ring, heights)[0] + background + u_b * random.standard_normal(Z.size)
+
+
+def drawn(seed):
+    """A base as calliper and data sheet allow, and its background."""
+    by = np.random.default_rng((seed, 1)).standard_normal(6)
+    ring = Ring(
+        1.4e-3 * (1 + 0.03 * by[0]), 1e-3 * by[1], 0.015 + 2e-4 * by[2], 0.03 + 1e-4 * by[3], 0.055 + 1e-4 * by[4]
+    )
+    return ring, 5e-5 * by[5]
+
+
+@pytest.mark.parametrize("free_radii", [False, True])
+def test_uncertainties_predict_the_scatter(free_radii):
+    pulls, reduced = [], []
+    for seed in range(25):
+        ring, background = drawn(seed)
+        found = fit_scan(Z, scan(seed, ring, background), KNOWN, U_B * np.ones(17), U_Z, free_radii=free_radii)
+        truth = [ring.strength, ring.origin, ring.thickness, background, ring.inner_radius, ring.outer_radius]
+        pulls.append((found.values - truth) / np.sqrt(np.diagonal(found.covariance)))
+        reduced.append(found.statistics.reduced_chi_square)
+    # three standard errors of a standard deviation, and of a mean, from 25
+    assert np.std(pulls, axis=0) == pytest.approx(np.ones(6), abs=0.43)
+    assert np.mean(pulls, axis=0) == pytest.approx(np.zeros(6), abs=0.6)
+    assert np.mean(reduced) == pytest.approx(1.0, abs=3 * np.sqrt(2 / 16 / 25) + 0.05)  # 0.05: radii that are held
+
+
+def test_a_scan_without_noise_gives_the_ring_back():
+    known = replace(
+        KNOWN, inner_radius=Prior(0.0301, 0.0), outer_radius=Prior(0.0549, 0.0), thickness=None, origin=None
+    )
+    found = fit_scan(Z, scan(u_b=0.0, u_z=0.0), known, 1e-9)
+    expected = [TRUTH.strength, TRUTH.origin, TRUTH.thickness, 2e-5, 0.0301, 0.0549]
+    # with a u of 1 nT; the prior of the background, 0 ± 50 µT, draws by its share of that, 1e-8
+    assert found.values == pytest.approx(expected, rel=1e-5)
+    assert found.fitted == PARAMETERS[:4]
+    assert found.warnings == () or "scatter far less" in found.warnings[0]
+
+
+def test_a_pole_that_points_down_is_the_same_but_for_the_sign():
+    up, down = (fit_scan(Z, sign * scan(background=0.0), KNOWN, U_B, U_Z) for sign in (1, -1))
+    assert down.values[0] == pytest.approx(-up.values[0], rel=1e-9)
+    assert down.values[1:3] == pytest.approx(up.values[1:3], rel=1e-6)
+    assert down.residuals == pytest.approx(-up.residuals, abs=1e-12)
+
+
+def test_what_the_scan_cannot_tell_stays_the_callipers():
+    found = fit_scan(Z, scan(), KNOWN, U_B, U_Z)
+    thickness, origin = found.learned("thickness"), found.learned("origin")
+    assert thickness is not None
+    assert origin is not None
+    assert thickness > 0.99
+    assert origin < 0.2
+    assert found.learned("strength") is None
+    free = fit_scan(Z, scan(), replace(KNOWN, thickness=None), U_B, U_Z)
+    assert free.parameters["thickness"].u is not None
+    assert free.parameters["thickness"].u > 2e-3
+    assert abs(free.correlation("thickness", "strength")) > 0.5
+
+
+def test_the_radii_that_are_held_are_in_the_uncertainties():
+    exact = replace(KNOWN, inner_radius=Prior(0.03, 0.0), outer_radius=Prior(0.055, 0.0))
+    with_u, without = (fit_scan(Z, scan(), known, U_B, U_Z) for known in (KNOWN, exact))
+    assert with_u.values == pytest.approx(without.values, rel=1e-9)
+    # what a refit with another radius moves is what the covariance holds of it
+    moved = fit_scan(Z, scan(), replace(exact, inner_radius=Prior(0.0301, 0.0)), U_B, U_Z).values - without.values
+    outer = fit_scan(Z, scan(), replace(exact, outer_radius=Prior(0.0551, 0.0)), U_B, U_Z).values - without.values
+    more = np.diagonal(with_u.covariance - without.covariance)
+    assert np.sqrt(more[:3]) == pytest.approx(np.hypot(moved, outer)[:3], rel=0.02)  # first order
+
+
+def test_the_scale_of_the_instrument_goes_into_the_strength_alone():
+    plain, scaled = (fit_scan(Z, scan(), replace(KNOWN, gain_u=gain), U_B, U_Z) for gain in (0.0, 0.01))
+    u = [found.parameters["strength"].u or 0.0 for found in (plain, scaled)]
+    assert u[1] == pytest.approx(np.hypot(u[0], 0.01 * plain.values[0]), rel=1e-9)
+    assert scaled.parameters["origin"] == plain.parameters["origin"]
+
+
+def test_without_uncertainties_the_scatter_stands_for_them():
+    known = fit_scan(Z, scan(u_z=0.0), KNOWN, U_B)
+    unknown = fit_scan(Z, scan(u_z=0.0), KNOWN)
+    assert unknown.statistics.reduced_chi_square is None
+    # 17 readings tell a standard deviation to 17 %
+    assert np.mean(unknown.u) == pytest.approx(np.mean(known.u), rel=0.6)
+
+
+def test_a_base_that_is_no_such_ring_enlarges_the_uncertainties():
+    bent = scan() * (1 + 3 * Z)
+    found = fit_scan(Z, bent, KNOWN, U_B, U_Z)
+    assert "leaves more than the stated uncertainties explain" in found.warnings[0]
+    assert any("the scan wants origin" in text for text in found.warnings)
+
+
+def test_a_slip_of_the_probe_is_named():
+    slipped = scan()
+    slipped[9] = on_axis(TRUTH, np.array([Z[9] + 0.004]))[0, 0]
+    texts = fit_scan(Z, slipped, KNOWN, U_B, U_Z).warnings
+    assert any("the reading at 75 mm lies" in text for text in texts)
+
+
+def test_an_uncertainty_that_is_common_to_all_is_recognised():
+    assert any("scatter far less" in text for text in fit_scan(Z, scan(), KNOWN, 2e-4, U_Z).warnings)
+
+
+@pytest.mark.parametrize(
+    ("z", "b", "error", "says"),
+    [
+        (Z[:2], scan()[:2], TooFewHeights, "readings at 2 heights (from 30 to 35 mm), at least 4 are needed"),
+        (np.full(9, 0.07), scan()[:9], TooFewHeights, "readings at 1 height (all at 70 mm)"),
+        (Z[:0], Z[:0], TooFewHeights, "readings at 0 heights"),
+        (Z, 1e-3 * scan(), NoField, "nowhere above 0.0246 mT"),
+        (Z, np.minimum(scan(), 0.0200), FieldStandsStill, "stays at 20 mT from 45 to 70 mm"),
+        (Z, scan() * np.where(Z > 0.08, -1, 1), FieldTurnsOver, "between 80 and 85 mm"),
+        (Z, scan()[:-1], ShapesDiffer, "flux density has shape (16,)"),
+        (Z, np.where(Z > 0.1, np.nan, scan()), NotFinite, "flux density number 16 is nan"),
+    ],
+)
+def test_a_bad_scan_is_refused_in_a_sentence(z, b, error, says):
+    with pytest.raises(error) as caught:
+        fit_scan(z, b, KNOWN)
+    assert says in str(caught.value)
+
+
+def test_uncertainties_and_radii_that_cannot_be_are_refused():
+    with pytest.raises(NotPositive):
+        fit_scan(Z, scan(), KNOWN, 0.0)
+    with pytest.raises(NotPositive):
+        fit_scan(Z, scan(), KNOWN, U_B, -1e-3)
+    with pytest.raises(ImpossibleRing, match=r"inner radius 0\.06 m, outer radius 0\.055 m"):
+        fit_scan(Z, scan(), replace(KNOWN, inner_radius=Prior(0.06, 0.0)))
+
+
+def test_the_sign_may_change_where_that_of_the_base_does():
+    low = np.arange(0.012, 0.10, 0.006)
+    found = fit_scan(low, on_axis(TRUTH, low)[0], KNOWN, U_B, U_Z)
+    assert found.values[0] == pytest.approx(TRUTH.strength, rel=0.02)

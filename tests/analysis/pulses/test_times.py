@@ -1,0 +1,93 @@
+"""Spin frequency of lists of pulse times, clean and as real switches give them."""
+
+import numpy as np
+import pytest
+
+from analysis.errors import NotFinite, TimesNotIncreasing, TooFewPulses
+from analysis.pulses import spin_of_times
+from levilab.benchmark.estimators.traces import HARD, make
+
+
+def pulse_times(frequency=30.3, chirp=-0.1, duration=10.0, phase=0.37):
+    """Times at which phase + frequency t + chirp t²/2 is whole, by the closed form."""
+    turn = np.arange(1, int((frequency + chirp * duration / 2) * duration))
+    return (-frequency + np.sqrt(frequency**2 + 2 * chirp * (turn - phase))) / chirp
+
+
+def names(found):
+    return {note.name for note in found.notes}
+
+
+def test_exact_times_give_the_exact_frequency_and_slope():
+    found = spin_of_times(pulse_times())
+    assert abs(found.frequency.value - (30.3 - 0.1 * found.reference_time)) < 1e-9  # times are rounded to 1e-15 s
+    assert abs(found.chirp.value + 0.1) < 1e-9
+    assert abs(found.phase.value - (0.37 + 30.3 * found.reference_time - 0.05 * found.reference_time**2) % 1) < 1e-8
+    assert (found.pulses, found.missing, found.doubled, found.method) == (pulse_times().size, 0, 0, "edges")
+
+
+def test_frequency_and_slope_are_independent_at_the_reference_time():
+    random = np.random.default_rng(1)
+    times = pulse_times()
+    times = times[(times < 3) | (random.uniform(size=times.size) < 0.3)]  # many more pulses at the beginning
+    found = [spin_of_times(times + 1e-5 * random.standard_normal(times.size)) for _ in range(300)]
+    frequency = [f.frequency.value + 0.1 * f.reference_time for f in found]
+    correlation = np.corrcoef(frequency, [f.chirp.value for f in found])[0, 1]
+    assert abs(correlation) < 0.17  # 3 standard errors from 300 trials
+
+
+def test_the_uncertainty_predicts_the_scatter():
+    random, pulls = np.random.default_rng(2), []
+    for _ in range(400):
+        found = spin_of_times(pulse_times() + 1e-4 * random.standard_normal(pulse_times().size))
+        pulls.append((found.frequency.value - 30.3 + 0.1 * found.reference_time) / found.frequency.u)
+    assert np.std(pulls) == pytest.approx(1, abs=0.12)  # 3 standard errors of a standard deviation, and u's own scatter
+
+
+def test_few_pulses_widen_the_uncertainty_to_68_per_cent():
+    random, times = np.random.default_rng(3), np.arange(6) / 30
+    found = [spin_of_times(times + 1e-4 * random.standard_normal(6)) for _ in range(500)]
+    covered = np.mean([abs(f.frequency.value - 30) < f.frequency.u for f in found])
+    assert covered == pytest.approx(0.683, abs=0.063)  # 3 standard errors; without Student's t it would be 0.61
+
+
+def test_missing_doubled_and_wrong_pulses_are_counted():
+    random, times = np.random.default_rng(4), pulse_times()
+    kept = np.delete(times, random.choice(np.arange(1, times.size - 1), 100, replace=False))
+    found = spin_of_times(np.sort(np.concatenate([kept, random.uniform(0.1, 9.9, 20)])))
+    assert abs(found.frequency.value - (30.3 - 0.1 * found.reference_time)) < 1e-6
+    assert found.missing == pytest.approx(100, abs=2)  # a random time may lie where a pulse is missing
+    assert found.doubled == pytest.approx(20, abs=2)
+    assert {"missing", "doubled"} <= names(found)
+
+
+def test_a_switch_that_spoils_half_of_the_turns_is_stood():
+    random, pulls, wrong = np.random.default_rng(5), [], []
+    for _ in range(40):
+        trace = make(HARD["a switch that bounces, times"], random)
+        found = spin_of_times(trace.samples)
+        pulls.append((found.frequency.value - trace.truth(found.reference_time)) / found.frequency.u)
+        wrong.append(np.mean(np.abs(np.diff(trace.samples) * found.frequency.value - 1) > 0.2))
+    assert np.mean(wrong) > 0.5  # of the recorded turns
+    assert np.abs(pulls).max() < 5
+    assert np.std(pulls) == pytest.approx(1, abs=0.34)  # 3 standard errors from 40
+
+
+def test_a_slope_that_changes_is_fitted_with_a_third_degree():
+    grid = np.linspace(0, 20, 200001)
+    phase = 30 * (1 - np.exp(-0.004 * grid)) / 0.004
+    times = np.interp(np.arange(1, int(phase[-1])), phase, grid)
+    found = spin_of_times(times + 1e-6 * np.random.default_rng(6).standard_normal(times.size))
+    assert "curved" in names(found)
+    truth = 30 * np.exp(-0.004 * found.reference_time)
+    assert abs(found.frequency.value / truth - 1) < 3e-6  # what the fourth degree leaves
+    assert abs(spin_of_times(times, degree=2).frequency.value / truth - 1) > 5e-5
+
+
+def test_wrong_lists_are_refused_with_the_reason():
+    with pytest.raises(TooFewPulses, match=r"3 pulses in 0\.2 s, at least 4 are needed"):
+        spin_of_times([0.0, 0.1, 0.2])
+    with pytest.raises(NotFinite, match="pulse time number 2"):
+        spin_of_times([0.0, np.nan, 0.2, 0.3, 0.4])
+    with pytest.raises(TimesNotIncreasing):
+        spin_of_times([0.0, 0.2, 0.1, 0.3, 0.4])

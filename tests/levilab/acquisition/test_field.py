@@ -1,0 +1,168 @@
+"""The Hall scan on the virtual bench: what it writes, what the person may answer, and what goes wrong."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from instruments.clock import VirtualClock
+from levilab.acquisition.experiments.field import FieldSettings, typed_height
+from levilab.acquisition.loop import AcquisitionRequest, acquire
+from levilab.acquisition.request import AcquisitionOptions, request_for
+from levilab.acquisition.session import ExperimentFailed
+from levilab.acquisition.table import Configuration, with_settings
+from levilab.bench.config import ConfigError, Limits
+from levilab.bench.person import PlaceProbe, ShieldProbe
+from levilab.world.base import Base, Stand, drawn_base
+from levilab.world.bench import virtual_bus, virtual_wiring
+from levilab.world.spin_world import SpinScene, SpinWorld
+from support.acquisitions import Impatient, Silent
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from levilab.bench.person import Task
+
+#: Few heights and readings: what is tested is what happens to them.
+SHORT = FieldSettings(lowest_m=0.04, highest_m=0.08, step_m=0.01, readings=3, settle_s=0.1)
+BASE = Base(thickness_m=0.015, origin_m=0.0008, background_t=3e-5)
+
+
+def request_of(out: Path, settings: FieldSettings = SHORT, base: Base = BASE, **changes: Any) -> AcquisitionRequest:
+    """A scan of this base, its probe put in place exactly."""
+    world = SpinWorld(SpinScene(base=base), VirtualClock())
+    wiring = dataclasses.replace(virtual_wiring(world), **changes)
+    config = with_settings(Configuration(), "field", settings)
+    return AcquisitionRequest("field", config, lambda: wiring, out=out, synthetic_how="a test")
+
+
+def test_the_readings_are_the_base_field_within_their_uncertainty(tmp_path: Path) -> None:
+    show = Silent()
+    run = acquire(request_of(tmp_path), show)
+    assert run.status == "finished"
+    frame = run.readings().frame
+    assert frame["height_m"].tolist() == [0.04, 0.05, 0.06, 0.07, 0.08]
+    truth = np.array([BASE.flux_density(height) for height in frame["height_m"]])
+    own, whole = frame["flux_density_mean_u_t"].to_numpy(), frame["flux_density_u_t"].to_numpy()
+    # three readings of a last digit of 1 µT: 4 u, where a scatter from three is itself known to a factor of two
+    assert (np.abs(frame["flux_density_t"] - truth) < np.maximum(4 * own, 2e-6)).all()
+    assert whole == pytest.approx(np.hypot(np.hypot(own, 0.0012 * truth), 5e-5), rel=1e-3)
+    assert show.left[-1] == 0.0
+    assert show.left == sorted(show.left, reverse=True)
+
+
+def test_the_probe_is_zeroed_in_its_chamber_first(tmp_path: Path) -> None:
+    """The virtual gaussmeter shows 80 µT and more without it; the background is the base's surroundings', and stays."""
+    asked: list[Task] = []
+    world = SpinWorld(SpinScene(base=Base(strength_t_m=1e-9, background_t=4e-5)), VirtualClock())
+    wiring = virtual_wiring(world)
+
+    def person(task: Task) -> str:
+        asked.append(task)
+        return wiring.person(task)
+
+    config = with_settings(Configuration(), "field", SHORT)
+    request = AcquisitionRequest(
+        "field", config, lambda: dataclasses.replace(wiring, person=person), out=tmp_path, synthetic_how="a test"
+    )
+    field = acquire(request, Silent()).readings().column("flux_density_t")
+    assert [type(task) for task in asked] == [ShieldProbe] + [PlaceProbe] * 5
+    assert field == pytest.approx(4e-5 * np.ones(5), abs=3e-6)
+
+
+def test_a_height_that_is_typed_is_the_one_that_is_kept(tmp_path: Path) -> None:
+    answers = iter(["", "41,5", "high", "4.9 cm", "", "", ""])
+    run = acquire(request_of(tmp_path, person=lambda _: next(answers)), Silent())
+    assert run.readings().column("height_m").tolist() == [0.0415, 0.049, 0.06, 0.07, 0.08]
+    texts = [event["text"] for event in run.events()]
+    assert "'high' is no height: a number in mm is expected, as 61.5" in texts
+    assert "the probe stands at 41.50 mm" in texts
+
+
+@pytest.mark.parametrize(
+    ("typed", "height"),
+    [("61.5", 0.0615), ("61,5 mm", 0.0615), ("+6 cm", 0.06), ("0.06 m", 0.06), ("-5", -0.005), ("6e1", None),
+     ("9999", None), ("mm", None)],
+)  # fmt: skip
+def test_heights_as_people_type_them(typed: str, height: float | None) -> None:
+    assert typed_height(typed) == height
+
+
+def test_a_field_beyond_the_range_ends_the_scan_in_a_sentence(tmp_path: Path) -> None:
+    settings = SHORT.model_copy(update={"range_t": 0.003})
+    with pytest.raises(ExperimentFailed, match=r"at 40\.0 mm is beyond the range of 3 mT.*field\.range_t"):
+        acquire(request_of(tmp_path, settings), Silent())
+
+
+def test_the_range_may_be_left_to_the_instrument(tmp_path: Path) -> None:
+    for range_t, automatic in ((0.0, "ON"), (0.035, "OFF")):
+        run = acquire(request_of(tmp_path, SHORT.model_copy(update={"range_t": range_t})), Silent())
+        assert run.status == "finished"
+        assert run.record.instruments["magnetometer"]["settings_end"]["automatic_range"] == automatic
+
+
+def test_an_interrupted_scan_goes_on_at_the_next_height(tmp_path: Path) -> None:
+    bench = tmp_path / "bench.toml"
+    bench.write_text("[field]\nlowest_m = 0.04\nhighest_m = 0.08\nstep_m = 0.01\nreadings = 3\n", encoding="utf-8")
+    options = AcquisitionOptions(mock=True, bench=bench, out=tmp_path, seed=5)
+    run = acquire(request_for("field", options), Impatient(2))
+    assert (run.status, run.count()) == ("interrupted", 2)
+    again = acquire(request_for("field", AcquisitionOptions(resume=run.folder)), Silent())
+    assert again.status == "finished"
+    assert again.readings().column("height_m").tolist() == [0.04, 0.05, 0.06, 0.07, 0.08]
+    base, stand = drawn_base(5), Stand(scatter_m=2e-4, seed=5)
+    truth = [stand.at(height).sees(base) for height in (0.04, 0.05, 0.06, 0.07, 0.08)]
+    assert again.readings().column("flux_density_t") == pytest.approx(truth, abs=3e-6)
+    assert f"strength {base.strength_t_m:.6e} T m" in (again.record.synthetic_how or "")
+
+
+def test_a_magnetometer_that_is_reset_on_the_way_is_set_up_anew(tmp_path: Path) -> None:
+    """After the second height another program resets it: the third is read once more, in the range of the others."""
+    world = SpinWorld(SpinScene(base=BASE), VirtualClock())
+    bus = virtual_bus(world)
+    meter: Any = bus.instruments["ASRLmagnetometer.levilab::INSTR"]
+
+    class Resets(Silent):
+        def reading(self, text: str, elapsed: float, remaining: float) -> None:
+            super().reading(text, elapsed, remaining)
+            if len(self.readings) == 2:
+                meter.reset()
+
+    from instruments.virtual.bench.visa_library import library_for
+
+    wiring = dataclasses.replace(virtual_wiring(world), library=library_for(bus))
+    config = with_settings(Configuration(), "field", SHORT)
+    run = acquire(AcquisitionRequest("field", config, lambda: wiring, out=tmp_path, synthetic_how="a test"), Resets())
+    assert run.status == "finished"
+    assert run.count() == 5
+    assert [event["kind"] for event in run.events()].count("found again") == 1
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        ({"step_m": 5.0}, "make 1 heights, 4 to 1000 are expected"),
+        ({"step_m": 1e-6}, "heights, 4 to 1000 are expected"),
+        ({"lowest_m": 0.2}, "make 0 heights"),
+    ],
+)
+def test_heights_that_make_no_scan_are_refused(settings: dict[str, float], says: str) -> None:
+    with pytest.raises(ValidationError) as caught:
+        FieldSettings(**settings)  # type: ignore[arg-type]
+    assert says in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        ({"base_inner_radius_m": 0.06}, r"field\.base_inner_radius_m = 0\.06 must be less than"),
+        ({"lowest_m": 30.0, "highest_m": 110.0, "step_m": 5.0}, "is it in metres"),
+    ],
+)
+def test_bases_and_heights_that_cannot_be_are_refused(settings: dict[str, float], says: str) -> None:
+    with pytest.raises(ConfigError, match=says):
+        FieldSettings(**settings).check("field", Limits())  # type: ignore[arg-type]

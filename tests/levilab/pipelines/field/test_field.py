@@ -1,0 +1,255 @@
+"""The analysis of scans: results and their recall, users' files, bad input, and what the command prints."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from levilab.errors import DataError, DoesNotSuit
+from levilab.formats.device import Device, DeviceError, read_device
+from levilab.formats.table import parse_columns
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.field.analysis import FieldAnalysis, analyze_scans
+from levilab.pipelines.field.document import as_document, recall_scans, result_of
+from levilab.pipelines.field.figure import field_figure
+from levilab.pipelines.field.report import field_part
+from levilab.pipelines.field.table import field_tables
+from levilab.pipelines.result import save
+from levilab.pipelines.sources import Options
+from levilab.pipelines.top import calculate_top
+from levilab.report.page import render
+from levilab.world.base import Base
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+#: A top alone: the base is taken from the run.
+TOP_OF_THESIS = Device.model_validate({"top": {"moment_a_m2": 0.714}})
+#: The base as it is.
+CALLIPER = Device.model_validate(
+    {"base": {"inner_radius_m": 0.03, "inner_radius_u_m": 0.0, "outer_radius_m": 0.055, "outer_radius_u_m": 0.0,
+              "thickness_m": 0.015, "thickness_u_m": 0.0, "origin_m": 0.0}}
+)  # fmt: skip
+HEIGHTS_MM = np.arange(30.0, 111.0, 5.0)
+BASE = Base(thickness_m=0.015, origin_m=0.0005)
+FIELD_MT = np.array([1e3 * BASE.flux_density(z / 1e3) for z in HEIGHTS_MM])
+
+
+@pytest.fixture
+def scan(tmp_path: Path, sample_data: Path) -> Path:
+    return shutil.copytree(sample_data / "field-scan", tmp_path / "scan")
+
+
+@pytest.fixture
+def device(sample_data: Path) -> Path:
+    return sample_data / "device.toml"
+
+
+def keep(found: FieldAnalysis) -> Path:
+    """Write the result as `save_result` does, but for the figure."""
+    return save(result_of(found, found.place), found.place, b"")[0]
+
+
+def csv(path: Path, header: str, *columns: np.ndarray) -> Path:
+    rows = [",".join(f"{value:.6g}" for value in row) for row in zip(*columns, strict=True)]
+    path.write_text("\n".join([header, *rows, ""]), encoding="utf-8")
+    return path
+
+
+# --- the sample scan ---
+
+
+def test_the_sample_scan_gives_its_truth_back(sample_data: Path, device: Path) -> None:
+    """As make.py prints it; 3 u, where the seed was chosen before this was seen."""
+    found = analyze_scans([sample_data / "field-scan"], Options(device=read_device(device)))
+    for name, truth in (("strength", 1.409299e-3), ("origin", 0.811e-3), ("thickness", 14.79e-3)):
+        estimate = found.values[name]
+        assert estimate.value is not None
+        assert estimate.u is not None
+        assert abs(estimate.value - truth) < 3 * estimate.u, name
+
+
+def test_a_result_holds_what_was_found_and_is_read_not_computed(
+    scan: Path, device: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options = Options(device=read_device(device), height_m=0.0735)
+    found = analyze_scans([scan], options)
+    document = json.loads(keep(found).read_text(encoding="utf-8"))
+    assert document["values"]["strength"]["unit"] == "T m"
+    assert {"origin", "thickness", "moment", "mass_to_set"} <= set(document["values"])
+    assert document["models"][0]["name"] == "ring"
+    assert document["synthetic"] is True
+    monkeypatch.setattr("levilab.pipelines.field.document.analyze_source", None)
+    recalled = recall_scans([scan], Options())
+    assert recalled.origins[0].text.startswith("as levilab analyze found it")
+    assert as_document(recalled, scan) == document
+    assert field_tables(recalled) == field_tables(found)
+    for name in ("height", "flux_density", "u", "residuals", "covariance"):  # all that is drawn comes from these
+        assert np.array_equal(getattr(recalled.runs[0].scan, name), getattr(found.runs[0].scan, name)), name
+    assert recalled.all_warnings == found.all_warnings
+
+
+def test_other_options_are_computed_anew_with_those_of_the_result(scan: Path) -> None:
+    keep(analyze_scans([scan], Options(device=TOP_OF_THESIS)))
+    recalled = recall_scans([scan], Options(free_radii=True))
+    assert recalled.origins[0].text.startswith("analyzed for this page: other options")
+    assert recalled.origins[0].options.device == TOP_OF_THESIS
+    assert "inner_radius" in recalled.runs[0].scan.fitted
+
+
+def test_a_result_that_does_not_go_with_the_readings_is_refused(scan: Path) -> None:
+    file = keep(analyze_scans([scan], Options()))
+    document = json.loads(file.read_text(encoding="utf-8"))
+    del document["runs"][0]["models"][0]["parameters"]["origin"]
+    file.write_text(json.dumps(document), encoding="utf-8")
+    with pytest.raises(DataError, match="each with a value"):
+        recall_scans([scan], Options())
+
+
+def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(tmp_path: Path, scan: Path) -> None:
+    other = shutil.copytree(scan, tmp_path / "other")
+    text = (other / "readings.csv").read_text(encoding="utf-8").replace(",0.035,", ",0.0352,")
+    (other / "readings.csv").write_text(text, encoding="utf-8")
+    found = analyze_scans([tmp_path], Options())
+    alone = [run.values["strength"] for run in found.runs]
+    mean = found.values["strength"]
+    assert mean.value == pytest.approx(np.mean([one.value for one in alone]))
+    assert mean.u is not None
+    assert alone[0].u is not None
+    assert mean.u > 0.99 * alone[0].u
+    page = render(replace(ANALYSES["field"], svg=lambda _: "<svg/>"), found)
+    assert "None of these 2 runs came from a real top" in page
+    assert as_document(found, tmp_path)["values"]["strength"]["runs"] == 2
+    assert len(field_figure(found).axes) == 4
+    assert len(field_part(found).inputs) == 2
+
+
+# --- users' files ---
+
+
+@pytest.mark.parametrize(
+    ("titles", "z", "b"),
+    [
+        (("height_m,flux_density_t", ""), HEIGHTS_MM / 1e3, FIELD_MT / 1e3),
+        (("z [mm],B [mT]", ""), HEIGHTS_MM, FIELD_MT),
+        (("Höhe (cm),Bz / G", ""), HEIGHTS_MM / 10, FIELD_MT * 10),
+        (("Abstand,Hallsonde", "z=Abstand [mm],b=Hallsonde [G]"), HEIGHTS_MM, FIELD_MT * 10),
+        (("a,b2", "height_m=1,flux_density_t=2"), HEIGHTS_MM / 1e3, FIELD_MT / 1e3),
+    ],
+)
+def test_files_of_users_are_read_in_their_units(
+    tmp_path: Path, titles: tuple[str, str], z: np.ndarray, b: np.ndarray
+) -> None:
+    path = csv(tmp_path / "hall.csv", titles[0], z, b)
+    options = Options(columns=parse_columns(titles[1]), device=CALLIPER)
+    found = analyze_scans([path], options)
+    strength = found.values["strength"].value
+    assert strength == pytest.approx(
+        BASE.strength_t_m, rel=1e-3
+    )  # the origin is left open to 1 mm, the background to 50 µT
+    assert any("no uncertainty of the readings" in text for text in found.all_warnings)
+
+
+@pytest.mark.parametrize(
+    ("z", "b", "says"),
+    [
+        (HEIGHTS_MM[:2], FIELD_MT[:2], "holds 2 readings, at least 3 readings are needed"),
+        (HEIGHTS_MM[:3], FIELD_MT[:3], "readings at 3 heights (from 30 to 40 mm), at least 4 are needed: scan on"),
+        (0 * HEIGHTS_MM + 70, FIELD_MT, "readings at 1 height (all at 70 mm)"),
+        (HEIGHTS_MM, np.minimum(FIELD_MT, 20.0), "the probe is saturated, or not moved"),
+        (HEIGHTS_MM, np.where(HEIGHTS_MM > 80, -1, 1) * FIELD_MT, "was the probe turned over"),
+        (HEIGHTS_MM * 1e3, FIELD_MT, "a height of 30 m cannot be"),
+        (HEIGHTS_MM, FIELD_MT * 1e4, "a flux density of"),
+    ],
+)
+def test_bad_scans_are_refused_in_one_line(tmp_path: Path, z: np.ndarray, b: np.ndarray, says: str) -> None:
+    path = csv(tmp_path / "hall.csv", "z [mm],B [mT]", z, b)
+    with pytest.raises(DataError) as caught:
+        analyze_scans([path], Options(device=CALLIPER))
+    assert says in str(caught.value)
+    assert str(path) in str(caught.value)
+
+
+def test_a_file_without_its_base_says_what_is_missing(tmp_path: Path) -> None:
+    path = csv(tmp_path / "hall.csv", "z [mm],B [mT]", HEIGHTS_MM, FIELD_MT)
+    with pytest.raises(DataError, match=r"the radii of the base are not known.*`device`"):
+        analyze_scans([path], Options())
+
+
+def test_a_file_of_something_else_does_not_suit(tmp_path: Path, sample_data: Path) -> None:
+    with pytest.raises(DoesNotSuit, match="needs a field run"):
+        analyze_scans([sample_data / "spin-down-1"], Options())
+    path = csv(tmp_path / "spin.csv", "t,f", HEIGHTS_MM, FIELD_MT)
+    with pytest.raises(DoesNotSuit, match=r"no title is known \(height_m, flux_density_t.*z=NAME,b=NAME"):
+        analyze_scans([path], Options())
+
+
+def test_a_moment_needs_the_mass(scan: Path) -> None:
+    with pytest.raises(DataError, match=r"`height` tells the moment of a top only if its mass is known"):
+        analyze_scans([scan], Options(height_m=0.073))
+
+
+# --- the device file ---
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("[base", "not readable as TOML"),
+        ("[base]\ninner_radius = 0.03", "base.inner_radius is no key known here"),
+        ("[base]\ninner_radius_m = '3 cm'", "write the number without its unit"),
+        ("[top]\ninertia_axial_kg_m2 = 1e-6", "both inertias are expected"),
+        ("[top]\nmagnet_radius_m = 0.01", "magnet_radius_m and magnet_height_m"),
+        ("[top]\nmass_kg = 0.02\n[[top.parts]]\nname = 'a'\nmass_kg = 0.1\nouter_radius_m = 0.1", "from the parts"),
+        ("[[top.parts]]\nname = 'a'\nmass_kg = -0.1\nouter_radius_m = 0.1", "top.parts.0.mass_kg"),
+    ],
+)
+def test_a_device_file_that_is_wrong_is_named_with_its_key(tmp_path: Path, text: str, says: str) -> None:
+    path = tmp_path / "device.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(DeviceError) as caught:
+        read_device(path)
+    assert says in str(caught.value)
+
+
+def test_a_hole_larger_than_its_part_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "device.toml"
+    path.write_text(
+        "[[top.parts]]\nname = 'ring'\nmass_kg = 0.1\nouter_radius_m = 0.01\ninner_radius_m = 0.02", encoding="utf-8"
+    )
+    with pytest.raises(DataError, match=r"device\.toml: part ring: inner_radius = 0\.02"):
+        calculate_top(path)
+
+
+# --- the commands ---
+
+
+def test_the_commands_print_and_refuse_in_one_line(
+    levilab: Callable[..., object], tmp_path: Path, scan: Path, device: Path
+) -> None:
+    done = levilab("analyze", "field", scan, "--device", device, "--height", "73.5", "--no-save")
+    for said in ("strength ρ", "moment of the top", "mass to set", "SYNTHETIC", "1 K warmer"):
+        assert said in done.stdout
+    shown = json.loads(levilab("analyze", "field", scan, "--json", "--no-save").stdout)
+    assert shown["values"]["strength"]["value"] == pytest.approx(1.409e-3, rel=0.02)
+    levilab("report", scan, "-o", "page.html")
+    assert "Field of the base on its axis" in (tmp_path / "page.html").read_text(encoding="utf-8")
+    top = json.loads(levilab("top", device, "--json").stdout)
+    assert top["values"]["mass"]["value"] == pytest.approx(0.02505)
+    assert "I₃/I₁" in levilab("top", device).stdout
+    for words, status, says in (
+        (("analyze", "field", scan, "--height", "1e9"), 2, "--height 1e+09: a number of millimetres"),
+        (("analyze", "field", scan, "--height-u", "1"), 2, "--height-u: goes with --height alone"),
+        (("analyze", "field", scan, "--height", "73"), 1, "give it with --device"),
+        (("analyze", "field", scan, "--device", "none.toml"), 1, "none.toml: there is no such file"),
+        (("top", scan), 1, "is a folder"),
+    ):
+        refused = levilab(*words, check=status)
+        assert says in refused.stderr
+        assert len(refused.stderr.splitlines()) == 1
