@@ -341,11 +341,11 @@ def test_a_top_that_fell_is_put_back_to_where_its_scene_starts():
     clock = VirtualClock()
     world = MotionWorld(FALLING, clock)
     clock.sleep(1.0)
-    assert world.light(1.0, 1e-3, 1000).max() < 0.6
+    assert world.light(1.0, 1e-3, 1000).max() < 0.15  # dark: 0.1 V, and noise of 10 mV
     world.float_top(1)
     again = world.light(1.0, 1e-3, 300)
     first = MotionWorld(FALLING, VirtualClock()).light(0.0, 1e-3, 300)
-    assert again.max() > 0.6
+    assert again.max() > 0.15  # a falling top soon leaves the lens's view, so its tape is not bright
     assert np.allclose(again, first, atol=0.1)  # but for the noise of the light, of 10 mV
 
 
