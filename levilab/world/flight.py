@@ -41,9 +41,9 @@ class _Up:
     """A piece of a top's life.
 
     scene: with the drive; state: where it begins, shape (18,); step: of the integration [s]; times [s], turns of the
-    tape and, as part of them, turns of the washers that it is on beside the top, shape (n,) each; stem: displacement of
-    the stem along x [m] and its rate [m/s] then, shape (2, n); lift: height of the rim towards x above the base [m]
-    then, shape (n,).
+    tape and, as part of them, turns of the washers that it is on beside the top then, shape (n,) each; stem:
+    displacement of the stem along x [m] and its rate [m/s] then, shape (2, n); lift: height of the rim towards x above
+    the base [m] then, shape (n,).
     """
 
     scene: Scene
@@ -213,8 +213,7 @@ class Flight:
         # of the states only the first is kept: a bench may run for hours
         slips = self._slip + _slips(motion)
         self._slip = float(slips[-1])
-        stem = _stem(motion, self._stem_height)
-        seen = (motion.time.copy(), _turns(motion) + slips, slips, stem, _lift(motion))
+        seen = (motion.time.copy(), _turns(motion) + slips, slips, _stem(motion, self._stem_height), _lift(motion))
         self._pieces.append(begin, _Up(self._scene, state, motion.accuracy.step, *seen))
         if motion.fell is not None:
             self._fall(motion.fell.time)

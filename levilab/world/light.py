@@ -118,15 +118,18 @@ class Tape:
         return behind - triggers.sign * self.sigma * math.sqrt(-2 * math.log(share))
 
     def crossing(self, near: Array, clean: Callable[[Array], Array], level: float, seed: int) -> Array:
-        """When the voltage crosses a level [V], from times near that [s], shape (n,) [s]; clean: the voltage then.
+        """When the voltage crosses a level [V], from times near that [s]; clean: the voltage then.
 
+        Where the voltage does not change there is no crossing, so there may be fewer than times.
         Newton's method on the clean voltage; noise then moves the crossing by what it is over the slope.
         """
         for _ in range(2):
             three = near + np.array([[-_CLOSE_S], [0.0], [_CLOSE_S]])
             before, here, after = clean(three.T.ravel()).reshape(-1, 3).T
             slope = (after - before) / (2 * _CLOSE_S)
-            near = near - (here - level) / slope
+            crosses = slope != 0  # where a top is put back or falls, no pulse is near
+            slope = slope[crosses]
+            near = near[crosses] - (here - level)[crosses] / slope
         return near - self.noise_at(near, seed) / slope
 
 

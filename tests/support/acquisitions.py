@@ -19,8 +19,12 @@ if TYPE_CHECKING:
 
     from levilab.world.spin_world import World
 
-#: Counts before the drive is off: the spin at first, every 10 s of the 201 on the way up, at the end of it, 20 held.
-BEFORE = 42
+#: Counts before the drive is off: the spin at first, every 10 s of the 201 on the way up, and at the end of it.
+BEFORE = 22
+
+
+#: A held top is counted for 20 s, which is a third of what an acquisition costs.
+LET_GO_AT_ONCE = ("spin.hold_s=0",)
 
 
 class Silent:
@@ -57,8 +61,9 @@ class Impatient(Silent):
 
 
 def mock(out: Path, seed: int | None = 1, **changes: Any) -> AcquisitionRequest:
-    """A spin-down on the virtual bench, as the command line asks for it."""
-    return request_for("spin", AcquisitionOptions(mock=True, out=out, seed=seed, **changes))
+    """A spin-down on the virtual bench, as the command line asks for it, but let go at once."""
+    settings = () if "resume" in changes else LET_GO_AT_ONCE
+    return request_for("spin", AcquisitionOptions(mock=True, out=out, seed=seed, settings=settings, **changes))
 
 
 def in_world(request: AcquisitionRequest, world: World) -> AcquisitionRequest:
@@ -68,6 +73,6 @@ def in_world(request: AcquisitionRequest, world: World) -> AcquisitionRequest:
 
 def of_scene(out: Path, scene: SpinScene, settings: SpinSettings | None = None) -> AcquisitionRequest:
     """A spin-down of a top that only spins."""
-    config = with_settings(Configuration(), "spin", settings or SpinSettings())
+    config = with_settings(Configuration(), "spin", settings or SpinSettings(hold_s=0))
     request = AcquisitionRequest("spin", config, wiring=NotImplemented, out=out, synthetic_how="a test")
     return in_world(request, SpinWorld(scene, VirtualClock()))

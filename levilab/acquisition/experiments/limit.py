@@ -89,7 +89,7 @@ def run(session: Session[LimitSettings]) -> None:
     """Lose the top, note its limit, float it again; so many times."""
     settings = session.settings
     prepare_counter(session)
-    session.begin(lambda: None, resumed="with the next top")
+    session.begin(lambda: None, resumed="going on with the next top")
     measure = _lower if settings.which == "lower" else _upper
     for number in range(len(session.rows), settings.repetitions):
         row = _with_a_top(session, number, measure)

@@ -43,17 +43,17 @@ def kinds(run: Run) -> list[str]:
 
 
 def test_the_lower_limits_are_those_of_the_world_within_their_uncertainty(tmp_path: Path) -> None:
-    run = acquire(mock(tmp_path, *QUICK, "limit.repetitions=20"), Silent())
+    run = acquire(mock(tmp_path, *QUICK, "limit.repetitions=14"), Silent())
     frame, scene = run.readings().frame, drawn(1)
-    truth = np.array([scene.fall_of(number) for number in range(20)])
+    truth = np.array([scene.fall_of(number) for number in range(14)])
     pulls = (frame["spin_frequency_hz"] - truth) / frame["spin_frequency_u_hz"]
-    assert abs(pulls.mean()) < 0.7  # 3 standard errors of 20
-    assert pulls.std() == pytest.approx(1, abs=0.5)  # 3 of a standard deviation
+    assert abs(pulls.mean()) < 0.8  # 3 standard errors of 14
+    assert pulls.std() == pytest.approx(1, abs=0.57)  # 3 of a standard deviation
     assert np.corrcoef(frame["spin_frequency_hz"], truth)[0, 1] > 0.85
     assert frame["spin_frequency_u_hz"].between(0.02, 0.1).all()
     assert (frame["spin_seen_hz"] > frame["spin_frequency_hz"] - 0.3).all()
-    assert kinds(run).count("asked the person") == 19  # the first one floats already
-    assert kinds(run).count("fell") == 20
+    assert kinds(run).count("asked the person") == 13  # the first one floats already
+    assert kinds(run).count("fell") == 14
     assert run.record.instruments["generator"]["settings_end"]["output"] is False
 
 
@@ -77,6 +77,9 @@ def test_a_top_that_falls_under_the_drive_is_said_to_have_fallen(tmp_path: Path)
         def light(self, start: float, step: float, n: int) -> Any:
             dark = np.full(n, self.scene.tape.dark)
             return dark if self._drive_spin > 2 * math.pi * 36 else super().light(start, step, n)
+
+        def crossings(self, start: float, stop: float, triggers: Any) -> Any:
+            return np.empty(0) if self._drive_spin > 2 * math.pi * 36 else super().crossings(start, stop, triggers)
 
     settings = ("limit.which=upper", "limit.creep_hz_per_s=0.2", "limit.hold_s=0", "limit.repetitions=1")
     run = acquire(in_world(mock(tmp_path, *settings), Falling(SpinScene(), VirtualClock())), Silent())

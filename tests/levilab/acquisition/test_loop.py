@@ -64,10 +64,7 @@ def test_a_spin_down_is_read_every_ten_seconds_until_the_top_falls(tmp_path: Pat
     assert 21 < frame["spin_frequency_hz"].iloc[-1] < 24
     assert (frame["spin_frequency_u_hz"] == 0.03).all()
     assert outputs[-1] is False
-    assert [event["kind"] for event in run.events()] == [
-        *("drive on", "locked", "held", "drive off"),
-        *("asked again", "fell"),
-    ]
+    assert [event["kind"] for event in run.events()] == ["drive on", "locked", "drive off", "asked again", "fell"]
 
 
 def test_the_readings_follow_the_law_of_the_world_within_their_uncertainty(tmp_path: Path) -> None:
@@ -177,7 +174,7 @@ def test_ctrl_c_twice_breaks_through_an_exchange_and_outputs_are_off_all_the_sam
     assert outputs[-1] is False
 
 
-@pytest.mark.parametrize("when", [0, 1, 2, 11, 21, 41, 42, 50, 59, 60])
+@pytest.mark.parametrize("when", [0, 1, 2, 11, 20, 21, 22, 30, 39, 40])
 def test_an_exception_at_any_moment_leaves_outputs_off_and_the_readings_so_far(
     tmp_path: Path, outputs: list[bool], monkeypatch: pytest.MonkeyPatch, when: int
 ) -> None:
@@ -455,7 +452,7 @@ def test_a_spin_down_in_full_motion_has_the_drag_of_its_scene(tmp_path: Path) ->
     from levilab.simulator import preset
 
     run = acquire(mock(tmp_path, scene="spindown"), Silent())
-    assert [event["kind"] for event in run.events()][-4:] == ["held", "drive off", "asked again", "fell"]
+    assert [event["kind"] for event in run.events()][-4:] == ["locked", "drive off", "asked again", "fell"]
     spins = run.readings().frame["spin_frequency_hz"]
     assert spins.iloc[0] == pytest.approx(40, abs=0.6)  # it swings about the drive
     assert 22.5 < spins.iloc[-1] < 26

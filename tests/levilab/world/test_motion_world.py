@@ -345,7 +345,7 @@ def test_a_top_that_fell_is_put_back_to_where_its_scene_starts():
     world.float_top(1)
     again = world.light(1.0, 1e-3, 300)
     first = MotionWorld(FALLING, VirtualClock()).light(0.0, 1e-3, 300)
-    assert again.max() > 0.15  # a falling top soon leaves the lens's view, so its tape is not bright
+    assert again.max() > 0.2  # dark it has 0.1 V and noise of 0.01 V
     assert np.allclose(again, first, atol=0.1)  # but for the noise of the light, of 10 mV
 
 
