@@ -17,7 +17,7 @@ TOLERANCE = 1e-12
 MOST_EVALUATIONS = 500  # a sound fit needs 5 to 30
 
 
-def _minimizer(residual: Residual, gradient: Gradient, start: Array) -> Any:
+def _minimizer(residual: Residual, gradient: Gradient, start: Array, most: int = MOST_EVALUATIONS) -> Any:
     from lmfit import Minimizer, Parameter
 
     def values(parameters: Any) -> Array:
@@ -31,7 +31,7 @@ def _minimizer(residual: Residual, gradient: Gradient, start: Array) -> Any:
     return Minimizer(
         lambda parameters: residual(values(parameters)),
         [Parameter(f"q{i}", value=float(value)) for i, value in enumerate(start)],
-        max_nfev=MOST_EVALUATIONS,
+        max_nfev=most,
         Dfun=slopes,
         col_deriv=1,
         ftol=TOLERANCE,
@@ -39,10 +39,10 @@ def _minimizer(residual: Residual, gradient: Gradient, start: Array) -> Any:
     )
 
 
-def solve(residual: Residual, gradient: Gradient, start: Array) -> tuple[Array, bool]:
+def solve(residual: Residual, gradient: Gradient, start: Array, most: int = MOST_EVALUATIONS) -> tuple[Array, bool]:
     """The parameters of the smallest sum of squares, and whether the search ended there.
 
-    A search that does not end in `MOST_EVALUATIONS` returns the best point found.
+    A search that does not end in so many evaluations at `most` returns the best point found.
     """
     accepted = start
 
@@ -51,7 +51,7 @@ def solve(residual: Residual, gradient: Gradient, start: Array) -> tuple[Array, 
         accepted = q
         return gradient(q)
 
-    result = _minimizer(residual, remember, start).leastsq()
+    result = _minimizer(residual, remember, start, most).leastsq()
     if result.aborted:
         return accepted, False
     return np.array([parameter.value for parameter in result.params.values()]), True

@@ -283,6 +283,7 @@ def _regress(pieces: Pieces, pulse: Pulse, window: Window, degree: int | None) -
         if np.array_equal(new, use) or np.count_nonzero(new) < 4:
             break
         use = new
+    fit = fit.with_expected_variance()
     bound = float(np.sqrt(fit.unit_covariance[1, 1])) / fit.half
     good = usable & (amplitude > 0.03 * mean)
     return Match(

@@ -13,6 +13,8 @@ Array = NDArray[np.float64]
 
 #: The slope's own change is fitted where it differs from 0 by so many standard uncertainties.
 CURVED = 4.0
+#: The noise of the samples counts as so many degrees of freedom, where there are fewer of the residuals.
+FEW = 30.0
 #: Residuals are grouped into so many blocks to see whether neighbours resemble each other.
 BLOCKS = 50
 #: Blocks scatter more, or less, than single residuals where chance would do it with less than this probability.
@@ -65,6 +67,20 @@ class Fit:
     def times(self, factor: float) -> Fit:
         """The phase multiplied: half or twice the frequency."""
         return replace(self, coefficients=self.coefficients * factor)
+
+    def with_expected_variance(self) -> Fit:
+        """For weights that are 1/variance: what few residuals leave unknown comes from the noise of the samples.
+
+        Unless the residuals contradict it: then they alone count.
+        """
+        if self.freedom >= FEW:
+            return self
+        from scipy.special import chdtrc
+
+        if chdtrc(self.freedom, self.freedom * self.variance) < WHITE:
+            return self
+        freedom = self.freedom + FEW
+        return replace(self, variance=(self.freedom * self.variance + FEW) / freedom, freedom=freedom)
 
     def phase_at(self, time: float, origin: float = 0.0) -> Estimate:
         """Phase at a time, from 0 to 1 [turns], of what passes at a phase of origin."""

@@ -5,15 +5,22 @@ good to 0.1 %; PHYSICS.md §5). So a mean over runs has its uncertainty from the
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.errors import NothingToCombine
-from analysis.residuals import durbin_watson, runs_test_p
+from analysis.residuals import Correlation, durbin_watson, runs_test_p
 from analysis.spindown.drag import LAWS
-from analysis.spindown.fit import SpinDown, comparison_warnings
+from analysis.spindown.fit import (
+    TILT_DEMANDED,
+    SpinDown,
+    comparison_warnings,
+    correlation_warnings,
+    is_correlated,
+)
 from analysis.spindown.lawfit import ROUNDING, LawFit
 from analysis.spindown.selection import NO_FIT, Statistics, statistics, weigh
 from analysis.spindown.verdict import Verdict, verdict
@@ -64,6 +71,8 @@ class Combined:
         verdict: what they say about each law.
         runs: how many there are.
         warnings: what to know before using the numbers.
+        correlation: of neighbouring readings' noise, over all runs.
+        tilt: mean of the moment's tilt [rad] over the runs that show it, by the best law; None where none does.
     """
 
     fits: tuple[CombinedLaw, ...]
@@ -71,6 +80,8 @@ class Combined:
     verdict: Verdict
     runs: int
     warnings: tuple[str, ...]
+    correlation: Correlation | None = None
+    tilt: Mean | None = None
 
     def fit(self, name: str) -> CombinedLaw:
         """One law."""
@@ -92,13 +103,57 @@ def combine(runs: Sequence[SpinDown]) -> Combined:
     names = [name for name in LAWS if runs and all(name in _names(run) for run in runs)]
     if not names:
         raise NothingToCombine(runs=len(runs))
-    weighed, criterion = weigh({name: _statistics(runs, name) for name in names})
+    stats = {name: _statistics(runs, name) for name in names}
+    correlation = _correlation(runs)
+    if correlation and is_correlated(correlation):
+        share = 1 / correlation.factor()
+        stats = {name: replace(fit, n_effective=share * fit.n) for name, fit in stats.items()}
+    weighed, criterion = weigh(stats)
+    tilt = _tilt(runs, next(iter(weighed)))
     fits = tuple(_combined(name, [run.fit(name) for run in runs], weighed[name]) for name in names)
     exponent = next((fit.constants["exponent"] for fit in fits if fit.name == "power"), None)
     fall = max(float(1 - run.frequency[-1] / run.frequency[0]) for run in runs)
-    decision = verdict(weighed, criterion, fall=fall, exponent=exponent)
-    said = [*comparison_warnings(weighed, decision.best), *_about_number(runs)]
-    return Combined(fits, decision.best, decision, len(runs), tuple(said))
+    decision = verdict(weighed, criterion, fall=fall, exponent=exponent, correlation=correlation, tilt=tilt)
+    mixed = 0 < sum(run.u is None for run in runs) < len(runs)
+    n = sum(len(run.time) for run in runs)
+    said = [
+        *comparison_warnings(weighed, decision.best, mixed=mixed),
+        *correlation_warnings(correlation, n),
+        *_about_number(runs),
+    ]
+    return Combined(fits, decision.best, decision, len(runs), tuple(said), correlation, tilt)
+
+
+def tilt_demanded(runs: Sequence[SpinDown]) -> bool:
+    """Whether runs that do not demand the count's tilt each by itself do so together."""
+    gains = [run.tilt_gain for run in runs if run.tilt_gain is not None]
+    return len(gains) > 1 and sum(gains) > TILT_DEMANDED
+
+
+def _correlation(runs: Sequence[SpinDown]) -> Correlation | None:
+    """Of all runs: the mean by their numbers of readings, and the joint probability (Stouffer's)."""
+    seen = [(len(run.time), run.correlation) for run in runs if run.correlation is not None]
+    if not seen:
+        return None
+    if len(seen) == 1:
+        return seen[0][1]
+    n = np.array([size for size, _ in seen], dtype=float)
+    value = float(n @ [one.value for _, one in seen] / n.sum())
+    u = float(np.linalg.norm(n * [one.u for _, one in seen]) / n.sum())
+    return Correlation(value, u, _together([one.p for _, one in seen]), _together([one.p_shape for _, one in seen]))
+
+
+def _together(probabilities: Sequence[float]) -> float:
+    """One-sided probabilities of independent tests, as one (S. A. Stouffer et al., The American Soldier (1949))."""
+    from scipy.special import ndtr, ndtri
+
+    z = -ndtri(np.clip(probabilities, 1e-12, 1 - 1e-12)).sum() / sqrt(len(probabilities))
+    return float(ndtr(-z))
+
+
+def _tilt(runs: Sequence[SpinDown], best: str) -> Mean | None:
+    seen = [run.fit(best).parameters["moment_tilt"] for run in runs if run.fit(best).has_tilt]
+    return mean(seen) if seen else None
 
 
 def _about_number(runs: Sequence[SpinDown]) -> list[str]:

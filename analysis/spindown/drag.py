@@ -80,6 +80,12 @@ def _power_gradient(tau: Array, q: Array, m: float | None = None) -> Array:
     return np.array(rows)
 
 
+def _power_slowing(x: Array, q: Array, m: float | None = None) -> Array:
+    """−dx/dτ of a power law."""
+    order = float(q[2]) if m is None else m
+    return np.asarray(q[1] * np.exp(_clip((order + 1) * np.log(x), LARGEST_LOG)))
+
+
 def _mixture(tau: Array, x0: float, alpha: float, beta: float) -> tuple[Array, Array, Array, Array]:
     """For x = x₀ e⁻ʸ/(1 + β x₀ τ E): y = ατ, e⁻ʸ, E = (1 − e⁻ʸ)/y, and the denominator."""
     y = _clip(alpha * tau, LARGEST_LOG)
@@ -103,6 +109,11 @@ def _mixed_gradient(tau: Array, q: Array) -> Array:
     return np.array([fall / grown**2, -tau * x - q[2] * tau * eaten * slope, -mean * eaten])
 
 
+def _mixed_slowing(x: Array, q: Array) -> Array:
+    """−dx/dτ of the mixed law."""
+    return np.asarray((q[1] + q[2] * x) * x)
+
+
 @dataclass(frozen=True)
 class DragLaw:
     """A law ω̇ = −f(ω).
@@ -114,6 +125,7 @@ class DragLaw:
         orders: m = n − 1 of each term, none where the exponent is itself a parameter.
         spin: dimensionless closed form, (τ, q) → x, shapes (n,), (p,) → (n,).
         gradient: its slopes with respect to q, (τ, q) → (p, n).
+        slowing: −dx/dτ at spins x, (x, q) → (n,), shapes (n,), (p,).
     """
 
     name: str
@@ -122,6 +134,7 @@ class DragLaw:
     orders: tuple[float, ...]
     spin: Callable[[Array, Array], Array]
     gradient: Callable[[Array, Array], Array]
+    slowing: Callable[[Array, Array], Array]
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -170,15 +183,15 @@ class DragLaw:
 
 def _of_order(m: float, name: str, constant: str, unit: str) -> DragLaw:
     spin, gradient = partial(_power, m=m), partial(_power_gradient, m=m)
-    return DragLaw(name, (constant,), (unit,), (m,), spin, gradient)
+    return DragLaw(name, (constant,), (unit,), (m,), spin, gradient, partial(_power_slowing, m=m))
 
 
 _TABLE = (
     _of_order(0.0, "stokes", "c1", "1/s"),
     _of_order(1.0, "newton", "c2", "1/rad"),
     _of_order(0.5, "disc", "c32", "(rad/s)^-1/2/s"),
-    DragLaw("mixed", ("c1", "c2"), ("1/s", "1/rad"), (0.0, 1.0), _mixed, _mixed_gradient),
-    DragLaw("power", ("c", "exponent"), ("(rad/s)^(1-exponent)/s", "1"), (), _power, _power_gradient),
+    DragLaw("mixed", ("c1", "c2"), ("1/s", "1/rad"), (0.0, 1.0), _mixed, _mixed_gradient, _mixed_slowing),
+    DragLaw("power", ("c", "exponent"), ("(rad/s)^(1-exponent)/s", "1"), (), _power, _power_gradient, _power_slowing),
 )
 LAWS = MappingProxyType({law.name: law for law in _TABLE})
 

@@ -2,22 +2,25 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.least_squares import profile, solve
-from analysis.residuals import durbin_watson, runs_test_p
+from analysis.least_squares import MOST_EVALUATIONS, profile, solve
+from analysis.residuals import DENSE, ar1, durbin_watson, runs_test_p
 from analysis.spindown.drag import LAWS, DragLaw
 from analysis.spindown.readings import Readings
 from analysis.spindown.selection import Statistics, statistics
+from analysis.spindown.tilt import MORE, UNKNOWN_PART, UNKNOWN_TILT, WOBBLE, CountedLaw, Law, counted
 from analysis.uncertainty import Curvature, Estimate, bootstrap, curvature, propagate
 
 Array = NDArray[np.float64]
 Uncertainty = Literal["covariance", "profile", "bootstrap"]
 Intervals = Sequence[tuple[float, float] | None]
 
+MOST_WITH_TILT = 60  # a law that the readings suit needs 5 to 15
 FACTOR_TOLD = 3.0  # u(ln c) above which "known to a factor" says nothing
 ROUNDING = 64 * float(np.finfo(float).eps)  # relative: residuals below it are the computer's, not the top's
 
@@ -28,14 +31,15 @@ class LawFit:
 
     Attributes:
         name: of the law, a key of `analysis.spindown.drag.LAWS`.
-        parameters: start_frequency [Hz] (spin at `start_time`), then the constants of the law.
+        parameters: start_frequency [Hz] (spin at `start_time`), then the constants of the law; where the count's tilt
+            is in it, moment_tilt δ [rad], resonance ν_r [Hz] and wobble K [Hz], see `analysis.spindown.tilt`.
         covariance: of the parameters, in that order, shape (p, p); None where undefined.
         statistics: how well it fits.
         residuals: reading − fit [Hz], shape (n,).
         linearised: the constant by an unweighted straight line, where the law has one.
         warnings: what to know before using the numbers.
         start_time: time of the first reading [s].
-        solution: the same parameters as fitted, dimensionless (see `analysis.spindown.drag`).
+        solution: the same parameters, dimensionless (see `analysis.spindown.drag`, and `tilt.counted`).
         reference: their units, spin frequency [Hz] and time [s].
     """
 
@@ -59,7 +63,12 @@ class LawFit:
         """The fitted curve [Hz] at times [s] on the clock of the readings, shape (n,)."""
         frequency, duration = self.reference
         tau = (np.asarray(time, dtype=float) - self.start_time) / duration
-        return frequency * self.law.spin(tau, self.solution)
+        return frequency * counted(self.law, tau, self.solution)
+
+    @property
+    def has_tilt(self) -> bool:
+        """Whether the count's tilt is in it."""
+        return len(self.solution) > len(self.law.parameters)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,43 +81,156 @@ class Solution:
         q: dimensionless parameters, shape (p,).
         converged: whether the search ended.
         residuals: (reading − fit)/u in dimensionless numbers, u = 1 where unknown, shape (n,).
+        slopes: of fit/u with the parameters, shape (p, n).
+        expected: slopes and residual of what was known beforehand, shapes (p, k), (k,); k is 0 or 2.
         curvature: covariance for u as given, and leverages.
     """
 
-    law: DragLaw
+    law: Law
     readings: Readings
     q: Array
     converged: bool
     residuals: Array
+    slopes: Array
+    expected: tuple[Array, Array]
     curvature: Curvature
+
+    @property
+    def weight_scale(self) -> float:
+        """The largest weight: by so much residuals are larger than in units of ν_ref."""
+        return float(np.max(self.readings.weight))
+
+    @cached_property
+    def statistics(self) -> Statistics:
+        """How well it fits."""
+        readings = self.readings
+        residuals = self.residuals / readings.weight * readings.reference_hz
+        return statistics(
+            n=len(readings),
+            n_parameters=self.n_parameters,
+            rss=float(residuals @ residuals),
+            least_rss=len(readings) * (ROUNDING * readings.reference_hz) ** 2,
+            chi_square=float(self.residuals @ self.residuals) if readings.sigma_known else None,
+            durbin_watson=durbin_watson(self.residuals),
+            runs_test_p=runs_test_p(self.residuals),
+        )
+
+    @property
+    def n_parameters(self) -> int:
+        """Those that the readings alone determine."""
+        return len(self.q) - len(self.expected[1])
 
     @property
     def degrees_of_freedom(self) -> int:
         """Readings beyond the parameters."""
-        return len(self.readings) - len(self.q)
+        return len(self.readings) - self.n_parameters
 
 
-def solution(law: DragLaw, readings: Readings) -> Solution:
-    """The least-squares solution of one law."""
-    tau, x, weight = readings.tau, readings.x, readings.weight
-    q, converged = solve(
-        lambda q: (law.spin(tau, q) - x) * weight, lambda q: law.gradient(tau, q) * weight, _start(law, readings)
-    )
+Function = Callable[[Array], Array]
+
+
+def _objective(law: Law, readings: Readings, y: Array, scale: float) -> tuple[Function, Function]:
+    """Residuals and their slopes for the spins y; scale: of one reading's, for what is known beforehand."""
+    tau, weight = readings.tau, readings.weight
+    if not isinstance(law, CountedLaw):
+        return (lambda q: (law.spin(tau, q) - y) * weight), (lambda q: law.gradient(tau, q) * weight)
+    known = law.expected
+
+    def residual(q: Array) -> Array:
+        return np.append((law.spin(tau, q) - y) * weight, [(q[i] - value) * scale / u for i, value, u in known])
+
+    def gradient(q: Array) -> Array:
+        rows = np.zeros((len(q), len(known)))
+        for k, (i, _, u) in enumerate(known):
+            rows[i, k] = scale / u
+        return np.hstack([law.gradient(tau, q) * weight, rows])
+
+    return residual, gradient
+
+
+def solution(law: Law, readings: Readings, start: Array | None = None, scale: float = 1.0) -> Solution:
+    """The least-squares solution of one law.
+
+    Args:
+        law: with the count's tilt or without.
+        readings: what it is fitted to.
+        start: of the search; None: by straight lines, for a law without the tilt.
+        scale: of one residual, in the units of the weights; only for what is known of the tilt beforehand.
+    """
+    residual, gradient = _objective(law, readings, readings.x, scale)
+    begin = _start(law, readings) if start is None and isinstance(law, DragLaw) else start
+    assert begin is not None
+    q, converged = solve(residual, gradient, begin, MOST_EVALUATIONS if isinstance(law, DragLaw) else MOST_WITH_TILT)
+    n = len(readings)
+    left, slopes = -residual(q), gradient(q)
+    bent = curvature(slopes)
     return Solution(
-        law, readings, q, converged, (x - law.spin(tau, q)) * weight, curvature(law.gradient(tau, q) * weight)
+        law,
+        readings,
+        q,
+        converged,
+        left[:n],
+        slopes[:, :n],
+        (slopes[:, n:], left[n:]),
+        Curvature(bent.covariance, bent.leverage[:n]),
     )
 
 
-def fit_law(found: Solution, uncertainty: Uncertainty, samples: int, seed: int) -> LawFit:
-    """The solution in textbook constants, with uncertainties and statistics."""
+def with_tilt(plain: Solution, last: tuple[float, float, float]) -> Solution | None:
+    """The same law as a counter sees it; None where the readings ask for no tilt, or a negative one.
+
+    Args:
+        plain: the solution without.
+        last: x of the last reading, then a and its u (see `CountedLaw`).
+    """
+    assert isinstance(plain.law, DragLaw)
+    law, readings = CountedLaw(plain.law, *last), plain.readings
+    start = np.array([*plain.q, 0.003, law.gap, WOBBLE])
+    found, scale = None, 1.0 if readings.sigma_known else scatter(plain)
+    for _ in range(1 if readings.sigma_known else 2):
+        found = solution(law, readings, start, scale)
+        if not found.converged or not np.isfinite(found.residuals).all() or found.degrees_of_freedom < 1:
+            return None
+        start, scale = found.q, scatter(found)
+    return found if found is not None and found.q[-MORE] > 0 and found.curvature.covariance is not None else None
+
+
+def scatter(found: Solution) -> float:
+    """Standard deviation of the residuals, in the units of the weights."""
+    free = max(found.degrees_of_freedom, 1)
+    return max(float(np.sqrt(found.residuals @ found.residuals / free)), ROUNDING)
+
+
+def fit_law(
+    found: Solution,
+    uncertainty: Uncertainty,
+    samples: int,
+    seed: int,
+    *,
+    rho: float = 0.0,
+    plain: Solution | None = None,
+) -> LawFit:
+    """The solution in textbook constants, with uncertainties and statistics.
+
+    Args:
+        found: the solution.
+        uncertainty: see `analysis.spindown.fit.fit_spin_down`.
+        samples: of a bootstrap.
+        seed: of a bootstrap.
+        rho: correlation of neighbouring readings' noise.
+        plain: the same law without the count's tilt, where `found` has it.
+    """
     law, readings = found.law, found.readings
     values, slopes = law.natural(found.q, readings.reference_hz, readings.duration)
-    stats = _statistics(found)
-    variance = _variance(found, stats)
-    covariance, u = None, np.full(len(values), np.nan)
-    if variance is not None and found.curvature.covariance is not None:
-        covariance, u = propagate(found.curvature.covariance * variance, slopes)
-    intervals = _INTERVALS[uncertainty](found, values, u, samples, seed)
+    stats = found.statistics
+    covariance, u, independent = _uncertainties(found, slopes, rho)
+    intervals = _INTERVALS[uncertainty](found, values, independent, samples, seed)
+    if plain is not None:
+        covariance, u = _with_unknown_part(covariance, u, values, _natural(plain))
+    intervals = [
+        _stretched(interval, float(value), float(wide / own) if own > 0 else 1.0)
+        for interval, value, wide, own in zip(intervals, values, u, independent, strict=True)
+    ]
     # c = κ/(T ω_refᵐ) can leave the range of floats, to infinity or to zero
     representable = np.isfinite(values) & ((values != 0) | (found.q == 0))
     parameters = {
@@ -119,41 +241,91 @@ def fit_law(found: Solution, uncertainty: Uncertainty, samples: int, seed: int) 
             law.parameters, values, representable, u, law.parameter_units, intervals, strict=True
         )
     }
+    of_drag = law.law if isinstance(law, CountedLaw) else law
     return LawFit(
         name=law.name,
         parameters=parameters,
         covariance=covariance if representable.all() else None,
         statistics=stats,
         residuals=readings.reference_hz * (readings.x - law.spin(readings.tau, found.q)),
-        linearised=linearised(law, readings) if len(law.orders) == 1 else None,
+        linearised=linearised(of_drag, readings) if len(law.orders) == 1 else None,
         warnings=_warnings(found, parameters, intervals, asked=uncertainty),
         start_time=readings.start_time,
-        solution=found.q,
+        solution=law.solution(found.q) if isinstance(law, CountedLaw) else found.q,
         reference=(readings.reference_hz, readings.duration),
     )
 
 
-def _statistics(found: Solution) -> Statistics:
-    readings = found.readings
-    residuals = found.residuals / readings.weight * readings.reference_hz
-    return statistics(
-        n=len(readings),
-        n_parameters=len(found.q),
-        rss=float(residuals @ residuals),
-        least_rss=len(readings) * (ROUNDING * readings.reference_hz) ** 2,
-        chi_square=float(found.residuals @ found.residuals) if readings.sigma_known else None,
-        durbin_watson=durbin_watson(found.residuals),
-        runs_test_p=runs_test_p(found.residuals),
-    )
+def _natural(found: Solution) -> Array:
+    return found.law.natural(found.q, found.readings.reference_hz, found.readings.duration)[0]
 
 
-def _variance(found: Solution, stats: Statistics) -> float | None:
+def _uncertainties(found: Solution, slopes: Array, rho: float) -> tuple[Array | None, Array, Array]:
+    """Covariance and u of the textbook parameters for noise of a correlation, and u for independent noise.
+
+    Of correlated noise the least-squares solution has the covariance H (J R Jᵀ + E Eᵀ) H, H = (JJᵀ + E Eᵀ)⁻¹, and the
+    residuals have the mean square tr(MR)/n: a fit follows such noise (GUM F.1.2.3; D. Cochrane & G. H. Orcutt,
+    J. Am. Stat. Assoc. 44, 32 (1949)).
+    """
+    h, undefined = found.curvature.covariance, np.full(len(slopes), np.nan)
+    if h is None:
+        return None, undefined, undefined
+    n, (beforehand, _) = len(found.readings), found.expected
+    scale = np.sqrt(np.diagonal(h))  # the parameters differ by orders of magnitude
+
+    variance = _variance(found, float(found.degrees_of_freedom), correlated=False)
+    if variance is None:
+        return None, undefined, undefined
+    covariance, independent = propagate(h * variance, slopes)
+    if rho <= 0:
+        return covariance, independent, independent
+    j = found.slopes * scale[:, None]
+    noise = j @ ar1(n, rho) @ j.T if n <= DENSE else j @ j.T * (1 + rho) / (1 - rho)
+    known = beforehand * scale[:, None]
+    unit = h / np.outer(scale, scale)
+    # M = 1 − JᵀHJ: what the fit follows is lost from the residuals, with independent noise p of n parts
+    free = n - float(np.trace(unit @ noise))
+    larger = _variance(found, free, correlated=True)
+    assert larger is not None
+    # what was known beforehand does not become less certain with the readings
+    full = unit @ (noise * larger + known @ known.T * (1.0 if found.readings.sigma_known else variance)) @ unit
+    wide, u = propagate(full * np.outer(scale, scale), slopes)
+    grown = np.fmax(u, independent)  # no less than for independent noise, whatever rounding does
+    if wide is not None:
+        ratio = np.divide(grown, u, out=np.ones_like(u), where=u > 0)
+        wide = wide * np.outer(ratio, ratio)
+    return wide, grown, independent
+
+
+def _with_unknown_part(covariance: Array | None, u: Array, values: Array, plain: Array) -> tuple[Array | None, Array]:
+    """A part of what the tilt changes in the constants is unknown."""
+    change = np.zeros(len(values))
+    with np.errstate(invalid="ignore", over="ignore"):
+        change[: len(plain)] = UNKNOWN_PART * (values[: len(plain)] - plain)
+        change[len(plain)] = UNKNOWN_TILT * values[len(plain)]
+    if not np.isfinite(change).all():
+        return covariance, u
+    wider = np.hypot(u, change)
+    return (None if covariance is None else covariance + np.outer(change, change)), wider
+
+
+def _stretched(interval: tuple[float, float] | None, value: float, by: float) -> tuple[float, float] | None:
+    """An interval for independent noise, as much wider as u is."""
+    if interval is None or not np.isfinite(by) or by == 1.0:
+        return interval
+    return value - (value - interval[0]) * by, value + (interval[1] - value) * by
+
+
+def _variance(found: Solution, free: float, *, correlated: bool) -> float | None:
     """Of the residuals in units of the stated one: 1, or by how much they are too large to be chance (Birge)."""
+    squares = float(found.residuals @ found.residuals)
     if found.readings.sigma_known:
-        return stats.inflation
+        if correlated:  # χ² of correlated noise scatters more than its own distribution says
+            return max(1.0, squares / max(free, 1.0))
+        return found.statistics.inflation
     if found.degrees_of_freedom == 0:
         return None
-    return max(float(found.residuals @ found.residuals) / found.degrees_of_freedom, ROUNDING**2)
+    return max(squares / max(free, 1.0), ROUNDING**2)
 
 
 def straight_line(x: Array, y: Array, weight: Array | None = None) -> tuple[float, float, float | None]:
@@ -211,31 +383,26 @@ def _profile(found: Solution, values: Array, u: Array, samples: int, seed: int) 
     units = readings.reference_hz, readings.duration
     if not (np.isfinite(u) & (u > 0)).all() or found.degrees_of_freedom == 0:
         return [None] * len(values)
+    of, slopes = _objective(law, readings, readings.x, 1.0 if readings.sigma_known else scatter(found))
 
     def residual(natural: Array) -> Array:
-        return (law.spin(readings.tau, law.dimensionless(natural, *units)) - readings.x) * readings.weight
+        return of(law.dimensionless(natural, *units))
 
     def gradient(natural: Array) -> Array:
         q = law.dimensionless(natural, *units)
-        rows = law.gradient(readings.tau, q) * readings.weight
-        return np.asarray(np.linalg.solve(law.natural(q, *units)[1].T, rows))
+        return np.asarray(np.linalg.solve(law.natural(q, *units)[1].T, slopes(q)))
 
-    return profile(residual, gradient, values, u, _statistics(found).inflation if readings.sigma_known else None)
+    return profile(residual, gradient, values, u, found.statistics.inflation if readings.sigma_known else None)
 
 
 def _bootstrap(found: Solution, values: Array, u: Array, samples: int, seed: int) -> Intervals:
     law, readings = found.law, found.readings
     if not np.isfinite(u).all() or found.degrees_of_freedom == 0:
         return [None] * len(values)
-    fitted = law.spin(readings.tau, found.q)
+    fitted, scale = law.spin(readings.tau, found.q), 1.0 if readings.sigma_known else scatter(found)
 
     def refit(errors: Array) -> Array:
-        drawn = fitted + errors / readings.weight
-        q, _ = solve(
-            lambda q: (law.spin(readings.tau, q) - drawn) * readings.weight,
-            lambda q: law.gradient(readings.tau, q) * readings.weight,
-            found.q,
-        )
+        q, _ = solve(*_objective(law, readings, fitted + errors / readings.weight, scale), found.q)
         return law.natural(q, readings.reference_hz, readings.duration)[0]
 
     return bootstrap(refit, found.residuals, found.curvature.leverage, samples=samples, seed=seed)
@@ -257,8 +424,8 @@ def _warnings(
         said.append(f"{name}: the search for the best fit did not end, the numbers are those of the best point found")
     if not found.readings.sigma_known and found.degrees_of_freedom == 0:
         said.append(
-            f"{name}: {len(found.q)} parameters pass through {len(found.q)} readings, so nothing tells their "
-            "uncertainty: record more readings, or state the uncertainty of each"
+            f"{name}: {found.n_parameters} parameters pass through {found.n_parameters} readings, so nothing tells "
+            "their uncertainty: record more readings, or state the uncertainty of each"
         )
     elif found.curvature.covariance is None:
         said.append(f"{name}: the readings do not separate the parameters, so these have no uncertainty")

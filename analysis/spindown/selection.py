@@ -30,6 +30,7 @@ class Statistics:
         weight: Akaike weight among the laws fitted.
         durbin_watson: near 2 for noise.
         runs_test_p: small when the signs of the residuals are in no random order.
+        n_effective: how many independent readings tell as much, where the noise of neighbours is correlated.
     """
 
     n: int
@@ -45,6 +46,7 @@ class Statistics:
     weight: float | None
     durbin_watson: float | None
     runs_test_p: float | None
+    n_effective: float | None = None
 
     @property
     def sigma_known(self) -> bool:
@@ -130,8 +132,9 @@ def variance_factor(fits: Mapping[str, Statistics]) -> float:
 
 
 def deviance(fit: Statistics, factor: float) -> float:
-    """What is left of the misfit when χ² counts in those units."""
-    return fit.misfit / factor if fit.sigma_known else fit.misfit
+    """What is left of the misfit when χ² counts in those units, and correlated readings as fewer."""
+    share = 1.0 if fit.n_effective is None else fit.n_effective / fit.n
+    return share * (fit.misfit / factor if fit.sigma_known else fit.misfit)
 
 
 def _criteria(fit: Statistics, factor: float) -> dict[str, float | None]:

@@ -8,10 +8,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import floor, log10
 
+from analysis.residuals import Correlation
 from analysis.spindown.selection import Statistics, deviance, variance_factor
 from analysis.uncertainty import Estimate
 
 EXCLUDED, TIED = 10.0, 4.0  # differences of AICc, Burnham & Anderson (2002) §2.6
+# Residuals that noise with a correlation of `analysis.residuals.NOISE` makes less often than this have a shape; where
+# the scatter exceeds the stated uncertainties, this much is enough against independent readings.
+SHAPE, SHAPE_BEYOND_U = 0.003, 0.01
 SPECIAL_CASES = {"mixed": ("stokes", "newton"), "power": ("stokes", "newton", "disc")}
 _SIMPLE = ("stokes", "newton", "disc")
 
@@ -28,6 +32,7 @@ class Verdict:
         weak: names of laws disfavoured but not excluded.
         excluded: names of laws the readings exclude, each with the reason.
         text: the same in a few sentences.
+        describes: whether any law describes the readings: what the best one leaves over may be noise.
     """
 
     best: str
@@ -37,9 +42,18 @@ class Verdict:
     weak: tuple[str, ...]
     excluded: tuple[tuple[str, str], ...]
     text: str
+    describes: bool = True
 
 
-def verdict(fits: Mapping[str, Statistics], criterion: str, *, fall: float, exponent: Estimate | None) -> Verdict:
+def verdict(
+    fits: Mapping[str, Statistics],
+    criterion: str,
+    *,
+    fall: float,
+    exponent: Estimate | None,
+    correlation: Correlation | None = None,
+    tilt: Estimate | None = None,
+) -> Verdict:
     """What the readings say about the laws.
 
     Args:
@@ -47,6 +61,8 @@ def verdict(fits: Mapping[str, Statistics], criterion: str, *, fall: float, expo
         criterion: by which.
         fall: part of the spin lost between the first and the last reading, 0 to 1.
         exponent: of the power law, where it was fitted.
+        correlation: of what the best law leaves over.
+        tilt: of the moment against the axis [rad], where the count shows it.
     """
     best = next(iter(fits))
     telling = criterion == "aicc" or (criterion == "bic" and fits[best].sigma_known)
@@ -54,9 +70,14 @@ def verdict(fits: Mapping[str, Statistics], criterion: str, *, fall: float, expo
     listed = {kind: tuple(name for name in fits if kinds[name] == kind) for kind in ("tied", "needless", "weak")}
     excluded = tuple((name, _reason(name, best, fits)) for name in fits if kinds[name] == "excluded")
     open_ = [name for name in (*listed["tied"], *listed["weak"]) if name in _SIMPLE]
-    decided = telling and len(open_) <= 1
+    described = _describes(fits[best], correlation)
+    decided = telling and len(open_) <= 1 and described
+    if not described:
+        first = _no_law(best, fits[best], correlation)
+    else:
+        first = _about_best(listed["tied"], exponent) if decided else _undecided(fits[best].n, fall, open_)
     sentences = [
-        _about_best(listed["tied"], exponent) if decided else _undecided(fits[best].n, fall, open_),
+        first,
         _sentence("The readings exclude", [f"{name} ({reason})" for name, reason in excluded], ""),
         _sentence(
             "They speak against",
@@ -64,9 +85,33 @@ def verdict(fits: Mapping[str, Statistics], criterion: str, *, fall: float, expo
             ", without excluding it",
         ),
         _about_needless(listed["needless"], best, exponent) if decided else "",
+        _about_tilt(tilt),
     ]
     text = " ".join(filter(None, sentences))
-    return Verdict(best, decided, listed["tied"], listed["needless"], listed["weak"], excluded, text)
+    return Verdict(best, decided, listed["tied"], listed["needless"], listed["weak"], excluded, text, described)
+
+
+def _describes(best: Statistics, correlation: Correlation | None) -> bool:
+    """Whether what the best law leaves over may be noise, correlated perhaps."""
+    if correlation is None:
+        return True
+    return correlation.p_shape >= SHAPE and not (best.inflation > 1 and correlation.p < SHAPE_BEYOND_U)
+
+
+def _no_law(best: str, fit: Statistics, correlation: Correlation | None) -> str:
+    alike = f", neighbours correlated by {correlation.value:.2f}" if correlation else ""
+    beyond = f", {fit.inflation**0.5:.2g} times the stated uncertainties" if fit.inflation > 1 else ""
+    return (
+        f"No law describes these readings: what the best one, {best}, leaves over ({fit.rms_residual:.2g} Hz "
+        f"rms{beyond}) has a shape{alike}. Its constants and their uncertainties are those of a curve through the "
+        "readings, not of a drag."
+    )
+
+
+def _about_tilt(tilt: Estimate | None) -> str:
+    if tilt is None or tilt.value is None or not tilt.u:
+        return ""
+    return f"The counter sees the wobble of the top: its moment is tilted against its axis by {_value(tilt)} rad."
 
 
 def _kind(fits: Mapping[str, Statistics], name: str, best: str) -> str:
@@ -125,8 +170,15 @@ def _in_words(exponent: Estimate | None) -> str:
     """As n = 1.507 ± 0.006."""
     if exponent is None or exponent.value is None or not exponent.u:
         return "of whatever exponent"
-    digits = min(max(0, -floor(log10(exponent.u)) + (exponent.u < 3 * 10 ** floor(log10(exponent.u)))), 9)
-    return f"n = {exponent.value:.{digits}f} ± {exponent.u:.{digits}f}"
+    return f"n = {_value(exponent)}"
+
+
+def _value(estimate: Estimate) -> str:
+    """As 1.507 ± 0.006."""
+    assert estimate.value is not None
+    assert estimate.u
+    digits = min(max(0, -floor(log10(estimate.u)) + (estimate.u < 3 * 10 ** floor(log10(estimate.u)))), 9)
+    return f"{estimate.value:.{digits}f} ± {estimate.u:.{digits}f}"
 
 
 def _sentence(start: str, names: Sequence[str], end: str) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from analysis.errors import AnalysisError
-from analysis.spindown.combine import Combined, combine
+from analysis.spindown.combine import Combined, combine, tilt_demanded
 from analysis.spindown.fit import SpinDown, fit_spin_down
 from levilab.errors import DataError
 from levilab.pipelines.result import Place, place_of
@@ -85,6 +85,11 @@ def analyze_spindowns(paths: Sequence[Path], options: Options) -> SpinDownAnalys
     paths = [find_run(path) for path in paths]
     found = collect(paths, NEEDS, lambda _: options.columns)
     runs = tuple(fit_source(source, options) for source in found.sources)
+    if tilt_demanded(runs):
+        runs = tuple(
+            run if run.has_tilt else fit_source(source, options, tilt=True)
+            for source, run in zip(found.sources, runs, strict=True)
+        )
     return SpinDownAnalysis(
         sources=found.sources,
         runs=runs,
@@ -97,8 +102,11 @@ def analyze_spindowns(paths: Sequence[Path], options: Options) -> SpinDownAnalys
     )
 
 
-def fit_source(source: Source[Readings], options: Options) -> SpinDown:
-    """All laws fitted to one input.  Raises DataError, which names the file."""
+def fit_source(source: Source[Readings], options: Options, *, tilt: bool | None = None) -> SpinDown:
+    """All laws fitted to one input.  Raises DataError, which names the file.
+
+    tilt: whether the count has the top's tilt; None: if the readings demand it.
+    """
     readings = source.readings
     try:
         return fit_spin_down(
@@ -109,6 +117,7 @@ def fit_source(source: Source[Readings], options: Options) -> SpinDown:
             bootstrap_samples=options.bootstrap_samples,
             seed=options.seed,
             keep_outliers=options.keep_outliers,
+            tilt=tilt,
         )
     except AnalysisError as error:
         raise DataError(f"{source.data}: {error}") from error

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import asdict, fields, replace
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from analysis.residuals import Correlation
 from analysis.spindown.combine import Combined, CombinedLaw, Mean, combine
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import SpinDown
 from analysis.spindown.lawfit import LawFit
 from analysis.spindown.selection import Statistics
+from analysis.spindown.tilt import PARAMETERS, counted
 from analysis.spindown.verdict import Verdict
 from levilab.errors import DataError, unquoted
 from levilab.files import finite
@@ -68,6 +70,16 @@ class StatisticsPart(Part):
     durbin_watson: float | None
     runs_test_p: float | None
     difference: float | None
+    n_effective: float | None = None
+
+
+class CorrelationPart(Part):
+    """How much the noise of neighbouring readings is alike; see `analysis.residuals.Correlation`."""
+
+    value: float
+    u: float
+    p: float
+    p_shape: float
 
 
 class FitPart(Part):
@@ -102,7 +114,7 @@ class ModelPart(Part):
             raise ValueError(f"{self.name!r} is no drag law; known are {', '.join(LAWS)}")
         if not set(law.constants) <= set(self.parameters):
             raise ValueError(f"{self.name} lacks one of its constants {', '.join(law.constants)}")
-        size = len(law.parameters)
+        size = len(law.parameters) + (len(PARAMETERS) if set(PARAMETERS) <= set(self.parameters) else 0)
         if self.covariance is not None and [len(row) for row in self.covariance] != [size] * size:
             raise ValueError(f"{self.name}: its covariance is not {size} × {size}")
         lines = set(law.constants) if SHOWN_LAWS[self.name].straight else set()
@@ -158,6 +170,8 @@ class _WithLaws(Part):
     verdict: str
     decided: bool
     standing: StandingPart
+    describes: bool = True
+    correlation: CorrelationPart | None = None
 
     @model_validator(mode="after")
     def _laws_are_there(self) -> Self:
@@ -174,6 +188,7 @@ class SpinDownPart(RunPart, _WithLaws):
 
     reference: ReferencePart
     outliers: tuple[OutlierPart, ...]
+    tilt_gain: float | None = None
 
     @property
     def start_time(self) -> float:
@@ -187,7 +202,8 @@ class SpinDownPart(RunPart, _WithLaws):
         if "start_time" not in self.values or self.values["start_time"].value is None:
             raise ValueError("a run lacks its start time")
         for model in self.models:
-            if len(model.fit.solution or ()) != len(LAWS[model.name].parameters):
+            tilt = len(PARAMETERS) if set(PARAMETERS) <= set(model.parameters) else 0
+            if len(model.fit.solution or ()) != len(LAWS[model.name].parameters) + tilt:
                 raise ValueError(f"{model.name}: its solution is missing or of another law")
             if not set(LAWS[model.name].parameters) <= set(model.parameters):
                 raise ValueError(f"{model.name} lacks its start frequency")
@@ -265,7 +281,8 @@ def result_of(analysis: SpinDownAnalysis, place: Place) -> SpinDownResult:
         "runs": [_run(analysis, k, place.folder) for k in range(len(sources))],
         "warnings": [unquoted(text) for text in analysis.all_warnings],
     }
-    return SpinDownResult.model_validate(finite(document | _verdict(combined.best, combined.verdict)))
+    said = _verdict(combined.best, combined.verdict, combined.correlation)
+    return SpinDownResult.model_validate(finite(document | said))
 
 
 def _settings(options: Options) -> dict[str, Any]:
@@ -279,11 +296,13 @@ def _settings(options: Options) -> dict[str, Any]:
     }
 
 
-def _verdict(best: str, verdict: Verdict) -> dict[str, Any]:
+def _verdict(best: str, verdict: Verdict, correlation: Correlation | None) -> dict[str, Any]:
     return {
         "best_model": best,
         "verdict": verdict.text,
         "decided": verdict.decided,
+        "describes": verdict.describes,
+        "correlation": None if correlation is None else asdict(correlation),
         "standing": {
             "tied": list(verdict.indistinguishable),
             "needless": list(verdict.needless),
@@ -301,7 +320,12 @@ def _combined_values(analysis: SpinDownAnalysis) -> dict[str, Any]:
         for name, mean in best.constants.items()
         if mean.scatter is not None
     }
-    return _values(best.constants) | scatter
+    tilt = {"moment_tilt": _value(analysis.combined.tilt)} if analysis.combined.tilt else {}
+    return _values(best.constants) | scatter | tilt | _residual_correlation(analysis.combined.correlation)
+
+
+def _residual_correlation(found: Correlation | None) -> dict[str, Any]:
+    return {"residual_correlation": {"value": found.value, "u": found.u, "unit": "1"}} if found else {}
 
 
 def _combined_models(analysis: SpinDownAnalysis) -> list[dict[str, Any]]:
@@ -345,7 +369,9 @@ def _run(analysis: SpinDownAnalysis, k: int, folder: Path) -> dict[str, Any]:
             "start_time": {"value": run.start_time, "u": None, "unit": "s"},
             "duration": {"value": float(run.time[-1] - run.time[0]), "u": None, "unit": "s"},
         }
-        | _values(run.fit(run.best).parameters),
+        | _values(run.fit(run.best).parameters)
+        | _residual_correlation(run.correlation),
+        "tilt_gain": run.tilt_gain,
         "models": [_model(fit) for fit in run.fits],
         "reference": {"frequency_hz": frequency, "time_s": duration},
         "outliers": [
@@ -357,7 +383,7 @@ def _run(analysis: SpinDownAnalysis, k: int, folder: Path) -> dict[str, Any]:
             for i in run.outliers
         ],
         "warnings": [unquoted(text) for text in (*source.warnings, *run.warnings)],
-    } | _verdict(run.best, run.verdict)
+    } | _verdict(run.best, run.verdict, run.correlation)
 
 
 def _values(estimates: Mapping[str, Estimate]) -> dict[str, Any]:
@@ -478,7 +504,13 @@ def _combined(result: SpinDownResult) -> Combined:
         )
         for model in result.models
     )
-    return Combined(fits, result.best_model, _verdict_of(result), len(result.runs), ())
+    tilt = _mean(result.values["moment_tilt"]) if "moment_tilt" in result.values else None
+    seen = _correlation_of(result)
+    return Combined(fits, result.best_model, _verdict_of(result), len(result.runs), (), seen, tilt)
+
+
+def _correlation_of(part: _WithLaws) -> Correlation | None:
+    return None if part.correlation is None else Correlation(**part.correlation.model_dump())
 
 
 def _mean(value: Value) -> Mean:
@@ -515,6 +547,8 @@ def _spin_down(part: SpinDownPart, source: Source[Readings], options: Options, f
         outliers=tuple(outliers),
         start_time=part.start_time,
         warnings=part.warnings,
+        correlation=_correlation_of(part),
+        tilt_gain=part.tilt_gain,
     )
 
 
@@ -525,10 +559,14 @@ def _law_fit(
     tau, x = (time - start_time) / reference.time_s, frequency / reference.frequency_hz
     return LawFit(
         name=model.name,
-        parameters={name: model.parameters[name].estimate for name in LAWS[model.name].parameters},
+        parameters={
+            name: model.parameters[name].estimate
+            for name in (*LAWS[model.name].parameters, *PARAMETERS)
+            if name in model.parameters
+        },
         covariance=None if model.covariance is None else np.array(model.covariance, dtype=float),
         statistics=_statistics(model),
-        residuals=reference.frequency_hz * (x - LAWS[model.name].spin(tau, solution)),
+        residuals=reference.frequency_hz * (x - counted(LAWS[model.name], tau, solution)),
         linearised={name: value.estimate for name, value in model.linearised.items()} if model.linearised else None,
         warnings=model.warnings,
         start_time=start_time,
@@ -551,4 +589,5 @@ def _verdict_of(part: _WithLaws) -> Verdict:
         weak=standing.weak,
         excluded=tuple((one.name, one.reason) for one in standing.excluded),
         text=part.verdict,
+        describes=part.describes,
     )

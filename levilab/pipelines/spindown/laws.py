@@ -53,4 +53,5 @@ SHOWN_LAWS = MappingProxyType({
 #: The laws' parameters in the field's letters.
 SYMBOLS = MappingProxyType({
     "start_frequency": "ν₀", "c1": "C₁", "c2": "C₂", "c32": "C₃/₂", "c": "c", "exponent": "n",
+    "moment_tilt": "δ", "resonance": "ν_r", "wobble": "K",
 })  # fmt: skip

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from analysis.spindown.drag import LAWS, spin
+from analysis.spindown.tilt import PARAMETERS
 from levilab.pipelines.spindown.laws import SHOWN_LAWS, SYMBOLS
 
 
 def test_every_law_that_is_fitted_is_shown_and_every_constant_has_a_symbol() -> None:
     assert list(SHOWN_LAWS) == list(LAWS)
-    assert set(SYMBOLS) == {name for law in LAWS.values() for name in law.parameters}
+    assert set(SYMBOLS) == {name for law in LAWS.values() for name in law.parameters} | set(PARAMETERS)
     assert len({law.colour for law in SHOWN_LAWS.values()}) == len(SHOWN_LAWS)
 
 
