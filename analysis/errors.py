@@ -107,6 +107,16 @@ class NothingToCombine(AnalysisError):
         )
 
 
+class NoRange(AnalysisError):
+    """Points that all lie at one drive frequency [Hz]."""
+
+    def __init__(self, *, at: float, seen: int) -> None:
+        self.at, self.seen = at, seen
+        super().__init__(
+            f"all {seen} points are at a drive frequency of {at:g} Hz, a line needs several: sweep the drive"
+        )
+
+
 class TooFewHeights(AnalysisError):
     """A scan at too few heights to tell strength, origin and background apart.  lowest, highest: of those seen [m]."""
 

@@ -1,4 +1,4 @@
-"""Make the sample data: synthetic spin-downs, upper limits, records, a scan, files of scopes; published lower limits.
+"""Make the sample data: spin-downs, limits, oscilloscope records, a scan and, on demand, a sweep, as run folders.
 
 The thesis prints the constants of four spin-downs, C₁ and C₂ of unweighted straight lines, but none of their
 readings.  These readings are made up so that they give those constants: the law of a laminar disc from about
@@ -14,12 +14,16 @@ The records and the scan are what `levilab acquire` writes on the virtual bench:
 computers are left out.
 
 Run it from anywhere: ``python sample_data/make.py``.  It writes the same bytes each time.
+
+``python sample_data/make.py --full-motion`` makes the sweep of the drive, too: ``levilab acquire precession --mock``
+with records of the phase, its top simulated in full motion.  Its last digits depend on the processor.
 """
 
 import json
 import math
 import shutil
 import struct
+import sys
 import tempfile
 import wave
 from collections.abc import Callable
@@ -320,6 +324,38 @@ noise N(0, {NOISE_V:g} V); rounded to {DIGIT_V:g} V.  recording.wav has 2 V at f
 """
 
 
+def precession_sweep() -> None:
+    """A sweep of the drive on the virtual bench, without the times of the day at which it was made."""
+    folder, seed = HERE / "precession-sweep", 1
+    with tempfile.TemporaryDirectory() as out:
+        bench = Path(out) / "bench.toml"
+        bench.write_text("[precession]\nrecord_s = 6.0\n", encoding="utf-8")
+        options = AcquisitionOptions(mock=True, bench=bench, out=Path(out), seed=seed)
+        run = acquire(request_for("precession", options), Mute())
+        readings = run.readings().frame.round(6)
+        write(
+            folder,
+            ",".join(readings.columns),
+            [",".join(f"{value:.10g}" for value in row) for row in readings.to_numpy().tolist()],
+            {
+                "experiment": "precession",
+                "started_utc": None,
+                "channels": run.record.channels,
+                "configuration": {name: run.record.configuration[name] for name in ("precession", "scene")},
+                "seed": seed,
+                "note": "a sweep from 44 Hz down to 28 Hz",
+                "synthetic": True,
+                "synthetic_how": f"SYNTHETIC: {run.record.synthetic_how}; made by sample_data/make.py --full-motion",
+            },
+        )
+        events = [{key: value for key, value in event.items() if key != "utc"} for event in run.events()]
+        lines = [json.dumps(event, ensure_ascii=False, sort_keys=True) + "\n" for event in events]
+        (folder / "events.jsonl").write_text("".join(lines), encoding="utf-8", newline="\n")
+        shutil.copytree(run.folder / "traces", folder / "traces", dirs_exist_ok=True)
+        shutil.copy(run.folder / "traces.jsonl", folder)
+    print("precession-sweep")
+
+
 #: Name → the scene, None for a top that only spins; lines of the bench file; a note.
 TRACES: dict[str, tuple[str | None, str, str]] = {
     "trace-tape": (None, "records = 5", "the tape of a top that spins down: five records, 10 s apart"),
@@ -429,3 +465,5 @@ def main() -> None:
 
 if __name__ == "__main__":
     main()
+    if "--full-motion" in sys.argv[1:]:
+        precession_sweep()

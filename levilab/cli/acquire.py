@@ -21,12 +21,13 @@ acquire_app = typer.Typer(no_args_is_help=True, help="Run an experiment on the b
 #: Experiment → what its command does.  The table of experiments itself takes too long to import for a help page.
 EXPERIMENT_HELP = {
     "spin": "Spin-down: drive the top up, switch the drive off, count its spin until it falls.",
+    "trace": "Records of the oscilloscope: raw codes into the run folder, written as they come.",
+    "field": "Hall scan: the base's flux density on its axis, at one height after the other.",
     "limit": (
         "Limits of the spin, top after top: where a free top falls, or with --set limit.which=upper where a driven one "
         "is lost."
     ),
-    "trace": "Records of the oscilloscope: raw codes into the run folder, written as they come.",
-    "field": "Hall scan: the base's flux density on its axis, at one height after the other.",
+    "precession": "Precession: sweep the drive, and count at each frequency how often the stem cuts a laser beam.",
 }
 _ENDING = "Ctrl-C ends the run after the reading under way; outputs go off and the run is kept."
 

@@ -90,6 +90,9 @@ PulseMethod = Annotated[
 UncertaintyKind = Annotated[
     Uncertainty, typer.Option("--uncertainty", help="profile and bootstrap add 68 % intervals, and take longer.")
 ]
+Orthogonal = Annotated[
+    bool, typer.Option("--orthogonal", help="Let the uncertainty of the drive's frequency count, too.")
+]
 Save = Annotated[bool, typer.Option(help="Write the result and figures beside the run.")]
 ResultFolder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Write them there instead.")]
 
@@ -104,6 +107,9 @@ ANALYSIS_HELP = {
         "traces."
     ),
     "field": "The base from a Hall scan: strength, origin, thickness; heights, masses and spins of tops that float.",
+    "precession": (
+        "Precession against drive: slope and intercept, tested against a locked top, and what 1.05 would take."
+    ),
     "limit": "Limits of the spin, lower and upper: mean, scatter, trend and outliers, beside the window of the top.",
 }
 #: The command that stands for no name, and is not listed.
@@ -200,6 +206,26 @@ def limit(
     _analyze(context, paths, given, save=save, out=out, as_json=as_json)
 
 
+def precession(
+    context: typer.Context,
+    paths: Paths,
+    columns: Columns = "",
+    reading_u: ReadingU = None,
+    keep_outliers: KeepOutliers = False,
+    orthogonal: Orthogonal = False,
+    save: Save = True,
+    out: ResultFolder = None,
+    as_json: Json = False,
+) -> None:
+    """Fit the line of precession against drive."""
+    given = inputs(columns, None, None) | {
+        "reading_u": positive_u(reading_u),
+        "keep_outliers": keep_outliers,
+        "orthogonal": orthogonal,
+    }
+    _analyze(context, paths, given, save=save, out=out, as_json=as_json)
+
+
 def each(
     context: typer.Context,
     paths: Paths,
@@ -219,7 +245,9 @@ def each(
     _analyze(context, paths, given | {"method": method.value}, save=save, out=out, as_json=as_json)
 
 
-_COMMANDS: dict[str, Callable[..., None]] = {"spindown": spindown, "spin": spin, "field": field, "limit": limit}
+_COMMANDS: dict[str, Callable[..., None]] = {
+    command.__name__: command for command in (spindown, spin, field, limit, precession)
+}
 for _name, _help in ANALYSIS_HELP.items():
     analyze_app.command(_name, help=_help, epilog=f"Example: levilab analyze {_name} sample_data/")(_COMMANDS[_name])
 analyze_app.command(_EACH, help=_EACH_HELP, hidden=True, epilog="Example: levilab analyze sample_data/")(each)

@@ -20,6 +20,13 @@ from levilab.pipelines.limit.analysis import LimitAnalysis, LimitOptions, analyz
 from levilab.pipelines.limit.document import limit_document, recall_limits, save_limits
 from levilab.pipelines.limit.report import limit_part
 from levilab.pipelines.limit.table import limit_tables
+from levilab.pipelines.precession.analysis import NEEDS as PRECESSION_NEEDS
+from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionOptions, analyze_precessions
+from levilab.pipelines.precession.document import as_document as precession_document
+from levilab.pipelines.precession.document import recall_precessions
+from levilab.pipelines.precession.document import save_result as save_precession
+from levilab.pipelines.precession.report import precession_part
+from levilab.pipelines.precession.table import precession_tables
 from levilab.pipelines.spin.analysis import NEEDS as SPIN_NEEDS
 from levilab.pipelines.spin.analysis import SpinAnalysis, SpinOptions, analyze_spins
 from levilab.pipelines.spin.document import as_document as spin_document
@@ -136,6 +143,13 @@ def _limit_svg(analysis: LimitAnalysis) -> str:
     return as_svg(limit_figure(analysis))
 
 
+def _precession_svg(analysis: PrecessionAnalysis) -> str:
+    from levilab.pipelines.precession.figure import precession_figure  # with matplotlib
+    from levilab.present.style import as_svg
+
+    return as_svg(precession_figure(analysis))
+
+
 _TABLE: tuple[Analysis[Any], ...] = (
     Analysis[SpinDownAnalysis](
         SPINDOWN_NEEDS,
@@ -180,6 +194,17 @@ _TABLE: tuple[Analysis[Any], ...] = (
         limit_tables,
         _limit_svg,
         limit_part,
+    ),
+    Analysis[PrecessionAnalysis](
+        PRECESSION_NEEDS,
+        PrecessionOptions,
+        analyze_precessions,
+        recall_precessions,
+        precession_document,
+        save_precession,
+        precession_tables,
+        _precession_svg,
+        precession_part,
     ),
 )
 ANALYSES = MappingProxyType({analysis.name: analysis for analysis in _TABLE})

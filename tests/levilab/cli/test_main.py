@@ -91,6 +91,7 @@ def test_an_analysis_need_not_be_named(levilab: Command, sample_data: Path) -> N
         ("spin", 13),
         ("field", 1),
         ("limit", 3),
+        ("precession", 1),
     ]
     assert "Did you mean 'spindown'" in levilab("analyze", "spindwon", check=2).stderr
 

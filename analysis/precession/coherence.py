@@ -1,0 +1,189 @@
+"""Are the pulses of the laser locked to the drive?  Their phases on the drive, as vectors of length one.
+
+Source: Mardia & Jupp, Directional Statistics (2000), §2.3 (mean direction), §6.3 (Rayleigh's test).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.errors import TooFewReadings
+
+Array = NDArray[np.float64]
+
+#: Pulses below which a mean vector says little.
+FEWEST_PULSES = 5
+#: Rayleigh's p below which pulses are held for locked.
+LOCKED_P = 1e-3
+#: The phase of a locked top swings like a pendulum, by less than this [turns]; one that drifts leaves it some time.
+_STAYS = 1.0
+#: Phases are means over this [s]: short against the swing of a locked top, some seconds.
+_WINDOW_S = 0.4
+#: Part of the signal's height by which it must fall back before a pulse can begin anew: noise makes no pulses.
+_HYSTERESIS = 0.25
+
+
+@dataclass(frozen=True)
+class Coherence:
+    """How firmly pulses follow a drive.
+
+    Attributes:
+        pulses: how many.
+        length: of the mean vector: 1 where all come at one phase of the drive, about 1/√pulses where they come anyhow.
+        phase_rad: of the mean vector on the drive.
+        p_random: how probable so long a vector is for pulses at random (Rayleigh).
+        drift_hz, u_drift_hz: frequency of the pulses − frequency of the drive: the slope of their phase, and its u from
+            the scatter about it; a locked top swings about the drive within some seconds, which a short record shows as
+            a drift.
+        excursion_turns: from the lowest to the highest phase, of means over some tenths of a second.
+        drive_hz: frequency of the drive in the same record.
+        duration_s: from the first pulse to the last.
+    """
+
+    pulses: int
+    length: float
+    phase_rad: float
+    p_random: float
+    drift_hz: float
+    u_drift_hz: float
+    drive_hz: float
+    duration_s: float
+    excursion_turns: float
+
+    @property
+    def locked(self) -> bool:
+        """Whether the pulses follow the drive: by no chance, and their phase stays within one turn."""
+        return self.p_random < LOCKED_P and self.excursion_turns < _STAYS
+
+
+def coherence(pulse_times: Array, drive: Array, dt: float, drive_frequency: float, start: float = 0.0) -> Coherence:
+    """Coherence of pulses with a drive that was recorded beside them.
+
+    Args:
+        pulse_times: shape (n,), increasing [s].
+        drive: the drive's voltage, evenly sampled, shape (m,); its first harmonic counts.
+        dt: between its samples [s].
+        drive_frequency: near the drive's, to better than one period in the record [Hz].
+        start: time of its first sample [s].
+
+    Raises:
+        TooFewReadings: below five pulses.
+    """
+    if pulse_times.size < FEWEST_PULSES:
+        raise TooFewReadings(seen=pulse_times.size, needed=FEWEST_PULSES)
+    frequency, phase = first_harmonic(drive, dt, drive_frequency)
+    turns = frequency * (pulse_times - start) + phase / (2 * np.pi)
+    vectors = np.exp(2j * np.pi * turns)
+    mean = complex(vectors.mean())
+    drift, u_drift, excursion = _course(pulse_times, turns)
+    return Coherence(
+        pulses=pulse_times.size,
+        length=min(abs(mean), 1.0),
+        phase_rad=float(np.angle(mean)),
+        p_random=rayleigh_p(abs(mean), pulse_times.size),
+        drift_hz=drift,
+        u_drift_hz=u_drift,
+        drive_hz=frequency,
+        duration_s=float(pulse_times[-1] - pulse_times[0]),
+        excursion_turns=excursion,
+    )
+
+
+def rayleigh_p(length: float, n: int) -> float:
+    """How probable a mean vector of this length is for n phases at random.
+
+    Wilkie, Appl. Stat. 32, 311 (1983): good to three digits above p = 0.001 from n = 10 on.
+
+    >>> round(rayleigh_p((2.919 / 10) ** 0.5, 10), 3)  # tabulated: 0.05
+    0.05
+    """
+    resultant = n * min(length, 1.0)
+    return min(1.0, math.exp(math.sqrt(1 + 4 * n + 4 * (n**2 - resultant**2)) - (1 + 2 * n)))
+
+
+def first_harmonic(signal: Array, dt: float, near: float) -> tuple[float, float]:
+    """Frequency [Hz] and phase of the cosine at the first sample [rad] of a periodic signal's first harmonic.
+
+    The phases of sixteenths of the record, each a least-squares cosine, lie on a line whose slope corrects the
+    frequency.  near: the frequency to better than one period in the record [Hz].
+    """
+    parts = np.array_split(np.arange(signal.size), 16 if near * dt * signal.size > 32 else 2)
+    times = np.array([dt * (part[0] + part[-1]) / 2 for part in parts])
+    phases = []
+    for part, middle in zip(parts, times, strict=True):
+        angle = 2 * np.pi * near * (dt * part - middle)
+        columns = np.column_stack((np.cos(angle), -np.sin(angle), np.ones_like(angle)))
+        (real, imaginary, _), *_ = np.linalg.lstsq(columns, signal[part], rcond=None)
+        phases.append(math.atan2(imaginary, real) - 2 * np.pi * near * middle)
+    slope, intercept = np.polynomial.polynomial.polyfit(times, np.unwrap(phases), 1)[::-1]
+    return near + float(slope) / (2 * np.pi), float(intercept)
+
+
+def pulse_times(signal: Array, dt: float, start: float = 0.0) -> Array:
+    """When a beam is cut, shape (n,) [s]: the middle of each dip of its signal, between its flanks at half height.
+
+    Args:
+        signal: shape (m,) [V].
+        dt: between samples [s].
+        start: time of the first [s].
+    """
+    signal = -signal
+    low, high = (float(level) for level in np.percentile(signal, [0.5, 99.5]))
+    middle = (low + high) / 2
+    lower = middle - _HYSTERESIS * (high - low)
+    if not high > low:
+        return np.empty(0)
+    state, ups, downs = bool(signal[0] > middle), [], []
+    for k in np.flatnonzero(np.diff((signal > middle).astype(np.int8) + (signal > lower).astype(np.int8))).tolist():
+        if not state and signal[k + 1] > middle:
+            state = True
+            ups.append(k)
+        elif state and signal[k + 1] <= lower:
+            state = False
+            downs.append(_last_above(signal, middle, k))
+    if downs and (not ups or downs[0] < ups[0]):
+        downs.pop(0)
+    flanks = [
+        (_crossing(signal, middle, up), _crossing(signal, middle, down)) for up, down in zip(ups, downs, strict=False)
+    ]
+    return np.array([start + dt * (a + b) / 2 for a, b in flanks])
+
+
+def _last_above(signal: Array, level: float, k: int) -> int:
+    """The last sample above a level at or before k."""
+    while k > 0 and signal[k] <= level:
+        k -= 1
+    return k
+
+
+def _crossing(signal: Array, level: float, k: int) -> float:
+    """Where the signal crosses a level between samples k and k + 1, in samples."""
+    rise = float(signal[k + 1] - signal[k])
+    return k + (level - float(signal[k])) / rise if rise else float(k)
+
+
+def _course(times: Array, turns: Array) -> tuple[float, float, float]:
+    """How the phase goes on: its slope and the u of it [Hz], and from its lowest to its highest [turns].
+
+    The phase of the mean vector, window by window: a doubled or missing pulse does not upset it as it does a phase that
+    is counted on from pulse to pulse.
+    """
+    span = float(np.ptp(times))
+    windows = max(4, min(times.size // FEWEST_PULSES, math.ceil(span / _WINDOW_S)))
+    number = np.minimum(((times - times[0]) / span * windows).astype(np.int64), windows - 1)
+    vectors = np.exp(2j * np.pi * turns)
+    sums = np.bincount(number, vectors.real) + 1j * np.bincount(number, vectors.imag)
+    filled = np.bincount(number) > 0
+    phase = np.unwrap(np.angle(sums[filled])) / (2 * np.pi)
+    middle = (np.flatnonzero(filled) + 0.5) * span / windows
+    off = middle - middle.mean()
+    s_tt = float(np.sum(off**2))
+    slope = float(np.sum(off * phase)) / s_tt
+    left = phase - phase.mean() - slope * off
+    u = math.sqrt(float(np.sum(left**2)) / max(phase.size - 2, 1) / s_tt)
+    # pulses that are faster than the drive come earlier and earlier on it
+    return -slope, u, float(np.ptp(phase))

@@ -1,0 +1,270 @@
+"""A straight line through points with their uncertainties: weighted, or with uncertainties along both axes.
+
+Source: Draper & Smith, Applied Regression Analysis (1998), §3 (bands), §5 (joint regions), §8 (influence); York,
+Evensen, López Martínez & De Basabe Delgado, Am. J. Phys. 72, 367 (2004), §III (uncertainties along both axes).
+
+Everything is computed about the weighted mean of x, where slope and height are uncorrelated: about zero, far outside
+a sweep from 26 to 40 Hz, they would be correlated by −0.99.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.errors import NoRange, TooFewReadings
+
+Array = NDArray[np.float64]
+
+#: Points below which two parameters leave nothing over.
+FEWEST = 3
+#: A χ² less probable than this: the line, or the stated uncertainty, is wrong.
+NO_FIT = 1e-3
+#: Of the bands.
+CONFIDENCE = 0.95
+#: York's iteration: so close to the last slope it ends; it takes 5 to 10 rounds, a hundred means that none is found.
+_CLOSE, _MOST_ROUNDS = 1e-14, 100
+#: A scatter below this share of the values is the rounding of the numbers, and says nothing.
+_ROUNDING = 1e-13
+
+
+@dataclass(frozen=True)
+class Line:
+    """y = intercept + slope·x.
+
+    Attributes:
+        slope, u_slope: [1]; u None where the points leave it undefined.
+        intercept, u_intercept: at x = 0 [Hz].
+        centre: weighted mean of x [Hz].
+        height, u_height: of the line there [Hz]; uncorrelated with the slope.
+        correlation: of slope and intercept.
+        n: points.
+        chi_square: Σ(residual/u)²; None where no u was given.
+        p_fit: how probable so large a χ² is if the line and the u hold.
+        scale: by which the u of the points count: 1, or √(χ²/dof) where p_fit < 0.001; without u the scatter about the
+            line [Hz].
+        u_known: whether the points' own u are believed: then tests use the normal distribution, else Student's t.
+        orthogonal: whether u along x counts, too.
+    """
+
+    slope: float
+    u_slope: float | None
+    intercept: float
+    u_intercept: float | None
+    centre: float
+    height: float
+    u_height: float | None
+    correlation: float | None
+    n: int
+    chi_square: float | None
+    p_fit: float | None
+    scale: float
+    u_known: bool
+    orthogonal: bool
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Points beyond the two parameters."""
+        return self.n - 2
+
+    @property
+    def quantile(self) -> float:
+        """Half of a 95 % interval in standard uncertainties."""
+        from scipy.special import ndtri, stdtrit
+
+        level = (1 + CONFIDENCE) / 2
+        return float(ndtri(level) if self.u_known else stdtrit(self.degrees_of_freedom, level))
+
+    def at(self, x: Array) -> Array:
+        """The line [Hz]."""
+        return np.asarray(self.height + self.slope * (x - self.centre))
+
+    def u_at(self, x: Array) -> Array:
+        """Standard uncertainty of the line [Hz], NaN where it is undefined."""
+        if self.u_slope is None or self.u_height is None:
+            return np.full_like(x, np.nan)
+        return np.hypot(self.u_height, self.u_slope * (x - self.centre))
+
+    def confidence_band(self, x: Array) -> Array:
+        """Half the width at each x of the band that holds the line with 95 % [Hz]."""
+        return self.quantile * self.u_at(x)
+
+    def prediction_band(self, x: Array, u: float) -> Array:
+        """Half the width of the band that holds one more point of this u, or weight, with 95 % [Hz]."""
+        return self.quantile * np.hypot(self.u_at(x), self.scale * u)
+
+    def p_against(self, slope: float = 1.0, intercept: float = 0.0) -> float | None:
+        """How probable so large a departure from a line is if that line is true: slope and intercept jointly.
+
+        χ² with two degrees of freedom, or F with two and n − 2.  None where the points leave it undefined.
+        """
+        if not self.u_slope or not self.u_height:
+            return None
+        from scipy.special import chdtrc, fdtrc
+
+        off = (self.slope - slope) / self.u_slope
+        aside = (self.height - intercept - slope * self.centre) / self.u_height
+        statistic = off**2 + aside**2
+        return float(chdtrc(2, statistic) if self.u_known else fdtrc(2, self.degrees_of_freedom, statistic / 2))
+
+
+@dataclass(frozen=True)
+class Influence:
+    """What each point does to the line, shape (n,) each.
+
+    leverage: how far the line follows the point, 0 to 1; residual: y − line [Hz]; studentised: the same in units of its
+    own standard deviation, with scatter taken from the other points where u is not known, NaN where it is undefined;
+    slope_change, intercept_change: by which the line without the point differs.
+    """
+
+    leverage: Array
+    residual: Array
+    studentised: Array
+    slope_change: Array
+    intercept_change: Array
+
+
+def fit_line(x: Array, y: Array, u: Array | None = None) -> Line:
+    """The weighted line through points.
+
+    Args:
+        x: shape (n,) [Hz].
+        y: shape (n,) [Hz].
+        u: standard uncertainty of y, shape (n,) [Hz]; None: not known, all weigh alike and the scatter counts.
+
+    Raises:
+        TooFewReadings: below three.
+        NoRange: all at one x.
+
+    >>> line = fit_line(np.array([26.0, 30.0, 34.0]), np.array([26.01, 30.0, 33.99]), np.full(3, 0.01))
+    >>> round(line.slope, 4), round(line.intercept, 4), round(line.u_slope, 5)
+    (0.9975, 0.075, 0.00177)
+    """
+    _check(x)
+    weight = np.ones_like(x) if u is None else u**-2.0
+    centre, height, s_xx = _means(x, y, weight)
+    slope = float(np.sum(weight * (x - centre) * (y - height)) / s_xx)
+    return _line(x, y, weight, (centre, height, slope, s_xx), u_given=u is not None, orthogonal=False)
+
+
+def fit_orthogonal(x: Array, y: Array, u_x: Array, u_y: Array, *, known: bool = True) -> Line:
+    """The most probable line through points with uncertainties along both axes.
+
+    Args:
+        x: shape (n,) [Hz].
+        y: shape (n,) [Hz].
+        u_x: standard uncertainty of x, shape (n,) [Hz].
+        u_y: standard uncertainty of y, shape (n,) [Hz].
+        known: whether these are uncertainties, or only their ratios.
+
+    Raises:
+        TooFewReadings: below three.
+        NoRange: all at one x.
+    """
+    _check(x)
+    slope = fit_line(x, y, u_y).slope
+    for _ in range(_MOST_ROUNDS):
+        weight, before = 1 / (u_y**2 + slope**2 * u_x**2), slope
+        centre, height, _ = _means(x, y, weight)
+        off, aside = x - centre, y - height
+        beta = weight * (off * u_y**2 + slope * aside * u_x**2)
+        slope = float(np.sum(weight * beta * aside) / np.sum(weight * beta * off))
+        if abs(slope - before) <= _CLOSE * abs(slope):
+            break
+    weight = 1 / (u_y**2 + slope**2 * u_x**2)
+    true_x = centre + weight * (off * u_y**2 + slope * aside * u_x**2)  # the most probable, eq. (13f) there
+    inner = float(np.sum(weight * true_x) / np.sum(weight))
+    s_xx = float(np.sum(weight * (true_x - inner) ** 2))
+    at_inner = height + slope * (inner - centre)
+    return _line(x, y, weight, (inner, at_inner, slope, s_xx), u_given=known, orthogonal=True)
+
+
+def influence(x: Array, y: Array, line: Line, weight: Array) -> Influence:
+    """What each point does to a line.
+
+    Where uncertainties along both axes count, the weights and the slope in them are held fixed: the changes are then
+    right to first order.
+
+    Args:
+        x: shape (n,) [Hz].
+        y: shape (n,) [Hz].
+        line: through these points.
+        weight: 1/u² of each, shape (n,).
+    """
+    off = x - float(np.sum(weight * x) / np.sum(weight))
+    s_xx = float(np.sum(weight * off**2))
+    leverage = np.minimum(weight * (1 / np.sum(weight) + off**2 / s_xx), 1.0)
+    residual = y - line.at(x)
+    alone = np.maximum(1 - leverage, 1e-12)  # a point that the line must go through
+    slope_change = -weight * off * residual / (s_xx * alone)
+    middle_change = -weight * residual / (np.sum(weight) * alone)
+    intercept_change = middle_change - slope_change * (x - off)
+    own = residual * np.sqrt(weight / alone)
+    if line.u_known:
+        return Influence(leverage, residual, own, slope_change, intercept_change)
+    left = float(np.sum(weight * residual**2)) - own**2  # without the point
+    dof = line.degrees_of_freedom - 1
+    with np.errstate(invalid="ignore", divide="ignore"):
+        scatter = np.sqrt(left / dof) if dof > 0 else np.full_like(x, np.nan)
+        studentised = np.where(left > 0, own / scatter, np.nan)
+    return Influence(leverage, residual, studentised, slope_change, intercept_change)
+
+
+# --- what both fits share ---
+
+
+def _check(x: Array) -> None:
+    if x.size < FEWEST:
+        raise TooFewReadings(seen=x.size, needed=FEWEST)
+    if np.ptp(x) <= _ROUNDING * np.abs(x).max():
+        raise NoRange(at=float(x[0]), seen=x.size)
+
+
+def _means(x: Array, y: Array, weight: Array) -> tuple[float, float, float]:
+    """Weighted means of x and y, and Σw(x − mean)²."""
+    total = np.sum(weight)
+    centre, height = float(np.sum(weight * x) / total), float(np.sum(weight * y) / total)
+    return centre, height, float(np.sum(weight * (x - centre) ** 2))
+
+
+def _line(
+    x: Array, y: Array, weight: Array, solution: tuple[float, float, float, float], *, u_given: bool, orthogonal: bool
+) -> Line:
+    """The line with its uncertainties.  solution: centre, height there, slope, Σw(x − centre)²."""
+    centre, height, slope, s_xx = solution
+    dof = x.size - 2
+    residual = y - height - slope * (x - centre)
+    left = float(np.sum(weight * residual**2))
+    p_fit, scale = None, math.sqrt(left / dof)
+    believed = False
+    if u_given:
+        from scipy.special import chdtrc
+
+        p_fit = float(chdtrc(dof, left))
+        believed = p_fit >= NO_FIT
+        scale = 1.0 if believed else scale
+    rounding = _ROUNDING * float(np.abs(y).max()) * math.sqrt(float(weight.max()))
+    u_slope = u_height = u_intercept = correlation = None
+    if scale > rounding:
+        u_slope, u_height = scale / math.sqrt(s_xx), scale / math.sqrt(float(np.sum(weight)))
+        u_intercept = math.hypot(u_height, centre * u_slope)
+        correlation = -centre * u_slope / u_intercept
+    return Line(
+        slope=slope,
+        u_slope=u_slope,
+        intercept=height - slope * centre,
+        u_intercept=u_intercept,
+        centre=centre,
+        height=height,
+        u_height=u_height,
+        correlation=correlation,
+        n=x.size,
+        chi_square=left if u_given else None,
+        p_fit=p_fit,
+        scale=scale,
+        u_known=believed,
+        orthogonal=orthogonal,
+    )

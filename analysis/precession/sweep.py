@@ -1,0 +1,334 @@
+"""A sweep of the drive's frequency: is what the laser counts the drive's frequency itself?
+
+A top that is locked to its drive wobbles at the drive's frequency, and its stem cuts the laser's beam once in each
+period: ν_p = ν_d, slope 1, intercept 0.  That is what is tested, jointly.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.errors import NotFinite, NotPositive, ShapesDiffer
+from analysis.precession.line import FEWEST, NO_FIT, Line, fit_line, fit_orthogonal, influence
+from analysis.precession.miscounts import Miscount, Robust, find_miscounts, robust_line
+from analysis.precession.power import Power, what_it_takes
+
+Array = NDArray[np.float64]
+
+#: A joint test below this excludes slope 1 and intercept 0.
+EXCLUDED_P = 0.01
+#: A studentised residual, or a leverage in units of the mean one, that is worth a word.
+_FAR, _HEAVY = 3.5, 3.0
+#: An uncertainty of the drive that matters: so large a share of that of the precession.
+_MATTERS = 0.3
+#: A spin that differs from the drive's frequency by so many u, and by this share at least, is a symptom.
+_SPIN_FAR, _SPIN_SHARE = 5.0, 1e-3
+
+
+@dataclass(frozen=True)
+class Point:
+    """A point of the sweep.
+
+    Attributes:
+        drive, precession: [Hz].
+        u: of the precession, as it counts in the fit [Hz]; None: all weigh alike.
+        u_drive: [Hz]; None: not known.
+        spin, u_spin: [Hz], where they were measured.
+        leverage, residual, studentised, slope_change, intercept_change: see `analysis.precession.line.Influence`; None
+            for a point that is left out, and where undefined.  The residual of a point left out is from the line, too.
+        miscount: what was counted in the place of the precession, in words; None: nothing is amiss.
+        used: whether the line goes through it.
+    """
+
+    drive: float
+    precession: float
+    u: float | None
+    u_drive: float | None
+    spin: float | None
+    u_spin: float | None
+    leverage: float | None
+    residual: float
+    studentised: float | None
+    slope_change: float | None
+    intercept_change: float | None
+    miscount: str | None
+    used: bool
+
+
+@dataclass(frozen=True)
+class SweepFit:
+    """The line through a sweep and what it says.
+
+    Attributes:
+        line: the one asked for, weighted or orthogonal.
+        robust: the median line through all points, miscounts included.
+        p_locked: how probable so large a departure from slope 1, intercept 0 is for a locked top.
+        power: what it takes to tell a slope of 1.05 from 1.
+        points: in the order given.
+        spin_offset, u_spin_offset: mean of spin − drive [Hz], where the spin was measured.
+        warnings: what to know before using the numbers.
+    """
+
+    line: Line
+    robust: Robust
+    p_locked: float | None
+    power: Power | None
+    points: tuple[Point, ...]
+    spin_offset: float | None
+    u_spin_offset: float | None
+    warnings: tuple[str, ...]
+
+    @property
+    def locked(self) -> bool | None:
+        """Whether the points agree with a locked top; None where they leave it open."""
+        return None if self.p_locked is None else self.p_locked >= EXCLUDED_P
+
+    def column(self, name: str) -> Array:
+        """One attribute of all points, NaN where there is none, shape (n,)."""
+        return np.array([math.nan if (v := getattr(p, name)) is None else v for p in self.points], dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What was measured, shape (n,) each [Hz]; u and the spin where they are known.  gate_s: of the counter [s]."""
+
+    drive: Array
+    precession: Array
+    u: Array | None = None
+    u_drive: Array | None = None
+    spin: Array | None = None
+    u_spin: Array | None = None
+    gate_s: float | None = None
+
+
+def fit_sweep(sweep: Sweep, *, orthogonal: bool = False, keep_miscounts: bool = False) -> SweepFit:
+    """Fit a line to a sweep, and test slope 1 and intercept 0.
+
+    Args:
+        sweep: the points.
+        orthogonal: let the uncertainties of the drive's frequency count, too; where they are not known they are taken
+            as large as those of the precession.
+        keep_miscounts: let the line go through points whose miscount can be named, too.
+
+    Raises:
+        TooFewReadings: below three points.
+        NoRange: all at one drive frequency.
+        ShapesDiffer, NotFinite, NotPositive: what is no sweep.
+    """
+    _check(sweep)
+    fit_line(sweep.drive, sweep.precession)  # raises for what no line goes through
+    robust = robust_line(sweep.drive, sweep.precession)
+    found = find_miscounts(sweep.drive, sweep.precession, sweep.u, robust, sweep.gate_s)
+    used, warnings = _used(sweep, found, keep=keep_miscounts)
+    chosen = _part(sweep, used)
+    line = _fitted(chosen, orthogonal=orthogonal)
+    spin_offset, u_spin_offset = _spin_offset(chosen)
+    fit = SweepFit(
+        line=line,
+        robust=robust,
+        p_locked=line.p_against(),
+        power=what_it_takes(line, float(np.ptp(chosen.drive)), _usual_u(chosen, line)),
+        points=_points(sweep, used, found, line),
+        spin_offset=spin_offset,
+        u_spin_offset=u_spin_offset,
+        warnings=(),
+    )
+    return replace(fit, warnings=(*warnings, *_doubts(fit, chosen, found)))
+
+
+# --- what is measured ---
+
+
+def _check(sweep: Sweep) -> None:
+    columns = {
+        "the drive frequency": sweep.drive,
+        "the precession frequency": sweep.precession,
+        "u of the precession": sweep.u,
+        "u of the drive": sweep.u_drive,
+        "the spin": sweep.spin,
+        "u of the spin": sweep.u_spin,
+    }
+    for quantity, values in columns.items():
+        if values is None:
+            continue
+        if values.shape != sweep.drive.shape or values.ndim != 1:
+            raise ShapesDiffer(quantity=quantity, seen=values.shape, expected=sweep.drive.shape)
+        wrong = np.flatnonzero(~np.isfinite(values))
+        if wrong.size:
+            raise NotFinite(quantity=quantity, index=int(wrong[0]), value=float(values[wrong[0]]))
+        below = np.flatnonzero(values <= 0)
+        if below.size:
+            raise NotPositive(quantity=quantity, unit="Hz", index=int(below[0]), value=float(values[below[0]]))
+
+
+def _used(sweep: Sweep, found: list[Miscount], *, keep: bool) -> tuple[NDArray[np.bool_], list[str]]:
+    """The points that the line goes through: all but those whose miscount has a name."""
+    used = np.ones(sweep.drive.size, dtype=np.bool_)
+    named = [one.index for one in found if one.named]
+    if keep or not named:
+        return used, []
+    used[named] = False
+    if used.sum() >= max(FEWEST, sweep.drive.size / 2) and np.ptp(sweep.drive[used]) > 0:
+        return used, []
+    text = (
+        f"{len(named)} of {sweep.drive.size} points look like miscounts: too many to leave out, so the line goes "
+        "through all of them; look at the laser's signal and the trigger level"
+    )
+    return np.ones_like(used), [text]
+
+
+def _part(sweep: Sweep, used: NDArray[np.bool_]) -> Sweep:
+    def part(values: Array | None) -> Array | None:
+        return None if values is None else values[used]
+
+    return Sweep(
+        sweep.drive[used],
+        sweep.precession[used],
+        part(sweep.u),
+        part(sweep.u_drive),
+        part(sweep.spin),
+        part(sweep.u_spin),
+        sweep.gate_s,
+    )
+
+
+# --- the line ---
+
+
+def _fitted(sweep: Sweep, *, orthogonal: bool) -> Line:
+    if not orthogonal:
+        return fit_line(sweep.drive, sweep.precession, sweep.u)
+    u = np.ones_like(sweep.drive) if sweep.u is None else sweep.u
+    u_drive = u if sweep.u_drive is None or sweep.u is None else sweep.u_drive
+    return fit_orthogonal(sweep.drive, sweep.precession, u_drive, u, known=sweep.u is not None)
+
+
+def _weight(sweep: Sweep, line: Line) -> Array:
+    """1/u² of each point in the fit, shape (n,)."""
+    u = np.ones_like(sweep.drive) if sweep.u is None else sweep.u
+    if not line.orthogonal:
+        return np.asarray(u**-2.0)
+    u_drive = u if sweep.u_drive is None or sweep.u is None else sweep.u_drive
+    return np.asarray(1 / (u**2 + line.slope**2 * u_drive**2))
+
+
+def _usual_u(sweep: Sweep, line: Line) -> float:
+    """Of a point, as it counts: the middle one [Hz]."""
+    return line.scale * float(np.median(_weight(sweep, line) ** -0.5))
+
+
+def _points(sweep: Sweep, used: NDArray[np.bool_], found: list[Miscount], line: Line) -> tuple[Point, ...]:
+    chosen = _part(sweep, used)
+    effects = influence(chosen.drive, chosen.precession, line, _weight(chosen, line))
+    place = np.cumsum(used) - 1
+    texts = {one.index: one.text for one in found}
+    left = sweep.precession - line.at(sweep.drive)
+
+    def at(values: Array | None, i: int) -> float | None:
+        return None if values is None or not np.isfinite(values[i]) else float(values[i])
+
+    def of_used(values: Array, i: int) -> float | None:
+        return at(values, int(place[i])) if used[i] else None
+
+    return tuple(
+        Point(
+            drive=float(sweep.drive[i]),
+            precession=float(sweep.precession[i]),
+            u=at(sweep.u, i),
+            u_drive=at(sweep.u_drive, i),
+            spin=at(sweep.spin, i),
+            u_spin=at(sweep.u_spin, i),
+            leverage=of_used(effects.leverage, i),
+            residual=float(left[i]),
+            studentised=of_used(effects.studentised, i),
+            slope_change=of_used(effects.slope_change, i),
+            intercept_change=of_used(effects.intercept_change, i),
+            miscount=texts.get(i),
+            used=bool(used[i]),
+        )
+        for i in range(sweep.drive.size)
+    )
+
+
+def _spin_offset(sweep: Sweep) -> tuple[float | None, float | None]:
+    """Mean of spin − drive, weighted where u is known, and its u from the scatter or the u, whichever is larger."""
+    if sweep.spin is None:
+        return None, None
+    off = sweep.spin - sweep.drive
+    weight = np.ones_like(off) if sweep.u_spin is None else sweep.u_spin**-2.0
+    mean = float(np.sum(weight * off) / np.sum(weight))
+    scatter = math.sqrt(float(np.sum(weight * (off - mean) ** 2)) / (off.size - 1) / float(np.sum(weight)))
+    own = 0.0 if sweep.u_spin is None else float(np.sum(weight)) ** -0.5
+    return mean, max(scatter, own)
+
+
+# --- what to know ---
+
+
+def _doubts(fit: SweepFit, sweep: Sweep, found: list[Miscount]) -> list[str]:
+    texts = []
+    for one in found:
+        point = fit.points[one.index]
+        gate = "" if sweep.gate_s else "; whether whole pulses are missing only the counter's gate could say"
+        what = one.text if one.named else f"{one.text}{gate} (it stays in)"
+        out = "" if point.used or not one.named else ", left out of the line"
+        texts.append(
+            f"point {one.index + 1}, {point.precession:.5g} Hz at a drive of {point.drive:.5g} Hz: {what}{out}"
+        )
+    line = fit.line
+    if line.p_fit is not None and not line.u_known:
+        texts.append(
+            f"the points scatter {line.scale:.2g} times as much as their u says (p = {line.p_fit:.1g}): "
+            "all uncertainties are enlarged by that"
+        )
+    if line.chi_square is not None and line.p_fit is not None and 1 - line.p_fit < NO_FIT:
+        texts.append(
+            "the points scatter much less than their u says: the swing of a locked top about the drive is in it, and "
+            "comes back to where it was"
+        )
+    if fit.p_locked is None:
+        texts.append("the points lie on the line to the last digit: without their u nothing can be tested; give it")
+    texts += [
+        f"point {k}, at {p.drive:.5g} Hz, alone moves the slope by {abs(p.slope_change):.2g}, {share:.1f} of its u"
+        for k, p in enumerate(fit.points, 1)
+        if p.slope_change is not None and line.u_slope and (share := abs(p.slope_change) / line.u_slope) > _FAR
+    ]
+    heavy = _HEAVY * 2 / line.n
+    texts += [
+        f"point {k}, at {p.drive:.5g} Hz, holds the line nearly by itself (leverage {p.leverage:.2f}): measure more "
+        "points near it"
+        for k, p in enumerate(fit.points, 1)
+        if p.leverage is not None and p.leverage > max(heavy, 0.9)
+    ]
+    if not line.orthogonal and sweep.u is not None and sweep.u_drive is not None:
+        worst = float(np.max(sweep.u_drive / sweep.u))
+        if worst > _MATTERS:
+            texts.append(
+                f"u of the drive's frequency is up to {worst:.2g} of that of the precession: let it count with "
+                "`orthogonal` = True"
+            )
+    if line.orthogonal and (sweep.u is None or sweep.u_drive is None):
+        texts.append("u of the drive's frequency is not known and taken as large as that of the precession")
+    texts += _about_spin(fit, sweep)
+    return texts
+
+
+def _about_spin(fit: SweepFit, sweep: Sweep) -> list[str]:
+    offset, u = fit.spin_offset, fit.u_spin_offset
+    if (
+        offset is None
+        or u is None
+        or abs(offset) < _SPIN_SHARE * float(sweep.drive.mean())
+        or abs(offset) < _SPIN_FAR * u
+    ):
+        return []
+    where = "below" if offset < 0 else "above"
+    text = (
+        f"the spin that was counted lies {abs(offset):.3g} Hz {where} the drive: a locked top spins with it; is the "
+        "tape on a loose washer, or was the top not locked?"
+    )
+    return [text]

@@ -1,0 +1,318 @@
+"""Sweeps of the drive at some paths: each by itself and together."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from analysis.errors import AnalysisError
+from analysis.precession.coherence import Coherence, coherence, pulse_times
+from analysis.precession.sweep import EXCLUDED_P, Sweep, SweepFit, fit_sweep
+from analysis.uncertainty import Estimate
+from levilab.errors import DataError
+from levilab.pipelines.precession.readings import Readings, read_sweep_file, read_sweep_run
+from levilab.pipelines.result import Place, place_of
+from levilab.pipelines.sources import InputOptions, Needs, Source, collect
+from levilab.present.numbers import plain, with_uncertainty
+from levilab.runs.run import find_run
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from pathlib import Path
+
+    from analysis.precession.power import Power
+    from levilab.runs.traces import StoredTrace
+
+    Array = np.ndarray[tuple[int], np.dtype[np.float64]]
+
+PRECESSION = "precession"
+#: The runs that suit, and what is needed of a data file.
+NEEDS = Needs(
+    analysis=PRECESSION,
+    experiments=frozenset({"precession"}),
+    read_file=read_sweep_file,
+    read_run=read_sweep_run,
+)
+
+
+@dataclass(frozen=True)
+class PrecessionOptions(InputOptions):
+    """How sweeps are analyzed.
+
+    reading_u: of every count of the precession [Hz], in the place of what the data say; keep_outliers: points that
+    miscounted are kept; orthogonal: the uncertainty of the drive's frequency counts, too.
+    """
+
+    reading_u: float | None = None
+    keep_outliers: bool = False
+    orthogonal: bool = False
+
+
+#: A record that is kept at the moment of a reading is that reading's [s].
+_AT_ONCE_S = 0.01
+#: Slopes of runs that differ with less probability than this are named.
+DIFFERENT_P = 0.01
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where the fit of one run comes from.  options: how it was made; text: for people."""
+
+    options: PrecessionOptions
+    text: str = "analyzed now"
+
+
+@dataclass(frozen=True)
+class PointCoherence:
+    """How firmly the laser's pulses follow the drive at a point.  point: its number, from 0 on."""
+
+    point: int
+    coherence: Coherence
+
+
+@dataclass(frozen=True)
+class PrecessionRun:
+    """One sweep.  coherences: of the records that were kept; warnings: about these."""
+
+    fit: SweepFit
+    coherences: tuple[PointCoherence, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class PrecessionAnalysis:
+    """Sweeps, each by itself and together.
+
+    runs, origins: one per source; combined: the line through the points of all of them; place: where the result
+    belongs; warnings: about the inputs; remarks: what does not belong to the analysis.
+    """
+
+    sources: tuple[Source[Readings], ...]
+    runs: tuple[PrecessionRun, ...]
+    combined: SweepFit
+    options: PrecessionOptions
+    place: Place
+    warnings: tuple[str, ...]
+    remarks: tuple[str, ...]
+    origins: tuple[Origin, ...]
+
+    @property
+    def home(self) -> Path:
+        """The folder that the result belongs to."""
+        return self.place.folder
+
+    @property
+    def text(self) -> str:
+        """What the data say, in a few sentences."""
+        return verdict(self.combined)
+
+    @property
+    def all_warnings(self) -> list[str]:
+        """Every warning once, a run's with its name where there are several runs."""
+        several = len(self.runs) > 1
+        texts = [*self.warnings, *(self.combined.warnings if several else ())]
+        for source, run in zip(self.sources, self.runs, strict=True):
+            prefix = f"{source.name}: " if several else ""
+            texts += [prefix + text for text in (*source.warnings, *run.fit.warnings, *run.warnings)]
+        return list(dict.fromkeys(texts))
+
+
+def analyze_precessions(paths: Sequence[Path], options: PrecessionOptions) -> PrecessionAnalysis:
+    """Fit a line to every sweep found at the paths, and to all points together.
+
+    Raises DataError for what cannot be used; the text names the file.
+    """
+    paths = [find_run(path) for path in paths]
+    found = collect(paths, NEEDS, lambda _: options)
+    runs = tuple(fit_source(source, options) for source in found.sources)
+    return PrecessionAnalysis(
+        sources=found.sources,
+        runs=runs,
+        combined=combine(runs, options),
+        options=options,
+        place=place_of(paths, found.sources),
+        warnings=(*found.warnings, *about_inputs(found.sources, options)),
+        remarks=found.remarks,
+        origins=(Origin(options),) * len(runs),
+    )
+
+
+def fit_source(source: Source[Readings], options: PrecessionOptions) -> PrecessionRun:
+    """The line through one sweep, and the coherence of its records.  Raises DataError, which names the file."""
+    readings = source.readings
+    u = readings.u if options.reading_u is None else np.full(len(readings), options.reading_u)
+    sweep = Sweep(
+        drive=readings.drive,
+        precession=readings.precession,
+        u=u,
+        u_drive=readings.u_drive,
+        spin=readings.spin,
+        u_spin=readings.u_spin,
+        gate_s=_gate(source),
+    )
+    try:
+        fit = fit_sweep(sweep, orthogonal=options.orthogonal, keep_miscounts=options.keep_outliers)
+    except AnalysisError as error:
+        raise DataError(f"{source.data}: {error}") from error
+    coherences, warnings = _coherences(source)
+    return PrecessionRun(fit, coherences, warnings)
+
+
+def _gate(source: Source[Readings]) -> float | None:
+    """The counter's gate [s], where a run says it."""
+    settings = source.run.record.configuration.get(PRECESSION) if source.run else None
+    gate = settings.get("gate_s") if isinstance(settings, dict) else None
+    return float(gate) if isinstance(gate, int | float) and gate > 0 else None
+
+
+def combine(runs: Sequence[PrecessionRun], options: PrecessionOptions) -> SweepFit:
+    """The line through the points of all runs that their own lines go through; of one run it is that run's."""
+    if len(runs) == 1:
+        return runs[0].fit
+    fits = [run.fit for run in runs]
+    used = [np.array([point.used for point in fit.points]) for fit in fits]
+
+    def joined(name: str) -> Array | None:
+        columns = [fit.column(name)[which] for fit, which in zip(fits, used, strict=True)]
+        all_known = all(bool(np.isfinite(column).all()) for column in columns)
+        return np.concatenate(columns) if all_known else None
+
+    drive, precession = joined("drive"), joined("precession")
+    assert drive is not None
+    assert precession is not None
+    sweep = Sweep(drive, precession, joined("u"), joined("u_drive"), joined("spin"), joined("u_spin"))
+    fit = fit_sweep(sweep, orthogonal=options.orthogonal, keep_miscounts=True)
+    return _with_warnings(fit, _about_slopes(fits))
+
+
+def _with_warnings(fit: SweepFit, texts: Iterable[str]) -> SweepFit:
+    return replace(fit, warnings=(*fit.warnings, *texts))
+
+
+def _about_slopes(fits: Sequence[SweepFit]) -> Iterable[str]:
+    """A word where the slopes of the runs differ by more than their u."""
+    slopes = [(fit.line.slope, fit.line.u_slope) for fit in fits if fit.line.u_slope]
+    if len(slopes) < 2:
+        return
+    from scipy.special import chdtrc
+
+    slope, u = (np.array(values, dtype=float) for values in zip(*slopes, strict=True))
+    mean = np.sum(slope / u**2) / np.sum(u**-2.0)
+    p = float(chdtrc(len(slope) - 1, float(np.sum(((slope - mean) / u) ** 2))))
+    if p < DIFFERENT_P:
+        yield (
+            f"the slopes of the {len(slope)} runs differ by more than their u says (p = {p:.1g}): the line through all "
+            "points has too small a u; look at the runs one by one"
+        )
+
+
+def about_inputs(sources: Sequence[Source[Readings]], options: PrecessionOptions) -> Iterable[str]:
+    """What to know of the inputs before using the numbers."""
+    synthetic = sum(source.synthetic for source in sources)
+    if 0 < synthetic < len(sources):
+        yield (
+            f"{synthetic} of {len(sources)} inputs are SYNTHETIC, the others are not known to be: "
+            "a line through both says nothing about a real top"
+        )
+    given = [source.name for source in sources if source.readings.u is not None]
+    if options.reading_u is not None and given:
+        names = ", ".join(given)
+        yield f"the given u of a reading, {options.reading_u:g} Hz, takes the place of the uncertainties in {names}"
+    if options.columns and all(source.run for source in sources):
+        yield "names of columns were given, but none of the inputs is a data file"
+
+
+# --- phase lock ----------------------------------------------------------------------------------------
+
+
+def _coherences(source: Source[Readings]) -> tuple[tuple[PointCoherence, ...], tuple[str, ...]]:
+    """How firmly the pulses follow the drive in each pair of records of a run, laser and drive."""
+    if source.run is None or source.readings.time is None:
+        return (), ()
+    try:
+        traces = source.run.traces()
+    except DataError as error:
+        return (), (f"the records of the oscilloscope are not used: {error}",)
+    found, warnings = [], []
+    for laser, drive in pairwise(traces):
+        if (laser.channel, drive.channel) != ("laser", "drive"):
+            continue
+        # a record is kept before its point's reading is
+        point = int(np.searchsorted(source.readings.time, laser.time_s - _AT_ONCE_S))
+        if point >= len(source.readings):
+            continue
+        try:
+            found.append(PointCoherence(point, _coherence(laser, drive, float(source.readings.drive[point]))))
+        except AnalysisError as error:
+            warnings.append(f"record {laser.number}, of point {point + 1}: {error}")
+    doubtful = [f"{one.point + 1}" for one in found if not one.coherence.locked]
+    if doubtful:
+        points = f"point{'s' * (len(doubtful) > 1)} {', '.join(doubtful)}"
+        warnings.append(f"the laser's pulses do not keep to the drive's phase at {points}")
+    return tuple(found), tuple(warnings)
+
+
+def _coherence(laser: StoredTrace, drive: StoredTrace, frequency: float) -> Coherence:
+    record, beside = laser.trace, drive.trace
+    pulses = pulse_times(record.volts[np.isfinite(record.volts)], record.dt_s, record.t0_s)
+    return coherence(pulses, beside.volts[np.isfinite(beside.volts)], beside.dt_s, frequency, beside.t0_s)
+
+
+# --- in words ------------------------------------------------------------------------------------------
+
+
+def slope_of(fit: SweepFit) -> Estimate:
+    """The slope."""
+    return Estimate(fit.line.slope, fit.line.u_slope, "1")
+
+
+def intercept_of(fit: SweepFit) -> Estimate:
+    """The intercept."""
+    return Estimate(fit.line.intercept, fit.line.u_intercept, "Hz")
+
+
+def verdict(fit: SweepFit) -> str:
+    """What a sweep says, in a few sentences."""
+    head = f"Slope {with_uncertainty(slope_of(fit))}, intercept {with_uncertainty(intercept_of(fit))}."
+    return " ".join((head, _about_lock(fit), *([_about_power(fit.power)] if fit.power else [])))
+
+
+def _about_lock(fit: SweepFit) -> str:
+    p = fit.p_locked
+    if p is None:
+        return "Whether the top was locked to the drive cannot be tested without the u of the points."
+    if p >= EXCLUDED_P:
+        return f"A locked top, slope 1 and intercept 0, agrees with the {fit.line.n} points (p = {plain(p, 2)})."
+    return (
+        f"A locked top, slope 1 and intercept 0, is excluded (p = {plain(p, 1)}): the precession that was counted lies "
+        f"{_offset(fit):+.2g} Hz from the drive at {fit.line.centre:.4g} Hz."
+    )
+
+
+def _offset(fit: SweepFit) -> float:
+    return fit.line.height - fit.line.centre
+
+
+def _about_power(power: Power) -> str:
+    told = f"a slope of {power.slope:g} from 1"
+    if power.enough:
+        return (
+            f"These points tell {told} with a probability of {at_most(power.now)}; the smallest difference that they "
+            f"tell in nine cases of ten is {plain(power.smallest_difference, 2)}. A range of "
+            f"{plain(power.range_needed_hz, 2)} Hz, or a u of {plain(power.u_needed_hz, 2)} Hz a point, would do."
+        )
+    points = "more than a million points" if power.points_needed is None else f"{power.points_needed} points"
+    return (
+        f"These points would tell {told} in {100 * power.now:.0f} % of cases only. It takes {points} such as these "
+        f"({power.points} now), a range of {plain(power.range_needed_hz, 2)} Hz ({plain(power.range_hz, 2)} Hz now), "
+        f"or a u of {plain(power.u_needed_hz, 2)} Hz a point ({plain(power.u_hz, 2)} Hz now), for nine cases of ten."
+    )
+
+
+def at_most(probability: float) -> str:
+    """A probability, never shown as certainty."""
+    return "more than 0.999" if probability > 0.999 else f"{math.floor(1000 * probability) / 1000:.3f}"

@@ -1,0 +1,214 @@
+"""Sweeps → their figure."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from levilab.pipelines.precession.analysis import intercept_of, slope_of
+from levilab.present.numbers import plain, short_name, without_unit
+from levilab.present.style import STYLE, row
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from analysis.precession.sweep import SweepFit
+    from levilab.pipelines.precession.analysis import PrecessionAnalysis
+
+    Array = NDArray[np.float64]
+
+#: One a run, as long as there are so few.
+MARKERS = "osD^vP*X"
+#: Okabe and Ito's colours: the line, the median line, points left out.
+LINE, ROBUST, OUT = "#0072B2", "#E69F00", "#D55E00"
+#: More points have no bars.
+MOST_BARS = 200
+
+
+def precession_figure(analysis: PrecessionAnalysis) -> Figure:
+    """Points with line and bands; departures from a locked top; what each point does to the line; phase lock."""
+    phases = any(run.coherences for run in analysis.runs)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(10, 11))
+        _draw_line(row(figure, 0.655, 0.315)[0], analysis)
+        _draw_departures(row(figure, 0.325, 0.255)[0], analysis)
+        panels = row(figure, 0.055, 0.185, 3 if phases else 2, gap=0.085)
+        _draw_leverage(panels[0], analysis)
+        _draw_changes(panels[1], analysis)
+        if phases:
+            _draw_phases(panels[2], analysis)
+    return figure
+
+
+# --- the line ------------------------------------------------------------------------------------------
+
+
+def _draw_line(axes: Axes, analysis: PrecessionAnalysis) -> None:
+    fit = analysis.combined
+    x = _span(fit)
+    axes.plot(
+        x, x, color="black", linestyle="dashed", linewidth=1, label="locked top: slope 1, intercept 0", zorder=2.4
+    )
+    label = f"line: slope {without_unit(slope_of(fit))}, intercept {without_unit(intercept_of(fit))} Hz"
+    axes.plot(x, fit.line.at(x), color=LINE, linewidth=1.6, label=label, zorder=2.6)
+    robust = fit.robust
+    y = float(robust.intercept.value or 0.0) + float(robust.slope.value or 0.0) * x
+    axes.plot(x, y, color=ROBUST, linestyle="dotted", linewidth=1.6, label="median line, robust", zorder=2.5)
+    _draw_bands(axes, x, fit.line.at(x), fit, labels=True)
+    inside = np.concatenate([run.fit.column("precession")[_used(run.fit)] for run in analysis.runs])
+    low, high = min(float(inside.min()), float(x[0])), max(float(inside.max()), float(x[-1]))
+    margin = 0.05 * (high - low)
+    axes.set_ylim(low - margin, high + margin)
+    for k, (run, source) in enumerate(zip(analysis.runs, analysis.sources, strict=True)):
+        several = len(analysis.runs) > 1
+        _draw_points(
+            axes, run.fit, k, run.fit.column("precession"), label=short_name(source.name) if several else "points"
+        )
+        _draw_left_out(axes, run.fit)
+    axes.set(xlabel="frequency of the drive ν$_d$  [Hz]", ylabel="precession that was counted ν$_p$  [Hz]")
+    made_up = sum(source.synthetic for source in analysis.sources)
+    mark = "" if not made_up else "  (SYNTHETIC)" if made_up == len(analysis.sources) else f"  ({made_up} SYNTHETIC)"
+    axes.set_title(f"{_finding(fit)}{mark}", loc="left", fontsize=11)
+    axes.legend(loc="upper left")
+
+
+def _finding(fit: SweepFit) -> str:
+    if fit.p_locked is None:
+        return "Precession against drive"
+    follows = "follows" if fit.locked else "does not follow"
+    return f"The precession {follows} the drive one to one (p = {plain(fit.p_locked, 2)})"
+
+
+def _span(fit: SweepFit) -> Array:
+    drive = fit.column("drive")
+    margin = 0.04 * float(np.ptp(drive))
+    return np.linspace(float(drive.min()) - margin, float(drive.max()) + margin, 200)
+
+
+def _used(fit: SweepFit) -> NDArray[np.bool_]:
+    return np.array([point.used for point in fit.points])
+
+
+def _usual_u(fit: SweepFit) -> float:
+    """Of a point, before it is scaled [Hz]; where none is given, 1: the scale is the scatter itself."""
+    u = fit.column("u")[_used(fit)]
+    return float(np.median(u)) if np.isfinite(u).all() else 1.0
+
+
+def _draw_bands(axes: Axes, x: Array, y: Array, fit: SweepFit, *, unit: float = 1.0, labels: bool = False) -> None:
+    """The bands of 95 % about a line at y.  unit: of y [Hz]."""
+    if fit.line.u_slope is None:
+        return
+    for half, alpha, what in (
+        (fit.line.prediction_band(x, _usual_u(fit)), 0.10, "95 % of further points"),
+        (fit.line.confidence_band(x), 0.28, "95 % confidence of the line"),
+    ):
+        axes.fill_between(
+            x, y - half / unit, y + half / unit, color=LINE, alpha=alpha, linewidth=0, label=what if labels else None
+        )
+
+
+def _draw_points(
+    axes: Axes, fit: SweepFit, k: int, y: Array, *, bars: Array | None = None, label: str | None = None
+) -> None:
+    used = _used(fit)
+    style: Any = {"color": "black", "linestyle": "none", "marker": MARKERS[k % len(MARKERS)], "zorder": 3}
+    style |= {"markersize": 5 if used.sum() <= MOST_BARS else 2, "markerfacecolor": "white"}
+    error = bars[used] if bars is not None and used.sum() <= MOST_BARS and np.isfinite(bars).all() else None
+    axes.errorbar(fit.column("drive")[used], y[used], error, elinewidth=0.9, label=label, **style)
+
+
+def _draw_left_out(axes: Axes, fit: SweepFit) -> None:
+    """A cross where a point lies; an arrow at the edge, with its value, where it lies beyond."""
+    low, high = axes.get_ylim()
+    for point in fit.points:
+        if point.miscount is None or point.used:
+            continue
+        beyond = not low <= point.precession <= high
+        y = min(max(point.precession, low + 0.03 * (high - low)), high - 0.03 * (high - low))
+        marker = "x" if not beyond else "v" if point.precession < low else "^"
+        axes.plot(point.drive, y, marker=marker, color=OUT, markersize=8, linestyle="none", zorder=5)
+        text = f"{point.precession:.4g} Hz: {point.miscount}" if beyond else point.miscount
+        last = point.drive > float(fit.column("drive").mean())
+        axes.annotate(
+            text, (point.drive, y), (-8 if last else 8, -3), textcoords="offset points", color=OUT, fontsize=8,
+            ha="right" if last else "left", zorder=5,
+        )  # fmt: skip
+
+
+# --- departures from a locked top ----------------------------------------------------------------------
+
+
+def _draw_departures(axes: Axes, analysis: PrecessionAnalysis) -> None:
+    """ν_p − ν_d in units of u: noise about zero for a locked top."""
+    fit = analysis.combined
+    unit = fit.line.scale * _usual_u(fit) if fit.line.u_slope else 1.0
+    known = fit.line.chi_square is not None
+    for bound, alpha in ((2, 0.08), (1, 0.14)):
+        axes.axhspan(-bound, bound, color="black", alpha=alpha, linewidth=0)
+    axes.axhline(0, color="black", linestyle="dashed", linewidth=1)
+    x = _span(fit)
+    y = (fit.line.at(x) - x) / unit
+    axes.plot(x, y, color=LINE, linewidth=1.6)
+    if fit.line.u_slope:
+        half = fit.line.confidence_band(x) / unit
+        axes.fill_between(x, y - half, y + half, color=LINE, alpha=0.28, linewidth=0)
+    tallest = 3.0
+    for k, run in enumerate(analysis.runs):
+        u = run.fit.column("u") * fit.line.scale
+        own = np.where(np.isfinite(u), u, unit)
+        off = (run.fit.column("precession") - run.fit.column("drive")) / own
+        _draw_points(axes, run.fit, k, off, bars=np.ones_like(off))
+        tallest = max(tallest, 1.15 * float(np.abs(off[_used(run.fit)]).max()) + 1)
+    axes.set_ylim(-tallest, tallest)
+    what = "u" if known else "scatter"
+    axes.set(xlabel="frequency of the drive ν$_d$  [Hz]", ylabel=f"(ν$_p$ − ν$_d$) / {what}")
+    size = f"{what} of a point {unit:.2g} Hz" if fit.line.u_slope else "in Hz"
+    axes.set_title(
+        f"Departures from a locked top, {size}; grey: ±1 and ±2; blue: the line and where it lies with 95 %", loc="left"
+    )
+
+
+# --- influence -----------------------------------------------------------------------------------------
+
+
+def _draw_leverage(axes: Axes, analysis: PrecessionAnalysis) -> None:
+    """How far the line follows each point."""
+    for k, run in enumerate(analysis.runs):
+        drive, leverage, used = run.fit.column("drive"), run.fit.column("leverage"), _used(run.fit)
+        axes.vlines(drive[used], 0, leverage[used], color="black", linewidth=1)
+        _draw_points(axes, run.fit, k, leverage)
+    n = min(run.fit.line.n for run in analysis.runs)
+    axes.axhline(2 / n, color="dimgrey", linestyle="dotted", linewidth=1)
+    axes.set(xlabel="ν$_d$  [Hz]", ylabel="leverage", ylim=(0, None))
+    axes.set_title(f"Leverage; dotted: the mean, {2 / n:.2g}", loc="left")
+
+
+def _draw_changes(axes: Axes, analysis: PrecessionAnalysis) -> None:
+    """By how much the slope changes without each point."""
+    axes.axhline(0, color="black", linewidth=0.8)
+    tallest = 1.0
+    for k, run in enumerate(analysis.runs):
+        u = run.fit.line.u_slope or 1.0
+        drive, change, used = run.fit.column("drive"), run.fit.column("slope_change") / u, _used(run.fit)
+        axes.vlines(drive[used], 0, change[used], color="black", linewidth=1)
+        _draw_points(axes, run.fit, k, change)
+        tallest = max(tallest, 1.2 * float(np.nanmax(np.abs(change))))
+    axes.set(xlabel="ν$_d$  [Hz]", ylabel="change of the slope / u", ylim=(-tallest, tallest))
+    axes.set_title("The slope without the point", loc="left")
+
+
+def _draw_phases(axes: Axes, analysis: PrecessionAnalysis) -> None:
+    """The mean vector of the pulses at each point that has a record."""
+    for k, run in enumerate(analysis.runs):
+        drive = [run.fit.points[one.point].drive for one in run.coherences]
+        length = [one.coherence.length for one in run.coherences]
+        colours = [LINE if one.coherence.locked else OUT for one in run.coherences]
+        axes.vlines(drive, 0, length, color=colours, linewidth=1)
+        axes.scatter(drive, length, c=colours, s=22, marker=MARKERS[k % len(MARKERS)], zorder=3)
+    axes.set(xlabel="ν$_d$  [Hz]", ylabel="mean vector of the pulses", ylim=(0, 1.05))
+    axes.set_title("Phase lock to the drive; 1: firm", loc="left")

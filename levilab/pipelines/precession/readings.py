@@ -1,0 +1,141 @@
+"""What a table must fulfil to be a sweep of the drive."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from levilab.formats.columns import TableError
+from levilab.formats.table import FEWEST, read_table
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from levilab.formats.table import Table
+    from levilab.pipelines.sources import InputOptions
+    from levilab.runs.run import Run
+
+    Array = NDArray[np.float64]
+
+#: Columns that an analysis of sweeps looks at.
+QUANTITIES = (
+    *("time_s", "drive_frequency_hz", "drive_frequency_u_hz", "precession_frequency_hz"),
+    *("precession_frequency_u_hz", "spin_frequency_hz", "spin_frequency_u_hz"),
+)
+#: Relative: units and printed digits round in about the tenth digit, but no two sweeps agree so far in all points.
+SAME = 1e-9
+#: Beyond these a number is no measurement, and its powers would leave the range of floating point [Hz].
+SLOWEST_HZ, HIGHEST_HZ = 1e-9, 1e12
+#: No sweep has more points; a recording of all counts has.
+MOST_POINTS = 10_000
+#: The columns that hold uncertainties, and what of.
+_OF_U = {"precession_frequency_u_hz": "precession", "drive_frequency_u_hz": "drive", "spin_frequency_u_hz": "spin"}
+_OF = {"precession_frequency_hz": "precession", "drive_frequency_hz": "drive", "spin_frequency_hz": "spin"}
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """The points of a sweep, each array of shape (n,) [Hz], None where the table has no such column."""
+
+    drive: Array
+    precession: Array
+    u: Array | None
+    u_drive: Array | None
+    spin: Array | None
+    u_spin: Array | None
+    time: Array | None
+    warnings: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.drive)
+
+    def same_as(self, other: Readings) -> bool:
+        """Whether these are the same points, but for the rounding of another unit in the file."""
+        pairs = ((self.drive, other.drive), (self.precession, other.precession))
+        return len(self) == len(other) and all(bool(np.allclose(a, b, rtol=SAME, atol=0)) for a, b in pairs)
+
+
+def read_sweep_file(path: Path, options: InputOptions) -> Readings:
+    """The sweep in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
+    return sweep_readings(read_table(path, columns=options.columns, quantities=QUANTITIES, guess=options.guess))
+
+
+def read_sweep_run(run: Run, _: InputOptions) -> Readings:
+    """The sweep of a run."""
+    return sweep_readings(run.readings())
+
+
+def sweep_readings(table: Table) -> Readings:
+    """The points of a sweep.
+
+    Args:
+        table: with `drive_frequency_hz` and `precession_frequency_hz`; their uncertainties, the spin and the time are
+            taken where it has them.
+
+    Raises:
+        TableError: a column is missing, there are too few or too many points, or a number cannot be meant; the line of
+            the file is named.
+    """
+    drive, precession = table.column("drive_frequency_hz"), table.column("precession_frequency_hz")
+    if drive.size < FEWEST:
+        raise TableError(
+            table.path,
+            f"holds {drive.size} point{'s' * (drive.size != 1)}, at least {FEWEST} are needed: sweep further",
+        )
+    if drive.size > MOST_POINTS:
+        raise TableError(
+            table.path,
+            f"holds {drive.size} points, up to {MOST_POINTS} are expected: give one mean for each drive frequency",
+        )
+    for name, what in _OF.items():
+        if name in table.frame:
+            _check(table, table.column(name), f"the {what} frequency")
+    if np.ptp(drive) <= SAME * drive.max():
+        raise TableError(
+            table.path, f"all {drive.size} points are at a drive frequency of {drive[0]:g} Hz: sweep the drive"
+        )
+    u = {name: table.column(name) for name in _OF_U if name in table.frame}
+    warnings = list(table.warnings)
+    if "spin_frequency_u_hz" in u and "spin_frequency_hz" not in table.frame and "precession_frequency_u_hz" not in u:
+        u["precession_frequency_u_hz"] = u.pop("spin_frequency_u_hz")
+        warnings.append(f"{table.path.name}: the column of uncertainties is taken for that of the precession")
+    for name, values in u.items():
+        _check_u(table, values, _OF_U[name], precession)
+    has_spin = "spin_frequency_hz" in table.frame
+    return Readings(
+        drive=drive,
+        precession=precession,
+        u=u.get("precession_frequency_u_hz"),
+        u_drive=u.get("drive_frequency_u_hz"),
+        spin=table.column("spin_frequency_hz") if has_spin else None,
+        u_spin=u.get("spin_frequency_u_hz") if has_spin else None,
+        time=table.column("time_s") if "time_s" in table.frame else None,
+        warnings=tuple(warnings),
+    )
+
+
+def _check(table: Table, values: Array, what: str) -> None:
+    wrong = np.flatnonzero((values < SLOWEST_HZ) | (values > HIGHEST_HZ))
+    if wrong.size:
+        i = int(wrong[0])
+        raise TableError(
+            table.path,
+            f"{what} is {values[i]:.9g} Hz, a number above 0 and up to {HIGHEST_HZ:g} is expected: remove the point",
+            line=int(table.lines[i]),
+        )
+
+
+def _check_u(table: Table, values: Array, of: str, size: Array) -> None:
+    """An uncertainty that is not above 0, or below the rounding of the number itself, is a mistake."""
+    wrong = np.flatnonzero(~((values > 1e-15 * size) & (values < 1e15 * size)))
+    if wrong.size:
+        i = int(wrong[0])
+        raise TableError(
+            table.path,
+            f"the uncertainty of the {of} frequency is {values[i]:.3g} Hz: correct it or remove the column",
+            line=int(table.lines[i]),
+        )

@@ -1,0 +1,70 @@
+"""Sweeps → their part of a report."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from levilab.pipelines.part import InputPart, ReportPart
+from levilab.pipelines.precession.analysis import verdict
+from levilab.pipelines.precession.table import coherence_table, lines_table, points_table, power_table
+
+if TYPE_CHECKING:
+    from levilab.pipelines.precession.analysis import Origin, PrecessionAnalysis, PrecessionRun
+    from levilab.pipelines.precession.readings import Readings
+    from levilab.pipelines.sources import Source
+
+#: Points printed in the page; more stay in the run folder.
+MOST_POINTS = 200
+
+
+def precession_part(analysis: PrecessionAnalysis) -> ReportPart:
+    """Verdict, lines, power, phase lock, and the points."""
+    several = len(analysis.runs) > 1
+    names = [f" of {source.name}" if several else "" for source in analysis.sources]
+    return ReportPart(
+        subject="precession",
+        heading="Precession of a driven top",
+        lead=f"{analysis.combined.line.n} points used",
+        figure_text="Precession against drive with the line, departures from the drive, influence of each point",
+        template="pipelines/precession/report.html.j2",
+        context={
+            "verdict": analysis.text,
+            "lines": lines_table(analysis),
+            "power": power_table(analysis.combined),
+            "coherences": [
+                coherence_table(run, name) for run, name in zip(analysis.runs, names, strict=True) if run.coherences
+            ],
+        },
+        inputs=tuple(
+            _input(source, run, origin)
+            for source, run, origin in zip(analysis.sources, analysis.runs, analysis.origins, strict=True)
+        ),
+    )
+
+
+def _input(source: Source[Readings], run: PrecessionRun, origin: Origin) -> InputPart:
+    count = len(run.fit.points)
+    context = {"points": points_table(run, most=MOST_POINTS), "shown": min(count, MOST_POINTS), "count": count}
+    return InputPart(_in_words(source, run, origin), origin.text, verdict(run.fit), context)
+
+
+def _in_words(source: Source[Readings], run: PrecessionRun, origin: Origin) -> tuple[str, ...]:
+    drive, out = run.fit.column("drive"), sum(not point.used for point in run.fit.points)
+    text = f"{len(drive)} points, {drive.min():.4g} Hz to {drive.max():.4g} Hz"
+    return text + (f", {out} left out as miscounts" if out else ""), _uncertainty(source, run, origin)
+
+
+def _uncertainty(source: Source[Readings], run: PrecessionRun, origin: Origin) -> str:
+    """How large u of a point is, and where it comes from."""
+    u = run.fit.column("u")
+    if not np.isfinite(u).all():
+        return "u of a point: not known, taken from the scatter about the line"
+    low, high = float(u.min()), float(u.max())
+    size = f"{low:.2g} Hz" if low == high else f"{low:.2g} Hz to {high:.2g} Hz"
+    if origin.options.reading_u is not None:
+        return f"u of a point: {size}, as given to the analysis"
+    channels = source.run.record.channels if source.run else []
+    where = next((c.get("source") for c in channels if c.get("name") == "precession_frequency_u_hz"), None)
+    return f"u of a point: {size}, {where or 'from a column of the data'}"

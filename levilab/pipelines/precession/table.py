@@ -1,0 +1,132 @@
+"""Sweeps → tables, for the terminal."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from analysis.uncertainty import Estimate
+from levilab.pipelines.precession.analysis import at_most, intercept_of, slope_of
+from levilab.present.numbers import plain, without_unit
+from levilab.present.tables import Row, Table, table
+
+if TYPE_CHECKING:
+    from analysis.precession.sweep import Point, SweepFit
+    from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionRun
+
+#: Points that a terminal shows; more stand in result.json.
+MOST_POINTS = 60
+#: Heads of the table of points, whose numbers stand to the right.
+POINT_HEADS = ("ν_d [Hz]", "ν_p [Hz]", "spin [Hz]", "ν_p − ν_d [Hz]", "leverage", "Δslope/u")
+
+
+def precession_tables(analysis: PrecessionAnalysis) -> tuple[Table, ...]:
+    """The lines, what it takes to tell a slope of 1.05 from 1, the points.  Each fits a terminal of 80 columns."""
+    tables = [lines_table(analysis), power_table(analysis.combined)]
+    tables += [points_table(run, name) for run, name in _names(analysis)]
+    tables += [coherence_table(run, name) for run, name in _names(analysis)]
+    return tuple(one for one in tables if one.rows)
+
+
+def _names(analysis: PrecessionAnalysis) -> list[tuple[PrecessionRun, str]]:
+    several = len(analysis.runs) > 1
+    return [
+        (run, f" of {source.name}" if several else "")
+        for run, source in zip(analysis.runs, analysis.sources, strict=True)
+    ]
+
+
+def lines_table(analysis: PrecessionAnalysis) -> Table:
+    """The line of each run and of all together, and the median line beside it."""
+    total, synthetic = len(analysis.runs), sum(source.synthetic for source in analysis.sources)
+    made_up = "" if not synthetic else ", SYNTHETIC" if synthetic == total else f", {synthetic} of them SYNTHETIC"
+    rows = []
+    if total > 1:
+        for run, source in zip(analysis.runs, analysis.sources, strict=True):
+            rows.append(Row((f"{source.name}: {line_name(run.fit)}", *_line_cells(run.fit))))
+    together = "together" if total > 1 else "best"
+    rows.append(
+        Row(
+            (("all points: " if total > 1 else "") + line_name(analysis.combined), *_line_cells(analysis.combined)),
+            together,
+        )
+    )
+    robust = analysis.combined.robust
+    rows.append(Row(("median line, robust", without_unit(robust.slope), without_unit(robust.intercept), "—", "—")))
+    rows.append(Row(("locked top", "1", "0", "—", "—")))
+    heads = ("line", "slope", "intercept [Hz]", "χ²/dof", "p locked")
+    title = f"Precession against drive, {total} sweep{'s' * (total > 1)}{made_up}"
+    return table(title, heads, rows, numbers=heads[1:])
+
+
+def line_name(fit: SweepFit) -> str:
+    """Which line, through how many points."""
+    kind = "orthogonal" if fit.line.orthogonal else "weighted" if fit.line.chi_square is not None else "least squares"
+    return f"{kind}, {fit.line.n} points"
+
+
+def _line_cells(fit: SweepFit) -> tuple[str, ...]:
+    line = fit.line
+    reduced = None if line.chi_square is None else line.chi_square / line.degrees_of_freedom
+    return without_unit(slope_of(fit)), without_unit(intercept_of(fit)), plain(reduced), plain(fit.p_locked, 2)
+
+
+def power_table(fit: SweepFit) -> Table:
+    """What tells a slope of 1.05 from 1; without an uncertainty of the slope no rows."""
+    power = fit.power
+    if power is None:
+        return table("", (), ())
+    needed = "> 10⁶" if power.points_needed is None else str(power.points_needed)
+    rows = [
+        ("probability of telling it", at_most(power.now), "0.9"),
+        (
+            "u of the slope",
+            plain(fit.line.u_slope),
+            plain((fit.line.u_slope or 0.0) * (power.slope - 1) / power.smallest_difference),
+        ),
+        ("points, u and range as they are", str(power.points), needed),
+        ("range of ν_d [Hz], points and u as they are", plain(power.range_hz), plain(power.range_needed_hz)),
+        ("u of a point [Hz], all else as it is", plain(power.u_hz, 2), plain(power.u_needed_hz, 2)),
+    ]
+    title = f"To tell a slope of {power.slope:g} from 1 (95 % confidence, power 0.9), any one of the last three"
+    return table(title, ("", "now", "needed"), rows, numbers=("now", "needed"))
+
+
+def points_table(run: PrecessionRun, name: str = "", most: int = MOST_POINTS) -> Table:
+    """The points, the first of many."""
+    fit = run.fit
+    rows = [Row(_point_cells(fit, point), "" if point.used else "outlier") for point in fit.points[:most]]
+    more = f" (the first {most} of {len(fit.points)})" if len(fit.points) > most else ""
+    return table(f"Points{name}{more}", POINT_HEADS, rows, numbers=POINT_HEADS)
+
+
+def _point_cells(fit: SweepFit, point: Point) -> tuple[str, ...]:
+    u = point.u
+    both = None if u is None else math.hypot(u, point.u_drive or 0.0)
+    change = None if point.slope_change is None or not fit.line.u_slope else point.slope_change / fit.line.u_slope
+    return (
+        without_unit(Estimate(point.drive, point.u_drive, "Hz")) if point.u_drive else f"{point.drive:.7g}",
+        without_unit(Estimate(point.precession, u, "Hz")),
+        "—" if point.spin is None else without_unit(Estimate(point.spin, point.u_spin, "Hz")),
+        without_unit(Estimate(point.precession - point.drive, both, "Hz")),
+        plain(point.leverage, 2) if point.used else "left out",
+        "—" if change is None else f"{change:+.2f}",
+    )
+
+
+def coherence_table(run: PrecessionRun, name: str = "") -> Table:
+    """How firmly the laser's pulses follow the drive, record by record."""
+    rows = [
+        (
+            f"{run.fit.points[one.point].drive:.6g}",
+            str(one.coherence.pulses),
+            f"{one.coherence.length:.4f}",
+            f"{math.degrees(one.coherence.phase_rad):.0f}",
+            without_unit(Estimate(one.coherence.drift_hz, one.coherence.u_drift_hz, "Hz")),
+            f"{one.coherence.excursion_turns:.2f}",
+            "yes" if one.coherence.locked else "no",
+        )
+        for one in run.coherences
+    ]
+    heads = ("ν_d [Hz]", "pulses", "mean vector", "phase [°]", "drift [Hz]", "turns", "locked")
+    return table(f"Phase of the laser's pulses on the drive{name}", heads, rows, numbers=heads[:6])

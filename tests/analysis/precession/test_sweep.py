@@ -1,0 +1,149 @@
+"""The sweep: miscounts, what it takes to tell a slope, warnings."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from analysis.errors import NotPositive, ShapesDiffer
+from analysis.precession.line import fit_line
+from analysis.precession.miscounts import robust_line
+from analysis.precession.power import probability_of_telling, what_it_takes
+from analysis.precession.sweep import Sweep, fit_sweep
+
+DRIVE = np.arange(26.0, 46.0, 2.0)
+NOISE = 0.02
+
+
+def counted(seed=0, **wrong):
+    """What the laser counts at DRIVE.  wrong: p3=0.5 multiplies point 3, n5=1 adds 1 Hz to point 5."""
+    precession = DRIVE + NOISE * np.random.default_rng(seed).standard_normal(DRIVE.size)
+    for name, value in wrong.items():
+        i = int(name[1:])
+        precession[i] = precession[i] * value if name[0] == "p" else precession[i] + value
+    return precession
+
+
+def sweep(precession, **known):
+    return Sweep(DRIVE, precession, np.full(DRIVE.size, NOISE), **known)
+
+
+# --- miscounts ---
+
+
+def test_the_median_line_has_the_median_of_all_slopes():
+    precession = counted(p2=0.5)
+    slopes = [(precession[j] - precession[i]) / (DRIVE[j] - DRIVE[i]) for i, j in combinations(range(DRIVE.size), 2)]
+    robust = robust_line(DRIVE, precession)
+    assert robust.slope.value == pytest.approx(np.median(slopes), rel=1e-12)
+    assert robust.intercept.value == pytest.approx(np.median(precession - np.median(slopes) * DRIVE), rel=1e-9)
+    interval = stats.theilslopes(precession, DRIVE, alpha=0.6827)
+    assert robust.slope.interval == (pytest.approx(interval.low_slope), pytest.approx(interval.high_slope))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "text"),
+    [
+        ({"p3": 0.5}, "half the frequency was counted"),
+        ({"p3": 2.0}, "twice the frequency was counted"),
+        ({"n3": 1.0}, "2 pulses a gate too many"),
+        ({"n3": -0.5}, "1 pulse a gate too few"),
+    ],
+)
+def test_a_miscount_is_named_and_the_line_goes_on_without_it(wrong, text):
+    fit = fit_sweep(sweep(counted(**wrong), gate_s=2.0))
+    others = np.arange(DRIVE.size) != 3
+    assert fit.points[3].miscount == text
+    assert [point.used for point in fit.points] == others.tolist()
+    assert any("point 4" in w and text in w and "left out" in w for w in fit.warnings)
+    assert fit.line == fit_line(DRIVE[others], counted()[others], np.full(9, NOISE))
+    kept = fit_sweep(sweep(counted(**wrong), gate_s=2.0), keep_miscounts=True)
+    assert kept.line.n == DRIVE.size
+
+
+def test_a_point_that_no_miscount_explains_stays_in_the_line():
+    fit = fit_sweep(sweep(counted(n3=0.3), gate_s=2.0))
+    assert fit.points[3].used
+    assert "no miscount explains it" in fit.warnings[0]
+    assert fit.line.scale > 2  # and says that the points scatter more than their u
+
+
+def test_noise_alone_is_no_miscount():
+    fits = [fit_sweep(sweep(counted(seed), gate_s=2.0)) for seed in range(100)]
+    assert all(point.used for fit in fits for point in fit.points)
+
+
+def test_counts_that_are_mostly_alike_have_a_line():
+    drive = np.array([30.0, 30.0, 30.0, 36.0, 30.0])
+    exact = fit_sweep(Sweep(drive, drive))
+    assert exact.line.slope == pytest.approx(1)
+    assert exact.p_locked is None
+    assert "nothing can be tested" in exact.warnings[-1]
+    many = np.append(np.full(2000, 30.0), [36.0, 37.0])
+    assert robust_line(many, many).slope.value == pytest.approx(1)
+
+
+# --- power ---
+
+
+@pytest.mark.parametrize("dof", [1, 3, 20])
+def test_the_power_is_that_of_the_noncentral_t_distribution(dof):
+    limit = stats.t(dof).ppf(0.975)
+    for shift in (0.5, 2.0, 5.0):
+        expected = stats.nct(dof, shift).sf(limit) + stats.nct(dof, shift).cdf(-limit)
+        assert probability_of_telling(shift, 1.0, dof) == pytest.approx(expected, abs=2e-6)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_what_it_takes_tells_a_slope_of_105_nine_times_in_ten(known):
+    drive = np.linspace(30, 32, 6)
+    random = np.random.default_rng(3)
+    line = fit_line(drive, drive + 0.1 * random.standard_normal(6), np.full(6, 0.1) if known else None)
+    scatter = 0.1 if known else line.scale
+    power = what_it_takes(line, 2.0, scatter)
+    cases = {
+        "points": (np.tile(drive, -(-power.points_needed // 6))[: power.points_needed], scatter),
+        "range": (30 + (drive - 30) * power.range_needed_hz / 2, scatter),
+        "u": (drive, power.u_needed_hz),
+    }
+    for x, sigma in cases.values():
+        told = 0
+        for _ in range(300):
+            y = 1.05 * x + sigma * random.standard_normal(x.size)
+            found = fit_line(x, y, np.full(x.size, sigma) if known else None)
+            told += abs(found.slope - 1) > found.u_slope * (1.959964 if known else stats.t(x.size - 2).ppf(0.975))
+        assert told / 300 == pytest.approx(0.9, abs=0.06)  # 3 standard errors of a share from 300
+
+
+# --- the whole ---
+
+
+def test_a_locked_top_agrees_and_a_slope_of_105_is_excluded():
+    assert fit_sweep(sweep(counted())).locked
+    tilted = fit_sweep(sweep(1.05 * counted()))
+    assert not tilted.locked
+    assert tilted.p_locked < 1e-9
+
+
+def test_a_spin_beside_the_drive_is_warned_of():
+    slow = DRIVE - 0.4 + NOISE * np.random.default_rng(1).standard_normal(DRIVE.size)
+    fit = fit_sweep(sweep(counted(), spin=slow))
+    assert fit.spin_offset == pytest.approx(-0.4, abs=0.03)
+    assert any("below the drive" in warning for warning in fit.warnings)
+    assert not fit_sweep(sweep(counted(), spin=DRIVE + (slow - DRIVE + 0.4))).warnings
+
+
+def test_an_uncertain_drive_asks_for_the_orthogonal_line():
+    u_drive = np.full(DRIVE.size, NOISE)
+    assert any("`orthogonal`" in w for w in fit_sweep(sweep(counted(), u_drive=u_drive)).warnings)
+    both = fit_sweep(sweep(counted(), u_drive=u_drive), orthogonal=True)
+    assert both.line.orthogonal
+    assert both.line.u_slope == pytest.approx(2**0.5 * fit_sweep(sweep(counted())).line.u_slope, rel=0.01)
+
+
+def test_what_is_no_sweep_is_named():
+    with pytest.raises(NotPositive, match="the precession frequency number 2"):
+        fit_sweep(sweep(counted(p1=-1.0)))
+    with pytest.raises(ShapesDiffer, match="u of the drive"):
+        fit_sweep(sweep(counted(), u_drive=np.ones(3)))

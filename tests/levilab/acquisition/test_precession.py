@@ -1,0 +1,156 @@
+"""The sweep of the drive: on the virtual bench in full motion once, its decisions with a top that only spins."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from instruments.clock import VirtualClock
+from levilab.acquisition.experiments.precession import PrecessionSettings
+from levilab.acquisition.loop import AcquisitionRequest, acquire
+from levilab.acquisition.request import AcquisitionOptions, request_for
+from levilab.acquisition.session import ExperimentFailed
+from levilab.acquisition.table import Configuration, with_settings
+from levilab.pipelines.precession.analysis import PrecessionOptions, analyze_precessions
+from levilab.runs.run import Run
+from levilab.world.bench import virtual_wiring
+from levilab.world.spin_world import SpinScene, SpinWorld
+from support.acquisitions import Impatient, Silent
+from support.commands import command
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from levilab.bench.person import Task
+    from levilab.world.spin_world import Array
+
+QUICK = {"hold_s": 1.0, "counts": 3, "gate_s": 0.5, "interval_s": 1.0, "ramp_hz_per_s": 0.2}
+
+
+class Wobbling(SpinWorld):
+    """A top that only spins; the laser sees it as often as the lamp does."""
+
+    def laser(self, start: float, step: float, n: int) -> Array:
+        return self.light(start, step, n)
+
+
+def request(out: Path, world: SpinWorld, **settings: Any) -> AcquisitionRequest:
+    """A sweep of a top that is in this world, as on a real bench: without a seed."""
+    chosen = {"drive_frequency_hz": 30.0, "frequencies_hz": (30.5, 31.0, 32.0)} | QUICK | settings
+    config = with_settings(Configuration(), "precession", PrecessionSettings(**chosen))
+    return AcquisitionRequest(
+        "precession", config, lambda: virtual_wiring(world, config.limits), out=out, synthetic_how="a test"
+    )
+
+
+def events(run: Run, *kinds: str) -> list[str]:
+    return [event["text"] for event in run.events() if event["kind"] in kinds]
+
+
+def kept(out: Path) -> Run:
+    return Run.load(next(out.iterdir()))
+
+
+def test_a_sweep_in_full_motion_finds_a_locked_top(tmp_path: Path) -> None:
+    options = AcquisitionOptions(mock=True, out=tmp_path, seed=1)
+    asked = request_for("precession", options)
+    quick = QUICK | {"hold_s": 5.0, "gate_s": 1.0, "interval_s": 2.0, "record_s": 5.0}
+    settings = PrecessionSettings(drive_frequency_hz=45.0, frequencies_hz=(45.0, 44.5, 44.0), **quick)
+    show = Silent()
+    run = acquire(replace(asked, config=with_settings(asked.config, "precession", settings)), show)
+    assert run.status == "finished"
+    assert run.record.synthetic
+    readings = run.readings()
+    assert list(readings.header) == [channel["name"] for channel in run.record.channels]
+    np.testing.assert_array_equal(readings.column("drive_frequency_hz"), [45.0, 44.5, 44.0])
+    for quantity in ("spin", "precession"):
+        off = readings.column(f"{quantity}_frequency_hz") - readings.column("drive_frequency_hz")
+        # three gates in a row of a top that swings about the drive: their scatter is known to a factor of two
+        assert (np.abs(off) < 8 * readings.column(f"{quantity}_frequency_u_hz") + 0.02).all()
+    assert run.record.instruments["generator"]["settings_end"]["output"] is False
+    assert show.left == sorted(show.left, reverse=True)
+    assert show.left[-1] == 0
+    (found,) = analyze_precessions([run.folder], PrecessionOptions()).runs
+    assert [one.point for one in found.coherences] == [0, 1, 2]
+    assert all(one.coherence.locked for one in found.coherences)
+
+
+def test_an_interrupted_sweep_goes_on_at_the_next_point(tmp_path: Path) -> None:
+    first = request(tmp_path, Wobbling(SpinScene(), VirtualClock()))
+    run = acquire(first, Impatient(1))
+    assert (run.status, run.count()) == ("interrupted", 1)
+    assert run.record.instruments["generator"]["settings_end"]["output"] is False
+    again = acquire(replace(first, resume=run, wiring=first.wiring), Silent())
+    assert again.status == "finished"
+    readings = again.readings()
+    np.testing.assert_array_equal(readings.column("drive_frequency_hz"), [30.5, 31.0, 32.0])
+    assert (np.diff(readings.column("time_s")) > 0).all()
+    np.testing.assert_allclose(readings.column("precession_frequency_hz"), [30.5, 31.0, 32.0], atol=0.2)
+
+
+def test_where_the_lock_is_lost_the_top_is_driven_up_anew(tmp_path: Path) -> None:
+    # 8 Hz in two steps of a second: no drive pulls a top so fast
+    world = Wobbling(SpinScene(drag="stokes", constants=(1e-5,)), VirtualClock())
+    run = acquire(request(tmp_path, world, frequencies_hz=(30.1, 38.0, 46.0, 54.0), ramp_hz_per_s=4.0), Silent())
+    assert run.status == "finished"
+    assert run.count() == 1
+    assert len(events(run, "lock lost")) == 4
+    assert [text.split(" Hz")[0] for text in events(run, "left out")] == ["the point of 38", "the point of 46"]
+    assert "the sweep ends here" in events(run, "ended")[0]
+    assert run.record.instruments["generator"]["settings_end"]["output"] is False
+
+
+def test_a_top_that_fell_is_asked_for(tmp_path: Path) -> None:
+    # let go at 30.1 Hz it falls within two seconds
+    world = Wobbling(SpinScene(start_hz=30.5, drag="stokes", constants=(0.003,), fall_hz=29.95), VirtualClock())
+    asked: list[str] = []
+    wanted = request(tmp_path, world, frequencies_hz=(30.1, 35.0, 36.0), ramp_hz_per_s=4.0)
+    wiring = wanted.wiring()
+
+    def person(task: Task) -> str:
+        asked.append(task.text)
+        return wiring.person(task)
+
+    run = acquire(replace(wanted, wiring=lambda: replace(wiring, person=person)), Silent())
+    assert (run.status, run.count()) == ("finished", 1)
+    assert asked
+    assert all("float" in text for text in asked)
+
+
+def test_a_counter_with_one_input_has_its_cable_changed_at_each_point(tmp_path: Path) -> None:
+    run = acquire(request(tmp_path, Wobbling(SpinScene(), VirtualClock()), laser_input=1), Silent())
+    assert run.count() == 3
+    there, back = "in place of the tape's", "the tape's phototransistor"
+    tasks = events(run, "asked the person")
+    assert [next(words for words in (there, back) if words in text) for text in tasks] == 3 * [there, back]
+
+
+def test_a_beam_that_is_never_cut_ends_the_sweep_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(ExperimentFailed, match=r"no laser pulses at 0.65 V, input 2: .*laser_trigger_level_v"):
+        acquire(request(tmp_path, SpinWorld(SpinScene(), VirtualClock())), Silent())
+    run = kept(tmp_path)
+    assert run.status == "failed"
+    assert run.record.instruments["generator"]["settings_end"]["output"] is False
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ("frequencies_hz = [30, 31]", "at least three drive frequencies"),
+        ("step_hz = 0.001", "a sweep of 16001 points is more than 1000"),
+        ("step_hz = 20", "at least three drive frequencies"),
+        ("frequencies_hz = [30, 31, 200]", "precession: the sweep goes to 200 Hz, this bench allows 0 to 100 Hz"),
+        ("counts = 2", "counts"),
+        ("laser_input = 1", "no person who could change the counter's cable"),
+        ("laser_input = 3", "laser_input"),
+    ],
+)
+def test_what_is_no_sweep_costs_one_line(tmp_path: Path, table: str, said: str) -> None:
+    (tmp_path / "bench.toml").write_text(f"[precession]\n{table}\n", encoding="utf-8")
+    ended = command("acquire", "precession", "--mock", "--bench", "bench.toml", cwd=tmp_path)
+    assert ended.status == 1
+    assert said in ended.err
+    assert len(ended.err.strip().splitlines()) == 1

@@ -1,0 +1,161 @@
+"""Sweeps from files and runs to results, pages and figures."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from instruments.drivers.oscilloscope import Trace
+from levilab.errors import DataError
+from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
+from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionOptions, analyze_precessions
+from levilab.pipelines.precession.document import as_document, recall_precessions, result_of
+from levilab.pipelines.result import save
+from levilab.report.page import render
+from levilab.runs.run import RunRecord, utc_now
+from levilab.runs.writer import RunWriter
+from support.commands import command
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+DRIVE = np.arange(28.0, 46.0, 2.0)
+U = 0.03
+
+
+def sweep_csv(path: Path, *, slope: float = 1.0, u: bool = True, seed: int = 1, half: int | None = None) -> Path:
+    """A file of a user's own: German titles, a comma for the point."""
+    counted = slope * DRIVE + U * np.random.default_rng(seed).standard_normal(DRIVE.size)
+    if half is not None:
+        counted[half] /= 2
+    rows = [f"{d:.1f};{c:.4f}" + (f";{U}" if u else "") for d, c in zip(DRIVE, counted, strict=True)]
+    header = "Antriebsfrequenz [Hz];Präzession [Hz]" + (";u(ν_p)" if u else "")
+    path.write_text("\n".join([header, *(row.replace(".", ",") for row in rows), ""]), encoding="utf-8")
+    return path
+
+
+def save_without_picture(found: PrecessionAnalysis) -> Path:
+    return save(result_of(found, found.place), found.place, b"", first=False)[0]
+
+
+def test_a_file_of_ones_own_is_analyzed_without_naming_its_columns(tmp_path: Path) -> None:
+    file = sweep_csv(tmp_path / "mine.csv", half=3)
+    ((row, found),) = analyze_suiting([file], {})
+    assert row.name == "precession"
+    document = as_document(found, tmp_path)
+    values = document["values"]
+    assert values["slope"]["value"] == pytest.approx(1, abs=3 * values["slope"]["u"])
+    assert values["intercept"]["unit"] == "Hz"
+    assert 0.01 < values["p_locked"]["value"] <= 1
+    assert values["power"]["value"] > 0.99
+    assert "half the frequency was counted, left out of the line" in document["warnings"][0]
+    weighted, robust = document["models"]
+    (a, b), (_, c) = weighted["covariance"]
+    assert (a, c) == (pytest.approx(values["slope"]["u"] ** 2), pytest.approx(values["intercept"]["u"] ** 2))
+    assert b < 0
+    assert weighted["centred"]["covariance"][0][1] == 0
+    assert (weighted["statistics"]["n"], robust["statistics"]["n"]) == (8, 9)
+
+
+def test_the_options_reach_the_fit(tmp_path: Path) -> None:
+    file = sweep_csv(tmp_path / "mine.csv", half=3)
+    kept = analyze_precessions([file], PrecessionOptions(keep_outliers=True, orthogonal=True, reading_u=0.1)).combined
+    assert (kept.line.n, kept.line.orthogonal, kept.points[0].u) == (9, True, 0.1)
+
+
+def test_several_sweeps_share_a_line(tmp_path: Path) -> None:
+    files = [sweep_csv(tmp_path / f"{k}.csv", seed=k) for k in (1, 2)]
+    found = analyze_precessions(files, PrecessionOptions())
+    assert found.combined.line.n == 18
+    assert found.combined.line.u_slope == pytest.approx(found.runs[0].fit.line.u_slope / 2**0.5)
+    other = sweep_csv(tmp_path / "3.csv", slope=1.05, seed=3)
+    together = analyze_precessions([*files, other], PrecessionOptions())
+    assert any("slopes of the 3 runs differ" in text for text in together.all_warnings)
+    assert "is excluded" in together.text
+
+
+def test_a_result_is_read_and_not_computed_anew(tmp_path: Path) -> None:
+    files = [sweep_csv(tmp_path / f"{k}.csv", seed=k, half=k) for k in (1, 2)]
+    found = analyze_precessions(files[:1], PrecessionOptions(orthogonal=True))
+    result = save_without_picture(found)
+    again = recall_precessions(files[:1], PrecessionOptions())
+    assert again.runs == found.runs
+    assert again.combined == found.combined
+    assert again.all_warnings == found.all_warnings
+    assert again.origins[0].text.startswith("as levilab analyze found it")
+    other_options = recall_precessions(files[:1], PrecessionOptions(keep_outliers=True))
+    assert other_options.origins[0].text.startswith("analyzed for this page: other options")
+    assert other_options.combined.line.orthogonal  # what is not given is as it was
+    # of another sweep's points
+    text = result.read_text(encoding="utf-8").replace('"drive": 30.0', '"drive": 30.5')
+    result.write_text(text, encoding="utf-8")
+    with pytest.raises(DataError, match=r"its points are not those of .*analyze anew"):
+        recall_precessions(files[:1], PrecessionOptions())
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("nu_d,nu_x\n1,2\n3,4\n5,6\n", "no column is known to be precession_frequency_hz"),
+        ("f_d,f_p\n30,30\n31,31\n", "at least 3 readings are needed"),
+        ("f_d,f_p\n30,30\n30,31\n30,29\n", "all 3 points are at a drive frequency of 30 Hz: sweep the drive"),
+        ("f_d,f_p\n30,30\n31,-31\n32,32\n", "line 3: the precession frequency is -31 Hz"),
+        ("f_d,f_p,u_f_p\n30,30,0\n31,31,1\n32,32,1\n", "line 2: the uncertainty of the precession frequency is 0 Hz"),
+        ("f_d,f_p\n30,30\n31,thirty\n32,32\n", "line 3"),
+    ],
+)
+def test_what_is_no_sweep_costs_one_line(tmp_path: Path, content: str, said: str) -> None:
+    (tmp_path / "bad.csv").write_text(content.replace("nu_d", "f_d"), encoding="utf-8")
+    ended = command("analyze", "precession", "bad.csv", cwd=tmp_path)
+    assert ended.status == 1
+    assert said in ended.err
+    assert len(ended.err.strip().splitlines()) == 1
+    assert not ended.out
+
+
+def run_with_records(folder: Path, drift: float) -> Path:
+    """A run of three points; the laser is recorded at the second one and drifts beside the drive [Hz]."""
+    names = ("time_s", "drive_frequency_hz", "precession_frequency_hz", "precession_frequency_u_hz")
+    record = RunRecord(
+        experiment="precession",
+        status="running",
+        started_utc=utc_now(),
+        channels=[{"name": name, "unit": "s" if name == "time_s" else "Hz", "source": "made up"} for name in names],
+        configuration={"precession": {"gate_s": 1.0}},
+    )
+    t = 1e-3 * np.arange(5000)
+    with RunWriter.create(folder, record) as writer:
+        for k, drive in enumerate((44.0, 40.0, 36.0)):
+            if k == 1:
+                cut = np.cos(2 * np.pi * (drive + drift) * t) > 0.8
+                for channel, volts in (("laser", 1.0 - cut), ("drive", np.sin(2 * np.pi * drive * t))):
+                    codes = np.rint(100 + 100 * volts).astype(np.uint8)
+                    writer.trace(10.0 * k + 9, Trace(codes, 1e-3, -2.5, 0.01, -1.0, 1), channel)
+            writer.reading(dict(zip(names, (10.0 * (k + 1), drive, drive, 0.02), strict=True)))
+        writer.finish("finished")
+        return writer.folder
+
+
+def test_a_record_says_whether_the_pulses_keep_to_the_drives_phase(tmp_path: Path) -> None:
+    found = analyze_precessions([run_with_records(tmp_path / "locked", 0.0)], PrecessionOptions())
+    ((point, coherence),) = [(one.point, one.coherence) for one in found.runs[0].coherences]
+    assert point == 1
+    assert coherence.length > 0.99
+    assert coherence.phase_rad == pytest.approx(-np.pi / 2, abs=0.15)  # a cosine's maxima on a sine's phase, ±½ ms
+    drifting = analyze_precessions([run_with_records(tmp_path / "drifting", 0.6)], PrecessionOptions())
+    assert drifting.runs[0].coherences[0].coherence.drift_hz == pytest.approx(0.6, abs=0.01)
+    assert any("do not keep to the drive's phase at point 2" in text for text in drifting.all_warnings)
+
+
+def test_figure_and_page_show_what_was_found(tmp_path: Path) -> None:
+    analysis = ANALYSES["precession"]
+    found = analysis.analyze(
+        [sweep_csv(tmp_path / "mine.csv", half=3), run_with_records(tmp_path / "runs", 0.0)], PrecessionOptions()
+    )
+    page = render(analysis, found)
+    assert found.text.split(". ")[0].replace("−", "-") in page.replace("−", "-")
+    assert "mean vector" in page
+    assert "half the frequency was counted" in page
+    assert "left out" in page
