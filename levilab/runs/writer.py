@@ -180,9 +180,12 @@ class RunWriter:
         """Change entries of run.json.  Raises CannotWrite."""
         with _told("write run.json", self.folder):
             self._rescue_if_lost()
-            record = self.record.model_copy(update=changes)
-            replace_atomically(self.folder / RECORD, record.as_json())
-        self.record = record
+            self.record = self.record.model_copy(update=changes)
+            try:
+                replace_atomically(self.folder / RECORD, self.record.as_json())
+            except FileNotFoundError:  # the folder went at this moment
+                self._rescue_if_lost()
+                replace_atomically(self.folder / RECORD, self.record.as_json())
 
     def reading(self, row: Mapping[str, float | None]) -> None:
         """Append a row to readings.csv.  None becomes an empty cell.  Raises CannotWrite with the row in it.

@@ -17,8 +17,7 @@ from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import Configuration, settings_of, with_settings
 from levilab.bench.config import ConfigError
 from levilab.errors import UsageError
-from levilab.pipelines.sources import Options
-from levilab.pipelines.spindown.analysis import analyze_spindowns
+from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
 from levilab.world.spin_world import SpinScene, SpinWorld, drawn
 from support.acquisitions import Impatient, Silent, in_world
 
@@ -184,4 +183,4 @@ def test_loose_washers_are_warned_of_in_the_run_and_in_its_result(tmp_path: Path
     (warning,) = [event["text"] for event in run.events() if event["kind"] == "warning"]
     assert "LOOSE WASHERS, the tape slips by 0.1" in warning
     assert warning in show.messages
-    assert warning in json.loads(json.dumps(analyze_spindowns([run.folder], Options()).all_warnings))
+    assert warning in json.loads(json.dumps(analyze_spindowns([run.folder], SpinDownOptions()).all_warnings))

@@ -12,6 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from levilab.runs.listing import list_runs
@@ -167,11 +168,20 @@ def survives(tmp_path: Path, before: str, reason: str) -> int:
     return len(shown)
 
 
+def bytes_written(out: Path) -> int:
+    """How much a whole run writes, in the reckoning of FULL."""
+    room = 10**9
+    told = "import atexit, sys; atexit.register(lambda: print('left', left, file=sys.stderr))\n"
+    process = start(out, before=FULL.format(room=room) + told)
+    _, err = process.communicate(timeout=HANG_GUARD_S)
+    assert process.returncode == 0, err
+    return room - int(err.split()[-1])
+
+
 def test_a_disk_that_fills_up_at_any_moment_loses_no_reading_that_was_shown(tmp_path: Path) -> None:
-    shown = [
-        survives(tmp_path / str(room), FULL.format(room=room), "No space left")
-        for room in (0, 40, 1500, *range(10600, 14500, 350))
-    ]
+    written = bytes_written(tmp_path / "whole")
+    rooms = (0, 40, 1500, *np.linspace(0.7 * written, 0.88 * written, 10).astype(int))
+    shown = [survives(tmp_path / str(room), FULL.format(room=room), "No space left") for room in rooms]
     assert shown[0] == 0
     assert max(shown) > 3
     assert len(set(shown)) > 2

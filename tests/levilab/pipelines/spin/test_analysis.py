@@ -177,7 +177,7 @@ def test_each_analysis_takes_its_own_out_of_a_folder(sample_data: Path, tmp_path
     down, spin = found["spindown"], found["spin"]
     assert [source.name for source in down.sources][:2] == ["spin-down-1", "spin-down-2"]
     assert [source.name for source in down.sources][4:] == ["long.wav"]
-    assert len(spin.sources) == 14  # eleven files, the long one, two runs with traces
+    assert len(spin.sources) == 15  # eleven files, the long one, three runs with traces
     quiet = [text for each in (down, spin) for text in (*each.warnings, *each.remarks)]
     assert not [text for text in quiet if any(name in text for name in ("notes", "field.csv", "no titles"))]
     assert [text for text in down.remarks if "npy" in text] == []
