@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, fields
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
     from levilab.pipelines.part import ReportPart
     from levilab.pipelines.sources import InputOptions, Needs, Source
     from levilab.present.tables import Table
+    from levilab.runs.run import Run
 
 
 class Analyzed(Protocol):
@@ -221,8 +223,22 @@ def analyze_suiting(paths: Sequence[Path], given: Mapping[str, Any]) -> list[tup
 
 
 def recall_suiting(paths: Sequence[Path], given: Mapping[str, Any]) -> tuple[Analysis[Any], Any]:
-    """The first analysis that suits, with what it found or had found before.  Raises DataError if none does."""
-    return next(_suiting(lambda analysis: analysis.recall(paths, analysis.options_from(given))))
+    """The first analysis that suits, with what it found or had found before.  Raises DataError if none does.
+
+    An analysis that is for the runs' experiment goes before one that suits only because a run keeps records, too.
+    """
+    suiting = _suiting(lambda analysis: analysis.recall(paths, analysis.options_from(given)))
+    first = next(suiting)
+    return next((one for one in itertools.chain([first], suiting) if _is_for(*one)), first)
+
+
+def _is_for(analysis: Analysis[A], found: A) -> bool:
+    """Whether an input is a data file, or a run of an experiment that the analysis is for."""
+    return any(source.run is None or _is_for_run(analysis, source.run) for source in found.sources)
+
+
+def _is_for_run(analysis: Analysis[Any], run: Run) -> bool:
+    return run.record.experiment in analysis.needs.experiments
 
 
 def _suiting(run: Callable[[Analysis[Any]], Any]) -> Iterator[tuple[Analysis[Any], Any]]:
@@ -242,11 +258,14 @@ def _suiting(run: Callable[[Analysis[Any]], Any]) -> Iterator[tuple[Analysis[Any
 def save(analysis: Analysis[A], found: A, folder: Path | None = None) -> list[Path]:
     """Write the result and the figure beside the inputs, or into a folder; returns the files.  Raises CannotWrite.
 
-    The name result.json belongs to the first row that takes the run's experiment; with data files and with several
-    inputs, which may be of any kind, to the first row of all.  Every other analysis has its name in its result's.
+    The name result.json belongs to the first row that is for the run's experiment, or where none is to the first one
+    that takes the run; with data files and with several inputs, which may be of any kind, to the first row of all.
+    Every other analysis has its name in its result's.
     """
     run = found.sources[0].run if len(found.sources) == 1 else None
     rows = [row for row in ANALYSES.values() if run is None or row.needs.take(run)]
+    if run is not None:
+        rows = [row for row in rows if _is_for_run(row, run)] or rows
     return analysis.save(found, folder, first=rows[0].name == analysis.name)
 
 

@@ -143,3 +143,13 @@ def test_an_analysis_that_does_not_suit_is_passed_over(
     table.write_text(text.replace("1,2", "1,two"), encoding="utf-8")
     with pytest.raises(DataError, match="line 3"):
         analyze_suiting([table], {})
+
+
+def test_a_sweep_that_keeps_records_is_a_sweep_first(tmp_path: Path, sample_data: Path) -> None:
+    """Its records suit the analysis of spins, too, which stands above that of sweeps."""
+    run = shutil.copytree(sample_data / "precession-sweep", tmp_path / "sweep")
+    row, found = recall_suiting([run], {})
+    assert row.name == "precession"
+    assert save_found(row, found)[0].name == "result.json"
+    spin = ANALYSES["spin"]
+    assert save_found(spin, spin.analyze([run], spin.options_from({})))[0].name == "result.spin.json"
