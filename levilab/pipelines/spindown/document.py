@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from analysis.residuals import Correlation
-from analysis.spindown.combine import Combined, CombinedLaw, Mean, combine
+from analysis.spindown.combine import Combined, CombinedLaw, Mean, combine, tilt_demanded
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import SpinDown
 from analysis.spindown.lawfit import LawFit
@@ -448,6 +448,11 @@ def recall_spindowns(paths: Sequence[Path], options: SpinDownOptions) -> SpinDow
     if whole and _holds(whole[1].settings.options, given):
         return _restored(whole[1], whole[0], found, place)
     recalled = [_recalled(source, archive, given) for source in found.sources]
+    if tilt_demanded([run for _, run, _ in recalled]):
+        recalled = [
+            one if one[1].has_tilt else _with_tilt(source, one[2].options)
+            for source, one in zip(found.sources, recalled, strict=True)
+        ]
     runs = tuple(run for _, run, _ in recalled)
     sources = tuple(source for source, _, _ in recalled)
     return SpinDownAnalysis(
@@ -483,6 +488,12 @@ def _recalled(
     options = replace(made_with, **given)
     why = "the readings are others than in" if earlier.sha256 != source.sha256 else "other options than those of"
     return source, fit_source(source, options), Origin(options, f"analyzed for this page: {why} {earlier.file}")
+
+
+def _with_tilt(source: Source[Readings], options: SpinDownOptions) -> tuple[Source[Readings], SpinDown, Origin]:
+    """One input fitted with the count's tilt, which it shows only together with the others."""
+    origin = Origin(options, "analyzed for this page: the runs show a tilt of the top together, not each by itself")
+    return source, fit_source(source, options, tilt=True), origin
 
 
 def _origin(earlier: Earlier[SpinDownResult]) -> Origin:

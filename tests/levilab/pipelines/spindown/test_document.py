@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from analysis.spindown.drag import LAWS
+from analysis.spindown.tilt import count
 from levilab.errors import DataError
 from levilab.pipelines.result import save
 from levilab.pipelines.spindown import document
@@ -27,9 +29,9 @@ def fitted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     names: list[str] = []
     fit = document.fit_source
 
-    def noted(source: Any, options: SpinDownOptions) -> Any:
+    def noted(source: Any, options: SpinDownOptions, **more: Any) -> Any:
         names.append(source.path.name)
-        return fit(source, options)
+        return fit(source, options, **more)
 
     monkeypatch.setattr(document, "fit_source", noted)
     return names
@@ -263,3 +265,21 @@ def test_a_warning_about_an_input_is_recalled_once_however_it_is_named(
     monkeypatch.chdir(tmp_path)
     after = recall_spindowns([path.relative_to(tmp_path) for path in paths], SpinDownOptions())
     assert sum("no header" in text for text in after.all_warnings) == 2
+
+
+def test_a_tilt_that_runs_show_together_is_in_a_recall_without_result(tmp_path: Path) -> None:
+    """Each run is too noisy for it; what a report says must not depend on whether `analyze` came before."""
+    t, law = np.arange(0, 160, 10.0), LAWS["disc"]
+    q = law.dimensionless(np.array([40.0, 2.34e-4]), 29.0, 160.0)
+    counts = 29.0 * count(law, t / 160.0, q, 0.03**2, 21.6 / 29.0)
+    random = np.random.default_rng(5)
+    for k in range(4):
+        noisy = counts + random.normal(0, 0.03, t.size)
+        rows = [f"{time:g},{spin:.4f},0.03" for time, spin in zip(t, noisy, strict=True)]
+        text = "\n".join(["time_s,spin_frequency_hz,spin_frequency_u_hz", *rows, ""])
+        (tmp_path / f"run-{k}.csv").write_text(text, encoding="utf-8")
+    analysis, recalled = (function([tmp_path], SpinDownOptions()) for function in (analyze_spindowns, recall_spindowns))
+    assert analysis.combined.tilt is not None
+    assert recalled.combined.tilt == analysis.combined.tilt
+    assert recalled.combined.fit("disc").constants == analysis.combined.fit("disc").constants
+    assert any("show a tilt of the top together" in origin.text for origin in recalled.origins)
