@@ -57,9 +57,14 @@ class Subject:
 def acquired(
     experiment: str, seed: int, folder: Path, change: Callable[[AcquisitionRequest], AcquisitionRequest]
 ) -> Run:
-    """A finished run of a mock experiment.  change: puts it into a world of known numbers.  Raises TrialFailed."""
+    """A finished run of a mock experiment.  change: puts it into a world of known numbers.
+
+    Raises TrialFailed; KeyboardInterrupt where Ctrl-C ended the run: it is meant for the whole cross-check.
+    """
     request = request_for(experiment, AcquisitionOptions(mock=True, out=folder, seed=seed))
     run = acquire(change(request), Mute())
+    if run.status == "interrupted":
+        raise KeyboardInterrupt
     if run.status != "finished":
         raise TrialFailed(f"{run.folder.name}: the run is {run.status}")
     return run

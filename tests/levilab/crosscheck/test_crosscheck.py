@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import signal
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +13,7 @@ import pytest
 from levilab.crosscheck.catalogue import SUBJECTS
 from levilab.crosscheck.figure import crosscheck_figure
 from levilab.crosscheck.study import crosscheck
-from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
+from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquired, pull_of
 from levilab.crosscheck.table import crosscheck_table, failures_in_words
 from levilab.present.style import as_png
 
@@ -62,6 +64,25 @@ def test_the_table_and_the_notes_show_what_failed():
 def test_a_value_without_an_uncertainty_is_no_pull():
     with pytest.raises(TrialFailed, match="c32: the analysis gives no value with an uncertainty"):
         pull_of("c32", {"value": 1.0, "u": None}, 1.0)
+
+
+def test_ctrl_c_in_a_trial_ends_the_cross_check():
+    """It interrupts the run of the trial; the next trial would go on otherwise."""
+    trials = []
+
+    def trial(seed: int, folder: Path) -> list[Pull]:
+        trials.append(seed)
+
+        def interrupted(request):
+            signal.raise_signal(signal.SIGINT)
+            return request.wiring()
+
+        acquired("field", seed, folder, lambda request: replace(request, wiring=lambda: interrupted(request)))
+        return [Pull("five", 5.0, 0.1, 5.0)]
+
+    with pytest.raises(KeyboardInterrupt):
+        of(Subject("interrupted", "five", trial), 2)
+    assert trials == [0]
 
 
 @pytest.mark.parametrize(
