@@ -183,6 +183,8 @@ def _improve(
         if bad is not None:
             outside |= bad[index]
         valid = ~outside
+        if not valid.any():
+            return None
     cell = (
         np.clip((place * TABLE).astype(np.intp), 0, TABLE - 1)
         if window.half < 0.5

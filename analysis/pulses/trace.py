@@ -27,6 +27,8 @@ Choice = Literal["auto", "edges", "matched", "likelihood"]
 
 #: Samples per second of the shortened trace in which pulses are searched for.
 SEARCH_RATE = 2500.0
+#: A trace that moves by no more than this part of its values is constant: sums of them are rounded by as much.
+ROUNDING = 1e-12
 #: Fewer edges than this have to stand out of the noise so many times, or they may be noise.
 FEW, CLEAR = 16, 3.0
 #: Pulses that last longer than this part of a turn are placed by their edges alone.
@@ -65,6 +67,8 @@ def spin_of_trace(
     """
     x, bad = _checked(samples, rate)
     factor = max(int(rate // SEARCH_RATE), 1)
+    if np.ptp(x) <= ROUNDING * np.abs(x).max():
+        raise TooFewPulses(seen=0, needed=FEWEST, duration=x.size / rate)
     cleaned = clean(x, rate, shorten(x, factor), bad)
     trace = Trace(cleaned, rate, rate / factor)
     try:
@@ -77,6 +81,7 @@ def spin_of_trace(
         raise
     found, trap = _without_trap(trace, found, degree)
     return _result(found, doubled, start, method=used, origin=found.origin, notes=(*why, *trap, *cleaned.notes))
+
 
 
 class Trace:

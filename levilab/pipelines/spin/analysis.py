@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 import numpy as np
 
 from analysis.errors import AnalysisError
-from analysis.pulses import phases, spin_of_times, spin_of_trace, track_of_blocks, track_of_times
+from analysis.pulses import Finding, phases, spin_of_times, spin_of_trace, track_of_blocks, track_of_times
 from levilab.errors import DataError
 from levilab.pipelines.result import Place, place_of
 from levilab.pipelines.sources import InputOptions, Needs, Source, collect
@@ -20,15 +20,17 @@ from levilab.runs.traces import INDEX
 from levilab.runs.waveforms import has_traces
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-    from analysis.pulses import Finding, Phase, SpinFrequency, Track
+    from analysis.pulses import Phase, SpinFrequency, Track
     from levilab.formats.waveforms.waveform import Waveform
 
     Array = NDArray[np.float64]
+
+T = TypeVar("T")
 
 SPIN = "spin"
 #: The runs and files that suit.
@@ -147,26 +149,35 @@ def analyze_spins(paths: Sequence[Path], options: SpinOptions) -> SpinAnalysis:
     """
     paths = [find_run(path) for path in paths]
     found = collect(paths, NEEDS, lambda _: options)
-    runs, sources, warnings = [], [], list(found.warnings)
-    for source in found.sources:
-        try:
-            runs.append(spin_of_source(source, options))
-            sources.append(source)
-        except DataError as error:
-            if len(found.sources) == 1:
-                raise
-            warnings.append(f"passed over: {error}")
-    if not runs:
-        raise DataError(warnings[-1].removeprefix("passed over: "))
+    done, warnings = of_each(found.sources, lambda source: (source, spin_of_source(source, options)))
+    sources, runs = (tuple(part) for part in zip(*done, strict=True))
     return SpinAnalysis(
-        sources=tuple(sources),
-        runs=tuple(runs),
+        sources=sources,
+        runs=runs,
         options=options,
         place=place_of(paths, sources),
-        warnings=(*warnings, *about_inputs(sources, options)),
+        warnings=(*found.warnings, *warnings, *about_inputs(sources, options)),
         remarks=found.remarks,
         origins=(Origin(options),) * len(runs),
     )
+
+
+def of_each(sources: Sequence[Source[Records]], find: Callable[[Source[Records]], T]) -> tuple[list[T], list[str]]:
+    """What is found of each input, and warnings about those that are passed over: of several, none has to be sound.
+
+    Raises DataError where nothing is found of any.
+    """
+    done, warnings = [], []
+    for source in sources:
+        try:
+            done.append(find(source))
+        except DataError as error:
+            if len(sources) == 1:
+                raise
+            warnings.append(f"passed over: {error}")
+    if not done:
+        raise DataError(warnings[-1].removeprefix("passed over: "))
+    return done, warnings
 
 
 def about_inputs(sources: Sequence[Source[Records]], options: SpinOptions) -> list[str]:
@@ -215,7 +226,7 @@ def _with_rate(spin: SpinFrequency, waveform: Waveform) -> SpinFrequency:
 
 
 def _of_several(records: Records, options: SpinOptions) -> SpinRun:
-    """A spin for each record of a run; what has no pulses is left out, unless none has."""
+    """A spin for each record of a run; what has no pulses is left out with a note, unless none has."""
     spins: list[SpinFrequency] = []
     missed: AnalysisError | None = None
     for waveform in records.waveforms:
@@ -230,6 +241,10 @@ def _of_several(records: Records, options: SpinOptions) -> SpinRun:
     series = Series(*_columns(spins), of="record")
     names = dict.fromkeys(note.name for spin in spins for note in spin.notes)
     notes = tuple(next(note for spin in spins for note in spin.notes if note.name == name) for name in names)
+    if missed:
+        left_out, all_of_them = len(records.waveforms) - len(spins), len(records.waveforms)
+        text = f"{left_out} of {all_of_them} records are left out, the last of them for this: {missed}"
+        notes = (*notes, Finding("no-pulses", text))
     return SpinRun(spins[len(spins) // 2], series, notes)
 
 

@@ -35,6 +35,7 @@ from levilab.pipelines.spin.analysis import (
     SpinOptions,
     SpinRun,
     about_inputs,
+    of_each,
     spin_of_source,
 )
 from levilab.runs.run import find_run
@@ -232,13 +233,14 @@ def recall_spins(paths: Sequence[Path], options: SpinOptions) -> SpinAnalysis:
         return replace(earlier.result.settings.options, **given) if earlier else options
 
     found = collect(paths, NEEDS, reading)
-    recalled = [_recalled(source, archive, given) for source in found.sources]
+    recalled, warnings = of_each(found.sources, lambda source: _recalled(source, archive, given))
+    sources = tuple(source for source, _, _ in recalled)
     return SpinAnalysis(
-        sources=tuple(source for source, _, _ in recalled),
+        sources=sources,
         runs=tuple(run for _, run, _ in recalled),
         options=options,
-        place=place_of(paths, found.sources),
-        warnings=(*found.warnings, *about_inputs(found.sources, options)),
+        place=place_of(paths, sources),
+        warnings=(*found.warnings, *warnings, *about_inputs(sources, options)),
         remarks=found.remarks,
         origins=tuple(origin for _, _, origin in recalled),
     )

@@ -143,3 +143,10 @@ def test_traces_without_pulses_are_refused():
         spin_of_trace(noise(), 0.0)
     with pytest.raises(ShapesDiffer):
         spin_of_trace(np.zeros((100, 2)), RATE)
+
+
+@pytest.mark.parametrize("method", ["auto", "edges", "matched", "likelihood"])
+@pytest.mark.parametrize("level", [0.0, 0.1, 10 * 0.01])
+def test_a_constant_trace_has_no_pulses_however_its_sums_are_rounded(level, method):
+    with pytest.raises(TooFewPulses, match="0 pulses in 0.4 s"):
+        spin_of_trace(np.full(1600, level), 4000, method=method)

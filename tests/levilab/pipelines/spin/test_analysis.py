@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -125,6 +126,20 @@ def test_the_traces_of_a_run_are_read_in_volts_on_its_clock(traced: Path) -> Non
     assert save_found(ANALYSES["spin"], analysis)[0] == traced / "result.json"
 
 
+def test_records_of_a_run_that_are_left_out_are_counted_in_a_note(traced: Path) -> None:
+    channels = [{"name": "time_s", "unit": "s", "source": "a test"}]
+    record = RunRecord(experiment="trace", status="running", started_utc=utc_now(), channels=channels)
+    with RunWriter.create(traced.parent, record, tell=lambda _: None) as writer:
+        for k, stored in enumerate(Run.load(traced).traces()):
+            dark = np.full_like(stored.trace.codes, 10)
+            writer.trace(10.0 * k, stored.trace if k else replace(stored.trace, codes=dark), "light")
+        writer.finish("finished")
+    analysis = analyze_spins([writer.folder], SpinOptions())
+    assert len(analysis.runs[0].series) == 2
+    (note,) = [text for text in analysis.all_warnings if text.endswith("(no-pulses)")]
+    assert "1 of 3 records are left out, the last of them for this: 0 pulses" in note
+
+
 def test_the_result_says_what_the_interface_promises(sample_data: Path, tmp_path: Path) -> None:
     path = shutil.copy(sample_data / "scope-files" / "keysight-dsox.csv", tmp_path)
     analysis = analyze_spins([tmp_path / "keysight-dsox.csv"], SpinOptions())
@@ -162,6 +177,16 @@ def test_a_record_without_pulses_is_refused_in_one_line(tmp_path: Path) -> None:
     path = write_wav(tmp_path / "dark.wav", np.full(4000, 0.1), 1000)
     with pytest.raises(DataError, match=r"dark\.wav: 0 pulses in 4 s, at least 4 are needed"):
         analyze_spins([path], SpinOptions())
+
+
+@pytest.mark.parametrize("find", [analyze_spins, recall_spins])
+def test_a_record_without_pulses_among_others_is_passed_over(find: Any, tmp_path: Path) -> None:
+    """By a report, too, which recalls."""
+    write_wav(tmp_path / "dark.wav", np.full(4000, 0.1), 1000)
+    write_wav(tmp_path / "spins.wav", pulses(30.0 * np.arange(4000) / 1000), 1000)
+    found = find([tmp_path], SpinOptions())
+    assert [source.name for source in found.sources] == ["spins.wav"]
+    assert [text for text in found.warnings if "passed over: " in text and "dark.wav: 0 pulses" in text]
 
 
 def test_each_analysis_takes_its_own_out_of_a_folder(sample_data: Path, tmp_path: Path) -> None:
