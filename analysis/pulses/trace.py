@@ -83,7 +83,6 @@ def spin_of_trace(
     return _result(found, doubled, start, method=used, origin=found.origin, notes=(*why, *trap, *cleaned.notes))
 
 
-
 class Trace:
     """A trace that was cleaned, with the rates of its samples and bins [1/s]."""
 
