@@ -104,7 +104,7 @@ def _with_a_top(
 ) -> Row | None:
     """The limit of a top; one that the drive does not take up falls after a while, and is floated again."""
     falls = 0
-    while True:
+    while not _is_over(session):
         _have_a_top(session, number)
         try:
             return measure(session)
@@ -114,6 +114,7 @@ def _with_a_top(
             if falls == _MOST_FALLS:
                 raise
             session.event("once more", f"{failed}; it {'fell' if fell else 'is still up'}, once more")
+    return None
 
 
 def _have_a_top(session: Session[LimitSettings], number: int) -> None:
@@ -144,6 +145,8 @@ def _coast_down(session: Session[LimitSettings]) -> None:
     settings = session.settings
     session.event("coasts", "the top is still up and comes down by itself")
     while (spin := spin_now(session)) is not None and spin > settings.drive_frequency_hz:
+        if session.now() > settings.longest_s:
+            return
         session.progress(f"coasts down, {spin:.2f} Hz", 1.0)
         session.wait(settings.interval_s)
 
@@ -173,9 +176,11 @@ def _lower(session: Session[LimitSettings]) -> Row | None:
             missed_since = None
             session.progress(f"free at {reading['spin_frequency_hz']:.2f} Hz", 1.0)
         else:
-            missed_since = asked if missed_since is None else missed_since
+            # a counter that was lost saw nothing of the top, which may have been up all that time
+            if top.missed[-1] is not Missed.LOST and missed_since is None:
+                missed_since = asked
             if end := top.fall(asked):
-                return _limit_of_fall(session, seen, missed_since, end)
+                return _limit_of_fall(session, seen, asked if missed_since is None else missed_since, end)
         session.wait(settings.interval_s - (session.now() - asked))
     return None
 
@@ -200,7 +205,7 @@ def _limit_of_fall(session: Session[LimitSettings], seen: list[Row], missed_sinc
         "time_s": session.now(),
         "spin_frequency_hz": limit.value,
         "spin_frequency_u_hz": limit.u,
-        "spin_seen_hz": float(spins[-1]),
+        "spin_seen_hz": float(spins.min()),
         "drive_frequency_hz": settings.drive_frequency_hz,
         "drive_amplitude_v": settings.drive_amplitude_vpp / 2,
     }
@@ -224,13 +229,16 @@ def _upper(session: Session[LimitSettings]) -> Row | None:
 def _creep_up(session: Session[LimitSettings]) -> Row | None:
     """Raise the drive until the top does not follow; None where the time is over."""
     settings = session.settings
-    start, begin = settings.drive_frequency_hz, session.now()
+    start, drive, at = settings.drive_frequency_hz, settings.drive_frequency_hz, session.now()
+    # a counter that is reached again after a while must not make the drive jump
+    longest_step_s = RAMP_STEP_S + 2 * settings.gate_s
     every = max(1, round(settings.interval_s / RAMP_STEP_S))
     held = start
     seen: list[tuple[float, float]] = []
     for k in itertools.count(1):
         session.wait(RAMP_STEP_S)
-        drive = start + settings.creep_hz_per_s * (session.now() - begin)
+        before, at = at, session.now()
+        drive += settings.creep_hz_per_s * min(at - before, longest_step_s)
         if drive > settings.highest_hz:
             name = session.writer.record.experiment
             raise ExperimentFailed(
@@ -263,7 +271,9 @@ def _limit_of_loss(
     settings, (held, drive) = session.settings, between
     top = FreeTop(session)
     is_up = lost.spin is not None or top.read() is not None or top.missed[-1] is Missed.UNSTEADY
-    limit, u = (held + drive) / 2, (drive - held) / 12**0.5
+    # a top that slips is taken for held until it is far behind; but it only slows, so its limit is above what was seen
+    low = min(held, seen[-1][0]) if seen else held
+    limit, u = (low + drive) / 2, (drive - low) / 12**0.5
     kind, what = ("lock lost", "the drive lost the top") if is_up else ("top lost", "the top fell")
     session.event(kind, f"{what} at {limit:.2f} Hz: {lost}", spin_frequency_hz=limit, drive_frequency_hz=drive)
     safely_held = [(spin, drive) for spin, drive in seen if drive < held - _BELOW_HZ][-_COMPARED:]

@@ -10,6 +10,9 @@ import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
+from instruments.errors import NoAnswer
+from levilab.acquisition.counting import FreeTop
+from levilab.acquisition.driving import DidNotFollow, held_spin
 from levilab.acquisition.experiments.limit import LimitSettings
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
@@ -67,6 +70,79 @@ def test_the_upper_limit_is_where_drag_takes_all_that_the_drive_can_give(tmp_pat
     assert kinds(run)[-1] == "held"
     assert "lock lost" in kinds(run)
     assert "warning" not in kinds(run)
+
+
+class Slipping(SpinWorld):
+    """The drive loses the top when it is set above 36 Hz."""
+
+    def _go_on(self, now: Any) -> None:
+        if self._drive_spin > 2 * math.pi * 36:
+            self._hold = 0.0
+        super()._go_on(now)
+
+
+#: An upper limit, soon: from 34 Hz at 0.1 Hz/s.
+SLIPS = ("limit.which=upper", "limit.drive_frequency_hz=34", "limit.hold_s=0", "limit.repetitions=1")
+
+
+def test_a_top_that_slips_before_it_is_missed_has_its_limit_within_u(tmp_path: Path) -> None:
+    """It is 1 Hz behind only some seconds after it was lost, while the drive goes on creeping."""
+    run = acquire(in_world(mock(tmp_path, *SLIPS), Slipping(SpinScene(), VirtualClock())), Silent())
+    (limit,), (u,) = (run.readings().frame[name] for name in ("spin_frequency_hz", "spin_frequency_u_hz"))
+    assert "lock lost" in kinds(run)
+    assert abs(limit - 36) < 2 * u  # an even distribution ends at 1.7 u
+    assert u < 0.5
+
+
+def test_a_drive_does_not_jump_after_a_counter_was_away(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In 12 s the drive would have gone on by 1.2 Hz, which no top follows at once."""
+    away = iter([12.0])
+
+    def look(session: Any, drive: float) -> float:
+        session.wait(next(away, 0.0) if drive > 34.5 else 0.0)
+        return held_spin(session, drive)
+
+    monkeypatch.setattr("levilab.acquisition.experiments.limit.held_spin", look)
+    run = acquire(in_world(mock(tmp_path, *SLIPS), Slipping(SpinScene(), VirtualClock())), Silent())
+    assert run.readings().frame["spin_frequency_hz"].tolist() == pytest.approx([36], abs=0.3)
+
+
+def test_a_top_that_falls_while_the_counter_is_away_may_have_fallen_all_that_time(tmp_path: Path) -> None:
+    """The moment of its fall is known as well as when it was seen last, and first seen down."""
+
+    lost: list[float] = []
+    counted = FreeTop._count
+
+    def count(top: Any) -> Any:
+        row = counted(top)
+        if row and row["spin_frequency_hz"] < 22.3 and not lost:
+            lost.append(row["time_s"])
+            top.session.wait(25.0)
+            raise NoAnswer(top.session.bench.address("counter"), "READ?", 25.0)
+        return row
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(FreeTop, "_count", count)
+        world = SpinWorld(SpinScene(), VirtualClock())
+        run = acquire(in_world(mock(tmp_path, *QUICK, "limit.repetitions=1"), world), Silent())
+    (limit,), (u,) = (run.readings().frame[name] for name in ("spin_frequency_hz", "spin_frequency_u_hz"))
+    assert "instrument lost" in kinds(run)
+    assert u > 0.3  # 25 s at 0.06 Hz/s, an even distribution
+    assert abs(limit - SpinScene.fall_hz) < 2 * u
+
+
+def test_a_top_that_never_follows_does_not_keep_a_series_beyond_its_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def never(session: Any) -> None:
+        session.wait(60.0)
+        raise DidNotFollow("the top did not follow")
+
+    monkeypatch.setattr("levilab.acquisition.experiments.limit.drive_up_and_let_go", never)
+    world = SpinWorld(SpinScene(fall_hz=1.0), VirtualClock())  # it stays up
+    run = acquire(in_world(mock(tmp_path, "limit.longest_s=200"), world), Silent())
+    assert kinds(run)[-1] == "longest"
+    assert kinds(run).count("once more") == 4
 
 
 def test_a_top_that_falls_under_the_drive_is_said_to_have_fallen(tmp_path: Path) -> None:
