@@ -67,6 +67,7 @@ class Session(Generic[S]):
         rows: the readings so far, those of the resumed run included.
         zero: bench time of time_s = 0 [s], None before it is reached.
         asked: when the last reading was asked for [s].
+        paused_s: how long a resumed run lay still after its last reading, maybe for days [s].
     """
 
     bench: Bench
@@ -80,6 +81,7 @@ class Session(Generic[S]):
     rows: list[Row] = field(default_factory=list)
     zero: float | None = None
     asked: float = 0.0
+    paused_s: float = 0.0
     _replaying: bool = False
     _losses: int = 0  # since the last reading
     _lost: bool = False  # since the last reading was asked for
@@ -89,6 +91,10 @@ class Session(Generic[S]):
     def now(self) -> float:
         """Seconds since time zero."""
         return self.bench.clock.now() - (self.zero or 0.0)
+
+    def spent(self) -> float:
+        """Seconds since time zero, without those in which a resumed run lay still."""
+        return self.now() - self.paused_s
 
     def wait(self, duration: float) -> None:
         """Let bench time pass [s].  Raises Interrupted if the end was asked for."""
@@ -121,6 +127,7 @@ class Session(Generic[S]):
             self.wait(self.rows[-1]["time_s"])
         else:
             self.zero = self.bench.clock.now() - self.earlier.run.elapsed()
+        self.paused_s = self.now() - self.rows[-1]["time_s"]
         count = len(self.rows)
         self.event("resumed", f"resumed after {count} reading{'s' * (count != 1)}, {resumed}")
 

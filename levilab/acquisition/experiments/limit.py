@@ -96,7 +96,7 @@ def run(session: Session[LimitSettings]) -> None:
         if row is None:
             return
         left = settings.repetitions - number - 1
-        session.keep(row, left * session.now() / (number + 1))
+        session.keep(row, left * session.spent() / (number + 1))
 
 
 def _with_a_top(
@@ -145,7 +145,7 @@ def _coast_down(session: Session[LimitSettings]) -> None:
     settings = session.settings
     session.event("coasts", "the top is still up and comes down by itself")
     while (spin := spin_now(session)) is not None and spin > settings.drive_frequency_hz:
-        if session.now() > settings.longest_s:
+        if session.spent() > settings.longest_s:
             return
         session.progress(f"coasts down, {spin:.2f} Hz", 1.0)
         session.wait(settings.interval_s)
@@ -153,7 +153,7 @@ def _coast_down(session: Session[LimitSettings]) -> None:
 
 def _is_over(session: Session[LimitSettings]) -> bool:
     longest = session.settings.longest_s
-    if session.now() <= longest:
+    if session.spent() <= longest:
         return False
     session.event("longest", f"{longest:g} s are over ({session.writer.record.experiment}.longest_s)")
     return True

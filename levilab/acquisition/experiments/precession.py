@@ -184,7 +184,7 @@ def _go_on(session: Session[PrecessionSettings], place: _Place) -> None:
     """From where the top was driven up to, through the points that are left.  Raises NotHeld."""
     settings = session.settings
     drive = settings.drive_frequency_hz
-    while place.next < len(settings.sweep) and not _is_over(session):
+    while place.next < len(settings.sweep) and session.spent() <= settings.longest_s:
         target = settings.sweep[place.next]
         _creep(session, place, drive, target)
         _wait_for_lock(session, target)
@@ -224,7 +224,7 @@ def _have_a_top(session: Session[PrecessionSettings], place: _Place) -> None:
 
 def _is_over(session: Session[PrecessionSettings]) -> bool:
     longest = session.settings.longest_s
-    if session.now() <= longest:
+    if session.spent() <= longest:
         return False
     session.event("longest", f"{longest:g} s are over (precession.longest_s)")
     return True
@@ -283,7 +283,7 @@ def _measure(session: Session[PrecessionSettings], drive: float) -> Row:
     laser = _counted(session, drive, settings.laser_trigger_level_v, settings.laser_input)
     if settings.laser_input == 1:
         session.ask(Task("Connect the tape's phototransistor to the counter's input 1 again."))
-    prepare_counter(session)
+    _count_the_tape_again(session)
     held_spin(session, drive)  # else what the laser counted is of a top on its way down
     spin, u_spin = _mean(spins, settings)
     precession, u_precession = _mean(_checked(session, laser, drive), settings)
@@ -295,6 +295,14 @@ def _measure(session: Session[PrecessionSettings], drive: float) -> Row:
         "precession_frequency_hz": precession,
         "precession_frequency_u_hz": u_precession,
     }
+
+
+def _count_the_tape_again(session: Session[PrecessionSettings]) -> None:
+    """Set the counter up for the tape; one that fails is reached again."""
+    try:
+        prepare_counter(session)
+    except InstrumentError as error:
+        session.reconnect("counter", error, lambda: prepare_counter(session))
 
 
 def _counted(session: Session[PrecessionSettings], drive: float, level_v: float, channel: int) -> Array:

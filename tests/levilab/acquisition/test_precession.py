@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +10,8 @@ import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
+from instruments.errors import NoAnswer
+from levilab.acquisition.counting import prepare_counter
 from levilab.acquisition.experiments.precession import PrecessionSettings
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
@@ -89,6 +92,40 @@ def test_an_interrupted_sweep_goes_on_at_the_next_point(tmp_path: Path) -> None:
     np.testing.assert_array_equal(readings.column("drive_frequency_hz"), [30.5, 31.0, 32.0])
     assert (np.diff(readings.column("time_s")) > 0).all()
     np.testing.assert_allclose(readings.column("precession_frequency_hz"), [30.5, 31.0, 32.0], atol=0.2)
+
+
+def test_a_sweep_that_is_resumed_on_another_day_goes_on(tmp_path: Path) -> None:
+    """The time that it may take does not run while it lies still."""
+    first = request(tmp_path, Wobbling(SpinScene(), VirtualClock()))
+    run = acquire(first, Impatient(1))
+    file = run.folder / "run.json"
+    text = file.read_text(encoding="utf-8")
+    file.write_text(re.sub(r'("time_zero_utc": )"[^"]*"', r'\1"2026-01-01T00:00:00Z"', text), encoding="utf-8")
+    again = acquire(replace(first, resume=Run.load(run.folder), synthetic_how=None), Silent())
+    assert again.count() == 3
+
+
+def test_a_counter_that_fails_between_laser_and_tape_is_reached_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[int] = []
+
+    def prepare(session: Any) -> None:
+        calls.append(len(calls))
+        if len(calls) == 2:  # the first is at the start
+            raise NoAnswer(session.bench.address("counter"), "*OPC?", 1.0)
+        prepare_counter(session)
+
+    monkeypatch.setattr("levilab.acquisition.experiments.precession.prepare_counter", prepare)
+    run = acquire(request(tmp_path, Wobbling(SpinScene(), VirtualClock())), Silent())
+    assert run.count() == 3
+    assert len(events(run, "found again")) == 1
+
+
+def test_a_sweep_whose_time_is_over_says_so_once(tmp_path: Path) -> None:
+    run = acquire(request(tmp_path, Wobbling(SpinScene(), VirtualClock()), longest_s=20.0), Silent())
+    assert 0 < run.count() < 3
+    assert len(events(run, "longest")) == 1
 
 
 def test_where_the_lock_is_lost_the_top_is_driven_up_anew(tmp_path: Path) -> None:
