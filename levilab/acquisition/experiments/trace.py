@@ -202,7 +202,9 @@ def _why_no_trigger(session: Session[TraceSettings]) -> str:
         _prepare_scope(session, sweep="auto")
         session.bench.oscilloscope.acquire(timeout_s=settings.trigger_patience_s)
         low, high = _range(session.bench.oscilloscope.trace(_shown(settings)))
-    except (InstrumentError, ValueError):
+    except InstrumentError:
+        low = high = math.nan
+    if math.isnan(low):
         return f"{said}, and no record without one: is the signal there?"
     level = settings.trigger_level_v
     if settings.trigger_source not in settings.channels:
@@ -217,9 +219,9 @@ def _shown(settings: TraceSettings) -> int:
 
 
 def _range(trace: Trace) -> tuple[float, float]:
-    """The lowest and the highest voltage of a trace [V].  Raises ValueError where it has no sample."""
+    """The lowest and the highest voltage of a trace [V], NaN where it has no sample."""
     volts = trace.volts[~np.isnan(trace.volts)]
-    return float(volts.min()), float(volts.max())
+    return (float(volts.min()), float(volts.max())) if volts.size else (math.nan, math.nan)
 
 
 def _keep(session: Session[TraceSettings], traces: list[Trace]) -> None:
@@ -232,7 +234,9 @@ def _keep(session: Session[TraceSettings], traces: list[Trace]) -> None:
             session.event("look at the scale", f"record {number}: {problem}", record=number, channel=trace.channel)
     shown = next(trace for trace in traces if trace.channel == _shown(settings))
     low, high = _range(shown)
-    row: Row = {"time_s": now, "record": number, "lowest_v": low, "highest_v": high}
+    row: Row = {"time_s": now, "record": number}
+    if not math.isnan(low):
+        row |= {"lowest_v": low, "highest_v": high}
     session.keep(row, (settings.records - number) * settings.interval_s)
 
 

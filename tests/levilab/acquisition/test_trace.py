@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
+from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.errors import OutOfRange
 from instruments.virtual.counter.edges import crossings
 from levilab.acquisition.loop import AcquisitionRequest, acquire
@@ -141,6 +142,21 @@ def test_a_channel_that_shows_nothing_or_too_much_is_told(tmp_path: Path) -> Non
     texts = [event["text"] for event in run.events()]
     assert "channel 1 (tape) is beyond the screen" in texts[0]
     assert "channel 4 (channel 4) shows nothing" in texts[1]
+
+
+def test_a_record_without_a_single_sample_is_kept_and_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = RigolDS1000Z.trace
+
+    def hollow(scope: Any, channel: int) -> Any:
+        trace = whole(scope, channel)
+        return replace(trace, codes=np.zeros_like(trace.codes), none=0)
+
+    monkeypatch.setattr(RigolDS1000Z, "trace", hollow)
+    run = acquire(mock_trace(tmp_path, "records = 1\npoints = 1000", seed=1), Silent())
+    assert run.status == "finished"
+    assert len(run.traces()) == 1
+    assert "shows nothing" in run.events()[0]["text"]
+    assert run.readings().frame[["lowest_v", "highest_v"]].isna().all(axis=None)
 
 
 def test_a_channel_that_another_program_turns_off_is_turned_on_again(tmp_path: Path) -> None:
