@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 Array = NDArray[np.float64]
 AxialField = Callable[[Array], Array]
@@ -24,6 +23,13 @@ AxialField = Callable[[Array], Array]
 #: Steps of the scans: heights in which a window or an equilibrium is looked for, and spins.
 HEIGHTS = 4000
 SPINS = 2000
+
+
+def _zero(function: Callable[[float], float], low: float, high: float, *, xtol: float, rtol: float = 1e-14) -> float:
+    """Where a function changes sign, by Brent's method."""
+    from scipy.optimize import brentq  # takes a moment to load
+
+    return float(brentq(function, low, high, xtol=xtol, rtol=rtol))
 
 
 @dataclass(frozen=True)
@@ -115,7 +121,7 @@ def _edge(field: AxialField, top: Symmetric, inside: float, outside: float) -> f
     """The height at which one of the conditions passes zero."""
     size = _sizes(field, inside)
     worst = lambda z: float(np.min(_conditions(field, top, np.array([z]))[:, 0] / size))  # noqa: E731
-    return float(brentq(worst, inside, outside, xtol=1e-15, rtol=1e-14))
+    return _zero(worst, inside, outside, xtol=1e-15, rtol=1e-14)
 
 
 def _sizes(field: AxialField, z: float) -> Array:
@@ -151,7 +157,7 @@ def equilibria(field: AxialField, top: Symmetric, low: float, high: float) -> tu
         return float(top.moment * field(np.array([height]))[1, 0] - weight)
 
     values = top.moment * field(z)[1] - weight
-    places = [float(brentq(missing, z[i], z[i + 1], xtol=1e-15)) for i in np.flatnonzero(values[1:] * values[:-1] < 0)]
+    places = [_zero(missing, z[i], z[i + 1], xtol=1e-15) for i in np.flatnonzero(values[1:] * values[:-1] < 0)]
     return tuple(_described(field, top, place) for place in places)
 
 
@@ -207,7 +213,7 @@ def spin_windows(field: AxialField, top: Symmetric, height: float) -> tuple[tupl
     def discriminant(spin: float) -> float:
         return _discriminant(quartic(field, top, height, 2 * math.pi * spin))
 
-    edges = [float(brentq(discriminant, spins[i], spins[i + 1], xtol=1e-13, rtol=1e-14)) for i in change]
+    edges = [_zero(discriminant, spins[i], spins[i + 1], xtol=1e-13, rtol=1e-14) for i in change]
     edges = [0.0] * bool(stable[0]) + edges + [math.inf] * bool(stable[-1])
     return tuple(zip(edges[::2], edges[1::2], strict=True))
 

@@ -17,7 +17,6 @@ from levilab.pipelines.result import Place, place_of
 from levilab.pipelines.sources import InputOptions, Needs, Source, collect
 from levilab.present.numbers import with_uncertainty
 from levilab.runs.run import find_run
-from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.keys import SceneError
 from levilab.simulator.scene import Scene, scene_of
 
@@ -243,6 +242,8 @@ def device_of(source: Source[LimitReadings]) -> Device:
 
 def described_device(scene: Scene, name: str) -> Device:
     """What theory says of a scene's top, where it floats.  Raises NoWindow, SceneError."""
+    from levilab.simulator.equilibrium import stability_of  # with numba, which no other analysis needs
+
     found = stability_of(scene)
     windows = found.floating.spins if found.floating else ()
     low, high = spins_of_window(windows, scene.start.spin_hz)

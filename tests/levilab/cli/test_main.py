@@ -347,6 +347,7 @@ HEAVY = {"numpy", "scipy", "pandas", "matplotlib", "lmfit", "pyvisa", "jinja2", 
         (["--version"], set[str]()),
         (["acquire", "spin", "--mock"], {"numpy", "pandas", "pyvisa"}),
         (["runs", "."], {"numpy", "pandas"}),
+        (["analyze", "nowhere"], {"numpy", "pandas"}),
     ],
 )
 def test_nothing_heavy_is_imported_where_it_is_not_used(tmp_path: Path, words: list[str], allowed: set[str]) -> None:
