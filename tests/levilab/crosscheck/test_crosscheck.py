@@ -67,6 +67,7 @@ def test_a_value_without_an_uncertainty_is_no_pull():
 @pytest.mark.parametrize(
     ("name", "seed", "quantities"),
     [
+        ("spin", 1, {"frequency", "chirp"}),
         ("spindown", 1, {"newton c2", "start frequency", "exponent", "fall"}),
         ("motion", 1, {"disc c32", "exponent", "fall"}),
         (
