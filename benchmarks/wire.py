@@ -377,7 +377,7 @@ def _acquired() -> dict[str, float]:
     with tempfile.TemporaryDirectory() as folder, ExitStack() as patched:
         request = request_for("spin", AcquisitionOptions(mock=True, out=Path(folder), seed=1))
         world: Any = SpinWorld(drawn(1), VirtualClock())
-        light = world.light = Stopwatch(world.light)
+        light = world.crossings = Stopwatch(world.crossings)
         disk = Stopwatch(os.fsync)
         patched.enter_context(mock.patch("os.fsync", disk))
         start = time.perf_counter()

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
-from levilab.crosscheck.subjects import field, motion, spindown
+from levilab.crosscheck.subjects import field, motion, precession, spin, spindown
 
 #: Name → subject.
-SUBJECTS = MappingProxyType({subject.name: subject for subject in (spindown.SUBJECT, motion.SUBJECT, field.SUBJECT)})
+SUBJECTS = MappingProxyType(
+    {
+        subject.name: subject
+        for subject in (spin.SUBJECT, spindown.SUBJECT, motion.SUBJECT, precession.SUBJECT, field.SUBJECT)
+    }
+)

@@ -77,11 +77,11 @@ def _banner(found: Analyzed) -> tuple[str, str] | None:
         return None
     below = "How it was made stands below, under its name."
     if total == 1:
-        return "SYNTHETIC.", f"This run did not come from a real top. {below}"
+        return "SYNTHETIC.", f"This run did not come from a real bench. {below}"
     below = "How each was made stands below, under its name."
     if len(made_up) == total:
-        return "SYNTHETIC.", f"None of these {total} runs came from a real top. {below}"
-    said = f"{len(made_up)} of {total} runs did not come from a real top ({', '.join(made_up)})"
+        return "SYNTHETIC.", f"None of these {total} runs came from a real bench. {below}"
+    said = f"{len(made_up)} of {total} runs did not come from a real bench ({', '.join(made_up)})"
     mixed = "Means, comparisons and figure are of both together and so no measurement: report the real runs "
     return "REAL AND SYNTHETIC RUNS MIXED.", f"{said}. {mixed}by themselves. {below}"
 

@@ -121,16 +121,16 @@ class Tape:
         """When the voltage crosses a level [V], from times near that [s]; clean: the voltage then.
 
         Where the voltage does not change there is no crossing, so there may be fewer than times.
-        Newton's method on the clean voltage; noise then moves the crossing by what it is over the slope.
+        One step of Newton's method on the clean voltage, which the offset has brought within some µs of it; noise then
+        moves the crossing by what it is over the slope.
         """
-        for _ in range(2):
-            three = near + np.array([[-_CLOSE_S], [0.0], [_CLOSE_S]])
-            before, here, after = clean(three.T.ravel()).reshape(-1, 3).T
-            slope = (after - before) / (2 * _CLOSE_S)
-            crosses = slope != 0  # where a top is put back or falls, no pulse is near
-            slope = slope[crosses]
-            near = near[crosses] - (here - level)[crosses] / slope
-        return near - self.noise_at(near, seed) / slope
+        three = near + np.array([[-_CLOSE_S], [0.0], [_CLOSE_S]])
+        before, here, after = clean(three.T.ravel()).reshape(-1, 3).T
+        slope = (after - before) / (2 * _CLOSE_S)
+        crosses = slope != 0  # where a top is put back or falls, no pulse is near
+        slope = slope[crosses]
+        near = near[crosses] - (here - level)[crosses] / slope
+        return np.asarray(near - self.noise_at(near, seed) / slope)
 
 
 def _behind_a_pole(u: Array, q: Array) -> Array:
@@ -238,11 +238,25 @@ def noise(times: Array, seed: tuple[int, int]) -> Array:
     place = times / NOISE_S
     whole = np.floor(place)
     share = place - whole
-    number = whole.astype(np.int64).view(np.uint64)
-    start = np.uint64(int(np.random.SeedSequence(seed).generate_state(1, np.uint64)[0]))
-    table = _normal()
-    here, there = table[_hash(number + start)], table[_hash(number + start + np.uint64(1))]
+    number = whole.astype(np.int64)
+    first, last = (int(number.min()), int(number.max())) if number.size else (0, 0)
+    if last - first < number.size:  # a dense record: several samples share a number
+        drawn = _normal_at(np.arange(first, last + 2), seed)
+        here, there = drawn[number - first], drawn[number - first + 1]
+    else:
+        here, there = _normal_at(number, seed), _normal_at(number + 1, seed)
     return np.asarray((here * (1 - share) + there * share) / np.sqrt((1 - share) ** 2 + share**2))
+
+
+def _normal_at(numbers: NDArray[np.int64], seed: tuple[int, int]) -> Array:
+    """A normal number for each whole number."""
+    return _normal()[_hash(numbers.view(np.uint64) + _start_of(seed))]
+
+
+@functools.cache
+def _start_of(seed: tuple[int, int]) -> np.uint64:
+    """Where the numbers of a seed begin."""
+    return np.uint64(int(np.random.SeedSequence(seed).generate_state(1, np.uint64)[0]))
 
 
 def _hash(numbers: NDArray[np.uint64]) -> NDArray[np.uint64]:

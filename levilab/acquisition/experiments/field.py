@@ -126,7 +126,7 @@ def run(session: Session[FieldSettings]) -> None:
     heights = session.settings.heights_m
     _set_up(session)
     _zero(session)
-    session.begin(lambda: session.progress("probe zeroed", 1.0))
+    session.begin(lambda: session.progress("probe zeroed", 1.0), resumed="the probe was zeroed again")
     done, since = len(session.rows), session.now()
     for k in range(done, len(heights)):
         height = _place(session, heights[k], f"{k + 1} of {len(heights)}")

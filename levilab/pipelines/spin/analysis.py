@@ -202,14 +202,14 @@ def spin_of_source(source: Source[Records], options: SpinOptions) -> SpinRun:
 
 def _of_times(times: Array) -> SpinRun:
     if times[-1] - times[0] <= LONGEST_WHOLE_S:
-        return _of_one(spin_of_times(times))
+        return _of_one(spin_of_times(times).under_drag())
     return _of_track(track_of_times(times, window=WINDOW_S))
 
 
 def _of_waveform(waveform: Waveform, channel: str, options: SpinOptions) -> SpinRun:
     if waveform.duration <= LONGEST_WHOLE_S:
         samples = waveform.samples(channel)
-        spin = spin_of_trace(samples, waveform.rate, start=waveform.start, method=options.method)
+        spin = spin_of_trace(samples, waveform.rate, start=waveform.start, method=options.method).under_drag()
         return _of_one(_with_rate(spin, waveform))
     blocks = waveform.blocks(channel)
     return _of_track(
@@ -232,7 +232,8 @@ def _of_several(records: Records, options: SpinOptions) -> SpinRun:
     for waveform in records.waveforms:
         try:
             samples = waveform.samples()
-            spins.append(spin_of_trace(samples, waveform.rate, start=waveform.start, method=options.method))
+            spin = spin_of_trace(samples, waveform.rate, start=waveform.start, method=options.method)
+            spins.append(spin.under_drag())
         except AnalysisError as error:
             missed = error
     if not spins:

@@ -91,3 +91,20 @@ def test_wrong_lists_are_refused_with_the_reason():
         spin_of_times([0.0, np.nan, 0.2, 0.3, 0.4])
     with pytest.raises(TimesNotIncreasing):
         spin_of_times([0.0, 0.2, 0.1, 0.3, 0.4])
+
+
+@pytest.mark.parametrize("power", [0.0, 1.0, 2.0])
+def test_a_slope_that_changes_as_under_drag_is_allowed_for(power):
+    """ν′ = −0.1 Hz/s (ν/30 Hz)^n over 4 s, to the third order of time; the parabola alone is off by ν″T²/40."""
+    slope, spin = -0.1, 30.0
+    change = power * slope**2 / spin
+    t = np.linspace(-2.0, 2.0, 4001)
+    turns = spin * t + slope * t**2 / 2 + change * t**3 / 6
+    whole = np.arange(np.ceil(turns[0]), np.floor(turns[-1]) + 1)
+    times = np.interp(whole, turns, t) + np.random.default_rng(1).normal(0, 1e-7, whole.size)
+    plain = spin_of_times(times, degree=2)
+    found = plain.under_drag()
+    truth = spin + slope * found.reference_time
+    assert found.frequency.u == pytest.approx(0.6 * slope**2 / spin * 16 / 40, rel=0.05)  # 0.6 ν′²/ν T²/40
+    assert abs(found.frequency.value - truth) < 2 * found.frequency.u
+    assert abs(plain.frequency.value - truth) == pytest.approx(change * 16 / 40, abs=2e-6)

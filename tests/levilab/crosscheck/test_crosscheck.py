@@ -88,6 +88,7 @@ def test_ctrl_c_in_a_trial_ends_the_cross_check():
 @pytest.mark.parametrize(
     ("name", "seed", "quantities"),
     [
+        ("spin", 1, {"frequency", "chirp"}),
         ("spindown", 1, {"newton c2", "start frequency", "exponent", "fall"}),
         ("motion", 1, {"disc c32", "exponent", "fall"}),
         (

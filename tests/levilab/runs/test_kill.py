@@ -116,6 +116,7 @@ def test_a_signal_ends_the_process_with_130_and_the_run_kept(tmp_path: Path, nam
 FULL = """
 import builtins, errno, os
 left = {room}
+after_readings = []
 class Small:
     '''A file on a disk with little room: what no longer fits is half written, then refused, as write(2) does.'''
     def __init__(self, file): self.file = file
@@ -126,6 +127,7 @@ class Small:
         global left
         self.file.write(text[:left]); self.file.flush()
         short, left = len(text) > left, max(0, left - len(text))
+        if self.file.name.endswith('readings.csv'): after_readings.append({room} - left)
         if short: raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         return len(text)
 from pathlib import Path
@@ -168,19 +170,18 @@ def survives(tmp_path: Path, before: str, reason: str) -> int:
     return len(shown)
 
 
-def bytes_written(out: Path) -> int:
-    """How much a whole run writes, in the reckoning of FULL."""
-    room = 10**9
-    told = "import atexit, sys; atexit.register(lambda: print('left', left, file=sys.stderr))\n"
-    process = start(out, before=FULL.format(room=room) + told)
+def written_after_readings(out: Path) -> list[int]:
+    """How much a run has written after each line of readings.csv, in the reckoning of FULL."""
+    told = "import atexit, sys; atexit.register(lambda: print(*after_readings, file=sys.stderr))\n"
+    process = start(out, before=FULL.format(room=10**9) + told)
     _, err = process.communicate(timeout=HANG_GUARD_S)
     assert process.returncode == 0, err
-    return room - int(err.split()[-1])
+    return [int(number) for number in err.splitlines()[-1].split()]
 
 
 def test_a_disk_that_fills_up_at_any_moment_loses_no_reading_that_was_shown(tmp_path: Path) -> None:
-    written = bytes_written(tmp_path / "whole")
-    rooms = (0, 40, 1500, *np.linspace(0.7 * written, 0.88 * written, 10).astype(int))
+    header, *readings = written_after_readings(tmp_path / "whole")
+    rooms = (0, 40, header + 1000, *np.linspace(readings[0] - 20, readings[-1] + 20, 9).astype(int))
     shown = [survives(tmp_path / str(room), FULL.format(room=room), "No space left") for room in rooms]
     assert shown[0] == 0
     assert max(shown) > 3

@@ -1,0 +1,28 @@
+"""The sweep of the drive: a locked top wobbles at the drive's frequency, so the line has slope 1 and meets 0."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from levilab.crosscheck.subject import Pull, Subject, acquired, pull_of
+from levilab.pipelines.catalogue import ANALYSES
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def trial(seed: int, folder: Path) -> list[Pull]:
+    """One sweep of a top in full motion; the seed draws the phase at which the drive takes hold, and the noise."""
+    run = acquired("precession", seed, folder, lambda request: request)
+    analysis = ANALYSES["precession"]
+    found = analysis.analyze([run.folder], analysis.options_from({}))
+    (one,) = analysis.document(found, folder)["runs"]
+    return [pull_of("slope", one["values"]["slope"], 1.0), pull_of("intercept", one["values"]["intercept"], 0.0)]
+
+
+SUBJECT = Subject(
+    "precession",
+    "the sweep of the drive of a top in full motion: slope and intercept of its precession",
+    trial,
+    trials=10,
+)

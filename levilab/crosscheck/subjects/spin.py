@@ -1,0 +1,84 @@
+"""A record of the tape's light: frequency and chirp, by the pulses of some tenths of a second to some seconds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from instruments.clock import VirtualClock
+from levilab.acquisition.table import settings_of, with_settings
+from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquired, pull_of
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.world.bench import virtual_wiring
+from levilab.world.light import Tape
+from levilab.world.spin_world import Array, SpinScene, SpinWorld
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from levilab.acquisition.loop import AcquisitionRequest
+
+#: The chirp's truth is a difference over twice this [s].
+_APART_S = 0.05
+
+
+class _Watched(SpinWorld):
+    """A world that remembers at which of its times the oscilloscope looked: step count → time of the first sample."""
+
+    def __init__(self, scene: SpinScene) -> None:
+        super().__init__(scene, VirtualClock())
+        self.looks: dict[int, float] = {}
+
+    def light(self, start: float, step: float, n: int) -> Array:
+        """See SpinWorld."""
+        self.looks[n] = start
+        return super().light(start, step, n)
+
+
+def trial(seed: int, folder: Path) -> list[Pull]:
+    """One record: spin, drag, tape, noise, jitter of the pulses and the record's length are drawn by the seed."""
+    random = np.random.default_rng((seed, 5))
+    scene = SpinScene(
+        start_hz=float(random.uniform(24.0, 45.0)),
+        constants=(2.34e-4 * float(random.uniform(0.7, 1.3)),),
+        fall_hz=20.0,
+        tape=Tape(width=float(random.uniform(0.02, 0.05)), noise=float(10 ** random.uniform(-2.5, -1.0))),
+        jitter=float(10 ** random.uniform(-5, -2)),
+        seed=seed,
+    )
+    world = _Watched(scene)
+    duration = float(random.uniform(1.0, 4.0))
+    run = acquired("trace", seed, folder, lambda request: _in_world(request, world, duration))
+    (stored,) = run.traces()
+    start = world.looks.get(stored.trace.codes.size)
+    if start is None:
+        raise TrialFailed("the oscilloscope took its record in several pieces: its time is not known")
+    found = ANALYSES["spin"]
+    options = found.options_from({})
+    (one,) = found.document(found.analyze([run.folder], options), folder)["runs"]
+    values = one["values"]
+    # the run's time counts from its own zero; the record has the same first sample in both
+    moment = values["reference_time"]["value"] - (stored.time_s + stored.trace.t0_s) + start
+    before, here, after = world.motion(moment + np.array([-_APART_S, 0.0, _APART_S]))[0] / (2 * math.pi)
+    return [
+        pull_of("frequency", values["frequency"], float(here)),
+        pull_of("chirp", values["chirp"], float(after - before) / (2 * _APART_S)),
+    ]
+
+
+def _in_world(request: AcquisitionRequest, world: _Watched, duration_s: float) -> AcquisitionRequest:
+    settings = settings_of(request.config, "trace").model_copy(
+        update={"records": 1, "duration_s": duration_s, "points": round(20_000 * duration_s)}
+    )
+    config = with_settings(request.config, "trace", settings)
+    return replace(request, config=config, wiring=lambda: virtual_wiring(world, config.limits))
+
+
+SUBJECT = Subject(
+    "spin",
+    "a record of the light of a top that slows down: frequency and chirp",
+    trial,
+)
