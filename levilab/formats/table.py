@@ -107,6 +107,14 @@ def read_table(
     )
 
 
+def must_be_positive(table: Table, values: "NDArray[np.float64]", what: str, advice: str) -> None:
+    """Raise TableError, which names the line, for the first of these values that is not above 0."""
+    wrong = np.flatnonzero(values <= 0)
+    if wrong.size:
+        i = int(wrong[0])
+        raise TableError(table.path, f"{what} is {values[i]:.9g} {advice}", line=int(table.lines[i]))
+
+
 def read_run_readings(path: Path, channels: Collection[str] = ()) -> Table:
     """Read the readings.csv of a run folder, which may still be being written.
 

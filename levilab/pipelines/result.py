@@ -16,6 +16,7 @@ from levilab.errors import DataError
 from levilab.files import CannotWrite, parse_json, replace_atomically
 from levilab.runs.run import RECORD
 from levilab.settings import in_one_line
+from levilab.software import software_versions
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -223,6 +224,13 @@ class Earlier(Generic[R]):
     def sha256(self) -> str:
         """Of the data file at that time."""
         return self.result.inputs[self.number].sha256
+
+    @property
+    def text(self) -> str:
+        """Where it comes from, for people."""
+        then = self.result.software
+        by = f", by levilab {then.get('levilab', '?')}" if then != software_versions() else ""
+        return f"as levilab analyze found it{by}: {self.file}"
 
 
 class Archive(Generic[R]):

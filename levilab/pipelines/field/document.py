@@ -335,9 +335,7 @@ def _recalled(
 
 
 def _origin(earlier: Earlier[FieldResult]) -> Origin:
-    now, then = software_versions(), earlier.result.software
-    by = f", by levilab {then.get('levilab', '?')}" if then != now else ""
-    return Origin(earlier.result.settings.options, f"as levilab analyze found it{by}: {earlier.file}")
+    return Origin(earlier.result.settings.options, earlier.text)
 
 
 def _restored(earlier: Earlier[FieldResult], source: Source[FieldReadings]) -> FieldRun:

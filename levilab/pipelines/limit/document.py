@@ -22,7 +22,7 @@ from levilab.pipelines.limit.analysis import (
     limits_of,
     together,
 )
-from levilab.pipelines.result import SCHEMA, Archive, Part, Place, Result, RunPart, Value, place_of, relative
+from levilab.pipelines.result import SCHEMA, Archive, Earlier, Part, Place, Result, RunPart, Value, place_of, relative
 from levilab.pipelines.result import save as save_files
 from levilab.pipelines.sources import collect
 from levilab.runs.run import find_run
@@ -233,8 +233,6 @@ def recall_limits(paths: Sequence[Path], options: LimitOptions) -> LimitAnalysis
         file, result = whole
         numbers = {given.sha256: k for k, given in enumerate(result.inputs)}
         order = [numbers[source.sha256] for source in found.sources]
-        now, then = software_versions(), result.software
-        by = f", by levilab {then.get('levilab', '?')}" if then != now else ""
         made_with = LimitOptions(columns=result.settings.columns or None, reading_u=result.settings.reading_u_hz)
         return LimitAnalysis(
             sources=tuple(replace(source, warnings=()) for source in found.sources),
@@ -246,7 +244,7 @@ def recall_limits(paths: Sequence[Path], options: LimitOptions) -> LimitAnalysis
             place=place,
             warnings=tuple(dict.fromkeys((*result.warnings, *map(unquoted, found.warnings)))),
             remarks=found.remarks,
-            origins=(f"as levilab analyze found it{by}: {file}",) * len(order),
+            origins=(Earlier(file, result, 0).text,) * len(order),
         )
     return _anew(found.sources, options, place, (found.warnings, found.remarks))
 

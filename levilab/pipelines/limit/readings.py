@@ -9,7 +9,7 @@ import numpy as np
 
 from levilab.errors import DoesNotSuit
 from levilab.formats.columns import TableError
-from levilab.formats.table import read_table
+from levilab.formats.table import must_be_positive, read_table
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -78,9 +78,9 @@ def limit_readings(table: Table) -> LimitReadings:
         raise TableError(table.path, "holds no limit: at least one repetition is needed")
     has_u = "spin_frequency_u_hz" in table.frame.columns
     u = table.column("spin_frequency_u_hz") if has_u else None
-    _must_be_positive(table, limit, "the limit", "Hz, but a spinning top is above 0: remove the row")
+    must_be_positive(table, limit, "the limit", "Hz, but a spinning top is above 0: remove the row")
     if u is not None:
-        _must_be_positive(table, u, "the uncertainty", "Hz, but must be above 0: correct it or remove the column")
+        must_be_positive(table, u, "the uncertainty", "Hz, but must be above 0: correct it or remove the column")
     spread = float(np.ptp(limit) / limit.mean())
     if spread > _MOST_SPREAD:
         raise DoesNotSuit(
@@ -88,10 +88,3 @@ def limit_readings(table: Table) -> LimitReadings:
             "one row a repetition is expected"
         )
     return LimitReadings(limit, u, table.warnings)
-
-
-def _must_be_positive(table: Table, values: Array, what: str, advice: str) -> None:
-    wrong = np.flatnonzero(values <= 0)
-    if wrong.size:
-        i = int(wrong[0])
-        raise TableError(table.path, f"{what} is {values[i]:.9g} {advice}", line=int(table.lines[i]))

@@ -339,9 +339,7 @@ def _recalled(
 
 
 def _origin(earlier: Earlier[PrecessionResult]) -> Origin:
-    now, then = software_versions(), earlier.result.software
-    by = f", by levilab {then.get('levilab', '?')}" if then != now else ""
-    return Origin(earlier.result.settings.options, f"as levilab analyze found it{by}: {earlier.file}")
+    return Origin(earlier.result.settings.options, earlier.text)
 
 
 def _restored(result: PrecessionResult, file: Path, found: Found[Readings], place: Place) -> PrecessionAnalysis:

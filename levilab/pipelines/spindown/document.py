@@ -497,9 +497,7 @@ def _with_tilt(source: Source[Readings], options: SpinDownOptions) -> tuple[Sour
 
 
 def _origin(earlier: Earlier[SpinDownResult]) -> Origin:
-    now, then = software_versions(), earlier.result.software
-    by = f", by levilab {then.get('levilab', '?')}" if then != now else ""
-    return Origin(earlier.result.settings.options, f"as levilab analyze found it{by}: {earlier.file}")
+    return Origin(earlier.result.settings.options, earlier.text)
 
 
 def _restored(result: SpinDownResult, file: Path, found: Found[Readings], place: Place) -> SpinDownAnalysis:

@@ -9,7 +9,7 @@ from analysis.errors import AnalysisError
 from analysis.pulses import phases, track_of_blocks, track_of_times
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
-from levilab.formats.table import FEWEST, Table, read_table
+from levilab.formats.table import FEWEST, Table, must_be_positive, read_table
 from levilab.formats.waveforms.header import NoRate, NoWaveform
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes
@@ -148,9 +148,9 @@ def spin_readings(table: Table, *, fewest: int = FEWEST) -> Readings:
         raise TableError(table.path, f"holds {time.size} readings, at least {fewest} are needed: record longer")
     _must_be_ordinary(table, time, frequency)
     _must_increase(table, time)
-    _must_be_positive(table, frequency, "the frequency", "Hz, but a spinning top is above 0: remove the reading")
+    must_be_positive(table, frequency, "the frequency", "Hz, but a spinning top is above 0: remove the reading")
     if u is not None:
-        _must_be_positive(table, u, "the uncertainty", "Hz, but must be above 0: correct it or remove the column")
+        must_be_positive(table, u, "the uncertainty", "Hz, but must be above 0: correct it or remove the column")
         _must_be_possible(table, u, frequency)
     return Readings(time, frequency, u, (*table.warnings, *_doubts(table, frequency)))
 
@@ -200,13 +200,6 @@ def _must_increase(table: Table, time: "NDArray[np.float64]") -> None:
             "the readings, or correct one",
             line=after,
         )
-
-
-def _must_be_positive(table: Table, values: "NDArray[np.float64]", what: str, advice: str) -> None:
-    wrong = np.flatnonzero(values <= 0)
-    if wrong.size:
-        i = int(wrong[0])
-        raise TableError(table.path, f"{what} is {values[i]:.9g} {advice}", line=int(table.lines[i]))
 
 
 def _must_be_possible(table: Table, u: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> None:
