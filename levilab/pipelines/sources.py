@@ -231,7 +231,7 @@ def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]
 
 @contextmanager
 def _passing_over(broken: list[str], remarks: list[str]) -> Iterator[None]:
-    """Note what is wrong with a data file that nobody named; one of another kind is of no concern."""
+    """Note what is wrong with a data file that was found in a folder; one of another kind is of no concern."""
     try:
         yield
     except NoRate as error:

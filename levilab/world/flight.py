@@ -1,4 +1,4 @@
-"""The motion of a top as far as somebody looks, under a drive that changes meanwhile; put back when it has fallen."""
+"""The motion of a top as far as an instrument looks, under a drive that changes; put back when it has fallen."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ class Flight:
             self._state, self._step, self._known = self._begin(time), None, time
 
     def forget(self, before: float) -> None:
-        """Nobody will ask for times before this one [s]."""
+        """Drop what ended before this time [s]."""
         self._pieces.forget(before)
 
     def turns(self, times: Array) -> tuple[Array, NDArray[np.bool_]]:
@@ -186,7 +186,7 @@ class Flight:
                 place[part], up[part] = _cubic(times[part], piece.times, *piece.stem), True
         return place, up
 
-    # --- as far as somebody looks ---
+    # --- as far as an instrument looks ---
 
     def look(self, until: float) -> None:
         """Work the motion out up to this time [s]."""
@@ -236,7 +236,7 @@ class Flight:
         self._wait(time)
 
     def _wait(self, fallen: float) -> None:
-        """Nothing happens until somebody puts the top back."""
+        """Nothing happens until the top is put back."""
         self._state, self._known = None, math.inf if self._again_s is None else fallen + self._again_s
 
 

@@ -105,7 +105,7 @@ class Tape:
         """Where a trigger fires about the middle of a turn [turns], to 1e-3 of a turn.
 
         rate: of turns [Hz]; least: height of the lowest pulse.  None where it does not fire once a turn for certain, or
-        nobody can say where without a trace: a level in the noise, near the top of a pulse or above saturation, a
+        only a trace can say where: a level in the noise, near the top of a pulse or above saturation, a
         hysteresis smaller than the noise, ripple, a phototransistor slower than the pulse.
         """
         margin, share = 5 * self.noise, (triggers.fire - self.dark) / (self.bright - self.dark)

@@ -1,4 +1,4 @@
-"""A world in full motion: the top of a scene, simulated as far as somebody looks, under the drive of the bench.
+"""A world in full motion: the top of a scene, simulated as far as an instrument looks, under the drive of the bench.
 
 The light is that of a tape which passes a fixed spot on the top's rim.  So the wobble of the top is seen in it: where
 it stands 1 mm aside, its tape comes a hundredth of a turn early or late.  The laser's beam beside the stem is cut as
@@ -40,7 +40,7 @@ _SHAPES = {"SIN": "sine", "SQU": "square", "TRI": "triangle"}
 
 
 def prepare(scene: Scene) -> None:
-    """Have all code compiled, which takes some seconds the first time on a machine, before anybody waits for it.
+    """Have all code compiled, which takes some seconds the first time on a machine.
 
     Raises SceneError for a scene without motion, SimulationError for one that cannot be simulated.
     """
@@ -97,7 +97,7 @@ class MotionWorld:
         self._flight.put_back(self.clock.now())
 
     def keep_up(self) -> None:
-        """Work the motion out up to now, so that nobody has to wait for hours of it."""
+        """Simulate up to the present time, so that no question has to wait for hours of it."""
         self._forget()
         self._flight.look(self.clock.now())
 

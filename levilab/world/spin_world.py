@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Nobody asks for what is longer ago [s]: the counters look 12 000 s ahead and leave 2500 s out, the scopes look 600 s
+#: History that is kept [s]: the counters look 12 000 s ahead and leave 2500 s out, the scopes look 600 s
 #: back.
 KEPT_S = 15_000.0
 
@@ -42,7 +42,7 @@ class World(Protocol):
     clock: Clock
 
     def keep_up(self) -> None:
-        """Whatever takes long, do it up to now, before somebody asks; and forget what nobody asks for."""
+        """Simulate up to the present time, and drop history older than KEPT_S."""
 
     def light(self, start: float, step: float, n: int) -> Array:
         """The phototransistor's voltage at start + step·k, shape (n,) [V]."""

@@ -16,7 +16,7 @@ T = TypeVar("T")
 
 Array = NDArray[np.float64]
 
-#: So much that nobody asks for any more is let go at once: what is behind it in the list has to be moved.
+#: So many items are dropped at once: what is behind it in the list has to be moved.
 _AT_ONCE = 1000
 
 
@@ -58,7 +58,7 @@ class History(Generic[T]):
         self._items.append(item)
 
     def forget(self, before: float) -> None:
-        """Nobody will ask for times before this one."""
+        """Drop what ended before this time [s]."""
         stale = bisect_right(self._starts, before) - 1
         if stale >= _AT_ONCE:
             del self._starts[:stale], self._items[:stale]

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from levilab.acquisition.session import Row, Session
     from levilab.bench.config import Limits
 
-#: More heights than anybody has the patience for: a step in the wrong unit.
+#: More heights than a person has the patience for: a step in the wrong unit.
 _MOST_HEIGHTS = 1000
 #: As many as the model has parameters of its own.
 _FEWEST_HEIGHTS = 4

@@ -78,7 +78,7 @@ def read_spin_file(path: "Path", options: "InputOptions") -> Readings:
     except NoWaveform:
         pass
     except DataError as error:
-        if not options.guess:  # a damaged record that nobody called a spin-down
+        if not options.guess:  # a damaged record that was found in a folder
             raise DoesNotSuit(str(error)) from error
         raise
     else:
