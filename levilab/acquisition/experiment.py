@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Generic, Self, TypeVar
+from typing import TYPE_CHECKING, ClassVar, Generic, Self, TypeVar
 
 from pydantic import Field, PositiveFloat, model_validator
 from pydantic_core import PydanticCustomError
@@ -35,7 +35,13 @@ class ExperimentSettings(Settings):
 
 
 class CounterSettings(ExperimentSettings):
-    """Readings of the counter at an interval."""
+    """Readings of the counter at an interval.
+
+    one_top: whether all readings are of one top, which falls meanwhile: then longest_s counts from time zero, else a
+    resumed run has it anew.
+    """
+
+    one_top: ClassVar[bool] = True
 
     interval_s: PositiveFloat = Field(default=10.0, description="then read every so often,")
     gate_s: PositiveFloat = Field(default=1.0, description="counting for so long")

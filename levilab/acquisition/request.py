@@ -190,7 +190,7 @@ def _check_readings(run: Run, request: AcquisitionRequest) -> None:
         if channel.unit == "Hz" and channel.name in readings.frame and not (readings.column(channel.name) > 0).all():
             raise CannotResume(f"{readings.path}: {channel.name}: only numbers above 0 are expected; {_ANEW}")
     last = float(readings.column("time_s")[-1])
-    if isinstance(settings, CounterSettings) and last > settings.longest_s:
+    if isinstance(settings, CounterSettings) and settings.one_top and last > settings.longest_s:
         raise CannotResume(
             f"{run.folder}: its last reading is of {last:g} s, and it was to end after {settings.longest_s:g} s "
             f"({experiment.name}.longest_s): there is nothing to go on with; start anew"

@@ -67,7 +67,7 @@ class Session(Generic[S]):
         rows: the readings so far, those of the resumed run included.
         zero: bench time of time_s = 0 [s], None before it is reached.
         asked: when the last reading was asked for [s].
-        paused_s: how long a resumed run lay still after its last reading, maybe for days [s].
+        began: when this session began to measure: at time zero, or when it resumed the run, maybe days later [s].
     """
 
     bench: Bench
@@ -81,7 +81,7 @@ class Session(Generic[S]):
     rows: list[Row] = field(default_factory=list)
     zero: float | None = None
     asked: float = 0.0
-    paused_s: float = 0.0
+    began: float = 0.0
     _replaying: bool = False
     _losses: int = 0  # since the last reading
     _lost: bool = False  # since the last reading was asked for
@@ -93,8 +93,8 @@ class Session(Generic[S]):
         return self.bench.clock.now() - (self.zero or 0.0)
 
     def spent(self) -> float:
-        """Seconds since time zero, without those in which a resumed run lay still."""
-        return self.now() - self.paused_s
+        """Seconds since this session began to measure."""
+        return self.now() - self.began
 
     def wait(self, duration: float) -> None:
         """Let bench time pass [s].  Raises Interrupted if the end was asked for."""
@@ -127,7 +127,7 @@ class Session(Generic[S]):
             self.wait(self.rows[-1]["time_s"])
         else:
             self.zero = self.bench.clock.now() - self.earlier.run.elapsed()
-        self.paused_s = self.now() - self.rows[-1]["time_s"]
+        self.began = self.now()
         count = len(self.rows)
         self.event("resumed", f"resumed after {count} reading{'s' * (count != 1)}, {resumed}")
 

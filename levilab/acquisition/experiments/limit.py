@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt
@@ -45,6 +45,8 @@ _COMPARED, _BELOW_HZ = 20, 5.0
 
 class LimitSettings(DriveSettings):
     """Drive up and hold, then let go (lower) or creep upwards (upper) until the top is lost; again and again."""
+
+    one_top: ClassVar[bool] = False
 
     which: Literal["lower", "upper"] = Field(default="lower", description="lower, or upper")
     repetitions: PositiveInt = Field(default=10, description="so many tops, one after another")
@@ -91,12 +93,13 @@ def run(session: Session[LimitSettings]) -> None:
     prepare_counter(session)
     session.begin(lambda: None, resumed="going on with the next top")
     measure = _lower if settings.which == "lower" else _upper
-    for number in range(len(session.rows), settings.repetitions):
+    done = len(session.rows)
+    for number in range(done, settings.repetitions):
         row = _with_a_top(session, number, measure)
         if row is None:
             return
         left = settings.repetitions - number - 1
-        session.keep(row, left * session.spent() / (number + 1))
+        session.keep(row, left * session.spent() / (number + 1 - done))
 
 
 def _with_a_top(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
@@ -53,6 +53,8 @@ _RATE, _VOLTS_PER_DIVISION = 1000.0, 2.0
 
 class PrecessionSettings(DriveSettings):
     """Drive up, then to each frequency of a sweep; wait for the lock; count the spin and the laser."""
+
+    one_top: ClassVar[bool] = False
 
     drive_frequency_hz: PositiveFloat = Field(default=44.0, description="the top is driven up to this first,")
     first_hz: PositiveFloat = Field(default=44.0, description="sweep the drive from this")

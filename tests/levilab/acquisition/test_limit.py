@@ -194,6 +194,17 @@ def test_an_interrupted_series_goes_on_with_the_next_top(tmp_path: Path) -> None
     assert np.allclose(limits, truth, rtol=0, atol=0.25)  # 4 standard uncertainties
 
 
+def test_a_series_that_is_resumed_after_its_time_has_it_anew(tmp_path: Path) -> None:
+    half = acquire(mock(tmp_path, *QUICK, "limit.repetitions=2"), Impatient(1))
+    file = half.folder / "readings.csv"
+    header, row, *_ = file.read_text(encoding="utf-8").splitlines()
+    file.write_text(f"{header}\n{','.join(['90000.0', *row.split(',')[1:]])}\n", encoding="utf-8")
+    show = Silent()
+    run = acquire(mock(tmp_path, seed=None, resume=half.folder), show)
+    assert run.count() == 2
+    assert show.left == [0.0]
+
+
 def test_a_top_that_is_not_floated_ends_the_series_in_a_line(tmp_path: Path) -> None:
     settings = LimitSettings(float_s=5.0)
     config = with_settings(Configuration(), "limit", settings)
