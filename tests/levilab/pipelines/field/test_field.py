@@ -124,7 +124,7 @@ def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(tmp
     assert alone[0].u is not None
     assert mean.u > 0.99 * alone[0].u
     page = render(replace(ANALYSES["field"], svg=lambda _: "<svg/>"), found)
-    assert "None of these 2 runs came from a real top" in page
+    assert "None of these 2 runs came from a real bench" in page
     assert as_document(found, tmp_path)["values"]["strength"]["runs"] == 2
     assert len(field_figure(found).axes) == 4
     assert len(field_part(found).inputs) == 2
