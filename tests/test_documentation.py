@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from support.paths import ROOT
+from support.waiting import HANG_GUARD_S
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -42,7 +43,7 @@ def test_python_in_the_pages_prints_what_it_says(page: str, code: str, tmp_path:
         capture_output=True,
         text=True,
         encoding="utf-8",
-        timeout=60,
+        timeout=HANG_GUARD_S,
         check=False,
     )
     assert done.returncode == 0, done.stderr
@@ -66,7 +67,7 @@ def test_the_commands_of_the_pages_work_one_after_another(tmp_path: Path) -> Non
             capture_output=True,
             text=True,
             encoding="utf-8",
-            timeout=60,
+            timeout=HANG_GUARD_S,
             check=False,
         )
         assert done.returncode == 0, (command, done.stderr)

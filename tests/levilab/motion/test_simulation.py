@@ -24,6 +24,7 @@ from levilab.runs.run import Run
 from levilab.runs.writer import RunWriter
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
+from support.waiting import HANG_GUARD_S
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -352,11 +353,11 @@ def test_a_number_that_is_none_is_wrong_usage(levilab: Command) -> None:
 def test_interrupted_it_says_so_in_one_line_and_leaves_nothing(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "levilab", "simulate", "driven", "--duration", "6000", "--out", "runs"]
     with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
-        deadline = time.monotonic() + 60
+        deadline = time.monotonic() + HANG_GUARD_S
         while not list(tmp_path.glob("runs/*/run.json")) and time.monotonic() < deadline:
             time.sleep(0.05)  # until it is under way
         process.send_signal(signal.SIGINT)
-        _, told = process.communicate(timeout=60)
+        _, told = process.communicate(timeout=HANG_GUARD_S)
     assert process.returncode == 130
     assert told.splitlines()[-1] == "levilab: interrupted, nothing was written"
     assert "Traceback" not in told

@@ -23,6 +23,7 @@ from levilab.report.page import write_report
 from levilab.runs.run import RunRecord
 from support.paths import SAMPLE_DATA
 from support.spin_downs import spin_down_csv
+from support.waiting import HANG_GUARD_S
 
 
 def render(found: SpinDownAnalysis) -> str:
@@ -241,7 +242,9 @@ def test_the_report_says_what_it_had_to_analyze(run: Path, tmp_path: Path) -> No
 
 def test_the_page_needs_nothing_of_the_terminal() -> None:
     code = "import sys, levilab.report.page; print('rich' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=HANG_GUARD_S
+    )
     assert done.stdout == "False\n"
 
 
