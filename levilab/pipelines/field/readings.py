@@ -96,10 +96,14 @@ def _must_be_in_range(table: Table, values: Array, most: float, what: str, *, un
 #: Columns of a table that are looked at.
 QUANTITIES = ("height_m", "height_u_m", "flux_density_t", "flux_density_u_t")
 
+#: Those without which a table is no scan.
+NEEDED = ("height_m", "flux_density_t")
+
 
 def read_scan_file(path: Path, options: InputOptions) -> FieldReadings:
     """The scan in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
-    return field_readings(read_table(path, columns=options.columns, quantities=QUANTITIES, guess=options.guess))
+    table = read_table(path, columns=options.columns, quantities=QUANTITIES, needed=NEEDED, guess=options.guess)
+    return field_readings(table)
 
 
 def read_scan_run(run: Run, _: InputOptions) -> FieldReadings:
