@@ -54,7 +54,8 @@ def acquire_experiment(
     note: Annotated[str, typer.Option(help="Kept with the run.")] = "",
     realtime: Annotated[bool, typer.Option("--realtime", help="Keep the virtual bench to the wall clock.")] = False,
     resume: Annotated[
-        Path | None, typer.Option(metavar="RUN", help="Go on with an interrupted run: read on, without driving again.")
+        Path | None,
+        typer.Option(metavar="RUN", help="Go on with an interrupted run, with the settings that it was begun with."),
     ] = None,
     wire_log: Annotated[bool, typer.Option("--wire-log", help="Keep all bytes sent and received.")] = False,
     yes: Annotated[

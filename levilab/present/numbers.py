@@ -63,10 +63,12 @@ def short_name(name: str) -> str:
 def plain(value: float | None, digits: int = 3) -> str:
     """A statistic in a few digits; a dash where there is none.
 
-    >>> plain(0.0312345), plain(None)
-    ('0.0312', '—')
+    >>> plain(0.0312345), plain(4478.2), plain(None)
+    ('0.0312', '4478', '—')
     """
-    return "—" if value is None else f"{value:.{digits}g}"
+    if value is None:
+        return "—"
+    return f"{value:.0f}" if 10**digits <= abs(value) < 1e6 else f"{value:.{digits}g}"
 
 
 def share(weight: float | None) -> str:
