@@ -224,8 +224,20 @@ def analyze_suiting(
 
 
 def recall_suiting(paths: Sequence[Path], given: Mapping[str, Any]) -> tuple[Analysis[Any], Any]:
-    """The first analysis that suits, with what it found or had found before.  Raises DataError if none does."""
-    return next(_suiting(lambda analysis: analysis.recall(paths, analysis.options_from(given))))
+    """The first analysis that suits, with what it found or had found before.  Raises DataError if none does.
+
+    One that is made for the experiment goes before one that takes its runs, too.
+    """
+    suiting = _suiting(lambda analysis: analysis.recall(paths, analysis.options_from(given)))
+    first = next(suiting)
+    return first if _is_made_for(*first) else next((pair for pair in suiting if _is_made_for(*pair)), first)
+
+
+def _is_made_for(analysis: Analysis[A], found: A) -> bool:
+    """Whether any of the inputs is a data file, or a run of an experiment that the analysis is named for."""
+    return any(
+        source.run is None or source.run.record.experiment in analysis.needs.experiments for source in found.sources
+    )
 
 
 def _suiting(

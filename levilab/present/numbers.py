@@ -42,13 +42,18 @@ def in_words(unit: str) -> str:
 
 
 def _number(value: float, u: float | None) -> str:
-    """By the rule of the Particle Data Group, with a power of ten for what would begin with zeros."""
+    """By the rule of the Particle Data Group, with a power of ten for what would begin with zeros.
+
+    >>> _number(-0.0012, 0.05), _number(-0.012, 0.05)
+    ('0.00(5)', '-0.01(5)')
+    """
     from uncertainties import ufloat
 
     if not u:
         return f"{value:.4g}"
     ordinary = 1e-2 <= abs(value) < 1e5 or abs(value) < u < 1e5
-    return f"{ufloat(value, u):SP}" if ordinary else f"{ufloat(value, u):eSP}"
+    text = f"{ufloat(value, u):SP}" if ordinary else f"{ufloat(value, u):eSP}"
+    return re.sub(r"^-(?=0(\.0*)?\()", "", text)
 
 
 def short_name(name: str) -> str:

@@ -141,6 +141,11 @@ def test_what_one_analysis_cannot_use_keeps_no_other_from_its_own(tmp_path: Path
     assert [text.split(": no ")[1].split(" to analyze")[0] for text in told] == ["spin run", "field run"]
 
 
+def test_the_analysis_made_for_an_experiment_goes_before_one_that_takes_its_records(sample_data: Path) -> None:
+    for name, wanted in (("precession-sweep", "precession"), ("trace-tape", "spin"), ("scope-files", "spin")):
+        assert recall_suiting([sample_data / name], {})[0].name == wanted, name
+
+
 def test_an_analysis_that_does_not_suit_is_passed_over(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, sample_data: Path
 ) -> None:
