@@ -54,6 +54,10 @@ class DoesNotSuit(DataError):
     """What lies there is sound, but of another kind than an analysis needs: another experiment, other columns."""
 
 
+class NoneUsable(DataError):
+    """A folder that was searched: of what an analysis takes there, nothing can be used."""
+
+
 class NoInstrument(LevilabError):
     """No instrument answered that there is a driver for."""
 

@@ -47,7 +47,7 @@ _RADII = ("inner_radius", "outer_radius")
 #: Strength, origin, thickness and background: fewer heights tell nothing of the model.
 FEWEST_HEIGHTS = 4
 #: Heights closer than this are one [m]: no stand is set better.
-_SAME_HEIGHT = 1e-5
+SAME_HEIGHT_M = 1e-5
 #: The effective variance follows the slope; after so many turns it has settled to 1e-6.
 _MOST_TURNS = 8
 #: A field below so many u of the background is none.
@@ -246,7 +246,7 @@ def _checked(
 
 
 def _refuse_bad_scans(z: Array, b: Array, known: Known) -> None:
-    starts = np.flatnonzero(np.diff(z, prepend=-np.inf) > _SAME_HEIGHT)
+    starts = np.flatnonzero(np.diff(z, prepend=-np.inf) > SAME_HEIGHT_M)
     if starts.size < FEWEST_HEIGHTS:
         lowest, highest = (float(z[0]), float(z[-1])) if z.size else (math.nan, math.nan)
         raise TooFewHeights(seen=starts.size, needed=FEWEST_HEIGHTS, lowest=lowest, highest=highest)

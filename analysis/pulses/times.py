@@ -132,7 +132,7 @@ def findings_of(train: Train) -> tuple[Finding, ...]:
     """What is to be said of a train."""
     notes = []
     if train.missing:
-        notes.append(Finding("missing", f"{train.missing} turns have no pulse"))
+        notes.append(Finding("missing", f"{train.missing} turn{'s have' if train.missing > 1 else ' has'} no pulse"))
     if train.doubled:
         notes.append(Finding("doubled", f"{train.doubled} pulses lie beside the turns' own and were left out"))
     if train.fit.coefficients.size > 3:

@@ -219,7 +219,7 @@ def _result(
     if isinstance(found, Match) and found.flat:
         more.append(Finding("clipped", "the tops of the pulses are flat: the detector or the converter is saturated"))
     if found.missing:
-        more.append(Finding("missing", f"{found.missing} turns have no pulse"))
+        more.append(Finding("missing", f"{found.missing} turn{'s have' if found.missing > 1 else ' has'} no pulse"))
     if found.wrong:
         more.append(Finding("wrong", f"{found.wrong} pulses are not at their place and were left out"))
     if fit.coefficients.size > 3:

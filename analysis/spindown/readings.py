@@ -83,7 +83,7 @@ def checked(time: ArrayLike, frequency: ArrayLike, u: ArrayLike | None) -> Readi
         raise TimesNotIncreasing(index=i + 1, before=float(t[i]), after=float(t[i + 1]))
     for quantity, column in (("spin frequency", f), ("standard uncertainty", sigma)):
         _all_positive(quantity, column)
-    _falls(f)
+    must_fall(f)
     reference_hz, duration = float(np.exp(np.log(f).mean())), float(t[-1] - t[0])
     return Readings(
         time=t,
@@ -121,8 +121,8 @@ def _all_positive(quantity: str, column: Array) -> None:
         raise NotPositive(quantity=quantity, unit="Hz", index=int(bad[0]), value=float(column[bad[0]]))
 
 
-def _falls(frequency: Array) -> None:
-    """The medians of the first and last third decide, so that one miscounted reading does not."""
+def must_fall(frequency: Array) -> None:
+    """Raises NoSpinDown.  The medians of the first and last third decide, so that one miscounted reading does not."""
     third = -(-len(frequency) // 3)
     first, last = float(np.median(frequency[:third])), float(np.median(frequency[-third:]))
     if last >= first * (1 - 1e-12):

@@ -86,7 +86,7 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
     run = _resumable(find_run(options.resume, options.out), experiment) if options.resume else None
     virtual = options.mock or bool(run and run.record.seed is not None)
     _check_options(options, run, virtual=virtual)
-    config = _configuration(options, run, virtual=virtual)
+    config = _configuration(experiment, options, run, virtual=virtual)
     settings_of(config, experiment).check(experiment, config.limits)
     request = AcquisitionRequest(
         experiment,
@@ -120,18 +120,18 @@ def _check_options(options: AcquisitionOptions, run: Run | None, *, virtual: boo
         raise UsageError("realtime", "goes with `mock`: a real bench always keeps to the wall clock")
 
 
-def _configuration(options: AcquisitionOptions, run: Run | None, *, virtual: bool) -> BenchConfig:
+def _configuration(experiment: str, options: AcquisitionOptions, run: Run | None, *, virtual: bool) -> BenchConfig:
     """What the bench file says; a run is resumed as it was begun, only where the instruments are may have changed."""
     config = _as_it_was(run) if run else Configuration()
     if options.bench or not virtual:
         described = read_bench(options.bench or Path("bench.toml"), Configuration)
         places = {kind: getattr(described, kind) for kind in ("visa_library", "limits", *VIRTUAL)}
         config = config.model_copy(update=places) if run else described
-    return _with_given_settings(config, options.settings)
+    return _with_given_settings(config, experiment, options.settings)
 
 
-def _with_given_settings(config: BenchConfig, settings: Sequence[str]) -> BenchConfig:
-    """The configuration with some of the experiments' settings changed.  Raises UsageError."""
+def _with_given_settings(config: BenchConfig, experiment: str, settings: Sequence[str]) -> BenchConfig:
+    """The configuration with some of the experiment's settings changed.  Raises UsageError."""
     if not settings:
         return config
     table = config.model_dump(mode="json")
@@ -139,7 +139,10 @@ def _with_given_settings(config: BenchConfig, settings: Sequence[str]) -> BenchC
         key, equals, text = setting.partition("=")
         name, dot, field = key.strip().partition(".")
         if not (equals and dot and name in EXPERIMENTS):
-            expected = f"EXPERIMENT.KEY=VALUE is expected, with {', '.join(EXPERIMENTS)}, as limit.which=upper"
+            instead = f": {experiment}.{setting}?" if equals and not dot else ""
+            raise UsageError("settings", f"{experiment}.KEY=VALUE is expected{instead}", value=setting)
+        if name != experiment:
+            expected = f"is a setting of `levilab acquire {name}`, this is `levilab acquire {experiment}`"
             raise UsageError("settings", expected, value=setting)
         table[name][field] = parsed(f"{field}={text}")[1]
     try:

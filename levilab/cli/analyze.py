@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -286,30 +287,34 @@ def _analyze(
     """Carry out the analysis that the command is named after, or each."""
     from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
 
+    left_out: list[str] = []
     if context.info_name == _EACH:
-        results = analyze_suiting(paths, given)
+        results = analyze_suiting(paths, given, left_out.append)
     else:
         analysis = ANALYSES[str(context.info_name)]
         results = [(analysis, analysis.analyze(paths, analysis.options_from(given)))]
-    _write_and_print(context, results, save=save, out=out, as_json=as_json)
+    _write_and_print(context, results, left_out, save=save, out=out, as_json=as_json)
 
 
 def _write_and_print(
     context: typer.Context,
     results: list[tuple[Analysis[Any], Any]],
+    left_out: list[str],
     *,
     save: bool,
     out: Path | None,
     as_json: bool,
 ) -> None:
-    """Write the results, then print them: a reader that goes away must not cost a result."""
+    """Write the results, then print them: a reader that goes away must not cost a result.
+
+    left_out: why other analyses have no result.
+    """
     from levilab.pipelines.catalogue import print_analysis
 
     in_words = partial(with_options, names=option_names(context.find_root().command))
     failures: list[LevilabError] = []
-    messages: list[str] = []
+    messages = [*left_out, *_remarks([found.remarks for _, found in results])]
     for analysis, found in results:
-        messages += found.remarks
         if save:
             failure, written = _save(analysis, found, out)
             failures += [failure] if failure else []
@@ -324,6 +329,14 @@ def _write_and_print(
         message(in_words(text))
     if failures:
         raise failures[0]
+
+
+def _remarks(of_each: Sequence[Sequence[str]]) -> list[str]:
+    """What the analyses say, each once; runs that one of them passed over count only if all did."""
+    told = list(dict.fromkeys(text for remarks in of_each for text in remarks))
+    kinds = [text for text in told if re.fullmatch(r"passed over: \d+ \w+ runs?", text)]
+    taken = {text for text in kinds if not all(text in remarks for remarks in of_each)}
+    return [text for text in told if text not in taken]
 
 
 def _save(analysis: Analysis[Any], found: Any, out: Path | None) -> tuple[LevilabError | None, list[Path]]:

@@ -38,7 +38,10 @@ Rate = Annotated[
 KeepOutliers = Annotated[bool, typer.Option("--keep-outliers", help="Fit readings that look like miscounts, too.")]
 Paths = Annotated[list[Path], typer.Argument(metavar="PATH…", help="Run folders, data files, or folders to search.")]
 Presets = Annotated[
-    str, typer.Argument(metavar="SCENE", help="undriven, friction, tilted, driven, loose-washers, spindown, or a file.")
+    str,
+    typer.Argument(
+        metavar="SCENE", help="undriven, friction, tilted, driven, loose-washers, precession, spindown, or a file."
+    ),
 ]
 Settings = Annotated[
     list[str] | None,

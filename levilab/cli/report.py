@@ -9,7 +9,7 @@ import typer
 
 from levilab.cli.analyze import inputs, spindown_options
 from levilab.cli.options import Channel, Columns, Json, KeepOutliers, Paths, Rate, ReadingU
-from levilab.cli.output import print_json
+from levilab.cli.output import message, print_json
 
 
 def add_to(app: typer.Typer) -> None:
@@ -32,12 +32,13 @@ def report(
     """Report runs in one self-contained file: what was measured, with what, figures, numbers, warnings.
 
     The numbers are those that levilab analyze wrote beside the runs.  What has no result there, or one of other
-    readings or options than the given, is analyzed for the page.
+    readings or options than the given, is analyzed for the page.  A page is of one analysis; where a folder holds runs
+    of several kinds it is of the first, and the others are named.
     """
     from levilab.report.page import write_report
 
     given = inputs(columns, channel, rate) | spindown_options(reading_u, "covariance", keep_outliers)
-    typer.echo(f"the report is in {write_report(paths, output, given)}")
+    typer.echo(f"the report is in {write_report(paths, output, given, message)}")
 
 
 def runs(

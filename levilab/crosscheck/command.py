@@ -28,7 +28,7 @@ def check(names: Sequence[str], trials: int | None, seed: int) -> list[Checked]:
     """The trials of some subjects, or of all where none is named.  Raises UsageError for a name that is unknown."""
     for name in names:
         if name not in SUBJECTS:
-            raise UsageError("subjects", f"known are {', '.join(SUBJECTS)}", value=name)
+            raise UsageError("subject", f"known are {', '.join(SUBJECTS)}", value=name)
     found = []
     for name in names or SUBJECTS:
         subject = SUBJECTS[name]

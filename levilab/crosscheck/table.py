@@ -41,9 +41,18 @@ def _cells(spread: Spread) -> tuple[str, ...]:
         f"{spread.mean:+.2f} ± {1 / math.sqrt(n):.2f}",
         "–" if math.isnan(spread.deviation) else f"{spread.deviation:.2f} ± {1 / math.sqrt(2 * n):.2f}",
         f"{100 * spread.coverage:.0f} ± {100 * math.sqrt(COVERAGE * (1 - COVERAGE) / n):.0f} %",
-        f"{100 * spread.relative_u:.2g} %",
+        _percent(spread.relative_u),
         "yes" if spread.holds else "NO",
     )
+
+
+def _percent(part: float) -> str:
+    """Two digits, and no power of ten.
+
+    >>> _percent(0.00041), _percent(1.34)
+    ('0.041 %', '134 %')
+    """
+    return f"{100 * part:.0f} %" if abs(part) >= 1 else f"{100 * part:.2g} %"
 
 
 def failures_in_words(checked: Sequence[Checked]) -> list[str]:

@@ -73,7 +73,9 @@ def sniff(path: Path) -> Layout:
     dialect = find_dialect(lines[-SAMPLE:])
     if dialect is None:
         at, line = next((n, line) for n, line in enumerate(lines, 1) if line.strip())
-        raise NoTable(path, f"'{shown(line.strip())}' begins no table of at least two columns; {EXPORT}", line=at)
+        alone = "; number the rows in a column of their own if there is but one"
+        seen = f"'{shown(line.strip())}' begins no table of at least two columns"
+        raise NoTable(path, f"{seen}; {EXPORT}{alone}", line=at)
     return lay_out(lines, encoding, dialect, head)
 
 

@@ -50,10 +50,7 @@ class Table:
             TableError: the file has no such column.
         """
         if name not in self.frame.columns:
-            key = next((short for short, long in SHORTHANDS.items() if long == name), name)
-            raise NoSuchColumn(
-                self.path, f"no column is known to be {name}; it has {listed(self.header)}: say `columns` = {key}=NAME"
-            )
+            raise _no_column(self.path, name, self.header)
         values: NDArray[np.float64] = self.frame[name].to_numpy(dtype=np.float64)
         return values
 
@@ -63,6 +60,7 @@ def read_table(
     *,
     columns: Mapping[str, str] | None = None,
     quantities: Collection[str] = CANONICAL,
+    needed: Collection[str] = (),
     guess: bool = True,
 ) -> Table:
     """Read a table of text: CSV of any kind, tabs or blanks, decimal point or comma, with or without units.
@@ -71,6 +69,7 @@ def read_table(
         path: the file.
         columns: {canonical column, or t, f, u: title in the file or 1-based number}, where titles are not known.
         quantities: canonical columns that are wanted; what stands in others is nobody's concern.
+        needed: canonical columns without which the table is of another kind, whatever stands in its rows.
         guess: whether columns without titles are taken as time, spin frequency and its uncertainty.
 
     Returns:
@@ -84,16 +83,19 @@ def read_table(
         header, wanted, warnings = _titles(path, layout, columns or {}, guess=guess)
         chosen, doubts = choose_columns(path, header, layout.units, wanted, quantities)
         if not chosen:
-            short = [key for key, name in SHORTHANDS.items() if name in quantities and not name.endswith("_u_hz")]
             known = ", ".join(
                 [*(name for name in quantities if name not in COMPANIONS), "t, f [Hz], rpm, z [mm], B [mT] …"]
             )
+            wanted_names = needed or [name for name in SHORTHANDS.values() if name in quantities][:2]
             raise NoSuchColumn(
                 path,
                 f"no title is known ({known}) among {listed(header)}: say `columns` = "
-                + ",".join(f"{key}=NAME" for key in short[:2]),
+                + ",".join(f"{_key(name)}=NAME" for name in wanted_names),
                 line=layout.header_line or layout.first_line,
             )
+        for name in needed:
+            if name not in {column.name for column in chosen}:
+                raise _no_column(path, name, header)
         rows = read_rows(path, layout, chosen)
     table = _table(path, header, chosen, rows, (*warnings, *doubts))
     if len(table.frame) >= FEWEST:
@@ -165,6 +167,16 @@ def parse_columns(text: str) -> dict[str, str]:
         what = f"'{shown(unknown[0])}' is no quantity known here; {', '.join(SHORTHANDS)} are, as t=Zeit,f=3"
         raise ColumnsError("columns", what)
     return found
+
+
+def _key(name: str) -> str:
+    """What `columns` calls a canonical column."""
+    return next((short for short, long in SHORTHANDS.items() if long == name), name)
+
+
+def _no_column(path: Path, name: str, header: Sequence[str]) -> NoSuchColumn:
+    text = f"no column is known to be {name}; it has {listed(header)}: say `columns` = {_key(name)}=NAME"
+    return NoSuchColumn(path, text)
 
 
 def _must_be_file(path: Path) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
-from levilab.errors import DoesNotSuit, unquoted
+from levilab.errors import DoesNotSuit, NoneUsable, unquoted
 from levilab.pipelines.field.analysis import NEEDS as FIELD_NEEDS
 from levilab.pipelines.field.analysis import FieldAnalysis, analyze_scans
 from levilab.pipelines.field.device import FieldOptions
@@ -212,14 +212,17 @@ _TABLE: tuple[Analysis[Any], ...] = (
 ANALYSES = MappingProxyType({analysis.name: analysis for analysis in _TABLE})
 
 
-def analyze_suiting(paths: Sequence[Path], given: Mapping[str, Any]) -> list[tuple[Analysis[Any], Any]]:
+def analyze_suiting(
+    paths: Sequence[Path], given: Mapping[str, Any], tell: Callable[[str], None] | None = None
+) -> list[tuple[Analysis[Any], Any]]:
     """Each analysis that suits what lies at the paths, with what it found.  Raises DataError: none suits, or damage.
 
     Args:
         paths: run folders, data files, folders to search.
         given: options by their names, of any analysis.
+        tell: is told why an analysis was left out that found nothing usable in a folder.
     """
-    return list(_suiting(lambda analysis: analysis.analyze(paths, analysis.options_from(given))))
+    return list(_suiting(lambda analysis: analysis.analyze(paths, analysis.options_from(given)), tell))
 
 
 def recall_suiting(paths: Sequence[Path], given: Mapping[str, Any]) -> tuple[Analysis[Any], Any]:
@@ -241,18 +244,26 @@ def _is_for_run(analysis: Analysis[Any], run: Run) -> bool:
     return run.record.experiment in analysis.needs.experiments
 
 
-def _suiting(run: Callable[[Analysis[Any]], Any]) -> Iterator[tuple[Analysis[Any], Any]]:
+def _suiting(
+    run: Callable[[Analysis[Any]], Any], tell: Callable[[str], None] | None = None
+) -> Iterator[tuple[Analysis[Any], Any]]:
     """What suits, one after the other, each carried out when it is asked for."""
     errors: list[DoesNotSuit] = []
+    unusable: list[NoneUsable] = []
     for analysis in ANALYSES.values():
         try:
             found = run(analysis)
         except DoesNotSuit as error:
             errors.append(error)
+        except NoneUsable as error:  # of one analysis; a run that was broken off at once keeps no other from its own
+            unusable.append(error)
         else:
             yield analysis, found
-    if len(errors) == len(ANALYSES):
-        raise errors[0]
+    if len(errors) + len(unusable) == len(ANALYSES):
+        raise [*unusable, *errors][0]
+    if tell:
+        for left_out in unusable:
+            tell(str(left_out))
 
 
 def save(analysis: Analysis[A], found: A, folder: Path | None = None) -> list[Path]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, TypeVar
 
-from levilab.errors import DataError, DoesNotSuit
+from levilab.errors import DataError, DoesNotSuit, NoneUsable
 from levilab.formats.waveforms.header import NoRate
 from levilab.formats.waveforms.record import SEARCHED
 from levilab.runs.run import READINGS, RECORD, Run, find_runs
@@ -224,7 +224,7 @@ def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]
             found.append(_of_file(file, needs, chosen))
     if not found:
         text = f"{root}: {_nothing_found(needs, others, broken, [file.name for file in files])}"
-        raise DataError(text) if broken else DoesNotSuit(text)
+        raise NoneUsable(text) if broken else DoesNotSuit(text)
     kinds = [f"passed over: {count} {kind} run{'s' * (count > 1)}" for kind, count in sorted(others.items())]
     return Found(tuple(found), tuple(broken), (*kinds, *remarks))
 

@@ -42,13 +42,18 @@ def in_words(unit: str) -> str:
 
 
 def _number(value: float, u: float | None) -> str:
-    """By the rule of the Particle Data Group, with a power of ten for what would begin with zeros."""
+    """By the rule of the Particle Data Group, with a power of ten for what would begin with zeros.
+
+    >>> _number(-0.0012, 0.05), _number(-0.012, 0.05)
+    ('0.00(5)', '-0.01(5)')
+    """
     from uncertainties import ufloat
 
     if not u:
         return f"{value:.4g}"
     ordinary = 1e-2 <= abs(value) < 1e5 or abs(value) < u < 1e5
-    return f"{ufloat(value, u):SP}" if ordinary else f"{ufloat(value, u):eSP}"
+    text = f"{ufloat(value, u):SP}" if ordinary else f"{ufloat(value, u):eSP}"
+    return re.sub(r"^-(?=0(\.0*)?\()", "", text)
 
 
 def short_name(name: str) -> str:
@@ -63,10 +68,12 @@ def short_name(name: str) -> str:
 def plain(value: float | None, digits: int = 3) -> str:
     """A statistic in a few digits; a dash where there is none.
 
-    >>> plain(0.0312345), plain(None)
-    ('0.0312', '—')
+    >>> plain(0.0312345), plain(4478.2), plain(None)
+    ('0.0312', '4478', '—')
     """
-    return "—" if value is None else f"{value:.{digits}g}"
+    if value is None:
+        return "—"
+    return f"{value:.0f}" if 10**digits <= abs(value) < 1e6 else f"{value:.{digits}g}"
 
 
 def share(weight: float | None) -> str:

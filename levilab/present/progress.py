@@ -57,7 +57,7 @@ class Lines:
 
     def reading(self, text: str, elapsed: float, remaining: float) -> None:
         """A line."""
-        self.message(f"{text}   about {remaining:.0f} s left")
+        self.message(f"{text}   about {remaining:.0f} s left" if remaining >= 0.5 else text)
 
     def message(self, text: str) -> None:
         """A line.  A display that went away does not end a measurement."""

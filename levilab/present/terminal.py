@@ -57,6 +57,7 @@ def new_table(title: str | None, *columns: str, numbers: Sequence[str] = ()) -> 
 def draw(table: Table) -> RichTable:
     """A table that is data."""
     drawn = new_table(escape(table.title), *map(escape, table.heads))
+    drawn.show_header = any(table.heads)
     for k in table.numbers:
         drawn.columns[k].justify = "right"
     for row in table.rows:

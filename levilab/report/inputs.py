@@ -103,7 +103,7 @@ def _moment(event: Mapping[str, Any], zero: str | None) -> str:
 def _drive(record: RunRecord) -> tuple[str, ...]:
     """What drove the top before the readings, and what the bench stands."""
     settings, limits = (record.configuration.get(table) for table in (record.experiment, "limits"))
-    if not isinstance(settings, dict):
+    if not isinstance(settings, dict) or settings.get(_DRIVE[1], 0) is None:  # nothing drives the top
         return ()
     signal = [value_in_words(key, settings[key]) for key in _DRIVE if key in settings]
     ramp = [f"raised by {settings['ramp_hz_per_s']} Hz/s"] if "ramp_hz_per_s" in settings else []

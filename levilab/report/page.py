@@ -16,7 +16,7 @@ from levilab.runs.run import utc_now
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
 A = TypeVar("A", bound=Analyzed)
@@ -26,17 +26,23 @@ class UnknownFormat(UsageError):
     """A report in a format that is not written."""
 
 
-def write_report(paths: Sequence[Path], output: Path, given: Mapping[str, Any] | None = None) -> Path:
+def write_report(
+    paths: Sequence[Path],
+    output: Path,
+    given: Mapping[str, Any] | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> Path:
     """Report what was found of the inputs at the paths; what has no result yet is analyzed, and nothing is stored.
 
     given: options by their names; those at their defaults count as not given, see
-    `levilab.pipelines.spindown.document.recall_spindowns`.
+    `levilab.pipelines.spindown.document.recall_spindowns`; tell: is told what lies there and is not in the report.
     Raises DataError, UnknownFormat, CannotWrite.
     """
     if output.suffix.lower() not in {".html", ".htm"}:
         expected = "reports are written as HTML, name the file report.html; a browser prints it to PDF"
         raise UnknownFormat("output", expected, value=output)
-    page = render(*recall_suiting(paths, given or {}))
+    analysis, found = recall_suiting(paths, given or {})
+    page = render(analysis, found)
     try:
         output.parent.mkdir(parents=True, exist_ok=True)
         replace_atomically(output, page)
@@ -44,6 +50,10 @@ def write_report(paths: Sequence[Path], output: Path, given: Mapping[str, Any] |
         raise CannotWrite(
             f"{output}: could not be written ({error.strerror or error}): choose another place with `output`"
         ) from error
+    if tell and found.remarks:
+        for remark in found.remarks:
+            tell(remark)
+        tell(f"a report is of one analysis, here {analysis.name}: for others name their runs")
     return output
 
 

@@ -105,7 +105,8 @@ def print_runs(runs: Sequence[Listed], root: Path) -> None:
         table.add_column("note", no_wrap=True, overflow="ellipsis", max_width=console.width - 80)
     for run in runs:
         when = (run.started_utc or "—")[:16].replace("T", " ")
-        what = run.experiment + (f" {run.scene}" if run.scene else "") + (", synthetic" if run.synthetic else "")
+        scene = f" {run.scene}" if run.scene not in {"", run.experiment} else ""
+        what = run.experiment + scene + (", synthetic" if run.synthetic else "")
         cells = [when, _below(run.path, root), what, run.status, run.size, f"{run.length_s:.0f} s"]
         notes = [run.note] if with_notes else []
         table.add_row(*(_harmless(text) for text in (*cells, *notes)))

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.errors import TooFewHeights
+from analysis.field.fit import FEWEST_HEIGHTS, SAME_HEIGHT_M
 from levilab.formats.columns import TableError
 from levilab.formats.table import read_table
 
@@ -64,6 +66,10 @@ def field_readings(table: Table) -> FieldReadings:
         raise TableError(table.path, "holds no readings yet: scan at least four heights")
     _must_be_in_range(table, height, _HIGHEST_M, "a height", unit="m", column="z=NAME [mm]")
     _must_be_in_range(table, flux_density, _STRONGEST_T, "a flux density", unit="T", column="b=NAME [mT]")
+    heights = 1 + int(np.count_nonzero(np.diff(np.sort(height)) > SAME_HEIGHT_M))
+    if heights < FEWEST_HEIGHTS:  # here and not in the fit alone: a scan broken off spoils no search of a folder
+        span = {"lowest": float(height.min()), "highest": float(height.max())}
+        raise TableError(table.path, str(TooFewHeights(seen=heights, needed=FEWEST_HEIGHTS, **span)))
     columns = table.frame.columns
     own = OWN_U in columns
     u_name = OWN_U if own else "flux_density_u_t"
@@ -96,10 +102,14 @@ def _must_be_in_range(table: Table, values: Array, most: float, what: str, *, un
 #: Columns of a table that are looked at.
 QUANTITIES = ("height_m", "height_u_m", "flux_density_t", "flux_density_u_t")
 
+#: Those without which a table is no scan.
+NEEDED = ("height_m", "flux_density_t")
+
 
 def read_scan_file(path: Path, options: InputOptions) -> FieldReadings:
     """The scan in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
-    return field_readings(read_table(path, columns=options.columns, quantities=QUANTITIES, guess=options.guess))
+    table = read_table(path, columns=options.columns, quantities=QUANTITIES, needed=NEEDED, guess=options.guess)
+    return field_readings(table)
 
 
 def read_scan_run(run: Run, _: InputOptions) -> FieldReadings:

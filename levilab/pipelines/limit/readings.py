@@ -10,6 +10,7 @@ import numpy as np
 from levilab.errors import DoesNotSuit
 from levilab.formats.columns import TableError
 from levilab.formats.table import must_be_positive, read_table
+from levilab.formats.titles import read_title
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 QUANTITIES = ("spin_frequency_hz", "spin_frequency_u_hz")
 #: Limits that differ by more than this part of their mean are none of one top: most likely a spin-down.
 _MOST_SPREAD = 0.25
+#: So many steps in a row do not all go the same way by chance.
+_FEWEST_STEPS = 4
 #: Relative: units and printed digits round in about the tenth digit.
 _SAME = 1e-9
 
@@ -54,7 +57,17 @@ class LimitReadings:
 
 def read_limit_file(path: Path, options: InputOptions) -> LimitReadings:
     """The limits in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
-    return limit_readings(read_table(path, columns=options.columns, quantities=QUANTITIES, guess=options.guess))
+    table = read_table(path, columns=options.columns, quantities=QUANTITIES, needed=QUANTITIES[:1], guess=options.guess)
+    readings = limit_readings(table)
+    steps = np.diff(readings.limit)
+    timed = any(read_title(title).column == "time_s" for title in table.header)
+    if timed and len(steps) >= _FEWEST_STEPS and (np.all(steps < 0) or np.all(steps > 0)):
+        way = "falls" if steps[0] < 0 else "rises"
+        raise DoesNotSuit(
+            f"{path}: the spin {way} from row to row, as that of one top does; of limits one row a repetition is "
+            "expected (leave out the column of times if these are limits)"
+        )
+    return readings
 
 
 def read_limit_run(run: Run, _: InputOptions) -> LimitReadings:

@@ -26,6 +26,8 @@ QUANTITIES = (
     *("time_s", "drive_frequency_hz", "drive_frequency_u_hz", "precession_frequency_hz"),
     *("precession_frequency_u_hz", "spin_frequency_hz", "spin_frequency_u_hz"),
 )
+#: Those without which a table is no sweep.
+NEEDED = ("drive_frequency_hz", "precession_frequency_hz")
 #: Relative: units and printed digits round in about the tenth digit, but no two sweeps agree so far in all points.
 SAME = 1e-9
 #: Beyond these a number is no measurement, and its powers would leave the range of floating point [Hz].
@@ -61,7 +63,8 @@ class Readings:
 
 def read_sweep_file(path: Path, options: InputOptions) -> Readings:
     """The sweep in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
-    return sweep_readings(read_table(path, columns=options.columns, quantities=QUANTITIES, guess=options.guess))
+    table = read_table(path, columns=options.columns, quantities=QUANTITIES, needed=NEEDED, guess=options.guess)
+    return sweep_readings(table)
 
 
 def read_sweep_run(run: Run, _: InputOptions) -> Readings:

@@ -243,7 +243,9 @@ def _draw_residuals(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:
     """What the pulses' times leave over: noise about zero, without a shape."""
     axes.axhline(0, color=VERMILION, linewidth=1)
     limit = 6 * 1e6 * max(spin.scatter, float(np.median(np.abs(excerpt.residuals))) if len(excerpt.residuals) else 0.0)
-    values = 1e6 * excerpt.residuals
+    scale, unit = (1e-3, "ms") if limit >= 1e4 else (1.0, "µs")  # five digits would not find room beside the axis
+    limit *= scale
+    values = 1e6 * scale * excerpt.residuals
     inside = np.abs(values) <= limit
     style: Any = {"linestyle": "none", "color": "black", "markersize": 4}
     axes.plot(excerpt.arrivals[inside], values[inside], marker=".", **style)
@@ -253,8 +255,10 @@ def _draw_residuals(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:
         axes.legend(loc="upper right")
     if limit > 0:
         axes.set_ylim(-1.1 * limit, 1.1 * limit)
-    axes.set(xlabel="time  [s]", ylabel="time of a pulse − fit  [µs]")
-    axes.set_title("Residuals of the pulses' times", loc="left")
+    axes.set(xlabel="time  [s]", ylabel=f"time of a pulse − fit  [{unit}]")
+    curved = any(note.name == "curved" for note in spin.notes)
+    bend = ", with the bend of a third degree" if curved else ""
+    axes.set_title(f"Residuals of the pulses' times{bend}", loc="left")
 
 
 def _draw_series(axes: Axes, run: SpinRun) -> None:

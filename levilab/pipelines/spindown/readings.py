@@ -7,6 +7,7 @@ import numpy as np
 
 from analysis.errors import AnalysisError
 from analysis.pulses import phases, track_of_blocks, track_of_times
+from analysis.spindown.readings import must_fall
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
 from levilab.formats.table import FEWEST, Table, must_be_positive, read_table
@@ -138,8 +139,8 @@ def spin_readings(table: Table, *, fewest: int = FEWEST) -> Readings:
         fewest: readings that are needed.
 
     Raises:
-        TableError: a column is missing, there are too few readings, times repeat or go back, or a frequency or
-            an uncertainty is not positive; the line of the file is named.
+        TableError: a column is missing, there are too few readings, times repeat or go back, the spin does not fall,
+            or a frequency or an uncertainty is not positive; the line of the file is named.
     """
     time, frequency = table.column("time_s"), table.column("spin_frequency_hz")
     has_u = "spin_frequency_u_hz" in table.frame.columns
@@ -152,6 +153,12 @@ def spin_readings(table: Table, *, fewest: int = FEWEST) -> Readings:
     if u is not None:
         must_be_positive(table, u, "the uncertainty", "Hz, but must be above 0: correct it or remove the column")
         _must_be_possible(table, u, frequency)
+    try:
+        must_fall(frequency)
+    except (
+        AnalysisError
+    ) as error:  # here and not in the fit alone: one run under the drive spoils no search of a folder
+        raise TableError(table.path, str(error)) from error
     return Readings(time, frequency, u, (*table.warnings, *_doubts(table, frequency)))
 
 

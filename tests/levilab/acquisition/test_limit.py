@@ -229,8 +229,9 @@ def test_a_series_ends_when_its_time_is_over(tmp_path: Path) -> None:
         ("limit.which=middle", "limit.which = 'middle': Input should be 'lower' or 'upper'"),
         ("limit.repetitions=0", "greater than 0"),
         ("limit.wich=upper", "limit.wich is no key known here"),
-        ("which=upper", "EXPERIMENT.KEY=VALUE is expected"),
-        ("limit.which", "as limit.which=upper"),
+        ("which=upper", "limit.KEY=VALUE is expected: limit.which=upper?"),
+        ("limit.which", "limit.KEY=VALUE is expected"),
+        ("spin.hold_s=1", "is a setting of `levilab acquire spin`, this is `levilab acquire limit`"),
     ],
 )
 def test_settings_on_the_command_line_that_cannot_be_are_refused(tmp_path: Path, settings: str, says: str) -> None:

@@ -129,6 +129,23 @@ def test_damage_is_not_passed_over_because_another_analysis_runs(
         recall_suiting([runs / name], {})
 
 
+def test_what_one_analysis_cannot_use_keeps_no_other_from_its_own(tmp_path: Path, sample_data: Path) -> None:
+    root = tmp_path / "runs"
+    shutil.copytree(sample_data / "lower-limits", root / "limits")
+    for name, rows in (("spin-down-1", 1), ("field-scan", 2)):  # broken off: too few readings
+        readings = shutil.copytree(sample_data / name, root / name) / "readings.csv"
+        lines = readings.read_text(encoding="utf-8").splitlines(keepends=True)
+        readings.write_text("".join(lines[: 1 + rows]), encoding="utf-8")
+    told: list[str] = []
+    assert [row.name for row, _ in analyze_suiting([root], {}, told.append)] == ["limit"]
+    assert [text.split(": no ")[1].split(" to analyze")[0] for text in told] == ["spin run", "field run"]
+
+
+def test_the_analysis_made_for_an_experiment_goes_before_one_that_takes_its_records(sample_data: Path) -> None:
+    for name, wanted in (("precession-sweep", "precession"), ("trace-tape", "spin"), ("scope-files", "spin")):
+        assert recall_suiting([sample_data / name], {})[0].name == wanted, name
+
+
 def test_an_analysis_that_does_not_suit_is_passed_over(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, sample_data: Path
 ) -> None:

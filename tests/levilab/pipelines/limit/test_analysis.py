@@ -88,6 +88,9 @@ def test_a_spin_down_is_no_limit_and_runs_without_limits_are_told(tmp_path: Path
     assert [row.name for row, _ in analyze_suiting([file], {})] == ["spindown"]
     with pytest.raises(DoesNotSuit, match="no limits of one top"):
         analyze_limits([file], LimitOptions())
+    file.write_text("t,f\n0,40\n10,39\n20,38\n30,37\n40,36\n", encoding="utf-8")  # not far down
+    with pytest.raises(DoesNotSuit, match="the spin falls from row to row"):
+        analyze_limits([file], LimitOptions())
     empty = shutil.copytree(sample_data / "lower-limits", tmp_path / "run")
     (empty / "readings.csv").write_text("spin_frequency_hz\n", encoding="utf-8")
     with pytest.raises(TableError, match="at least one repetition is needed"):
