@@ -126,4 +126,4 @@ def test_the_command_prints_writes_and_judges(levilab: Callable[..., object], tm
     failed = levilab("crosscheck", "bad", "--json", "--trials", "40", check=1)
     assert json.loads(failed.stdout)["subjects"][0]["quantities"][0]["mean"] > 1.5
     refused = levilab("crosscheck", "nonsense", check=2)
-    assert refused.stderr == "levilab: subjects nonsense: known are good, bad\n"
+    assert refused.stderr == "levilab: subject nonsense: known are good, bad\n"
