@@ -222,8 +222,8 @@ def _read(session: Session[FieldSettings], height: float) -> float:
 def _mean(settings: FieldSettings, values: list[float]) -> Row:
     """Mean and standard uncertainties [T]; readings that all show the same digits are known to half of the last one."""
     n = len(values)
-    mean = sum(values) / n
-    scatter = math.sqrt(sum((value - mean) ** 2 for value in values) / (n - 1) / n)
+    mean = math.fsum(values) / n
+    scatter = math.sqrt(math.fsum((value - mean) ** 2 for value in values) / (n - 1) / n)
     own = math.hypot(scatter, _digit(values) / math.sqrt(12))
     whole = math.hypot(own, settings.gain_u * mean, settings.background_u_t)
     return {
