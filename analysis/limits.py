@@ -87,7 +87,7 @@ class Statistics:
         n: repetitions.
         trend: per repetition [Hz]; None of too few.
         trend_p: how probable so large a trend is by chance.
-        outliers: numbers of those that chance would hardly put there, from 0; they count all the same.
+        outliers: numbers of those that chance would hardly put there, from 0; they stay in the statistics.
     """
 
     mean: Estimate

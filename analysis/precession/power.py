@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 OTHER_SLOPE, POWER = 1.05, 0.9
 #: A sweep of more points is no answer any more.
 MOST_POINTS = 1_000_000
-#: A slope so many u from 1 is told almost certainly, even from three points.
+#: Even three points distinguish a slope so many u from 1 almost certainly.
 _CERTAIN = 100.0
 #: For integrals over the distribution of the scatter: right to 1e-7.
 _NODES = 200
@@ -120,7 +120,7 @@ def what_it_takes(line: Line, range_hz: float, u_hz: float) -> Power | None:
 
 
 def _ratio_for(power: float, dof: int | None) -> float:
-    """Difference over u(slope) that is told with this power."""
+    """Difference over u(slope) that a test with this power detects."""
     from scipy.optimize import brentq
 
     return float(brentq(lambda ratio: probability_of_telling(ratio, 1.0, dof) - power, 0.0, _CERTAIN))

@@ -220,7 +220,7 @@ def analyze_suiting(
     Args:
         paths: run folders, data files, folders to search.
         given: options by their names, of any analysis.
-        tell: is told why an analysis was left out that found nothing usable in a folder.
+        tell: called with the reason why an analysis found nothing usable in a folder.
     """
     return list(_suiting(lambda analysis: analysis.analyze(paths, analysis.options_from(given)), tell))
 

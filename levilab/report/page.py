@@ -35,7 +35,7 @@ def write_report(
     """Report what was found of the inputs at the paths; what has no result yet is analyzed, and nothing is stored.
 
     given: options by their names; those at their defaults count as not given, see
-    `levilab.pipelines.spindown.document.recall_spindowns`; tell: is told what lies there and is not in the report.
+    `levilab.pipelines.spindown.document.recall_spindowns`; tell: called with what lies there and is not in the report.
     Raises DataError, UnknownFormat, CannotWrite.
     """
     if output.suffix.lower() not in {".html", ".htm"}:

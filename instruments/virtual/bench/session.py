@@ -137,7 +137,7 @@ class Session:
             return work
 
     def catch_up(self) -> Work[None]:
-        """What has gone on in the instrument while nobody asked, to be worked out with go_on()."""
+        """What has gone on in the instrument since the last message, to be worked out with go_on()."""
         return Work(self.device.catch_up())
 
     def go_on(self, work: Work[None]) -> bool:

@@ -214,7 +214,7 @@ def _why_no_trigger(session: Session[TraceSettings]) -> str:
 
 
 def _shown(settings: TraceSettings) -> int:
-    """The channel whose range is told: the one that triggers, if it is recorded."""
+    """The channel whose range the message names: the one that triggers, if it is recorded."""
     return settings.trigger_source if settings.trigger_source in settings.channels else settings.channels[0]
 
 

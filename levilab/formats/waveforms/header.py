@@ -325,7 +325,7 @@ def _count(keys: Mapping[str, Sequence[str]], dialect: Dialect) -> int | None:
     return int(count.value) if count and 0 < count.value < 1e15 else None
 
 
-# --- nobody's header in particular ---------------------------------------------------------------------
+# --- headers of no particular maker --------------------------------------------------------------------
 
 
 def _plain(head: Head, dialect: Dialect, wanted: Mapping[str, str]) -> Header:

@@ -1,4 +1,4 @@
-"""What a file with samples or with pulse times says, whoever wrote it."""
+"""What a file with samples or with pulse times says, whichever program wrote it."""
 
 from __future__ import annotations
 

@@ -259,7 +259,7 @@ def warnings_of(statistics: Statistics) -> list[str]:
         numbers = ", ".join(str(i + 1) for i in statistics.outliers)
         plural = "s" * (len(statistics.outliers) > 1)
         texts.append(
-            f"repetition{plural} {numbers} do{'es' * (not plural)} not belong to the others; counted all the same"
+            f"repetition{plural} {numbers} do{'es' * (not plural)} not belong to the others; the mean includes them"
         )
     if statistics.drifts and statistics.trend:
         texts.append(

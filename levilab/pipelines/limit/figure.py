@@ -71,7 +71,7 @@ def _draw_limits(axes: Axes, analysis: LimitAnalysis, group: Limits) -> None:
     outliers = list(found.outliers)
     if outliers:
         style = {"marker": "o", "markersize": 12, "markerfacecolor": "none", "color": "red", "linestyle": "none"}
-        axes.plot(np.array(outliers) + 1, every[outliers], label="outlier, counted all the same", **style)  # type: ignore[arg-type]
+        axes.plot(np.array(outliers) + 1, every[outliers], label="outlier, in the mean", **style)  # type: ignore[arg-type]
     reach = max(float(np.abs(every - mean).max()), 0.2)
     axes.axhline(mean, color=_MEAN, linewidth=1.2, label=f"mean {with_uncertainty(found.mean)}")
     if found.scatter and found.mean.u is not None and found.scatter.value is not None:

@@ -70,7 +70,7 @@ class Series:
     """Frequency against time.
 
     time [s], frequency [Hz], u [Hz]: shape (m,), a value for each window or record; phases: (what the top did, from, to
-    [s]); of: what there is a value for, in words.
+    [s]); of: what each value is of, in words.
     """
 
     time: Array
@@ -138,7 +138,7 @@ class SpinAnalysis:
         return list(dict.fromkeys(texts))
 
 
-#: So many inputs are told of in words.
+#: The text describes so many inputs at most.
 MOST_SENTENCES = 4
 
 
