@@ -347,7 +347,7 @@ def _still_held(session: Session[PrecessionSettings], drive: float, spins: Array
 
 
 def _checked(session: Session[PrecessionSettings], laser: Array, drive: float) -> Array:
-    """The counts of the laser; what looks like a miscount gives an event, and stays in the mean.  Raises ExperimentFailed."""
+    """The counts of the laser; a likely miscount gives an event, and stays in the mean.  Raises ExperimentFailed."""
     settings = session.settings
     seen = laser[np.isfinite(laser)]
     if seen.size < 3:
