@@ -1,7 +1,5 @@
 """Acquire: experiments on the bench.  Heavy imports happen inside the commands that need them."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -108,7 +106,7 @@ for _name, _help in EXPERIMENT_HELP.items():
     )(acquire_experiment)
 
 
-def _ask(task: Task) -> str:
+def _ask(task: "Task") -> str:
     """Ask the person at the bench, on the terminal."""
     from levilab.acquisition.session import ExperimentFailed
 

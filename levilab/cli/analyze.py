@@ -1,8 +1,7 @@
 """Analyze: runs and data files.  Heavy imports happen inside the commands that need them."""
 
-from __future__ import annotations
-
 import re
+from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -26,8 +25,6 @@ from levilab.cli.output import message, print_json
 from levilab.errors import LevilabError, UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
     from levilab.pipelines.catalogue import Analysis
 
 
@@ -298,7 +295,7 @@ def _analyze(
 
 def _write_and_print(
     context: typer.Context,
-    results: list[tuple[Analysis[Any], Any]],
+    results: list[tuple["Analysis[Any]", Any]],
     left_out: list[str],
     *,
     save: bool,
@@ -339,7 +336,7 @@ def _remarks(of_each: Sequence[Sequence[str]]) -> list[str]:
     return [text for text in told if text not in taken]
 
 
-def _save(analysis: Analysis[Any], found: Any, out: Path | None) -> tuple[LevilabError | None, list[Path]]:
+def _save(analysis: "Analysis[Any]", found: Any, out: Path | None) -> tuple[LevilabError | None, list[Path]]:
     """What kept the result from being written, or the files; what was found is shown either way."""
     from levilab.pipelines.catalogue import save
 

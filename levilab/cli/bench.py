@@ -1,7 +1,5 @@
 """The commands of the bench.  Heavy imports happen where they are needed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -62,7 +60,7 @@ def bench_init(
     message(f"wrote {out}: look it over, then try it with `levilab bench check`")
 
 
-def _tell_found(found: list[Found]) -> None:
+def _tell_found(found: "list[Found]") -> None:
     for one in found:
         if one.identity:
             what = f"{one.kind} {one.model}" if one.kind else "no driver of levilab's"
@@ -107,7 +105,7 @@ def bench_check(
         raise typer.Exit(exit_codes.INSTRUMENT)
 
 
-def _tell_checked(one: Checked) -> None:
+def _tell_checked(one: "Checked") -> None:
     typer.echo(f"{one.kind} at {one.address}")
     if one.model:
         typer.echo(
@@ -157,7 +155,7 @@ def bench_serve(
         raise typer.Exit(exit_codes.INTERRUPTED)
 
 
-def _tell_as_json(instruments: tuple[Served, ...]) -> None:
+def _tell_as_json(instruments: "tuple[Served, ...]") -> None:
     offers = {served.kind: {"model": served.model, "resources": served.resources} for served in instruments}
     print_json({"ready": True, "instruments": offers}, indent=None)
 
@@ -166,7 +164,7 @@ def _tell_as_json(instruments: tuple[Served, ...]) -> None:
 _HINTS = {"socket": "a line feed ends every message", "pty": "8 data bits, no parity"}
 
 
-def _tell(instruments: tuple[Served, ...]) -> None:
+def _tell(instruments: "tuple[Served, ...]") -> None:
     width = max(len(name) for served in instruments for name in served.resources.values())
     for served in instruments:
         typer.echo(f"{served.kind} {served.model}")

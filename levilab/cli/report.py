@@ -1,7 +1,5 @@
 """Report, and the list of runs.  Heavy imports happen inside the commands that need them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 
