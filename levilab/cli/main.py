@@ -1,7 +1,5 @@
 """The application and its console script.  Heavy imports happen inside the commands that need them."""
 
-from __future__ import annotations
-
 import codecs
 import contextlib
 import os

@@ -1,7 +1,5 @@
 """The commands of the simulator: simulate, stability, benchmark.  Heavy imports happen where they are needed."""
 
-from __future__ import annotations
-
 import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -32,7 +30,7 @@ def add_to(app: typer.Typer) -> None:
     app.add_typer(benchmark_app, name="benchmark")
 
 
-def _scene(name: str, settings: list[str] | None) -> Scene:
+def _scene(name: str, settings: list[str] | None) -> "Scene":
     """The scene with the changes; a wrong name or key raises before anything heavy is loaded."""
     from levilab.simulator.scene import SceneError, read_scene, with_settings
 
@@ -99,7 +97,7 @@ def simulate(
 
 
 @contextlib.contextmanager
-def _interruptible(what_is_left: str) -> Iterator[None]:
+def _interruptible(what_is_left: str) -> "Iterator[None]":
     """Ctrl-C ends the command with one line."""
     try:
         yield
@@ -108,7 +106,7 @@ def _interruptible(what_is_left: str) -> Iterator[None]:
         raise typer.Exit(exit_codes.INTERRUPTED) from None
 
 
-def _explained(scene: Scene, duration: float) -> tuple[Effect, ...]:
+def _explained(scene: "Scene", duration: float) -> "tuple[Effect, ...]":
     from levilab.motion.effects import explain
 
     message("switching each effect on or off: some seconds, up to 15 where code must be compiled first")
@@ -162,13 +160,13 @@ def stability(
         print_json(document)
 
 
-def _span(name: str, text: str | None) -> Span | None:
+def _span(name: str, text: str | None) -> "Span | None":
     from levilab.stability.map import span_of
 
     return None if text is None else span_of(name, text)
 
 
-def _mapped(scene: Scene, spans: tuple[Span | None, Span | None], duration: float, out: Path) -> dict[str, object]:
+def _mapped(scene: "Scene", spans: "tuple[Span | None, Span | None]", duration: float, out: Path) -> dict[str, object]:
     from levilab.present.progress import Share
     from levilab.stability.map import survival_map
     from levilab.stability.table import place_for_map, write_map

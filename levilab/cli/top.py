@@ -1,7 +1,5 @@
 """The calculator for the top.  Heavy imports happen inside the command."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 
