@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.pulses.regression import median
+from analysis.pulses.regression import Fit, median
 from analysis.pulses.result import Finding
 from analysis.pulses.search import WIDE, noise_of, shorten
 
@@ -22,6 +22,8 @@ HIGHEST, SHORTEST = 210.0, 1.0
 NARROW = 2.0
 #: ... and is so many times as high as its next multiples, which those of a pulse train nearly equal.
 SINGLE = 2.5
+#: A line at a harmonic of the pulses is their own if it is no more than so many times as high as those beside it.
+OWN = 1.5
 #: In a third of the record it is at least this part of its height in all of it.
 STAYS = 0.6
 #: Hum is fitted to pieces of so many seconds, half overlapping.
@@ -34,18 +36,26 @@ DEAD = 0.3
 
 @dataclass(frozen=True)
 class Clean:
-    """samples and the shortened bins without what is no pulse; bad: samples that do not count, None: all do."""
+    """samples and the shortened bins without what is no pulse; bad: samples that do not count, None: all do.
+
+    lines: of hum, frequency [Hz] and amplitude; before: the bins with the hum in them.
+    """
 
     samples: Array
     bins: Array
     bad: Mask | None
     notes: tuple[Finding, ...]
+    lines: tuple[tuple[float, float], ...]
+    before: Array
 
 
-def clean(samples: Array, rate: float, bins: Array, bad: Mask | None) -> Clean:
+def clean(
+    samples: Array, rate: float, bins: Array, bad: Mask | None, *, own: tuple[tuple[float, float], ...] = ()
+) -> Clean:
     """Take off what is there; a trace without any of it comes back as it is.
 
-    samples: shape (n,); rate: of them [1/s]; bins: means of n // len(bins) samples; bad: which samples are no numbers.
+    samples: shape (n,); rate: of them [1/s]; bins: means of n // len(bins) samples; bad: which samples are no numbers;
+    own: lines that are no hum but the pulses' own.
     """
     factor = samples.size // bins.size
     bin_rate = rate / factor
@@ -65,10 +75,11 @@ def clean(samples: Array, rate: float, bins: Array, bad: Mask | None) -> Clean:
         long[: bins.size * factor] = np.repeat(dead, factor)
         bad = long if bad is None else bad | long
     if np.count_nonzero(counted) < 64:
-        return Clean(samples, bins, bad, tuple(notes))
+        return Clean(samples, bins, bad, tuple(notes), (), bins)
     if not counted.all():
         bins = np.interp(np.arange(bins.size), np.flatnonzero(counted), bins[counted])
-    lines = mains_lines(bins, bin_rate)
+    before = bins
+    lines = tuple(line for line in mains_lines(bins, bin_rate) if line not in own)
     if lines:
         names = " and ".join(f"{amplitude:.2g} at {frequency:.5g} Hz" for frequency, amplitude in lines)
         notes.append(Finding("hum", f"hum of amplitude {names} was taken off"))
@@ -81,7 +92,51 @@ def clean(samples: Array, rate: float, bins: Array, bad: Mask | None) -> Clean:
         bins = bins - np.interp((np.arange(bins.size) + 0.5) / bin_rate, times, values)
     if not counted.all():
         bins = np.where(counted, bins, np.median(bins[counted]))
-    return Clean(samples, bins, bad, tuple(notes))
+    return Clean(samples, bins, bad, tuple(notes), lines, before)
+
+
+def own_lines(found: Clean, rate: float, fit: Fit) -> tuple[tuple[float, float], ...]:
+    """Those lines of hum that are harmonics of the pulses; rate: of the bins; fit: the phase of the pulses.
+
+    A harmonic may lie at a multiple of the mains, too. It then is about as high as the harmonics beside it, and hum
+    is higher.
+    """
+    duration = found.before.size / rate
+    slowest, fastest = np.sort(fit.frequency(np.array([0.0, duration])))
+    if slowest <= 0:
+        return ()
+
+    def harmonic(place: float) -> int:
+        """Which harmonic passes a frequency during the record; 0: none does."""
+        k = round(2 * place / (slowest + fastest))
+        near = k * slowest - 3 / duration < place < k * fastest + 3 / duration
+        return k if near else 0
+
+    harmonics = {line: harmonic(line[0]) for line in found.lines}
+    if not any(harmonics.values()):
+        return ()
+    thin = shorten(found.before, max(int(rate / (4 * HIGHEST)), 1))
+    thin = thin - thin.mean()
+    time = (np.arange(thin.size) + 0.5) * duration / thin.size
+    turn = np.exp(-2j * np.pi * fit.phase(time))
+    hann = 1 - np.cos(2 * np.pi * time / duration)
+
+    def height(k: int) -> float:
+        return 2 * abs(complex(np.mean(thin * turn**k)))
+
+    doubtful = {line: k for line, k in harmonics.items() if k}
+    own: list[tuple[float, float]] = []
+    while True:  # a line that is the pulses' own is a measure of those beside it
+        for line, k in doubtful.items():
+            beside = [j for j in range(k - 2, k + 3) if j > 0 and j not in doubtful.values()]
+            # a harmonic whose frequency changes during the record is no higher than this at one frequency
+            share = abs(complex(np.mean(hann * turn**k * np.exp(2j * np.pi * line[0] * time))))
+            if line[1] < OWN * share * max(map(height, beside), default=0.0):
+                own.append(line)
+                del doubtful[line]
+                break
+        else:
+            return tuple(own)
 
 
 def _dead(bins: Array, rate: float, whole: Mask | None) -> Mask:
@@ -124,18 +179,25 @@ def mains_lines(bins: Array, rate: float) -> list[tuple[float, float]]:
 
     found: list[tuple[float, float]] = []
     for mains in MAINS:
-        for multiple in range(1, int(HIGHEST / mains) + 1):
+        hum: set[int] = set()
+        for multiple in range(int(HIGHEST / mains), 0, -1):  # from above: hum is no measure of what is below it
             nominal = mains * multiple
             reach = max(STRAYS * multiple, 2 * width)
             band = near(nominal, reach)
             peak = band.start + int(np.argmax(amplitude[band]))
             if amplitude[peak] <= 8 * level or not _narrow(amplitude, peak, near(peak * width, 1.5 + 3 * width)):
                 continue
-            further = [amplitude[near(k * nominal, k * reach)].max() for k in (2, 3, 4) if k * nominal < 2 * HIGHEST]
+            further = sorted(
+                float(amplitude[near(k * nominal, k * reach)].max())
+                for k in (2, 3, 4)
+                if k * nominal < 2 * HIGHEST and k * multiple not in hum
+            )
             height, place = float(amplitude[peak]), _peak(amplitude, peak) * width
-            if height > SINGLE * sorted(further)[len(further) // 2] and _stays(thin, place / thin_rate, height):
+            alone = not further or height > SINGLE * further[len(further) // 2]
+            if alone and _stays(thin, place / thin_rate, height):
+                hum.add(multiple)
                 found.append((place, height))
-    return found
+    return sorted(found)
 
 
 def _narrow(amplitude: Array, peak: int, beside: slice) -> bool:
@@ -144,7 +206,7 @@ def _narrow(amplitude: Array, peak: int, beside: slice) -> bool:
 
 
 def _stays(thin: Array, frequency: float, height: float) -> bool:
-    """Whether a line is as high in the first or the last third of the record: that of a chirped pulse train is not.
+    """Whether a line is as high in a third of the record.
 
     frequency: in parts of the rate.
     """
@@ -152,7 +214,7 @@ def _stays(thin: Array, frequency: float, height: float) -> bool:
     wave = (1 - np.cos(2 * np.pi * (np.arange(third) + 0.5) / third)) * np.exp(
         -2j * np.pi * frequency * np.arange(third)
     )
-    pieces = (thin[:third], thin[-third:])
+    pieces = (thin[:third], thin[third : 2 * third], thin[-third:])
     return max(2 / third * abs(complex(wave @ (piece - piece.mean()))) for piece in pieces) > STAYS * height
 
 

@@ -15,10 +15,14 @@ Array = NDArray[np.float64]
 CURVED = 4.0
 #: The noise of the samples counts as so many degrees of freedom, where there are fewer of the residuals.
 FEW = 30.0
-#: Residuals are grouped into so many blocks to see whether neighbours resemble each other.
+#: Residuals are grouped into so many blocks to see whether neighbours resemble each other ...
 BLOCKS = 50
+#: ... and into so many, of three turns or more, to see whether neighbours differ.
+SHORT_BLOCKS, SHORTEST_BLOCK = 100, 3
 #: Blocks scatter more, or less, than single residuals where chance would do it with less than this probability.
 WHITE, ALTERNATING = 0.01, 0.001
+#: The same of short blocks that scatter less: hum that is left moves pulses to and fro, from each turn to the next.
+TO_AND_FRO = 0.05
 
 
 @dataclass(frozen=True)
@@ -171,33 +175,37 @@ def _fit(times: Array, turns: Array, weight: Array | None, degree: int) -> tuple
     residuals = standard if weight is None else standard / root
     left = float(standard @ standard) - float(along[-1]) ** 2
     third = abs(float(along[-1])) / np.sqrt(max(left, 1e-300) / max(times.size - degree - 2, 1))
-    variance, inflation, freedom = scatter(standard, degree + 1)
+    variance, inflation, freedom = scatter(standard, turns, degree + 1)
     return Fit(coefficients, inverse @ inverse.T, centre, half, variance, inflation, freedom, residuals), third
 
 
-def scatter(residuals: Array, parameters: int) -> tuple[float, float, float]:
+def scatter(residuals: Array, turns: Array, parameters: int) -> tuple[float, float, float]:
     """Variance of residuals, the factor by which blocks of neighbours scatter more or less, degrees of freedom.
 
-    residuals: standardised, shape (n,); parameters: of the fit.  What matters for a frequency is how
-    residuals scatter over times as long as the record, not from one to the next.
+    residuals: standardised, and turns: their phase, shape (n,); parameters: of the fit.  What matters for a frequency
+    is how residuals scatter over times as long as the record, not from one to the next.
     """
     n = residuals.size
     freedom = max(n - parameters, 1)
     variance = float(residuals @ residuals) / freedom
     each = -(-n // BLOCKS)
-    blocks = -(-n // each)
-    if each < 2 or blocks < parameters + 6 or variance <= 0:
+    if each < 2 or variance <= 0:
         return variance, 1.0, freedom
-    starts = np.arange(0, n, each)
-    sums = np.add.reduceat(residuals, starts)
-    sizes = np.diff(np.append(starts, n))
-    coarse = float((sums**2 / sizes).sum()) / (blocks - parameters)
-    ratio = coarse / variance
-    if 0.75 < ratio < 1.3:
-        return variance, 1.0, freedom
-    from scipy.special import fdtr
+    short = max(SHORTEST_BLOCK, -(-n // SHORT_BLOCKS))
+    for size, less, more in ((each, ALTERNATING, WHITE), (short, TO_AND_FRO, 0.0)):
+        place = turns // size
+        starts = np.concatenate([[0], np.flatnonzero(place[1:] != place[:-1]) + 1])
+        blocks = starts.size
+        if blocks < parameters + 6:
+            continue
+        sums = np.add.reduceat(residuals, starts)
+        sizes = np.diff(np.append(starts, n))
+        ratio = float((sums**2 / sizes).sum()) / (blocks - parameters) / variance
+        if 0.85 < ratio < 1.3:
+            continue
+        from scipy.special import fdtr
 
-    p = float(fdtr(blocks - parameters, freedom, ratio))
-    if ALTERNATING < p < 1 - WHITE:
-        return variance, 1.0, freedom
-    return variance, ratio, blocks - parameters
+        p = float(fdtr(blocks - parameters, freedom, ratio))
+        if p < less or p > 1 - more:
+            return variance, ratio, blocks - parameters
+    return variance, 1.0, freedom
