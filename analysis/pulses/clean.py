@@ -7,17 +7,23 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.errors import TooFewPulses
 from analysis.pulses.regression import Fit, median
 from analysis.pulses.result import Finding
-from analysis.pulses.search import WIDE, noise_of, shorten
+from analysis.pulses.search import WIDE, find_events, noise_of, shorten
+from analysis.pulses.times import FEWEST, fit_train
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+#: Frequencies [Hz] and amplitudes.
+Lines = tuple[tuple[float, float], ...]
 
 #: Mains and its multiples [Hz], and how far from nominal a grid strays [Hz].
 MAINS, STRAYS = (50.0, 60.0), 0.25
 #: Lines are looked for below this, and need a record of so long.
 HIGHEST, SHORTEST = 210.0, 1.0
+#: The spectrum of a trace without noise counts as this part of the trace's range at least.
+FAINTEST = 3e-4
 #: A line of the mains holds so many times the power of all within 1.5 Hz beside it ...
 NARROW = 2.0
 #: ... and is so many times as high as its next multiples, which those of a pulse train nearly equal.
@@ -45,13 +51,11 @@ class Clean:
     bins: Array
     bad: Mask | None
     notes: tuple[Finding, ...]
-    lines: tuple[tuple[float, float], ...]
+    lines: Lines
     before: Array
 
 
-def clean(
-    samples: Array, rate: float, bins: Array, bad: Mask | None, *, own: tuple[tuple[float, float], ...] = ()
-) -> Clean:
+def clean(samples: Array, rate: float, bins: Array, bad: Mask | None, *, own: Lines = ()) -> Clean:
     """Take off what is there; a trace without any of it comes back as it is.
 
     samples: shape (n,); rate: of them [1/s]; bins: means of n // len(bins) samples; bad: which samples are no numbers;
@@ -80,6 +84,8 @@ def clean(
         bins = np.interp(np.arange(bins.size), np.flatnonzero(counted), bins[counted])
     before = bins
     lines = tuple(line for line in mains_lines(bins, bin_rate) if line not in own)
+    own = _own_at_sight(lines, bins, bin_rate)
+    lines = tuple(line for line in lines if line not in own)
     if lines:
         names = " and ".join(f"{amplitude:.2g} at {frequency:.5g} Hz" for frequency, amplitude in lines)
         notes.append(Finding("hum", f"hum of amplitude {names} was taken off"))
@@ -95,13 +101,27 @@ def clean(
     return Clean(samples, bins, bad, tuple(notes), lines, before)
 
 
-def own_lines(found: Clean, rate: float, fit: Fit) -> tuple[tuple[float, float], ...]:
-    """Those lines of hum that are harmonics of the pulses; rate: of the bins; fit: the phase of the pulses.
+def _own_at_sight(lines: Lines, bins: Array, rate: float) -> Lines:
+    """Those lines that are harmonics of pulses which are seen before anything is taken off."""
+    if not lines:
+        return ()
+    events = find_events(bins, rate)
+    if events.times.size < FEWEST:
+        return ()
+    try:
+        train = fit_train(events.times)
+    except TooFewPulses:
+        return ()
+    return own_lines(lines, bins, rate, train.fit)
+
+
+def own_lines(lines: Lines, bins: Array, rate: float, fit: Fit) -> Lines:
+    """Those lines that are harmonics of the pulses; bins: with the lines in them; rate: of the bins; fit: the phase.
 
     A harmonic may lie at a multiple of the mains, too. It then is about as high as the harmonics beside it, and hum
     is higher.
     """
-    duration = found.before.size / rate
+    duration = bins.size / rate
     slowest, fastest = np.sort(fit.frequency(np.array([0.0, duration])))
     if slowest <= 0:
         return ()
@@ -112,10 +132,10 @@ def own_lines(found: Clean, rate: float, fit: Fit) -> tuple[tuple[float, float],
         near = k * slowest - 3 / duration < place < k * fastest + 3 / duration
         return k if near else 0
 
-    harmonics = {line: harmonic(line[0]) for line in found.lines}
+    harmonics = {line: harmonic(line[0]) for line in lines}
     if not any(harmonics.values()):
         return ()
-    thin = shorten(found.before, max(int(rate / (4 * HIGHEST)), 1))
+    thin = shorten(bins, max(int(rate / (4 * HIGHEST)), 1))
     thin = thin - thin.mean()
     time = (np.arange(thin.size) + 0.5) * duration / thin.size
     turn = np.exp(-2j * np.pi * fit.phase(time))
@@ -172,7 +192,7 @@ def mains_lines(bins: Array, rate: float) -> list[tuple[float, float]]:
     amplitude = np.zeros(transform.size)  # behind a Hann window, which is a sum of three neighbours
     amplitude[1:-1] = np.abs(transform[1:-1] - 0.5 * (transform[:-2] + transform[2:])) * (2 / n)
     width = thin_rate / n  # of a bin
-    level = median(amplitude[: int(HIGHEST / width)])
+    level = max(median(amplitude[: int(HIGHEST / width)]), FAINTEST * float(np.ptp(thin)))
 
     def near(frequency: float, reach: float) -> slice:
         return slice(max(round((frequency - reach) / width), 1), round((frequency + reach) / width) + 1)
@@ -310,12 +330,15 @@ def _baseline(bins: Array, rate: float, counted: Mask) -> tuple[Array, Array] | 
     n = ordered.shape[1]
     values = ordered[:, n // 2]
     scatter = median(values - ordered[:, n // 6]) / 0.967
-    if scatter > WIDE * noise_of(bins):  # pulses that last about as long as the pauses: no level is that of the pauses
+    reach = float(ordered[:, -1].mean() - ordered[:, 0].mean())
+    if scatter > max(
+        WIDE * noise_of(bins), 0.05 * reach
+    ):  # pulses that last about as long as the pauses: no level is that of the pauses
         values = 0.5 * (ordered[:, n // 20] + ordered[:, -1 - n // 20])
     error = 1.2533 * scatter / np.sqrt(n)
     times = ((np.arange(count) + 0.5) * size / rate)[there]
     around = np.concatenate([values[:1], values, values[-1:]])
     wander = float(np.ptp(around[:-2] + around[1:-1] + around[2:])) / 3
-    if wander < WANDERS * error or wander < 0.02 * float(ordered[:, -1].mean() - ordered[:, 0].mean()):
+    if wander < WANDERS * error or wander < 0.02 * reach:
         return None
     return times, values

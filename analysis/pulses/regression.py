@@ -15,6 +15,10 @@ Array = NDArray[np.float64]
 CURVED = 4.0
 #: The noise of the samples counts as so many degrees of freedom, where there are fewer of the residuals.
 FEW = 30.0
+#: Roundings that shift the frequency by so many times what independent ones would are not seen in residuals.
+COHERENT = 2.0
+#: Rounded times of turns shift the phase gained in half the record by no more than this part of their rounding.
+GRID_AT_MOST = 0.6
 #: Residuals are grouped into so many blocks to see whether neighbours resemble each other ...
 BLOCKS = 50
 #: ... and into so many, of three turns or more, to see whether neighbours differ.
@@ -85,6 +89,36 @@ class Fit:
             return self
         freedom = self.freedom + FEW
         return replace(self, variance=(self.freedom * self.variance + FEW) / freedom, freedom=freedom)
+
+    def with_grid(self, times: Array, weight: Array | None, *, step: float, steep: float) -> Fit:
+        """The same with at least the uncertainty that comes from samples which are too far apart for the flanks.
+
+        A flank between two samples may lie anywhere between them, and residuals do not show it where turns are nearly
+        whole numbers of samples. So the error of a rounded time is carried to the frequency, for all places of the
+        flank between samples and all drifts up to one sample along the record; its mean square is the least variance.
+        Where the flank comes to lie everywhere between samples the residuals show it, and nothing is to be done.
+
+        Args:
+            times: of the turns that were fitted, shape (n,) [s].
+            weight: of them, shape (n,); None: all alike.
+            step: from one sample to the next [s].
+            steep: part of the pulse's height that lies between two samples at most; what flanks of several samples
+                leave of the error falls with its square.
+        """
+        rounding = min(steep, 1.0) ** 2 * step * float(self.coefficients[1]) / self.half  # [turns]
+        seen = float(self.covariance[1, 1])
+        if seen >= (GRID_AT_MOST * rounding) ** 2:
+            return self
+        u = (times - self.centre) / self.half
+        powers = u[:, None] ** np.arange(self.coefficients.size)
+        carried = (powers if weight is None else powers * weight[:, None]) @ self.unit_covariance[1]
+        place = np.arange(8)[:, None, None] / 8 + np.linspace(-1, 1, 9)[:, None] * u + times / step
+        rounded = (place - np.rint(place)) * rounding
+        least = float(np.mean((rounded @ carried) ** 2))
+        if least <= max(seen, COHERENT**2 * rounding**2 / 12 * float(carried @ carried)):
+            return self
+        student = _student(self.freedom) ** 2
+        return replace(self, variance=least / (float(self.unit_covariance[1, 1]) * self.inflation * student))
 
     def phase_at(self, time: float, origin: float = 0.0) -> Estimate:
         """Phase at a time, from 0 to 1 [turns], of what passes at a phase of origin."""

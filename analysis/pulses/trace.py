@@ -77,8 +77,10 @@ def spin_of_trace(
         if cleaned.lines:
             raise OnlyHum(seen=error.seen, needed=error.needed, duration=error.duration) from None
         raise
-    if cleaned.lines and (own := own_lines(cleaned, Trace(cleaned, rate).bin_rate, found.match.fit)):
-        found = _found(Trace(clean(x, rate, bins, bad, own=own), rate), method, degree)
+    if cleaned.lines:
+        own = own_lines(cleaned.lines, cleaned.before, rate / (x.size // bins.size), found.match.fit)
+        if own:
+            found = _found(Trace(clean(x, rate, bins, bad, own=own), rate), method, degree)
     return _result(found, start)
 
 
@@ -144,8 +146,8 @@ def _by_edges(trace: Trace) -> tuple[Edges, int]:
     """The edges, and the number of pulses beside the turns' own.  Raises TooFewPulses."""
     events, train = _events(trace)
     if events.width * train.fit.coefficients[1] / train.fit.half > WIDE:
-        edges = Edges(train.fit, train.used.size, math.nan, math.nan, math.nan, train.missing, 0)
-        return edges, train.doubled
+        fit = train.fit.with_grid(events.times[train.used], None, step=1 / trace.rate, steep=1.0)
+        return Edges(fit, train.used.size, math.nan, math.nan, math.nan, train.missing, 0), train.doubled
     edges = place_edges(trace.samples, trace.rate, train.fit, width=events.width, sign=events.sign)
     if edges is None or (edges.turns < FEW and edges.height < CLEAR * edges.noise):
         raise trace.too_few(train.used.size)
