@@ -97,14 +97,18 @@ class Trace:
         """[s]."""
         return self.samples.size / self.rate
 
+    @property
+    def middles(self) -> Array:
+        """Times of the middles of the bins [s]."""
+        return (np.arange(self.bins.size, dtype=np.float64) + 0.5) / self.bin_rate - 0.5 / self.rate
+
     def too_few(self, seen: int) -> TooFewPulses:
         """The error of a trace without enough pulses."""
         return TooFewPulses(seen=seen, needed=FEWEST, duration=self.duration)
 
     def match(self, fit: Fit, degree: int | None) -> Match | None:
         """The matched filter from a phase that is about right; None where there are no pulses."""
-        middles = (np.arange(self.bins.size, dtype=np.float64) + 0.5) / self.bin_rate - 0.5 / self.rate
-        window = window_of(self.bins, fit.phase(middles))
+        window = window_of(self.bins, fit.phase(self.middles))
         if window is None:
             return None
         return match(self.samples, self.rate, fit, window, bad=self.bad, degree=degree)
@@ -207,7 +211,7 @@ def _without_trap(trace: Trace, found: Match, degree: int | None) -> tuple[Match
             return twice, (
                 Finding("half", "two equal pulses a turn: half the frequency fitted too, and was not taken"),
             )
-    if why := traps.alternates(found):
+    if why := traps.alternates(found) or traps.elsewhere(trace.bins, found.fit.phase(trace.middles)):
         half = trace.match(found.fit.times(0.5), degree)
         if half is not None:
             return half, (
