@@ -36,6 +36,8 @@ FEW, CLEAR = 16, 3.0
 WIDE = 0.2
 #: The matched filter is not trusted where more than these parts of the turns have no pulse, or one at a wrong place.
 MOST_MISSING, MOST_WRONG = 0.5, 0.15
+#: Nor where so many times as many pulses lie beside the turns as at them: a reflection is one of them for each turn.
+MOST_DOUBLED = 1.5
 
 
 def spin_of_trace(
@@ -163,10 +165,11 @@ def _by_pulse(trace: Trace, method: Choice, degree: int | None) -> tuple[Match, 
 
     Raises TooFewPulses.
     """
-    found, doubled, seen, why = None, 0, 0, "no pulses stand out that return regularly"
+    found, doubled, seen, astray, why = None, 0, 0, False, "no pulses stand out that return regularly"
     try:
         _, train = _events(trace)
         doubled, seen = train.doubled, train.used.size
+        astray = doubled > MOST_DOUBLED * seen
         found = trace.match(train.fit, degree)
     except TooFewPulses as error:
         seen = error.seen
@@ -175,7 +178,7 @@ def _by_pulse(trace: Trace, method: Choice, degree: int | None) -> tuple[Match, 
             raise trace.too_few(seen)
         return found, doubled, "matched", ()
     if found is not None and method == "auto":
-        why = _doubt(found)
+        why = "more pulses lie beside the turns than at them" if astray else _doubt(found)
         if not why:
             return found, doubled, "matched", ()
     fit = search(trace.bins, trace.bin_rate)
