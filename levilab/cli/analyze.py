@@ -1,6 +1,5 @@
 """Analyze: runs and data files.  Heavy imports happen inside the commands that need them."""
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from functools import partial
@@ -306,11 +305,11 @@ def _write_and_print(
 
     left_out: why other analyses have no result.
     """
-    from levilab.pipelines.catalogue import print_analysis
+    from levilab.pipelines.catalogue import print_analysis, remarks
 
     in_words = partial(with_options, names=option_names(context.find_root().command))
     failures: list[LevilabError] = []
-    messages = [*left_out, *_remarks([found.remarks for _, found in results])]
+    messages = [*left_out, *remarks([found.remarks for _, found in results])]
     for analysis, found in results:
         if save:
             failure, written = _save(analysis, found, out)
@@ -326,14 +325,6 @@ def _write_and_print(
         message(in_words(text))
     if failures:
         raise failures[0]
-
-
-def _remarks(of_each: Sequence[Sequence[str]]) -> list[str]:
-    """What the analyses say, each once; runs that one of them passed over count only if all did."""
-    told = list(dict.fromkeys(text for remarks in of_each for text in remarks))
-    kinds = [text for text in told if re.fullmatch(r"passed over: \d+ \w+ runs?", text)]
-    taken = {text for text in kinds if not all(text in remarks for remarks in of_each)}
-    return [text for text in told if text not in taken]
 
 
 def _save(analysis: "Analysis[Any]", found: Any, out: Path | None) -> tuple[LevilabError | None, list[Path]]:

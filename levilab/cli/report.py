@@ -6,7 +6,17 @@ from typing import Annotated
 import typer
 
 from levilab.cli.analyze import inputs, spindown_options
-from levilab.cli.options import Channel, Columns, Json, KeepOutliers, Paths, Rate, ReadingU
+from levilab.cli.options import (
+    Channel,
+    Columns,
+    Json,
+    KeepOutliers,
+    Paths,
+    Rate,
+    ReadingU,
+    option_names,
+    with_options,
+)
 from levilab.cli.output import message, print_json
 
 
@@ -17,6 +27,7 @@ def add_to(app: typer.Typer) -> None:
 
 
 def report(
+    context: typer.Context,
     paths: Paths,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE.html", help="The file to write.")] = Path(
         "report.html"
@@ -29,14 +40,16 @@ def report(
 ) -> None:
     """Report runs in one self-contained file: what was measured, with what, figures, numbers, warnings.
 
-    The numbers are those that levilab analyze wrote beside the runs.  What has no result there, or one of other
-    readings or options than the given, is analyzed for the page.  A page is of one analysis; where a folder holds runs
-    of several kinds it is of the first, and the others are named.
+    The numbers are those that levilab analyze wrote beside the runs, of every analysis; where it wrote them elsewhere
+    (--out), give that folder or result.json.  What has no result, or one of other readings or options than the given,
+    is analyzed for the page.
     """
     from levilab.report.page import write_report
 
     given = inputs(columns, channel, rate) | spindown_options(reading_u, "covariance", keep_outliers)
-    typer.echo(f"the report is in {write_report(paths, output, given, message)}")
+    names = option_names(context.find_root().command)
+    written = write_report(paths, output, given, lambda text: message(with_options(text, names)))
+    typer.echo(f"the report is in {written}")
 
 
 def runs(

@@ -110,6 +110,11 @@ class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOpt
         """What the data say, in a few sentences."""
         return "  ".join(group.text for group in self.groups)
 
+    @property
+    def averaged(self) -> Sequence[Sequence[Source[LimitReadings]]]:
+        """Those of a kind."""
+        return tuple(tuple(self.sources[k] for k in group.runs) for group in self.groups)
+
     def about_all(self) -> Iterable[str]:
         """What to know of the limits of a kind."""
         for group in self.groups:

@@ -13,10 +13,9 @@ from typing import Any
 
 import pytest
 
-from levilab.errors import LevilabError
-from levilab.pipelines.catalogue import ANALYSES, save
+from levilab.errors import DataError, LevilabError
+from levilab.pipelines.catalogue import ANALYSES, Analysis, save
 from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions, analyze_spindowns
-from levilab.pipelines.spindown.document import DOCUMENT
 from levilab.report.inputs import _drive
 from levilab.report.page import render as render_found
 from levilab.report.page import write_report
@@ -27,7 +26,7 @@ from support.waiting import HANG_GUARD_S
 
 
 def render(found: SpinDownAnalysis) -> str:
-    return render_found(ANALYSES["spindown"], found)
+    return render_found([(ANALYSES["spindown"], found)])
 
 
 class Page(HTMLParser):
@@ -202,8 +201,8 @@ def test_a_law_is_marked_best_only_where_the_readings_decide(tmp_path: Path, rea
     assert ("(best)" in parsed.text) == analysis.combined.verdict.decided
 
 
-def reported(*paths: Path, output: Path, **options: Any) -> str:
-    page = write_report(paths, output, options).read_text(encoding="utf-8")
+def reported(*paths: Path, output: Path, tell: Any = None, **options: Any) -> str:
+    page = write_report(paths, output, options, tell).read_text(encoding="utf-8")
     return " ".join(Page(page).text.split())
 
 
@@ -221,7 +220,7 @@ def test_the_report_does_not_fit_what_has_a_result(run: Path, tmp_path: Path, mo
     analysis = analyze_spindowns([run], SpinDownOptions())
     save(ANALYSES["spindown"], analysis)
     monkeypatch.setattr("levilab.pipelines.spindown.analysis.fit_spin_down", pytest.fail)
-    recalled = render(DOCUMENT.recall([run], SpinDownOptions()))
+    recalled = render(ANALYSES["spindown"].recall([run], SpinDownOptions()))
     anew = render(analysis)
     differ = [pair for pair in zip(recalled.split("\n"), anew.split("\n"), strict=True) if pair[0] != pair[1]]
     assert all("Analysis" in here or "written" in here for here, _ in differ)
@@ -275,7 +274,69 @@ def test_many_readings_are_cut_in_the_page_and_the_figure_stays_small(tmp_path: 
     assert len(html) < 3e6
 
 
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures take longer than all the rest."""
+    monkeypatch.setattr(Analysis, "svg", lambda *_: "<svg/>")
+    monkeypatch.setattr(Analysis, "png", lambda *_: b"")
+
+
+def headings(page: Path) -> list[str]:
+    return re.findall("<h1>(.*)</h1>", page.read_text(encoding="utf-8"))
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_all_analyses_of_a_folder_are_on_the_page_in_their_order(tmp_path: Path, sample_data: Path) -> None:
+    for name in ("upper-limits", "spin-down-1"):
+        shutil.copytree(sample_data / name, tmp_path / "runs" / name)
+    told: list[str] = []
+    page = write_report([tmp_path / "runs"], tmp_path / "page.html", tell=told.append)
+    assert headings(page) == [
+        "Report of 2 runs",
+        "Spin-down of a levitated top",
+        "Limits of the spin of a levitated top",
+        "What was measured, and with what",
+    ]
+    assert len(told) == 1  # no run is passed over by all analyses
+    assert "no result lies beside spin-down-1, upper-limits" in told[0]
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_run_that_has_two_results_is_described_once(tmp_path: Path, sample_data: Path) -> None:
+    run = shutil.copytree(sample_data / "precession-sweep", tmp_path / "sweep")
+    options = {"reading_u": 0.1}
+    for name in ("precession", "spin"):
+        analysis = ANALYSES[name]
+        page = write_report([run], tmp_path / "page.html", options)
+        assert headings(page)[1:2] != ["Spin frequency of a top"]  # whose analysis is for other experiments
+        save(analysis, analysis.analyze([run], analysis.options_from(options)))
+    page = write_report([run], tmp_path / "page.html", options)
+    assert headings(page)[1:3] == ["Spin frequency of a top", "Precession of a driven top"]
+    text = page.read_text(encoding="utf-8")
+    assert text.count("<h3>sweep</h3>") == 1
+    assert text.count("as levilab analyze found it") == 2
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_result_that_lies_elsewhere_is_found_by_its_own_path(tmp_path: Path, run: Path) -> None:
+    elsewhere = tmp_path / "elsewhere"
+    spindown = ANALYSES["spindown"]
+    save(spindown, analyze_spindowns([run], SpinDownOptions(reading_u=0.07)), elsewhere)
+    told: list[str] = []
+    text = reported(run, output=tmp_path / "page.html", tell=told.append)
+    assert "as levilab analyze found it" not in text
+    assert "(`out`), give that folder or file" in told[0]
+    for path in (elsewhere, elsewhere / "result.json"):
+        text = reported(path, output=tmp_path / "page.html", tell=pytest.fail)
+        assert f"as levilab analyze found it: {elsewhere / 'result.json'}" in text
+        assert "u of a reading: 0.07 Hz" in text
+    run.rename(tmp_path / "renamed")
+    with pytest.raises(DataError, match=r"elsewhere.result\.json: is of .*spin-c893, which is not there"):
+        reported(elsewhere, output=tmp_path / "page.html")
+
+
+@pytest.mark.usefixtures("undrawn")
 def test_a_report_that_cannot_be_written_is_told_in_one_line(tmp_path: Path, sample_data: Path) -> None:
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     with pytest.raises(LevilabError, match="`output`"):
-        write_report([sample_data], tmp_path / "file" / "report.html")
+        write_report([sample_data / "spin-down-1"], tmp_path / "file" / "report.html")
