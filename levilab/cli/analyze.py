@@ -20,7 +20,7 @@ from levilab.cli.options import (
     option_names,
     with_options,
 )
-from levilab.cli.output import message, print_json
+from levilab.cli.output import interruptible, message, print_json
 from levilab.errors import LevilabError, UsageError
 
 if TYPE_CHECKING:
@@ -284,12 +284,14 @@ def _analyze(
     from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
 
     left_out: list[str] = []
-    if context.info_name == _EACH:
-        results = analyze_suiting(paths, given, left_out.append)
-    else:
-        analysis = ANALYSES[str(context.info_name)]
-        results = [(analysis, analysis.analyze(paths, analysis.options_from(given)))]
-    _write_and_print(context, results, left_out, save=save, out=out, as_json=as_json)
+    with interruptible("what was fitted so far is lost, nothing is written"):
+        if context.info_name == _EACH:
+            results = analyze_suiting(paths, given, left_out.append)
+        else:
+            analysis = ANALYSES[str(context.info_name)]
+            results = [(analysis, analysis.analyze(paths, analysis.options_from(given)))]
+    with interruptible("look which results are written: each one is whole"):
+        _write_and_print(context, results, left_out, save=save, out=out, as_json=as_json)
 
 
 def _write_and_print(

@@ -17,7 +17,7 @@ from levilab.cli.options import (
     option_names,
     with_options,
 )
-from levilab.cli.output import message, print_json
+from levilab.cli.output import interruptible, message, print_json
 
 
 def add_to(app: typer.Typer) -> None:
@@ -48,7 +48,8 @@ def report(
 
     given = inputs(columns, channel, rate) | spindown_options(reading_u, "covariance", keep_outliers)
     names = option_names(context.find_root().command)
-    written = write_report(paths, output, given, lambda text: message(with_options(text, names)))
+    with interruptible("no report is written"):
+        written = write_report(paths, output, given, lambda text: message(with_options(text, names)))
     typer.echo(f"the report is in {written}")
 
 

@@ -211,7 +211,9 @@ def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]
         chosen = options(folder)
         try:
             run = Run.load(folder)
-            if needs.take(run):
+            if goes_on := run.continued_in:
+                remarks.append(f"passed over: {folder} was broken off, its run goes on in {goes_on.name}")
+            elif needs.take(run):
                 found.append(_of_run(run, needs, chosen))
             else:
                 others[run.record.experiment] += 1
