@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.errors import NotFinite, NotPositive, ShapesDiffer
+from analysis.numbers import digits
 from analysis.precession.line import FEWEST, NO_FIT, Line, fit_line, fit_orthogonal, influence
 from analysis.precession.miscounts import Miscount, Robust, find_miscounts, robust_line
 from analysis.precession.power import Power, what_it_takes
@@ -282,7 +283,7 @@ def _doubts(fit: SweepFit, sweep: Sweep, found: list[Miscount]) -> list[str]:
     line = fit.line
     if line.p_fit is not None and not line.u_known:
         texts.append(
-            f"the points scatter {line.scale:.2g} times as much as their u says (p = {line.p_fit:.1g}): "
+            f"the points scatter {digits(line.scale)} times as much as their u says (p = {digits(line.p_fit, 1)}): "
             "all uncertainties are enlarged by that"
         )
     if line.chi_square is not None and line.p_fit is not None and 1 - line.p_fit < NO_FIT:
@@ -293,7 +294,7 @@ def _doubts(fit: SweepFit, sweep: Sweep, found: list[Miscount]) -> list[str]:
     if fit.p_locked is None:
         texts.append("the points lie on the line to the last digit: without their u nothing can be tested; give it")
     texts += [
-        f"point {k}, at {p.drive:.5g} Hz, alone moves the slope by {abs(p.slope_change):.2g}, {share:.1f} of its u"
+        f"point {k}, at {p.drive:.5g} Hz, alone moves the slope by {digits(abs(p.slope_change))}, {share:.1f} of its u"
         for k, p in enumerate(fit.points, 1)
         if p.slope_change is not None and line.u_slope and (share := abs(p.slope_change) / line.u_slope) > _FAR
     ]
@@ -308,7 +309,7 @@ def _doubts(fit: SweepFit, sweep: Sweep, found: list[Miscount]) -> list[str]:
         worst = float(np.max(sweep.u_drive / sweep.u))
         if worst > _MATTERS:
             texts.append(
-                f"u of the drive's frequency is up to {worst:.2g} of that of the precession: let it count with "
+                f"u of the drive's frequency is up to {digits(worst)} of that of the precession: let it count with "
                 "`orthogonal` = True"
             )
     if line.orthogonal and (sweep.u is None or sweep.u_drive is None):
@@ -328,7 +329,7 @@ def _about_spin(fit: SweepFit, sweep: Sweep) -> list[str]:
         return []
     where = "below" if offset < 0 else "above"
     text = (
-        f"the spin that was counted lies {abs(offset):.3g} Hz {where} the drive: a locked top spins with it; is the "
-        "tape on a loose washer, or was the top not locked?"
+        f"the spin that was counted lies {digits(abs(offset), 3)} Hz {where} the drive: a locked top spins with it; is "
+        "the tape on a loose washer, or was the top not locked?"
     )
     return [text]

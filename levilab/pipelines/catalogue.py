@@ -27,6 +27,8 @@ from levilab.pipelines.spin.table import spin_tables
 from levilab.pipelines.spindown.document import DOCUMENT as SPINDOWN
 from levilab.pipelines.spindown.report import spindown_part
 from levilab.pipelines.spindown.table import spindown_tables
+from levilab.present.clock import moment
+from levilab.present.numbers import short_name
 from levilab.runs.run import RECORD, find_runs
 
 if TYPE_CHECKING:
@@ -39,6 +41,9 @@ if TYPE_CHECKING:
     from levilab.pipelines.sources import InputOptions, Needs, Source
     from levilab.present.tables import Table
     from levilab.runs.run import Run
+
+#: Starts of runs that the terminal shows; the report has all.
+MOST_STARTS = 6
 
 
 @dataclass(frozen=True)
@@ -235,6 +240,10 @@ def print_analysis(analysis: Analysis[A], found: A, in_words: Callable[[str], st
     console = terminal()
     for table in analysis.tables(found):
         console.print(draw(table))
+    starts = [f"{short_name(one.name)} {moment(one.start)}" for one in found.sources if one.start]
+    if starts:
+        more = f"; and {len(starts) - MOST_STARTS} more" if len(starts) > MOST_STARTS else ""
+        console.print(f"[bold]Start, local time.[/bold] {escape('; '.join(starts[:MOST_STARTS]))}{more}")
     console.print(f"[bold]What the data say.[/bold] {escape(found.text)}")
     for warning in found.all_warnings:
         console.print(f"[yellow]note:[/yellow] {escape(in_words(warning))}")

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
+from levilab.present.clock import moment
 from levilab.present.words import setting_in_words, settings_in_words, value_in_words
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ def _facts(source: Source[Any], parts: Sequence[About]) -> list[tuple[str, tuple
     return [
         ("Synthetic", made_up),
         ("Note", (record.note,) if record.note else ()),
-        ("When", _when(record)),
+        ("When", (*_when(record), *_local_start(source))),
         ("Status", (source.run.status,)),
         *about_readings,
         ("Drive", _drive(record)),
@@ -104,6 +105,13 @@ def _when(record: RunRecord) -> tuple[str, ...]:
     """Begin and end, as far as they are known; a virtual clock may have made one of them."""
     ends = [_time(utc) for utc in (record.started_utc, record.ended_utc) if utc]
     return (" to ".join(dict.fromkeys(ends)),) if ends else ()
+
+
+def _local_start(source: Source[Any]) -> tuple[str, ...]:
+    """The start on the clock of the person who reads."""
+    if source.start is None:
+        return ()
+    return (f"{'time zero' if source.time_zero else 'started'} at {moment(source.start)}, local time",)
 
 
 def _time(utc: str) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from analysis import stability
 from analysis.errors import AnalysisError
 from analysis.limits import Comparison, Statistics, compare, nearest_edge, spins_of_window, summarize
+from analysis.numbers import digits
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.limit.readings import LimitReadings, read_limit_file, read_limit_run
@@ -279,4 +280,4 @@ def _compared(one: Comparison) -> str:
     if one.p is None:
         return f"That is {where}."
     verdict = "which chance explains" if one.agrees else "more than chance makes"
-    return f"The mean lies {where}, {verdict} (p = {one.p:.2g})."
+    return f"The mean lies {where}, {verdict} (p = {digits(one.p)})."

@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+from datetime import datetime, timedelta
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -151,6 +152,11 @@ def test_times_are_to_the_second_and_what_is_not_known_is_left_out(run: Path) ->
     started, ended = "2026-11-21T00:52:00.123456Z", "2026-11-21T00:55:10.5Z"
     text = text_of(changed(run, started_utc=started, ended_utc=ended))
     assert "2026-11-21 00:52:00 UTC to 2026-11-21 00:55:10 UTC" in text
+    zero = "2026-11-21T00:52:00Z"
+    parsed = text_of(changed(run, started_utc=started, time_zero_utc=zero))
+    here = datetime.fromisoformat(zero).astimezone()
+    assert f"time zero at {here:%Y-%m-%d %H:%M:%S} " in parsed
+    assert f"{here + timedelta(seconds=190):%H:%M:%S} 190.000 21.75" in parsed  # the last reading
 
 
 def test_what_happened_tells_the_fall(run: Path) -> None:
@@ -189,7 +195,7 @@ def test_intervals_are_shown_where_they_were_asked_for(run: Path) -> None:
     assert "68 % interval" not in text_of(run)
     text = text_of(run, options=SpinDownOptions(uncertainty="profile"))
     assert "68 % interval (profile)" in text
-    assert re.search(r"\[0\.0002365\d*, 0\.0002371\d*\]|\[0\.0002366\d*, 0\.0002372\d*\]", text)
+    assert re.search(r"\[2\.365\d×10⁻⁴ … 2\.371\d×10⁻⁴\]|\[2\.366\d×10⁻⁴ … 2\.372\d×10⁻⁴\]", text)
 
 
 @pytest.mark.parametrize("readings", [3, 20])
@@ -212,7 +218,7 @@ def test_the_report_shows_what_analyze_found_intervals_included(run: Path, tmp_p
     low, high = result["models"][2]["parameters"]["c32"]["interval_68"]
     text = reported(run, output=tmp_path / "report.html")
     assert "68 % interval (bootstrap)" in text
-    assert f"[{low:.5g}, {high:.5g}]" in text
+    assert f"[{1e4 * low:.4f}×10⁻⁴ … {1e4 * high:.4f}×10⁻⁴]" in text  # as the terminal shows it
     assert f"as levilab analyze found it: {run / 'result.json'}" in text
 
 
@@ -248,7 +254,7 @@ def test_the_page_needs_nothing_of_the_terminal() -> None:
 
 
 def test_one_p_value_is_the_same_number_on_the_page_and_the_terminal(page: Page) -> None:
-    assert "2.3e-14" in page.text
+    assert "2.3×10⁻¹⁴" in page.text
 
 
 def test_nothing_is_folded_away_so_that_all_is_printed(page: Page) -> None:

@@ -268,7 +268,9 @@ def test_a_warning_about_an_input_is_recalled_once_however_it_is_named(
         analyzed(path)
     monkeypatch.chdir(tmp_path)
     after = recall_spindowns([path.relative_to(tmp_path) for path in paths], SpinDownOptions())
-    assert sum("no header" in text for text in after.all_warnings) == 2
+    about = [text for text in after.all_warnings if "no header" in text]
+    assert len(about) == 2
+    assert [text.count("one.csv") + text.count("two.csv") for text in about] == [1, 1]  # named once
 
 
 def test_a_tilt_that_runs_show_together_is_in_a_recall_without_result(tmp_path: Path) -> None:
