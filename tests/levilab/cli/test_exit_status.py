@@ -9,7 +9,7 @@ import pytest
 
 from levilab.cli import exit_codes
 from levilab.cli.main import app, main
-from levilab.cli.options import in_options, option_names
+from levilab.cli.quantities import in_options, option_names
 from levilab.errors import LevilabError, UsageError
 from support.commands import command
 from support.paths import ROOT, SAMPLE_DATA
