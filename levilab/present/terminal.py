@@ -9,20 +9,25 @@ from typing import TYPE_CHECKING
 from rich import box
 from rich.console import Console
 from rich.markup import escape
+from rich.measure import Measurement, measure_renderables
+from rich.padding import Padding
 from rich.table import Table as RichTable
 
 from levilab.present.characters import for_encoding
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from typing import Any
 
+    from rich.console import ConsoleOptions, RenderableType
     from rich.text import Text
 
     from levilab.present.tables import Table
 
 #: SIMPLE_HEAD in plain ASCII; rich itself would draw a frame.
 _ASCII_HEAD = box.Box("    \n    \n -- \n    \n    \n -- \n    \n    \n", ascii=True)
+#: Columns below which no text can be read, and more than any table has.
+_NARROWEST, _UNLIMITED = 20, 10_000
 
 
 class _Terminal(Console):
@@ -33,15 +38,46 @@ class _Terminal(Console):
         return super().render_str(for_encoding(text, self.encoding), **options)
 
 
+class _Table(RichTable):
+    """A table; where the terminal is too narrow for its words, a list: row after row, a line for each column."""
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Any]:
+        """As rich asks for it.  A column is never narrower than its longest word, which rich itself would cut."""
+        unlimited = options.update(width=_UNLIMITED)
+        whole = Measurement.get(console, unlimited, self)
+        columns = [measure_renderables(console, unlimited, [column.header, *column.cells]) for column in self.columns]
+        free, wanted = options.max_width - whole.minimum, whole.maximum - whole.minimum
+        if free < 0:
+            yield from self._rows()
+            return
+        if free < wanted:
+            for column, needed in zip(self.columns, columns, strict=True):
+                column.width = needed.minimum + needed.span * free // wanted
+        yield from super().__rich_console__(console, options)
+
+    def _rows(self) -> Iterator[RenderableType]:
+        if self.title:
+            yield Padding(self.title, (0, 0, 1, 0), style="bold")
+        heads = [column.header for column in self.columns]
+        for first, *cells in zip(*(column.cells for column in self.columns), strict=True):
+            if first:
+                yield Padding(first, 0, style="bold")
+            row = RichTable.grid(padding=(0, 1))
+            for head, cell in zip(heads[1:], cells, strict=True):
+                if cell:
+                    row.add_row(head, cell)
+            yield Padding(row, (0, 0, 1, 1))
+
+
 def terminal() -> Console:
     """As wide as the terminal; into a pipe or file as wide as the tables need."""
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 160
-    return _Terminal(width=max(width, 80), highlight=False)
+    return _Terminal(width=max(width, _NARROWEST), highlight=False)
 
 
 def new_table(title: str | None, *columns: str, numbers: Sequence[str] = ()) -> RichTable:
     """An empty table; numbers: the columns that are aligned to the right."""
-    table = RichTable(
+    table = _Table(
         box=box.SIMPLE_HEAD if _is_unicode(sys.stdout.encoding) else _ASCII_HEAD,
         padding=(0, 1, 0, 0),
         pad_edge=False,
