@@ -95,6 +95,8 @@ def read_bench(path: Path, tables: type[C], *, instead: str = ", or try `mock`")
             f"{path}: there is no such file: describe your bench in it (docs/bench.md){instead}"
         ) from None
     except OSError as error:
+        if path.is_dir():
+            raise ConfigError(f"{path}: is a folder; a TOML file is expected") from None
         raise ConfigError(f"{path}: cannot be read ({error.strerror}): a TOML file is expected") from error
     except ValueError as error:
         raise ConfigError(f"{path}: not readable as TOML: {error}") from error

@@ -297,7 +297,8 @@ def _analyze(
         try:
             results = [(analysis, analysis.analyze(paths, analysis.options_from(given)))]
         except DoesNotSuit as error:
-            raise DoesNotSuit(f"{error}{_suiting(analysis, paths, given)}") from error
+            advice = "" if "levilab analyze" in str(error) else _suiting(analysis, paths, given)
+            raise DoesNotSuit(f"{error}{advice}") from error
     _write_and_print(context, results, left_out, save=save, out=out, as_json=as_json)
 
 

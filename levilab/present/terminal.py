@@ -7,7 +7,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from rich import box
-from rich.console import Console
+from rich.console import Console, Group
 from rich.markup import escape
 from rich.measure import Measurement, measure_renderables
 from rich.padding import Padding
@@ -42,31 +42,39 @@ class _Table(RichTable):
     """A table; where the terminal is too narrow for its words, a list: row after row, a line for each column."""
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Any]:
-        """As rich asks for it.  A column is never narrower than its longest word, which rich itself would cut."""
-        unlimited = options.update(width=_UNLIMITED)
-        whole = Measurement.get(console, unlimited, self)
-        columns = [measure_renderables(console, unlimited, [column.header, *column.cells]) for column in self.columns]
-        free, wanted = options.max_width - whole.minimum, whole.maximum - whole.minimum
-        if free < 0:
-            yield from self._rows()
-            return
-        if free < wanted:
-            for column, needed in zip(self.columns, columns, strict=True):
-                column.width = needed.minimum + needed.span * free // wanted
-        yield from super().__rich_console__(console, options)
+        """As rich asks for it."""
+        fits = _share_width(self, console, options)
+        yield from super().__rich_console__(console, options) if fits else self._rows(console, options)
 
-    def _rows(self) -> Iterator[RenderableType]:
+    def _rows(self, console: Console, options: ConsoleOptions) -> Iterator[RenderableType]:
         if self.title:
             yield Padding(self.title, (0, 0, 1, 0), style="bold")
         heads = [column.header for column in self.columns]
         for first, *cells in zip(*(column.cells for column in self.columns), strict=True):
             if first:
                 yield Padding(first, 0, style="bold")
-            row = RichTable.grid(padding=(0, 1))
+            row = RichTable.grid("", "", padding=(0, 1))
             for head, cell in zip(heads[1:], cells, strict=True):
                 if cell:
                     row.add_row(head, cell)
+            if console.measure(Group(*heads[1:])).maximum > options.max_width // 2:
+                _share_width(row, console, options.update(width=options.max_width - 1))
             yield Padding(row, (0, 0, 1, 1))
+
+
+def _share_width(table: RichTable, console: Console, options: ConsoleOptions) -> bool:
+    """Share the width among the columns, none of them narrower than its longest word, which rich itself would cut.
+
+    Returns whether there is width enough.
+    """
+    unlimited = options.update(width=_UNLIMITED)
+    whole = Measurement.get(console, unlimited, table)
+    free, wanted = options.max_width - whole.minimum, whole.maximum - whole.minimum
+    if 0 <= free < wanted:
+        for column in table.columns:
+            needed = measure_renderables(console, unlimited, [column.header, *column.cells])
+            column.width = needed.minimum + needed.span * free // wanted
+    return free >= 0
 
 
 def terminal() -> Console:
