@@ -5,7 +5,8 @@
 
 The top of the scene `spindown` (24.3 g, moment tilted by 1.8°, drag of a laminar disc), locked to the drive at 45 Hz
 with three angles between them.  The drive creeps up in steps of a second until the top falls, or is 1 Hz beside the
-drive.
+drive.  By then it has slipped for some seconds; but it only slows, so its limit lies between the spin a second before
+(or the drive then, if that was lower) and the drive now: the middle of these is given, as `levilab acquire limit` does.
 
 Against it stands the balance of torques.  A drive of amplitude B (of its first harmonic) accelerates the spin by no
 more than α = δ|μ|B/2I₃, half of it because half of a field along one line turns with the top, δ being the part of the
@@ -55,16 +56,27 @@ FIELD_T, STRONG_T, CREEP, FAST = 4e-4, 8e-4, 0.05, 0.1
 
 @dataclass(frozen=True)
 class Loss:
-    """How a creep ended: the drive then [Hz], "lock" or "top"; on the way, second by second, drives [Hz] and swings.
+    """How a creep ended, and on the way, second by second, drives [Hz] and swings.
 
-    aside: largest distance from the axis; up_and_down: highest minus lowest place [m].
+    between: the limit lies between these [Hz]; how: "lock" was lost, or the "top" fell; aside: largest distance from
+    the axis; up_and_down: highest minus lowest place [m].
     """
 
-    drive: float
+    between: tuple[float, float]
     how: str
     drives: list[float]
     aside: list[float]
     up_and_down: list[float]
+
+    @property
+    def limit(self) -> float:
+        """The middle [Hz]."""
+        return sum(self.between) / 2
+
+    @property
+    def u(self) -> float:
+        """Standard uncertainty, of an even distribution between the two [Hz]."""
+        return (self.between[1] - self.between[0]) / 12**0.5
 
 
 def creep_up(scene: Scene, waveform: str, field: float, rate: float, *, turns: float, start: float = FROM_HZ) -> Loss:
@@ -76,6 +88,7 @@ def creep_up(scene: Scene, waveform: str, field: float, rate: float, *, turns: f
     drives: list[float] = []
     aside: list[float] = []
     up_and_down: list[float] = []
+    low = start
     for k in range(round((TO_HZ - start) / (rate * STEP_S)) + 1):
         drive = start + k * rate * STEP_S
         driven = scene.changed(
@@ -93,11 +106,13 @@ def creep_up(scene: Scene, waveform: str, field: float, rate: float, *, turns: f
         aside.append(float(np.hypot(motion.position[:, 0], motion.position[:, 1]).max()))
         up_and_down.append(float(np.ptp(motion.position[:, 2])))
         if motion.fell is not None:
-            return Loss(drive, "top", drives, aside, up_and_down)
-        if abs(float(motion.spin_hz.mean()) - drive) > HELD_WITHIN_HZ:
-            return Loss(drive, "lock", drives, aside, up_and_down)
+            return Loss((low, drive), "top", drives, aside, up_and_down)
+        spin = float(motion.spin_hz.mean())
+        if abs(spin - drive) > HELD_WITHIN_HZ:
+            return Loss((low, drive), "lock", drives, aside, up_and_down)
+        low = min(spin, drive)
         state, time, turns = motion.states[-1], float(motion.states[-1, TIME]), turns + drive * STEP_S
-    return Loss(TO_HZ, "held", drives, aside, up_and_down)
+    return Loss((TO_HZ, TO_HZ), "held", drives, aside, up_and_down)
 
 
 def window_edge(scene: Scene) -> float:
@@ -136,7 +151,7 @@ def balance(scene: Scene, waveform: str, field: float, rate: float) -> float:
 
 
 def study() -> dict[str, Any]:
-    """All creeps; each entry has the waveform, field, creep, mass, and per angle the drive at the loss and how."""
+    """All creeps; each entry has the waveform, field, creep, mass, and for each angle the limit and how it was lost."""
     entries: list[dict[str, Any]] = []
 
     def entry(subject: str, waveform: str, field: float, rate: float, mass: float) -> None:
@@ -149,7 +164,8 @@ def study() -> dict[str, Any]:
                 "field_t": field,
                 "creep_hz_per_s": rate,
                 "mass_kg": mass,
-                "lost_at_hz": [round(loss.drive, 3) for loss in losses],
+                "limit_hz": [round(loss.limit, 3) for loss in losses],
+                "limit_u_hz": [round(loss.u, 3) for loss in losses],
                 "how": [loss.how for loss in losses],
                 "balance_hz": balance(scene, waveform, field, rate),
                 "window_hz": window_edge(scene),
@@ -208,7 +224,7 @@ def draw(results: dict[str, Any], path: Path) -> None:
         mass.set_xlabel("mass of the top  [g]")
         mass.set_title(f"A strong drive reaches the edge of the window (0.8 mT, {FAST:g} Hz/s)", loc="left")
         for axes in (amplitude, creep, mass):
-            axes.set_ylabel("drive when the top is lost  [Hz]")
+            axes.set_ylabel("upper limit of the spin  [Hz]")
             axes.axhline(61, color="grey", linewidth=0.8)
             axes.annotate(
                 "thesis 61 Hz", (0.99, 61), xycoords=("axes fraction", "data"), ha="right", va="bottom", color="grey"
@@ -240,7 +256,7 @@ def _draw_losses(axes: Axes, results: dict[str, Any], subject: str, key: str, fa
         x = factor * np.array([one[key] for one in mine])
         axes.plot(x, [one["balance_hz"] for one in mine], color=colour, linewidth=1)
         for value, one in zip(x, mine, strict=True):
-            for lost, how in zip(one["lost_at_hz"], one["how"], strict=True):
+            for lost, how in zip(one["limit_hz"], one["how"], strict=True):
                 axes.plot(value, lost, color=colour, marker=_MARKERS[how], markersize=5, alpha=0.7, linestyle="none")
     x = factor * np.array([one[key] for one in chosen])
     order = np.argsort(x)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -13,6 +14,7 @@ from levilab.files import finite
 from levilab.pipelines.limit.analysis import (
     LIMIT,
     NEEDS,
+    Conditions,
     Device,
     LimitAnalysis,
     LimitOptions,
@@ -49,6 +51,17 @@ class DevicePart(Part):
     resonance_hz: float | None
 
 
+class ConditionsPart(Part):
+    """Under which the limits were measured; see `levilab.pipelines.limit.analysis.Conditions`."""
+
+    which: Which
+    top: str
+    waveform: str | None
+    amplitude_vpp: float | None
+    creep_hz_per_s: float | None
+    step_hz: float | None
+
+
 class ComparisonPart(Part):
     """A mean beside theory; see `analysis.limits.Comparison`."""
 
@@ -59,14 +72,19 @@ class ComparisonPart(Part):
 
 
 class _WithLimits(Part):
-    """What stands with each run, and with the limits of a kind together."""
+    """What stands with each run, and with the limits of the same conditions together.
+
+    freedom: degrees of freedom of the standard error, null where it rests on no scatter.
+    """
 
     which: Which
+    conditions: ConditionsPart
     repetitions: int = Field(ge=1)
+    freedom: float | None
     trend_p: float | None
     outliers: tuple[int, ...]
     comparisons: tuple[ComparisonPart, ...]
-    device: DevicePart | None
+    device: DevicePart
     ends: dict[Literal["fell", "lock lost", "top lost"], int]
     verdict: str
 
@@ -76,7 +94,7 @@ class LimitRunPart(RunPart, _WithLimits):
 
 
 class GroupPart(_WithLimits):
-    """All limits of a kind."""
+    """All limits of the same conditions."""
 
     values: dict[str, Value]
     numbers: tuple[int, ...]
@@ -132,7 +150,7 @@ def limit_result(analysis: LimitAnalysis, place: Place) -> LimitResult:
         "synthetic": any(source.synthetic for source in sources),
         "software": software_versions(),
         "settings": _settings(analysis.options),
-        "values": _top_values(analysis.groups),
+        "values": _top_values(analysis),
         "models": [],
         "groups": [
             {"values": _values(group.statistics), "numbers": list(group.runs)} | _limits(group)
@@ -157,21 +175,36 @@ def _settings(options: LimitOptions) -> dict[str, Any]:
     return {"columns": dict(options.columns or {}), "reading_u_hz": options.reading_u}
 
 
-def _top_values(groups: Sequence[Limits]) -> dict[str, Any]:
-    """Of one kind of limits by their plain names, of two with the kind before them."""
-    if len(groups) == 1:
-        return _values(groups[0].statistics)
-    return {f"{group.which}_{name}": value for group in groups for name, value in _values(group.statistics).items()}
+def _top_values(analysis: LimitAnalysis) -> dict[str, Any]:
+    """Of one group by their plain names, else with the kind before them, and its number where it has several."""
+    if len(analysis.groups) == 1:
+        return _values(analysis.groups[0].statistics)
+    values: dict[str, Any] = {}
+    for group in analysis.groups:
+        number = analysis.number(group)
+        prefix = group.which if number is None else f"{group.which}_{number}"
+        values |= {f"{prefix}_{name}": value for name, value in _values(group.statistics).items()}
+    return values
 
 
 def _values(found: Statistics) -> dict[str, Any]:
     error = found.mean.u if found.scatter else None
-    values = {"mean": _value(found.mean), "standard_error": {"value": error, "u": None, "unit": "Hz"}}
-    if found.scatter:
-        values["scatter"] = _value(found.scatter)
-    if found.trend:
-        values["trend"] = _value(found.trend)
+    values = {"mean": _value(found.mean), "standard_error": _plain(error)}
+    for name in ("scatter", "trend", "between"):
+        if estimate := getattr(found, name):
+            values[_NAMES.get(name, name)] = _value(estimate)
+    if found.step:
+        values["step_error"] = _plain(found.step)
     return values
+
+
+#: Names of what would not be understood by itself.
+_NAMES = {"between": "between_runs"}
+
+
+def _plain(value: float | None) -> dict[str, Any]:
+    """A frequency without an uncertainty of its own."""
+    return {"value": value, "u": None, "unit": "Hz"}
 
 
 def _value(estimate: Estimate) -> dict[str, Any]:
@@ -182,21 +215,21 @@ def _limits(limits: Limits) -> dict[str, Any]:
     found, device = limits.statistics, limits.device
     return {
         "which": limits.which,
+        "conditions": vars(limits.conditions),
         "repetitions": found.n,
+        "freedom": found.freedom,
         "trend_p": found.trend_p,
         "outliers": list(found.outliers),
         "comparisons": [
             {
                 "name": one.name,
-                "expected": {"value": one.expected, "u": None, "unit": "Hz"},
+                "expected": _plain(one.expected),
                 "difference": _value(one.difference),
                 "p": one.p,
             }
             for one in limits.comparisons
         ],
-        "device": None
-        if device is None
-        else {
+        "device": {
             "name": device.name,
             "linear_lower_hz": device.lower,
             "linear_upper_hz": device.upper,
@@ -268,19 +301,24 @@ def _holds(made_with: SettingsPart, options: LimitOptions) -> bool:
 
 
 def _restored(part: _WithLimits, values: Mapping[str, Value], runs: tuple[int, ...]) -> Limits:
-    scatter, trend = values.get("scatter"), values.get("trend")
+    step = values["step_error"].value if "step_error" in values else None
     statistics = Statistics(
         mean=values["mean"].estimate,
-        scatter=scatter.estimate if scatter else None,
+        scatter=values["scatter"].estimate if "scatter" in values else None,
         n=part.repetitions,
-        trend=trend.estimate if trend else None,
+        trend=values["trend"].estimate if "trend" in values else None,
         trend_p=part.trend_p,
         outliers=part.outliers,
+        step=step or 0.0,
+        freedom=math.inf if part.freedom is None else part.freedom,
+        runs=len(runs),
+        between=values["between_runs"].estimate if "between_runs" in values else None,
     )
     comparisons = tuple(
         Comparison(one.name, one.expected.value or 0.0, one.difference.estimate, one.p) for one in part.comparisons
     )
     said = part.device
-    device = Device(said.name, said.linear_lower_hz, said.linear_upper_hz, said.resonance_hz) if said else None
+    device = Device(said.name, said.linear_lower_hz, said.linear_upper_hz, said.resonance_hz)
+    conditions = Conditions(**vars(part.conditions))
     ends = {str(kind): n for kind, n in part.ends.items()}
-    return Limits(part.which, statistics, comparisons, device, ends, runs)
+    return Limits(part.which, conditions, statistics, comparisons, device, ends, runs)
