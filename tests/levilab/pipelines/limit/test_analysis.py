@@ -83,6 +83,69 @@ def test_a_file_of_ones_own_needs_nothing_but_the_spins(tmp_path: Path) -> None:
     assert (group.which, group.statistics.n) == ("upper", 3)  # by the nearer edge of the window
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "21.7\n21.4\n21.9\n",
+        "limit [Hz]\n21,7\n21,4\n21,9\n",
+        "# ours\nf [mHz]\n21700\n21400\n\n21900\n",
+        "1302\n1284\n1314",
+    ],
+    ids=["numbers", "a title", "another unit", "rpm"],
+)
+def test_a_column_of_limits_alone_is_enough(tmp_path: Path, text: str, request: pytest.FixtureRequest) -> None:
+    file = tmp_path / "my.csv"
+    file.write_text(("rpm\n" if request.node.callspec.id == "rpm" else "") + text, encoding="utf-8")
+    (group,) = analyze_limits([file], LimitOptions()).groups
+    assert group.statistics.mean.value == pytest.approx(65.0 / 3)
+    assert (group.which, group.statistics.n) == ("lower", 3)
+
+
+@pytest.mark.parametrize("text", ["time [s]\n21.7\n21.4\n", "21.7\nhigh\n21.9\n", "height [mm]\n21.7\n"])
+def test_another_column_is_no_limit(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "my.csv"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(TableError):
+        analyze_limits([file], LimitOptions())
+
+
+def test_runs_of_other_conditions_stand_apart(sample_data: Path, tmp_path: Path) -> None:
+    """The same drive twice is one group, with the scatter between the runs; a stronger one or another creep is not."""
+    names = {"one": {}, "two": {}, "strong": {"drive_amplitude_vpp": 20.0}, "slow": {"creep_hz_per_s": 0.05}}
+    for k, (name, changes) in enumerate(names.items()):
+        folder = shutil.copytree(sample_data / "upper-limits", tmp_path / name)
+        record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        record["configuration"]["limit"] |= changes
+        (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
+        header, *rows = (folder / "readings.csv").read_text(encoding="utf-8").splitlines()
+        shifted = [row.split(",") for row in rows]
+        text = [",".join([row[0], f"{float(row[1]) + 2.0 * k:.3f}", *row[2:]]) for row in shifted]
+        (folder / "readings.csv").write_text("\n".join([header, *text, ""]), encoding="utf-8")
+    analysis = analyze_limits([tmp_path / name for name in names], LimitOptions())
+    assert sorted(group.runs for group in analysis.groups) == [(0, 1), (2,), (3,)]
+    both = next(group for group in analysis.groups if group.runs == (0, 1))
+    assert both.statistics.between
+    assert both.statistics.between.value == pytest.approx(2 / 2**0.5, rel=0.3)
+    assert both.statistics.mean.u == pytest.approx(
+        1.0, rel=0.05
+    )  # half of 2 Hz: the runs differ by more than their tops
+    assert "which differ by" in both.text
+    assert any("are of 3 conditions and are not put together" in text for text in analysis.all_warnings)
+    values = limit_document(analysis, tmp_path)["values"]
+    assert {"upper_1_mean", "upper_2_mean", "upper_3_standard_error", "upper_1_between_runs"} <= values.keys()
+
+
+def test_upper_limits_that_do_not_scatter_are_no_better_than_a_step(sample_data: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(sample_data / "upper-limits", tmp_path / "run")
+    header, *rows = (folder / "readings.csv").read_text(encoding="utf-8").splitlines()
+    alike = [",".join([row.split(",")[0], *rows[0].split(",")[1:]]) for row in rows]
+    (folder / "readings.csv").write_text("\n".join([header, *alike, ""]), encoding="utf-8")
+    analysis = analyze_limits([folder], LimitOptions())
+    (run,) = analysis.runs
+    assert run.statistics.mean.u == pytest.approx(float(rows[0].split(",")[2]))
+    assert any("however often it is repeated: creep slower" in text for text in analysis.all_warnings)
+
+
 def test_a_spin_down_is_no_limit_and_runs_without_limits_are_told(tmp_path: Path, sample_data: Path) -> None:
     file = spin_down_csv(tmp_path / "my.csv")
     assert [row.name for row, _ in analyze_suiting([file], {})] == ["spindown"]
