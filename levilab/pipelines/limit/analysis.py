@@ -12,17 +12,18 @@ from analysis import stability
 from analysis.errors import AnalysisError
 from analysis.limits import Comparison, Sample, Statistics, combine, compare, nearest_edge, spins_of_window, summarize
 from levilab.errors import DataError
+from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.limit.readings import LimitReadings, read_limit_file, read_limit_run
-from levilab.pipelines.result import Place, place_of
-from levilab.pipelines.sources import InputOptions, Needs, Source, collect
+from levilab.pipelines.sources import InputOptions, Needs
 from levilab.present.numbers import with_uncertainty
-from levilab.runs.run import find_run
 from levilab.simulator.keys import SceneError
 from levilab.simulator.scene import Scene, scene_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
+
+    from levilab.pipelines.sources import Source
 
 Which = Literal["lower", "upper"]
 
@@ -97,7 +98,7 @@ class Conditions:
             "" if self.waveform is None else _WAVEFORMS.get(self.waveform, self.waveform),
             "" if self.amplitude_vpp is None else f"{self.amplitude_vpp:g} Vpp",
             "" if self.creep_hz_per_s is None else f"{self.creep_hz_per_s:g} Hz/s",
-            "" if self.step_hz is None else f"steps of {self.step_hz:g} Hz",
+            "" if self.step_hz is None else f"a look each {self.step_hz:g} Hz",
         ]
         return ", ".join([*filter(None, drive), self.top])
 
@@ -113,7 +114,7 @@ class Limits:
         comparisons: with theory.
         device: that theory is of.
         ends: kind of event → how often a top was lost so.
-        runs: numbers of the inputs that it is of, from 0.
+        runs: of a group, the numbers of the inputs, from 0.
     """
 
     which: Which
@@ -122,7 +123,7 @@ class Limits:
     comparisons: tuple[Comparison, ...]
     device: Device
     ends: Mapping[str, int]
-    runs: tuple[int, ...]
+    runs: tuple[int, ...] = ()
 
     @property
     def text(self) -> str:
@@ -130,34 +131,13 @@ class Limits:
         return " ".join(_sentences(self))
 
 
-@dataclass(frozen=True)
-class LimitAnalysis:
-    """Limits, each run by itself and those of the same conditions together.
-
-    Attributes:
-        sources: the inputs.
-        runs: one per source.
-        groups: one for each of the conditions that there are runs of, lower limits first.
-        options: how it was analyzed.
-        place: where the result belongs.
-        warnings: about the inputs.
-        remarks: what does not belong to the analysis.
-        origins: where each run's numbers come from, in words.
-    """
-
-    sources: tuple[Source[LimitReadings], ...]
-    runs: tuple[Limits, ...]
-    groups: tuple[Limits, ...]
-    options: LimitOptions
-    place: Place
-    warnings: tuple[str, ...]
-    remarks: tuple[str, ...]
-    origins: tuple[str, ...]
+class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOptions]):
+    """Limits, each run by itself and those of the same conditions together."""
 
     @property
-    def home(self) -> Path:
-        """The folder that the result belongs to."""
-        return self.place.folder
+    def groups(self) -> tuple[Limits, ...]:
+        """One for each of the conditions that there are runs of, lower limits first."""
+        return self.combined
 
     @property
     def text(self) -> str:
@@ -169,41 +149,32 @@ class LimitAnalysis:
         alike = [one for one in self.groups if one.which == group.which]
         return alike.index(group) + 1 if len(alike) > 1 else None
 
-    @property
-    def all_warnings(self) -> list[str]:
-        """Every warning once, a run's with its name where there are several runs."""
-        texts = list(self.warnings)
-        for source, run in zip(self.sources, self.runs, strict=True):
-            prefix = f"{source.name}: " if len(self.runs) > 1 else ""
-            texts += [prefix + text for text in (*source.warnings, *warnings_of(run.statistics))]
+    def about_all(self) -> Iterable[str]:
+        """What to know of the limits of the same conditions, and of conditions that differ."""
+        for which in ("lower", "upper"):
+            texts = [group.conditions.text for group in self.groups if group.which == which]
+            if len(texts) > 1:
+                listed = "; ".join(texts)
+                yield f"the {which} limits are of {len(texts)} conditions and are not put together: {listed}"
         for group in self.groups:
+            yield from self._about_tops(group)
             if len(group.runs) > 1:
-                texts += warnings_of(group.statistics)
-        return list(dict.fromkeys(texts))
+                yield from warnings_of(group.statistics)
+
+    def _about_tops(self, group: Limits) -> Iterable[str]:
+        synthetic = sum(self.sources[k].synthetic for k in group.runs)
+        if 0 < synthetic < len(group.runs):
+            yield (
+                f"{synthetic} of {len(group.runs)} runs of {group.which} limits are SYNTHETIC, the others are not "
+                "known to be: a mean over both says nothing about a real top"
+            )
+
+    def about_run(self, run: Limits) -> Iterable[str]:
+        """What to know of one run."""
+        return warnings_of(run.statistics)
 
 
-def analyze_limits(paths: Sequence[Path], options: LimitOptions) -> LimitAnalysis:
-    """Statistics of the limits found at the paths, and what theory says of them.
-
-    Raises DataError for what cannot be used; the text names the file.
-    """
-    paths = [find_run(path) for path in paths]
-    found = collect(paths, NEEDS, lambda _: options)
-    runs = tuple(limits_of(source, options, k) for k, source in enumerate(found.sources))
-    groups = together(found.sources, runs, options)
-    return LimitAnalysis(
-        sources=found.sources,
-        runs=runs,
-        groups=groups,
-        options=options,
-        place=place_of(paths, found.sources),
-        warnings=(*found.warnings, *about_inputs(found.sources, groups)),
-        remarks=found.remarks,
-        origins=("analyzed now",) * len(runs),
-    )
-
-
-def limits_of(source: Source[LimitReadings], options: LimitOptions, number: int = 0) -> Limits:
+def limits_of(source: Source[LimitReadings], options: LimitOptions) -> Limits:
     """One input.  Raises DataError, which names the file."""
     device = device_of(source)
     which = _which(source, device)
@@ -213,8 +184,14 @@ def limits_of(source: Source[LimitReadings], options: LimitOptions, number: int 
         raise DataError(f"{source.data}: {error}") from error
     kinds = Counter(str(event["kind"]) for event in source.run.events()) if source.run else Counter[str]()
     ends = {kind: kinds[kind] for kind in ENDS if kinds[kind]}
-    comparisons = _comparisons(statistics, device, which)
-    return Limits(which, _conditions(source, which, device), statistics, comparisons, device, ends, (number,))
+    return Limits(
+        which,
+        _conditions(source, which, device),
+        statistics,
+        _comparisons(statistics, device, which),
+        device,
+        ends,
+    )
 
 
 def together(
@@ -225,7 +202,9 @@ def together(
     for k, run in sorted(enumerate(runs), key=lambda one: one[1].which):
         groups.setdefault((run.conditions, run.device), []).append(k)
     return tuple(
-        runs[numbers[0]] if len(numbers) == 1 else _combined(tuple(numbers), sources, runs, options)
+        replace(runs[numbers[0]], runs=tuple(numbers))
+        if len(numbers) == 1
+        else _combined(tuple(numbers), sources, runs, options)
         for numbers in groups.values()
     )
 
@@ -342,19 +321,15 @@ def warnings_of(statistics: Statistics) -> list[str]:
     return texts
 
 
-def about_inputs(sources: Sequence[Source[LimitReadings]], groups: Sequence[Limits]) -> Iterable[str]:
-    """What to know of the inputs before using the numbers."""
-    for group in groups:
-        synthetic = sum(sources[k].synthetic for k in group.runs)
-        if 0 < synthetic < len(group.runs):
-            yield (
-                f"{synthetic} of {len(group.runs)} runs of {group.which} limits are SYNTHETIC, the others are not "
-                "known to be: a mean over both says nothing about a real top"
-            )
-    for which in ("lower", "upper"):
-        texts = [group.conditions.text for group in groups if group.which == which]
-        if len(texts) > 1:
-            yield (f"the {which} limits are of {len(texts)} conditions and are not put together: {'; '.join(texts)}")
+METHOD = Method(needs=NEEDS, kind=LimitAnalysis, options=LimitOptions, fit=limits_of, combine=together)
+
+
+def analyze_limits(paths: Sequence[Path], options: LimitOptions) -> LimitAnalysis:
+    """Statistics of the limits found at the paths, and what theory says of them.
+
+    Raises DataError for what cannot be used; the text names the file.
+    """
+    return METHOD.analyze(paths, options)
 
 
 # --- in words ---

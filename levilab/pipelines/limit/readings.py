@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from levilab.errors import DoesNotSuit
-from levilab.formats.columns import NoTable, TableError
+from levilab.formats.columns import NoSuchColumn, NoTable, TableError
 from levilab.formats.table import Table, must_be_positive, read_table
 from levilab.formats.titles import read_title, unit_factor
 
@@ -63,7 +63,7 @@ def read_limit_file(path: Path, options: InputOptions) -> LimitReadings:
         table = read_table(
             path, columns=options.columns, quantities=QUANTITIES, needed=QUANTITIES[:1], guess=options.guess
         )
-    except NoTable as error:
+    except (NoTable, NoSuchColumn) as error:
         single = _single_column(path, guess=options.guess)
         if single is None:
             raise error from None

@@ -51,7 +51,7 @@ def theory_table(analysis: LimitAnalysis) -> Table:
     rows = [
         Row(
             (
-                one.name if analysis.number(group) is None else f"{_group(analysis, group.runs[0])}: {one.name}",
+                one.name if analysis.number(group) is None else f"{analysis.number(group)}: {one.name}",
                 f"{one.expected:.2f}",
                 without_unit(one.difference),
                 plain(one.p, 2),
