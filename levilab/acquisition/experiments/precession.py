@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 from pydantic_core import PydanticCustomError
 
+from analysis.precession.gates import FEWEST, Gates, Rate, Swing, pulses_too_many, rates_at_point, swing_of
 from instruments.errors import InstrumentError, OutOfRange
 from levilab.acquisition.counting import prepare_counter, spin_now
 from levilab.acquisition.driving import RAMP_STEP_S, DriveSettings, NotHeld, drive_up, held_spin, no_light
@@ -19,6 +20,7 @@ from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import ConfigError
 from levilab.bench.person import FloatTop, Task
 from levilab.runs.channel import Channel
+from levilab.runs.gates import COUNTED, gates_event
 
 if TYPE_CHECKING:
     from typing import Self
@@ -41,12 +43,15 @@ _LOOKS, _LOCKED_WITHIN_HZ, _MOST_LOOKS = 3, 0.25, 12
 _TRIES, _MOST_LOST = 2, 2
 #: A person who floated the top has pressed Enter: after so many looks in the dark there is none.
 _DARK_LOOKS = 5
-#: Spreads gates evenly over a period, however many there are.
-_GOLDEN = (math.sqrt(5) - 1) / 2
+#: Gates have so many lengths, in parts of `gate_s`, and so long a pause before them, in periods of the drive.
+_GATES, _PAUSES = (0.75, 1.25), 4.0
 #: No count is better than that: the resolution of the counters over a second [Hz].
 _LEAST_U_HZ = 1e-7
-#: A gate so many standard deviations off the others, and by half a count at least, has miscounted.
-_FAR = 5.0
+#: A swing of more than this [turns] is taken off by a step of the drive's phase that lasts so long [s], if that is at
+#: most such a part of its period.  From half a turn on a top is lost.
+_CALM, _STEP_S, _SHORT = 0.12, 0.3, 0.25
+#: No top's pulses are so many in a gate: what is counted then is something else.
+_MOST_PERIODS = 1e9
 #: Of an oscilloscope's record of laser and drive: samples a second, and volts of a division; the drive has ±5 V.
 _RATE, _VOLTS_PER_DIVISION = 1000.0, 2.0
 
@@ -123,6 +128,8 @@ def channels(settings: PrecessionSettings) -> tuple[Channel, ...]:
     over = f"{settings.counts} gates of {settings.gate_s:g} s"
     one = "that of one count in the configuration" if settings.reading_u_hz else f"scatter of {over}"
     u = f"{one} over √{settings.counts}"
+    if not settings.reading_u_hz and settings.counts >= FEWEST:
+        u = f"{one}, the swing about the drive taken off"
     return (
         Channel("time_s", "s", "bench clock, from the beginning of the sweep, at the end of the point"),
         Channel("drive_frequency_hz", "Hz", "generator, as set"),
@@ -190,9 +197,11 @@ def _go_on(session: Session[PrecessionSettings], place: _Place) -> None:
         target = settings.sweep[place.next]
         _creep(session, place, drive, target)
         _wait_for_lock(session, target)
-        row = _measure(session, target)
+        row, counts = _measure(session, target)
         if settings.record_s:
             _record(session, target)
+        text = f"spin and laser were counted at {target:g} Hz"
+        session.writer.event(session.now(), COUNTED, text, drive_frequency_hz=target, **counts)
         session.keep(row | {"time_s": session.now()}, _time_left(settings, place.next + 1))
         place.next, place.tries, place.lost, drive = place.next + 1, 0, 0, target
 
@@ -275,11 +284,12 @@ def _wait_for_lock(session: Session[PrecessionSettings], drive: float) -> None:
     raise NotHeld(seen[-1], drive)
 
 
-def _measure(session: Session[PrecessionSettings], drive: float) -> Row:
-    """Spin and precession of a locked top.  Raises NotHeld, ExperimentFailed."""
+def _measure(session: Session[PrecessionSettings], drive: float) -> tuple[Row, dict[str, Any]]:
+    """Spin and precession of a locked top, and the gates that they are from.  Raises NotHeld, ExperimentFailed."""
     settings = session.settings
     spins = _counted(session, drive, settings.trigger_level_v, 1)
-    _still_held(session, drive, spins)
+    _still_held(session, drive, spins.frequency)
+    _calm(session, drive, swing_of(spins))
     if settings.laser_input == 1:
         session.ask(Task("Connect the laser's phototransistor to the counter's input 1, in place of the tape's."))
     laser = _counted(session, drive, settings.laser_trigger_level_v, settings.laser_input)
@@ -287,16 +297,36 @@ def _measure(session: Session[PrecessionSettings], drive: float) -> Row:
         session.ask(Task("Connect the tape's phototransistor to the counter's input 1 again."))
     _count_the_tape_again(session)
     held_spin(session, drive)  # else what the laser counted is of a top on its way down
-    spin, u_spin = _mean(spins, settings)
-    precession, u_precession = _mean(_checked(session, laser, drive), settings)
-    return {
+    _check_pulses(settings, laser)
+    spin, precession = rates_at_point(spins, laser)
+    _say_what_was_miscounted(session, laser, precession, drive)
+    row = {
         "drive_frequency_hz": drive,
         "drive_frequency_u_hz": settings.clocks_u * drive,
-        "spin_frequency_hz": spin,
-        "spin_frequency_u_hz": u_spin,
-        "precession_frequency_hz": precession,
-        "precession_frequency_u_hz": u_precession,
+        "spin_frequency_hz": spin.value,
+        "spin_frequency_u_hz": _u(spin, settings),
+        "precession_frequency_hz": precession.value,
+        "precession_frequency_u_hz": _u(precession, settings),
     }
+    return row, gates_event(spins, laser)
+
+
+def _calm(session: Session[PrecessionSettings], drive: float, swing: Swing | None) -> None:
+    """Take the swing about the drive off, which hardly anything damps and each change of the drive may enlarge.
+
+    Where the top is farthest ahead of the drive, or behind it, it turns as fast as the drive: set forward or back by as
+    much, the drive finds it at rest where it belongs.  The drive is set so by a frequency that differs for a moment.
+    """
+    if swing is None or swing.size < _CALM or not swing.frequency * _STEP_S < _SHORT:
+        return
+    half = 0.5 / swing.frequency
+    number = math.ceil((session.now() + _STEP_S - swing.crest) / half)
+    ahead = swing.size if number % 2 == 0 else -swing.size
+    session.wait(swing.crest + number * half - _STEP_S / 2 - session.now())
+    session.bench.generator.frequency = drive + ahead / _STEP_S
+    session.wait(_STEP_S)
+    session.bench.generator.frequency = drive
+    session.event("calmed", f"the top swung {swing.size:.2f} turns about the drive: the drive was moved by as much")
 
 
 def _count_the_tape_again(session: Session[PrecessionSettings]) -> None:
@@ -307,24 +337,31 @@ def _count_the_tape_again(session: Session[PrecessionSettings]) -> None:
         session.reconnect("counter", error, lambda: prepare_counter(session))
 
 
-def _counted(session: Session[PrecessionSettings], drive: float, level_v: float, channel: int) -> Array:
-    """Counts at an input of the counter, shape (counts,) [Hz], NaN where there was none.
+def _counted(session: Session[PrecessionSettings], drive: float, level_v: float, channel: int) -> Gates:
+    """The gates of an input of the counter.
 
-    Their gates differ by parts of a period.  A gate begins and ends with a pulse, and a late pulse is the likelier one.
-    If a gate is a whole number of periods, its last pulse is one that came no earlier in its period than the first, so
-    the count is too low by up to half the scatter of the gates; over gates of all lengths both ends are late alike.
+    A gate begins and ends with a pulse.  Pulses come early and late where a nutation goes on beside the wobble in step,
+    at the beats of the two, and a late pulse is the likelier one to begin or end a gate.  Both ends are late alike, and
+    no beat meets one gate as it meets the next, where gates begin and end at times that have nothing to do with pulses:
+    so their lengths and the pauses between them are drawn.  Numbers that are spread more evenly than by chance make the
+    mean better and its uncertainty unknown.
     """
     settings = session.settings
     counter = session.bench.counter
-    counts: list[float] = []
+    found: list[tuple[float, float, float]] = []
+    seed = session.writer.record.seed  # of a virtual run, which is the same each time
+    random = np.random.default_rng(None if seed is None else (seed, round(1e6 * drive), channel))
 
     def prepare(gate_s: float = settings.gate_s) -> None:
         counter.prepare(gate_s=gate_s, trigger_level_v=level_v, channel=channel)
 
-    while len(counts) < settings.counts:
+    while len(found) < settings.counts:
         session.stop.check()
+        length, pause = random.random(2).tolist()
+        gate_s = round(settings.gate_s * (_GATES[0] + (_GATES[1] - _GATES[0]) * length), 6)
         try:
-            prepare(round(settings.gate_s + len(counts) * _GOLDEN % 1 / drive, 6))
+            prepare(gate_s)
+            session.wait(pause * _PAUSES / drive)
             count = counter.frequency()
             session.bench.record_settings("counter")  # raises if they are not as they were set
         except InstrumentError as error:
@@ -332,8 +369,16 @@ def _counted(session: Session[PrecessionSettings], drive: float, level_v: float,
                 raise
             session.reconnect("counter", error, prepare)
         else:
-            counts.append(math.nan if count is None else count)
-    return np.array(counts)
+            found.append(_gate(session.now(), gate_s, count))
+    begin, end, frequency = np.array(found).T
+    return Gates(begin, end, frequency)
+
+
+def _gate(end: float, gate_s: float, count: float | None) -> tuple[float, float, float]:
+    """Begin, end [s] and frequency [Hz] of a gate that ended now: it lasts up to the first pulse behind its length."""
+    if count is None or not count * gate_s < _MOST_PERIODS:
+        return end - gate_s, end, math.nan if count is None else count
+    return end - math.ceil(count * gate_s - 1e-6) / count, end, count
 
 
 def _still_held(session: Session[PrecessionSettings], drive: float, spins: Array) -> None:
@@ -346,29 +391,31 @@ def _still_held(session: Session[PrecessionSettings], drive: float, spins: Array
         raise NotHeld(worst, drive)
 
 
-def _checked(session: Session[PrecessionSettings], laser: Array, drive: float) -> Array:
-    """The counts of the laser; a likely miscount gives an event, and stays in the mean.  Raises ExperimentFailed."""
-    settings = session.settings
-    seen = laser[np.isfinite(laser)]
-    if seen.size < 3:
+def _check_pulses(settings: PrecessionSettings, laser: Gates) -> None:
+    """Raise ExperimentFailed where the laser is hardly ever cut."""
+    if np.isfinite(laser.frequency).sum() < 3:
         raise ExperimentFailed(
             f"the counter sees no laser pulses at {settings.laser_trigger_level_v:g} V, input {settings.laser_input}: "
             "does the stem cut the beam, and is the trigger level between free and cut "
             "(precession.laser_trigger_level_v)?"
         )
-    middle = float(np.median(seen))
-    usual = 1.4826 * float(np.median(np.abs(seen - middle)))
-    far = np.abs(seen - middle) > max(_FAR * usual, 0.5 / settings.gate_s)
-    if far.any() or seen.size < laser.size:
-        values = ", ".join(f"{value:.4g}" for value in laser)
-        session.event("miscounted", f"the laser's counts at {drive:g} Hz differ: {values} Hz", drive_frequency_hz=drive)
-    return seen
 
 
-def _mean(counts: Array, settings: PrecessionSettings) -> tuple[float, float]:
-    """Mean of counts and its standard uncertainty [Hz]."""
-    one = float(counts.std(ddof=1)) if settings.reading_u_hz is None else settings.reading_u_hz
-    return float(counts.mean()), max(one / math.sqrt(counts.size), _LEAST_U_HZ)
+def _say_what_was_miscounted(session: Session[PrecessionSettings], laser: Gates, found: Rate, drive: float) -> None:
+    """An event where gates of the laser were left out, or had no count."""
+    said = [f"gate {gate + 1} has {pulses_too_many(pulses)}" for gate, pulses in found.wrong]
+    if found.missing:
+        said.append(f"{found.missing} of {len(laser)} gates have no count")
+    if said:
+        text = f"the laser's gates at {drive:g} Hz: {', '.join(said)}; left out"
+        session.event("miscounted", text, drive_frequency_hz=drive)
+
+
+def _u(rate: Rate, settings: PrecessionSettings) -> float:
+    """Standard uncertainty of a rate [Hz]; one that the configuration gives is that of one count."""
+    if settings.reading_u_hz is not None:
+        return settings.reading_u_hz / math.sqrt(settings.counts)
+    return max(rate.u, _LEAST_U_HZ)
 
 
 def _record(session: Session[PrecessionSettings], drive: float) -> None:
