@@ -55,9 +55,15 @@ def _draw_line(axes: Axes, analysis: PrecessionAnalysis) -> None:
     )
     label = f"line: slope {without_unit(slope_of(fit))}, intercept {without_unit(intercept_of(fit))} Hz"
     axes.plot(x, fit.line.at(x), color=LINE, linewidth=1.6, label=label, zorder=2.6)
-    robust = fit.robust
-    y = float(robust.intercept.value or 0.0) + float(robust.slope.value or 0.0) * x
-    axes.plot(x, y, color=ROBUST, linestyle="dotted", linewidth=1.6, label="median line, robust", zorder=2.5)
+    axes.plot(
+        x,
+        median_line(fit, x),
+        color=ROBUST,
+        linestyle=(0, (1, 2)),
+        linewidth=1.8,
+        label="median line, robust",
+        zorder=2.7,
+    )
     _draw_bands(axes, x, fit.line.at(x), fit, labels=True)
     inside = np.concatenate([run.fit.column("precession")[_used(run.fit)] for run in analysis.runs])
     low, high = min(float(inside.min()), float(x[0])), max(float(inside.max()), float(x[-1]))
@@ -74,6 +80,11 @@ def _draw_line(axes: Axes, analysis: PrecessionAnalysis) -> None:
     mark = "" if not made_up else "  (SYNTHETIC)" if made_up == len(analysis.sources) else f"  ({made_up} SYNTHETIC)"
     axes.set_title(f"{_finding(fit)}{mark}", loc="left", fontsize=11)
     axes.legend(loc="upper left")
+
+
+def median_line(fit: SweepFit, x: Array) -> Array:
+    """The median line at x [Hz]."""
+    return np.asarray(float(fit.robust.intercept.value or 0.0) + float(fit.robust.slope.value or 0.0) * x)
 
 
 def _finding(fit: SweepFit) -> str:
@@ -154,6 +165,7 @@ def _draw_departures(axes: Axes, analysis: PrecessionAnalysis) -> None:
     x = _span(fit)
     y = (fit.line.at(x) - x) / unit
     axes.plot(x, y, color=LINE, linewidth=1.6)
+    axes.plot(x, (median_line(fit, x) - x) / unit, color=ROBUST, linestyle=(0, (1, 2)), linewidth=1.8, zorder=2.7)
     if fit.line.u_slope:
         half = fit.line.confidence_band(x) / unit
         axes.fill_between(x, y - half, y + half, color=LINE, alpha=0.28, linewidth=0)
@@ -169,7 +181,8 @@ def _draw_departures(axes: Axes, analysis: PrecessionAnalysis) -> None:
     axes.set(xlabel="frequency of the drive ν$_d$  [Hz]", ylabel=f"(ν$_p$ − ν$_d$) / {what}")
     size = f"{what} of a point {unit:.2g} Hz" if fit.line.u_slope else "in Hz"
     axes.set_title(
-        f"Departures from a locked top, {size}; grey: ±1 and ±2; blue: the line and where it lies with 95 %", loc="left"
+        f"Departures from a locked top, {size}; grey: ±1 and ±2; blue: the line and where it lies with 95 %; orange: median line",
+        loc="left",
     )
 
 
