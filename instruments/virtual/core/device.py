@@ -38,7 +38,8 @@ class VirtualInstrument:
 
     A subclass gives its identity and extends `table()` and, where it reacts to settings, `changed()`.
 
-    clock: of the bench; pace: time for one message [s].
+    clock: of the bench; identity: the answer to ``*IDN?`` of another model of the family; pace: time for one
+    message [s].
     """
 
     identity = "levilab,virtual,0,0"
@@ -47,8 +48,9 @@ class VirtualInstrument:
     #: Whether it knows blocks (IEEE 488.2, 7.7.6).
     takes_blocks = True
 
-    def __init__(self, clock: Clock, *, pace: float = 2e-3) -> None:
+    def __init__(self, clock: Clock, *, identity: str | None = None, pace: float = 2e-3) -> None:
         self.clock, self.pace = clock, pace
+        self.identity = identity or self.identity
         self.settings: dict[str, Value] = {}
         self._defaults: dict[str, Value] = {}
         self.status = Status()

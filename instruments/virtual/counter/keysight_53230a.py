@@ -35,7 +35,7 @@ _HYSTERESIS = 0.04
 class Virtual53230A(VirtualCounter):
     """A reciprocal counter: whole periods between the first edge and the first one after the gate, over their time.
 
-    signal, second: the voltages at the inputs 1 and 2.
+    signal, second: the voltages at the inputs 1 and 2; resolution: of a gate of 1 s, relative.
 
     Sources: Keysight 53220A/53230A Programmer's Reference and User's Guide.  The guide gives readings a three-digit
     exponent; here it has two, as for every other instrument on this bench.  The time-out is 1 s in the guide and off
@@ -55,8 +55,17 @@ class Virtual53230A(VirtualCounter):
         "TOT": Function("TOTalize:TIMed"),
     }
 
-    def __init__(self, clock: Clock, *, signal: Signal, second: Signal = darkness) -> None:
-        super().__init__(clock, signal=signal, second=second)
+    def __init__(
+        self,
+        clock: Clock,
+        *,
+        signal: Signal,
+        second: Signal = darkness,
+        identity: str | None = None,
+        resolution: float = _RESOLUTION,
+    ) -> None:
+        self._resolution = resolution
+        super().__init__(clock, signal=signal, second=second, identity=identity)
         self.settings["timeout"] = 1.0
 
     def table(self) -> tuple[Command, ...]:
@@ -121,8 +130,7 @@ class Virtual53230A(VirtualCounter):
         self.settings |= {f"automatic{channel}": True for channel in self._channels}
         self.settings |= {f"relative{channel}": 50.0 for channel in self._channels}
 
-    @staticmethod
-    def _gate_for(name: str, plain: list[str]) -> float:
+    def _gate_for(self, name: str, plain: list[str]) -> float:
         """The gate that resolves this [s].  Raises ScpiError."""
         expected, resolution = (
             math.nan
@@ -134,7 +142,7 @@ class Virtual53230A(VirtualCounter):
             return 0.1 if math.isnan(expected) else min(max(expected, 1e-6), 1e3)
         if math.isnan(expected) or math.isnan(resolution) or not resolution:
             return 0.1
-        return min(max(_RESOLUTION * expected / resolution, 1e-4), 1e3)
+        return min(max(self._resolution * expected / resolution, 1e-4), 1e3)
 
     def _configuration(self) -> str:
         where = ",".join(f"(@{channel})" for channel in self._channels)

@@ -91,9 +91,17 @@ class VirtualCNT91(VirtualCounter):
         "NDUT": Function("NDUTycycle"),
     }
 
-    def __init__(self, clock: Clock, *, signal: Signal, second: Signal = darkness, native: bool = False) -> None:
+    def __init__(
+        self,
+        clock: Clock,
+        *,
+        signal: Signal,
+        second: Signal = darkness,
+        identity: str | None = None,
+        native: bool = False,
+    ) -> None:
         self._native = native
-        super().__init__(clock, signal=signal, second=second)
+        super().__init__(clock, signal=signal, second=second, identity=identity)
 
     def table(self) -> tuple[Command, ...]:
         """Its commands; sources: see the class."""

@@ -67,11 +67,10 @@ class VirtualOscilloscope(VirtualInstrument):
     ) -> None:
         self.channels = range(1, channels + 1)
         self._signals = signals
-        self.identity = identity or self.identity
         self.acquisition = Acquisition(self._plan, keeps_old=self.keeps_old)
         self._headers: dict[str, str] = {}
         self._restoring = False
-        super().__init__(clock)
+        super().__init__(clock, identity=identity)
         self.run()
 
     # --- what a subclass says of its numbers and its scaling ---
