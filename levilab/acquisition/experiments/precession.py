@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -12,20 +11,12 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_
 from pydantic_core import PydanticCustomError
 
 from analysis.precession.gates import FEWEST, Gates, Rate, Swing, pulses_too_many, rates_at_point, swing_of
-from instruments.errors import InstrumentError, OutOfRange
-from levilab.acquisition.counting import prepare_counter, spin_now
-from levilab.acquisition.driving import (
-    RAMP_STEP_S,
-    DriveSettings,
-    NotHeld,
-    check_drive,
-    drive_up,
-    held_spin,
-    no_light,
-)
+from instruments.errors import InstrumentError
+from levilab.acquisition.counting import prepare_counter
+from levilab.acquisition.driving import DriveSettings, NotHeld, check_drive, held_spin, sweep_drive
 from levilab.acquisition.experiment import Experiment
 from levilab.acquisition.session import ExperimentFailed
-from levilab.bench.person import FloatTop, Task
+from levilab.bench.person import Task
 from levilab.runs.channel import Channel
 from levilab.runs.gates import COUNTED, gates_event
 
@@ -41,15 +32,9 @@ if TYPE_CHECKING:
 
 #: Points of a sweep, at most.
 _MOST_POINTS = 1000
-#: While the drive creeps the top is looked at so often [s].
-_LOOK_EVERY_S = 10.0
 #: A locked top swings about the drive, by some tenths of a hertz: so many looks in a row have a mean this near to it
 #: [Hz]; after so many looks it is not locked.
 _LOOKS, _LOCKED_WITHIN_HZ, _MOST_LOOKS = 3, 0.25, 12
-#: How often a point is tried, and so many points lost one after the other end the sweep.
-_TRIES, _MOST_LOST = 2, 2
-#: A person who floated the top has pressed Enter: after so many looks in the dark there is none.
-_DARK_LOOKS = 5
 #: Gates have so many lengths, in parts of `gate_s`, and so long a pause before them, in periods of the drive.
 _GATES, _PAUSES = (0.75, 1.25), 4.0
 #: No count is better than that: the resolution of the counters over a second [Hz].
@@ -148,15 +133,6 @@ def channels(settings: PrecessionSettings) -> tuple[Channel, ...]:
 # --- the sweep ---
 
 
-@dataclass
-class _Place:
-    """Where the sweep is.  next: point; tries: of it so far; lost: points left out one after the other."""
-
-    next: int
-    tries: int = 0
-    lost: int = 0
-
-
 def run(session: Session[PrecessionSettings]) -> None:
     """Drive the top up and through the sweep; where it is lost, drive it up anew."""
     settings = session.settings
@@ -166,20 +142,8 @@ def run(session: Session[PrecessionSettings]) -> None:
         )
     prepare_counter(session)
     session.begin(lambda: None, resumed="the top is driven up anew")
-    place = _Place(_points_done(session.rows, settings.sweep))
-    while place.next < len(settings.sweep) and place.lost < _MOST_LOST and not _is_over(session):
-        try:
-            _have_a_top(session, place)
-            drive_up(session)
-            _go_on(session, place)
-        except NotHeld as lost:
-            session.bench.outputs_off()
-            _note_loss(session, place, lost)
-        except InstrumentError as error:
-            if error.address != session.bench.address("generator") or isinstance(error, OutOfRange):
-                raise
-            session.reconnect("generator", error, session.bench.outputs_off)
-    session.bench.outputs_off()
+    left = settings.sweep[_points_done(session.rows, settings.sweep) :]
+    sweep_drive(session, left, lambda drive: _point(session, drive))
     session.event("drive off", f"drive off, {len(session.rows)} of {len(settings.sweep)} points were measured")
 
 
@@ -191,58 +155,6 @@ def _points_done(rows: list[Row], sweep: tuple[float, ...]) -> int:
         same = [k for k in range(done, len(sweep)) if math.isclose(sweep[k], drive, rel_tol=1e-9)]
         done = same[0] + 1 if same else done
     return done
-
-
-def _go_on(session: Session[PrecessionSettings], place: _Place) -> None:
-    """From where the top was driven up to, through the points that are left.  Raises NotHeld."""
-    settings = session.settings
-    drive = settings.drive_frequency_hz
-    while place.next < len(settings.sweep) and session.spent() <= settings.longest_s:
-        target = settings.sweep[place.next]
-        _creep(session, place, drive, target)
-        _wait_for_lock(session, target)
-        row, counts = _measure(session, target)
-        if settings.record_s:
-            _record(session, target)
-        text = f"spin and laser were counted at {target:g} Hz"
-        session.writer.event(session.now(), COUNTED, text, drive_frequency_hz=target, **counts)
-        session.keep(row | {"time_s": session.now()}, _time_left(settings, place.next + 1))
-        place.next, place.tries, place.lost, drive = place.next + 1, 0, 0, target
-
-
-def _note_loss(session: Session[PrecessionSettings], place: _Place, lost: NotHeld) -> None:
-    """Write down that the lock was lost at a point; after the last try the point is left out."""
-    settings = session.settings
-    drive = settings.sweep[place.next]
-    place.tries += 1
-    text = f"the lock was lost on the way to the point of {drive:g} Hz, or at it: {lost}"
-    session.event("lock lost", f"{text}; try {place.tries} of {_TRIES}", drive_frequency_hz=drive)
-    if place.tries < _TRIES:
-        return
-    place.next, place.tries, place.lost = place.next + 1, 0, place.lost + 1
-    session.event("left out", f"the point of {drive:g} Hz is left out", drive_frequency_hz=drive)
-    if place.lost == _MOST_LOST and place.next < len(settings.sweep):
-        session.event("ended", f"{_MOST_LOST} points one after the other were lost: the sweep ends here")
-
-
-def _have_a_top(session: Session[PrecessionSettings], place: _Place) -> None:
-    """See that a top floats; where none does, ask for one.  Raises ExperimentFailed."""
-    session.progress(f"point {place.next + 1}", place.next / len(session.settings.sweep))
-    if spin_now(session) is not None:
-        return
-    session.ask(FloatTop("The counter sees no top: spin the top and let it float.", len(session.rows)))
-    for _ in range(_DARK_LOOKS):
-        if spin_now(session) is not None:
-            return
-    raise no_light(session)
-
-
-def _is_over(session: Session[PrecessionSettings]) -> bool:
-    longest = session.settings.longest_s
-    if session.spent() <= longest:
-        return False
-    session.event("longest", f"{longest:g} s are over (precession.longest_s)")
-    return True
 
 
 def _time_left(settings: PrecessionSettings, done: int) -> float:
@@ -257,19 +169,18 @@ def _time_left(settings: PrecessionSettings, done: int) -> float:
 # --- one point ---
 
 
-def _creep(session: Session[PrecessionSettings], place: _Place, start: float, target: float) -> None:
-    """Move the drive in steps that a locked top can follow.  Raises NotHeld."""
+def _point(session: Session[PrecessionSettings], drive: float) -> None:
+    """Wait for the lock, measure, and keep the reading.  Raises NotHeld, ExperimentFailed."""
     settings = session.settings
-    steps = math.ceil(abs(target - start) / (settings.ramp_hz_per_s * RAMP_STEP_S) - 1e-9)
-    for k in range(1, steps + 1):
-        session.stop.check()
-        drive = start + (target - start) * k / steps
-        session.bench.generator.frequency = drive
-        share = (place.next + k / steps) / len(settings.sweep)
-        session.progress(f"point {place.next + 1} of {len(settings.sweep)}: drive at {drive:.2f} Hz", min(share, 1.0))
-        session.wait(RAMP_STEP_S)
-        if k % round(_LOOK_EVERY_S / RAMP_STEP_S) == 0:
-            held_spin(session, drive)
+    _wait_for_lock(session, drive)
+    row, counts = _measure(session, drive)
+    if settings.record_s:
+        _record(session, drive)
+    text = f"spin and laser were counted at {drive:g} Hz"
+    session.writer.event(session.now(), COUNTED, text, drive_frequency_hz=drive, **counts)
+    session.keep(
+        row | {"time_s": session.now()}, _time_left(settings, _points_done([*session.rows, row], settings.sweep))
+    )
 
 
 def _wait_for_lock(session: Session[PrecessionSettings], drive: float) -> None:

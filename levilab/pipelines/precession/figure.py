@@ -181,7 +181,7 @@ def _draw_departures(axes: Axes, analysis: PrecessionAnalysis) -> None:
     axes.set(xlabel="frequency of the drive ν$_d$  [Hz]", ylabel=f"(ν$_p$ − ν$_d$) / {what}")
     size = f"{what} of a point {unit:.2g} Hz" if fit.line.u_slope else "in Hz"
     axes.set_title(
-        f"Departures from a locked top, {size}; grey: ±1 and ±2; blue: the line and where it lies with 95 %; orange: median line",
+        f"Departures from a locked top, {size}; grey: ±1 and ±2; blue: the line, with 95 %; orange: the median line",
         loc="left",
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import TYPE_CHECKING
 
 from analysis.uncertainty import Estimate
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 
 #: Points that a terminal shows; more stand in result.json.
 MOST_POINTS = 60
+#: An uncertainty below this has a power of ten [Hz].
+_LEAST_DECIMAL = 1e-6
 #: Heads of the table of points, whose numbers stand to the right.
 POINT_HEADS = ("ν_d [Hz]", "ν_p [Hz]", "spin [Hz]", "ν_p − ν_d [Hz]", "leverage", "Δslope/u")
 
@@ -100,6 +103,19 @@ def points_table(run: PrecessionRun, name: str = "", most: int = MOST_POINTS) ->
     return table(f"Points{name}{more}", POINT_HEADS, rows, numbers=POINT_HEADS)
 
 
+def decimal(value: float, u: float | None) -> str:
+    """A value about 0 with its standard uncertainty, for a column in which no entry should have a power of ten.
+
+    >>> decimal(0.008, 0.0071), decimal(-0.00012, 0.0071), decimal(0.008, None), decimal(1e-9, 2e-10)
+    ('0.008(7)', '0.000(7)', '0.008', '1.00(20)×10⁻⁹')
+    """
+    if u is None or not _LEAST_DECIMAL < u < 1 / _LEAST_DECIMAL:
+        return without_unit(Estimate(value, u, "Hz"))
+    from uncertainties import ufloat
+
+    return re.sub(r"^-(?=0(\.0*)?\()", "", f"{ufloat(value, u):fSP}")
+
+
 def _point_cells(fit: SweepFit, point: Point) -> tuple[str, ...]:
     u = point.u
     both = None if u is None else math.hypot(u, point.u_drive or 0.0)
@@ -108,7 +124,7 @@ def _point_cells(fit: SweepFit, point: Point) -> tuple[str, ...]:
         without_unit(Estimate(point.drive, point.u_drive, "Hz")) if point.u_drive else f"{point.drive:.7g}",
         without_unit(Estimate(point.precession, u, "Hz")),
         "—" if point.spin is None else without_unit(Estimate(point.spin, point.u_spin, "Hz")),
-        without_unit(Estimate(point.precession - point.drive, both, "Hz")),
+        decimal(point.precession - point.drive, both),
         plain(point.leverage, 2) if point.used else "left out",
         "—" if change is None else f"{change:+.2f}",
     )
@@ -122,7 +138,7 @@ def coherence_table(run: PrecessionRun, name: str = "") -> Table:
             str(one.coherence.pulses),
             f"{one.coherence.length:.4f}",
             f"{math.degrees(one.coherence.phase_rad):.0f}",
-            without_unit(Estimate(one.coherence.drift_hz, one.coherence.u_drift_hz, "Hz")),
+            decimal(one.coherence.drift_hz, one.coherence.u_drift_hz),
             f"{one.coherence.excursion_turns:.2f}",
             "yes" if one.coherence.locked else "no",
         )
