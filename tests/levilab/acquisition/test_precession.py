@@ -60,7 +60,14 @@ def kept(out: Path) -> Run:
 def test_a_sweep_in_full_motion_finds_a_locked_top(tmp_path: Path) -> None:
     options = AcquisitionOptions(mock=True, out=tmp_path, seed=1)
     asked = request_for("precession", options)
-    quick = QUICK | {"hold_s": 5.0, "gate_s": 1.0, "interval_s": 2.0, "record_s": 5.0, "counts": 8, "ramp_hz_per_s": 0.1}
+    quick = QUICK | {
+        "hold_s": 5.0,
+        "gate_s": 1.0,
+        "interval_s": 2.0,
+        "record_s": 5.0,
+        "counts": 8,
+        "ramp_hz_per_s": 0.1,
+    }
     settings = PrecessionSettings(drive_frequency_hz=45.0, frequencies_hz=(45.0, 44.5, 44.0), **quick)
     show = Silent()
     run = acquire(replace(asked, config=with_settings(asked.config, "precession", settings)), show)
