@@ -302,7 +302,7 @@ def _doubts(fit: SweepFit, sweep: Sweep, found: list[Miscount]) -> list[str]:
         )
     if line.chi_square is not None and line.p_fit is not None and 1 - line.p_fit < NO_FIT:
         texts.append(
-            f"the points scatter much less than their u says (χ² of {line.chi_square:.2g} for "
+            f"the points scatter much less than their u says (χ² of {digits(line.chi_square)} for "
             f"{line.degrees_of_freedom} degrees of freedom): their u is too large, and so is that of the line; gates "
             "in a row scatter more than their mean, for a locked top swings about its drive and comes back"
         )
@@ -337,13 +337,13 @@ def _about_drive(drive: Array, u_drive: Array, u: Array, line: Line) -> list[str
     share = float(np.median(u_drive / drive))
     if np.ptp(u_drive / drive) > _ONE_CLOCK * share:
         worst = float(np.max(u_drive / u))
-        text = f"u of the drive's frequency is up to {worst:.2g} of that of the precession"
+        text = f"u of the drive's frequency is up to {digits(worst)} of that of the precession"
         return [f"{text}: let it count with `orthogonal` = True"] if worst > _MATTERS else []
     of_slope = share * abs(line.slope)
     if line.u_slope is None or of_slope <= _MATTERS * line.u_slope:
         return []
-    text = f"u of the drive's frequency is {share:.2g} of it at all points, as that of a clock"
-    return [f"{text}: the slope is uncertain by {of_slope:.2g} beside its u of {line.u_slope:.2g}"]
+    text = f"u of the drive's frequency is {digits(share)} of it at all points, as that of a clock"
+    return [f"{text}: the slope is uncertain by {digits(of_slope)} beside its u of {digits(line.u_slope)}"]
 
 
 def _about_spin(fit: SweepFit, sweep: Sweep) -> list[str]:

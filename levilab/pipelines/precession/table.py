@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
 #: Points that a terminal shows; more stand in result.json.
 MOST_POINTS = 60
-#: An uncertainty below this has a power of ten [Hz].
-_LEAST_DECIMAL = 1e-6
 #: Heads of the table of points, whose numbers stand to the right.
 POINT_HEADS = ("ν_d [Hz]", "ν_p [Hz]", "spin [Hz]", "ν_p − ν_d [Hz]", "leverage", "Δslope/u")
 
