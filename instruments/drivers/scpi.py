@@ -143,6 +143,30 @@ class ScpiInstrument:
         rows = (row for owner in reversed(cls.__mro__) for row in vars(owner).values())
         return [row for row in rows if isinstance(row, Setting)]
 
+    def field_of(self, answer: str, header: str, key: str) -> str:
+        """What an answer says of one setting: all of it, where it has neither header nor fields.
+
+        Raises ValueError where it says nothing of it.
+        """
+        return answer
+
+    def confirm(self, setting: Setting[Any], value: bool | float | str) -> None:  # noqa: FBT001
+        """Called when a setting was sent: an instrument without an error queue is asked for it.
+
+        Raises OutOfRange for a number that it sets otherwise, CommandRefused for anything else.
+        """
+
+    def ask_back(self, setting: Setting[Any], value: bool | float | str, **aside: float) -> None:  # noqa: FBT001
+        """See that a setting was taken, for `confirm`.  aside: how far an answer may be off, `rounding`."""
+        now = getattr(self, setting.name)
+        if not setting.differs(value, now, **aside):
+            return
+        if setting.kind is float:
+            allowed = f"{now}, as the instrument has set it"
+            raise OutOfRange(self.transport.address, setting.name, value, allowed)
+        sent = f"{self.header_in_use(setting.header)} {value}"
+        raise CommandRefused(self.transport.address, sent, (f"{setting.name} is {now!r} afterwards",))
+
     def header_in_use(self, header: str) -> str:
         """The header of a declared setting as it is sent; with several inputs, that of the input in use."""
         return header
@@ -162,7 +186,9 @@ class Setting(Generic[T]):
     header: the SCPI header; kind: float, bool or str; unit: of the number on the wire;
     low, high: what the instrument takes; choices: the words it takes, long form with the short form in capitals
     (SINusoid); answers: words that it may answer beside the choices; form: the form of its answer, where that is not
-    the instrument's NUMBER, or of a text without choices; resolution: the step in which the instrument sets it [unit].
+    the instrument's NUMBER, or of a text without choices; resolution: the step in which the instrument sets it [unit];
+    key: the name of the field where the header has several, ``C1:BSWV WVTP,SINE,FRQ,1000HZ,…``; suffix: the unit that
+    is sent with a number.
     """
 
     header: str
@@ -174,6 +200,8 @@ class Setting(Generic[T]):
     answers: tuple[str, ...] = ()
     form: Form | None = None
     resolution: float = 0.0
+    key: str = ""
+    suffix: str = ""
     name: str = ""
 
     def __post_init__(self) -> None:
@@ -200,20 +228,26 @@ class Setting(Generic[T]):
         answer = instrument.transport.query(question)
         form = self.form or instrument.NUMBER
         try:
-            return cast("T", self._parse(answer, form))
+            return cast("T", self._parse(instrument.field_of(answer, self.header, self.key), form))
         except ValueError:
             instrument.reject(question, answer, self._expected(form))
 
     def __set__(self, instrument: ScpiInstrument, value: T) -> None:
         """Check, send, and read the error queue."""
         self._check(instrument.transport.address, value)
-        instrument.command(f"{instrument.header_in_use(self.header)} {self._spell(value)}")
+        key = f"{self.key}," if self.key else ""
+        instrument.command(f"{instrument.header_in_use(self.header)} {key}{self._spell(value)}{self.suffix}")
+        instrument.confirm(self, value)
         instrument.set_to[self.full_name] = self._canonical(value)
 
-    def differs(self, asked: T, answered: T) -> bool:
-        """Whether an answer is another value than the one that was set, rounding and the setting's resolution aside."""
+    def differs(self, asked: T, answered: T, *, rounding: float = 0.0) -> bool:
+        """Whether an answer is another value than the one that was set, rounding and the setting's resolution aside.
+
+        rounding: a further one, in the setting's unit.
+        """
         if self.kind is float:
-            return not abs(float(answered) - float(asked)) <= _ROUNDING * abs(float(asked)) + self.resolution
+            aside = _ROUNDING * abs(float(asked)) + self.resolution + rounding
+            return not abs(float(answered) - float(asked)) <= aside
         return self._canonical(asked) != self._canonical(answered)
 
     def _parse(self, answer: str, form: Form) -> bool | float | str:

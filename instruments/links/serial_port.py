@@ -12,12 +12,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from instruments.errors import BadAnswer, InstrumentError, NotConnected, Occupied, OutOfRange, SilentLine
-from instruments.ieee488 import BrokenBlock, read_block
+from instruments.ieee488 import PLAIN_BLOCK, BrokenBlock, read_block
 from instruments.links.advice import CLOSED
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from instruments.ieee488 import BlockForm
     from instruments.links.transport import TrafficLog
 
 #: pyserial's letters for what bench.toml says in words.
@@ -118,7 +119,7 @@ class SerialTransport:
         self._record("<", line)
         return line.decode("ascii").strip()
 
-    def query_block(self, message: str, *, patience: float = 0.0) -> bytes:
+    def query_block(self, message: str, *, patience: float = 0.0, form: BlockForm = PLAIN_BLOCK) -> bytes:
         """Ask for a block; see :class:`instruments.links.transport.Transport`.
 
         A block may take longer than the time-out, but not be silent for so long.
@@ -131,7 +132,7 @@ class SerialTransport:
             if not head:
                 raise SilentLine(self.address, message, within)
             first = iter((head,))
-            block = read_block(lambda count: next(first, b"") or self._exactly(count))
+            block = read_block(lambda count: next(first, b"") or self._exactly(count), form)
             self._rest()
         self._record("<", b"(%d bytes)" % len(block))
         return block

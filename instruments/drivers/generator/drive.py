@@ -121,13 +121,17 @@ class DriveGenerator(ScpiInstrument):
         address = self.transport.address
         self.limits.check(address, frequency_hz=frequency_hz, amplitude_vpp=amplitude_vpp, offset_v=offset_v)
         check_peak(address, amplitude_vpp, offset_v)
-        self.command("*RST")
-        self.command(f"{self.OUTPUT}:LOAD INF")
-        self.command("VOLT:UNIT VPP")
+        self._reset()
         self._shape(waveform)
         self.frequency = frequency_hz
         self._level(amplitude_vpp, offset_v)
         self.prepared_here = True
+
+    def _reset(self) -> None:
+        """All outputs off, nothing but a plain signal, voltages peak to peak at the open terminals."""
+        self.command("*RST")
+        self.command(f"{self.OUTPUT}:LOAD INF")
+        self.command("VOLT:UNIT VPP")
 
     def _level(self, amplitude_vpp: float, offset_v: float) -> None:
         """The offset that was there leaves no room for the amplitude, nor the amplitude after a reset for much."""

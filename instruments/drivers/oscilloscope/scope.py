@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import contextlib
 import re
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from instruments.drivers.oscilloscope import NeverTriggered, NothingAcquired, Preamble, Trace
-from instruments.drivers.oscilloscope.setup import Channel, Setup, is_still
+from instruments.drivers.oscilloscope.setup import Channel, Setup
 from instruments.drivers.scpi import ScpiInstrument, Setting
 from instruments.errors import InstrumentError, NoAnswer, OutOfRange, SettingsLost
+from instruments.ieee488 import PLAIN_BLOCK
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -25,17 +26,17 @@ if TYPE_CHECKING:
 
     from instruments.clock import Clock
     from instruments.drivers.oscilloscope.setup import Value
-    from instruments.ieee488 import Form
+    from instruments.ieee488 import BlockForm, Form
     from instruments.links.transport import Transport
 
 #: Between two questions whether the record is complete [s].
 _POLL = 0.02
-#: What the scopes of both families can trigger on, and where: words of both guides' :TRIGger chapters.
-_TRIGGER_MODES = (
+#: What the scopes of Rigol and Keysight can trigger on, and where: words of both guides' :TRIGger chapters.
+TRIGGER_MODES = (
     *("EDGE", "GLITch", "PATTern", "TV", "DELay", "EBURst", "OR", "RUNT", "SHOLd", "TRANsition", "USB"),
     *("SBUS1", "SBUS2", "PULSe", "SLOPe", "VIDeo", "TIMeout", "WINDows", "NEDGe", "DURATion", "RS232", "IIC", "SPI"),
 )
-_TRIGGER_SOURCES = (
+TRIGGER_SOURCES = (
     *(f"CHANnel{n}" for n in range(1, 5)),
     *("EXTernal", "EXT5", "AC", "ACLine", "LINE", "WGEN", "WMOD", "NONE"),
     *(f"D{n}" for n in range(16)),
@@ -48,13 +49,18 @@ _BLOCK_PATIENCE = 10.0
 class Scope(ScpiInstrument):
     """What the drivers do in the same way; a subclass gives headers, time base, states and blocks.
 
-    CHANNEL: the class of its inputs; OFFSET_SIGN: of the voltage in the middle of the screen, in its offset; READY: how
-    it acquires while it is set up; SLOPES, SWEEPS: its words for them; CODES: of a clipped trace, and of no sample;
-    PASSING: settings that acquire() leaves in another state than they were prepared; PREAMBLE: the form of each of its
-    ten fields.
+    CHANNEL: the class of its inputs; SOURCE: how an input is called as the trigger's source; STOP: ends every
+    acquisition; MAIN, EDGE: the settings that choose the time base, and the trigger on edges; OFFSET_SIGN: of the
+    voltage in the middle of the screen, in its offset; READY: how it acquires while it is set up; SLOPES, SWEEPS: its
+    words for them; CODES: of a clipped trace, and of no sample; PASSING: settings that acquire() leaves in another
+    state than they were prepared; PREAMBLE: the form of each of its ten fields.
     """
 
     CHANNEL: ClassVar[type[Channel]]
+    SOURCE: ClassVar[str] = "CHAN{}"
+    STOP: ClassVar[str] = ":STOP"
+    MAIN: ClassVar[Mapping[str, Value]] = {"time_mode": "MAIN"}
+    EDGE: ClassVar[Mapping[str, Value]] = {"trigger_mode": "EDGE"}
     OFFSET_SIGN: ClassVar[float] = 1.0
     READY: ClassVar[str]
     SLOPES: ClassVar[Mapping[str, str]]
@@ -63,10 +69,8 @@ class Scope(ScpiInstrument):
     PASSING: ClassVar[Mapping[str, str]] = {}
     PREAMBLE: ClassVar[tuple[Form, ...]]
 
-    time_mode = Setting(":TIM:MODE", str, choices=("MAIN", "WINDow", "XY", "ROLL"))
-    trigger_mode = Setting(":TRIG:MODE", str, choices=_TRIGGER_MODES)
-    trigger_source = Setting(":TRIG:EDGE:SOUR", str, choices=_TRIGGER_SOURCES)
-    trigger_level = Setting(":TRIG:EDGE:LEV", float, unit="V", low=-1e5, high=1e5)
+    trigger_source: Setting[str]
+    trigger_level: Setting[float]
 
     def __init__(self, transport: Transport, *, clock: Clock | None = None) -> None:
         """Drive the scope.  clock: the one its trigger is waited for with; by default the wall's."""
@@ -137,7 +141,7 @@ class Scope(ScpiInstrument):
         times = self._times(setup)
         self._setup = setup
         self._wanted = {self.CHANNEL(self, n): self._scaling(setup) for n in setup.shown}
-        self._wanted[self] = {"time_mode": "MAIN"} | times | self._trigger(setup)
+        self._wanted[self] = {**self.MAIN} | times | self._trigger(setup)
         self.forget_errors()
         self.command(self.READY)
         self._set(inputs)
@@ -175,8 +179,8 @@ class Scope(ScpiInstrument):
 
     def _trigger(self, setup: Setup) -> dict[str, Value]:
         return {
-            "trigger_mode": "EDGE",
-            "trigger_source": f"CHAN{setup.trigger_source}",
+            **self.EDGE,
+            "trigger_source": self.SOURCE.format(setup.trigger_source),
             "trigger_slope": self.SLOPES[setup.trigger_slope],
             "trigger_level": setup.trigger_level_v,
             "sweep": self.SWEEPS[setup.sweep],
@@ -206,9 +210,14 @@ class Scope(ScpiInstrument):
             declared = {row.name: row for row in part.declared()}
             for name, value in rows.items():
                 now = getattr(part, name)
-                if now != self.PASSING.get(name) and not is_still(self._setup, declared[name], value, now):
-                    differing[head + declared[name].full_name] = (value, now)
+                row = declared[name]
+                if now != self.PASSING.get(name) and row.differs(value, now, rounding=self.rounding(row)):
+                    differing[head + row.full_name] = (value, now)
         return differing
+
+    def rounding(self, row: Setting[Any]) -> float:
+        """How far from what it was given this scope may set a number."""
+        return self._setup.rounding(row.unit) if self._setup else 0.0
 
     def _check_taken(self) -> None:
         """Check that the scope has set what was sent to it.
@@ -251,7 +260,7 @@ class Scope(ScpiInstrument):
     def off(self) -> None:
         """Acquire no more; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
         self.forget_errors()
-        self.command(":STOP")
+        self.command(self.STOP)
 
     def acquire(self, *, timeout_s: float) -> None:
         """Take one record; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
@@ -337,15 +346,15 @@ class Scope(ScpiInstrument):
     def _pieces(self, preamble: Preamble) -> Iterator[NDArray[np.uint8]]:
         raise NotImplementedError
 
-    def _block(self, points: int) -> NDArray[np.uint8]:
+    def _block(self, points: int, question: str = ":WAV:DATA?", form: BlockForm = PLAIN_BLOCK) -> NDArray[np.uint8]:
         """The next block, which must hold so many codes.  Raises BadAnswer, CommandRefused."""
-        self.raise_errors(":WAV:DATA?")
+        self.raise_errors(question)
         try:
             with self.resynchronised():
-                block = self.transport.query_block(":WAV:DATA?", patience=_BLOCK_PATIENCE)
+                block = self.transport.query_block(question, patience=_BLOCK_PATIENCE, form=form)
         except NoAnswer:
-            self.raise_errors(":WAV:DATA?")  # the reason stands in the queue, if there is one
+            self.raise_errors(question)  # the reason stands in the queue, if there is one
             raise
         if len(block) != points:
-            self.reject(":WAV:DATA?", f"{len(block)} bytes", f"{points} bytes")
+            self.reject(question, f"{len(block)} bytes", f"{points} bytes")
         return np.frombuffer(block, dtype=np.uint8)

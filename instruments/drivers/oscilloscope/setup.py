@@ -1,9 +1,9 @@
-"""What an oscilloscope was asked for, its inputs' settings, and whether an answer is what was set."""
+"""What an oscilloscope was asked for, and its inputs' settings."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NoReturn, cast
+from typing import TYPE_CHECKING, ClassVar, NoReturn, cast
 
 from instruments.drivers.scpi import ScpiInstrument, Setting
 
@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
     Value = bool | float | str
 
-#: Scopes round what they are given: by so much of a division, of the record, and of the number itself.
-_OF_A_DIVISION, _OF_THE_RECORD, _OF_ITSELF = 0.1, 0.01, 0.01
+#: Scopes round what they are given: by so much of a division and of the record, beside what all instruments do.
+_OF_A_DIVISION, _OF_THE_RECORD = 0.1, 0.01
 
 SLOPES = {"rising": "POS", "falling": "NEG"}
 
@@ -46,13 +46,16 @@ class Setup:
 class Channel(ScpiInstrument):
     """The settings of one input: headers that begin with its name."""
 
-    display = Setting("DISP", bool)
-    inverted = Setting("INV", bool)
+    #: How its headers begin.
+    HEAD: ClassVar[str] = "CHAN{}:"
+
+    display: Setting[bool]
+    inverted: Setting[bool]
 
     def __init__(self, scope: ScpiInstrument, number: int) -> None:
         super().__init__(scope.transport)
         self.scope, self.number = scope, number
-        self.head = f"CHAN{number}:"
+        self.head = self.HEAD.format(number)
         # only its question is used here: commands go through the scope, which reads its error queue
         self.transport = cast("Transport", _Headed(scope.transport, self.head))
 
@@ -73,11 +76,3 @@ class _Headed:
 
     def query(self, message: str, *, patience: float = 0.0) -> str:
         return self._transport.query(self._head + message, patience=patience)
-
-
-def is_still(setup: Setup | None, setting: Setting[Any], wanted: Value, now: Value) -> bool:
-    """Whether an answer is what was set, rounding aside."""
-    if setting.kind is float:
-        rounding = setup.rounding(setting.unit) if setup else 0.0
-        return abs(float(now) - float(wanted)) <= rounding + _OF_ITSELF * abs(float(wanted))
-    return not setting.differs(wanted, now)

@@ -5,7 +5,7 @@ An answer may take long to be worked out, so an instrument works on a message in
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from instruments.virtual.core.parameters import at_most_one, boolean, choice, limit, none, nr3, number, one
 from instruments.virtual.core.parser import Command, Parser
@@ -13,9 +13,10 @@ from instruments.virtual.core.status import OPERATION_COMPLETE, Status
 from instruments.virtual.core.steps import at_once
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from instruments.clock import Clock
+    from instruments.virtual.core.rows import Row
     from instruments.virtual.core.steps import Steps, Work
 
 Value = float | str | bool
@@ -45,8 +46,13 @@ class VirtualInstrument:
     identity = "levilab,virtual,0,0"
     #: What ``SYST:ERR?`` answers when there is nothing to tell, how many entries it keeps, and what ends an answer.
     no_error, queue_size, line_end = '+0,"No error"', 20, "\n"
-    #: Whether it knows blocks (IEEE 488.2, 7.7.6).
-    takes_blocks = True
+    #: Whether it knows blocks (IEEE 488.2, 7.7.6), and path memory (SCPI-1999, volume 1, 6.2.4).
+    takes_blocks = path_memory = True
+    #: Its commands beyond the common ones, and those of each channel.
+    ROWS: ClassVar[tuple[Row, ...]] = ()
+    CHANNEL_ROWS: ClassVar[tuple[Row, ...]] = ()
+    #: The numbers of the channels that CHANNEL_ROWS are for.
+    numbered: Sequence[int] = ()
 
     def __init__(self, clock: Clock, *, identity: str | None = None, pace: float = 2e-3) -> None:
         self.clock, self.pace = clock, pace
@@ -58,7 +64,12 @@ class VirtualInstrument:
         self._ready = 0.0
         #: On the message that came last, if it is worked on in slices: it may not be done yet.
         self.work: Work[None] | None = None
-        self.parser = Parser(queue_size=self.queue_size, no_error=self.no_error, noted=self.status.note_error)
+        self.parser = Parser(
+            queue_size=self.queue_size,
+            no_error=self.no_error,
+            noted=self.status.note_error,
+            path_memory=self.path_memory,
+        )
         self.parser.commands = (*self._common(), *self.table())
         self.settings |= self._defaults
 
@@ -105,7 +116,24 @@ class VirtualInstrument:
 
     def table(self) -> tuple[Command, ...]:
         """The commands beyond the common ones."""
-        return ()
+        of_channels = (row.of_channel(n).bind(self) for n in self.numbered for row in self.CHANNEL_ROWS)
+        return (*of_channels, *(row.bind(self) for row in self.ROWS))
+
+    def declare(self, name: str, header: str, default: Value) -> None:
+        """There is this setting, with this value after ``*RST``."""
+        self._defaults[name] = default
+
+    def spell(self, value: float) -> str:
+        """A number as this instrument prints it."""
+        return nr3(value)
+
+    def reply(self, header: str, text: str, unit: str = "") -> str:
+        """What is answered to the question of a row: the text alone."""
+        return text
+
+    def adjusted(self, name: str, before: float) -> None:
+        """A number has changed from what it was before."""
+        self.changed(name)
 
     def changed(self, name: str) -> None:
         """Called after a setting has changed."""
