@@ -86,11 +86,12 @@ class DriveGenerator(ScpiInstrument):
     amplitude: Setting[float]
     offset: Setting[float]
     output: Setting[bool]
+    #: Whether the signal that is set is one of :meth:`prepare`, under the limits as they are.
+    prepared_here: bool
 
     def __init__(self, transport: Transport, *, clock: Clock | None = None) -> None:
         super().__init__(transport, clock=clock)
         self._limits = NO_LIMITS
-        #: Whether the signal that is set is one of :meth:`prepare`, under the limits as they are.
         self.prepared_here = False
 
     @property
@@ -106,6 +107,13 @@ class DriveGenerator(ScpiInstrument):
     def limits(self, limits: Limits) -> None:
         self._limits = limits
         self.prepared_here = False
+
+    def __exit__(self, *_error: object) -> None:
+        """Outputs off, then closed.  Raises CommandRefused if one is still on."""
+        try:
+            self.off()
+        finally:
+            self.close()
 
     def command(self, message: str) -> None:
         """As every instrument; after a reset, or one that was cut off, no program answers for the signal."""

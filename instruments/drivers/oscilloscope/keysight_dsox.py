@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from instruments.drivers.oscilloscope.setup import Value
+    from instruments.drivers import Value
 
 
 #: Programmer's Guides, <NR3>: a sign, one to three digits, with or without a point, an exponent of two or three digits.

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from instruments.drivers.oscilloscope.setup import Value
+    from instruments.drivers import Value
 
 
 #: Programming Guide, "scientific notation": six digits behind the point, two of exponent, a sign where it is negative.

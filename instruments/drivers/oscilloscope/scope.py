@@ -8,6 +8,7 @@ it hands a record out and before it says that the signal never triggered.
 from __future__ import annotations
 
 import contextlib
+import functools
 import re
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from instruments.clock import Clock
-    from instruments.drivers.oscilloscope.setup import Value
+    from instruments.drivers import Value
     from instruments.ieee488 import BlockForm, Form
     from instruments.links.transport import Transport
 
@@ -78,7 +79,7 @@ class Scope(ScpiInstrument):
         self._acquired = False
         self._duration = 0.0
         self._setup: Setup | None = None
-        self._wanted: dict[ScpiInstrument, dict[str, Value]] = {}
+        self._prepared: tuple[ScpiInstrument, ...] = ()
 
     def identity(self) -> str:
         """The answer to ``*IDN?``; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
@@ -87,6 +88,20 @@ class Scope(ScpiInstrument):
         return answer
 
     _inputs: int | None = None
+
+    @functools.cached_property
+    def channel(self) -> dict[int, Channel]:
+        """Its inputs by number: ``scope.channel[1].scale``.  Asked for its identity, where it was not yet."""
+        if self._inputs is None:
+            self.identity()
+        return {n: self.CHANNEL(self, n) for n in range(1, (self._inputs or 4) + 1)}
+
+    def command(self, message: str) -> None:
+        """As every instrument; a reset takes the inputs' settings, too."""
+        super().command(message)
+        if message.upper().startswith("*RST") and self._inputs:
+            for channel in self.channel.values():
+                channel.set_to.clear()
 
     @staticmethod
     def _number_of_inputs(model: str) -> int:
@@ -97,9 +112,7 @@ class Scope(ScpiInstrument):
     def settings(self) -> dict[str, bool | float | str]:
         """Every declared setting, those of the prepared channels as ``channel1_…``."""
         channels = {
-            f"channel{n}_{name}": value
-            for n in self._channels
-            for name, value in self.CHANNEL(self, n).settings().items()
+            f"channel{n}_{name}": value for n in self._channels for name, value in self.channel[n].settings().items()
         }
         return super().settings() | channels
 
@@ -140,11 +153,17 @@ class Scope(ScpiInstrument):
         inputs = self._check_setup(setup)
         times = self._times(setup)
         self._setup = setup
-        self._wanted = {self.CHANNEL(self, n): self._scaling(setup) for n in setup.shown}
-        self._wanted[self] = {**self.MAIN} | times | self._trigger(setup)
+        self._prepared = (*(self.channel[n] for n in setup.shown), self)
+        for part in self._prepared:
+            part.set_to.clear()
         self.forget_errors()
         self.command(self.READY)
-        self._set(inputs)
+        for n in range(1, inputs + 1):  # first, for the trigger's level depends on their scales
+            if n in setup.shown:
+                self._give(self.channel[n], self._scaling(setup))
+            else:
+                self.channel[n].display = False
+        self._give(self, {**self.MAIN} | times | self._trigger(setup))
         self._check_taken()
 
     def _check_setup(self, setup: Setup) -> int:
@@ -186,37 +205,26 @@ class Scope(ScpiInstrument):
             "sweep": self.SWEEPS[setup.sweep],
         }
 
-    def _set(self, inputs: int) -> None:
-        """Send what is wanted: the inputs first, for the trigger's level depends on their scales."""
-        wanted = {part.number: part for part in self._wanted if isinstance(part, Channel)}
-        for n in range(1, inputs + 1):
-            if n in wanted:
-                self._give(wanted[n])
-            else:
-                self.CHANNEL(self, n).display = False
-        self._give(self)
-
-    def _give(self, part: ScpiInstrument) -> None:
-        for name, value in self._wanted[part].items():
+    def _give(self, part: ScpiInstrument, wanted: Mapping[str, Value]) -> None:
+        for name, value in wanted.items():
             setattr(part, name, value)
 
     # --- comparing ---
 
     def lost(self) -> dict[str, tuple[object, object]]:
-        """Settings that are no longer as prepare() wanted them: name → (as prepared, now)."""
+        """Settings that are no longer as they were set: name → (as set, now).
+
+        Those of the prepared inputs as ``channel1_…``; what acquire() changes by itself is none of them.
+        """
         differing: dict[str, tuple[object, object]] = {}
-        for part, rows in self._wanted.items():
+        for part in self._prepared:
             head = f"channel{part.number}_" if isinstance(part, Channel) else ""
-            declared = {row.name: row for row in part.declared()}
-            for name, value in rows.items():
-                now = getattr(part, name)
-                row = declared[name]
-                if now != self.PASSING.get(name) and row.differs(value, now, rounding=self.rounding(row)):
-                    differing[head + row.full_name] = (value, now)
+            found = part.unlike()
+            differing |= {head + name: both for name, both in found.items() if both[1] != self.PASSING.get(name)}
         return differing
 
     def rounding(self, row: Setting[Any]) -> float:
-        """How far from what it was given this scope may set a number."""
+        """A part of a division, and of the record."""
         return self._setup.rounding(row.unit) if self._setup else 0.0
 
     def _check_taken(self) -> None:

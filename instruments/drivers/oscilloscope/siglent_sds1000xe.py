@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from instruments.drivers.oscilloscope.setup import Value
+    from instruments.drivers import Value
 
 
 #: "1.00E+00V": as it was measured; other firmware may print more digits, or a factor of 1, 10, 100 short.
@@ -59,12 +59,11 @@ class _SiglentChannel(Channel):
 
     def field_of(self, answer: str, header: str, key: str) -> str:
         """What stands behind the header; a switch as 0 or 1."""
-        return _as_digit(_after_header(answer, self.head + header))
+        return _as_digit(_after_header(answer, self.header_in_use(header)))
 
     def confirm(self, setting: Setting[Any], value: bool | float | str) -> None:  # noqa: FBT001
         """Ask for it: there is no error queue."""
-        assert isinstance(self.scope, Scope)
-        self.ask_back(setting, value, rounding=self.scope.rounding(setting))
+        self.ask_back(setting, value)
 
 
 def _single(value: float) -> float:
@@ -138,7 +137,7 @@ class SiglentSDS1000XE(Scope):
 
     def confirm(self, setting: Setting[Any], value: bool | float | str) -> None:  # noqa: FBT001
         """Ask for it: there is no error queue."""
-        self.ask_back(setting, value, rounding=self.rounding(setting))
+        self.ask_back(setting, value)
 
     def forget_errors(self) -> None:
         """There is no error queue; answers are to have headers."""
@@ -163,8 +162,8 @@ class SiglentSDS1000XE(Scope):
     def _scaling(self, setup: Setup) -> dict[str, Value]:
         return super()._scaling(setup) | {"coupling": self.COUPLINGS[setup.coupling]}
 
-    def _give(self, part: ScpiInstrument) -> None:
-        super()._give(part)
+    def _give(self, part: ScpiInstrument, wanted: Mapping[str, Value]) -> None:
+        super()._give(part, wanted)
         if part is self and self._setup:
             shown = set(self._setup.shown)
             depths = _HALVES if {1, 2} <= shown or {3, 4} <= shown else _DEPTHS

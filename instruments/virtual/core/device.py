@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
-from instruments.virtual.core.parameters import at_most_one, boolean, choice, limit, none, nr3, number, one
+from instruments.virtual.core.parameters import at_most_one, boolean, choice, limit, none, nr3, number, one, one_of
 from instruments.virtual.core.parser import Command, Parser
 from instruments.virtual.core.status import OPERATION_COMPLETE, Status
 from instruments.virtual.core.steps import at_once
@@ -180,12 +180,25 @@ class VirtualInstrument:
 
         return Command(pattern, set_, answers(lambda: f"{getattr(self.status, name):+d}"))
 
-    def numeric(self, pattern: str, name: str, *, low: float, high: float, default: float, unit: str = "") -> Command:
-        """A row for a number that can be set and asked for, ``MIN``, ``MAX`` and ``DEF`` included."""
+    def numeric(
+        self,
+        pattern: str,
+        name: str,
+        *,
+        low: float,
+        high: float,
+        default: float,
+        unit: str = "",
+        values: tuple[float, ...] = (),
+    ) -> Command:
+        """A row for a number that can be set and asked for, ``MIN``, ``MAX`` and ``DEF`` included.
+
+        values: the only ones that there are.
+        """
         self._defaults[name] = default
 
         def read(text: str) -> float:
-            return number(text, low=low, high=high, default=default, unit=unit)
+            return one_of(number(text, low=low, high=high, default=default, unit=unit), values)
 
         def ask(parameters: list[str]) -> str:
             asked = at_most_one(parameters)

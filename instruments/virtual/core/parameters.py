@@ -71,6 +71,17 @@ def number(text: str, *, low: float, high: float, default: float, unit: str = ""
     return value
 
 
+def one_of(value: float, values: tuple[float, ...]) -> float:
+    """A number of an input that has these values and no other, any where there are none.  Raises ScpiError.
+
+    >>> one_of(50.0, (50.0, 1e6))
+    50.0
+    """
+    if values and value not in values:
+        raise ScpiError(-224, f"{value:g}")
+    return value
+
+
 def _value(match: re.Match[str]) -> float:
     """The number without its unit.  Raises ScpiError if it has too many digits."""
     mantissa, exponent = match[1], match[2] or ""

@@ -13,7 +13,7 @@ import re
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
-from instruments.virtual.core.parameters import at_most_one, boolean, choice, limit, none, number, one
+from instruments.virtual.core.parameters import at_most_one, boolean, choice, limit, none, number, one, one_of
 from instruments.virtual.core.parser import Command, ScpiError
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ class Number(Setting):
     default: after ``*RST``, None where another row gives it; limits: lowest and highest, or how they follow from the
     device (and the channel); unit: that may be sent with it; rounded: to what the instrument can do; spell: how it is
     printed, if not as all numbers; factor: the number on the wire is so many times the setting;
-    clips: a number beyond a limit becomes the limit instead of an error.
+    clips: a number beyond a limit becomes the limit instead of an error; values: the only ones that there are.
     """
 
     default: float | None = None
@@ -94,6 +94,7 @@ class Number(Setting):
     spell: Callable[[float], str] | None = None
     factor: float = 1.0
     clips: bool = False
+    values: tuple[float, ...] = ()
 
     def of_channel(self, n: int) -> Self:
         """The same of one channel."""
@@ -119,7 +120,9 @@ class Number(Setting):
                 sent = number(text, low=-9e99, high=9e99, default=default, unit=self.unit)
                 value = min(max(sent, low), high)
             else:
-                value = number(text, low=low, high=high, default=self.factor * default, unit=self.unit)
+                value = one_of(
+                    number(text, low=low, high=high, default=self.factor * default, unit=self.unit), self.values
+                )
             _put(device, self.name, self.rounded(value / self.factor))
 
         def ask(parameters: list[str]) -> str:

@@ -214,9 +214,11 @@ class Virtual53230A(VirtualCounter):
         level = f"{head}LEVel[1]"
         return (
             self.word(head + "COUPling", "coupling" + name, ("AC", "DC"), "AC"),
-            self.numeric(head + "IMPedance", "impedance" + name, low=50, high=1e6, default=1e6, unit="OHM"),
-            self.numeric(head + "PROBe", "probe_factor" + name, low=1, high=10, default=1),
-            self.numeric(head + "RANGe", "range" + name, low=5, high=50, default=5, unit="V"),
+            self.numeric(
+                head + "IMPedance", "impedance" + name, low=50, high=1e6, default=1e6, unit="OHM", values=(50, 1e6)
+            ),
+            self.numeric(head + "PROBe", "probe_factor" + name, low=1, high=10, default=1, values=(1, 10)),
+            self.numeric(head + "RANGe", "range" + name, low=5, high=50, default=5, unit="V", values=(5, 50)),
             self.word(head + "SLOPe[1]", "slope" + name, ("POSitive", "NEGative"), "POS"),
             self.toggle(head + "NREJect", "noise_rejection" + name),
             self.toggle(head + "FILTer[:LPASs][:STATe]", "filter" + name),

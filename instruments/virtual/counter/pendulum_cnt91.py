@@ -11,6 +11,7 @@ from instruments.ieee488 import INFINITY, NOT_A_NUMBER
 from instruments.virtual.core.device import answers, does
 from instruments.virtual.core.parameters import at_most_one, choice, limit, none, number, one
 from instruments.virtual.core.parser import Command, ScpiError
+from instruments.virtual.core.rows import Number
 from instruments.virtual.counter.counter import DARK, Function, VirtualCounter, darkness
 from instruments.virtual.counter.edges import Input
 from instruments.virtual.counter.measurements import Looks, Measurement, Span, Wish, first_edge
@@ -47,6 +48,14 @@ def number_text(value: float) -> str:
     ('+2.0000000000000E-08', '+9.9100000000000E+37')
     """
     return f"{value:+.13E}"
+
+
+def _input_values(head: str, name: str) -> tuple[Number, ...]:
+    """The rows of an input that has some values and no other."""
+    return (
+        Number(head + "IMPedance", "impedance" + name, 1e6, (50, 1e6), "OHM", spell=number_text, values=(50, 1e6)),
+        Number(head + "ATTenuation", "attenuation" + name, 1.0, (1, 10), spell="{:+.0f}".format, values=(1, 10)),
+    )
 
 
 @dataclass
@@ -242,8 +251,7 @@ class VirtualCNT91(VirtualCounter):
         head, name = f"INPut{suffix}:", str(channel)
         return (
             self.word(head + "COUPling", "coupling" + name, ("AC", "DC"), "AC"),
-            self._number(head + "IMPedance", "impedance" + name, low=50, high=1e6, default=1e6, unit="OHM"),
-            self.integer(head + "ATTenuation", "attenuation" + name, low=1, high=10, default=1),
+            *(row.bind(self) for row in _input_values(head, name)),
             self.toggle(head + "FILTer[:LPASs][:STATe]", "filter" + name),
             self.toggle(head + "FILTer:DIGital", "digital_filter" + name),
             self._number(head + "FILTer:DIGital:FREQuency", "cutoff" + name, low=1, high=5e7, default=1e5, unit="HZ"),
