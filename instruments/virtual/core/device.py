@@ -149,7 +149,7 @@ class VirtualInstrument:
         return (
             Command("*IDN", get=answers(lambda: self.identity)),
             Command("*RST", set=does(self.reset)),
-            Command("*CLS", set=does(self._clear_status)),
+            Command("*CLS", set=does(self.clear_status)),
             Command("*OPC", set=does(self._note_completion), get=answers(lambda: "1")),
             Command("*WAI", set=none),
             Command("*TRG", set=does(self.trigger)),
@@ -167,7 +167,8 @@ class VirtualInstrument:
         """The status byte (IEEE 488.2, 11.2)."""
         return self.status.byte(errors_waiting=bool(self.parser.errors), message_available=message_available)
 
-    def _clear_status(self) -> None:
+    def clear_status(self) -> None:
+        """``*CLS``: no errors, no events."""
         self.parser.errors.clear()
         self.status.events = 0
 

@@ -81,13 +81,14 @@ def _put(device: Device, name: str, value: Value) -> None:
 class Number(Setting):
     """A number that can be set and asked for, MIN, MAX and DEF included.
 
-    default: after ``*RST``, None where another row gives it; limits: lowest and highest, or how they follow from the
-    device (and the channel); unit: that may be sent with it; rounded: to what the instrument can do; spell: how it is
-    printed, if not as all numbers; factor: the number on the wire is so many times the setting;
-    clips: a number beyond a limit becomes the limit instead of an error; values: the only ones that there are.
+    default: after ``*RST``; limits: lowest and highest, or how they follow from the device (and the channel);
+    unit: that may be sent with it; rounded: to what the instrument can do; spell: how it is printed, if not as all
+    numbers; factor: the number on the wire is so many times the setting; clips: a number beyond a limit becomes the
+    limit instead of an error; values: the only ones that there are; alias: another row has the setting, too, and gives
+    its default.
     """
 
-    default: float | None = None
+    default: float
     limits: tuple[float, float] | Callable[..., tuple[float, float]] = (0.0, 0.0)
     unit: str = ""
     rounded: Callable[[float], float] = float
@@ -95,6 +96,7 @@ class Number(Setting):
     factor: float = 1.0
     clips: bool = False
     values: tuple[float, ...] = ()
+    alias: bool = False
 
     def of_channel(self, n: int) -> Self:
         """The same of one channel."""
@@ -103,9 +105,9 @@ class Number(Setting):
 
     def bind(self, device: Device) -> Command:
         """See the base."""
-        default = self.default or 0.0
-        if self.default is not None:
-            device.declare(self.name, self.header, self.default)
+        default = self.default
+        if not self.alias:
+            device.declare(self.name, self.header, default)
         spell = self.spell or device.spell
 
         def limits() -> tuple[float, float]:

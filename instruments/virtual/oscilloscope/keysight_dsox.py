@@ -17,7 +17,7 @@ import numpy as np
 from instruments.virtual.core.device import answers, does
 from instruments.virtual.core.parameters import choice, number, one
 from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.oscilloscope.scope import VirtualOscilloscope, block_content
+from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope, block_content
 from instruments.virtual.oscilloscope.screenshot import bmp8, bmp24, draw, grey, png
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
             Command("RSTate", get=answers(self._state)),
             Command("*LRN", get=answers(lambda: ":SYST:SET " + self.block(self.setup()))),
             Command("*OPT", get=answers(lambda: "0")),
-            *self.presets(),
+            *(row.bind(self) for row in PRESETS),
         )
 
     def _digitize(self, parameters: list[str]) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from instruments.virtual.core.device import Value, VirtualInstrument, answers
 from instruments.virtual.core.parameters import at_most_one, choice, limit, number, one
 from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.core.rows import short_header
+from instruments.virtual.core.rows import Both, short_header
 from instruments.virtual.oscilloscope.acquisition import LOOK_AHEAD, Acquisition, Plan
 from instruments.virtual.oscilloscope.measure import Measured, edges, measure
 from instruments.virtual.oscilloscope.record import COARSEST, Edge, Input, Record, open_input
@@ -73,6 +73,7 @@ class VirtualOscilloscope(VirtualInstrument):
         self.acquisition = Acquisition(self._plan, keeps_old=self.keeps_old)
         self._headers: dict[str, str] = {}
         self._restoring = False
+        self._kept: dict[int, str] = {}
         super().__init__(clock, identity=identity)
         self.run()
 
@@ -285,22 +286,14 @@ class VirtualOscilloscope(VirtualInstrument):
         finally:
             self._restoring = False
 
-    def presets(self) -> tuple[Command, ...]:
-        """Setups as blocks and in ten places."""
-        kept: dict[int, str] = {}
+    def keep(self, parameters: list[str]) -> None:
+        """*SAV: the setup in one of ten places."""
+        self._kept[_place(parameters)] = self.setup().decode("latin-1")
 
-        def place(parameters: list[str]) -> int:
-            return int(number(one(parameters), low=0, high=9, default=0))
-
-        def keep(parameters: list[str]) -> None:
-            kept[place(parameters)] = self.setup().decode("latin-1")
-
-        def recall(parameters: list[str]) -> None:
-            where = place(parameters)
-            if where in kept:
-                self.restore(kept[where])
-
-        return (Command("*SAV", set=keep), Command("*RCL", set=recall))
+    def recall(self, parameters: list[str]) -> None:
+        """*RCL: the setup of a place, if there is one."""
+        if (where := _place(parameters)) in self._kept:
+            self.restore(self._kept[where])
 
     # --- acquiring ---
 
@@ -470,6 +463,14 @@ class VirtualOscilloscope(VirtualInstrument):
             break
         self.settings |= {"time_offset": 0.0, "trigger_sweep": "AUTO"}
         self.run()
+
+
+def _place(parameters: list[str]) -> int:
+    return int(number(one(parameters), low=0, high=9, default=0))
+
+
+#: Setups in ten places.
+PRESETS = (Both("*SAV", lambda s, p: s.keep(p)), Both("*RCL", lambda s, p: s.recall(p)))
 
 
 def block_content(text: str) -> str:

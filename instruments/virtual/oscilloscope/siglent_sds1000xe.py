@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from instruments.virtual.core.parameters import choice, one
 from instruments.virtual.core.parser import Command, ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Row, Switch, Word, short_header
-from instruments.virtual.oscilloscope.scope import VirtualOscilloscope, one_two_five
+from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope, one_two_five
 from instruments.virtual.oscilloscope.screenshot import bmp24, draw
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
     identity = "Siglent Technologies,SDS1104X-E,VIRTUAL,8.2.6.1.37R9"
     columns, lowest, digits, keeps_old = _COLUMNS, 0, 9, True
     path_memory = False
-    ROWS: ClassVar = _REST
+    ROWS: ClassVar = (*_REST, *PRESETS)
     CHANNEL_ROWS: ClassVar = _CHANNEL
 
     def __init__(
@@ -127,7 +127,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
     def table(self) -> tuple[Command, ...]:
         """Its commands, and the source of its trigger."""
         self._defaults["trigger_source"] = "C1"
-        return (*super().table(), *self.presets())
+        return super().table()
 
     def reset(self) -> None:
         """The state after ``*RST``; how answers look stays."""
