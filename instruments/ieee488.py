@@ -88,6 +88,16 @@ def _after_header(read: Callable[[int], bytes], longest: int) -> bytes:
     raise BrokenBlock(repr(header))
 
 
+def block(data: bytes, digits: int = 0) -> bytes:
+    """A definite-length block, without a line end.  digits: of its length, by default as few as it needs.
+
+    >>> block(b"abc"), block(b""), block(b"abc", digits=9)
+    (b'#13abc', b'#10', b'#9000000003abc')
+    """
+    size = f"{len(data):0{digits}d}" if digits else str(len(data))
+    return f"#{len(size)}{size}".encode() + data
+
+
 def block_of(message: bytes, form: BlockForm = PLAIN_BLOCK) -> bytes:
     r"""The bytes of a block that came as a whole message.  Raises BrokenBlock.
 

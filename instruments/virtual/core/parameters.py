@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+from instruments.ieee488 import BrokenBlock, block, block_of
 from instruments.virtual.core.parser import ScpiError
 
 _MULTIPLIERS = {"": 1.0, "N": 1e-9, "U": 1e-6, "M": 1e-3, "K": 1e3, "MA": 1e6, "G": 1e9}
@@ -80,6 +81,23 @@ def one_of(value: float, values: tuple[float, ...]) -> float:
     if values and value not in values:
         raise ScpiError(-224, f"{value:g}")
     return value
+
+
+def block_text(data: bytes, digits: int = 0) -> str:
+    """A definite-length block as an answer has it, a character for each byte; see `instruments.ieee488.block`."""
+    return block(data, digits).decode("latin-1")
+
+
+def block_content(text: str, error: int = -104) -> bytes:
+    """The bytes of a block that was sent as a parameter.  error: what is reported for anything else, raises ScpiError.
+
+    >>> block_content("#13abc")
+    b'abc'
+    """
+    try:
+        return block_of(text.encode("latin-1") + b"\n")
+    except BrokenBlock:
+        raise ScpiError(error) from None
 
 
 def _value(match: re.Match[str]) -> float:

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, ClassVar
 
 from instruments.ieee488 import INFINITY, NOT_A_NUMBER
 from instruments.virtual.core.device import answers, does
-from instruments.virtual.core.parameters import at_most_one, choice, limit, none, number, one
+from instruments.virtual.core.parameters import at_most_one, block_text, choice, limit, none, number, one
 from instruments.virtual.core.parser import Command, ScpiError
 from instruments.virtual.core.rows import Number
 from instruments.virtual.counter.counter import DARK, Function, VirtualCounter, darkness
 from instruments.virtual.counter.edges import Input
 from instruments.virtual.counter.measurements import Looks, Measurement, Span, Wish, first_edge
-from instruments.virtual.counter.parameters import block, channels_of, without_channels
+from instruments.virtual.counter.parameters import channels_of, without_channels
 from instruments.virtual.counter.run import Run
 
 if TYPE_CHECKING:
@@ -487,13 +487,13 @@ class VirtualCNT91(VirtualCounter):
         missing = math.nan if self._native else NOT_A_NUMBER
         if kind == "REAL":
             reals = (missing if value == NOT_A_NUMBER else value for value in numbers)
-            return ",".join(block(struct.pack(order + "d", value)) for value in reals)
+            return ",".join(block_text(struct.pack(order + "d", value)) for value in reals)
         data = b"".join(
             struct.pack(order + "d", missing if value == NOT_A_NUMBER else value)
             + (struct.pack(order + "q", round(stamp * 1e12)) if stamped else b"")
             for value, stamp in pairs
         )
-        return block(data) if size_known else f"#6{len(data):06d}" + data.decode("latin-1")
+        return block_text(data) if size_known else f"#6{len(data):06d}" + data.decode("latin-1")
 
     def _missing(self, value: float) -> str:
         return "" if self._native and value == NOT_A_NUMBER else number_text(value)

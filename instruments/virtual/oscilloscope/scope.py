@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from instruments.virtual.core.device import Value, VirtualInstrument, answers
-from instruments.virtual.core.parameters import at_most_one, choice, limit, number, one
+from instruments.virtual.core.parameters import at_most_one, block_text, choice, limit, number, one
 from instruments.virtual.core.parser import Command, ScpiError
 from instruments.virtual.core.rows import Both, short_header
+from instruments.virtual.core.trigger import crossings
 from instruments.virtual.oscilloscope.acquisition import LOOK_AHEAD, Acquisition, Plan
-from instruments.virtual.oscilloscope.measure import Measured, edges, measure
+from instruments.virtual.oscilloscope.measure import Measured, measure
 from instruments.virtual.oscilloscope.record import COARSEST, Edge, Input, Record, open_input
 
 if TYPE_CHECKING:
@@ -406,7 +407,7 @@ class VirtualOscilloscope(VirtualInstrument):
     def block(self, data: bytes) -> str:
         """A definite-length block as text, and the time that it takes."""
         self.busy_until(self._ready + len(data) / self.transfer)
-        return f"#{self.digits}{len(data):0{self.digits}d}" + data.decode("latin-1")
+        return block_text(data, self.digits)
 
     def on_screen(self, channel: int, points: int = 50_000) -> Measured:
         """The trace on the screen, from its codes.  Raises ScpiError if there is none."""
@@ -454,7 +455,7 @@ class VirtualOscilloscope(VirtualInstrument):
                 continue
             self.settings |= {f"chan{n}_display": True, f"chan{n}_coupling": "DC"}
             self.fit(n, (low + high) / 2, one_two_five((high - low) / 6, up=True))
-            found = edges(volts, (low + high) / 2, 0.1 * (high - low))
+            found = crossings(volts, (low + high) / 2, 0.1 * (high - low))
             if found.size > 1:
                 period = float(np.diff(found).mean()) * COARSEST
                 self.settings["time_scale"] = one_two_five(3 * period / self.columns, up=True)
@@ -471,17 +472,6 @@ def _place(parameters: list[str]) -> int:
 
 #: Setups in ten places.
 PRESETS = (Both("*SAV", lambda s, p: s.keep(p)), Both("*RCL", lambda s, p: s.recall(p)))
-
-
-def block_content(text: str) -> str:
-    """The content of a definite-length block that was sent as a parameter.  Raises ScpiError."""
-    if len(text) < 2 or text[0] != "#" or not "1" <= text[1] <= "9":
-        raise ScpiError(-104)
-    begin = 2 + int(text[1])
-    digits = text[2:begin]
-    if not digits.isascii() or not digits.isdigit() or len(text) - begin != int(digits):
-        raise ScpiError(-104)
-    return text[begin:]
 
 
 def one_two_five(value: float, *, up: bool = False) -> float:
