@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 
 import pytest
 from hypothesis import settings
@@ -22,3 +23,13 @@ def signals_as_at_a_terminal():
         number = getattr(signal, name, None)
         if number and signal.getsignal(number) is signal.SIG_IGN:
             signal.signal(number, signal.default_int_handler if name == "SIGINT" else signal.SIG_DFL)
+
+
+@pytest.fixture(autouse=True)
+def practice_bench_is_fresh():
+    """PyVISA keeps one library of a name: without this a test would find the top as the one before has left it."""
+    if "pyvisa_levilab" in sys.modules:
+        import pyvisa
+
+        for name in ("@levilab", "realtime@levilab"):
+            pyvisa.ResourceManager(name).visalib.bus = None

@@ -106,10 +106,11 @@ def _independent(coefficients: Array, covariance: Array, half: float) -> tuple[E
     u, size = 0.0, coefficients.size
     for _ in range(5):  # with a third degree the slope at the time changes with the time
         d1, d2 = _derivatives(u, size)
-        together, slope = float(d1 @ covariance @ d2), float(d2 @ covariance @ d2)
+        against = covariance @ d2
+        together, slope = float(d1 @ against), float(d2 @ against)
         step = together / slope if slope > 0 else 0.0
-        u = float(np.clip(u - step, -1, 1))
-        if abs(step) < 1e-12:
+        u = min(max(u - step, -1.0), 1.0)
+        if abs(step) < 1e-12 or size < 4:
             break
     d1, d2 = _derivatives(u, size)
     frequency = Estimate(float(d1 @ coefficients) / half, float(np.sqrt(d1 @ covariance @ d1)) / half, "Hz")
@@ -118,9 +119,8 @@ def _independent(coefficients: Array, covariance: Array, half: float) -> tuple[E
 
 
 def _derivatives(u: float, size: int) -> tuple[Array, Array]:
-    k = np.arange(size)
-    d1 = np.where(k > 0, k * u ** np.maximum(k - 1, 0), 0.0)
-    d2 = np.where(k > 1, k * (k - 1) * u ** np.maximum(k - 2, 0), 0.0)
+    d1 = np.array([k * u ** (k - 1) if k > 0 else 0.0 for k in range(size)])
+    d2 = np.array([k * (k - 1) * u ** (k - 2) if k > 1 else 0.0 for k in range(size)])
     return d1, d2
 
 

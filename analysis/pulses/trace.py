@@ -65,12 +65,12 @@ def spin_of_trace(
     >>> f"{found.at(1.0).value:.4f} Hz at 1 s", f"{found.chirp.value:.3f} Hz/s"
     ('24.9000 Hz at 1 s', '-0.100 Hz/s')
     """
-    x, bad = _checked(samples, rate)
-    factor = max(int(rate // SEARCH_RATE), 1)
-    if np.ptp(x) <= ROUNDING * np.abs(x).max():
+    x, bins, bad = _checked(samples, rate)
+    # the bins are a pass over an eighth of the samples; where they move, so do the samples
+    if _constant(bins) and _constant(x):
         raise TooFewPulses(seen=0, needed=FEWEST, duration=x.size / rate)
-    cleaned = clean(x, rate, shorten(x, factor), bad)
-    trace = Trace(cleaned, rate, rate / factor)
+    cleaned = clean(x, rate, bins, bad)
+    trace = Trace(cleaned, rate, rate / (x.size // bins.size))
     try:
         if method == "edges":
             return _by_edges(trace, start)
@@ -192,7 +192,13 @@ def _without_trap(trace: Trace, found: Match, degree: int | None) -> tuple[Match
     return found, ()
 
 
-def _checked(samples: ArrayLike, rate: float) -> tuple[Array, NDArray[np.bool_] | None]:
+def _constant(values: Array) -> bool:
+    low, high = float(values.min()), float(values.max())
+    return high - low <= ROUNDING * max(abs(low), abs(high))
+
+
+def _checked(samples: ArrayLike, rate: float) -> tuple[Array, Array, NDArray[np.bool_] | None]:
+    """The samples, their shortened trace, and which of them are no finite numbers (None: all are)."""
     x = np.ascontiguousarray(samples, dtype=np.float64)
     if x.ndim != 1:
         raise ShapesDiffer(quantity="samples", seen=x.shape, expected=(x.size,))
@@ -200,13 +206,16 @@ def _checked(samples: ArrayLike, rate: float) -> tuple[Array, NDArray[np.bool_] 
         raise NotPositive(quantity="sample rate", unit="1/s", index=0, value=rate)
     if x.size < 64:
         raise TooFewPulses(seen=0, needed=FEWEST, duration=x.size / rate)
+    factor = max(int(rate // SEARCH_RATE), 1)
     with np.errstate(invalid="ignore", over="ignore"):
-        if math.isfinite(float(np.einsum("i->", x))):
-            return x, None
+        bins = shorten(x, factor)
+        if math.isfinite(float(bins.sum()) + float(x[bins.size * factor :].sum())):
+            return x, bins, None
     bad = ~np.isfinite(x)
     if bad.all():
         raise TooFewPulses(seen=0, needed=FEWEST, duration=x.size / rate)
-    return np.where(bad, np.median(x[~bad]), x), bad if bad.any() else None
+    x = np.where(bad, np.median(x[~bad]), x)
+    return x, shorten(x, factor), bad if bad.any() else None
 
 
 def _result(

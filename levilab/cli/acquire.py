@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from levilab.cli import exit_codes
+from levilab.cli.later import Later
 from levilab.cli.options import Json
 from levilab.cli.output import message, print_json
 
 if TYPE_CHECKING:
     from levilab.bench.person import Task
 
-acquire_app = typer.Typer(no_args_is_help=True, help="Run an experiment on the bench and write a run folder.")
+acquire_app = typer.Typer(no_args_is_help=True, add_completion=False)
 
 
 #: Experiment → what its command does.  The table of experiments itself takes too long to import for a help page.
@@ -102,8 +103,11 @@ def acquire_experiment(
 
 for _name, _help in EXPERIMENT_HELP.items():
     acquire_app.command(
-        _name, help=f"{_help}\n\n{_ENDING}", epilog=f"Example: levilab acquire {_name} --mock --note 'first try'"
-    )(acquire_experiment)
+        _name,
+        cls=Later,
+        help=f"{_help}\n\n{_ENDING}",
+        epilog=f"Example: levilab acquire {_name} --mock --note 'first try'",
+    )(lambda: acquire_experiment)
 
 
 def _ask(task: "Task") -> str:

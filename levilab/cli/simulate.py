@@ -18,16 +18,7 @@ if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
     from levilab.stability.map import Span
 
-benchmark_app = typer.Typer(no_args_is_help=True, help="Speed against error, with other programs beside.")
-
-
-def add_to(app: typer.Typer) -> None:
-    """Make the commands known to the application."""
-    app.command(epilog="Example: levilab simulate driven --duration 60 --set drive.frequency_hz=30.1 --out runs")(
-        simulate
-    )
-    app.command(epilog="Example: levilab stability undriven --set top.mass_kg=0.0255")(stability)
-    app.add_typer(benchmark_app, name="benchmark")
+benchmark_app = typer.Typer(no_args_is_help=True, add_completion=False)
 
 
 def _scene(name: str, settings: list[str] | None) -> "Scene":
@@ -62,10 +53,7 @@ def simulate(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Simulate the motion: does the top stay up, where and how fast does it turn, which frequencies are in it.
-
-    The first run for a kind of scene compiles for 4 to 7 s.  Ctrl-C ends it, and nothing is written then.
-    """
+    """Simulate a scene, and print what the motion is like."""
     chosen = _scene(scene, settings)
 
     from levilab.files import finite
@@ -136,7 +124,7 @@ def stability(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Where the top floats: heights, masses and spins, from the field and the theory of small motions."""
+    """Find where the top floats."""
     chosen = _scene(scene, settings)
     of_map = {"spins": spins, "masses": masses, "duration": duration, "out": out}
     if not survival and (without := [name for name, given in of_map.items() if given is not None]):

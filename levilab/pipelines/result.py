@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, Self, TypeVar
 
@@ -19,7 +19,7 @@ from levilab.settings import in_one_line
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from levilab.pipelines.sources import Source
 
@@ -179,6 +179,7 @@ def save(result: Result, place: Place, picture: bytes, *, first: bool = True) ->
 # --- reading it back -----------------------------------------------------------------------------------
 
 R = TypeVar("R", bound=Result)
+T = TypeVar("T")
 
 
 class NoResult(DataError):
@@ -218,7 +219,7 @@ class Earlier(Generic[R]):
 
     file: Path
     result: R
-    number: int
+    number: int = 0
 
     @property
     def sha256(self) -> str:
@@ -226,11 +227,28 @@ class Earlier(Generic[R]):
         return self.result.inputs[self.number].sha256
 
     @property
+    def part(self) -> Any:
+        """What the result says of the input."""
+        return self.result.runs[self.number]
+
+    @property
     def text(self) -> str:
         """Where it comes from, for people."""
         then = self.result.software
         by = f", by levilab {then.get('levilab', '?')}" if then != software_versions() else ""
         return f"as levilab analyze found it{by}: {self.file}"
+
+    def of(self, source: Source[Any]) -> Earlier[R]:
+        """The same of another input of the result."""
+        number = next(k for k, given in enumerate(self.result.inputs) if given.sha256 == source.sha256)
+        return replace(self, number=number)
+
+    def restore(self, read: Callable[[], T]) -> T:
+        """What is read from the result.  Raises DataError, which names the file, where that raises ValueError."""
+        try:
+            return read()
+        except ValueError as error:
+            raise DataError(f"{self.file}: {error}: {ANEW}") from error
 
 
 class Archive(Generic[R]):
@@ -249,14 +267,14 @@ class Archive(Generic[R]):
                     self._result(file)
                 self._read.setdefault(file, None)
 
-    def whole(self, sources: Sequence[Source[Any]]) -> tuple[Path, R] | None:
+    def whole(self, sources: Sequence[Source[Any]]) -> Earlier[R] | None:
         """The result of just these inputs, unchanged."""
         files = beside(sources[0].path).results(self._analysis) if len(sources) == 1 else self._together
         wanted = sorted(source.sha256 for source in sources)
         for file in files:
             result = self._result(file)
             if result and sorted(given.sha256 for given in result.inputs) == wanted:
-                return file, result
+                return Earlier(file, result)
         return None
 
     def earlier(self, path: Path, data: Path, sha256: str | None = None) -> Earlier[R] | None:

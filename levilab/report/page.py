@@ -6,11 +6,11 @@ Nothing is fetched when it is opened, and everything that a person typed is esca
 from __future__ import annotations
 
 import base64
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from levilab.errors import UsageError, unquoted
 from levilab.files import CannotWrite, replace_atomically
-from levilab.pipelines.catalogue import Analysis, Analyzed, recall_suiting
+from levilab.pipelines.catalogue import Analysis, recall_suiting
 from levilab.report.inputs import describe
 from levilab.runs.run import utc_now
 from levilab.software import software_versions
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
-A = TypeVar("A", bound=Analyzed)
+    from levilab.pipelines.analyzed import A, Analyzed
 
 
 class UnknownFormat(UsageError):
@@ -35,7 +35,7 @@ def write_report(
     """Report what was found of the inputs at the paths; what has no result yet is analyzed, and nothing is stored.
 
     given: options by their names; those at their defaults count as not given, see
-    `levilab.pipelines.spindown.document.recall_spindowns`; tell: called with what lies there and is not in the report.
+    `levilab.pipelines.document.Document.recall`; tell: called with what lies there and is not in the report.
     Raises DataError, UnknownFormat, CannotWrite.
     """
     if output.suffix.lower() not in {".html", ".htm"}:
@@ -80,7 +80,7 @@ def render(analysis: Analysis[A], found: A) -> str:
     )
 
 
-def _banner(found: Analyzed) -> tuple[str, str] | None:
+def _banner(found: Analyzed[Any, Any, Any, Any]) -> tuple[str, str] | None:
     """Which inputs are synthetic, and what that does to the result."""
     total, made_up = len(found.sources), [source.name for source in found.sources if source.synthetic]
     if not made_up:

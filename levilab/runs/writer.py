@@ -81,10 +81,14 @@ class RunWriter:
             _make_folder(out)
             writer = cls(_new_folder(out, record.experiment), record, tell)
             writer._created = True
-            writer._lock.acquire(blocking=False)
-            writer._append(table, writer._header())
-            replace_atomically(writer.folder / RECORD, record.as_json())
-            sync_folder(out)
+            try:
+                writer._lock.acquire(blocking=False)
+                writer._append(table, writer._header())
+                replace_atomically(writer.folder / RECORD, record.as_json())
+                sync_folder(out)
+            except BaseException:
+                writer._close()
+                raise
         return writer
 
     @classmethod

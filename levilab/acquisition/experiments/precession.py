@@ -13,10 +13,17 @@ from pydantic_core import PydanticCustomError
 
 from instruments.errors import InstrumentError, OutOfRange
 from levilab.acquisition.counting import prepare_counter, spin_now
-from levilab.acquisition.driving import RAMP_STEP_S, DriveSettings, NotHeld, drive_up, held_spin, no_light
+from levilab.acquisition.driving import (
+    RAMP_STEP_S,
+    DriveSettings,
+    NotHeld,
+    check_drive,
+    drive_up,
+    held_spin,
+    no_light,
+)
 from levilab.acquisition.experiment import Experiment
 from levilab.acquisition.session import ExperimentFailed
-from levilab.bench.config import ConfigError
 from levilab.bench.person import FloatTop, Task
 from levilab.runs.channel import Channel
 
@@ -105,12 +112,9 @@ class PrecessionSettings(DriveSettings):
     def check(self, table: str, limits: Limits) -> None:
         """Raise ConfigError for a drive that the bench does not allow."""
         super().check(table, limits)
-        for frequency in (min(self.sweep), max(self.sweep)):
-            if not limits.drive_lowest_hz <= frequency <= limits.drive_frequency_hz:
-                raise ConfigError(
-                    f"{table}: the sweep goes to {frequency:g} Hz, this bench allows {limits.drive_lowest_hz:g} to "
-                    f"{limits.drive_frequency_hz:g} Hz (limits.drive_lowest_hz, limits.drive_frequency_hz)"
-                )
+        names = ("first_hz", "last_hz") if self.frequencies_hz is None else ("frequencies_hz", "frequencies_hz")
+        ends = (self.sweep[0], self.sweep[-1]) if self.frequencies_hz is None else (min(self.sweep), max(self.sweep))
+        check_drive(table, limits, self.drive_amplitude_vpp, zip(names, ends, strict=True))
 
 
 def also_needs(settings: PrecessionSettings) -> tuple[str, ...]:

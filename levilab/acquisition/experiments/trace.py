@@ -10,9 +10,9 @@ from pydantic import AfterValidator, Field, PositiveFloat, PositiveInt
 
 from instruments.drivers.oscilloscope import NeverTriggered
 from instruments.errors import InstrumentError, OutOfRange
+from levilab.acquisition.driving import check_drive
 from levilab.acquisition.experiment import Experiment, ExperimentSettings
 from levilab.acquisition.session import ExperimentFailed
-from levilab.bench.config import ConfigError
 from levilab.runs.channel import Channel
 
 if TYPE_CHECKING:
@@ -75,22 +75,8 @@ class TraceSettings(ExperimentSettings):
 
     def check(self, table: str, limits: Limits) -> None:
         """Raise ConfigError for a drive that the bench does not allow."""
-        frequency = self.drive_frequency_hz
-        if frequency is None:
-            return
-        for name, wanted, limit in (
-            ("drive_amplitude_vpp", self.drive_amplitude_vpp, limits.drive_amplitude_vpp),
-            ("drive_frequency_hz", frequency, limits.drive_frequency_hz),
-        ):
-            if wanted > limit:
-                raise ConfigError(
-                    f"{table}.{name} = {wanted:g} is more than this bench allows, limits.{name} = {limit:g}"
-                )
-        if frequency < limits.drive_lowest_hz:
-            raise ConfigError(
-                f"{table}.drive_frequency_hz = {frequency:g} is less than this bench allows, "
-                f"limits.drive_lowest_hz = {limits.drive_lowest_hz:g}"
-            )
+        if self.drive_frequency_hz is not None:
+            check_drive(table, limits, self.drive_amplitude_vpp, [("drive_frequency_hz", self.drive_frequency_hz)])
 
     def for_scene(self, scene: Scene) -> Self:
         """See the base: the laser beside the tape, and the scene's drive, where neither was set."""

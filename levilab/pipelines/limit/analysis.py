@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -12,17 +12,18 @@ from analysis import stability
 from analysis.errors import AnalysisError
 from analysis.limits import Comparison, Statistics, compare, nearest_edge, spins_of_window, summarize
 from levilab.errors import DataError
+from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.limit.readings import LimitReadings, read_limit_file, read_limit_run
-from levilab.pipelines.result import Place, place_of
-from levilab.pipelines.sources import InputOptions, Needs, Source, collect
+from levilab.pipelines.sources import InputOptions, Needs
 from levilab.present.numbers import with_uncertainty
-from levilab.runs.run import find_run
 from levilab.simulator.keys import SceneError
 from levilab.simulator.scene import Scene, scene_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
+
+    from levilab.pipelines.sources import Source
 
 Which = Literal["lower", "upper"]
 
@@ -80,7 +81,7 @@ class Limits:
         comparisons: with theory.
         device: that theory is of; None of runs whose tops differ.
         ends: kind of event → how often a top was lost so.
-        runs: numbers of the inputs that it is of, from 0.
+        runs: of several runs of a kind, the numbers of the inputs, from 0.
     """
 
     which: Which
@@ -88,7 +89,7 @@ class Limits:
     comparisons: tuple[Comparison, ...]
     device: Device | None
     ends: Mapping[str, int]
-    runs: tuple[int, ...]
+    runs: tuple[int, ...] = ()
 
     @property
     def text(self) -> str:
@@ -96,75 +97,42 @@ class Limits:
         return " ".join(_sentences(self))
 
 
-@dataclass(frozen=True)
-class LimitAnalysis:
-    """Limits, each run by itself and those of a kind together.
-
-    Attributes:
-        sources: the inputs.
-        runs: one per source.
-        groups: one for each of the limits, lower and upper, that there are runs of.
-        options: how it was analyzed.
-        place: where the result belongs.
-        warnings: about the inputs.
-        remarks: what does not belong to the analysis.
-        origins: where each run's numbers come from, in words.
-    """
-
-    sources: tuple[Source[LimitReadings], ...]
-    runs: tuple[Limits, ...]
-    groups: tuple[Limits, ...]
-    options: LimitOptions
-    place: Place
-    warnings: tuple[str, ...]
-    remarks: tuple[str, ...]
-    origins: tuple[str, ...]
+class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOptions]):
+    """Limits, each run by itself and those of a kind together."""
 
     @property
-    def home(self) -> Path:
-        """The folder that the result belongs to."""
-        return self.place.folder
+    def groups(self) -> tuple[Limits, ...]:
+        """One for each of the limits, lower and upper, that there are runs of."""
+        return self.combined
 
     @property
     def text(self) -> str:
         """What the data say, in a few sentences."""
         return "  ".join(group.text for group in self.groups)
 
-    @property
-    def all_warnings(self) -> list[str]:
-        """Every warning once, a run's with its name where there are several runs."""
-        texts = list(self.warnings)
-        for source, run in zip(self.sources, self.runs, strict=True):
-            prefix = f"{source.name}: " if len(self.runs) > 1 else ""
-            texts += [prefix + text for text in (*source.warnings, *warnings_of(run.statistics))]
+    def about_all(self) -> Iterable[str]:
+        """What to know of the limits of a kind."""
         for group in self.groups:
+            yield from self._about_tops(group)
             if len(group.runs) > 1:
-                texts += warnings_of(group.statistics)
-        return list(dict.fromkeys(texts))
+                yield from warnings_of(group.statistics)
+
+    def _about_tops(self, group: Limits) -> Iterable[str]:
+        synthetic = sum(self.sources[k].synthetic for k in group.runs)
+        if 0 < synthetic < len(group.runs):
+            yield (
+                f"{synthetic} of {len(group.runs)} runs of {group.which} limits are SYNTHETIC, the others are not "
+                "known to be: a mean over both says nothing about a real top"
+            )
+        if group.device is None:
+            yield f"the {group.which} limits are of tops that differ: their mean is not compared with theory"
+
+    def about_run(self, run: Limits) -> Iterable[str]:
+        """What to know of one run."""
+        return warnings_of(run.statistics)
 
 
-def analyze_limits(paths: Sequence[Path], options: LimitOptions) -> LimitAnalysis:
-    """Statistics of the limits found at the paths, and what theory says of them.
-
-    Raises DataError for what cannot be used; the text names the file.
-    """
-    paths = [find_run(path) for path in paths]
-    found = collect(paths, NEEDS, lambda _: options)
-    runs = tuple(limits_of(source, options, k) for k, source in enumerate(found.sources))
-    groups = together(found.sources, runs, options)
-    return LimitAnalysis(
-        sources=found.sources,
-        runs=runs,
-        groups=groups,
-        options=options,
-        place=place_of(paths, found.sources),
-        warnings=(*found.warnings, *about_inputs(found.sources, groups)),
-        remarks=found.remarks,
-        origins=("analyzed now",) * len(runs),
-    )
-
-
-def limits_of(source: Source[LimitReadings], options: LimitOptions, number: int = 0) -> Limits:
+def limits_of(source: Source[LimitReadings], options: LimitOptions) -> Limits:
     """One input.  Raises DataError, which names the file."""
     device = device_of(source)
     try:
@@ -174,7 +142,7 @@ def limits_of(source: Source[LimitReadings], options: LimitOptions, number: int 
     which = _which(source, statistics, device)
     kinds = Counter(str(event["kind"]) for event in source.run.events()) if source.run else Counter[str]()
     ends = {kind: kinds[kind] for kind in ENDS if kinds[kind]}
-    return Limits(which, statistics, _comparisons(statistics, device, which), device, ends, (number,))
+    return Limits(which, statistics, _comparisons(statistics, device, which), device, ends)
 
 
 def together(
@@ -186,7 +154,7 @@ def together(
     for which in kinds:
         numbers = tuple(k for k, run in enumerate(runs) if run.which == which)
         if len(numbers) == 1:
-            groups.append(runs[numbers[0]])
+            groups.append(replace(runs[numbers[0]], runs=numbers))
         elif numbers:
             groups.append(_combined(which, numbers, sources, runs, options))
     return tuple(groups)
@@ -271,17 +239,15 @@ def warnings_of(statistics: Statistics) -> list[str]:
     return texts
 
 
-def about_inputs(sources: Sequence[Source[LimitReadings]], groups: Sequence[Limits]) -> Iterable[str]:
-    """What to know of the inputs before using the numbers."""
-    for group in groups:
-        synthetic = sum(sources[k].synthetic for k in group.runs)
-        if 0 < synthetic < len(group.runs):
-            yield (
-                f"{synthetic} of {len(group.runs)} runs of {group.which} limits are SYNTHETIC, the others are not "
-                "known to be: a mean over both says nothing about a real top"
-            )
-        if group.device is None:
-            yield f"the {group.which} limits are of tops that differ: their mean is not compared with theory"
+METHOD = Method(needs=NEEDS, kind=LimitAnalysis, options=LimitOptions, fit=limits_of, combine=together)
+
+
+def analyze_limits(paths: Sequence[Path], options: LimitOptions) -> LimitAnalysis:
+    """Statistics of the limits found at the paths, and what theory says of them.
+
+    Raises DataError for what cannot be used; the text names the file.
+    """
+    return METHOD.analyze(paths, options)
 
 
 # --- in words ---

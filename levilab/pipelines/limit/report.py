@@ -34,7 +34,7 @@ def limit_part(analysis: LimitAnalysis) -> ReportPart:
             "theory": theory_table(analysis),
         },
         inputs=tuple(
-            InputPart(_in_words(source, run), origin, run.text, _readings(source, run))
+            InputPart(_in_words(source, run), origin.text, run.text, _readings(source, run))
             for source, run, origin in zip(analysis.sources, analysis.runs, analysis.origins, strict=True)
         ),
     )

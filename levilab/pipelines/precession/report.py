@@ -11,7 +11,8 @@ from levilab.pipelines.precession.analysis import verdict
 from levilab.pipelines.precession.table import coherence_table, lines_table, points_table, power_table
 
 if TYPE_CHECKING:
-    from levilab.pipelines.precession.analysis import Origin, PrecessionAnalysis, PrecessionRun
+    from levilab.pipelines.analyzed import Origin
+    from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionOptions, PrecessionRun
     from levilab.pipelines.precession.readings import Readings
     from levilab.pipelines.sources import Source
 
@@ -44,19 +45,19 @@ def precession_part(analysis: PrecessionAnalysis) -> ReportPart:
     )
 
 
-def _input(source: Source[Readings], run: PrecessionRun, origin: Origin) -> InputPart:
+def _input(source: Source[Readings], run: PrecessionRun, origin: Origin[PrecessionOptions]) -> InputPart:
     count = len(run.fit.points)
     context = {"points": points_table(run, most=MOST_POINTS), "shown": min(count, MOST_POINTS), "count": count}
     return InputPart(_in_words(source, run, origin), origin.text, verdict(run.fit), context)
 
 
-def _in_words(source: Source[Readings], run: PrecessionRun, origin: Origin) -> tuple[str, ...]:
+def _in_words(source: Source[Readings], run: PrecessionRun, origin: Origin[PrecessionOptions]) -> tuple[str, ...]:
     drive, out = run.fit.column("drive"), sum(not point.used for point in run.fit.points)
     text = f"{len(drive)} points, {drive.min():.4g} Hz to {drive.max():.4g} Hz"
     return text + (f", {out} left out as miscounts" if out else ""), _uncertainty(source, run, origin)
 
 
-def _uncertainty(source: Source[Readings], run: PrecessionRun, origin: Origin) -> str:
+def _uncertainty(source: Source[Readings], run: PrecessionRun, origin: Origin[PrecessionOptions]) -> str:
     """How large u of a point is, and where it comes from."""
     u = run.fit.column("u")
     if not np.isfinite(u).all():

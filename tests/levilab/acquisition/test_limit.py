@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
+from instruments.drivers.generator.keysight_33500b import Keysight33500B
 from instruments.errors import NoAnswer
 from levilab.acquisition.counting import FreeTop
 from levilab.acquisition.driving import DidNotFollow, held_spin
@@ -92,6 +93,32 @@ def test_a_top_that_slips_before_it_is_missed_has_its_limit_within_u(tmp_path: P
     assert "lock lost" in kinds(run)
     assert abs(limit - 36) < 2 * u  # an even distribution ends at 1.7 u
     assert u < 0.5
+
+
+def test_a_limit_is_kept_though_the_generator_fails_as_it_is_switched_off(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Twice: the bench itself tries once more over a new link.  The top is not driven up again for it."""
+    off = Keysight33500B.off
+    faults: list[int] = []
+
+    class Watchful(Silent):
+        def reading(self, text: str, elapsed: float, remaining: float) -> None:
+            super().reading(text, elapsed, remaining)
+            faults.extend([1, 2])
+
+    def switched_off(self: Keysight33500B) -> None:
+        if faults:
+            faults.pop()
+            raise NoAnswer(self.transport.address, "OUTP1?", 1.0)
+        off(self)
+
+    monkeypatch.setattr(Keysight33500B, "off", switched_off)
+    run = acquire(in_world(mock(tmp_path, *SLIPS), Slipping(SpinScene(), VirtualClock())), Watchful())
+    assert (run.status, run.count()) == ("finished", 1)
+    assert "found again" in kinds(run)
+    assert kinds(run).count("drive on") == 1
+    assert run.record.instruments["generator"]["settings_end"]["output"] is False
 
 
 def test_a_drive_does_not_jump_after_a_counter_was_away(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,9 +14,9 @@ from typing import Any
 import pytest
 
 from levilab.errors import LevilabError
-from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.catalogue import ANALYSES, save
 from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions, analyze_spindowns
-from levilab.pipelines.spindown.document import recall_spindowns, save_result
+from levilab.pipelines.spindown.document import DOCUMENT
 from levilab.report.inputs import _drive
 from levilab.report.page import render as render_found
 from levilab.report.page import write_report
@@ -208,7 +208,7 @@ def reported(*paths: Path, output: Path, **options: Any) -> str:
 
 
 def test_the_report_shows_what_analyze_found_intervals_included(run: Path, tmp_path: Path) -> None:
-    save_result(analyze_spindowns([run], SpinDownOptions(uncertainty="bootstrap", bootstrap_samples=50)))
+    save(ANALYSES["spindown"], analyze_spindowns([run], SpinDownOptions(uncertainty="bootstrap", bootstrap_samples=50)))
     result = json.loads((run / "result.json").read_text(encoding="utf-8"))
     low, high = result["models"][2]["parameters"]["c32"]["interval_68"]
     text = reported(run, output=tmp_path / "report.html")
@@ -219,9 +219,9 @@ def test_the_report_shows_what_analyze_found_intervals_included(run: Path, tmp_p
 
 def test_the_report_does_not_fit_what_has_a_result(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     analysis = analyze_spindowns([run], SpinDownOptions())
-    save_result(analysis)
-    monkeypatch.setattr("levilab.pipelines.spindown.document.fit_source", pytest.fail)
-    recalled = render(recall_spindowns([run], SpinDownOptions()))
+    save(ANALYSES["spindown"], analysis)
+    monkeypatch.setattr("levilab.pipelines.spindown.analysis.fit_spin_down", pytest.fail)
+    recalled = render(DOCUMENT.recall([run], SpinDownOptions()))
     anew = render(analysis)
     differ = [pair for pair in zip(recalled.split("\n"), anew.split("\n"), strict=True) if pair[0] != pair[1]]
     assert all("Analysis" in here or "written" in here for here, _ in differ)
@@ -231,7 +231,7 @@ def test_the_report_says_what_it_had_to_analyze(run: Path, tmp_path: Path) -> No
     before = sorted(run.rglob("*"))
     assert "analyzed for this page: there was no result yet" in reported(run, output=tmp_path / "report.html")
     assert sorted(run.rglob("*")) == before
-    save_result(analyze_spindowns([run], SpinDownOptions()))
+    save(ANALYSES["spindown"], analyze_spindowns([run], SpinDownOptions()))
     text = reported(run, output=tmp_path / "report.html", reading_u=0.05)
     assert f"analyzed for this page: other options than those of {run / 'result.json'}" in text
     assert "u of a reading: 0.05 Hz, as given to the analysis" in text

@@ -10,9 +10,9 @@ import pytest
 
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
-from levilab.pipelines.catalogue import analyze_suiting
+from levilab.pipelines.catalogue import ANALYSES, analyze_suiting, save
 from levilab.pipelines.limit.analysis import LOWER_EDGE, RESONANCE, UPPER_EDGE, LimitOptions, analyze_limits
-from levilab.pipelines.limit.document import limit_document, recall_limits, save_limits
+from levilab.pipelines.limit.document import DOCUMENT
 from levilab.pipelines.limit.table import limit_tables
 from levilab.report.page import write_report
 from support.spin_downs import spin_down_csv
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 def test_the_published_limits_give_the_published_statistics(sample_data: Path) -> None:
     analysis = analyze_limits([sample_data / "lower-limits"], LimitOptions())
-    values = limit_document(analysis, sample_data)["values"]
+    values = ANALYSES["limit"].document(analysis, sample_data)["values"]
     assert round(values["mean"]["value"], 2) == 21.86
     assert round(values["scatter"]["value"], 2) == 0.25
     assert round(values["standard_error"]["value"], 2) == 0.08
@@ -41,7 +41,7 @@ def test_theory_beside_them_is_that_of_the_thesis_top(sample_data: Path) -> None
 
 def test_both_kinds_together_have_values_of_both(sample_data: Path, tmp_path: Path) -> None:
     analysis = analyze_limits([sample_data], LimitOptions())
-    document = limit_document(analysis, tmp_path)
+    document = ANALYSES["limit"].document(analysis, tmp_path)
     assert {"lower_mean", "upper_mean", "upper_standard_error"} <= document["values"].keys()
     assert [run["which"] for run in document["runs"]] == ["upper", "lower", "upper"]
     assert [group["repetitions"] for group in document["groups"]] == [10, 16]
@@ -54,26 +54,26 @@ def test_both_kinds_together_have_values_of_both(sample_data: Path, tmp_path: Pa
 def test_what_was_written_is_what_a_report_shows(sample_data: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(sample_data / "loose-washers", tmp_path / "run")
     analysis = analyze_limits([folder], LimitOptions())
-    assert [file.name for file in save_limits(analysis)] == ["result.json", "limit.png"]
-    again = recall_limits([folder], LimitOptions())
-    assert again.origins[0].startswith("as levilab analyze found it")
+    assert [file.name for file in save(ANALYSES["limit"], analysis)] == ["result.json", "limit.png"]
+    again = DOCUMENT.recall([folder], LimitOptions())
+    assert again.origins[0].text.startswith("as levilab analyze found it")
     assert again.groups == analysis.groups
     assert again.all_warnings == analysis.all_warnings
     assert limit_tables(again) == limit_tables(analysis)
     page = write_report([folder], tmp_path / "page.html").read_text(encoding="utf-8")
     assert "LOOSE WASHERS" in page
     assert analysis.groups[0].text.split(".")[0] in page
-    other = recall_limits([folder], LimitOptions(reading_u=0.5))  # other options than the result's
-    assert other.origins[0].startswith("analyzed for this page")
+    other = DOCUMENT.recall([folder], LimitOptions(reading_u=0.5))  # other options than the result's
+    assert other.origins[0].text.startswith("analyzed for this page")
 
 
 def test_a_result_that_is_damaged_is_an_error(sample_data: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(sample_data / "lower-limits", tmp_path / "run")
-    document = limit_document(analyze_limits([folder], LimitOptions()), folder)
+    document = ANALYSES["limit"].document(analyze_limits([folder], LimitOptions()), folder)
     document["runs"][0]["which"] = "middle"
     (folder / "result.json").write_text(json.dumps(document), encoding="utf-8")
     with pytest.raises(DataError, match=r"result\.json: runs\.0\.which = 'middle'"):
-        recall_limits([folder], LimitOptions())
+        DOCUMENT.recall([folder], LimitOptions())
 
 
 def test_a_file_of_ones_own_needs_nothing_but_the_spins(tmp_path: Path) -> None:

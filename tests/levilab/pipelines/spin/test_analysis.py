@@ -15,7 +15,7 @@ from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
 from levilab.pipelines.catalogue import save as save_found
 from levilab.pipelines.spin.analysis import SpinOptions, analyze_spins
-from levilab.pipelines.spin.document import as_document, recall_spins
+from levilab.pipelines.spin.document import DOCUMENT
 from levilab.pipelines.spin.figure import spin_figure
 from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
 from levilab.runs.run import Run, RunRecord, utc_now
@@ -121,7 +121,7 @@ def test_the_traces_of_a_run_are_read_in_volts_on_its_clock(traced: Path) -> Non
     series = analysis.runs[0].series
     assert series.frequency == pytest.approx([30, 29, 28], abs=0.01)
     assert series.time == pytest.approx([0, 10, 20], abs=0.05)
-    document = as_document(analysis, traced)
+    document = ANALYSES["spin"].document(analysis, traced)
     assert document["inputs"][0]["path"] == "traces.jsonl"
     assert save_found(ANALYSES["spin"], analysis)[0] == traced / "result.json"
 
@@ -151,16 +151,16 @@ def test_the_result_says_what_the_interface_promises(sample_data: Path, tmp_path
     assert result["values"]["reference_time"]["value"] == analysis.runs[0].spin.reference_time
     assert result["values"]["bound"]["value"] > 0
     assert result["method"] == result["runs"][0]["method"] == "matched"
-    recalled = recall_spins([tmp_path / "keysight-dsox.csv"], SpinOptions())
+    recalled = DOCUMENT.recall([tmp_path / "keysight-dsox.csv"], SpinOptions())
     assert recalled.origins[0].text.startswith("as levilab analyze found it")
-    assert as_document(recalled, tmp_path) == result
-    anew = recall_spins([tmp_path / "keysight-dsox.csv"], SpinOptions(method="edges"))
+    assert ANALYSES["spin"].document(recalled, tmp_path) == result
+    anew = DOCUMENT.recall([tmp_path / "keysight-dsox.csv"], SpinOptions(method="edges"))
     assert "other options" in anew.origins[0].text
     written.write_text(
         written.read_text(encoding="utf-8").replace('"method": "matched"', '"method": "guessed"'), encoding="utf-8"
     )
     with pytest.raises(DataError, match="guessed"):
-        recall_spins([tmp_path / "keysight-dsox.csv"], SpinOptions())
+        DOCUMENT.recall([tmp_path / "keysight-dsox.csv"], SpinOptions())
     assert path
 
 
@@ -179,7 +179,7 @@ def test_a_record_without_pulses_is_refused_in_one_line(tmp_path: Path) -> None:
         analyze_spins([path], SpinOptions())
 
 
-@pytest.mark.parametrize("find", [analyze_spins, recall_spins])
+@pytest.mark.parametrize("find", [analyze_spins, DOCUMENT.recall])
 def test_a_record_without_pulses_among_others_is_passed_over(find: Any, tmp_path: Path) -> None:
     """By a report, too, which recalls."""
     write_wav(tmp_path / "dark.wav", np.full(4000, 0.1), 1000)
