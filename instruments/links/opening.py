@@ -39,6 +39,6 @@ def open_link(
     options = dict(line)
     serial_name = address.upper().startswith("ASRL") and library == "@py"
     if "::" not in address or serial_name:
-        return SerialTransport(address, timeout=timeout, log=log, **options)
+        return SerialTransport(address, timeout=timeout, clock=clock, log=log, **options)
     pause = options.pop("pause", 0.0)
     return VisaTransport(address, library=library, timeout=timeout, line=options, pause=pause, clock=clock, log=log)
