@@ -15,6 +15,7 @@ from instruments.virtual.bench.faults import Fault
 from instruments.virtual.bench.visa_library import LevilabVisaLibrary, library_for
 from instruments.virtual.core.device import VirtualInstrument, answers
 from instruments.virtual.core.parser import Command
+from levilab.bench.config import ConfigError
 from support.waiting import HANG_GUARD_S
 
 COUNTER = "TCPIP0::counter.levilab::inst0::INSTR"
@@ -158,6 +159,17 @@ print(float(generator.query("FREQ?")))
         check=False,
     )
     assert (ended.stdout.strip(), ended.stderr) == ("38.5", "")
+
+
+def test_other_models_stand_before_the_name_of_the_library():
+    with contextlib.closing(pyvisa.ResourceManager("cnt-91,DSOX2000@levilab")) as manager:
+        names = [manager.open_resource(address).query("*IDN?") for address in (COUNTER, OSCILLOSCOPE)]
+    assert [name.split(",")[1].strip() for name in names] == ["CNT-91", "DSOX2024A"]
+    with (
+        contextlib.closing(pyvisa.ResourceManager("realtime,CNT91@levilab")) as manager,
+        pytest.raises(ConfigError, match="'CNT91' before @levilab is no model: known are realtime, 53230A"),
+    ):
+        manager.open_resource(COUNTER)
 
 
 def test_a_bench_in_real_time_keeps_to_the_wall_clock():
