@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.errors import NotFinite, ShapesDiffer, TimesNotIncreasing, TooFewPulses
+from analysis.numbers import digits
 from analysis.pulses.regression import Fit, fit_turns, median
 from analysis.pulses.result import Finding, SpinFrequency
 from analysis.pulses.turns import Numbering, number_turns
@@ -146,9 +147,9 @@ def findings_of(train: Train) -> tuple[Finding, ...]:
 def correlated(fit: Fit, what: str) -> tuple[Finding, ...]:
     """What is to be said where neighbouring turns or pulses are not independent."""
     if fit.inflation > 1:
-        text = f"neighbouring {what} resemble each other: variance x {fit.inflation:.2g}"
+        text = f"neighbouring {what} resemble each other: variance x {digits(fit.inflation)}"
     elif fit.inflation < TOLD:
-        text = f"neighbouring {what} differ from each other, which averages out: variance x {fit.inflation:.2g}"
+        text = f"neighbouring {what} differ from each other, which averages out: variance x {digits(fit.inflation)}"
     else:
         return ()
     return (Finding("correlated", text),)

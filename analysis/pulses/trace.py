@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.errors import NotPositive, OnlyHum, ShapesDiffer, TooFewPulses
+from analysis.numbers import digits
 from analysis.pulses import traps
 from analysis.pulses.clean import Clean, clean, own_lines
 from analysis.pulses.edges import Edges, place_edges
@@ -198,7 +199,7 @@ def _doubt(found: Match) -> str:
     turns = found.heights.size
     sweep = abs(found.fit.frequency_and_chirp()[1].value or 0.0) * found.fit.half
     if sweep > 0.5 * found.fit.coefficients[1] / found.fit.half:
-        return f"the frequency would change by {2 * sweep:.3g} Hz"
+        return f"the frequency would change by {digits(2 * sweep, 3)} Hz"
     if found.missing > MOST_MISSING * turns:
         return f"{found.missing} of {turns} turns have no pulse"
     if found.wrong > MOST_WRONG * turns:
