@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.errors import NotFinite, ShapesDiffer, TimesNotIncreasing, TooFewPulses
+from analysis.numbers import digits
 from analysis.pulses.regression import Fit, fit_turns, median
 from analysis.pulses.result import Finding, SpinFrequency
 from analysis.pulses.turns import Numbering, number_turns
@@ -139,7 +140,7 @@ def findings_of(train: Train) -> tuple[Finding, ...]:
         notes.append(Finding("curved", "the slope itself changes: a third degree was fitted"))
     if train.fit.inflation != 1:
         notes.append(
-            Finding("correlated", f"neighbouring pulses resemble each other: variance x {train.fit.inflation:.2g}")
+            Finding("correlated", f"neighbouring pulses resemble each other: variance x {digits(train.fit.inflation)}")
         )
     return tuple(notes)
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.errors import NotPositive, OnlyHum, ShapesDiffer, TooFewPulses
+from analysis.numbers import digits
 from analysis.pulses import traps
 from analysis.pulses.clean import Clean, clean
 from analysis.pulses.edges import Edges, place_edges
@@ -167,7 +168,7 @@ def _doubt(found: Match) -> str:
     turns = found.heights.size
     sweep = abs(found.fit.frequency_and_chirp()[1].value or 0.0) * found.fit.half
     if sweep > 0.5 * found.fit.coefficients[1] / found.fit.half:
-        return f"the frequency would change by {2 * sweep:.3g} Hz"
+        return f"the frequency would change by {digits(2 * sweep, 3)} Hz"
     if found.missing > MOST_MISSING * turns:
         return f"{found.missing} of {turns} turns have no pulse"
     if found.wrong > MOST_WRONG * turns:
@@ -234,7 +235,8 @@ def _result(
     if fit.coefficients.size > 3:
         more.append(Finding("curved", "the slope itself changes: a third degree was fitted"))
     if fit.inflation != 1:
-        more.append(Finding("correlated", f"neighbouring turns resemble each other: variance x {fit.inflation:.2g}"))
+        text = f"neighbouring turns resemble each other: variance x {digits(fit.inflation)}"
+        more.append(Finding("correlated", text))
     return SpinFrequency(
         frequency=frequency,
         chirp=chirp,

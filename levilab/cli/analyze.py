@@ -2,7 +2,6 @@
 
 import inspect
 import math
-import re
 from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from functools import partial
@@ -14,7 +13,7 @@ import typer.core
 
 from levilab.cli.later import Later
 from levilab.cli.options import Channel, Columns, Json, KeepOutliers, Paths, Rate, ReadingU
-from levilab.cli.output import message, print_json
+from levilab.cli.output import interruptible, message, print_json
 from levilab.cli.quantities import with_options
 from levilab.errors import DoesNotSuit, LevilabError, UsageError
 
@@ -290,16 +289,27 @@ def _analyze(
     from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
 
     left_out: list[str] = []
-    if context.info_name == _EACH:
-        results = analyze_suiting(paths, given, left_out.append)
-    else:
-        analysis = ANALYSES[str(context.info_name)]
-        try:
-            results = [(analysis, analysis.analyze(paths, analysis.options_from(given)))]
-        except DoesNotSuit as error:
-            advice = "" if "levilab analyze" in str(error) else _suiting(analysis, paths, given)
-            raise DoesNotSuit(f"{error}{advice}") from error
-    _write_and_print(context, results, left_out, save=save, out=out, as_json=as_json)
+    with interruptible("what was fitted so far is lost, nothing is written"):
+        if context.info_name == _EACH:
+            results = analyze_suiting(paths, given, left_out.append)
+        else:
+            analysis = ANALYSES[str(context.info_name)]
+            results = [(analysis, _analyze_as(analysis, paths, given))]
+    with interruptible("look which results are written: each one is whole"):
+        _write_and_print(context, results, left_out, save=save, out=out, as_json=as_json)
+
+
+def _analyze_as(analysis: "Analysis[Any]", paths: Sequence[Path], given: Mapping[str, Any]) -> Any:
+    """The result of one analysis; where the inputs do not suit it, the error names those that they suit.
+
+    Raises:
+        DoesNotSuit: with the analyses that read the inputs.
+    """
+    try:
+        return analysis.analyze(paths, analysis.options_from(given))
+    except DoesNotSuit as error:
+        advice = "" if "levilab analyze" in str(error) else _suiting(analysis, paths, given)
+        raise DoesNotSuit(f"{error}{advice}") from error
 
 
 def _suiting(analysis: "Analysis[Any]", paths: Sequence[Path], given: Mapping[str, Any]) -> str:
@@ -344,11 +354,11 @@ def _write_and_print(
 
     left_out: why other analyses have no result.
     """
-    from levilab.pipelines.catalogue import print_analysis
+    from levilab.pipelines.catalogue import print_analysis, remarks
 
     in_words = partial(with_options, app=context.find_root().command)
     failures: list[LevilabError] = []
-    messages = [*left_out, *_remarks([found.remarks for _, found in results])]
+    messages = [*left_out, *remarks([found.remarks for _, found in results])]
     for analysis, found in results:
         if save:
             failure, written = _save(analysis, found, out)
@@ -364,14 +374,6 @@ def _write_and_print(
         message(in_words(text))
     if failures:
         raise failures[0]
-
-
-def _remarks(of_each: Sequence[Sequence[str]]) -> list[str]:
-    """What the analyses say, each once; runs that one of them passed over count only if all did."""
-    told = list(dict.fromkeys(text for remarks in of_each for text in remarks))
-    kinds = [text for text in told if re.fullmatch(r"passed over: \d+ \w+ runs?", text)]
-    taken = {text for text in kinds if not all(text in remarks for remarks in of_each)}
-    return [text for text in told if text not in taken]
 
 
 def _save(analysis: "Analysis[Any]", found: Any, out: Path | None) -> tuple[LevilabError | None, list[Path]]:

@@ -79,9 +79,9 @@ def levilab(
 def report() -> Callable[..., None]:
     """Report runs in one self-contained file: what was measured, with what, figures, numbers, warnings.
 
-    The numbers are those that levilab analyze wrote beside the runs.  What has no result there, or one of other
-    readings or options than the given, is analyzed for the page.  A page is of one analysis; where a folder holds runs
-    of several kinds it is of the first, and the others are named.
+    The numbers are those that levilab analyze wrote beside the runs, of every analysis; where it wrote them elsewhere
+    (--out), give that folder or result.json.  What has no result, or one of other readings or options than the given,
+    is analyzed for the page.
     """
     from levilab.cli.report import report
 

@@ -292,7 +292,7 @@ def test_settings_on_the_command_line_go_before_the_bench_files(tmp_path: Path) 
 
 def test_loose_washers_are_warned_of_in_the_run_and_in_its_result(tmp_path: Path) -> None:
     """In full motion; the slip is that of the washers' drag against their coupling, I₃ C ω^1.5/k."""
-    given = ("spin.drive_frequency_hz=30.2", "spin.longest_s=21")
+    given = ("spin.drive_frequency_hz=30.2", "spin.interval_s=2", "spin.longest_s=5", "spin.hold_s=12")
     options = AcquisitionOptions(mock=True, out=tmp_path, seed=1, scene="loose-washers", settings=given)
     show = Silent()
     run = acquire(request_for("spin", options), show)

@@ -180,6 +180,21 @@ def test_an_interrupted_command_ends_with_130(monkeypatch: pytest.MonkeyPatch, t
     assert command("runs", ".", cwd=tmp_path).status == exit_codes.INTERRUPTED
 
 
+def test_an_interrupted_analysis_says_in_one_line_what_is_lost(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, sample_data: Path
+) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("levilab.pipelines.spindown.analysis.fit_spin_down", interrupted)
+    run = sample_data / "spin-down-1"
+    for words, says in (("analyze spindown", "is lost, nothing is written"), ("report", "no report is written")):
+        ended = command(*words.split(), str(run), cwd=tmp_path)
+        assert (ended.status, ended.out) == (exit_codes.INTERRUPTED, "")
+        assert len(ended.err.splitlines()) == 1
+        assert says in ended.err
+
+
 def test_a_defect_of_the_program_stays_loud(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def broken(_: object) -> None:
         raise ZeroDivisionError

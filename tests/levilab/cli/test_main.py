@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 import json
-import os
 import re
 import shutil
 import subprocess
@@ -18,6 +17,7 @@ from levilab.acquisition.table import EXPERIMENTS
 from levilab.cli.acquire import EXPERIMENT_HELP
 from levilab.cli.analyze import COMMANDS, OPTIONS
 from levilab.pipelines.catalogue import ANALYSES
+from support.commands import command
 from support.spin_downs import spin_down_csv
 from support.waiting import HANG_GUARD_S
 
@@ -320,18 +320,13 @@ def test_a_result_that_cannot_be_written_is_shown_all_the_same(levilab: Command,
 
 @pytest.mark.parametrize("encoding", ["cp1252", "ascii"])
 def test_an_old_code_page_costs_no_number_its_exponent(tmp_path: Path, encoding: str) -> None:
+    """As PYTHONIOENCODING and an old Windows have it: such streams refuse what they cannot carry."""
     path = spin_down_csv(tmp_path / "my.csv")
-    done = subprocess.run(
-        [sys.executable, "-m", "levilab", "analyze", "spindown", str(path), "--no-save"],
-        capture_output=True,
-        env=os.environ | {"PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"},
-        check=True,
-        timeout=HANG_GUARD_S,
-    )
-    text = done.stdout.decode(encoding)
-    assert "?" not in text
-    assert re.search(r"C3/2 = 2\.\d+\(\d+\)e-4 \(rad/s\)\^-(1/2|½)/s", text)
-    assert "chi2/dof" in text
+    done = command("analyze", "spindown", path, "--no-save", cwd=tmp_path, encoding=encoding)
+    assert done.status == 0, done.err
+    assert "?" not in done.out
+    assert re.search(r"C3/2 = 2\.\d+\(\d+\)e-4 \(rad/s\)\^-(1/2|½)/s", done.out)
+    assert "chi2/dof" in done.out
 
 
 def test_a_decoy_in_the_present_folder_is_not_imported(levilab: Command, tmp_path: Path) -> None:
@@ -344,24 +339,26 @@ def test_a_decoy_in_the_present_folder_is_not_imported(levilab: Command, tmp_pat
 HEAVY = {"numpy", "scipy", "pandas", "matplotlib", "lmfit", "pyvisa", "jinja2", "numba", "rich.progress"}
 
 
-@pytest.mark.parametrize(
-    ("words", "allowed"),
-    [
-        (["--help"], set[str]()),
-        (["acquire", "spin", "--help"], set[str]()),
-        (["simulate", "--help"], set[str]()),
-        (["simulate", "nowhere"], set[str]()),
-        (["--version"], set[str]()),
-        (["acquire", "spin", "--mock"], {"numpy", "pandas", "pyvisa"}),
-        (["runs", "."], {"numpy", "pandas"}),
-        (["analyze", "nowhere"], {"numpy", "pandas"}),
-    ],
-)
-def test_nothing_heavy_is_imported_where_it_is_not_used(tmp_path: Path, words: list[str], allowed: set[str]) -> None:
+#: What commands that follow each other in one process may have imported by then.
+IMPORTS: list[tuple[list[list[str]], set[str]]] = [
+    (
+        [["--help"], ["acquire", "spin", "--help"], ["simulate", "--help"], ["simulate", "nowhere"], ["--version"]],
+        set[str](),
+    ),
+    ([["runs", "."], ["analyze", "nowhere"]], {"numpy", "pandas"}),
+    ([["acquire", "spin", "--mock"]], {"numpy", "pandas", "pyvisa"}),
+]
+
+
+@pytest.mark.parametrize(("commands", "allowed"), IMPORTS, ids=["help", "runs", "acquire"])
+def test_nothing_heavy_is_imported_where_it_is_not_used(
+    tmp_path: Path, commands: list[list[str]], allowed: set[str]
+) -> None:
     program = (
-        f"import sys\nsys.argv = ['levilab', *{words!r}]\nfrom levilab.cli.main import main\n"
-        "try:\n    main()\nexcept SystemExit:\n    pass\n"
-        f"print('HEAVY', *sorted({HEAVY!r} & set(sys.modules)))"
+        "import sys\nfrom levilab.cli.main import main\n"
+        f"for words in {commands!r}:\n    sys.argv = ['levilab', *words]\n"
+        "    try:\n        main()\n    except SystemExit:\n        pass\n"
+        f"    print('HEAVY', *sorted({HEAVY!r} & set(sys.modules)))"
     )
     done = subprocess.run(
         [sys.executable, "-c", program],
@@ -372,5 +369,7 @@ def test_nothing_heavy_is_imported_where_it_is_not_used(tmp_path: Path, words: l
         check=True,
         timeout=HANG_GUARD_S,
     )
-    heavy = set(done.stdout.splitlines()[-1].split()[1:])
-    assert heavy <= allowed
+    heavy = [set(line.split()[1:]) for line in done.stdout.splitlines() if line.startswith("HEAVY")]
+    assert len(heavy) == len(commands)
+    for words, seen in zip(commands, heavy, strict=True):
+        assert seen <= allowed, words
