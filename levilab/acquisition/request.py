@@ -148,7 +148,7 @@ def _with_given_settings(config: BenchConfig, experiment: str, settings: Sequenc
     try:
         return Configuration.model_validate(table)
     except ValidationError as error:
-        raise UsageError("settings", in_one_line(error)) from error
+        raise UsageError("settings", in_one_line(error, Configuration)) from error
 
 
 def _as_it_was(run: Run) -> BenchConfig:

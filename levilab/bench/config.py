@@ -100,4 +100,4 @@ def read_bench(path: Path, tables: type[C]) -> C:
     try:
         return tables.model_validate(table)
     except ValidationError as error:
-        raise ConfigError(f"{path}: {in_one_line(error)}") from error
+        raise ConfigError(f"{path}: {in_one_line(error, tables)}") from error

@@ -15,6 +15,7 @@ from instruments.virtual.bench.faults import Fault
 from instruments.virtual.bench.visa_library import LevilabVisaLibrary, library_for
 from instruments.virtual.core.device import VirtualInstrument, answers
 from instruments.virtual.core.parser import Command
+from levilab.bench.config import ConfigError
 from support.waiting import HANG_GUARD_S
 
 COUNTER = "TCPIP0::counter.levilab::inst0::INSTR"
@@ -158,6 +159,14 @@ print(float(generator.query("FREQ?")))
         check=False,
     )
     assert (ended.stdout.strip(), ended.stderr) == ("38.5", "")
+
+
+def test_other_models_are_had_by_their_names_before_the_at_sign():
+    with contextlib.closing(pyvisa.ResourceManager("CNT-91,dsox1000@levilab")) as manager:
+        names = [manager.open_resource(name).query("*IDN?").split(",")[0] for name in manager.list_resources()[:3]]
+    assert names == ["PENDULUM", "Agilent Technologies", "KEYSIGHT TECHNOLOGIES"]
+    with pytest.raises(ConfigError, match="no virtual instrument 'DVM': known are realtime, 53230A, "):
+        pyvisa.ResourceManager("DVM@levilab").list_resources()
 
 
 def test_a_bench_in_real_time_keeps_to_the_wall_clock():
