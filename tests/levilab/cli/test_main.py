@@ -8,13 +8,14 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import fields
 from typing import TYPE_CHECKING
 
 import pytest
 
 from levilab.acquisition.table import EXPERIMENTS
 from levilab.cli.acquire import EXPERIMENT_HELP
-from levilab.cli.analyze import ANALYSIS_HELP
+from levilab.cli.analyze import COMMANDS, OPTIONS
 from levilab.pipelines.catalogue import ANALYSES
 from support.commands import command
 from support.spin_downs import spin_down_csv
@@ -26,10 +27,10 @@ if TYPE_CHECKING:
 
     Command = Callable[..., subprocess.CompletedProcess[str]]
 
-COMMANDS = ["", "acquire", "acquire spin", "analyze", "analyze spindown", "analyze spin", "report", "simulate", "runs"]
+HELP = ["", "acquire", "acquire spin", "analyze", "analyze spindown", "analyze spin", "report", "simulate", "runs"]
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", HELP)
 def test_every_command_has_help_and_the_ones_that_do_something_an_example(levilab: Command, command: str) -> None:
     text = levilab(*command.split(), "--help").stdout
     assert "Usage:" in text
@@ -39,7 +40,13 @@ def test_every_command_has_help_and_the_ones_that_do_something_an_example(levila
 
 def test_each_experiment_and_each_analysis_has_its_command() -> None:
     assert EXPERIMENT_HELP.keys() == EXPERIMENTS.keys()
-    assert ANALYSIS_HELP.keys() == ANALYSES.keys()
+    assert COMMANDS.keys() - {"each"} == ANALYSES.keys()
+
+
+def test_an_analysis_takes_each_option_of_its_command() -> None:
+    for name, analysis in ANALYSES.items():
+        taken = {field.name for field in fields(analysis.options_from({}))}
+        assert {OPTIONS[option].to or option for option in COMMANDS[name].options} <= taken, name
 
 
 def test_the_version_is_printed(levilab: Command) -> None:

@@ -161,12 +161,15 @@ print(float(generator.query("FREQ?")))
     assert (ended.stdout.strip(), ended.stderr) == ("38.5", "")
 
 
-def test_other_models_are_had_by_their_names_before_the_at_sign():
-    with contextlib.closing(pyvisa.ResourceManager("CNT-91,dsox1000@levilab")) as manager:
-        names = [manager.open_resource(name).query("*IDN?").split(",")[0] for name in manager.list_resources()[:3]]
-    assert names == ["PENDULUM", "Agilent Technologies", "KEYSIGHT TECHNOLOGIES"]
-    with pytest.raises(ConfigError, match="no virtual instrument 'DVM': known are realtime, 53230A, "):
-        pyvisa.ResourceManager("DVM@levilab").list_resources()
+def test_other_models_stand_before_the_name_of_the_library():
+    with contextlib.closing(pyvisa.ResourceManager("cnt-91,DSOX2000@levilab")) as manager:
+        names = [manager.open_resource(address).query("*IDN?") for address in (COUNTER, OSCILLOSCOPE)]
+    assert [name.split(",")[1].strip() for name in names] == ["CNT-91", "DSOX2024A"]
+    with (
+        contextlib.closing(pyvisa.ResourceManager("realtime,CNT91@levilab")) as manager,
+        pytest.raises(ConfigError, match="'CNT91' before @levilab is no model: known are realtime, 53230A"),
+    ):
+        manager.open_resource(COUNTER)
 
 
 def test_a_bench_in_real_time_keeps_to_the_wall_clock():
