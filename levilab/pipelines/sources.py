@@ -273,5 +273,6 @@ def _nothing_found(needs: Needs[Any], others: Counter[str], broken: list[str], f
     seen = [f"{count} {kind} run{'s' * (count > 1)}" for kind, count in sorted(others.items())]
     seen += [f"{len(broken)} that cannot be used, as {broken[0].removeprefix('passed over: ')}"] if broken else []
     seen += [f"{len(files)} data file{'s' * (len(files) > 1)}, as {files[0]}"] if files else []
-    what = f"found only {'; '.join(seen)}" if seen else "found nothing"
-    return f"no {needs.runs} to analyze in this folder ({what}); name a run folder or a data file"
+    if not seen:
+        return "holds no run and no data file; name a run folder, a data file, or a folder with some of them"
+    return f"no {needs.runs} to analyze in this folder (found only {'; '.join(seen)}); name a run folder or a data file"

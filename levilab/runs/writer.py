@@ -119,7 +119,7 @@ class RunWriter:
             _refuse_special(self.folder / name)
             _cut_torn_line(self.folder / name)
         self._check_header()
-        self._records = len(list((self.folder / traces.FOLDER).glob("*.npy")))
+        self._records = traces.last_number(self.folder)
         for name in _KEPT:
             if name not in self._files and (self.folder / name).exists():
                 self._open(name)

@@ -45,7 +45,7 @@ def _in_words(source: Source[LimitReadings], run: Limits) -> tuple[str, ...]:
     limit, u = source.readings.limit, source.readings.u
     span = f"{run.statistics.n} {run.which} limits, {limit.min():.2f} Hz to {limit.max():.2f} Hz"
     known = "not known" if u is None else f"{digits(u.min())} Hz to {digits(u.max())} Hz"
-    return span, f"u of a limit: {known}; the mean's comes from the scatter"
+    return span, f"u of a limit: {known}"
 
 
 def _readings(source: Source[LimitReadings], run: Limits) -> Mapping[str, object]:

@@ -105,6 +105,7 @@ def fit_source(source: Source[Readings], options: PrecessionOptions) -> Precessi
         spin=readings.spin,
         u_spin=readings.u_spin,
         gate_s=_gate(source),
+        gates=readings.laser,
     )
     try:
         fit = fit_sweep(sweep, orthogonal=options.orthogonal, keep_miscounts=options.keep_outliers)
@@ -212,8 +213,8 @@ def _coherences(source: Source[Readings]) -> tuple[tuple[PointCoherence, ...], t
 
 def _coherence(laser: StoredTrace, drive: StoredTrace, frequency: float) -> Coherence:
     record, beside = laser.trace, drive.trace
-    pulses = pulse_times(record.volts[np.isfinite(record.volts)], record.dt_s, record.t0_s)
-    return coherence(pulses, beside.volts[np.isfinite(beside.volts)], beside.dt_s, frequency, beside.t0_s)
+    pulses = pulse_times(record.volts, record.dt_s, record.t0_s)
+    return coherence(pulses, beside.volts, beside.dt_s, frequency, beside.t0_s)
 
 
 # --- in words ------------------------------------------------------------------------------------------

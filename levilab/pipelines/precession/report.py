@@ -74,6 +74,8 @@ def _uncertainty(source: Source[Readings], run: PrecessionRun, origin: Origin[Pr
     size = f"{digits(low)} Hz" if low == high else f"{digits(low)} Hz to {digits(high)} Hz"
     if origin.options.reading_u is not None:
         return f"u of a point: {size}, as given to the analysis"
+    if source.readings.laser is not None:
+        return f"u of a point: {size}, from the gates of all points, the swing about the drive taken off"
     channels = source.run.record.channels if source.run else []
     where = next((c.get("source") for c in channels if c.get("name") == "precession_frequency_u_hz"), None)
     return f"u of a point: {size}, {where or 'from a column of the data'}"

@@ -233,3 +233,30 @@ def test_the_figure_shows_the_trace_the_turns_the_residuals_and_the_frequency(
     residuals = np.concatenate([np.asarray(line.get_ydata(), float) for line in panels[2].get_lines()[1:]])
     assert len(residuals) > 10
     assert np.abs(residuals).max() < 200  # µs: a fifth of a pulse's width
+
+
+@pytest.mark.parametrize("what", ["trace", "times"])
+def test_residuals_from_a_third_degree_have_no_bend_left(what: str, tmp_path: Path) -> None:
+    """The slope changes by 0.6 Hz/s in a second, 1.5 turns at the ends: a parabola leaves milliseconds."""
+    random, time = np.random.default_rng(5), np.arange(10_000) / 2000
+    away = time - 2.5
+    turns = 0.3 + 30 * away - 0.3 * away**2 / 2 + 0.6 * away**3 / 6
+    if what == "times":
+        number = np.arange(np.ceil(turns[0]), np.floor(turns[-1]))
+        passes = np.interp(number, turns, time) + random.normal(0, 2e-5, number.size)
+        text = "pulse time [s]\n" + "".join(f"{one:.7f}\n" for one in passes)
+    else:
+        light = np.exp(-0.5 * (((turns + 0.5) % 1 - 0.5) / 0.02) ** 2) + random.normal(0, 0.02, time.size)
+        text = "time [s],signal [V]\n" + "".join(f"{a:.4f},{b:.4f}\n" for a, b in zip(time, light, strict=True))
+    file = tmp_path / "curved.csv"
+    file.write_text(text, encoding="utf-8")
+    analysis = analyze_spins([file], SpinOptions())
+    assert any(note.name == "curved" for note in analysis.runs[0].spin.notes)
+    panel = spin_figure(analysis).get_axes()[2]
+    (dots,) = [line for line in panel.get_lines() if line.get_marker() == "."]
+    at, residuals = (np.asarray(values, dtype=float) for values in (dots.get_xdata(), dots.get_ydata()))
+    assert len(at) > 140  # of 150 turns
+    third = np.polynomial.Polynomial.fit(at, residuals, 3)
+    assert np.ptp(third(at)) < 40  # µs: twice the noise of one pulse, and 8 of its standard errors at an end
+    assert residuals.std() < 30
+    assert panel.get_title(loc="left").endswith("from a fit of the third degree")
