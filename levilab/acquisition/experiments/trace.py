@@ -10,10 +10,11 @@ import numpy as np
 from pydantic import AfterValidator, Field, PositiveFloat, PositiveInt
 
 from instruments.drivers.oscilloscope import NeverTriggered
-from instruments.errors import InstrumentError, OutOfRange
+from instruments.errors import CommandRefused, InstrumentError, OutOfRange
 from levilab.acquisition.driving import HELD_WITHIN_HZ, check_drive
 from levilab.acquisition.experiment import Experiment, ExperimentSettings
 from levilab.acquisition.session import ExperimentFailed
+from levilab.bench.config import ConfigError
 from levilab.runs.channel import Channel
 from levilab.runs.traces import INDEX, described_times, undescribed_codes
 
@@ -25,6 +26,13 @@ if TYPE_CHECKING:
 
 #: A signal that moves by fewer codes than this is none: nothing is plugged in, or it is far too small for the scale.
 _FEWEST_CODES = 3
+#: So many divisions from its middle a scope records and triggers: the DS1000Z 5, others more.
+_HALF_SCREEN = 5
+#: Added where the oscilloscope refuses a setting (manuals of the DS1000Z, :CHANnel<n>:OFFSet, and of the DSO-X 1000).
+_OFFSETS = (
+    "a DS1000Z takes trace.offset_v from -2 to 2 V, and from 0.5 V a division (trace.volts_per_division) on from -100 "
+    "to 100 V; a DSOX1000 from -2 to 2 V, and from 0.2 V a division on from -50 to 50 V"
+)
 #: What the light of the tape is called, and so few of its pulses say how fast it turns.
 TAPE, _FEWEST_PULSES = "tape", 3
 #: A record of which more than this share lies beyond the screen is worth a warning.
@@ -49,8 +57,8 @@ class TraceSettings(ExperimentSettings):
     shows: tuple[str, ...] = Field(default=(TAPE,), description="what each of them shows")
     duration_s: PositiveFloat = Field(default=0.5, description="a record is at least so long")
     points: PositiveInt = Field(default=6000, description="and has at least so many points")
-    volts_per_division: PositiveFloat = 0.2
-    offset_v: float = Field(default=0.65, description="voltage in the middle of the screen")
+    volts_per_division: float = Field(default=0.2, ge=1e-3, le=10.0)
+    offset_v: float = Field(default=0.65, ge=-100.0, le=100.0, description="voltage in the middle of the screen")
     coupling: Literal["DC", "AC"] = Field(default="DC", description="DC or AC")
     trigger_channel: PositiveInt | None = Field(
         default=None, description="the first of the channels, if not given", examples=[1]
@@ -78,7 +86,13 @@ class TraceSettings(ExperimentSettings):
         return self.shows[k] if k < len(self.shows) else f"channel {channel}"
 
     def check(self, table: str, limits: Limits) -> None:
-        """Raise ConfigError for a drive that the bench does not allow."""
+        """Raise ConfigError for a trigger beyond the screen, and for a drive that the bench does not allow."""
+        low, high = (self.offset_v + k * self.volts_per_division for k in (-_HALF_SCREEN, _HALF_SCREEN))
+        if self.trigger_source in self.channels and not low <= self.trigger_level_v <= high:
+            raise ConfigError(
+                f"{table}.trigger_level_v = {self.trigger_level_v:g} is beyond what the oscilloscope records, {low:g} "
+                f"to {high:g} V: change it, {table}.offset_v or {table}.volts_per_division"
+            )
         if self.drive_frequency_hz is not None:
             check_drive(table, limits, self.drive_amplitude_vpp, [("drive_frequency_hz", self.drive_frequency_hz)])
 
@@ -149,18 +163,22 @@ def _note_what_was_cut_short(session: Session[TraceSettings]) -> None:
 
 def _prepare_scope(session: Session[TraceSettings], sweep: str = "normal") -> None:
     settings = session.settings
-    session.bench.oscilloscope.prepare(
-        channels=settings.channels,
-        duration_s=settings.duration_s,
-        points=settings.points,
-        volts_per_division=settings.volts_per_division,
-        offset_v=settings.offset_v,
-        coupling=settings.coupling,
-        trigger_level_v=settings.trigger_level_v,
-        trigger_slope=settings.trigger_slope,
-        trigger_source=settings.trigger_source,
-        sweep=sweep,
-    )
+    try:
+        session.bench.oscilloscope.prepare(
+            channels=settings.channels,
+            duration_s=settings.duration_s,
+            points=settings.points,
+            volts_per_division=settings.volts_per_division,
+            offset_v=settings.offset_v,
+            coupling=settings.coupling,
+            trigger_level_v=settings.trigger_level_v,
+            trigger_slope=settings.trigger_slope,
+            trigger_source=settings.trigger_source,
+            sweep=sweep,
+        )
+    except CommandRefused as refused:
+        address = session.bench.address("oscilloscope")
+        raise InstrumentError(address, f"{str(refused).removeprefix(address + ': ')}: {_OFFSETS}") from refused
 
 
 def _drive(session: Session[TraceSettings]) -> None:
@@ -315,4 +333,5 @@ EXPERIMENT = Experiment(
     channels=channels,
     run=run,
     also_needs=also_needs,
+    called="record",
 )

@@ -11,6 +11,7 @@ import numpy as np
 from analysis import stability
 from analysis.errors import AnalysisError
 from analysis.limits import Comparison, Sample, Statistics, combine, compare, nearest_edge, spins_of_window, summarize
+from analysis.numbers import digits
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.limit.readings import LimitReadings, read_limit_file, read_limit_run
@@ -143,6 +144,11 @@ class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOpt
     def text(self) -> str:
         """What the data say, in a few sentences."""
         return "  ".join(group.text for group in self.groups)
+
+    @property
+    def averaged(self) -> Sequence[Sequence[Source[LimitReadings]]]:
+        """Those of the same conditions."""
+        return tuple(tuple(self.sources[k] for k in group.runs) for group in self.groups)
 
     def number(self, group: Limits) -> int | None:
         """The number of a group among those of its kind, from 1; None where it is the only one."""
@@ -360,4 +366,4 @@ def _compared(one: Comparison) -> str:
     if one.p is None:
         return f"That is {where}."
     verdict = "which chance explains" if one.agrees else "more than chance makes"
-    return f"The mean lies {where}, {verdict} (p = {one.p:.2g})."
+    return f"The mean lies {where}, {verdict} (p = {digits(one.p)})."

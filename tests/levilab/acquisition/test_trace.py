@@ -11,7 +11,7 @@ import pytest
 from instruments.clock import VirtualClock
 from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.errors import OutOfRange
-from instruments.virtual.counter.edges import crossings
+from instruments.virtual.core.trigger import crossings
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
@@ -105,7 +105,10 @@ def test_a_resumed_run_keeps_its_records_and_counts_on(tmp_path: Path) -> None:
     assert len(after) == 4
     assert after[:2] == before
     assert len(show.readings) == 2
-    assert show.messages == ["resumed after 2 readings, the next record is number 3"]
+    assert show.messages[0] == "resumed after 2 records, the next record is number 3"
+    heads = show.messages[1]
+    assert heads.split() == ["time", "record", "lowest", "highest"]
+    assert len(heads) == len(show.readings[0])
     whole = acquire(mock_trace(tmp_path, "records = 4\ninterval_s = 2.0", seed=3), Silent())
     # the virtual top is where it would have been: a question or two earlier or later
     assert frequency(run, 3) == pytest.approx(frequency(whole, 3), abs=0.15)

@@ -13,7 +13,6 @@ from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
 from levilab.pipelines.catalogue import ANALYSES, analyze_suiting, save
 from levilab.pipelines.limit.analysis import LOWER_EDGE, RESONANCE, UPPER_EDGE, LimitOptions, analyze_limits
-from levilab.pipelines.limit.document import DOCUMENT
 from levilab.pipelines.limit.table import limit_tables
 from levilab.report.page import write_report
 from support.spin_downs import spin_down_csv
@@ -59,7 +58,7 @@ def test_what_was_written_is_what_a_report_shows(sample_data: Path, tmp_path: Pa
     folder = shutil.copytree(sample_data / "loose-washers", tmp_path / "run")
     analysis = analyze_limits([folder], LimitOptions())
     assert [file.name for file in save(ANALYSES["limit"], analysis)] == ["result.json", "limit.png"]
-    again = DOCUMENT.recall([folder], LimitOptions())
+    again = ANALYSES["limit"].recall([folder], LimitOptions())
     assert again.origins[0].text.startswith("as levilab analyze found it")
     assert again.groups == analysis.groups
     assert again.all_warnings == analysis.all_warnings
@@ -67,7 +66,7 @@ def test_what_was_written_is_what_a_report_shows(sample_data: Path, tmp_path: Pa
     page = write_report([folder], tmp_path / "page.html").read_text(encoding="utf-8")
     assert "LOOSE WASHERS" in page
     assert analysis.groups[0].text.split(".")[0] in page
-    other = DOCUMENT.recall([folder], LimitOptions(reading_u=0.5))  # other options than the result's
+    other = ANALYSES["limit"].recall([folder], LimitOptions(reading_u=0.5))  # other options than the result's
     assert other.origins[0].text.startswith("analyzed for this page")
 
 
@@ -77,7 +76,7 @@ def test_a_result_that_is_damaged_is_an_error(sample_data: Path, tmp_path: Path)
     document["runs"][0]["which"] = "middle"
     (folder / "result.json").write_text(json.dumps(document), encoding="utf-8")
     with pytest.raises(DataError, match=r"result\.json: runs\.0\.which = 'middle'"):
-        DOCUMENT.recall([folder], LimitOptions())
+        ANALYSES["limit"].recall([folder], LimitOptions())
 
 
 def test_a_file_of_ones_own_needs_nothing_but_the_spins(tmp_path: Path) -> None:

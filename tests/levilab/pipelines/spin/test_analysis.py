@@ -15,7 +15,6 @@ from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
 from levilab.pipelines.catalogue import save as save_found
 from levilab.pipelines.spin.analysis import SpinOptions, analyze_spins
-from levilab.pipelines.spin.document import DOCUMENT
 from levilab.pipelines.spin.figure import spin_figure
 from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
 from levilab.runs.run import Run, RunRecord, utc_now
@@ -151,16 +150,16 @@ def test_the_result_says_what_the_interface_promises(sample_data: Path, tmp_path
     assert result["values"]["reference_time"]["value"] == analysis.runs[0].spin.reference_time
     assert result["values"]["bound"]["value"] > 0
     assert result["method"] == result["runs"][0]["method"] == "matched"
-    recalled = DOCUMENT.recall([tmp_path / "keysight-dsox.csv"], SpinOptions())
+    recalled = ANALYSES["spin"].recall([tmp_path / "keysight-dsox.csv"], SpinOptions())
     assert recalled.origins[0].text.startswith("as levilab analyze found it")
     assert ANALYSES["spin"].document(recalled, tmp_path) == result
-    anew = DOCUMENT.recall([tmp_path / "keysight-dsox.csv"], SpinOptions(method="edges"))
+    anew = ANALYSES["spin"].recall([tmp_path / "keysight-dsox.csv"], SpinOptions(method="edges"))
     assert "other options" in anew.origins[0].text
     written.write_text(
         written.read_text(encoding="utf-8").replace('"method": "matched"', '"method": "guessed"'), encoding="utf-8"
     )
     with pytest.raises(DataError, match="guessed"):
-        DOCUMENT.recall([tmp_path / "keysight-dsox.csv"], SpinOptions())
+        ANALYSES["spin"].recall([tmp_path / "keysight-dsox.csv"], SpinOptions())
     assert path
 
 
@@ -179,7 +178,7 @@ def test_a_record_without_pulses_is_refused_in_one_line(tmp_path: Path) -> None:
         analyze_spins([path], SpinOptions())
 
 
-@pytest.mark.parametrize("find", [analyze_spins, DOCUMENT.recall])
+@pytest.mark.parametrize("find", [analyze_spins, ANALYSES["spin"].recall])
 def test_a_record_without_pulses_among_others_is_passed_over(find: Any, tmp_path: Path) -> None:
     """By a report, too, which recalls."""
     write_wav(tmp_path / "dark.wav", np.full(4000, 0.1), 1000)
