@@ -16,18 +16,22 @@ from instruments.drivers.counter.keysight_53230a import Keysight53230A
 from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
 from instruments.drivers.generator.agilent_33220a import Agilent33220A
 from instruments.drivers.generator.keysight_33500b import Keysight33500B
+from instruments.drivers.generator.siglent_sdg1000x import SiglentSDG1000X
 from instruments.drivers.magnetometer.lakeshore_425 import LakeShore425
 from instruments.drivers.magnetometer.lakeshore_475 import LakeShore475
 from instruments.drivers.oscilloscope.keysight_dsox import KeysightDSOX
 from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
+from instruments.drivers.oscilloscope.siglent_sds1000xe import SiglentSDS1000XE
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
 from instruments.virtual.generator.agilent_33220a import Virtual33220A
 from instruments.virtual.generator.keysight_33500b import Virtual33500B
+from instruments.virtual.generator.siglent_sdg1000x import VirtualSDG1000X
 from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
 from instruments.virtual.magnetometer.lakeshore_475 import Virtual475
 from instruments.virtual.oscilloscope.keysight_dsox import VirtualDSOX1000
 from instruments.virtual.oscilloscope.rigol_ds1000z import VirtualDS1000Z
+from instruments.virtual.oscilloscope.siglent_sds1000xe import VirtualSDS1000XE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -88,6 +92,7 @@ COUNTERS: tuple[Model[Counter], ...] = (
 GENERATORS: tuple[Model[Generator], ...] = (
     Model("33500B", Keysight33500B, Virtual33500B, "USB0::0x0957::0x2807::MY52400001::INSTR"),
     Model("33220A", Agilent33220A, Virtual33220A, "USB0::0x0957::0x0407::MY44033103::INSTR"),
+    Model("SDG1000X", SiglentSDG1000X, VirtualSDG1000X, "TCPIP0::192.168.1.24::INSTR", r"SDG1\d{3}X.*"),
 )
 OSCILLOSCOPES: tuple[Model[Oscilloscope], ...] = (
     Model("DS1000Z", RigolDS1000Z, VirtualDS1000Z, "TCPIP0::192.168.1.22::INSTR"),
@@ -104,6 +109,7 @@ OSCILLOSCOPES: tuple[Model[Oscilloscope], ...] = (
         "TCPIP0::192.168.1.31::hislip0::INSTR",
         answers_as=r"(DSO|MSO)-?X ?2\d{3}[A-Z]*",
     ),
+    Model("SDS1000X-E", SiglentSDS1000XE, VirtualSDS1000XE, "TCPIP0::192.168.1.32::INSTR", r"SDS1\d{3}X-[EU]"),
 )
 MAGNETOMETERS: tuple[Model[Magnetometer], ...] = (
     Model("425", LakeShore425, Virtual425, "COM3"),

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.errors import NotFinite, NotPositive, ShapesDiffer
+from analysis.numbers import digits
 from analysis.precession.line import FEWEST, NO_FIT, Line, fit_line, fit_orthogonal, influence
 from analysis.precession.miscounts import Miscount, Robust, find_miscounts, robust_line
 from analysis.precession.power import Power, what_it_takes
@@ -296,19 +297,19 @@ def _doubts(fit: SweepFit, sweep: Sweep, found: list[Miscount]) -> list[str]:
     line = fit.line
     if line.p_fit is not None and not line.u_known:
         texts.append(
-            f"the points scatter {line.scale:.2g} times as much as their u says (p = {line.p_fit:.1g}): "
+            f"the points scatter {digits(line.scale)} times as much as their u says (p = {digits(line.p_fit, 1)}): "
             "all uncertainties are enlarged by that"
         )
     if line.chi_square is not None and line.p_fit is not None and 1 - line.p_fit < NO_FIT:
         texts.append(
-            f"the points scatter much less than their u says (χ² of {line.chi_square:.2g} for "
+            f"the points scatter much less than their u says (χ² of {digits(line.chi_square)} for "
             f"{line.degrees_of_freedom} degrees of freedom): their u is too large, and so is that of the line; gates "
             "in a row scatter more than their mean, for a locked top swings about its drive and comes back"
         )
     if fit.p_locked is None:
         texts.append("the points lie on the line to the last digit: without their u nothing can be tested; give it")
     texts += [
-        f"point {k}, at {p.drive:.5g} Hz, alone moves the slope by {abs(p.slope_change):.2g}, {share:.1f} of its u"
+        f"point {k}, at {p.drive:.5g} Hz, alone moves the slope by {digits(abs(p.slope_change))}, {share:.1f} of its u"
         for k, p in enumerate(fit.points, 1)
         if p.slope_change is not None and line.u_slope and (share := abs(p.slope_change) / line.u_slope) > _FAR
     ]
@@ -336,13 +337,13 @@ def _about_drive(drive: Array, u_drive: Array, u: Array, line: Line) -> list[str
     share = float(np.median(u_drive / drive))
     if np.ptp(u_drive / drive) > _ONE_CLOCK * share:
         worst = float(np.max(u_drive / u))
-        text = f"u of the drive's frequency is up to {worst:.2g} of that of the precession"
+        text = f"u of the drive's frequency is up to {digits(worst)} of that of the precession"
         return [f"{text}: let it count with `orthogonal` = True"] if worst > _MATTERS else []
     of_slope = share * abs(line.slope)
     if line.u_slope is None or of_slope <= _MATTERS * line.u_slope:
         return []
-    text = f"u of the drive's frequency is {share:.2g} of it at all points, as that of a clock"
-    return [f"{text}: the slope is uncertain by {of_slope:.2g} beside its u of {line.u_slope:.2g}"]
+    text = f"u of the drive's frequency is {digits(share)} of it at all points, as that of a clock"
+    return [f"{text}: the slope is uncertain by {digits(of_slope)} beside its u of {digits(line.u_slope)}"]
 
 
 def _about_spin(fit: SweepFit, sweep: Sweep) -> list[str]:
@@ -356,7 +357,7 @@ def _about_spin(fit: SweepFit, sweep: Sweep) -> list[str]:
         return []
     where = "below" if offset < 0 else "above"
     text = (
-        f"the spin that was counted lies {abs(offset):.3g} Hz {where} the drive: a locked top spins with it; is the "
-        "tape on a loose washer, or was the top not locked?"
+        f"the spin that was counted lies {digits(abs(offset), 3)} Hz {where} the drive: a locked top spins with it; is "
+        "the tape on a loose washer, or was the top not locked?"
     )
     return [text]

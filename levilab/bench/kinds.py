@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from instruments.catalogue import COUNTERS, GENERATORS, MAGNETOMETERS, OSCILLOSCOPES, Model
 from instruments.drivers import Instrument
-from instruments.links.serial_port import SerialTransport
-from instruments.links.visa import VisaTransport
+from instruments.links.opening import open_link
 from levilab.bench.config import ConfigError
 
 if TYPE_CHECKING:
@@ -57,13 +56,6 @@ def transport_to(
     clock: Clock | None = None,
     log: TrafficLog | None = None,
 ) -> Transport:
-    """An open link: pyserial's where the address is a port or its URL, else PyVISA's.
-
-    clock: by which the pauses between messages are kept, the wall's by default.  Raises NotConnected.
-    """
+    """An open link to an instrument of the bench; see `open_link`.  Raises NotConnected."""
     line = dict(driver.SERIAL) | settings.line
-    serial_name = settings.address.upper().startswith("ASRL") and library == "@py"
-    if "::" not in settings.address or serial_name:
-        return SerialTransport(settings.address, timeout=settings.timeout_s, log=log, **line)
-    options: dict[str, Any] = {"pause": line.pop("pause", 0.0), "clock": clock, "log": log}
-    return VisaTransport(settings.address, library=library, timeout=settings.timeout_s, line=line, **options)
+    return open_link(settings.address, line=line, library=library, timeout=settings.timeout_s, clock=clock, log=log)

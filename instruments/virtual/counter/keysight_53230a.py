@@ -10,12 +10,12 @@ import numpy as np
 
 from instruments.ieee488 import INFINITY, NOT_A_NUMBER
 from instruments.virtual.core.device import answers, does
-from instruments.virtual.core.parameters import at_most_one, choice, limit, none, nr3, number, one
+from instruments.virtual.core.parameters import at_most_one, block_text, choice, limit, none, nr3, number, one
 from instruments.virtual.core.parser import Command, ScpiError
 from instruments.virtual.counter.counter import DARK, Function, VirtualCounter, darkness
 from instruments.virtual.counter.edges import Input
 from instruments.virtual.counter.measurements import Looks, Measurement, Span
-from instruments.virtual.counter.parameters import block, channels_of, without_channels
+from instruments.virtual.counter.parameters import channels_of, without_channels
 from instruments.virtual.counter.run import Run
 
 if TYPE_CHECKING:
@@ -214,9 +214,11 @@ class Virtual53230A(VirtualCounter):
         level = f"{head}LEVel[1]"
         return (
             self.word(head + "COUPling", "coupling" + name, ("AC", "DC"), "AC"),
-            self.numeric(head + "IMPedance", "impedance" + name, low=50, high=1e6, default=1e6, unit="OHM"),
-            self.numeric(head + "PROBe", "probe_factor" + name, low=1, high=10, default=1),
-            self.numeric(head + "RANGe", "range" + name, low=5, high=50, default=5, unit="V"),
+            self.numeric(
+                head + "IMPedance", "impedance" + name, low=50, high=1e6, default=1e6, unit="OHM", values=(50, 1e6)
+            ),
+            self.numeric(head + "PROBe", "probe_factor" + name, low=1, high=10, default=1, values=(1, 10)),
+            self.numeric(head + "RANGe", "range" + name, low=5, high=50, default=5, unit="V", values=(5, 50)),
             self.word(head + "SLOPe[1]", "slope" + name, ("POSitive", "NEGative"), "POS"),
             self.toggle(head + "NREJect", "noise_rejection" + name),
             self.toggle(head + "FILTer[:LPASs][:STATe]", "filter" + name),
@@ -376,7 +378,7 @@ class Virtual53230A(VirtualCounter):
         self._memory.fetched += count
         values, _ = self._memory.part(start, start + count)
         if as_block and self.settings["format"] == "ASC":
-            return block(",".join(map(nr3, values)).encode())
+            return block_text(",".join(map(nr3, values)).encode())
         return self._spell(values)
 
     def _last(self) -> str:
@@ -390,7 +392,7 @@ class Virtual53230A(VirtualCounter):
         if self.settings["format"] == "ASC":
             return ",".join(map(nr3, values))
         data = values.astype("<f8" if self.settings["byte_order"] == "SWAP" else ">f8").tobytes()
-        return head + data.decode("latin-1") if head else block(data)
+        return head + data.decode("latin-1") if head else block_text(data)
 
     def _set_format(self, parameters: list[str]) -> None:
         words = without_channels(parameters)

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from instruments.virtual.core.device import answers, does
-from instruments.virtual.core.parameters import choice, number, one
+from instruments.virtual.core.parameters import block_content, choice, number, one
 from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.oscilloscope.scope import VirtualOscilloscope, block_content
+from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope
 from instruments.virtual.oscilloscope.screenshot import bmp8, bmp24, draw, grey, png
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
             Command("RSTate", get=answers(self._state)),
             Command("*LRN", get=answers(lambda: ":SYST:SET " + self.block(self.setup()))),
             Command("*OPT", get=answers(lambda: "0")),
-            *self.presets(),
+            *(row.bind(self) for row in PRESETS),
         )
 
     def _digitize(self, parameters: list[str]) -> None:
@@ -440,7 +440,11 @@ class VirtualDSOX1000(VirtualOscilloscope):
             self.switch("HARDcopy:INKSaver", "ink_saver", default=True),
             self.switch("DISPlay:LABel", "labels"),
             self.word("MEASure:STATistics", "statistics", ("ON", "CURRent", "MEAN"), "ON"),
-            Command("SYSTem:SETup", set=lambda p: self.restore(block_content(one(p))), get=answers(self._setup)),
+            Command(
+                "SYSTem:SETup",
+                set=lambda p: self.restore(block_content(one(p)).decode("latin-1")),
+                get=answers(self._setup),
+            ),
             Command("SYSTem:PRESet", set=does(self.reset)),
         )
 

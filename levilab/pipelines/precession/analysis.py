@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.errors import AnalysisError
+from analysis.numbers import digits
 from analysis.precession.coherence import Coherence, coherence, pulse_times
 from analysis.precession.sweep import EXCLUDED_P, Sweep, SweepFit, fit_sweep
 from analysis.uncertainty import Estimate
@@ -157,8 +158,8 @@ def _about_slopes(fits: Sequence[SweepFit]) -> Iterable[str]:
     p = float(chdtrc(len(slope) - 1, float(np.sum(((slope - mean) / u) ** 2))))
     if p < DIFFERENT_P:
         yield (
-            f"the slopes of the {len(slope)} runs differ by more than their u says (p = {p:.1g}): the line through all "
-            "points has too small a u; look at the runs one by one"
+            f"the slopes of the {len(slope)} runs differ by more than their u says (p = {digits(p, 1)}): the line "
+            "through all points has too small a u; look at the runs one by one"
         )
 
 
