@@ -57,13 +57,15 @@ def place_edges(samples: Array, rate: float, fit: Fit, *, width: float, sign: in
     if np.count_nonzero(use) < 4 or missing > 0.6 * times.size:
         return None
     for _ in range(4):
-        new_fit = fit_turns(times[use], phase[use])
+        new_fit, fitted = fit_turns(times[use], phase[use]), use
         away = np.abs(phase - new_fit.phase(times))
         spread = 1.4826 * median(away[use])
         new = (heights > 0.3 * typical) & (away < GROSS * max(spread, 1e-12))
         if np.array_equal(new, use) or np.count_nonzero(new) < 4:
             break
         use = new
+    steep = float(np.abs(np.diff(mean)).max()) / max(abs(centre - floor), 1e-300)
+    new_fit = new_fit.with_grid(times[fitted], None, step=1 / rate, steep=steep)
     rest = (x if use.all() else x[use]) - mean
     noise = float(np.sqrt(np.einsum("ij,ij->", rest, rest) / rest.size))
     slope = 0.5 * (mean[2:] - mean[:-2])
@@ -74,7 +76,7 @@ def place_edges(samples: Array, rate: float, fit: Fit, *, width: float, sign: in
 
 
 def _sums(side: int) -> Array:
-    """What a piece of 4 side + 1 samples is multiplied by for its left, its right and its height, shape (4 side + 1, 3)."""
+    """What a piece of 4 side + 1 samples is multiplied by for left, right and height, shape (4 side + 1, 3)."""
     sums = np.zeros((4 * side + 1, 3))
     sums[side : 2 * side, 0] = 1.0
     sums[2 * side + 1 : 3 * side + 1, 1] = 1.0

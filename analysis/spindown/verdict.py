@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import floor, log10
 
+from analysis.numbers import digits
 from analysis.residuals import Correlation
 from analysis.spindown.selection import Statistics, deviance, variance_factor
 from analysis.uncertainty import Estimate
@@ -100,9 +101,9 @@ def _describes(best: Statistics, correlation: Correlation | None) -> bool:
 
 def _no_law(best: str, fit: Statistics, correlation: Correlation | None) -> str:
     alike = f", neighbours correlated by {correlation.value:.2f}" if correlation else ""
-    beyond = f", {fit.inflation**0.5:.2g} times the stated uncertainties" if fit.inflation > 1 else ""
+    beyond = f", {digits(fit.inflation**0.5)} times the stated uncertainties" if fit.inflation > 1 else ""
     return (
-        f"No law describes these readings: what the best one, {best}, leaves over ({fit.rms_residual:.2g} Hz "
+        f"No law describes these readings: what the best one, {best}, leaves over ({digits(fit.rms_residual)} Hz "
         f"rms{beyond}) has a shape{alike}. Its constants and their uncertainties are those of a curve through the "
         "readings, not of a drag."
     )
@@ -131,7 +132,7 @@ def _kind(fits: Mapping[str, Statistics], name: str, best: str) -> str:
 def _reason(name: str, best: str, fits: Mapping[str, Statistics]) -> str:
     fit = fits[name]
     shape = ", and its residuals have a shape" if fit.has_shape else ""
-    left = f"it leaves {fit.rms_residual:.2g} Hz rms, {best} {fits[best].rms_residual:.2g} Hz"
+    left = f"it leaves {digits(fit.rms_residual)} Hz rms, {best} {digits(fits[best].rms_residual)} Hz"
     return f"ΔAICc {fit.difference:.0f}: {left}{shape}"
 
 
@@ -153,8 +154,8 @@ def _about_best(tied: Sequence[str], exponent: Estimate | None) -> str:
 def _undecided(n: int, fall: float, names: Sequence[str]) -> str:
     laws = _list(names) if len(names) > 1 else "the laws"
     return (
-        f"These {n} readings cannot tell {laws} apart: over a fall of the spin by {100 * fall:.2g} % they differ too "
-        "little for readings of this number and precision. Let the top fall further, or read it more often."
+        f"These {n} readings cannot tell {laws} apart: over a fall of the spin by {digits(100 * fall)} % they differ "
+        "too little for readings of this number and precision. Let the top fall further, or read it more often."
     )
 
 

@@ -32,7 +32,7 @@ RAMP_STEP_S = 1.0
 #: top's mass fits its place for as long as the room keeps its temperature, which is no longer than some hours.
 _LONGEST_RAMP_S = 6 * 3600.0
 #: A held top swings about the drive's frequency by what the drive can hold at most, 0.5 Hz at 0.4 mT [Hz].
-_HELD_WITHIN_HZ = 1.0
+HELD_WITHIN_HZ = 1.0
 #: Whether the drive takes hold depends on how the top happens to point when it comes on, and one time in four it does
 #: not.  So the top is looked at so often on the way [s] (one that is not held loses 0.1 Hz/s to the air), and tried
 #: again with the drive so many turns later: a reading ends with a pulse, so without that it would point as before.
@@ -223,7 +223,7 @@ def _ramp(session: Session[D], start: float, target: float) -> float:
 def held_spin(session: Session[D], drive: float) -> float:
     """The spin of a top that is held by a drive [Hz].  Raises NotHeld."""
     spin = spin_now(session)
-    if spin is None or abs(spin - drive) > _HELD_WITHIN_HZ:
+    if spin is None or abs(spin - drive) > HELD_WITHIN_HZ:
         raise NotHeld(spin, drive)
     return spin
 

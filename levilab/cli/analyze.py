@@ -2,7 +2,6 @@
 
 import inspect
 import math
-import re
 from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from functools import partial
@@ -14,9 +13,9 @@ import typer.core
 
 from levilab.cli.later import Later
 from levilab.cli.options import Channel, Columns, Json, KeepOutliers, Paths, Rate, ReadingU
-from levilab.cli.output import message, print_json
+from levilab.cli.output import interruptible, message, print_json
 from levilab.cli.quantities import with_options
-from levilab.errors import LevilabError, UsageError
+from levilab.errors import DoesNotSuit, LevilabError, UsageError
 
 if TYPE_CHECKING:
     from levilab.pipelines.catalogue import Analysis
@@ -193,7 +192,7 @@ OPTIONS = {
 }
 
 
-class Row(NamedTuple):
+class Command(NamedTuple):
     """An analysis: what its command does, and its options."""
 
     help: str
@@ -203,29 +202,29 @@ class Row(NamedTuple):
 #: The command that stands for no name, and is not listed.  An option goes to those analyses that know it.
 _EACH = "each"
 #: The catalogue itself takes too long to import for a help page.
-ANALYSES = {
-    "spindown": Row(
+COMMANDS = {
+    "spindown": Command(
         "Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude.",
         ("columns", "channel", "rate", "reading_u", "uncertainty", "keep_outliers"),
     ),
-    "spin": Row(
+    "spin": Command(
         "Spin frequency and chirp from traces of a detector (WAV, scopes' CSV, .npy), lists of pulse times, runs with "
         "traces.",
         ("columns", "channel", "rate", "method"),
     ),
-    "field": Row(
+    "field": Command(
         "The base from a Hall scan: strength, origin, thickness; heights, masses and spins of tops that float.",
         ("columns", "device", "height", "height_u", "free_radii"),
     ),
-    "precession": Row(
+    "precession": Command(
         "Precession against drive: slope and intercept, tested against a locked top, and what 1.05 would take.",
         ("columns", "reading_u", "keep_outliers", "orthogonal"),
     ),
-    "limit": Row(
+    "limit": Command(
         "Limits of the spin, lower and upper: mean, scatter, trend and outliers, beside the window of the top.",
         ("columns", "reading_u"),
     ),
-    _EACH: Row(
+    _EACH: Command(
         "Each analysis that suits the runs or data files; --json prints a list where several suit.",
         ("columns", "channel", "rate", "reading_u", "uncertainty", "keep_outliers", "method"),
     ),
@@ -256,7 +255,7 @@ def _command(options: Sequence[str]) -> Callable[..., None]:
     return analyze
 
 
-def _add(name: str, row: Row) -> None:
+def _add(name: str, row: Command) -> None:
     words = "levilab analyze" if name == _EACH else f"levilab analyze {name}"
 
     @analyze_app.command(name, cls=Later, help=row.help, epilog=f"Example: {words} sample_data/", hidden=name == _EACH)
@@ -264,7 +263,7 @@ def _add(name: str, row: Row) -> None:
         return _command(row.options)
 
 
-for _name, _row in ANALYSES.items():
+for _name, _row in COMMANDS.items():
     _add(_name, _row)
 
 
@@ -290,12 +289,56 @@ def _analyze(
     from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
 
     left_out: list[str] = []
-    if context.info_name == _EACH:
-        results = analyze_suiting(paths, given, left_out.append)
-    else:
-        analysis = ANALYSES[str(context.info_name)]
-        results = [(analysis, analysis.analyze(paths, analysis.options_from(given)))]
-    _write_and_print(context, results, left_out, save=save, out=out, as_json=as_json)
+    with interruptible("what was fitted so far is lost, nothing is written"):
+        if context.info_name == _EACH:
+            results = analyze_suiting(paths, given, left_out.append)
+        else:
+            analysis = ANALYSES[str(context.info_name)]
+            results = [(analysis, _analyze_as(analysis, paths, given))]
+    with interruptible("look which results are written: each one is whole"):
+        _write_and_print(context, results, left_out, save=save, out=out, as_json=as_json)
+
+
+def _analyze_as(analysis: "Analysis[Any]", paths: Sequence[Path], given: Mapping[str, Any]) -> Any:
+    """The result of one analysis; where the inputs do not suit it, the error names those that they suit.
+
+    Raises:
+        DoesNotSuit: with the analyses that read the inputs.
+    """
+    try:
+        return analysis.analyze(paths, analysis.options_from(given))
+    except DoesNotSuit as error:
+        advice = "" if "levilab analyze" in str(error) else _suiting(analysis, paths, given)
+        raise DoesNotSuit(f"{error}{advice}") from error
+
+
+def _suiting(analysis: "Analysis[Any]", paths: Sequence[Path], given: Mapping[str, Any]) -> str:
+    """Which other analyses read what lies at the paths, as the end of a sentence; empty if none does."""
+    from levilab.pipelines.catalogue import ANALYSES
+    from levilab.runs.run import find_run
+
+    for path in paths:
+        others = [
+            other.name
+            for other in ANALYSES.values()
+            if other is not analysis and _reads(other, find_run(path), other.options_from(given))
+        ]
+        if others:
+            return f"; levilab analyze {' or '.join(others)} {path} reads it"
+    return ""
+
+
+def _reads(analysis: "Analysis[Any]", path: Path, options: Any) -> bool:
+    """Whether an analysis takes a run or a file, or one of the runs in a folder."""
+    from analysis.errors import AnalysisError
+    from levilab.runs.run import Run, find_runs
+
+    try:
+        if path.is_dir():
+            return any(analysis.needs.take(Run.load(folder)) for folder in find_runs(path))
+        return bool(analysis.needs.read_file(path, options))
+    except (LevilabError, AnalysisError):
+        return False
 
 
 def _write_and_print(
@@ -311,11 +354,11 @@ def _write_and_print(
 
     left_out: why other analyses have no result.
     """
-    from levilab.pipelines.catalogue import print_analysis
+    from levilab.pipelines.catalogue import print_analysis, remarks
 
     in_words = partial(with_options, app=context.find_root().command)
     failures: list[LevilabError] = []
-    messages = [*left_out, *_remarks([found.remarks for _, found in results])]
+    messages = [*left_out, *remarks([found.remarks for _, found in results])]
     for analysis, found in results:
         if save:
             failure, written = _save(analysis, found, out)
@@ -331,14 +374,6 @@ def _write_and_print(
         message(in_words(text))
     if failures:
         raise failures[0]
-
-
-def _remarks(of_each: Sequence[Sequence[str]]) -> list[str]:
-    """What the analyses say, each once; runs that one of them passed over count only if all did."""
-    told = list(dict.fromkeys(text for remarks in of_each for text in remarks))
-    kinds = [text for text in told if re.fullmatch(r"passed over: \d+ \w+ runs?", text)]
-    taken = {text for text in kinds if not all(text in remarks for remarks in of_each)}
-    return [text for text in told if text not in taken]
 
 
 def _save(analysis: "Analysis[Any]", found: Any, out: Path | None) -> tuple[LevilabError | None, list[Path]]:

@@ -3,19 +3,52 @@
 import codecs
 import contextlib
 import os
+import re
 import sys
 from collections.abc import Callable
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
+import typer.core
 
 from levilab.cli import exit_codes
 from levilab.cli.later import Later
 from levilab.cli.output import message
 from levilab.cli.quantities import in_options
 
+#: How typer, which reads values with pydantic, begins and ends what it says of a wrong one.
+_SHOULD_BE = re.compile(r"Input should be (a valid )?(.*?)(, unable to .*|, got .*)?")
+
+
+class Commands(typer.core.TyperGroup):
+    """All commands.  The wrong value of an option is refused in plain words."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Carry out what was called."""
+        try:
+            return super().invoke(ctx)
+        except typer.BadParameter as error:
+            error.message = in_plain_words(error.message)
+            raise
+
+
+def in_plain_words(text: str) -> str:
+    """What typer says of a wrong value.
+
+    >>> in_plain_words("Input should be a valid number, unable to parse string as a number")
+    'a number is expected'
+    >>> in_plain_words("Input should be greater than or equal to 10")
+    'a number greater than or equal to 10 is expected'
+    """
+    if found := _SHOULD_BE.fullmatch(text):
+        what = found[2].replace("integer", "whole number")
+        return f"a {what} is expected" if found[1] else f"a number {what} is expected"
+    return text.removeprefix("Value error, ")
+
+
 app = typer.Typer(
     name="levilab",
+    cls=Commands,
     help="The lab application for experiments on the Levitron: acquire, analyze, report.",
     epilog="Try: levilab acquire spin --mock",
     no_args_is_help=True,
@@ -46,9 +79,9 @@ def levilab(
 def report() -> Callable[..., None]:
     """Report runs in one self-contained file: what was measured, with what, figures, numbers, warnings.
 
-    The numbers are those that levilab analyze wrote beside the runs.  What has no result there, or one of other
-    readings or options than the given, is analyzed for the page.  A page is of one analysis; where a folder holds runs
-    of several kinds it is of the first, and the others are named.
+    The numbers are those that levilab analyze wrote beside the runs, of every analysis; where it wrote them elsewhere
+    (--out), give that folder or result.json.  What has no result, or one of other readings or options than the given,
+    is analyzed for the page.
     """
     from levilab.cli.report import report
 

@@ -7,10 +7,12 @@ import typer
 
 from levilab.cli.analyze import OPTIONS, as_analyses_take
 from levilab.cli.options import Channel, Columns, Json, KeepOutliers, Paths, Rate, ReadingU
-from levilab.cli.output import message, print_json
+from levilab.cli.output import interruptible, message, print_json
+from levilab.cli.quantities import with_options
 
 
 def report(
+    context: typer.Context,
     paths: Paths,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE.html", help="The file to write.")] = Path(
         "report.html"
@@ -32,7 +34,10 @@ def report(
         "uncertainty": OPTIONS["uncertainty"].default,
         "keep_outliers": keep_outliers,
     }
-    typer.echo(f"the report is in {write_report(paths, output, as_analyses_take(given), message)}")
+    app = context.find_root().command
+    with interruptible("no report is written"):
+        written = write_report(paths, output, as_analyses_take(given), lambda text: message(with_options(text, app)))
+    typer.echo(f"the report is in {written}")
 
 
 def runs(

@@ -6,14 +6,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from levilab.cli import exit_codes
 from levilab.cli.options import Json, Presets, Settings
-from levilab.cli.output import message, print_json
+from levilab.cli.output import interruptible, message, print_json
 from levilab.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from levilab.motion.effects import Effect
     from levilab.simulator.scene import Scene
     from levilab.stability.map import Span
@@ -62,7 +59,7 @@ def simulate(
     from levilab.present.progress import Share
 
     order = SimulationOrder(chosen, duration, tolerance, rate, out)
-    with _interruptible("nothing was written"), contextlib.closing(Share("simulating")) as share:
+    with interruptible("nothing was written"), contextlib.closing(Share("simulating")) as share:
         done = carry_out(order, message, share)
     if done.folder:
         message(f"wrote {done.folder}")
@@ -70,7 +67,7 @@ def simulate(
         from levilab.motion.table import print_motion
 
         print_motion(done.summary)
-    with _interruptible("the effects are not known"):
+    with interruptible("the effects are not known"):
         effects = _explained(chosen, duration) if explain else ()
     if as_json:
         from dataclasses import asdict
@@ -82,16 +79,6 @@ def simulate(
         from levilab.motion.table import print_effects
 
         print_effects(effects)
-
-
-@contextlib.contextmanager
-def _interruptible(what_is_left: str) -> "Iterator[None]":
-    """Ctrl-C ends the command with one line."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        message(f"levilab: interrupted, {what_is_left}")
-        raise typer.Exit(exit_codes.INTERRUPTED) from None
 
 
 def _explained(scene: "Scene", duration: float) -> "tuple[Effect, ...]":
@@ -160,7 +147,7 @@ def _mapped(scene: "Scene", spans: "tuple[Span | None, Span | None]", duration: 
     from levilab.stability.table import place_for_map, write_map
 
     place_for_map(out)
-    with _interruptible("no map was written"), contextlib.closing(Share("simulating the map")) as share:
+    with interruptible("no map was written"), contextlib.closing(Share("simulating the map")) as share:
         found = survival_map(scene, *spans, duration=duration, progress=share)
     for path in write_map(found, out):
         message(f"wrote {path}")
@@ -211,5 +198,5 @@ def benchmark_estimators(
     """
     from levilab.benchmark.estimators.command import run_and_tell
 
-    with _interruptible("nothing was written"):
+    with interruptible("nothing was written"):
         run_and_tell(trials=trials, out=out, as_json=as_json)

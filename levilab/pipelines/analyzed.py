@@ -69,6 +69,11 @@ class Analyzed(Generic[S, R, T, Opt]):
         """What the data say, in a few sentences."""
         raise NotImplementedError
 
+    @property
+    def averaged(self) -> Sequence[Sequence[Source[S]]]:
+        """Inputs whose numbers are taken together."""
+        return (self.sources,)
+
     def about_all(self) -> Iterable[str]:
         """What to know of all inputs together before using the numbers."""
         return ()

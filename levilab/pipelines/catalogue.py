@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+import re
 from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Generic
@@ -18,24 +18,32 @@ from levilab.pipelines.limit.table import limit_tables
 from levilab.pipelines.precession.document import DOCUMENT as PRECESSION
 from levilab.pipelines.precession.report import precession_part
 from levilab.pipelines.precession.table import precession_tables
-from levilab.pipelines.result import Place
+from levilab.pipelines.result import Place, read_inputs, results_in
 from levilab.pipelines.result import save as save_files
+from levilab.pipelines.sources import data_files
 from levilab.pipelines.spin.document import DOCUMENT as SPIN
 from levilab.pipelines.spin.report import spin_part
 from levilab.pipelines.spin.table import spin_tables
 from levilab.pipelines.spindown.document import DOCUMENT as SPINDOWN
 from levilab.pipelines.spindown.report import spindown_part
 from levilab.pipelines.spindown.table import spindown_tables
+from levilab.present.clock import moment
+from levilab.present.numbers import short_name
+from levilab.runs.run import RECORD, find_runs
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
     from pathlib import Path
 
-    from levilab.pipelines.document import Document
+    from levilab.pipelines.document import Document, Looked
     from levilab.pipelines.part import ReportPart
-    from levilab.pipelines.sources import InputOptions, Needs
+    from levilab.pipelines.result import Written
+    from levilab.pipelines.sources import InputOptions, Needs, Source
     from levilab.present.tables import Table
     from levilab.runs.run import Run
+
+#: Starts of runs that the terminal shows; the report has all.
+MOST_STARTS = 6
 
 
 @dataclass(frozen=True)
@@ -72,7 +80,7 @@ class Analysis(Generic[A]):
 
     def recall(self, paths: Sequence[Path], options: InputOptions) -> A:
         """The same, from result.json where it holds.  Raises DataError."""
-        return self.result.recall(paths, options)
+        return self.result.recall(self.result.look(paths, options))
 
     def document(self, found: A, folder: Path) -> dict[str, Any]:
         """The content of result.json for a folder."""
@@ -117,23 +125,72 @@ def analyze_suiting(
     return list(_suiting(lambda analysis: analysis.analyze(paths, analysis.options_from(given)), tell))
 
 
-def recall_suiting(paths: Sequence[Path], given: Mapping[str, Any]) -> tuple[Analysis[Any], Any]:
-    """The first analysis that suits, with what it found or had found before.  Raises DataError if none does.
+def recall_suiting(
+    paths: Sequence[Path], given: Mapping[str, Any], tell: Callable[[str], None] | None = None
+) -> list[tuple[Analysis[Any], Any]]:
+    """Each analysis that has a result of what lies at the paths, as it was found; in the order of the catalogue.
 
-    An analysis that is for the runs' experiment goes before one that suits only because a run keeps records, too.
+    An input that has no result is analyzed by those that are for its experiment, and a data file by all that suit.
+    Raises DataError: none suits, or damage.
+
+    Args:
+        paths: run folders, data files, folders to search, and results that lie elsewhere: their files, or a folder with
+            nothing to analyze in it.
+        given: options by their names, of any analysis.
+        tell: called with the reason why an analysis found nothing usable in a folder.
     """
-    suiting = _suiting(lambda analysis: analysis.recall(paths, analysis.options_from(given)))
-    first = next(suiting)
-    return next((one for one in itertools.chain([first], suiting) if _is_for(*one)), first)
+    places, written = _split(paths)
+
+    def look(analysis: Analysis[Any]) -> Looked[Any, Any, Any]:
+        own = [one for one in written if one.analysis == analysis.name]
+        inputs = [*places, *(path for one in own for path in one.inputs)]
+        if not inputs:
+            raise DoesNotSuit(f"{written[0].file}: is no result of {analysis.name}")
+        return analysis.result.look(inputs, analysis.options_from(given), [one.file for one in own])
+
+    looked = list(_suiting(look, tell))
+    have = {source.path for _, at in looked for source in at.found.sources if at.has_result(source)}
+
+    def is_wanted(analysis: Analysis[Any], at: Looked[Any, Any, Any]) -> bool:
+        return any(
+            at.has_result(source) or (source.path not in have and _is_for(analysis, source))
+            for source in at.found.sources
+        )
+
+    wanted = [(analysis, at) for analysis, at in looked if is_wanted(analysis, at)] or looked[:1]
+    return [(analysis, analysis.result.recall(at)) for analysis, at in wanted]
 
 
-def _is_for(analysis: Analysis[A], found: A) -> bool:
+def _split(paths: Sequence[Path]) -> tuple[list[Path], list[Written]]:
+    """What is to be read or searched, and the results that were named by their own paths.  Raises DataError."""
+    places: list[Path] = []
+    written: list[Written] = []
+    for path in paths:
+        results = []
+        if path.suffix == ".json" and path.is_file():
+            results = [read_inputs(path)]
+        elif path.is_dir() and not (path / RECORD).exists() and not find_runs(path) and not data_files(path):
+            results = results_in(path)
+        written += results
+        places += [] if results else [path]
+    return places, written
+
+
+def _is_for(analysis: Analysis[Any], source: Source[Any]) -> bool:
     """Whether an input is a data file, or a run of an experiment that the analysis is for."""
-    return any(source.run is None or _is_for_run(analysis, source.run) for source in found.sources)
+    return source.run is None or _is_for_run(analysis, source.run)
 
 
 def _is_for_run(analysis: Analysis[Any], run: Run) -> bool:
     return run.record.experiment in analysis.needs.experiments
+
+
+def remarks(of_each: Sequence[Sequence[str]]) -> list[str]:
+    """What several analyses say, each once; runs that one of them passed over count only if all did."""
+    said = list(dict.fromkeys(text for texts in of_each for text in texts))
+    kinds = [text for text in said if re.fullmatch(r"passed over: \d+ \w+ runs?", text)]
+    taken = {text for text in kinds if not all(text in texts for texts in of_each)}
+    return [text for text in said if text not in taken]
 
 
 def _suiting(
@@ -183,6 +240,10 @@ def print_analysis(analysis: Analysis[A], found: A, in_words: Callable[[str], st
     console = terminal()
     for table in analysis.tables(found):
         console.print(draw(table))
+    starts = [f"{short_name(one.name)} {moment(one.start)}" for one in found.sources if one.start]
+    if starts:
+        more = f"; and {len(starts) - MOST_STARTS} more" if len(starts) > MOST_STARTS else ""
+        console.print(f"[bold]Start, local time.[/bold] {escape('; '.join(starts[:MOST_STARTS]))}{more}")
     console.print(f"[bold]What the data say.[/bold] {escape(found.text)}")
     for warning in found.all_warnings:
         console.print(f"[yellow]note:[/yellow] {escape(in_words(warning))}")

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from analysis.uncertainty import Estimate
     from levilab.pipelines.result import Place
-    from levilab.pipelines.sources import InputOptions, Source
+    from levilab.pipelines.sources import Found, InputOptions, Source
 
 #: The data file's own names of columns: an empty table where none were given.
 Columns = Annotated[
@@ -47,6 +47,27 @@ class Settings(Part):
 
 
 D = TypeVar("D", bound=Result)
+#: Why an input was analyzed for a page.
+NO_RESULT = "there was no result yet"
+
+
+@dataclass(frozen=True)
+class Looked(Generic[S, Opt, D]):
+    """Inputs as they lie there, and the results that were written of them.
+
+    paths: where they were looked for; found: the inputs; archive: the results; options: as given; given: those of them
+    that are not at their defaults.
+    """
+
+    paths: Sequence[Path]
+    found: Found[S]
+    archive: Archive[D]
+    options: Opt
+    given: Mapping[str, Any]
+
+    def has_result(self, source: Source[S]) -> bool:
+        """Whether there is a result of an input, of earlier readings or with other options perhaps."""
+        return self.archive.earlier(source.path, source.data, source.sha256) is not None
 
 
 @dataclass(frozen=True)
@@ -102,35 +123,46 @@ class Document(Generic[S, R, Opt, A, D]):
 
     # --- reading ---
 
-    def recall(self, paths: Sequence[Path], options: Opt) -> A:
-        """What `analyze` found at the paths, from its result.json; analyzed anew is only what has none that holds.
+    def look(self, paths: Sequence[Path], options: Opt, results: Sequence[Path] = ()) -> Looked[S, Opt, D]:
+        """What lies at the paths, and the results that were written of it.  Raises DataError.
 
-        A result holds as long as the readings are the same bytes, and it was made with the given options.  Options that
-        are at their defaults are not given: those of the result then count, for what is analyzed anew, too.
-
-        Raises DataError for what cannot be used, a damaged result.json included.
+        Args:
+            paths: run folders, data files, folders to search.
+            options: as given; those at their defaults are not given, and those of an earlier result count.
+            results: files of results that do not lie beside their inputs.
         """
         paths = [find_run(path) for path in paths]
-        archive = Archive(paths, self.result)
+        archive = Archive(paths, self.result, results)
         given = {one.name: value for one in fields(options) if (value := getattr(options, one.name)) != one.default}
 
         def reading(path: Path) -> Opt:
             earlier = archive.earlier(path, path)
             return replace(self._options(earlier), **given) if earlier else options
 
-        found = collect(paths, self.method.needs, reading)
+        return Looked(paths, collect(paths, self.method.needs, reading), archive, options, given)
+
+    def recall(self, looked: Looked[S, Opt, D]) -> A:
+        """What `analyze` found, from its result.json; analyzed anew is only what has none that holds.
+
+        A result holds as long as the readings are the same bytes, and it was made with the given options.
+
+        Raises DataError for what cannot be used, a damaged result.json included.
+        """
+        found, archive, given = looked.found, looked.archive, looked.given
         whole = archive.whole(found.sources)
         if whole and all(self._holds(whole.of(source), given, source) for source in found.sources):
             found = replace(found, warnings=(*whole.result.warnings, *map(unquoted, found.warnings)))
             numbers = [whole.of(source).number for source in found.sources]
             return self.method.gather(
-                paths,
+                looked.paths,
                 found,
-                options,
+                looked.options,
                 lambda source: self._restored(source, whole.of(source)),
                 lambda runs: whole.restore(lambda: self.combined(whole.result, runs, numbers)),
             )
-        return self.method.gather(paths, found, options, lambda source: self._recalled(source, archive, given))
+        return self.method.gather(
+            looked.paths, found, looked.options, lambda source: self._recalled(source, archive, given)
+        )
 
     def _options(self, earlier: Earlier[D]) -> Opt:
         settings: Settings = earlier.result.settings
@@ -152,7 +184,7 @@ class Document(Generic[S, R, Opt, A, D]):
         """One input: what was found of it, or its analysis."""
         earlier, own = archive.earlier(source.path, source.data, source.sha256), self._own(given, source)
         if earlier is None:
-            options, why = self.method.options(**own), "there was no result yet"
+            options, why = self.method.options(**own), NO_RESULT
         elif earlier.sha256 != source.sha256:
             options, why = replace(self._options(earlier), **own), f"the readings are others than in {earlier.file}"
         elif not self._holds(earlier, given, source):

@@ -227,13 +227,25 @@ def _creep_up(session: Session[LimitSettings], keep: Callable[[Row], None]) -> N
     """Raise the drive until the top does not follow, or time is over; the limit is kept before the drive goes off."""
     settings = session.settings
     start, drive, at = settings.drive_frequency_hz, settings.drive_frequency_hz, session.now()
-    # a counter that is reached again after a while must not make the drive jump
-    longest_step_s = RAMP_STEP_S + 2 * settings.gate_s
-    every = max(1, round(settings.interval_s / RAMP_STEP_S))
+    # A step lasts as long as a count, so the drive goes up evenly whether the top is looked at or not: uneven steps
+    # make it swing about the drive, until it is lost early.  A counter that is reached again must not make it jump.
+    every, longest_step_s = max(1, round(settings.interval_s / settings.gate_s)), 2 * settings.gate_s
     held = start
     seen: list[tuple[float, float]] = []
     for k in itertools.count(1):
-        session.wait(RAMP_STEP_S)
+        if k % every:
+            session.wait(settings.gate_s)
+        else:
+            try:
+                seen.append((held_spin(session, drive), drive))
+            except NotHeld as lost:
+                limit = _limit_of_loss(settings, (held, drive), seen)
+                keep({"time_s": session.now()} | limit)
+                _say_how_it_was_lost(session, lost, limit, seen)
+                return
+            held = drive
+            if is_over(session):
+                return
         before, at = at, session.now()
         drive += settings.creep_hz_per_s * min(at - before, longest_step_s)
         if drive > settings.highest_hz:
@@ -244,18 +256,6 @@ def _creep_up(session: Session[LimitSettings], keep: Callable[[Row], None]) -> N
             )
         session.bench.generator.frequency = drive
         session.progress(f"drive at {drive:.2f} Hz", (drive - start) / (settings.highest_hz - start))
-        if k % every:
-            continue
-        try:
-            seen.append((held_spin(session, drive), drive))
-        except NotHeld as lost:
-            limit = _limit_of_loss(settings, (held, drive), seen)
-            keep({"time_s": session.now()} | limit)
-            _say_how_it_was_lost(session, lost, limit, seen)
-            return
-        held = drive
-        if is_over(session):
-            return
 
 
 def _limit_of_loss(settings: LimitSettings, between: tuple[float, float], seen: list[tuple[float, float]]) -> Row:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from analysis.errors import AnalysisError
 from analysis.field.fit import LEARNS_NOTHING, fit_scan
 from analysis.field.floating import FERRITE_PER_K, Floating, follow
+from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
@@ -157,7 +158,7 @@ def _shown(name: str, estimate: Estimate) -> str:
 def _scatter_in_words(strength: Estimate) -> str:
     assert isinstance(strength, Mean)
     share = 100 * strength.scatter / abs(strength.value or 1.0)
-    return f"one differs from another by {share:.2g} %"
+    return f"one differs from another by {digits(share)} %"
 
 
 def _in_words(scan: FieldScan, floating: Floating | None) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -9,7 +10,7 @@ from pydantic import Field
 
 from analysis.limits import Comparison, Statistics
 from levilab.pipelines.document import Document, Settings, number, value_of, values_of
-from levilab.pipelines.limit.analysis import METHOD, Device, LimitAnalysis, Limits, Which
+from levilab.pipelines.limit.analysis import METHOD, Conditions, Device, LimitAnalysis, Limits, Which
 from levilab.pipelines.result import Part, Result, RunPart, Value
 
 if TYPE_CHECKING:
@@ -31,6 +32,17 @@ class DevicePart(Part):
     resonance_hz: float | None
 
 
+class ConditionsPart(Part):
+    """Under which the limits were measured; see `levilab.pipelines.limit.analysis.Conditions`."""
+
+    which: Which
+    top: str
+    waveform: str | None
+    amplitude_vpp: float | None
+    creep_hz_per_s: float | None
+    step_hz: float | None
+
+
 class ComparisonPart(Part):
     """A mean beside theory; see `analysis.limits.Comparison`."""
 
@@ -41,14 +53,19 @@ class ComparisonPart(Part):
 
 
 class _WithLimits(Part):
-    """What stands with each run, and with the limits of a kind together."""
+    """What stands with each run, and with the limits of the same conditions together.
+
+    freedom: degrees of freedom of the standard error, null where it rests on no scatter.
+    """
 
     which: Which
+    conditions: ConditionsPart
     repetitions: int = Field(ge=1)
+    freedom: float | None
     trend_p: float | None
     outliers: tuple[int, ...]
     comparisons: tuple[ComparisonPart, ...]
-    device: DevicePart | None
+    device: DevicePart
     ends: dict[Literal["fell", "lock lost", "top lost"], int]
     verdict: str
 
@@ -58,7 +75,7 @@ class LimitRunPart(RunPart, _WithLimits):
 
 
 class GroupPart(_WithLimits):
-    """All limits of a kind."""
+    """All limits of the same conditions."""
 
     values: dict[str, Value]
     numbers: tuple[int, ...]
@@ -85,7 +102,7 @@ class LimitResult(Result):
 
 def _entries(analysis: LimitAnalysis) -> dict[str, Any]:
     return {
-        "values": _top_values(analysis.groups),
+        "values": _top_values(analysis),
         "groups": [
             {"values": _values(group.statistics), "numbers": list(group.runs)} | _limits(group)
             for group in analysis.groups
@@ -97,25 +114,34 @@ def _run_entries(_: Source[LimitReadings], run: Limits) -> dict[str, Any]:
     return {"values": _values(run.statistics)} | _limits(run)
 
 
-def _top_values(groups: Sequence[Limits]) -> dict[str, Any]:
-    """Of one kind of limits by their plain names, of two with the kind before them."""
-    if len(groups) == 1:
-        return _values(groups[0].statistics)
-    return {f"{group.which}_{name}": value for group in groups for name, value in _values(group.statistics).items()}
+def _top_values(analysis: LimitAnalysis) -> dict[str, Any]:
+    """Of one group by their plain names, else with the kind before them, and its number where it has several."""
+    if len(analysis.groups) == 1:
+        return _values(analysis.groups[0].statistics)
+    values: dict[str, Any] = {}
+    for group in analysis.groups:
+        of_kind = analysis.number(group)
+        prefix = group.which if of_kind is None else f"{group.which}_{of_kind}"
+        values |= {f"{prefix}_{name}": value for name, value in _values(group.statistics).items()}
+    return values
 
 
 def _values(found: Statistics) -> dict[str, Any]:
-    error = found.mean.u if found.scatter else None
-    named = {"mean": found.mean, "scatter": found.scatter, "trend": found.trend}
+    named = {"mean": found.mean, "scatter": found.scatter, "trend": found.trend, "between_runs": found.between}
+    plain = {"standard_error": found.mean.u if found.scatter else None} | (
+        {"step_error": found.step} if found.step else {}
+    )
     known = {name: estimate for name, estimate in named.items() if estimate}
-    return values_of(known) | {"standard_error": number(error, "Hz")}
+    return values_of(known) | {name: number(value, "Hz") for name, value in plain.items()}
 
 
 def _limits(limits: Limits) -> dict[str, Any]:
     found, device = limits.statistics, limits.device
     return {
         "which": limits.which,
+        "conditions": vars(limits.conditions),
         "repetitions": found.n,
+        "freedom": found.freedom,
         "trend_p": found.trend_p,
         "outliers": list(found.outliers),
         "comparisons": [
@@ -127,9 +153,7 @@ def _limits(limits: Limits) -> dict[str, Any]:
             }
             for one in limits.comparisons
         ],
-        "device": None
-        if device is None
-        else {
+        "device": {
             "name": device.name,
             "linear_lower_hz": device.lower,
             "linear_upper_hz": device.upper,
@@ -148,30 +172,35 @@ def _run(part: LimitRunPart, *_: object) -> Limits:
 
 
 def _groups(result: LimitResult, _: object, order: Sequence[int]) -> tuple[Limits, ...]:
-    """All of a kind; order: the number in the result of each of our runs."""
+    """Those of the same conditions; order: the number in the result of each of our runs."""
     return tuple(
-        replace(_restored(group, group.values), runs=tuple(order.index(k) for k in group.numbers))
+        replace(_restored(group, group.values, len(group.numbers)), runs=tuple(order.index(k) for k in group.numbers))
         for group in result.groups
     )
 
 
-def _restored(part: _WithLimits, values: Mapping[str, Value]) -> Limits:
-    scatter, trend = values.get("scatter"), values.get("trend")
+def _restored(part: _WithLimits, values: Mapping[str, Value], runs: int = 1) -> Limits:
+    known = {name: value.estimate for name, value in values.items()}
+    step = known["step_error"].value if "step_error" in known else None
     statistics = Statistics(
-        mean=values["mean"].estimate,
-        scatter=scatter.estimate if scatter else None,
+        mean=known["mean"],
+        scatter=known.get("scatter"),
         n=part.repetitions,
-        trend=trend.estimate if trend else None,
+        trend=known.get("trend"),
         trend_p=part.trend_p,
         outliers=part.outliers,
+        step=step or 0.0,
+        freedom=math.inf if part.freedom is None else part.freedom,
+        runs=runs,
+        between=known.get("between_runs"),
     )
     comparisons = tuple(
         Comparison(one.name, one.expected.value or 0.0, one.difference.estimate, one.p) for one in part.comparisons
     )
     said = part.device
-    device = Device(said.name, said.linear_lower_hz, said.linear_upper_hz, said.resonance_hz) if said else None
+    device = Device(said.name, said.linear_lower_hz, said.linear_upper_hz, said.resonance_hz)
     ends = {str(kind): n for kind, n in part.ends.items()}
-    return Limits(part.which, statistics, comparisons, device, ends)
+    return Limits(part.which, Conditions(**vars(part.conditions)), statistics, comparisons, device, ends)
 
 
 DOCUMENT = Document(

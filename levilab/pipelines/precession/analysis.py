@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.errors import AnalysisError
+from analysis.numbers import digits
 from analysis.precession.coherence import Coherence, coherence, pulse_times
 from analysis.precession.sweep import EXCLUDED_P, Sweep, SweepFit, fit_sweep
 from analysis.uncertainty import Estimate
@@ -104,6 +105,7 @@ def fit_source(source: Source[Readings], options: PrecessionOptions) -> Precessi
         spin=readings.spin,
         u_spin=readings.u_spin,
         gate_s=_gate(source),
+        gates=readings.laser,
     )
     try:
         fit = fit_sweep(sweep, orthogonal=options.orthogonal, keep_miscounts=options.keep_outliers)
@@ -156,8 +158,8 @@ def _about_slopes(fits: Sequence[SweepFit]) -> Iterable[str]:
     p = float(chdtrc(len(slope) - 1, float(np.sum(((slope - mean) / u) ** 2))))
     if p < DIFFERENT_P:
         yield (
-            f"the slopes of the {len(slope)} runs differ by more than their u says (p = {p:.1g}): the line through all "
-            "points has too small a u; look at the runs one by one"
+            f"the slopes of the {len(slope)} runs differ by more than their u says (p = {digits(p, 1)}): the line "
+            "through all points has too small a u; look at the runs one by one"
         )
 
 
@@ -211,8 +213,8 @@ def _coherences(source: Source[Readings]) -> tuple[tuple[PointCoherence, ...], t
 
 def _coherence(laser: StoredTrace, drive: StoredTrace, frequency: float) -> Coherence:
     record, beside = laser.trace, drive.trace
-    pulses = pulse_times(record.volts[np.isfinite(record.volts)], record.dt_s, record.t0_s)
-    return coherence(pulses, beside.volts[np.isfinite(beside.volts)], beside.dt_s, frequency, beside.t0_s)
+    pulses = pulse_times(record.volts, record.dt_s, record.t0_s)
+    return coherence(pulses, beside.volts, beside.dt_s, frequency, beside.t0_s)
 
 
 # --- in words ------------------------------------------------------------------------------------------

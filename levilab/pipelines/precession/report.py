@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.numbers import digits
 from levilab.pipelines.part import InputPart, ReportPart
 from levilab.pipelines.precession.analysis import verdict
 from levilab.pipelines.precession.table import coherence_table, lines_table, points_table, power_table
+from levilab.present.clock import with_clock
 
 if TYPE_CHECKING:
     from levilab.pipelines.analyzed import Origin
@@ -47,7 +49,13 @@ def precession_part(analysis: PrecessionAnalysis) -> ReportPart:
 
 def _input(source: Source[Readings], run: PrecessionRun, origin: Origin[PrecessionOptions]) -> InputPart:
     count = len(run.fit.points)
-    context = {"points": points_table(run, most=MOST_POINTS), "shown": min(count, MOST_POINTS), "count": count}
+    time = source.readings.time
+    clock = with_clock(source.time_zero, None if time is None else time.tolist(), ())
+    context = {
+        "points": points_table(run, most=MOST_POINTS, clock=clock),
+        "shown": min(count, MOST_POINTS),
+        "count": count,
+    }
     return InputPart(_in_words(source, run, origin), origin.text, verdict(run.fit), context)
 
 
@@ -63,9 +71,11 @@ def _uncertainty(source: Source[Readings], run: PrecessionRun, origin: Origin[Pr
     if not np.isfinite(u).all():
         return "u of a point: not known, taken from the scatter about the line"
     low, high = float(u.min()), float(u.max())
-    size = f"{low:.2g} Hz" if low == high else f"{low:.2g} Hz to {high:.2g} Hz"
+    size = f"{digits(low)} Hz" if low == high else f"{digits(low)} Hz to {digits(high)} Hz"
     if origin.options.reading_u is not None:
         return f"u of a point: {size}, as given to the analysis"
+    if source.readings.laser is not None:
+        return f"u of a point: {size}, from the gates of all points, the swing about the drive taken off"
     channels = source.run.record.channels if source.run else []
     where = next((c.get("source") for c in channels if c.get("name") == "precession_frequency_u_hz"), None)
     return f"u of a point: {size}, {where or 'from a column of the data'}"

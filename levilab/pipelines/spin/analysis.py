@@ -99,6 +99,11 @@ class SpinAnalysis(Analyzed[Records, SpinRun, None, SpinOptions]):
         more = len(texts) - MOST_SENTENCES
         return " ".join(named) + (f" And {more} more, in the table." if more > 0 else "")
 
+    @property
+    def averaged(self) -> tuple[()]:
+        """None: nothing is averaged over different tops or times."""
+        return ()
+
     def about_all(self) -> Iterable[str]:
         """What to know of the method."""
         method = self.options.method

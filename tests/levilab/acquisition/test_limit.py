@@ -253,12 +253,16 @@ def test_a_series_ends_when_its_time_is_over(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("settings", "says"),
     [
-        ("limit.which=middle", "limit.which = 'middle': Input should be 'lower' or 'upper'"),
-        ("limit.repetitions=0", "greater than 0"),
-        ("limit.wich=upper", "limit.wich is no key known here"),
-        ("which=upper", "limit.KEY=VALUE is expected: limit.which=upper?"),
+        ("limit.which=middle", "lower or upper is expected; levilab acquire limit --settings lists all"),
+        ("limit.repetitions=0", "a whole number above 0 is expected"),
+        ("limit.drive_frequency_hz=fast", "a number above 0 up to 100 [Hz] is expected"),
+        ("limit.gate_s=0,5", "a number above 0 [s] is expected; write a decimal point, not a comma"),
+        ("limit.wich=upper", "there is no such setting, did you mean limit.which? levilab acquire limit --settings"),
+        ("limit.colour=red", "there is no such setting; levilab acquire limit --settings lists all"),
+        ("limit.gate_s=3", "gate_s = 3 must be shorter than interval_s = 2"),
+        ("which=upper", "limit.KEY=VALUE is expected, limit.which=upper?"),
         ("limit.which", "limit.KEY=VALUE is expected"),
-        ("spin.hold_s=1", "is a setting of `levilab acquire spin`, this is `levilab acquire limit`"),
+        ("spin.hold_s=1", "is a setting of levilab acquire spin, this is levilab acquire limit"),
     ],
 )
 def test_settings_on_the_command_line_that_cannot_be_are_refused(tmp_path: Path, settings: str, says: str) -> None:
@@ -288,7 +292,7 @@ def test_settings_on_the_command_line_go_before_the_bench_files(tmp_path: Path) 
 
 def test_loose_washers_are_warned_of_in_the_run_and_in_its_result(tmp_path: Path) -> None:
     """In full motion; the slip is that of the washers' drag against their coupling, I₃ C ω^1.5/k."""
-    given = ("spin.drive_frequency_hz=30.2", "spin.longest_s=21")
+    given = ("spin.drive_frequency_hz=30.2", "spin.interval_s=2", "spin.longest_s=5", "spin.hold_s=12")
     options = AcquisitionOptions(mock=True, out=tmp_path, seed=1, scene="loose-washers", settings=given)
     show = Silent()
     run = acquire(request_for("spin", options), show)

@@ -89,8 +89,8 @@ def test_each_analysis_finds_its_own_result_again(tmp_path: Path, runs: Path, na
     spin_down_csv(tmp_path / "my.csv")
     path = runs.parent / name
     analyzed(path)
-    row, recalled = recall_suiting([path], {})
-    assert row.name == "spindown"
+    (row, recalled), (second, _) = recall_suiting([path], {})
+    assert (row.name, second.name) == ("spindown", "second")
     assert all(origin.text.startswith("as levilab analyze found it") for origin in recalled.origins)
     archive = Archive([path], SecondResult)
     whole = archive.whole(recalled.sources)
@@ -147,7 +147,7 @@ def test_what_one_analysis_cannot_use_keeps_no_other_from_its_own(tmp_path: Path
 
 def test_the_analysis_made_for_an_experiment_goes_before_one_that_takes_its_records(sample_data: Path) -> None:
     for name, wanted in (("precession-sweep", "precession"), ("trace-tape", "spin"), ("scope-files", "spin")):
-        assert recall_suiting([sample_data / name], {})[0].name == wanted, name
+        assert [row.name for row, _ in recall_suiting([sample_data / name], {})] == [wanted], name
 
 
 def test_an_analysis_that_does_not_suit_is_passed_over(
@@ -168,7 +168,7 @@ def test_an_analysis_that_does_not_suit_is_passed_over(
 def test_a_sweep_that_keeps_records_is_a_sweep_first(tmp_path: Path, sample_data: Path) -> None:
     """Its records suit the analysis of spins, too, which stands above that of sweeps."""
     run = shutil.copytree(sample_data / "precession-sweep", tmp_path / "sweep")
-    row, found = recall_suiting([run], {})
+    ((row, found),) = recall_suiting([run], {})
     assert row.name == "precession"
     assert save_found(row, found)[0].name == "result.json"
     spin = ANALYSES["spin"]

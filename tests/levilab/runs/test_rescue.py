@@ -128,6 +128,35 @@ def test_a_run_that_is_lost_twice_is_rescued_twice(tmp_path: Path) -> None:
 
 
 @posix_only
+@pytest.mark.parametrize("torn", [False, True])
+def test_a_folder_that_was_cut_stays_readable_after_each_rescue(tmp_path: Path, torn: bool) -> None:
+    folders = []
+    with create(tmp_path, []) as writer:
+        writer.reading(row(0))
+        for k in range(1, 3):
+            folders.append(writer.folder)
+            size = (writer.folder / "readings.csv").stat().st_size
+            os.truncate(writer.folder / "readings.csv", size - 3)  # within the last line, onto which the next one goes
+            if torn:
+                (writer.folder / "run.json").write_text('{"schema', encoding="utf-8")
+            writer.reading(row(k))
+        writer.finish("finished")
+    for k, folder in enumerate(folders):
+        run = Run.load(folder)
+        assert (run.status, times(folder)) == ("interrupted", [10 * i for i in range(k)])
+        assert run.continued_in == [*folders, writer.folder][k + 1]
+    assert times(writer.folder) == [0, 10, 20]
+
+
+def test_a_torn_record_is_written_anew_with_the_next_reading(tmp_path: Path) -> None:
+    with create(tmp_path, []) as writer:
+        writer.reading(row(0))
+        (writer.folder / "run.json").write_text('{"schema', encoding="utf-8")
+        writer.reading(row(1))
+        assert Run.load(writer.folder).status == "running"
+
+
+@posix_only
 def test_a_resumed_run_is_rescued_with_its_earlier_readings(tmp_path: Path) -> None:
     with create(tmp_path, []) as writer:
         writer.reading(row(0))

@@ -85,7 +85,7 @@ def test_a_result_holds_what_was_found_and_is_read_not_computed(
     assert document["models"][0]["name"] == "ring"
     assert document["synthetic"] is True
     monkeypatch.setattr("levilab.pipelines.field.analysis.fit_scan", None)
-    recalled = DOCUMENT.recall([scan], FieldOptions())
+    recalled = ANALYSES["field"].recall([scan], FieldOptions())
     assert recalled.origins[0].text.startswith("as levilab analyze found it")
     assert ANALYSES["field"].document(recalled, scan) == document
     assert field_tables(recalled) == field_tables(found)
@@ -96,7 +96,7 @@ def test_a_result_holds_what_was_found_and_is_read_not_computed(
 
 def test_other_options_are_computed_anew_with_those_of_the_result(scan: Path) -> None:
     keep(analyze_scans([scan], FieldOptions(device=TOP_OF_THESIS)))
-    recalled = DOCUMENT.recall([scan], FieldOptions(free_radii=True))
+    recalled = ANALYSES["field"].recall([scan], FieldOptions(free_radii=True))
     assert recalled.origins[0].text.startswith("analyzed for this page: other options")
     assert recalled.origins[0].options.device == TOP_OF_THESIS
     assert "inner_radius" in recalled.runs[0].scan.fitted
@@ -108,7 +108,7 @@ def test_a_result_that_does_not_go_with_the_readings_is_refused(scan: Path) -> N
     del document["runs"][0]["models"][0]["parameters"]["origin"]
     file.write_text(json.dumps(document), encoding="utf-8")
     with pytest.raises(DataError, match="each with a value"):
-        DOCUMENT.recall([scan], FieldOptions())
+        ANALYSES["field"].recall([scan], FieldOptions())
 
 
 def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(
@@ -125,7 +125,7 @@ def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(
     assert alone[0].u is not None
     assert mean.u > 0.99 * alone[0].u
     monkeypatch.setattr(Analysis, "svg", lambda *_: "<svg/>")
-    page = render(ANALYSES["field"], found)
+    page = render([(ANALYSES["field"], found)])
     assert "None of these 2 runs came from a real bench" in page
     assert ANALYSES["field"].document(found, tmp_path)["values"]["strength"]["runs"] == 2
     assert len(field_figure(found).axes) == 4

@@ -200,7 +200,7 @@ def test_a_run_of_another_experiment_is_refused_by_name(sample_data: Path) -> No
 
 
 def test_a_folder_without_runs_says_what_it_found(sample_data: Path, tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="found nothing"):
+    with pytest.raises(DataError, match="holds no run and no data file"):
         analyze_spindowns([tmp_path], SpinDownOptions())
     shutil.copytree(sample_data / "lower-limits", tmp_path / "limits")
     with pytest.raises(DataError, match="found only 1 limit"):

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-recall_spindowns = DOCUMENT.recall
+SPINDOWN = ANALYSES["spindown"]
+recall_spindowns = SPINDOWN.recall
 
 
 @pytest.fixture
@@ -35,7 +36,8 @@ def fitted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         names.append(source.path.name)
         return METHOD.fit(source, options)
 
-    monkeypatch.setitem(globals(), "recall_spindowns", replace(DOCUMENT, method=replace(METHOD, fit=noted)).recall)
+    row = replace(SPINDOWN, result=replace(DOCUMENT, method=replace(METHOD, fit=noted)))
+    monkeypatch.setitem(globals(), "recall_spindowns", row.recall)
     return names
 
 
@@ -90,7 +92,7 @@ def test_several_runs_are_recalled_to_the_last_bit(runs: Path, fitted: list[str]
     assert same(after.combined.fits, before.combined.fits)
     assert same(after.combined.verdict, before.combined.verdict)
     assert after.all_warnings == before.all_warnings
-    assert ANALYSES["spindown"].document(after, runs) == ANALYSES["spindown"].document(before, runs)
+    assert SPINDOWN.document(after, runs) == SPINDOWN.document(before, runs)
 
 
 @pytest.mark.parametrize("n", [3, 4, 5, 7])
@@ -98,7 +100,7 @@ def test_results_that_lack_numbers_are_recalled_too(tmp_path: Path, fitted: list
     before = analyzed(spin_down_csv(tmp_path / "my.csv", n=n, u=n != 4))
     after = recall_spindowns([tmp_path / "my.csv"], SpinDownOptions())
     assert fitted == []
-    assert ANALYSES["spindown"].document(after, tmp_path) == ANALYSES["spindown"].document(before, tmp_path)
+    assert SPINDOWN.document(after, tmp_path) == SPINDOWN.document(before, tmp_path)
 
 
 def test_what_is_shown_is_what_stands_in_the_result(tmp_path: Path) -> None:
@@ -266,7 +268,9 @@ def test_a_warning_about_an_input_is_recalled_once_however_it_is_named(
         analyzed(path)
     monkeypatch.chdir(tmp_path)
     after = recall_spindowns([path.relative_to(tmp_path) for path in paths], SpinDownOptions())
-    assert sum("no header" in text for text in after.all_warnings) == 2
+    about = [text for text in after.all_warnings if "no header" in text]
+    assert len(about) == 2
+    assert [text.count("one.csv") + text.count("two.csv") for text in about] == [1, 1]  # named once
 
 
 def test_a_tilt_that_runs_show_together_is_in_a_recall_without_result(tmp_path: Path) -> None:
