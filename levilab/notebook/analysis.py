@@ -10,7 +10,7 @@ from dataclasses import fields, replace
 from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from analysis.errors import AnalysisError
 from levilab.errors import DataError, DoesNotSuit, LevilabError, UsageError
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
     One: TypeAlias = "Run | str | PathLike[str] | pd.DataFrame"
 
-Kind = Literal["spindown", "spin", "field", "limit", "precession"]
 _CHOICES = {
     "uncertainty": ("covariance", "profile", "bootstrap"),
     "method": ("auto", "edges", "matched", "likelihood"),

@@ -51,11 +51,16 @@ def in_rows(text: str, folder: Path, *, titles: int) -> str:
     >>> from pathlib import Path
     >>> in_rows("/tmp/x/DataFrame.csv, line 5: the time 3 s is repeated", Path("/tmp/x"), titles=1)
     'DataFrame.csv, row 3: the time 3 s is repeated'
+    >>> in_rows("/tmp/x/DataFrame.csv, line 1: no title is known", Path("/tmp/x"), titles=1)
+    'DataFrame.csv: no title is known'
     """
     for separator in ("/", "\\"):
         text = text.replace(f"{folder}{separator}", "")
 
-    def rows(match: re.Match[str]) -> str:
-        return match[1] + re.sub(r"\d+", lambda line: str(int(line[0]) - 1 - titles), match[2])
+    if titles:
+        text = re.sub(r", line 1\b", "", text)
 
-    return re.sub(r"\b(line)(s? \d+(?:, \d+)*)", lambda match: rows(match).replace("line", "row", 1), text)
+    def as_row(line: re.Match[str]) -> str:
+        return str(int(line[0]) - 1 - titles)
+
+    return re.sub(r"\bline(s? \d+(?:, \d+)*)", lambda lines: "row" + re.sub(r"\d+", as_row, lines[1]), text)

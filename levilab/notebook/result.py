@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from analysis.uncertainty import Estimate
 from levilab.errors import UsageError, unquoted
+from levilab.files import CannotWrite, replace_atomically
 from levilab.pipelines.catalogue import print_analysis
 from levilab.pipelines.catalogue import save as save_result
 from levilab.pipelines.result import Place
 from levilab.present.numbers import in_one_line
+from levilab.report.page import render_part
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -134,8 +136,6 @@ class AnalysisResult:
 
     def _repr_html_(self) -> str:
         """As a notebook shows it: what a report says, with its figure; nothing is fetched from elsewhere."""
-        from levilab.report.page import render_part  # with jinja2
-
         return render_part(self.analysis, self.found)
 
     def summary(self) -> str:
@@ -215,8 +215,6 @@ def _print(result: AnalysisResult, console: Any) -> None:
 
 def _copy(path: Path, to: Path) -> Path:
     """Raises CannotWrite."""
-    from levilab.files import CannotWrite, replace_atomically
-
     try:
         to.parent.mkdir(parents=True, exist_ok=True)
         replace_atomically(to, path.read_bytes())

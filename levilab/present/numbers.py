@@ -42,8 +42,8 @@ def in_one_line(estimate: Estimate) -> str:
     """Value, standard uncertainty in its last digits and unit, in characters that every program prints.
 
     >>> from analysis.uncertainty import Estimate
-    >>> in_one_line(Estimate(0.003262, 2.3e-5, "1/s")), in_one_line(Estimate(2.3687e-4, 3.0e-7, "1/rad"))
-    ('0.003262(23) 1/s', '2.3687(30)e-04 1/rad')
+    >>> in_one_line(Estimate(0.003262, 2.3e-5, "1/s")), in_one_line(Estimate(1.7151e-5, 1.7e-7, "1/rad"))
+    ('0.003262(23) 1/s', '1.715(17)e-05 1/rad')
     >>> in_one_line(Estimate(0.25, None, "1")), in_one_line(Estimate(None, None, "Hz"))
     ('0.25', 'not determined')
     """

@@ -30,7 +30,7 @@ _ASCII_HEAD = box.Box("    \n    \n -- \n    \n    \n -- \n    \n    \n", ascii=
 #: Columns below which no text can be read, and more than any table has.
 _NARROWEST, _UNLIMITED = 20, 10_000
 #: Columns of a text that is no terminal's: all tables fit into 80, and lines of words are still read with ease.
-TEXT_WIDTH = 100
+TEXT_WIDTH = 110
 
 
 class _Terminal(Console):

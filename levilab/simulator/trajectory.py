@@ -67,7 +67,7 @@ class Trajectory:
 
     def __repr__(self) -> str:
         name, end = self.scene.name or "a scene", float(self.time[-1])
-        how = "up to the end" if self.fell is None else f"lost by its {self.fell.name}"
+        how = "up to the end" if self.fell is None else f"lost at the limit of its {self.fell.name}"
         return f"<{type(self).__name__} of {name}: {len(self.time)} states in {end:.4g} s, {how}>"
 
     @property
