@@ -4,7 +4,7 @@ BIN    := .venv/bin
 DEMO   := demo
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test explore fuzz lint all-pythons wheel peers bench clean
+.PHONY: help setup demo test quick explore fuzz lint all-pythons wheel peers bench clean
 
 help:  ## list the targets
 	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -26,6 +26,12 @@ demo: setup  ## the main job on the virtual bench: acquire, analyze, report (int
 
 test: setup lint  ## everything that must pass: style, types, imports, tests
 	$(BIN)/python -m pytest
+
+quick: setup  ## within a minute: style and types, and the tests that are not slow
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/mypy
+	$(BIN)/python -m pytest -m 'not slow'
 
 explore: setup  ## the property tests with new random examples
 	HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest tests/levilab/formats tests/analysis tests/instruments

@@ -1,13 +1,15 @@
 """Limits of the spin: where a top falls or is lost, from one top to the next, and against what theory says.
 
-Sources: JCGM 100:2008 (GUM) §4.2 for mean, scatter and standard error; Grubbs, Technometrics 11, 1 (1969) for outliers;
-Simon, Heflinger & Ridgway, Am. J. Phys. 65, 286 (1997) for the linear window.
+Sources: JCGM 100:2008 (GUM) §4.2 for mean, scatter and standard error, F.2.2.1 for steps; Widrow, Kollár & Liu, IEEE
+Trans. Instrum. Meas. 45, 353 (1996) for how much of the error of a step repeated readings share; Paule & Mandel,
+J. Res. NBS 87, 377 (1982) for the mean of runs that differ; Grubbs, Technometrics 11, 1 (1969) for outliers; Simon,
+Heflinger & Ridgway, Am. J. Phys. 65, 286 (1997) for the linear window.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -77,6 +79,34 @@ def spin_at_fall(times: Array, spins: Array, u: float | None, between: tuple[flo
 # --- all of them ---
 
 
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """Limits of tops under the same conditions, in one run.
+
+    Attributes:
+        limits: shape (n,) [Hz].
+        u: their standard uncertainties, shape (n,) [Hz]; None: not known.
+        steps: each limit lies somewhere within a step of the drive of this width, shape (n,) [Hz], in the middle of
+            which it is given; the steps are the same for all tops.  None: the drive made no steps.
+    """
+
+    limits: Array
+    u: Array | None = None
+    steps: Array | None = None
+
+    @property
+    def step(self) -> float:
+        """The width of a step [Hz], 0 where there was none."""
+        return 0.0 if self.steps is None else math.sqrt(float(np.mean(self.steps**2)))
+
+    @property
+    def least(self) -> float:
+        """Variance that the limits' own, independent uncertainties leave to their mean [Hz²]."""
+        if self.u is None or self.steps is not None:
+            return 0.0
+        return float(np.sum(self.u**2)) / self.limits.size**2
+
+
 @dataclass(frozen=True)
 class Statistics:
     """What the repetitions say together.
@@ -85,9 +115,14 @@ class Statistics:
         mean: with the standard error as its u [Hz].
         scatter: standard deviation from one repetition to the next, with its own u [Hz]; None of a single one.
         n: repetitions.
-        trend: per repetition [Hz]; None of too few.
+        trend: per repetition [Hz]; None of too few, and of several runs.
         trend_p: how probable so large a trend is by chance.
         outliers: numbers of those that chance would hardly put there, from 0; they stay in the statistics.
+        step: the part of the standard error that the drive's steps leave, however many repetitions there are [Hz].
+        freedom: degrees of freedom of the standard error; infinite where it does not rest on a scatter.
+        runs: of how many runs.
+        between: standard deviation of a run's mean from another's, beyond what their tops explain, with its u [Hz];
+            None of one run, and of runs with a single repetition each, where it is part of the scatter.
     """
 
     mean: Estimate
@@ -96,6 +131,10 @@ class Statistics:
     trend: Estimate | None
     trend_p: float | None
     outliers: tuple[int, ...]
+    step: float = 0.0
+    freedom: float = math.inf
+    runs: int = 1
+    between: Estimate | None = None
 
     @property
     def drifts(self) -> bool:
@@ -103,40 +142,170 @@ class Statistics:
         return self.trend_p is not None and self.trend_p < TREND_P
 
 
-def summarize(limits: Array, u: Array | None = None) -> Statistics:
+def summarize(sample: Sample) -> Statistics:
     """Mean, scatter, standard error, trend and outliers of repeated limits.
 
-    The mean is not weighted: tops differ by more than their limits are uncertain.  Of a single one the u of the mean is
-    its own.
-
-    Args:
-        limits: shape (n,) [Hz].
-        u: their standard uncertainties, shape (n,) [Hz].
+    The mean is not weighted: tops differ by more than their limits are uncertain.  Its standard error is s/√n, no less
+    than the limits' own uncertainties leave to it; where the drive made steps, with what these leave: tops that scatter
+    by much less than a step all fall into the same one, and their mean is no better than its width over √12.  Of a
+    single one the u of the mean is its own.
 
     Raises:
         TooFewReadings, NotFinite, NotPositive: for what cannot be limits.
 
     >>> thesis = np.array([21.7, 21.4, 21.7, 21.9, 21.8, 22.3, 21.8, 22.0, 22.1, 21.9])
-    >>> found = summarize(thesis)
+    >>> found = summarize(Sample(thesis))
     >>> round(found.mean.value, 2), round(found.scatter.value, 2), round(found.mean.u, 2)
     (21.86, 0.25, 0.08)
+    >>> found = summarize(Sample(np.full(10, 67.1), steps=np.full(10, 0.2)))
+    >>> round(found.mean.u, 4), round(found.scatter.value, 4)
+    (0.0577, 0.0)
     """
-    n = limits.size
-    if n == 0:
+    limits, n = _checked(sample.limits), sample.limits.size
+    mean = float(limits.mean())
+    if n < FEWEST:
+        own = None if sample.u is None else float(sample.u[0])
+        return Statistics(Estimate(mean, own, "Hz"), None, n, None, None, (), sample.step / math.sqrt(12))
+    scatter = float(limits.std(ddof=1))
+    by_scatter = scatter**2 / n
+    step = _common_error(scatter, sample.step)
+    variance = max(by_scatter, sample.least) + step**2
+    trend, p = _trend(limits) if n >= FEWEST_FOR_SHAPE and scatter > 0 else (None, None)
+    return Statistics(
+        mean=Estimate(mean, math.sqrt(variance), "Hz"),
+        scatter=_with_own_u(scatter, n - 1),
+        n=n,
+        trend=trend,
+        trend_p=p,
+        outliers=outliers_of(limits),
+        step=step,
+        freedom=_freedom(variance, by_scatter, n - 1),
+    )
+
+
+def combine(runs: Sequence[Sample]) -> Statistics:
+    """The same of several runs under the same conditions, which may still differ by more than their tops.
+
+    A random-effects mean: all runs share one scatter s from top to top; a run of n tops has the variance τ² + s²/n and
+    the weight of its inverse, where τ is the scatter between runs that makes χ² of the runs' means what is expected
+    (Paule & Mandel).  Where the runs differ no more than their tops explain, τ is 0.
+
+    Raises:
+        TooFewReadings, NotFinite, NotPositive: for what cannot be limits.
+
+    >>> early, late = np.array([60.1, 59.9, 60.0]), np.array([61.1, 60.9, 61.0])
+    >>> found = combine([Sample(early), Sample(late)])
+    >>> round(found.mean.value, 2), round(found.mean.u, 2), round(found.scatter.value, 2), round(found.between.value, 2)
+    (60.5, 0.5, 0.1, 0.7)
+    """
+    limits = [_checked(run.limits) for run in runs]
+    numbers = np.array([one.size for one in limits])
+    within = int(numbers.sum()) - len(runs)
+    if len(runs) == 1:
+        return summarize(runs[0])
+    if within == 0:
+        known = [run.u for run in runs if run.u is not None]
+        steps = [run.steps for run in runs if run.steps is not None]
+        u, widths = (np.concatenate(one) if len(one) == len(runs) else None for one in (known, steps))
+        found = summarize(Sample(np.concatenate(limits), u, widths))
+        return replace(found, trend=None, trend_p=None, runs=len(runs))
+    means = np.array([one.mean() for one in limits])
+    square = sum(float(np.sum((one - one.mean()) ** 2)) for one in limits) / within
+    own = np.maximum(square / numbers, [run.least for run in runs])
+    between = _between(means, own)
+    weights = _weights(own + between)
+    mean = float(weights @ means)
+    by_scatter = float(weights**2 @ (own + between))
+    step = _common_error(math.sqrt(square + between), math.sqrt(float(np.mean([run.step**2 for run in runs]))))
+    variance = by_scatter + step**2
+    first = np.cumsum(numbers) - numbers
+    return Statistics(
+        mean=Estimate(mean, math.sqrt(variance), "Hz"),
+        scatter=_with_own_u(math.sqrt(square), within),
+        n=int(numbers.sum()),
+        trend=None,
+        trend_p=None,
+        outliers=tuple(int(start) + i for start, one in zip(first, limits, strict=True) for i in outliers_of(one)),
+        step=step,
+        freedom=_freedom(variance, by_scatter, len(runs) - 1 if between > 0 else within),
+        runs=len(runs),
+        between=_with_own_u(math.sqrt(between), len(runs) - 1),
+    )
+
+
+def _checked(limits: Array) -> Array:
+    if limits.size == 0:
         raise TooFewReadings(seen=0, needed=1)
     for i, value in enumerate(limits.tolist()):
         if not math.isfinite(value):
             raise NotFinite(quantity="limit", index=i, value=value)
         if value <= 0:
             raise NotPositive(quantity="limit", unit="Hz", index=i, value=value)
-    mean = float(limits.mean())
-    if n < FEWEST:
-        own = None if u is None else float(u[0])
-        return Statistics(Estimate(mean, own, "Hz"), None, n, None, None, ())
-    scatter = float(limits.std(ddof=1))
-    spread = Estimate(scatter, scatter / math.sqrt(2 * (n - 1)), "Hz")  # GUM E.4.3
-    trend, p = _trend(limits) if n >= FEWEST_FOR_SHAPE and scatter > 0 else (None, None)
-    return Statistics(Estimate(mean, scatter / math.sqrt(n), "Hz"), spread, n, trend, p, outliers_of(limits))
+    return limits
+
+
+def _with_own_u(scatter: float, freedom: int) -> Estimate:
+    """A standard deviation and its uncertainty (GUM E.4.3)."""
+    return Estimate(scatter, scatter / math.sqrt(2 * freedom), "Hz")
+
+
+def _freedom(variance: float, by_scatter: float, freedom: int) -> float:
+    """Of a variance of which only a part is from a scatter (Welch and Satterthwaite, GUM G.4)."""
+    return math.inf if by_scatter == 0 else freedom * (variance / by_scatter) ** 2
+
+
+def _between(means: Array, own: Array) -> float:
+    """The variance between runs [Hz²], from the runs' means and the variances that their tops leave to them."""
+    wanted = means.size - 1
+
+    def excess(between: float) -> float:
+        if not (own + between > 0).all():
+            return math.inf if np.ptp(means) > 0 else -1.0
+        weights = _weights(own + between)
+        return float(np.sum((means - weights @ means) ** 2 / (own + between))) - wanted
+
+    if excess(0.0) <= 0:
+        return 0.0
+    low, high = 0.0, float(np.ptp(means)) ** 2
+    for _ in range(100):  # halved until rounding ends it
+        middle = (low + high) / 2
+        low, high = (middle, high) if excess(middle) > 0 else (low, middle)
+    return high
+
+
+def _weights(variances: Array) -> Array:
+    """Inverse variances, of the sum 1; all alike where there is no variance at all."""
+    if not (variances > 0).all():
+        return np.full(variances.size, 1 / variances.size)
+    inverse = variances.min() / variances
+    return np.asarray(inverse / inverse.sum())
+
+
+def _common_error(scatter: float, step: float) -> float:
+    """The standard uncertainty that steps of the drive leave to a mean of ever so many limits [Hz].
+
+    A limit within a step is given as the middle of the step, wrong by step/√12.  Two tops share that error if they fall
+    into the same step, and do not if they scatter over several: of tops with a true scatter σ its correlation is
+    ρ = (6/π²) Σ exp(−4π²k²σ²/step²)/k², and the scatter that is seen has s² = σ² + (1 − ρ) step²/12.
+
+    Args:
+        scatter: that is seen, s [Hz].
+        step: [Hz].
+    """
+    if step == 0:
+        return 0.0
+    wanted, low, high = (scatter / step) ** 2, 0.0, 0.5
+    if wanted >= high + 1 / 12:  # ρ is 1e-9 there
+        return 0.0
+    k = np.arange(1, 200)
+
+    def correlation(square: float) -> float:
+        return float(6 / math.pi**2 * np.sum(np.exp(-4 * (math.pi * k) ** 2 * square) / k**2)) if square else 1.0
+
+    for _ in range(40):
+        middle = (low + high) / 2
+        low, high = (middle, high) if middle + (1 - correlation(middle)) / 12 < wanted else (low, middle)
+    return step * math.sqrt(correlation(low) / 12)
 
 
 def _trend(limits: Array) -> tuple[Estimate, float]:
@@ -149,11 +318,11 @@ def _trend(limits: Array) -> tuple[Estimate, float]:
     return Estimate(slope, u, "Hz"), 0.0 if u == 0 else _by_chance(slope / u, limits.size - 2)
 
 
-def _by_chance(t: float, freedom: int) -> float:
-    """How probable |t| or more is under Student's law."""
-    from scipy.special import stdtr  # scipy.stats takes a second to load
+def _by_chance(t: float, freedom: float) -> float:
+    """How probable |t| or more is under Student's law, the normal one where freedom is infinite."""
+    from scipy.special import ndtr, stdtr  # scipy.stats takes a second to load
 
-    return float(2 * stdtr(freedom, -abs(t)))
+    return float(2 * (ndtr(-abs(t)) if math.isinf(freedom) else stdtr(freedom, -abs(t))))
 
 
 def outliers_of(limits: Array) -> tuple[int, ...]:
@@ -211,7 +380,7 @@ def compare(found: Statistics, name: str, expected: float) -> Comparison:
     u = found.mean.u
     p = None
     if found.n >= FEWEST and u:
-        p = _by_chance(difference / u, found.n - 1)
+        p = _by_chance(difference / u, found.freedom)
     return Comparison(name, expected, Estimate(difference, u, "Hz"), p)
 
 

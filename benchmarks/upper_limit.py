@@ -5,7 +5,8 @@
 
 The top of the scene `spindown` (24.3 g, moment tilted by 1.8°, drag of a laminar disc), locked to the drive at 45 Hz
 with three angles between them.  The drive creeps up in steps of a second until the top falls, or is 1 Hz beside the
-drive.
+drive.  By then it has slipped for some seconds; but it only slows, so its limit lies between the spin a second before
+(or the drive then, if that was lower) and the drive now: the middle of these is given, as `levilab acquire limit` does.
 
 Against it stands the balance of torques.  A drive of amplitude B (of its first harmonic) accelerates the spin by no
 more than α = δ|μ|B/2I₃, half of it because half of a field along one line turns with the top, δ being the part of the
@@ -15,11 +16,15 @@ moment across the axis.  The top leans in step with its moment, which adds δ/((
 Where the drive is strong enough, two things are left: the upper edge of the linear window, and below it a resonance of
 the slow motions.  Sideways the top has two slow modes that turn forwards; where their frequencies differ by that of the
 motion up and down, the three exchange energy, and the swing stays larger afterwards.
+
+And it matters how evenly the drive creeps: the top swings about its drive with a period of some seconds, and steps that
+are long, or of two lengths in turn, set it swinging until it is lost below the balance.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import math
 from dataclasses import dataclass
@@ -35,6 +40,8 @@ from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.kernels.motion import TIME
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
 
     from levilab.simulator.scene import Scene
@@ -44,6 +51,8 @@ TOP = preset("spindown")
 #: Where the creep begins [Hz], how far it goes, the length of a step [s], and the angles of the drive then [turns].
 FROM_HZ, TO_HZ, STEP_S, ANGLES = 45.0, 95.0, 1.0, (0.5, 0.625, 0.75)
 HELD_WITHIN_HZ = 1.0
+#: Lengths of steps that are tried, one after the other in turn [s].
+STEPS = ((0.25,), (0.5,), (1.0,), (1.0, 1.5), (2.0,))
 #: First harmonic of a wave of amplitude 1.
 HARMONIC = {"sine": 1.0, "square": 4 / math.pi}
 #: Amplitudes [T], creeps [Hz/s] and masses [kg] that are tried; the usual ones.
@@ -55,29 +64,48 @@ FIELD_T, STRONG_T, CREEP, FAST = 4e-4, 8e-4, 0.05, 0.1
 
 @dataclass(frozen=True)
 class Loss:
-    """How a creep ended: the drive then [Hz], "lock" or "top"; on the way, second by second, drives [Hz] and swings.
+    """How a creep ended, and on the way, second by second, drives [Hz] and swings.
 
-    aside: largest distance from the axis; up_and_down: highest minus lowest place [m].
+    between: the limit lies between these [Hz]; how: "lock" was lost, or the "top" fell; aside: largest distance from
+    the axis; up_and_down: highest minus lowest place [m].
     """
 
-    drive: float
+    between: tuple[float, float]
     how: str
     drives: list[float]
     aside: list[float]
     up_and_down: list[float]
 
+    @property
+    def limit(self) -> float:
+        """The middle [Hz]."""
+        return sum(self.between) / 2
 
-def creep_up(scene: Scene, waveform: str, field: float, rate: float, *, turns: float, start: float = FROM_HZ) -> Loss:
+    @property
+    def u(self) -> float:
+        """Standard uncertainty, of an even distribution between the two [Hz]."""
+        return (self.between[1] - self.between[0]) / 12**0.5
+
+
+def creep_up(
+    scene: Scene, waveform: str, field: float, rate: float, *, turns: float, steps: Sequence[float] = (STEP_S,)
+) -> Loss:
     """Raise the drive of a locked top until it is lost.
 
-    field: the drive's amplitude [T]; rate [Hz/s]; turns: its phase at the start.
+    field: the drive's amplitude [T]; rate [Hz/s]; turns: its phase at the start; steps: how long the drive stays at a
+    frequency, one after the other in turn [s].
     """
+    start = FROM_HZ
     scene, state, time, step = scene.changed({"start.spin_hz": start}), None, 0.0, None
     drives: list[float] = []
     aside: list[float] = []
     up_and_down: list[float] = []
-    for k in range(round((TO_HZ - start) / (rate * STEP_S)) + 1):
-        drive = start + k * rate * STEP_S
+    low = start
+    begin = 0.0
+    for length in itertools.cycle(steps):
+        drive = start + rate * begin
+        if drive > TO_HZ:
+            break
         driven = scene.changed(
             {
                 "drive.waveform": waveform,
@@ -88,16 +116,19 @@ def creep_up(scene: Scene, waveform: str, field: float, rate: float, *, turns: f
         )
         # the step of the first second holds for twice the spin, too, if it is halved
         step = step or simulate(driven, STEP_S, tolerance=1e-6, rate=None).accuracy.step / 2
-        motion = simulate(driven, STEP_S, tolerance=1e-6, rate=100.0, start=state, step=step)
+        motion = simulate(driven, length, tolerance=1e-6, rate=100.0, start=state, step=step)
         drives.append(drive)
         aside.append(float(np.hypot(motion.position[:, 0], motion.position[:, 1]).max()))
         up_and_down.append(float(np.ptp(motion.position[:, 2])))
         if motion.fell is not None:
-            return Loss(drive, "top", drives, aside, up_and_down)
-        if abs(float(motion.spin_hz.mean()) - drive) > HELD_WITHIN_HZ:
-            return Loss(drive, "lock", drives, aside, up_and_down)
-        state, time, turns = motion.states[-1], float(motion.states[-1, TIME]), turns + drive * STEP_S
-    return Loss(TO_HZ, "held", drives, aside, up_and_down)
+            return Loss((low, drive), "top", drives, aside, up_and_down)
+        spin = float(motion.spin_hz.mean())
+        if abs(spin - drive) > HELD_WITHIN_HZ:
+            return Loss((low, drive), "lock", drives, aside, up_and_down)
+        low = min(spin, drive)
+        state, time, turns = motion.states[-1], float(motion.states[-1, TIME]), turns + drive * length
+        begin += length
+    return Loss((TO_HZ, TO_HZ), "held", drives, aside, up_and_down)
 
 
 def window_edge(scene: Scene) -> float:
@@ -135,38 +166,50 @@ def balance(scene: Scene, waveform: str, field: float, rate: float) -> float:
     return float(brentq(left, lowest, 500.0)) if left(lowest) > 0 else math.nan
 
 
+@dataclass(frozen=True)
+class Case:
+    """A creep that is tried: what it is tried for, and what differs from the usual one."""
+
+    subject: str
+    waveform: str
+    field_t: float
+    creep_hz_per_s: float
+    mass_kg: float = TOP.top.mass_kg
+    steps_s: tuple[float, ...] = (STEP_S,)
+
+
+CASES = (
+    *(Case("amplitude", waveform, field, CREEP) for waveform in HARMONIC for field in AMPLITUDES),
+    *(
+        Case("creep", waveform, field, rate)
+        for waveform, field in (("sine", FIELD_T), ("square", FIELD_T), ("square", STRONG_T))
+        for rate in CREEPS
+    ),
+    *(Case("mass", "square", STRONG_T, FAST, mass_kg=mass) for mass in MASSES),
+    *(Case("steps", "sine", FIELD_T, FAST, steps_s=steps) for steps in STEPS),
+)
+
+
+def entry(case: Case) -> dict[str, Any]:
+    """A case as it is kept: with the limit and how it was lost for each angle, and what theory says."""
+    scene = TOP.changed({"top.mass_kg": case.mass_kg})
+    drive = case.waveform, case.field_t, case.creep_hz_per_s
+    losses = [creep_up(scene, *drive, turns=angle, steps=case.steps_s) for angle in ANGLES]
+    found = vars(case) | {
+        "limit_hz": [round(loss.limit, 3) for loss in losses],
+        "limit_u_hz": [round(loss.u, 3) for loss in losses],
+        "how": [loss.how for loss in losses],
+        "balance_hz": balance(scene, *drive),
+        "window_hz": window_edge(scene),
+        "resonance_hz": resonance_of_three(scene),
+    }
+    print(found, flush=True)
+    return found
+
+
 def study() -> dict[str, Any]:
-    """All creeps; each entry has the waveform, field, creep, mass, and per angle the drive at the loss and how."""
-    entries: list[dict[str, Any]] = []
-
-    def entry(subject: str, waveform: str, field: float, rate: float, mass: float) -> None:
-        scene = TOP.changed({"top.mass_kg": mass})
-        losses = [creep_up(scene, waveform, field, rate, turns=angle) for angle in ANGLES]
-        entries.append(
-            {
-                "subject": subject,
-                "waveform": waveform,
-                "field_t": field,
-                "creep_hz_per_s": rate,
-                "mass_kg": mass,
-                "lost_at_hz": [round(loss.drive, 3) for loss in losses],
-                "how": [loss.how for loss in losses],
-                "balance_hz": balance(scene, waveform, field, rate),
-                "window_hz": window_edge(scene),
-                "resonance_hz": resonance_of_three(scene),
-            }
-        )
-        print(entries[-1], flush=True)
-
-    usual = TOP.top.mass_kg
-    for waveform in HARMONIC:
-        for field in AMPLITUDES:
-            entry("amplitude", waveform, field, CREEP, usual)
-    for waveform, field in (("sine", FIELD_T), ("square", FIELD_T), ("square", STRONG_T)):
-        for rate in CREEPS:
-            entry("creep", waveform, field, rate, usual)
-    for mass in MASSES:
-        entry("mass", "square", STRONG_T, FAST, mass)
+    """All cases, and the swing on the way up of some creeps."""
+    entries = [entry(case) for case in CASES]
     swings = {}
     for field, rate in ((FIELD_T, 0.02), (FIELD_T, CREEP), (STRONG_T, FAST), (STRONG_T, 0.2)):
         loss = creep_up(TOP, "square", field, rate, turns=ANGLES[0])
@@ -186,7 +229,7 @@ _MARKERS = {"lock": "o", "top": "v", "held": "^"}
 
 
 def draw(results: dict[str, Any], path: Path) -> None:
-    """Four panels: amplitude, creep, mass, and the swing on the way up."""
+    """Five panels: amplitude, creep, its steps, mass, and the swing on the way up; and what their signs mean."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
@@ -194,8 +237,8 @@ def draw(results: dict[str, Any], path: Path) -> None:
     from levilab.present.style import STYLE, save_png
 
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(10.5, 8.5), layout="constrained")
-        (amplitude, creep), (mass, swing) = figure.subplots(2, 2)
+        figure = Figure(figsize=(14.5, 8.2), layout="constrained")
+        (amplitude, creep, steps), (mass, swing, signs) = figure.subplots(2, 3)
         _draw_losses(amplitude, results, "amplitude", "field_t", 1e3)
         amplitude.set_xlabel("amplitude of the drive  [mT]")
         amplitude.set_title(f"A weak drive loses the top: drag is stronger ({CREEP:g} Hz/s)", loc="left")
@@ -204,27 +247,54 @@ def draw(results: dict[str, Any], path: Path) -> None:
         creep.set_xticks(CREEPS, [f"{rate:g}" for rate in CREEPS])
         creep.minorticks_off()
         creep.set_title("A fast creep takes torque, a slow one gives the swing time", loc="left")
+        _draw_steps(steps, results)
         _draw_losses(mass, results, "mass", "mass_kg", 1e3)
         mass.set_xlabel("mass of the top  [g]")
         mass.set_title(f"A strong drive reaches the edge of the window (0.8 mT, {FAST:g} Hz/s)", loc="left")
-        for axes in (amplitude, creep, mass):
-            axes.set_ylabel("drive when the top is lost  [Hz]")
+        for axes in (amplitude, creep, steps, mass):
+            axes.set_ylabel("upper limit of the spin  [Hz]")
             axes.axhline(61, color="grey", linewidth=0.8)
             axes.annotate(
-                "thesis 61 Hz", (0.99, 61), xycoords=("axes fraction", "data"), ha="right", va="bottom", color="grey"
+                "thesis 61 Hz", (0.01, 60.5), xycoords=("axes fraction", "data"), va="top", color="grey", fontsize=8
             )
         _draw_swings(swing, results)
+        dot = {"color": "grey", "linestyle": "none"}
         handles = [
             Line2D([], [], color=_COLOURS["sine", False], label="balance of torques, sine"),
             Line2D([], [], color=_COLOURS["square", False], label="the same, square (0.4 mT)"),
             Line2D([], [], color=_COLOURS["square", True], label="the same, square of 0.8 mT"),
             Line2D([], [], color="black", linestyle="--", label="upper edge of the linear window"),
             Line2D([], [], color="#CC79A7", linestyle=":", label="resonance of three slow motions"),
-            Line2D([], [], color="grey", marker="o", linestyle="none", label="simulated: the drive lost the top"),
-            Line2D([], [], color="grey", marker="v", linestyle="none", label="simulated: the top fell"),
+            Line2D([], [], **dot, marker="o", label="simulated: the drive lost the top"),
+            Line2D(
+                [], [], **dot, marker="o", fillstyle="none", label=f"the same, at once: it never held at {FROM_HZ:g} Hz"
+            ),
+            Line2D([], [], **dot, marker="v", label="simulated: the top fell"),
         ]
-        figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=8)
+        signs.axis("off")
+        what = "Top of the scene spindown: 24.3 g, moment tilted by 1.8°,\ndrag of a laminar disc; three angles each"
+        signs.legend(handles=handles, loc="center left", fontsize=9, title=what, alignment="left")
     save_png(figure, path)
+
+
+def _draw_steps(axes: Axes, results: dict[str, Any]) -> None:
+    """The limits of a sine of the usual amplitude, by how even its creep is."""
+    chosen = [one for one in results["entries"] if one["subject"] == "steps"]
+    for k, one in enumerate(chosen):
+        _draw_angles(axes, k, one, _COLOURS["sine", False])
+    axes.axhline(chosen[0]["balance_hz"], color=_COLOURS["sine", False], linewidth=1)
+    labels = [" and ".join(f"{length:g}" for length in one["steps_s"]) for one in chosen]
+    axes.set_xticks(range(len(chosen)), labels)
+    axes.set(xlabel="length of the drive's steps, in turn  [s]", xlim=(-0.5, len(chosen) - 0.5), ylim=(43, 97))
+    axes.set_title(f"Long and uneven steps swing the top (sine, 0.4 mT, {FAST:g} Hz/s)", loc="left")
+
+
+def _draw_angles(axes: Axes, x: float, one: dict[str, Any], colour: str) -> None:
+    """One mark an angle, hollow where the top was lost at once."""
+    for limit, how in zip(one["limit_hz"], one["how"], strict=True):
+        at_once = how == "lock" and limit < FROM_HZ + HELD_WITHIN_HZ
+        style: dict[str, Any] = {"marker": _MARKERS[how], "fillstyle": "none" if at_once else "full"}
+        axes.plot(x, limit, color=colour, markersize=5, alpha=0.7, linestyle="none", **style)
 
 
 def _draw_losses(axes: Axes, results: dict[str, Any], subject: str, key: str, factor: float) -> None:
@@ -240,8 +310,7 @@ def _draw_losses(axes: Axes, results: dict[str, Any], subject: str, key: str, fa
         x = factor * np.array([one[key] for one in mine])
         axes.plot(x, [one["balance_hz"] for one in mine], color=colour, linewidth=1)
         for value, one in zip(x, mine, strict=True):
-            for lost, how in zip(one["lost_at_hz"], one["how"], strict=True):
-                axes.plot(value, lost, color=colour, marker=_MARKERS[how], markersize=5, alpha=0.7, linestyle="none")
+            _draw_angles(axes, value, one, colour)
     x = factor * np.array([one[key] for one in chosen])
     order = np.argsort(x)
     for name, colour, dashes in (("window_hz", "black", "--"), ("resonance_hz", "#CC79A7", ":")):

@@ -30,31 +30,75 @@ class BrokenBlock(Exception):
         super().__init__(seen)
 
 
-def read_block(read: Callable[[int], bytes]) -> bytes:
+@dataclass(frozen=True)
+class BlockForm:
+    """What stands around a block.
+
+    longest_head: signs of a header before it (Siglent: ``C1:WF DAT2,#9…``), none by IEEE 488.2; ends: line feeds
+    behind it.
+    """
+
+    longest_head: int = 0
+    ends: int = 1
+
+
+#: As IEEE 488.2 has it.
+PLAIN_BLOCK = BlockForm()
+
+
+def read_block(read: Callable[[int], bytes], form: BlockForm = PLAIN_BLOCK) -> bytes:
     r"""The block at the head of a stream, and the line end behind it.
 
-    read: exactly so many bytes, or fewer if no more come.  Raises BrokenBlock.
+    read: exactly so many bytes, or fewer if no more come; form: what stands around it.  Raises BrokenBlock.
 
     >>> import io
     >>> read_block(io.BytesIO(b"#15a,\x0a,b\n").read)
     b'a,\n,b'
     """
-    head = read(2)
+    head = _after_header(read, form.longest_head) if form.longest_head else read(2)
     if not _HEAD.fullmatch(head):
         raise BrokenBlock(repr(head))
     size = _size(head, read(head[1] - ord("0")))
     block = read(size)
     if len(block) < size:
         raise BrokenBlock(f"{len(block)} bytes of a block of {size}")
+    for _ in range(form.ends):
+        _read_end(read, size)
+    return block
+
+
+def _read_end(read: Callable[[int], bytes], size: int) -> None:
     end = read(1)
     if end == b"\r":
         end = read(1)
     if end != b"\n":
         raise BrokenBlock(f"a block of {size} bytes that goes on with {end!r}")
-    return block
 
 
-def block_of(message: bytes) -> bytes:
+def _after_header(read: Callable[[int], bytes], longest: int) -> bytes:
+    """The first two bytes of a block behind a header of so many signs at most."""
+    header = b""
+    while len(header) <= longest:
+        sign = read(1)
+        if sign == b"#":
+            return sign + read(1)
+        header += sign
+        if not b" " <= sign <= b"~":
+            break
+    raise BrokenBlock(repr(header))
+
+
+def block(data: bytes, digits: int = 0) -> bytes:
+    """A definite-length block, without a line end.  digits: of its length, by default as few as it needs.
+
+    >>> block(b"abc"), block(b""), block(b"abc", digits=9)
+    (b'#13abc', b'#10', b'#9000000003abc')
+    """
+    size = f"{len(data):0{digits}d}" if digits else str(len(data))
+    return f"#{len(size)}{size}".encode() + data
+
+
+def block_of(message: bytes, form: BlockForm = PLAIN_BLOCK) -> bytes:
     r"""The bytes of a block that came as a whole message.  Raises BrokenBlock.
 
     The line feed behind the block is part of an answer (IEEE 488.2, 8.7.9): without it a block that lost a byte on its
@@ -64,7 +108,7 @@ def block_of(message: bytes) -> bytes:
     b'\x00\n\xff'
     """
     stream = io.BytesIO(message)
-    block = read_block(stream.read)
+    block = read_block(stream.read, form)
     if rest := stream.read().strip(b"\r\n"):
         raise BrokenBlock(f"a block of {len(block)} bytes that goes on with {rest[:20]!r}")
     return block
@@ -86,7 +130,8 @@ class Form:
     An answer that came for another question, or that lost a byte on the line, is recognised by its form only: the
     narrower the form, the fewer of them pass.
 
-    pattern: a regular expression that the whole answer matches, in ASCII; example: an answer in this form.
+    pattern: a regular expression that the whole answer matches, in ASCII; example: an answer in this form; suffix:
+    what may follow a number, a unit (regular expression).
 
     >>> NR3.number("+2.5E+01"), NR1.matches("1_0"), NR1.matches("\u0661")
     (25.0, False, False)
@@ -94,6 +139,7 @@ class Form:
 
     pattern: str
     example: str
+    suffix: str = ""
 
     def matches(self, answer: str) -> bool:
         """Whether the whole answer has this form."""
@@ -101,6 +147,9 @@ class Form:
 
     def number(self, answer: str) -> float:
         """The number in an answer of this form.  Raises ValueError."""
+        if self.suffix:
+            found = _compiled(f"({self.pattern})(?:{self.suffix})?").fullmatch(answer)
+            answer = found[1] if found else ""
         if not self.matches(answer):
             raise ValueError(answer)
         return float(answer)

@@ -25,7 +25,7 @@ def in_one_line(error: ValidationError) -> str:
     more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
     if first["type"] == "extra_forbidden":
         return f"{where} is no key known here{more}"
-    hint = "" if first["type"] == "literal_error" else _hint(first["input"])  # where words are expected
+    hint = "" if first["type"] == "literal_error" else hint_about(first["input"])  # where words are expected
     whole_table = first["type"] == "missing" or isinstance(first["input"], dict)
     seen = "" if whole_table else f" = {str(first['input'])[:60]!r}"
     return f"{where}{seen}: {first['msg']}{hint}{more}"
@@ -41,7 +41,7 @@ _NUMBERS = (
 )
 
 
-def _hint(seen: object) -> str:
-    """What is wrong with a text that was nearly a number."""
+def hint_about(seen: object) -> str:
+    """What is wrong with a text that was nearly a number, as the rest of a sentence; empty for any other."""
     found = (text for pattern, text in _NUMBERS if isinstance(seen, str) and pattern.fullmatch(seen))
     return next(found, "")

@@ -1,15 +1,18 @@
 """PyVISA finds the virtual bench here: ``pyvisa.ResourceManager("@levilab")``.
 
 The library is `instruments.virtual.bench.visa_library`; asked for by its name it stands for a bench with a top of its
-own.  Time-outs cost virtual time only; ``"realtime@levilab"`` keeps to the wall clock.
+own.  Time-outs cost virtual time only; ``"realtime@levilab"`` keeps to the wall clock.  Models other than the first of
+their kind stand there, too: ``"CNT-91,DSOX1000@levilab"``, ``"realtime,CNT-91@levilab"``.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from instruments.catalogue import CATALOGUE
 from instruments.clock import WallClock
 from instruments.virtual.bench.visa_library import LevilabVisaLibrary
+from levilab.bench.config import ConfigError
 from levilab.world.bench import own_world, virtual_bus
 
 if TYPE_CHECKING:
@@ -24,8 +27,24 @@ class PracticeBench(LevilabVisaLibrary):
     """The library that PyVISA makes of a name such as ``"@levilab"``: a fresh bench with a top of its own."""
 
     def default_bench(self) -> Bus:
-        """A top to practise with behind all four instruments."""
-        return virtual_bus(own_world(WallClock() if str(self.library_path) == REALTIME else None))
+        """A top to practise with behind all four instruments.  Raises ConfigError for a word that is no model."""
+        words = [word.strip() for word in str(self.library_path).split(",")]
+        clock = WallClock() if REALTIME in words else None
+        models = [word for word in words if word not in {REALTIME, *map(str, self.get_library_paths())}]
+        return virtual_bus(own_world(clock), dict(map(kind_and_name, models)))
+
+
+def kind_and_name(model: str) -> tuple[str, str]:
+    """The kind of a model, and its name, given in any case.  Raises ConfigError where it is none.
+
+    >>> kind_and_name("cnt-91")
+    ('counter', 'CNT-91')
+    """
+    known = {row.name: kind for kind, rows in CATALOGUE.items() for row in rows}
+    for name, kind in known.items():
+        if name.upper() == model.upper():
+            return kind, name
+    raise ConfigError(f"{model!r} before @levilab is no model: known are {REALTIME}, {', '.join(known)}")
 
 
 WRAPPER_CLASS = PracticeBench

@@ -38,6 +38,7 @@ from analysis.locked import slip_of
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.present.progress import Mute
+from levilab.simulator import preset
 
 HERE = Path(__file__).parent
 NOISE_HZ, STEP_S, DIGIT_HZ = 0.03, 10.0, 0.01
@@ -104,49 +105,62 @@ def solve(c1: float, c2: float, n: int) -> tuple[Array, Array, dict[str, float]]
 
 #: Upper limits: mean and scatter of the simulated bench (sine of 0.4 mT, creep of 0.1 Hz/s), tops, creep and how often
 #: the top is looked at; axial inertia, drag, and the coupling of the loose washers, which all the drag acts on.
-UPPER_HZ, UPPER_SCATTER_HZ, TOPS, CREEP_HZ_S, LOOK_S = 67.0, 2.0, 8, 0.1, 2.0
+UPPER_HZ, UPPER_SCATTER_HZ, TOPS, CREEP_HZ_S, LOOK_S = 69.0, 1.4, 8, 0.1, 2.0
 AXIAL_KG_M2, DRAG, COUPLING_N_M_S = 1.731314e-6, 2.34e-4, 1e-6
 HELD_HZ, COUNTS, COUNT_SCATTER_HZ = 30.0, 40, 0.08
+#: A top that is lost slows by so much, the drive goes on; it is missed when it is so far behind.  The tape was compared
+#: with the drive so far below.
+SLOWS_HZ_S, MISSED_HZ, BELOW_HZ = 0.15, 1.0, 7.0
 UPPER_CHANNELS = [
     {"name": "time_s", "unit": "s", "source": "made up, when the top was lost"},
     {"name": "spin_frequency_hz", "unit": "Hz", "source": "made up, spin up to which the top followed the drive"},
-    {"name": "spin_frequency_u_hz", "unit": "Hz", "source": "the drive's step between two looks, over the root of 12"},
-    {"name": "spin_seen_hz", "unit": "Hz", "source": "made up, the last one counted of the held top"},
-    {"name": "drive_frequency_hz", "unit": "Hz", "source": "made up, the last one at which the top was held"},
+    {"name": "spin_frequency_u_hz", "unit": "Hz", "source": "width of what it lies within, over the root of 12"},
+    {"name": "spin_seen_hz", "unit": "Hz", "source": "made up, the last one counted before the top was missed"},
+    {"name": "drive_frequency_hz", "unit": "Hz", "source": "made up, the one at that time"},
     {"name": "drive_amplitude_v", "unit": "V", "source": "made up, half of peak to peak"},
 ]
 UPPER_HOW = (
-    "SYNTHETIC: upper limits drawn from a normal law about 67 Hz with a scatter of 2 Hz, as the simulated bench gives "
-    "with a sine of 0.4 mT and a creep of 0.1 Hz/s; {washers}; made by sample_data/make.py"
+    "SYNTHETIC: upper limits drawn from a normal law about 69 Hz with a scatter of 1.4 Hz, as the simulated bench "
+    "gives with a sine of 0.4 mT and a creep of 0.1 Hz/s; each top then slips for some seconds until it is 1 Hz "
+    "behind; {washers}; made by sample_data/make.py"
 )
+UPPER_SETTINGS = {
+    "which": "upper",
+    "drive_frequency_hz": HELD_HZ,
+    "drive_waveform": "SIN",
+    "drive_amplitude_vpp": 10.0,
+    "creep_hz_per_s": CREEP_HZ_S,
+    "interval_s": LOOK_S,
+}
 
 
-def upper_limits(name: str, seed: int, *, loose: bool) -> None:
-    """A run of upper limits.  loose: the washers slip, and the tape on them turns slower than the top."""
+def upper_limits(name: str, scene: str, seed: int, *, loose: bool) -> None:
+    """A run of upper limits.  scene: that of the top; loose: the washers slip, and the tape on them turns slower."""
     random = np.random.default_rng(seed)
     rows, events, time = [], [], 0.0
-    step = CREEP_HZ_S * LOOK_S
     for _ in range(TOPS):
         limit = float(random.normal(UPPER_HZ, UPPER_SCATTER_HZ))
-        held = HELD_HZ + step * np.floor((limit - HELD_HZ) / step)
-        time += 60.0 + (held - HELD_HZ) / CREEP_HZ_S
-        for drive, seconds in ((HELD_HZ, time - (held - HELD_HZ) / CREEP_HZ_S), (float(held), time)):
+        missed, held, seen = when_missed(limit, slip_hz(limit) * loose)
+        time += 60.0 + (missed - HELD_HZ) / CREEP_HZ_S
+        for drive, seconds in ((HELD_HZ, time - (missed - HELD_HZ) / CREEP_HZ_S), (held - BELOW_HZ, time)):
             counts = drive - slip_hz(drive) * loose + random.normal(0, COUNT_SCATTER_HZ, COUNTS)
             slip = slip_of(counts.round(3).tolist(), drive)
             text = f"held at {drive:.2f} Hz: counted {slip.spin:.3f} Hz, {slip.difference:+.3f} Hz beside the drive"
             events.append({"time_s": round(seconds, 1), "kind": "held", "text": text})
             if slip.warning:
                 events.append({"time_s": round(seconds, 1), "kind": "warning", "text": slip.warning})
-        middle = held + step / 2
+        seen += float(random.normal(0, COUNT_SCATTER_HZ))
+        low = min(held, seen)
+        middle, u = (low + missed) / 2, (missed - low) / 12**0.5
         text = f"the drive lost the top at {middle:.2f} Hz"
         events.append({"time_s": round(time, 1), "kind": "lock lost", "text": text})
-        rows.append(f"{time:.1f},{middle:.2f},{step / 12**0.5:.4f},{counts[-1]:.3f},{held:.2f},5")
+        rows.append(f"{time:.1f},{middle:.3f},{u:.4f},{seen:.3f},{held:.2f},5")
     how = f"washers that slip by I3 C omega^1.5/k, k = {COUPLING_N_M_S:g} N m s" if loose else "sound washers"
     record = {
         "experiment": "limit",
         "started_utc": None,
         "channels": UPPER_CHANNELS,
-        "configuration": {"limit": {"which": "upper"}},
+        "configuration": {"limit": UPPER_SETTINGS, "scene": preset(scene).as_table()},
         "note": "a locked top whose washers are loose" if loose else "how far the drive takes the top",
         "synthetic": True,
         "synthetic_how": UPPER_HOW.format(washers=how),
@@ -154,6 +168,21 @@ def upper_limits(name: str, seed: int, *, loose: bool) -> None:
     write(HERE / name, ",".join(channel["name"] for channel in UPPER_CHANNELS), rows, record)
     lines = [json.dumps(event, ensure_ascii=False) + "\n" for event in events]
     (HERE / name / "events.jsonl").write_text("".join(lines), encoding="utf-8", newline="\n")
+
+
+def when_missed(limit: float, slip: float) -> tuple[float, float, float]:
+    """The drive at the first look at which a top is missed, and the drive and the counted spin at the look before [Hz].
+
+    limit: the drive at which the top was lost; slip: by how much its tape turns slower [Hz].
+    """
+    step = CREEP_HZ_S * LOOK_S
+    drive, spin, before = HELD_HZ, HELD_HZ - slip, (HELD_HZ, HELD_HZ - slip)
+    while drive - spin <= MISSED_HZ:
+        before = drive, spin
+        drive += step
+        since = max(0.0, (drive - limit) / CREEP_HZ_S)
+        spin = min(drive, limit) - SLOWS_HZ_S * since - slip
+    return drive, *before
 
 
 def slip_hz(spin_hz: float) -> float:
@@ -456,8 +485,8 @@ def main() -> None:
             "configuration": {"limit": {"which": "lower"}},
         },
     )
-    upper_limits("upper-limits", seed=1, loose=False)
-    upper_limits("loose-washers", seed=2, loose=True)
+    upper_limits("upper-limits", "spindown", seed=1, loose=False)
+    upper_limits("loose-washers", "loose-washers", seed=2, loose=True)
     for name, how_made in TRACES.items():
         write_traces(name, *how_made)
     from_the_virtual_bench("field", "field-scan", 11, "a base as in device.toml, heights set by hand to 0.2 mm")

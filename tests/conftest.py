@@ -2,12 +2,45 @@
 
 import os
 import signal
+import sys
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
 #: Makes the golden data, with a package that the tests do not need.
 collect_ignore = ["golden/make_trajectories.py"]
+
+#: Files and folders that take more than two seconds of a processor, or compile the simulator: `make quick` leaves them
+#: out.  A test is slow, too, where it is marked so itself.
+SLOW = """
+    analysis/precession/test_sweep.py  analysis/pulses/test_trace.py
+    analysis/spindown/test_fit.py  analysis/spindown/test_tilt.py
+    instruments/virtual/bench/test_fuzz.py  instruments/virtual/core/test_long_lines.py
+    instruments/virtual/servers/test_at_work.py
+    instruments/wire_faults
+    levilab/acquisition/test_limit.py  levilab/acquisition/test_loop.py  levilab/acquisition/test_losses.py
+    levilab/acquisition/test_precession.py
+    levilab/benchmark  levilab/cli/test_main.py  levilab/crosscheck  levilab/motion
+    levilab/pipelines/spindown  levilab/pipelines/test_result.py
+    levilab/report/test_page.py
+    levilab/runs/test_hostile.py  levilab/runs/test_kill.py
+    levilab/simulator
+    levilab/world/test_motion_world.py  levilab/world/test_serve.py  levilab/world/test_spin_world.py
+    test_documentation.py
+"""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what is slow, and let it go first: at the end no worker waits for another's long test."""
+    tests = Path(__file__).parent
+    slow = [tests / name for name in SLOW.split()]
+    assert all(path.exists() for path in slow), "SLOW in tests/conftest.py names a file that is gone"
+    for item in items:
+        if any(item.path.is_relative_to(path) for path in slow):
+            item.add_marker(pytest.mark.slow)
+    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+
 
 # What is green stays green: the same examples each time, however busy the machine. `make explore` looks for others.
 settings.register_profile("repeat", derandomize=True, deadline=None)
@@ -22,3 +55,13 @@ def signals_as_at_a_terminal():
         number = getattr(signal, name, None)
         if number and signal.getsignal(number) is signal.SIG_IGN:
             signal.signal(number, signal.default_int_handler if name == "SIGINT" else signal.SIG_DFL)
+
+
+@pytest.fixture(autouse=True)
+def practice_bench_is_fresh():
+    """PyVISA keeps one library of a name: without this a test would find the top as the one before has left it."""
+    if "pyvisa_levilab" in sys.modules:
+        import pyvisa
+
+        for name in ("@levilab", "realtime@levilab"):
+            pyvisa.ResourceManager(name).visalib.bus = None

@@ -28,6 +28,7 @@ from analysis.errors import (
 )
 from analysis.field.ring import Ring, on_axis, reversal, slopes
 from analysis.least_squares import solve
+from analysis.numbers import digits
 from analysis.residuals import durbin_watson, gross_errors, runs_test_p, studentised
 from analysis.uncertainty import Estimate, curvature
 
@@ -435,14 +436,15 @@ def _misfit(statistics: Statistics) -> tuple[float, list[str]]:
         return 1.0, []
     if float(chdtrc(statistics.degrees_of_freedom, statistics.chi_square)) < NO_FIT:
         text = (
-            f"the fit leaves more than the stated uncertainties explain (χ²/dof = {reduced:.3g}): all uncertainties "
-            f"are enlarged by {math.sqrt(reduced):.3g}; is the probe on the axis, and are the radii right?"
+            f"the fit leaves more than the stated uncertainties explain (χ²/dof = {digits(reduced, 3)}): all "
+            f"uncertainties are enlarged by {digits(math.sqrt(reduced), 3)}; is the probe on the axis, and are the "
+            "radii right?"
         )
         return reduced, [text]
     if float(chdtr(statistics.degrees_of_freedom, statistics.chi_square)) < _TOO_GOOD:
         text = (
-            f"the readings scatter far less than their stated uncertainties (χ²/dof = {reduced:.2g}): what is common "
-            "to all of them, such as the scale of the instrument, belongs into gain_u and background_u_t"
+            f"the readings scatter far less than their stated uncertainties (χ²/dof = {digits(reduced)}): what is "
+            "common to all of them, such as the scale of the instrument, belongs into gain_u and background_u_t"
         )
         return 1.0, [text]
     return 1.0, []
@@ -483,7 +485,7 @@ def _doubts(scan: FieldScan) -> list[str]:
             texts.append(
                 f"the scan wants {_WORDS[name]} = {times * found.value:.4g} {unit}, which lies "
                 f"{abs(found.value - prior.value) / prior.u:.1f} u from the stated {times * prior.value:.4g} {unit} "
-                f"(u = {times * prior.u:.2g} {unit}): measure it again, and where the heights are counted from"
+                f"(u = {digits(times * prior.u)} {unit}): measure it again, and where the heights are counted from"
             )
     low, strength = scan.parameters["strength"].value, scan.parameters["strength"].u
     if low is not None and strength is not None and abs(low) < 3 * strength:

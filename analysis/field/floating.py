@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from analysis.field.fit import FieldScan
 from analysis.field.magnet import Disc, axial_field, stiffnesses
 from analysis.field.ring import Ring
+from analysis.numbers import digits
 from analysis.stability import AxialField, Symmetric, Window, equilibria, windows
 from analysis.uncertainty import Estimate, propagate
 
@@ -244,7 +245,7 @@ def _doubts(found: Floating, top: KnownTop) -> list[str]:
     u = found.values["mass_to_set"].u
     if u is not None and u > width / 4:
         texts.append(
-            f"the mass to set is known to {1e3 * u:.2g} g only, and the window is {1e3 * width:.2g} g wide: "
+            f"the mass to set is known to {digits(1e3 * u)} g only, and the window is {digits(1e3 * width)} g wide: "
             "try masses about it; the height at which one floats tells the moment"
         )
     return texts

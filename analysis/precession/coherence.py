@@ -23,6 +23,8 @@ LOCKED_P = 1e-3
 _STAYS = 1.0
 #: Phases are means over this [s]: short against the swing of a locked top, some seconds.
 _WINDOW_S = 0.4
+#: Samples of a part of the drive's record from which on it has a phase.
+_FEWEST_SAMPLES = 8
 #: Part of the signal's height by which it must fall back before a pulse can begin anew: noise makes no pulses.
 _HYSTERESIS = 0.25
 
@@ -65,13 +67,13 @@ def coherence(pulse_times: Array, drive: Array, dt: float, drive_frequency: floa
 
     Args:
         pulse_times: shape (n,), increasing [s].
-        drive: the drive's voltage, evenly sampled, shape (m,); its first harmonic counts.
+        drive: the drive's voltage, evenly sampled, NaN where one is missing, shape (m,); its first harmonic counts.
         dt: between its samples [s].
         drive_frequency: near the drive's, to better than one period in the record [Hz].
         start: time of its first sample [s].
 
     Raises:
-        TooFewReadings: below five pulses.
+        TooFewReadings: below five pulses, or hardly a sample of the drive.
     """
     if pulse_times.size < FEWEST_PULSES:
         raise TooFewReadings(seen=pulse_times.size, needed=FEWEST_PULSES)
@@ -109,9 +111,16 @@ def first_harmonic(signal: Array, dt: float, near: float) -> tuple[float, float]
     """Frequency [Hz] and phase of the cosine at the first sample [rad] of a periodic signal's first harmonic.
 
     The phases of sixteenths of the record, each a least-squares cosine, lie on a line whose slope corrects the
-    frequency.  near: the frequency to better than one period in the record [Hz].
+    frequency.  near: the frequency to better than one period in the record [Hz].  Missing samples are NaN; a part of
+    which hardly any are left is left out.
+
+    Raises:
+        TooFewReadings: below two parts.
     """
     parts = np.array_split(np.arange(signal.size), 16 if near * dt * signal.size > 32 else 2)
+    parts = [seen for part in parts if (seen := part[np.isfinite(signal[part])]).size >= _FEWEST_SAMPLES]
+    if len(parts) < 2:
+        raise TooFewReadings(seen=int(np.isfinite(signal).sum()), needed=2 * _FEWEST_SAMPLES)
     times = np.array([dt * (part[0] + part[-1]) / 2 for part in parts])
     phases = []
     for part, middle in zip(parts, times, strict=True):
@@ -126,12 +135,18 @@ def first_harmonic(signal: Array, dt: float, near: float) -> tuple[float, float]
 def pulse_times(signal: Array, dt: float, start: float = 0.0) -> Array:
     """When a beam is cut, shape (n,) [s]: the middle of each dip of its signal, between its flanks at half height.
 
+    A dip in which samples are missing is left out.
+
     Args:
-        signal: shape (m,) [V].
+        signal: shape (m,) [V], NaN where a sample is missing.
         dt: between samples [s].
         start: time of the first [s].
     """
-    signal = -signal
+    missing = ~np.isfinite(signal)
+    if missing.all():
+        return np.empty(0)
+    index = np.arange(signal.size)
+    signal = -np.interp(index, index[~missing], signal[~missing])
     low, high = (float(level) for level in np.percentile(signal, [0.5, 99.5]))
     middle = (low + high) / 2
     lower = middle - _HYSTERESIS * (high - low)
@@ -150,7 +165,9 @@ def pulse_times(signal: Array, dt: float, start: float = 0.0) -> Array:
     flanks = [
         (_crossing(signal, middle, up), _crossing(signal, middle, down)) for up, down in zip(ups, downs, strict=False)
     ]
-    return np.array([start + dt * (a + b) / 2 for a, b in flanks])
+    lost = np.concatenate([[0], np.cumsum(missing)])  # samples missing before each
+    whole = [(a, b) for a, b in flanks if lost[math.ceil(b) + 1] == lost[math.floor(a)]]
+    return np.array([start + dt * (a + b) / 2 for a, b in whole])
 
 
 def _last_above(signal: Array, level: float, k: int) -> int:

@@ -8,11 +8,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.precession.gates import Gates, pulses_too_many, whole_counts
 from analysis.uncertainty import Estimate
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 Array = NDArray[np.float64]
 
@@ -64,8 +69,7 @@ class Miscount:
             part = {(1, 2): "half", (2, 1): "twice"}.get(self.times, f"{above}/{below} of")
             return f"{part} the frequency was counted"
         if self.counts is not None:
-            pulses, much = abs(self.counts), "many" if self.counts > 0 else "few"
-            return f"{pulses} pulse{'s' * (pulses > 1)} a gate too {much}"
+            return f"{pulses_too_many(self.counts)} in each gate"
         return "far off the line, and no miscount explains it"
 
 
@@ -109,7 +113,15 @@ def _median_slope(x: Array, y: Array) -> tuple[float, float, float]:
     return float(np.median(slopes)), float(slopes[low]), float(slopes[high])
 
 
-def find_miscounts(x: Array, y: Array, u: Array | None, robust: Robust, gate_s: float | None = None) -> list[Miscount]:
+def find_miscounts(
+    x: Array,
+    y: Array,
+    u: Array | None,
+    robust: Robust,
+    *,
+    gate_s: float | None = None,
+    gates: Sequence[Gates] | None = None,
+) -> list[Miscount]:
     """The points far off the median line, with what was counted there.
 
     Args:
@@ -117,7 +129,8 @@ def find_miscounts(x: Array, y: Array, u: Array | None, robust: Robust, gate_s: 
         y: shape (n,) [Hz].
         u: standard uncertainty of y, shape (n,) [Hz], if it is known.
         robust: the median line.
-        gate_s: of the counter [s]; without it whole counts cannot be told.
+        gate_s: of the counter [s]; without it, and without gates, whole counts cannot be told.
+        gates: behind each point, where they are known: then each of them has to be off by the same counts.
     """
     line = float(robust.intercept.value or 0.0) + float(robust.slope.value or 0.0) * x
     usual = np.maximum(robust.scatter, 1e-9 * np.abs(line))
@@ -125,8 +138,14 @@ def find_miscounts(x: Array, y: Array, u: Array | None, robust: Robust, gate_s: 
     found = []
     for i in np.flatnonzero(np.abs(y - line) > FAR * deviation).tolist():
         sigma, expected = float(deviation[i]), float(line[i])
-        found.append(Miscount(i, _times(float(y[i]), expected, sigma), _counts(float(y[i]) - expected, sigma, gate_s)))
-    return [Miscount(one.index, one.times) if one.times else one for one in found]
+        times = _times(float(y[i]), expected, sigma)
+        if times is not None:
+            found.append(Miscount(i, times))
+        elif gates is not None:
+            found.append(Miscount(i, counts=whole_counts(gates[i], expected) or None))
+        else:
+            found.append(Miscount(i, counts=_counts(float(y[i]) - expected, sigma, gate_s)))
+    return found
 
 
 def _times(y: float, expected: float, sigma: float) -> tuple[int, int] | None:

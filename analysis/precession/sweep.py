@@ -8,14 +8,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.errors import NotFinite, NotPositive, ShapesDiffer
+from analysis.numbers import digits
 from analysis.precession.line import FEWEST, NO_FIT, Line, fit_line, fit_orthogonal, influence
 from analysis.precession.miscounts import Miscount, Robust, find_miscounts, robust_line
 from analysis.precession.power import Power, what_it_takes
+
+if TYPE_CHECKING:
+    from analysis.precession.gates import Gates
 
 Array = NDArray[np.float64]
 
@@ -25,6 +30,8 @@ EXCLUDED_P = 0.01
 _FAR, _HEAVY = 3.5, 3.0
 #: An uncertainty of the drive that matters: so large a share of that of the precession.
 _MATTERS = 0.3
+#: Shares of u in the drive's frequency that differ by less than this are one clock's.
+_ONE_CLOCK = 1e-3
 #: A spin that differs from the drive's frequency by so many u, and by this share at least, is a symptom.
 _SPIN_FAR, _SPIN_SHARE = 5.0, 1e-3
 
@@ -94,7 +101,10 @@ class SweepFit:
 
 @dataclass(frozen=True)
 class Sweep:
-    """What was measured, shape (n,) each [Hz]; u and the spin where they are known.  gate_s: of the counter [s]."""
+    """What was measured, shape (n,) each [Hz]; u and the spin where they are known.
+
+    gate_s: of the counter [s]; gates: of the laser behind each point, where they are known.
+    """
 
     drive: Array
     precession: Array
@@ -103,6 +113,7 @@ class Sweep:
     spin: Array | None = None
     u_spin: Array | None = None
     gate_s: float | None = None
+    gates: tuple[Gates, ...] | None = None
 
 
 def fit_sweep(sweep: Sweep, *, orthogonal: bool = False, keep_miscounts: bool = False) -> SweepFit:
@@ -122,7 +133,7 @@ def fit_sweep(sweep: Sweep, *, orthogonal: bool = False, keep_miscounts: bool = 
     _check(sweep)
     fit_line(sweep.drive, sweep.precession)  # raises for what no line goes through
     robust = robust_line(sweep.drive, sweep.precession)
-    found = find_miscounts(sweep.drive, sweep.precession, sweep.u, robust, sweep.gate_s)
+    found = find_miscounts(sweep.drive, sweep.precession, sweep.u, robust, gate_s=sweep.gate_s, gates=sweep.gates)
     used, warnings = _used(sweep, found, keep=keep_miscounts)
     chosen = _part(sweep, used)
     line = _fitted(chosen, orthogonal=orthogonal)
@@ -273,7 +284,11 @@ def _doubts(fit: SweepFit, sweep: Sweep, found: list[Miscount]) -> list[str]:
     texts = []
     for one in found:
         point = fit.points[one.index]
-        gate = "" if sweep.gate_s else "; whether whole pulses are missing only the counter's gate could say"
+        gate = (
+            ""
+            if sweep.gate_s or sweep.gates
+            else "; whether whole pulses are missing only the counter's gate could say"
+        )
         what = one.text if one.named else f"{one.text}{gate} (it stays in)"
         out = "" if point.used or not one.named else ", left out of the line"
         texts.append(
@@ -282,18 +297,19 @@ def _doubts(fit: SweepFit, sweep: Sweep, found: list[Miscount]) -> list[str]:
     line = fit.line
     if line.p_fit is not None and not line.u_known:
         texts.append(
-            f"the points scatter {line.scale:.2g} times as much as their u says (p = {line.p_fit:.1g}): "
+            f"the points scatter {digits(line.scale)} times as much as their u says (p = {digits(line.p_fit, 1)}): "
             "all uncertainties are enlarged by that"
         )
     if line.chi_square is not None and line.p_fit is not None and 1 - line.p_fit < NO_FIT:
         texts.append(
-            "the points scatter much less than their u says: the swing of a locked top about the drive is in it, and "
-            "comes back to where it was"
+            f"the points scatter much less than their u says (χ² of {digits(line.chi_square)} for "
+            f"{line.degrees_of_freedom} degrees of freedom): their u is too large, and so is that of the line; gates "
+            "in a row scatter more than their mean, for a locked top swings about its drive and comes back"
         )
     if fit.p_locked is None:
         texts.append("the points lie on the line to the last digit: without their u nothing can be tested; give it")
     texts += [
-        f"point {k}, at {p.drive:.5g} Hz, alone moves the slope by {abs(p.slope_change):.2g}, {share:.1f} of its u"
+        f"point {k}, at {p.drive:.5g} Hz, alone moves the slope by {digits(abs(p.slope_change))}, {share:.1f} of its u"
         for k, p in enumerate(fit.points, 1)
         if p.slope_change is not None and line.u_slope and (share := abs(p.slope_change) / line.u_slope) > _FAR
     ]
@@ -305,16 +321,29 @@ def _doubts(fit: SweepFit, sweep: Sweep, found: list[Miscount]) -> list[str]:
         if p.leverage is not None and p.leverage > max(heavy, 0.9)
     ]
     if not line.orthogonal and sweep.u is not None and sweep.u_drive is not None:
-        worst = float(np.max(sweep.u_drive / sweep.u))
-        if worst > _MATTERS:
-            texts.append(
-                f"u of the drive's frequency is up to {worst:.2g} of that of the precession: let it count with "
-                "`orthogonal` = True"
-            )
+        texts += _about_drive(sweep.drive, sweep.u_drive, sweep.u, line)
     if line.orthogonal and (sweep.u is None or sweep.u_drive is None):
         texts.append("u of the drive's frequency is not known and taken as large as that of the precession")
     texts += _about_spin(fit, sweep)
     return texts
+
+
+def _about_drive(drive: Array, u_drive: Array, u: Array, line: Line) -> list[str]:
+    """Whether u of the drive's frequency matters.
+
+    One that is the same share of it at all points is that of a clock: all points are off by one factor, which moves the
+    slope by it and no point beside the line, so it does not ask for another regression.
+    """
+    share = float(np.median(u_drive / drive))
+    if np.ptp(u_drive / drive) > _ONE_CLOCK * share:
+        worst = float(np.max(u_drive / u))
+        text = f"u of the drive's frequency is up to {digits(worst)} of that of the precession"
+        return [f"{text}: let it count with `orthogonal` = True"] if worst > _MATTERS else []
+    of_slope = share * abs(line.slope)
+    if line.u_slope is None or of_slope <= _MATTERS * line.u_slope:
+        return []
+    text = f"u of the drive's frequency is {digits(share)} of it at all points, as that of a clock"
+    return [f"{text}: the slope is uncertain by {digits(of_slope)} beside its u of {digits(line.u_slope)}"]
 
 
 def _about_spin(fit: SweepFit, sweep: Sweep) -> list[str]:
@@ -328,7 +357,7 @@ def _about_spin(fit: SweepFit, sweep: Sweep) -> list[str]:
         return []
     where = "below" if offset < 0 else "above"
     text = (
-        f"the spin that was counted lies {abs(offset):.3g} Hz {where} the drive: a locked top spins with it; is the "
-        "tape on a loose washer, or was the top not locked?"
+        f"the spin that was counted lies {digits(abs(offset), 3)} Hz {where} the drive: a locked top spins with it; is "
+        "the tape on a loose washer, or was the top not locked?"
     )
     return [text]

@@ -7,21 +7,29 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.pulses.regression import median
+from analysis.errors import TooFewPulses
+from analysis.pulses.regression import Fit, median
 from analysis.pulses.result import Finding
-from analysis.pulses.search import WIDE, noise_of, shorten
+from analysis.pulses.search import WIDE, find_events, noise_of, shorten
+from analysis.pulses.times import FEWEST, fit_train
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+#: Frequencies [Hz] and amplitudes.
+Lines = tuple[tuple[float, float], ...]
 
 #: Mains and its multiples [Hz], and how far from nominal a grid strays [Hz].
 MAINS, STRAYS = (50.0, 60.0), 0.25
 #: Lines are looked for below this, and need a record of so long.
 HIGHEST, SHORTEST = 210.0, 1.0
+#: The spectrum of a trace without noise counts as this part of the trace's range at least.
+FAINTEST = 3e-4
 #: A line of the mains holds so many times the power of all within 1.5 Hz beside it ...
 NARROW = 2.0
 #: ... and is so many times as high as its next multiples, which those of a pulse train nearly equal.
 SINGLE = 2.5
+#: A line at a harmonic of the pulses is their own if it is no more than so many times as high as those beside it.
+OWN = 1.5
 #: In a third of the record it is at least this part of its height in all of it.
 STAYS = 0.6
 #: Hum is fitted to pieces of so many seconds, half overlapping.
@@ -34,18 +42,24 @@ DEAD = 0.3
 
 @dataclass(frozen=True)
 class Clean:
-    """samples and the shortened bins without what is no pulse; bad: samples that do not count, None: all do."""
+    """samples and the shortened bins without what is no pulse; bad: samples that do not count, None: all do.
+
+    lines: of hum, frequency [Hz] and amplitude; before: the bins with the hum in them.
+    """
 
     samples: Array
     bins: Array
     bad: Mask | None
     notes: tuple[Finding, ...]
+    lines: Lines
+    before: Array
 
 
-def clean(samples: Array, rate: float, bins: Array, bad: Mask | None) -> Clean:
+def clean(samples: Array, rate: float, bins: Array, bad: Mask | None, *, own: Lines = ()) -> Clean:
     """Take off what is there; a trace without any of it comes back as it is.
 
-    samples: shape (n,); rate: of them [1/s]; bins: means of n // len(bins) samples; bad: which samples are no numbers.
+    samples: shape (n,); rate: of them [1/s]; bins: means of n // len(bins) samples; bad: which samples are no numbers;
+    own: lines that are no hum but the pulses' own.
     """
     factor = samples.size // bins.size
     bin_rate = rate / factor
@@ -65,10 +79,13 @@ def clean(samples: Array, rate: float, bins: Array, bad: Mask | None) -> Clean:
         long[: bins.size * factor] = np.repeat(dead, factor)
         bad = long if bad is None else bad | long
     if np.count_nonzero(counted) < 64:
-        return Clean(samples, bins, bad, tuple(notes))
+        return Clean(samples, bins, bad, tuple(notes), (), bins)
     if not counted.all():
         bins = np.interp(np.arange(bins.size), np.flatnonzero(counted), bins[counted])
-    lines = mains_lines(bins, bin_rate)
+    before = bins
+    lines = tuple(line for line in mains_lines(bins, bin_rate) if line not in own)
+    own = _own_at_sight(lines, bins, bin_rate)
+    lines = tuple(line for line in lines if line not in own)
     if lines:
         names = " and ".join(f"{amplitude:.2g} at {frequency:.5g} Hz" for frequency, amplitude in lines)
         notes.append(Finding("hum", f"hum of amplitude {names} was taken off"))
@@ -81,7 +98,65 @@ def clean(samples: Array, rate: float, bins: Array, bad: Mask | None) -> Clean:
         bins = bins - np.interp((np.arange(bins.size) + 0.5) / bin_rate, times, values)
     if not counted.all():
         bins = np.where(counted, bins, np.median(bins[counted]))
-    return Clean(samples, bins, bad, tuple(notes))
+    return Clean(samples, bins, bad, tuple(notes), lines, before)
+
+
+def _own_at_sight(lines: Lines, bins: Array, rate: float) -> Lines:
+    """Those lines that are harmonics of pulses which are seen before anything is taken off."""
+    if not lines:
+        return ()
+    events = find_events(bins, rate)
+    if events.times.size < FEWEST:
+        return ()
+    try:
+        train = fit_train(events.times)
+    except TooFewPulses:
+        return ()
+    return own_lines(lines, bins, rate, train.fit)
+
+
+def own_lines(lines: Lines, bins: Array, rate: float, fit: Fit) -> Lines:
+    """Those lines that are harmonics of the pulses; bins: with the lines in them; rate: of the bins; fit: the phase.
+
+    A harmonic may lie at a multiple of the mains, too. It then is about as high as the harmonics beside it, and hum
+    is higher.
+    """
+    duration = bins.size / rate
+    slowest, fastest = np.sort(fit.frequency(np.array([0.0, duration])))
+    if slowest <= 0:
+        return ()
+
+    def harmonic(place: float) -> int:
+        """Which harmonic passes a frequency during the record; 0: none does."""
+        k = round(2 * place / (slowest + fastest))
+        near = k * slowest - 3 / duration < place < k * fastest + 3 / duration
+        return k if near else 0
+
+    harmonics = {line: harmonic(line[0]) for line in lines}
+    if not any(harmonics.values()):
+        return ()
+    thin = shorten(bins, max(int(rate / (4 * HIGHEST)), 1))
+    thin = thin - thin.mean()
+    time = (np.arange(thin.size) + 0.5) * duration / thin.size
+    turn = np.exp(-2j * np.pi * fit.phase(time))
+    hann = 1 - np.cos(2 * np.pi * time / duration)
+
+    def height(k: int) -> float:
+        return 2 * abs(complex(np.mean(thin * turn**k)))
+
+    doubtful = {line: k for line, k in harmonics.items() if k}
+    own: list[tuple[float, float]] = []
+    while True:  # a line that is the pulses' own is a measure of those beside it
+        for line, k in doubtful.items():
+            beside = [j for j in range(k - 2, k + 3) if j > 0 and j not in doubtful.values()]
+            # a harmonic whose frequency changes during the record is no higher than this at one frequency
+            share = abs(complex(np.mean(hann * turn**k * np.exp(2j * np.pi * line[0] * time))))
+            if line[1] < OWN * share * max(map(height, beside), default=0.0):
+                own.append(line)
+                del doubtful[line]
+                break
+        else:
+            return tuple(own)
 
 
 def _dead(bins: Array, rate: float, whole: Mask | None) -> Mask:
@@ -117,25 +192,32 @@ def mains_lines(bins: Array, rate: float) -> list[tuple[float, float]]:
     amplitude = np.zeros(transform.size)  # behind a Hann window, which is a sum of three neighbours
     amplitude[1:-1] = np.abs(transform[1:-1] - 0.5 * (transform[:-2] + transform[2:])) * (2 / n)
     width = thin_rate / n  # of a bin
-    level = median(amplitude[: int(HIGHEST / width)])
+    level = max(median(amplitude[: int(HIGHEST / width)]), FAINTEST * float(np.ptp(thin)))
 
     def near(frequency: float, reach: float) -> slice:
         return slice(max(round((frequency - reach) / width), 1), round((frequency + reach) / width) + 1)
 
     found: list[tuple[float, float]] = []
     for mains in MAINS:
-        for multiple in range(1, int(HIGHEST / mains) + 1):
+        hum: set[int] = set()
+        for multiple in range(int(HIGHEST / mains), 0, -1):  # from above: hum is no measure of what is below it
             nominal = mains * multiple
             reach = max(STRAYS * multiple, 2 * width)
             band = near(nominal, reach)
             peak = band.start + int(np.argmax(amplitude[band]))
             if amplitude[peak] <= 8 * level or not _narrow(amplitude, peak, near(peak * width, 1.5 + 3 * width)):
                 continue
-            further = [amplitude[near(k * nominal, k * reach)].max() for k in (2, 3, 4) if k * nominal < 2 * HIGHEST]
+            further = sorted(
+                float(amplitude[near(k * nominal, k * reach)].max())
+                for k in (2, 3, 4)
+                if k * nominal < 2 * HIGHEST and k * multiple not in hum
+            )
             height, place = float(amplitude[peak]), _peak(amplitude, peak) * width
-            if height > SINGLE * sorted(further)[len(further) // 2] and _stays(thin, place / thin_rate, height):
+            alone = not further or height > SINGLE * further[len(further) // 2]
+            if alone and _stays(thin, place / thin_rate, height):
+                hum.add(multiple)
                 found.append((place, height))
-    return found
+    return sorted(found)
 
 
 def _narrow(amplitude: Array, peak: int, beside: slice) -> bool:
@@ -144,7 +226,7 @@ def _narrow(amplitude: Array, peak: int, beside: slice) -> bool:
 
 
 def _stays(thin: Array, frequency: float, height: float) -> bool:
-    """Whether a line is as high in the first or the last third of the record: that of a chirped pulse train is not.
+    """Whether a line is as high in a third of the record.
 
     frequency: in parts of the rate.
     """
@@ -152,7 +234,7 @@ def _stays(thin: Array, frequency: float, height: float) -> bool:
     wave = (1 - np.cos(2 * np.pi * (np.arange(third) + 0.5) / third)) * np.exp(
         -2j * np.pi * frequency * np.arange(third)
     )
-    pieces = (thin[:third], thin[-third:])
+    pieces = (thin[:third], thin[third : 2 * third], thin[-third:])
     return max(2 / third * abs(complex(wave @ (piece - piece.mean()))) for piece in pieces) > STAYS * height
 
 
@@ -248,12 +330,15 @@ def _baseline(bins: Array, rate: float, counted: Mask) -> tuple[Array, Array] | 
     n = ordered.shape[1]
     values = ordered[:, n // 2]
     scatter = median(values - ordered[:, n // 6]) / 0.967
-    if scatter > WIDE * noise_of(bins):  # pulses that last about as long as the pauses: no level is that of the pauses
+    reach = float(ordered[:, -1].mean() - ordered[:, 0].mean())
+    if scatter > max(
+        WIDE * noise_of(bins), 0.05 * reach
+    ):  # pulses that last about as long as the pauses: no level is that of the pauses
         values = 0.5 * (ordered[:, n // 20] + ordered[:, -1 - n // 20])
     error = 1.2533 * scatter / np.sqrt(n)
     times = ((np.arange(count) + 0.5) * size / rate)[there]
-    smooth = np.convolve(np.pad(values, 1, mode="edge"), np.full(3, 1 / 3), mode="valid")
-    wander = float(np.ptp(smooth))
-    if wander < WANDERS * error or wander < 0.02 * float(ordered[:, -1].mean() - ordered[:, 0].mean()):
+    around = np.concatenate([values[:1], values, values[-1:]])
+    wander = float(np.ptp(around[:-2] + around[1:-1] + around[2:])) / 3
+    if wander < WANDERS * error or wander < 0.02 * reach:
         return None
     return times, values

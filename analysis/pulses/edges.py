@@ -42,31 +42,44 @@ def place_edges(samples: Array, rate: float, fit: Fit, *, width: float, sign: in
     times, numbers, frequency, middle = times[inside], numbers[inside], frequency[inside], middle[inside]
     if times.size < 4:
         return None
-    x = sign * samples[middle[:, None] + np.arange(-2 * side, 2 * side + 1)]
-    left, right = x[:, side : 2 * side].sum(axis=1), x[:, 2 * side + 1 : 3 * side + 1].sum(axis=1)
-    mean = np.median(x, axis=0) if times.size < 8 else x.mean(axis=0)
+    x = np.lib.stride_tricks.sliding_window_view(samples, 4 * side + 1)[middle - 2 * side]
+    left, right, heights = (x @ _sums(side)).T
+    mean = np.median(x, axis=0) if times.size < 8 else np.full(times.size, 1 / times.size) @ x
     centre, ends = float(mean[2 * side]), float(0.5 * (mean[side] + mean[3 * side]))
     floor = 0.5 * float(mean[0] + mean[-1])
     gain = 2 * (centre - ends)
     place = (middle + (right - left) / gain) / rate
     phase = numbers - (place - times) * frequency
-    heights = x[:, 2 * side - side // 2 : 2 * side + side // 2 + 1].mean(axis=1) - 0.5 * (x[:, 0] + x[:, -1])
+    heights = sign * heights
     typical = median(heights)
     use = heights > 0.3 * typical
     missing = int(np.count_nonzero(~use))
     if np.count_nonzero(use) < 4 or missing > 0.6 * times.size:
         return None
     for _ in range(4):
-        new_fit = fit_turns(times[use], phase[use])
+        new_fit, fitted = fit_turns(times[use], phase[use]), use
         away = np.abs(phase - new_fit.phase(times))
         spread = 1.4826 * median(away[use])
         new = (heights > 0.3 * typical) & (away < GROSS * max(spread, 1e-12))
         if np.array_equal(new, use) or np.count_nonzero(new) < 4:
             break
         use = new
-    rest = x[use] - mean
-    noise = float(np.sqrt(np.mean(rest**2)))
-    information = float((np.gradient(mean) ** 2).sum()) * (rate / float(frequency.mean())) ** 2
+    steep = float(np.abs(np.diff(mean)).max()) / max(abs(centre - floor), 1e-300)
+    new_fit = new_fit.with_grid(times[fitted], None, step=1 / rate, steep=steep)
+    rest = (x if use.all() else x[use]) - mean
+    noise = float(np.sqrt(np.einsum("ij,ij->", rest, rest) / rest.size))
+    slope = 0.5 * (mean[2:] - mean[:-2])
+    information = float(slope @ slope) * (rate / float(frequency.mean())) ** 2
     bound = float(np.sqrt(new_fit.unit_covariance[1, 1] / information)) * noise / new_fit.half
     wrong = times.size - missing - int(np.count_nonzero(use))
-    return Edges(new_fit, int(np.count_nonzero(use)), noise, centre - floor, bound, missing, wrong)
+    return Edges(new_fit, int(np.count_nonzero(use)), noise, sign * (centre - floor), bound, missing, wrong)
+
+
+def _sums(side: int) -> Array:
+    """What a piece of 4 side + 1 samples is multiplied by for left, right and height, shape (4 side + 1, 3)."""
+    sums = np.zeros((4 * side + 1, 3))
+    sums[side : 2 * side, 0] = 1.0
+    sums[2 * side + 1 : 3 * side + 1, 1] = 1.0
+    sums[2 * side - side // 2 : 2 * side + side // 2 + 1, 2] = 1 / (2 * (side // 2) + 1)
+    sums[[0, -1], 2] -= 0.5
+    return sums

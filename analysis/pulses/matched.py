@@ -191,7 +191,7 @@ def _improve(
         else (place * TABLE).astype(np.intp) % TABLE
     )
     pulse = learn(x, cell, valid, 2 * window.half)
-    return _regress(Pieces(x, cell, valid, times, numbers), pulse, window, degree)
+    return _regress(Pieces(x, cell, valid, times, numbers), pulse, window, degree, rate)
 
 
 def turn_times(fit: Fit, middle: float, duration: float) -> tuple[Array, Array, Array]:
@@ -238,7 +238,7 @@ def _flat(x: Array) -> bool:
     return bool(np.count_nonzero(np.count_nonzero(x == x.max(), axis=1) > 2) > 0.5 * len(x))
 
 
-def _regress(pieces: Pieces, pulse: Pulse, window: Window, degree: int | None) -> Match | None:
+def _regress(pieces: Pieces, pulse: Pulse, window: Window, degree: int | None, rate: float) -> Match | None:
     x, cell, valid, times, numbers = pieces.x, pieces.cell, pieces.valid, pieces.times, pieces.numbers
     g, d = pulse.shape[cell], pulse.slope[cell]
     if valid is not None:
@@ -281,11 +281,15 @@ def _regress(pieces: Pieces, pulse: Pulse, window: Window, degree: int | None) -
         fit = fit_turns(times[use], phase[use], weight[use] / noise2, degree=degree)
         standard = (phase - fit.phase(times)) * np.sqrt(weight / noise2)
         spread = max(1.4826 * median(np.abs(standard[use])), 0.5)
+        fitted = use
         new = usable & (amplitude > 0.03 * mean) & (np.abs(standard) < GROSS * spread)
         if np.array_equal(new, use) or np.count_nonzero(new) < 4:
             break
         use = new
     fit = fit.with_expected_variance()
+    height_of_pulse = float(np.ptp(pulse.shape))
+    steep = float(np.abs(pulse.slope).max()) * fit.coefficients[1] / (fit.half * rate * max(height_of_pulse, 1e-300))
+    fit = fit.with_grid(times[fitted], weight[fitted] / noise2, step=1 / rate, steep=steep)
     bound = float(np.sqrt(fit.unit_covariance[1, 1])) / fit.half
     good = usable & (amplitude > 0.03 * mean)
     return Match(
@@ -298,7 +302,7 @@ def _regress(pieces: Pieces, pulse: Pulse, window: Window, degree: int | None) -
         evidence=evidence,
         flat=_flat(x),
         noise=float(np.sqrt(noise2)),
-        height=mean * float(np.ptp(pulse.shape)),
+        height=mean * height_of_pulse,
         bound=bound,
         missing=int(np.count_nonzero(~usable | (height < FAINT * mean))),
         wrong=int(np.count_nonzero(good & ~use)),

@@ -15,10 +15,18 @@ Array = NDArray[np.float64]
 CURVED = 4.0
 #: The noise of the samples counts as so many degrees of freedom, where there are fewer of the residuals.
 FEW = 30.0
-#: Residuals are grouped into so many blocks to see whether neighbours resemble each other.
+#: Roundings that shift the frequency by so many times what independent ones would are not seen in residuals.
+COHERENT = 2.0
+#: Rounded times of turns shift the phase gained in half the record by no more than this part of their rounding.
+GRID_AT_MOST = 0.6
+#: Residuals are grouped into so many blocks to see whether neighbours resemble each other ...
 BLOCKS = 50
+#: ... and into so many, of three turns or more, to see whether neighbours differ.
+SHORT_BLOCKS, SHORTEST_BLOCK = 100, 3
 #: Blocks scatter more, or less, than single residuals where chance would do it with less than this probability.
 WHITE, ALTERNATING = 0.01, 0.001
+#: The same of short blocks that scatter less: hum that is left moves pulses to and fro, from each turn to the next.
+TO_AND_FRO = 0.05
 
 
 @dataclass(frozen=True)
@@ -82,6 +90,36 @@ class Fit:
         freedom = self.freedom + FEW
         return replace(self, variance=(self.freedom * self.variance + FEW) / freedom, freedom=freedom)
 
+    def with_grid(self, times: Array, weight: Array | None, *, step: float, steep: float) -> Fit:
+        """The same with at least the uncertainty that comes from samples which are too far apart for the flanks.
+
+        A flank between two samples may lie anywhere between them, and residuals do not show it where turns are nearly
+        whole numbers of samples. So the error of a rounded time is carried to the frequency, for all places of the
+        flank between samples and all drifts up to one sample along the record; its mean square is the least variance.
+        Where the flank comes to lie everywhere between samples the residuals show it, and nothing is to be done.
+
+        Args:
+            times: of the turns that were fitted, shape (n,) [s].
+            weight: of them, shape (n,); None: all alike.
+            step: from one sample to the next [s].
+            steep: part of the pulse's height that lies between two samples at most; what flanks of several samples
+                leave of the error falls with its square.
+        """
+        rounding = min(steep, 1.0) ** 2 * step * float(self.coefficients[1]) / self.half  # [turns]
+        seen = float(self.covariance[1, 1])
+        if seen >= (GRID_AT_MOST * rounding) ** 2:
+            return self
+        u = (times - self.centre) / self.half
+        powers = u[:, None] ** np.arange(self.coefficients.size)
+        carried = (powers if weight is None else powers * weight[:, None]) @ self.unit_covariance[1]
+        place = np.arange(8)[:, None, None] / 8 + np.linspace(-1, 1, 9)[:, None] * u + times / step
+        rounded = (place - np.rint(place)) * rounding
+        least = float(np.mean((rounded @ carried) ** 2))
+        if least <= max(seen, COHERENT**2 * rounding**2 / 12 * float(carried @ carried)):
+            return self
+        student = _student(self.freedom) ** 2
+        return replace(self, variance=least / (float(self.unit_covariance[1, 1]) * self.inflation * student))
+
     def phase_at(self, time: float, origin: float = 0.0) -> Estimate:
         """Phase at a time, from 0 to 1 [turns], of what passes at a phase of origin."""
         powers = ((time - self.centre) / self.half) ** np.arange(self.coefficients.size)
@@ -106,10 +144,11 @@ def _independent(coefficients: Array, covariance: Array, half: float) -> tuple[E
     u, size = 0.0, coefficients.size
     for _ in range(5):  # with a third degree the slope at the time changes with the time
         d1, d2 = _derivatives(u, size)
-        together, slope = float(d1 @ covariance @ d2), float(d2 @ covariance @ d2)
+        against = covariance @ d2
+        together, slope = float(d1 @ against), float(d2 @ against)
         step = together / slope if slope > 0 else 0.0
-        u = float(np.clip(u - step, -1, 1))
-        if abs(step) < 1e-12:
+        u = min(max(u - step, -1.0), 1.0)
+        if abs(step) < 1e-12 or size < 4:
             break
     d1, d2 = _derivatives(u, size)
     frequency = Estimate(float(d1 @ coefficients) / half, float(np.sqrt(d1 @ covariance @ d1)) / half, "Hz")
@@ -118,9 +157,8 @@ def _independent(coefficients: Array, covariance: Array, half: float) -> tuple[E
 
 
 def _derivatives(u: float, size: int) -> tuple[Array, Array]:
-    k = np.arange(size)
-    d1 = np.where(k > 0, k * u ** np.maximum(k - 1, 0), 0.0)
-    d2 = np.where(k > 1, k * (k - 1) * u ** np.maximum(k - 2, 0), 0.0)
+    d1 = np.array([k * u ** (k - 1) if k > 0 else 0.0 for k in range(size)])
+    d2 = np.array([k * (k - 1) * u ** (k - 2) if k > 1 else 0.0 for k in range(size)])
     return d1, d2
 
 
@@ -171,33 +209,37 @@ def _fit(times: Array, turns: Array, weight: Array | None, degree: int) -> tuple
     residuals = standard if weight is None else standard / root
     left = float(standard @ standard) - float(along[-1]) ** 2
     third = abs(float(along[-1])) / np.sqrt(max(left, 1e-300) / max(times.size - degree - 2, 1))
-    variance, inflation, freedom = scatter(standard, degree + 1)
+    variance, inflation, freedom = scatter(standard, turns, degree + 1)
     return Fit(coefficients, inverse @ inverse.T, centre, half, variance, inflation, freedom, residuals), third
 
 
-def scatter(residuals: Array, parameters: int) -> tuple[float, float, float]:
+def scatter(residuals: Array, turns: Array, parameters: int) -> tuple[float, float, float]:
     """Variance of residuals, the factor by which blocks of neighbours scatter more or less, degrees of freedom.
 
-    residuals: standardised, shape (n,); parameters: of the fit.  What matters for a frequency is how
-    residuals scatter over times as long as the record, not from one to the next.
+    residuals: standardised, and turns: their phase, shape (n,); parameters: of the fit.  What matters for a frequency
+    is how residuals scatter over times as long as the record, not from one to the next.
     """
     n = residuals.size
     freedom = max(n - parameters, 1)
     variance = float(residuals @ residuals) / freedom
     each = -(-n // BLOCKS)
-    blocks = -(-n // each)
-    if each < 2 or blocks < parameters + 6 or variance <= 0:
+    if each < 2 or variance <= 0:
         return variance, 1.0, freedom
-    starts = np.arange(0, n, each)
-    sums = np.add.reduceat(residuals, starts)
-    sizes = np.diff(np.append(starts, n))
-    coarse = float((sums**2 / sizes).sum()) / (blocks - parameters)
-    ratio = coarse / variance
-    if 0.75 < ratio < 1.3:
-        return variance, 1.0, freedom
-    from scipy.special import fdtr
+    short = max(SHORTEST_BLOCK, -(-n // SHORT_BLOCKS))
+    for size, less, more in ((each, ALTERNATING, WHITE), (short, TO_AND_FRO, 0.0)):
+        place = turns // size
+        starts = np.concatenate([[0], np.flatnonzero(place[1:] != place[:-1]) + 1])
+        blocks = starts.size
+        if blocks < parameters + 6:
+            continue
+        sums = np.add.reduceat(residuals, starts)
+        sizes = np.diff(np.append(starts, n))
+        ratio = float((sums**2 / sizes).sum()) / (blocks - parameters) / variance
+        if 0.85 < ratio < 1.3:
+            continue
+        from scipy.special import fdtr
 
-    p = float(fdtr(blocks - parameters, freedom, ratio))
-    if ALTERNATING < p < 1 - WHITE:
-        return variance, 1.0, freedom
-    return variance, ratio, blocks - parameters
+        p = float(fdtr(blocks - parameters, freedom, ratio))
+        if p < less or p > 1 - more:
+            return variance, ratio, blocks - parameters
+    return variance, 1.0, freedom

@@ -8,9 +8,11 @@ from typing import Literal
 
 from analysis.uncertainty import Estimate
 
-#: How the slope itself changes, as a multiple of slope²/frequency: 0 on an even ramp, n under a drag in proportion to
-#: the n-th power of the spin, which is 1 to 2.  Its middle and standard uncertainty.
-CHANGE_OF_SLOPE, CHANGE_OF_SLOPE_U = 1.0, 0.6
+#: How the slope itself changes, as a multiple of slope²/frequency, and its standard uncertainty.  Slower and slower: n
+#: under a drag in proportion to the n-th power of the spin, which is 1 to 2; an even ramp, 0, is three u away.
+UNDER_DRAG, UNDER_DRAG_U = 1.5, 0.5
+#: Faster and faster: only a drive does that.
+UNDER_DRIVE, UNDER_DRIVE_U = 0.0, 0.6
 
 Method = Literal["edges", "matched", "likelihood"]
 
@@ -74,13 +76,14 @@ class SpinFrequency:
         """The same for a top whose slope may change as air drag or an even ramp has it.
 
         A parabola of turns through times over a span T, where the slope changes by ν″ a second, gives a frequency in
-        the middle that is ν″T²/40 too high.  That change is expected from the slope, ν″ = (1.0 ± 0.6) ν′²/ν, and is
-        taken off; where a third degree was fitted nothing is left to be done.
+        the middle that is ν″T²/40 too high.  That change is expected from the slope, ν″ = (1.5 ± 0.5) ν′²/ν for a top
+        that gets slower, and is taken off; where a third degree was fitted nothing is left to be done.
         """
         frequency, chirp = self.frequency, self.chirp
         if any(note.name == "curved" for note in self.notes) or not frequency.value or not chirp.value:
             return self
         span = (self.pulses + self.missing - 1) / frequency.value
         most = chirp.value**2 / frequency.value * span**2 / 40
-        u = None if frequency.u is None else math.hypot(frequency.u, CHANGE_OF_SLOPE_U * most)
-        return replace(self, frequency=Estimate(frequency.value - CHANGE_OF_SLOPE * most, u, frequency.unit))
+        change, u_change = (UNDER_DRAG, UNDER_DRAG_U) if chirp.value < 0 else (UNDER_DRIVE, UNDER_DRIVE_U)
+        u = None if frequency.u is None else math.hypot(frequency.u, u_change * most)
+        return replace(self, frequency=Estimate(frequency.value - change * most, u, frequency.unit))

@@ -54,7 +54,8 @@ def noise_of(bins: Array) -> float:
 
 def find_events(bins: Array, rate: float) -> Events:
     """Centres of what stands out of the bins; rate: bins per second."""
-    total = np.concatenate([[0.0], np.cumsum(bins - bins[0])])
+    total = np.zeros(bins.size + 1)
+    np.cumsum(bins - bins[0], out=total[1:])
     noise = noise_of(bins)
     best = (0.0, 1, 1, 0.0)
     for width in WIDTHS:
@@ -66,9 +67,11 @@ def find_events(bins: Array, rate: float) -> Events:
         if contrast > 1.05 * best[0]:
             best = contrast, width, sign, threshold
     contrast, width, sign, threshold = best
-    smooth = sign * (total[width:] - total[:-width]) / width
-    above = np.flatnonzero(np.diff((smooth > threshold).view(np.int8)))
-    if above.size and smooth[0] > threshold:
+    smooth = total[width:] - total[:-width]  # sums: means would be one more pass
+    threshold *= sign * width
+    stands = smooth > threshold if sign > 0 else smooth < threshold
+    above = np.flatnonzero(stands[1:] != stands[:-1])
+    if above.size and stands[0]:
         above = above[1:]
     above = above[: above.size // 2 * 2]
     up, down = above[::2], above[1::2]

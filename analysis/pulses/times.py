@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.errors import NotFinite, ShapesDiffer, TimesNotIncreasing, TooFewPulses
+from analysis.numbers import digits
 from analysis.pulses.regression import Fit, fit_turns, median
 from analysis.pulses.result import Finding, SpinFrequency
 from analysis.pulses.turns import Numbering, number_turns
@@ -18,6 +19,8 @@ FEWEST = 4
 #: A pulse farther from its place than this many standard deviations of the others is no pulse of the top.
 GROSS = 4.5
 ROUNDS = 12
+#: A variance that is smaller by chance is seldom smaller than this part.
+TOLD = 0.6
 
 
 @dataclass(frozen=True)
@@ -137,11 +140,19 @@ def findings_of(train: Train) -> tuple[Finding, ...]:
         notes.append(Finding("doubled", f"{train.doubled} pulses lie beside the turns' own and were left out"))
     if train.fit.coefficients.size > 3:
         notes.append(Finding("curved", "the slope itself changes: a third degree was fitted"))
-    if train.fit.inflation != 1:
-        notes.append(
-            Finding("correlated", f"neighbouring pulses resemble each other: variance x {train.fit.inflation:.2g}")
-        )
+    notes += correlated(train.fit, "pulses")
     return tuple(notes)
+
+
+def correlated(fit: Fit, what: str) -> tuple[Finding, ...]:
+    """What is to be said where neighbouring turns or pulses are not independent."""
+    if fit.inflation > 1:
+        text = f"neighbouring {what} resemble each other: variance x {digits(fit.inflation)}"
+    elif fit.inflation < TOLD:
+        text = f"neighbouring {what} differ from each other, which averages out: variance x {digits(fit.inflation)}"
+    else:
+        return ()
+    return (Finding("correlated", text),)
 
 
 def with_notes(found: SpinFrequency, *notes: Finding) -> SpinFrequency:

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.errors import NotPositive, OnlyHum, ShapesDiffer, TooFewPulses
+from analysis.numbers import digits
 from analysis.pulses import traps
-from analysis.pulses.clean import Clean, clean
+from analysis.pulses.clean import Clean, clean, own_lines
 from analysis.pulses.edges import Edges, place_edges
 from analysis.pulses.likelihood import search
 from analysis.pulses.matched import Match, match, window_of
 from analysis.pulses.regression import median
 from analysis.pulses.result import Finding, Method, SpinFrequency
 from analysis.pulses.search import Events, find_events, shorten
-from analysis.pulses.times import FEWEST, Train, fit_train
+from analysis.pulses.times import FEWEST, Train, correlated, fit_train
 
 if TYPE_CHECKING:
     from analysis.pulses.regression import Fit
@@ -35,6 +37,8 @@ FEW, CLEAR = 16, 3.0
 WIDE = 0.2
 #: The matched filter is not trusted where more than these parts of the turns have no pulse, or one at a wrong place.
 MOST_MISSING, MOST_WRONG = 0.5, 0.15
+#: Nor where so many times as many pulses lie beside the turns as at them: a reflection is one of them for each turn.
+MOST_DOUBLED = 1.5
 
 
 def spin_of_trace(
@@ -65,36 +69,41 @@ def spin_of_trace(
     >>> f"{found.at(1.0).value:.4f} Hz at 1 s", f"{found.chirp.value:.3f} Hz/s"
     ('24.9000 Hz at 1 s', '-0.100 Hz/s')
     """
-    x, bad = _checked(samples, rate)
-    factor = max(int(rate // SEARCH_RATE), 1)
-    if np.ptp(x) <= ROUNDING * np.abs(x).max():
+    x, bins, bad = _checked(samples, rate)
+    # the bins are a pass over an eighth of the samples; where they move, so do the samples
+    if _constant(bins) and _constant(x):
         raise TooFewPulses(seen=0, needed=FEWEST, duration=x.size / rate)
-    cleaned = clean(x, rate, shorten(x, factor), bad)
-    trace = Trace(cleaned, rate, rate / factor)
+    cleaned = clean(x, rate, bins, bad)
     try:
-        if method == "edges":
-            return _by_edges(trace, start)
-        found, doubled, used, why = _by_pulse(trace, method, degree)
+        found = _found(Trace(cleaned, rate), method, degree)
     except TooFewPulses as error:
-        if any(note.name == "hum" for note in cleaned.notes):
+        if cleaned.lines:
             raise OnlyHum(seen=error.seen, needed=error.needed, duration=error.duration) from None
         raise
-    found, trap = _without_trap(trace, found, degree)
-    return _result(found, doubled, start, method=used, origin=found.origin, notes=(*why, *trap, *cleaned.notes))
+    if cleaned.lines:
+        own = own_lines(cleaned.lines, cleaned.before, rate / (x.size // bins.size), found.match.fit)
+        if own:
+            found = _found(Trace(clean(x, rate, bins, bad, own=own), rate), method, degree)
+    return _result(found, start)
 
 
 class Trace:
     """A trace that was cleaned, with the rates of its samples and bins [1/s]."""
 
-    def __init__(self, cleaned: Clean, rate: float, bin_rate: float) -> None:
+    def __init__(self, cleaned: Clean, rate: float) -> None:
         self.samples, self.bins, self.bad = cleaned.samples, cleaned.bins, cleaned.bad
         self.notes = cleaned.notes
-        self.rate, self.bin_rate = rate, bin_rate
+        self.rate, self.bin_rate = rate, rate / (self.samples.size // self.bins.size)
 
     @property
     def duration(self) -> float:
         """[s]."""
         return self.samples.size / self.rate
+
+    @property
+    def middles(self) -> Array:
+        """Times of the middles of the bins [s]."""
+        return (np.arange(self.bins.size, dtype=np.float64) + 0.5) / self.bin_rate - 0.5 / self.rate
 
     def too_few(self, seen: int) -> TooFewPulses:
         """The error of a trace without enough pulses."""
@@ -102,11 +111,34 @@ class Trace:
 
     def match(self, fit: Fit, degree: int | None) -> Match | None:
         """The matched filter from a phase that is about right; None where there are no pulses."""
-        middles = (np.arange(self.bins.size, dtype=np.float64) + 0.5) / self.bin_rate - 0.5 / self.rate
-        window = window_of(self.bins, fit.phase(middles))
+        window = window_of(self.bins, fit.phase(self.middles))
         if window is None:
             return None
         return match(self.samples, self.rate, fit, window, bad=self.bad, degree=degree)
+
+
+@dataclass(frozen=True)
+class Found:
+    """Pulses of a trace, which method found them, the phase of the fit at which a pulse's middle passes, and findings.
+
+    doubled: pulses beside the turns' own.
+    """
+
+    match: Match | Edges
+    doubled: int
+    method: Method
+    origin: float
+    notes: tuple[Finding, ...]
+
+
+def _found(trace: Trace, method: Choice, degree: int | None) -> Found:
+    """The pulses by a method.  Raises TooFewPulses."""
+    if method == "edges":
+        edges, doubled = _by_edges(trace)
+        return Found(edges, doubled, "edges", 0.0, trace.notes)
+    found, doubled, used, why = _by_pulse(trace, method, degree)
+    found, trap = _without_trap(trace, found, degree)
+    return Found(found, doubled, used, found.origin, (*why, *trap, *trace.notes))
 
 
 def _events(trace: Trace) -> tuple[Events, Train]:
@@ -117,17 +149,16 @@ def _events(trace: Trace) -> tuple[Events, Train]:
     return events, fit_train(events.times - 0.5 / trace.rate)  # a bin's centre is that of its samples
 
 
-def _by_edges(trace: Trace, start: float) -> SpinFrequency:
+def _by_edges(trace: Trace) -> tuple[Edges, int]:
+    """The edges, and the number of pulses beside the turns' own.  Raises TooFewPulses."""
     events, train = _events(trace)
     if events.width * train.fit.coefficients[1] / train.fit.half > WIDE:
-        return _result(
-            Edges(train.fit, train.used.size, math.nan, math.nan, math.nan, train.missing, 0),
-            train.doubled, start, method="edges", origin=0.0, notes=trace.notes,
-        )  # fmt: skip
+        fit = train.fit.with_grid(events.times[train.used], None, step=1 / trace.rate, steep=1.0)
+        return Edges(fit, train.used.size, math.nan, math.nan, math.nan, train.missing, 0), train.doubled
     edges = place_edges(trace.samples, trace.rate, train.fit, width=events.width, sign=events.sign)
     if edges is None or (edges.turns < FEW and edges.height < CLEAR * edges.noise):
         raise trace.too_few(train.used.size)
-    return _result(edges, train.doubled, start, method="edges", origin=0.0, notes=trace.notes)
+    return edges, train.doubled
 
 
 def _by_pulse(trace: Trace, method: Choice, degree: int | None) -> tuple[Match, int, Method, tuple[Finding, ...]]:
@@ -135,10 +166,11 @@ def _by_pulse(trace: Trace, method: Choice, degree: int | None) -> tuple[Match, 
 
     Raises TooFewPulses.
     """
-    found, doubled, seen, why = None, 0, 0, "no pulses stand out that return regularly"
+    found, doubled, seen, astray, why = None, 0, 0, False, "no pulses stand out that return regularly"
     try:
         _, train = _events(trace)
         doubled, seen = train.doubled, train.used.size
+        astray = doubled > MOST_DOUBLED * seen
         found = trace.match(train.fit, degree)
     except TooFewPulses as error:
         seen = error.seen
@@ -147,7 +179,7 @@ def _by_pulse(trace: Trace, method: Choice, degree: int | None) -> tuple[Match, 
             raise trace.too_few(seen)
         return found, doubled, "matched", ()
     if found is not None and method == "auto":
-        why = _doubt(found)
+        why = "more pulses lie beside the turns than at them" if astray else _doubt(found)
         if not why:
             return found, doubled, "matched", ()
     fit = search(trace.bins, trace.bin_rate)
@@ -167,7 +199,7 @@ def _doubt(found: Match) -> str:
     turns = found.heights.size
     sweep = abs(found.fit.frequency_and_chirp()[1].value or 0.0) * found.fit.half
     if sweep > 0.5 * found.fit.coefficients[1] / found.fit.half:
-        return f"the frequency would change by {2 * sweep:.3g} Hz"
+        return f"the frequency would change by {digits(2 * sweep, 3)} Hz"
     if found.missing > MOST_MISSING * turns:
         return f"{found.missing} of {turns} turns have no pulse"
     if found.wrong > MOST_WRONG * turns:
@@ -183,7 +215,7 @@ def _without_trap(trace: Trace, found: Match, degree: int | None) -> tuple[Match
             return twice, (
                 Finding("half", "two equal pulses a turn: half the frequency fitted too, and was not taken"),
             )
-    if why := traps.alternates(found):
+    if why := traps.alternates(found) or traps.elsewhere(trace.bins, found.fit.phase(trace.middles)):
         half = trace.match(found.fit.times(0.5), degree)
         if half is not None:
             return half, (
@@ -192,7 +224,13 @@ def _without_trap(trace: Trace, found: Match, degree: int | None) -> tuple[Match
     return found, ()
 
 
-def _checked(samples: ArrayLike, rate: float) -> tuple[Array, NDArray[np.bool_] | None]:
+def _constant(values: Array) -> bool:
+    low, high = float(values.min()), float(values.max())
+    return high - low <= ROUNDING * max(abs(low), abs(high))
+
+
+def _checked(samples: ArrayLike, rate: float) -> tuple[Array, Array, NDArray[np.bool_] | None]:
+    """The samples, their shortened trace, and which of them are no finite numbers (None: all are)."""
     x = np.ascontiguousarray(samples, dtype=np.float64)
     if x.ndim != 1:
         raise ShapesDiffer(quantity="samples", seen=x.shape, expected=(x.size,))
@@ -200,22 +238,24 @@ def _checked(samples: ArrayLike, rate: float) -> tuple[Array, NDArray[np.bool_] 
         raise NotPositive(quantity="sample rate", unit="1/s", index=0, value=rate)
     if x.size < 64:
         raise TooFewPulses(seen=0, needed=FEWEST, duration=x.size / rate)
+    factor = max(int(rate // SEARCH_RATE), 1)
     with np.errstate(invalid="ignore", over="ignore"):
-        if math.isfinite(float(np.einsum("i->", x))):
-            return x, None
+        bins = shorten(x, factor)
+        if math.isfinite(float(bins.sum()) + float(x[bins.size * factor :].sum())):
+            return x, bins, None
     bad = ~np.isfinite(x)
     if bad.all():
         raise TooFewPulses(seen=0, needed=FEWEST, duration=x.size / rate)
-    return np.where(bad, np.median(x[~bad]), x), bad if bad.any() else None
+    x = np.where(bad, np.median(x[~bad]), x)
+    return x, shorten(x, factor), bad if bad.any() else None
 
 
-def _result(
-    found: Match | Edges, doubled: int, start: float, *, method: Method, origin: float, notes: tuple[Finding, ...]
-) -> SpinFrequency:
+def _result(pulses: Found, start: float) -> SpinFrequency:
+    found = pulses.match
     fit = found.fit
     frequency, chirp, reference = fit.frequency_and_chirp()
     assert frequency.value is not None
-    more = [*notes, *traps.mains(frequency, chirp)]
+    more = [*pulses.notes, *traps.mains(frequency, chirp)]
     if isinstance(found, Match) and found.flat:
         more.append(Finding("clipped", "the tops of the pulses are flat: the detector or the converter is saturated"))
     if found.missing:
@@ -224,18 +264,17 @@ def _result(
         more.append(Finding("wrong", f"{found.wrong} pulses are not at their place and were left out"))
     if fit.coefficients.size > 3:
         more.append(Finding("curved", "the slope itself changes: a third degree was fitted"))
-    if fit.inflation != 1:
-        more.append(Finding("correlated", f"neighbouring turns resemble each other: variance x {fit.inflation:.2g}"))
+    more += correlated(fit, "turns")
     return SpinFrequency(
         frequency=frequency,
         chirp=chirp,
-        phase=fit.phase_at(reference, origin),
+        phase=fit.phase_at(reference, pulses.origin),
         reference_time=start + reference,
-        method=method,
+        method=pulses.method,
         bound=None if math.isnan(found.bound) else found.bound,
         pulses=found.turns,
         missing=found.missing,
-        doubled=doubled,
+        doubled=pulses.doubled,
         scatter=1.4826 * median(np.abs(fit.residuals)) / frequency.value,
         snr_db=20 * math.log10(found.height / found.noise) if found.height / found.noise > 0 else None,
         notes=tuple(more),

@@ -5,20 +5,28 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.pulses.clean import MAINS
+from analysis.pulses.matched import COARSE
 from analysis.pulses.result import Finding
 
 if TYPE_CHECKING:
     from analysis.pulses.matched import Match
     from analysis.uncertainty import Estimate
 
+Array = NDArray[np.float64]
+
 #: Every second pulse differs where the means of both halves are so many standard errors apart ...
 CERTAIN = 6.0
 #: ... and by so much, in parts of the height, or in turns.
 HIGHER, ASIDE = 0.1, 2e-3
 #: Two pulses of a turn are equal where the turn resembles itself half a turn later like this.
-EQUAL = 0.95
+EQUAL = 0.7
+#: Every second pulse lies elsewhere where the profiles of even and odd turns are less alike than this,
+ALIKE = 0.5
+#: and one of them stands out so many times its noise.
+STANDS_OUT = 8.0
 #: The frequency is that of the mains where it is so near to a multiple and changes so little, as parts of it [1, 1/s].
 NEAR, STEADY = 2e-3, 3e-4
 
@@ -46,6 +54,23 @@ def alternates(found: Match) -> str:
         if apart > max(CERTAIN * error, least):
             return what
     return ""
+
+
+def elsewhere(bins: Array, phase: Array) -> str:
+    """How every second pulse lies at another place, too far for `alternates`; empty if it does not.
+
+    bins: of the trace, and their phases [turns], shape (n,).
+    """
+    place = ((0.5 * phase - np.floor(0.5 * phase)) * 2 * COARSE).astype(np.intp)
+    counts = np.maximum(np.bincount(place, minlength=2 * COARSE), 1)
+    both = (np.bincount(place, bins, 2 * COARSE) / counts).reshape(2, COARSE)
+    both = both - np.median(both)
+    away = np.abs(both)
+    if phase[-1] - phase[0] < 16 or away.max() < STANDS_OUT * 1.4826 * float(np.median(away)):
+        return ""
+    even, odd = both
+    alike = float(even @ odd) / float(np.sqrt((even @ even) * (odd @ odd)) + 1e-300)
+    return "is not half-way between its neighbours" if alike < ALIKE else ""
 
 
 def mains(frequency: Estimate, chirp: Estimate) -> tuple[Finding, ...]:

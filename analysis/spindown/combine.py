@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.errors import NothingToCombine
+from analysis.numbers import digits
 from analysis.residuals import Correlation, durbin_watson, runs_test_p
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import (
@@ -194,7 +195,7 @@ def _about_number(runs: Sequence[SpinDown]) -> list[str]:
         width = float(stdtrit(n - 1, 0.5 + 0.5 * 0.6827))
         said.append(
             f"{n} runs tell their own scatter, and so u of the means, to {100 / np.sqrt(2 * (n - 1)):.0f} % only: a "
-            f"68 % interval is {width:.2g} u to each side (Student's t)"
+            f"68 % interval is {digits(width)} u to each side (Student's t)"
         )
     return said
 
@@ -329,7 +330,7 @@ def _warnings(law: str, constant: str, estimates: Sequence[Estimate], average: M
     if gammaincc((len(u) - 1) / 2, q / 2) < NO_FIT:
         ratio = average.scatter / float(np.sqrt((u**2).mean()))
         said.append(
-            f"{law}: {constant} scatters between the runs {ratio:.2g} times as much as each fit's own uncertainty "
+            f"{law}: {constant} scatters between the runs {digits(ratio)} times as much as each fit's own uncertainty "
             "explains: the runs differ, so trust the scatter, not the fit of one run"
         )
     return said

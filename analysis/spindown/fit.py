@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.errors import UnknownName
+from analysis.numbers import digits
 from analysis.residuals import Correlation, Jump, correlation, gross_errors, largest_jump, studentised
 from analysis.spindown.drag import LAWS
 from analysis.spindown.hidden import bend, hidden_tilt
@@ -185,7 +186,8 @@ def _about_jump(jump: Jump | None, readings: Readings) -> str:
     if jump is None:
         return ""
     before, after = readings.time[jump.index - 1], readings.time[jump.index]
-    return f"they jump by {jump.size:+.2g} Hz between {before:.4g} s and {after:.4g} s"
+    way = "up" if jump.size > 0 else "down"
+    return f"they jump {way} by {digits(abs(jump.size))} Hz between {before:.4g} s and {after:.4g} s"
 
 
 def _hidden(found: Solution, rho: float) -> Array | None:
@@ -423,8 +425,8 @@ def _miscounts(readings: Readings) -> tuple[NDArray[np.intp], Array]:
 def _outlier_warnings(readings: Readings, search: _Search, *, kept: bool) -> list[str]:
     done = "was kept as asked" if kept else "was left out"
     return [
-        f"the reading of {readings.frequency[i]:.6g} Hz at {readings.time[i]:.12g} s lies {deviation:.3g} standard "
-        f"deviations from the others and {done}"
+        f"the reading of {readings.frequency[i]:.6g} Hz at {readings.time[i]:.12g} s lies {digits(deviation, 3)} "
+        f"standard deviations from the others and {done}"
         for i, deviation in zip(search.indices, search.deviations, strict=True)
     ]
 
@@ -446,14 +448,14 @@ def comparison_warnings(fits: Mapping[str, Statistics], best: str, *, mixed: boo
     if fits[best].inflation > 1:
         birge = float(np.sqrt(fits[best].inflation))
         said.append(
-            f"even the best law, {best}, misses the readings by {birge:.2g} times their stated uncertainties, more "
+            f"even the best law, {best}, misses the readings by {digits(birge)} times their stated uncertainties, more "
             "than chance explains: all uncertainties are enlarged by that ratio; check the readings' uncertainties"
         )
     known, probability = fits[best].sigma_known, _less_than_chance(fits[best])
     if known and probability < NO_FIT:
         ratio = float(np.sqrt(fits[best].reduced_chi_square or 0.0))
         said.append(
-            f"the readings scatter only {ratio:.2g} times as much about the best law as their stated uncertainties "
+            f"the readings scatter only {digits(ratio)} times as much about the best law as their stated uncertainties "
             "say: are these too large?"
         )
     undefined = [name for name, fit in fits.items() if fit.aicc is None]
@@ -468,9 +470,9 @@ def correlation_warnings(found: Correlation | None, n: int) -> list[str]:
     if found is None or not is_correlated(found):
         return []
     said = (
-        f"neighbouring residuals resemble each other more than independent readings would (p = {found.p:.2g}): their "
-        f"correlation is {found.value:.2f} ± {found.u:.2f}, so {n} readings tell as much as {n / found.factor():.2g} "
-        "independent ones, and all uncertainties are enlarged accordingly"
+        f"neighbouring residuals resemble each other more than independent readings would (p = {digits(found.p)}): "
+        f"their correlation is {found.value:.2f} ± {found.u:.2f}, so {n} readings tell as much as "
+        f"{digits(n / found.factor())} independent ones, and all uncertainties are enlarged accordingly"
     )
     return [said]
 

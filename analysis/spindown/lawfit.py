@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.least_squares import MOST_EVALUATIONS, profile, solve
+from analysis.numbers import digits
 from analysis.residuals import DENSE, ar1, durbin_watson, runs_test_p
 from analysis.spindown.drag import LAWS, DragLaw
 from analysis.spindown.readings import Readings
@@ -467,7 +468,7 @@ def _constant_warnings(law: str, constant: str, estimate: Estimate) -> list[str]
         said.append(f"{law}: c is not determined, as it depends exponentially on the exponent")
     elif constant == "c" and u > 0.5 * abs(value):
         said.append(
-            f"{law}: c is known only to a factor of about {np.exp(u / abs(value)):.2g}, as it depends "
+            f"{law}: c is known only to a factor of about {digits(np.exp(u / abs(value)))}, as it depends "
             "exponentially on the exponent"
         )
     return said

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import floor, log10
 
+from analysis.numbers import digits
 from analysis.residuals import Correlation
 from analysis.spindown.selection import Statistics, deviance, variance_factor
 from analysis.uncertainty import Estimate
@@ -102,8 +103,8 @@ def _describes(best: Statistics, correlation: Correlation | None) -> bool:
 
 def _no_law(best: str, fit: Statistics, correlation: Correlation | None, broken: str) -> str:
     alike = f", neighbours correlated by {correlation.value:.2f}" if correlation else ""
-    beyond = f", {fit.inflation**0.5:.2g} times the stated uncertainties" if fit.inflation > 1 else ""
-    left = f"what the best one, {best}, leaves over ({fit.rms_residual:.2g} Hz rms{beyond})"
+    beyond = f", {digits(fit.inflation**0.5)} times the stated uncertainties" if fit.inflation > 1 else ""
+    left = f"what the best one, {best}, leaves over ({digits(fit.rms_residual)} Hz rms{beyond})"
     why = f"{broken}; {left} is no noise" if broken else f"{left} has a shape{alike}"
     return (
         f"No law describes these readings: {why}. Its constants and their uncertainties are those of a curve through "
@@ -134,7 +135,7 @@ def _kind(fits: Mapping[str, Statistics], name: str, best: str) -> str:
 def _reason(name: str, best: str, fits: Mapping[str, Statistics]) -> str:
     fit = fits[name]
     shape = ", and its residuals have a shape" if fit.has_shape else ""
-    left = f"it leaves {fit.rms_residual:.2g} Hz rms, {best} {fits[best].rms_residual:.2g} Hz"
+    left = f"it leaves {digits(fit.rms_residual)} Hz rms, {best} {digits(fits[best].rms_residual)} Hz"
     return f"ΔAICc {fit.difference:.0f}: {left}{shape}"
 
 
@@ -156,8 +157,8 @@ def _about_best(tied: Sequence[str], exponent: Estimate | None) -> str:
 def _undecided(n: int, fall: float, names: Sequence[str]) -> str:
     laws = _list(names) if len(names) > 1 else "the laws"
     return (
-        f"These {n} readings cannot tell {laws} apart: over a fall of the spin by {100 * fall:.2g} % they differ too "
-        "little for readings of this number and precision. Let the top fall further, or read it more often."
+        f"These {n} readings cannot tell {laws} apart: over a fall of the spin by {digits(100 * fall)} % they differ "
+        "too little for readings of this number and precision. Let the top fall further, or read it more often."
     )
 
 

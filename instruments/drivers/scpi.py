@@ -6,20 +6,23 @@ Source: IEEE 488.2-1992; SCPI-1999 volumes 1 and 2.
 from __future__ import annotations
 
 import contextlib
+import difflib
+import functools
 import math
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, NoReturn, TypeVar, cast, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, NoReturn, Self, TypeVar, cast, overload
 
 from instruments.clock import WallClock
 from instruments.errors import BadAnswer, CommandRefused, OutOfRange, WrongInstrument
 from instruments.ieee488 import IDENTITY_FIELDS, INFINITY, NOT_A_NUMBER, NUMERIC, Form, identity_fields
+from instruments.links.opening import open_link
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from instruments.clock import Clock
-    from instruments.links.transport import Transport
+    from instruments.links.transport import TrafficLog, Transport
 
 T = TypeVar("T", bound=bool | float | str)
 #: Error queues hold 20 to 32 entries; more questions than that mean that the instrument never says "none".
@@ -37,6 +40,11 @@ class ScpiInstrument:
 
     MODELS: what the model field of ``*IDN?`` must match, whole (regular expression); NUMBER: the form in which it
     prints numbers, where a setting or a question has none of its own.
+
+    It is a context manager: it is closed at the end.  One program, one thread: there is no lock within a driver.
+
+    >>> ScpiInstrument.connect("TCPIP0::192.168.1.20::5025::SOCKET")  # doctest: +SKIP
+    <ScpiInstrument 53230A MY58120113 at TCPIP0::192.168.1.20::5025::SOCKET>
     """
 
     MODELS: ClassVar[str] = ".*"
@@ -44,12 +52,71 @@ class ScpiInstrument:
     SERIAL: ClassVar[Mapping[str, Any]] = {}
     NUMBER: ClassVar[Form] = NUMERIC
 
+    transport: Transport
+    clock: Clock
+    #: What was set last of each declared setting, since the last reset.
+    set_to: dict[str, bool | float | str]
+    _fields: tuple[str, ...] = ()
+
     def __init__(self, transport: Transport, *, clock: Clock | None = None) -> None:
         """Drive the instrument at this link.  clock: of the bench, for what is waited for; by default the wall's."""
         self.transport = transport
-        self.clock: Clock = clock or WallClock()
-        #: What was set last of each declared setting, since the last reset.
-        self.set_to: dict[str, bool | float | str] = {}
+        self.clock = clock or WallClock()
+        self.set_to = {}
+
+    @classmethod
+    def connect(
+        cls,
+        address: str,
+        *,
+        library: Any = "@py",
+        timeout: float = 2.0,
+        clock: Clock | None = None,
+        log: TrafficLog | None = None,
+        **line: Any,
+    ) -> Self:
+        """The driver of the instrument at this address, which must answer as one of its models.
+
+        Args:
+            address: a port (``COM3``), or the name of a VISA resource.
+            library: PyVISA's, by its name or itself: ``"@py"``, ``"@levilab"``, ``""`` for the vendor's.
+            timeout: of one answer [s].
+            clock: of a virtual bench, the wall's by default.
+            log: is given all bytes.
+            line: baud_rate, data_bits, parity, stop_bits of a serial line, where they are not the instrument's own.
+
+        Raises:
+            NotConnected: nothing could be opened there.
+            NoAnswer: no instrument answers.
+            WrongInstrument: another one does.
+        """
+        link = open_link(address, line={**cls.SERIAL, **line}, library=library, timeout=timeout, clock=clock, log=log)
+        try:
+            instrument = cls(link, clock=clock)
+            instrument.identity()
+        except BaseException:
+            link.close()
+            raise
+        return instrument
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        """Model, serial number and address; the former two where the instrument was asked for them."""
+        known = " ".join(field for field in self._fields[1:3] if field)
+        return f"<{type(self).__name__}{' ' * bool(known)}{known} at {self.transport.address}>"
+
+    def __setattr__(self, name: str, value: object) -> None:
+        """Set an attribute that there is.  Raises AttributeError: a misspelt setting would be set nowhere."""
+        if not name.startswith("_") and name not in _attributes(cast("Any", type(self))):
+            near = difflib.get_close_matches(name, sorted(row.name for row in self.declared()), n=1)
+            hint = f": did you mean {near[0]!r}?" if near else ""
+            raise AttributeError(f"{type(self).__name__} has no setting {name!r}{hint}", name=name, obj=self)
+        super().__setattr__(name, value)
 
     def identity(self) -> str:
         """The answer to ``*IDN?``.
@@ -59,11 +126,12 @@ class ScpiInstrument:
         """
         answer = self.transport.query("*IDN?")
         try:
-            _, model, *_ = identity_fields(answer)
+            fields = identity_fields(answer)
         except ValueError:
             self.reject("*IDN?", answer, f"four fields with commas between them: {', '.join(IDENTITY_FIELDS)}")
-        if not re.fullmatch(self.MODELS, model, re.IGNORECASE):
+        if not re.fullmatch(self.MODELS, fields[1], re.IGNORECASE):
             raise WrongInstrument(self.transport.address, answer, f"one of {self.kind_of_instrument()}")
+        self._fields = fields
         return answer
 
     @classmethod
@@ -128,20 +196,53 @@ class ScpiInstrument:
         """Every declared setting as it stands in the instrument, unit at the end of the name."""
         return {setting.full_name: getattr(self, setting.name) for setting in self.declared()}
 
-    def unlike(self, now: dict[str, bool | float | str]) -> dict[str, tuple[object, object]]:
-        """Settings that stand in the instrument otherwise than they were set: name → (as set, now)."""
-        return {
-            setting.full_name: (asked, now[setting.full_name])
-            for setting in self.declared()
-            if (asked := self.set_to.get(setting.full_name)) is not None
-            and setting.differs(asked, now[setting.full_name])
-        }
+    def unlike(self, now: dict[str, bool | float | str] | None = None) -> dict[str, tuple[object, object]]:
+        """Settings that stand in the instrument otherwise than they were set: name → (as set, now).
+
+        now: what `settings` has returned; by default the instrument is asked for those that were set.
+        """
+        found: dict[str, tuple[object, object]] = {}
+        rows = {row.full_name: row for row in self.declared()}
+        for name, asked in self.set_to.items():
+            row = rows[name]
+            stands = getattr(self, row.name) if now is None else now[name]
+            if row.differs(asked, stands, rounding=self.rounding(row)):
+                found[name] = (asked, stands)
+        return found
+
+    def rounding(self, row: Setting[Any]) -> float:
+        """How far this instrument may set a number from what it was given, beside what all do [its unit]."""
+        return 0.0
 
     @classmethod
     def declared(cls) -> list[Setting[Any]]:
         """Its declared settings, those of a base first."""
         rows = (row for owner in reversed(cls.__mro__) for row in vars(owner).values())
         return [row for row in rows if isinstance(row, Setting)]
+
+    def field_of(self, answer: str, header: str, key: str) -> str:
+        """What an answer says of one setting: all of it, where it has neither header nor fields.
+
+        Raises ValueError where it says nothing of it.
+        """
+        return answer
+
+    def confirm(self, setting: Setting[Any], value: bool | float | str) -> None:  # noqa: FBT001
+        """Called when a setting was sent: an instrument without an error queue is asked for it.
+
+        Raises OutOfRange for a number that it sets otherwise, CommandRefused for anything else.
+        """
+
+    def ask_back(self, setting: Setting[Any], value: bool | float | str) -> None:  # noqa: FBT001
+        """See that a setting was taken, for `confirm`."""
+        now = getattr(self, setting.name)
+        if not setting.differs(value, now, rounding=self.rounding(setting)):
+            return
+        if setting.kind is float:
+            allowed = f"{now}, as the instrument has set it"
+            raise OutOfRange(self.transport.address, setting.name, value, allowed)
+        sent = f"{self.header_in_use(setting.header)} {value}"
+        raise CommandRefused(self.transport.address, sent, (f"{setting.name} is {now!r} afterwards",))
 
     def header_in_use(self, header: str) -> str:
         """The header of a declared setting as it is sent; with several inputs, that of the input in use."""
@@ -150,6 +251,13 @@ class ScpiInstrument:
     def close(self) -> None:
         """Give the instrument back."""
         self.transport.close()
+
+
+@functools.cache
+def _attributes(driver: Any) -> frozenset[str]:
+    """The names that can be set on a driver: its settings, properties, and what its classes annotate."""
+    annotated = (name for owner in driver.__mro__ for name in getattr(owner, "__annotations__", {}))
+    return frozenset({*dir(driver), *annotated})
 
 
 @dataclass(eq=False)
@@ -162,7 +270,9 @@ class Setting(Generic[T]):
     header: the SCPI header; kind: float, bool or str; unit: of the number on the wire;
     low, high: what the instrument takes; choices: the words it takes, long form with the short form in capitals
     (SINusoid); answers: words that it may answer beside the choices; form: the form of its answer, where that is not
-    the instrument's NUMBER, or of a text without choices; resolution: the step in which the instrument sets it [unit].
+    the instrument's NUMBER, or of a text without choices; resolution: the step in which the instrument sets it [unit];
+    key: the name of the field where the header has several, ``C1:BSWV WVTP,SINE,FRQ,1000HZ,…``; suffix: the unit that
+    is sent with a number; values: the only numbers that the instrument has; about: what it is, for `help`.
     """
 
     header: str
@@ -174,6 +284,10 @@ class Setting(Generic[T]):
     answers: tuple[str, ...] = ()
     form: Form | None = None
     resolution: float = 0.0
+    key: str = ""
+    suffix: str = ""
+    values: tuple[float, ...] = ()
+    about: str = ""
     name: str = ""
 
     def __post_init__(self) -> None:
@@ -182,6 +296,23 @@ class Setting(Generic[T]):
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
+        self.__doc__ = self.description()
+
+    def description(self) -> str:
+        """What `help` shows: what it is, the header on the wire, range and unit."""
+        about = f"{self.about}: " if self.about else ""
+        return f"{about}{self.header}{f' {self.key}' if self.key else ''}, {self._allowed()}."
+
+    def _allowed(self) -> str:
+        """What can be set, in words."""
+        unit = f" {self.unit}" if self.unit else ""
+        if self.kind is bool:
+            return "True or False"
+        if self.values:
+            return " or ".join(f"{value:g}" for value in self.values) + unit
+        if self.kind is float:
+            return f"{self.low:g} to {self.high:g}{unit}"
+        return "one of " + ", ".join(self.choices) if self.choices else f"a text, as {self.form and self.form.example}"
 
     @property
     def full_name(self) -> str:
@@ -200,20 +331,26 @@ class Setting(Generic[T]):
         answer = instrument.transport.query(question)
         form = self.form or instrument.NUMBER
         try:
-            return cast("T", self._parse(answer, form))
+            return cast("T", self._parse(instrument.field_of(answer, self.header, self.key), form))
         except ValueError:
             instrument.reject(question, answer, self._expected(form))
 
     def __set__(self, instrument: ScpiInstrument, value: T) -> None:
         """Check, send, and read the error queue."""
         self._check(instrument.transport.address, value)
-        instrument.command(f"{instrument.header_in_use(self.header)} {self._spell(value)}")
+        key = f"{self.key}," if self.key else ""
+        instrument.command(f"{instrument.header_in_use(self.header)} {key}{self._spell(value)}{self.suffix}")
+        instrument.confirm(self, value)
         instrument.set_to[self.full_name] = self._canonical(value)
 
-    def differs(self, asked: T, answered: T) -> bool:
-        """Whether an answer is another value than the one that was set, rounding and the setting's resolution aside."""
+    def differs(self, asked: T, answered: T, *, rounding: float = 0.0) -> bool:
+        """Whether an answer is another value than the one that was set, rounding and the setting's resolution aside.
+
+        rounding: a further one, in the setting's unit.
+        """
         if self.kind is float:
-            return not abs(float(answered) - float(asked)) <= _ROUNDING * abs(float(asked)) + self.resolution
+            aside = _ROUNDING * abs(float(asked)) + self.resolution + rounding
+            return not abs(float(answered) - float(asked)) <= aside
         return self._canonical(asked) != self._canonical(answered)
 
     def _parse(self, answer: str, form: Form) -> bool | float | str:
@@ -256,11 +393,13 @@ class Setting(Generic[T]):
             try:
                 _short_form(str(value), self.choices)
             except ValueError:
-                raise OutOfRange(address, self.name, value, "one of " + ", ".join(self.choices)) from None
+                raise OutOfRange(address, self.name, value, self._allowed()) from None
+        if self.values and value not in self.values:
+            raise OutOfRange(address, self.name, value, self._allowed())
         if self.kind is float and not self.low <= float(value) <= self.high:
-            raise OutOfRange(address, self.name, value, f"{self.low:g} to {self.high:g} {self.unit}")
+            raise OutOfRange(address, self.name, value, self._allowed())
         if self.kind is str and not self.choices and self.form and not self.form.matches(str(value)):
-            raise OutOfRange(address, self.name, value, f"a text, as {self.form.example}")
+            raise OutOfRange(address, self.name, value, self._allowed())
 
     def _spell(self, value: T) -> str:
         if self.kind is bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import math
 import re
 import socket
 import sys
@@ -11,13 +12,16 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from instruments.clock import WallClock
 from instruments.errors import BadAnswer, InstrumentError, NotConnected, Occupied, OutOfRange, SilentLine
-from instruments.ieee488 import BrokenBlock, read_block
+from instruments.ieee488 import PLAIN_BLOCK, BrokenBlock, read_block
 from instruments.links.advice import CLOSED
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from instruments.clock import Clock
+    from instruments.ieee488 import BlockForm
     from instruments.links.transport import TrafficLog
 
 #: pyserial's letters for what bench.toml says in words.
@@ -54,6 +58,7 @@ class SerialTransport:
         stop_bits: float = 1,
         timeout: float = 2.0,
         pause: float = 0.0,
+        clock: Clock | None = None,
         log: TrafficLog | None = None,
     ) -> None:
         """Open the port.
@@ -61,9 +66,11 @@ class SerialTransport:
         address: a port (``COM3``, ``/dev/ttyUSB0``), the same as a VISA resource (``ASRLCOM3::INSTR``, ``ASRL3::INSTR``
         for the third port), or a URL of pyserial's (``socket://host:port``).
         parity: none, odd, even, mark or space; timeout: of one answer [s]; pause: how long the instrument is left
-        alone after each exchange [s].  Raises NotConnected, Occupied, OutOfRange.
+        alone after each exchange [s]; clock: by which, the wall's by default.
+        Raises NotConnected, Occupied, OutOfRange.
         """
         self.address, self.timeout, self.pause = address, timeout, pause
+        self._clock: Clock = clock or WallClock()
         if parity not in PARITIES:
             raise OutOfRange(address, "parity", parity, "one of " + ", ".join(PARITIES))
         self._options: dict[str, Any] = {
@@ -76,7 +83,8 @@ class SerialTransport:
         self._out_of_step = self._locked = self._closed = False
         self._identities_due = 0  # answers to *IDN? that were not received, and may still come
         self._received = bytearray()
-        self._rested_at = 0.0
+        self._rested_at = -math.inf
+        self._lost = False
         self._port: Any = self._open()
 
     def _open(self) -> Any:
@@ -104,6 +112,8 @@ class SerialTransport:
 
     def write(self, message: str) -> None:
         """Send one message; see :class:`instruments.links.transport.Transport`."""
+        if self._lost:  # a converter that hung up, a plug that was pulled: it may be there again
+            self.reopen()
         with self._translated_errors(message, self.timeout):
             if self._out_of_step:
                 self._resynchronise()
@@ -118,7 +128,7 @@ class SerialTransport:
         self._record("<", line)
         return line.decode("ascii").strip()
 
-    def query_block(self, message: str, *, patience: float = 0.0) -> bytes:
+    def query_block(self, message: str, *, patience: float = 0.0, form: BlockForm = PLAIN_BLOCK) -> bytes:
         """Ask for a block; see :class:`instruments.links.transport.Transport`.
 
         A block may take longer than the time-out, but not be silent for so long.
@@ -131,13 +141,14 @@ class SerialTransport:
             if not head:
                 raise SilentLine(self.address, message, within)
             first = iter((head,))
-            block = read_block(lambda count: next(first, b"") or self._exactly(count))
+            block = read_block(lambda count: next(first, b"") or self._exactly(count), form)
             self._rest()
         self._record("<", b"(%d bytes)" % len(block))
         return block
 
     def _send(self, message: str) -> None:
-        time.sleep(max(0.0, self._rested_at - time.monotonic()))
+        if (rest := self._rested_at - self._clock.now()) > 0:
+            self._clock.sleep(rest)
         self._port.reset_input_buffer()  # an answer that came unasked is no answer to this
         self._received.clear()
         line = message.encode("ascii", errors="replace")
@@ -211,6 +222,7 @@ class SerialTransport:
         self._check_open()
         self._close_port()
         self._port = self._open()
+        self._lost = False
         self._out_of_step = True  # the instrument was not told, and may still be answering
         if self._locked:
             self.lock()
@@ -247,7 +259,8 @@ class SerialTransport:
             self._port.timeout = within
 
     def _rest(self) -> None:
-        self._rested_at = time.monotonic() + self.pause
+        if self.pause:
+            self._rested_at = self._clock.now() + self.pause
 
     def _record(self, direction: str, message: bytes) -> None:
         if self._log:
@@ -272,6 +285,7 @@ class SerialTransport:
             self._check_open()
             if getattr(error, "errno", None) in _IN_USE:
                 raise Occupied(self.address) from error
+            self._lost = True
             told = f"no link at {question!r} ({_one_line(error)}): check the cable, and that it is on"
             raise NotConnected(self.address, told) from error
 

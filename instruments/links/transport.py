@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
+
+from instruments.ieee488 import PLAIN_BLOCK
+
+if TYPE_CHECKING:
+    from instruments.ieee488 import BlockForm
 
 
 class Transport(Protocol):
@@ -22,8 +27,10 @@ class Transport(Protocol):
         timeout.  Raises NoAnswer when nothing came in time.
         """
 
-    def query_block(self, message: str, *, patience: float = 0.0) -> bytes:
+    def query_block(self, message: str, *, patience: float = 0.0, form: BlockForm = PLAIN_BLOCK) -> bytes:
         """Send a question and return the bytes of the definite-length block that answers it (IEEE 488.2, 8.7.9).
+
+        form: what stands around the block.
 
         Raises NoAnswer as query does, BadAnswer when it is no block or one that breaks off.
         """

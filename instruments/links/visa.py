@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from instruments.clock import WallClock
 from instruments.errors import BadAnswer, NoAnswer, NotConnected, Occupied, SilentLine
-from instruments.ieee488 import BrokenBlock, block_of, read_block
+from instruments.ieee488 import PLAIN_BLOCK, BrokenBlock, block_of, read_block
 from instruments.links.advice import CLOSED, advice, one_line
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from pyvisa.resources import MessageBasedResource
 
     from instruments.clock import Clock
+    from instruments.ieee488 import BlockForm
     from instruments.links.transport import TrafficLog
 
 
@@ -168,24 +169,24 @@ class VisaTransport:
             text = answer.decode("ascii")
         return text.strip()
 
-    def query_block(self, message: str, *, patience: float = 0.0) -> bytes:
+    def query_block(self, message: str, *, patience: float = 0.0, form: BlockForm = PLAIN_BLOCK) -> bytes:
         """Ask for a block; see :class:`Transport`."""
         self._begin(message)
         within = self.timeout + patience
         with self._translated_errors(message, within):
             self._send(message)
             self._wait_at_most(within)
-            block = self._block()
+            block = self._block(form)
             self._rest()
             self._record("<", block if len(block) <= _SHORT else block[:_SHORT] + b"... (%d bytes)" % len(block))
         return block
 
-    def _block(self) -> bytes:
+    def _block(self, form: BlockForm) -> bytes:
         self._resource.read_termination = None  # a line feed in the block is a byte like any other
         try:
             if not self._stream:
-                return block_of(self._resource.read_raw(_CHUNK))
-            return read_block(lambda count: self._resource.read_bytes(count, chunk_size=_CHUNK) if count else b"")
+                return block_of(self._resource.read_raw(_CHUNK), form)
+            return read_block(lambda count: self._resource.read_bytes(count, chunk_size=_CHUNK) if count else b"", form)
         finally:
             self._resource.read_termination = "\n"
 

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from instruments.errors import InstrumentError
 from levilab.acquisition.experiment import CounterSettings
+from levilab.acquisition.session import ExperimentFailed
 
 if TYPE_CHECKING:
     from levilab.acquisition.session import Row, Session
 
 S = TypeVar("S", bound=CounterSettings)
 
-#: A free top does not speed up (5 % leave room for noise), nor lose more than half its spin in 100 s (air: 30 %).
-_HIGHEST_SHARE, _HALVING_S = 1.05, 100.0
+#: A free top does not speed up (5 % leave room for noise) but loses a thousandth a second at least (air: 0.3 %/s), and
+#: no more than half its spin in 100 s (air: 30 %).
+_HIGHEST_SHARE, _LEAST_LOSS_PER_S, _HALVING_S = 1.05, 1e-3, 100.0
 #: Two counts of one spin, seconds apart, agree this well (drag takes 0.3 %/s, noise is 0.1 %).
 _SAME_SHARE = 0.03
-#: A fallen top rattles: after so many times without a credible count it is taken for fallen.
+#: So many readings are kept to compare a new one with: the last one, and two in case that it was a miscount.
+_KEPT = 3
+#: A fallen top rattles: after so many times without a credible count it is taken for fallen; after so many counts in a
+#: row that are too high, for another one.
 _MOST_MISSED = 3
 
 
@@ -28,6 +34,24 @@ class Missed(StrEnum):
     DARK = "no light pulses"
     LOST = "the instrument did not answer as it should"
     UNSTEADY = "no two counts that agree with each other or with the last reading"
+    MULTIPLE = "twice or three times what a coasting top can have"
+    FASTER = "more than a coasting top can have"
+
+
+#: Why there is no reading where the counter saw something that may be a fallen top.
+NO_TOP = frozenset({Missed.DARK, Missed.UNSTEADY})
+
+
+class AnotherTop(ExperimentFailed):
+    """The counter sees a top that spins faster than the last reading allows: not the one that was coasting."""
+
+    def __init__(self, last: Row, seen: Row) -> None:
+        self.last, self.seen = last, seen
+        super().__init__(
+            f"the counter sees {seen['spin_frequency_hz']:.4g} Hz, {seen['time_s'] - last['time_s']:.0f} s after "
+            f"{last['spin_frequency_hz']:.4g} Hz, and it stays so: a top that coasts gains no spin, so this one was "
+            "set spinning meanwhile; begin a new run with it"
+        )
 
 
 def prepare_counter(session: Session[S]) -> None:
@@ -55,19 +79,30 @@ class FreeTop(Generic[S]):
 
     Attributes:
         session: the acquisition.
-        last: the last reading, None before the first.
+        before: the readings so far, of which the last ones count.
         missed: why there was no reading, each time since the last one.
     """
 
     session: Session[S]
-    last: Row | None = None
+    before: list[Row] = field(default_factory=list)
     missed: list[Missed] = field(default_factory=list)
+    _warned: bool = False
+    _faster: Row = field(default_factory=dict)
+
+    @property
+    def last(self) -> Row | None:
+        """The last reading, None before the first."""
+        return self.before[-1] if self.before else None
 
     def read(self) -> Row | None:
         """A reading, or None; a count that is missing or does not follow from the last reading is asked for once more.
 
-        Two counts that agree are a reading, even if it does not follow: then the one before was the miscount.  A
-        counter that fails, or whose settings another program changed, costs this reading and is set up anew.
+        Two counts that agree are a reading, even if they do not follow, as long as a coasting top can have them: less
+        than before, or as much as before a miscount.  More than it can have is no reading.  A counter that fails, or
+        whose settings another program changed, costs this reading and is set up anew.
+
+        Raises:
+            AnotherTop: one that is faster, three times in a row.
         """
         session = self.session
         try:
@@ -77,9 +112,11 @@ class FreeTop(Generic[S]):
             reading = Missed.LOST
         if isinstance(reading, Missed):
             self.missed.append(reading)
+            if self.missed[-_MOST_MISSED:] == [Missed.FASTER] * _MOST_MISSED:
+                raise AnotherTop(self.before[-1], self._faster)
             return None
         self.missed.clear()
-        self.last = reading
+        self.before = [*self.before[1 - _KEPT :], reading]
         return reading
 
     def fall(self, asked: float) -> str:
@@ -93,7 +130,7 @@ class FreeTop(Generic[S]):
         last = self.last["time_s"] if self.last else 0.0
         if self.missed and self.missed[-1] is Missed.DARK:
             return f"no light pulses any more: the top fell between {last:.1f} s and {asked:.1f} s"
-        seen = [why for why in self.missed if why is not Missed.LOST]
+        seen = [why for why in self.missed if why in NO_TOP]
         if len(seen) >= _MOST_MISSED:
             return f"no steady pulses at {len(seen)} times in a row: the top fell after {last:.1f} s"
         return ""
@@ -105,12 +142,38 @@ class FreeTop(Generic[S]):
         what = "no reading" if first is None else f"{first['spin_frequency_hz']:.4g} Hz does not follow"
         self.session.event("asked again", f"{what}, asking once more", **_spin_of(first))
         second = self._count()
-        if second and (self._follows(second) or (first and _is_same_spin(first, second))):
+        if second and self._follows(second):
             return second
+        if first and second and _is_same_spin(first, second):
+            return self._agreed(second)
         if second:
             text = f"{second['spin_frequency_hz']:.4g} Hz is not credible either"
             self.session.event("not taken", text, **_spin_of(second))
         return Missed.UNSTEADY if first or second else Missed.DARK
+
+    def _agreed(self, reading: Row) -> Row | Missed:
+        """What two counts mean that agree, but do not follow from the last reading."""
+        last = self.before[-1]  # else they would follow
+        if reading["spin_frequency_hz"] < last["spin_frequency_hz"]:
+            return reading
+        if any(_is_drop(row, last) and is_plausible(row, reading) for row in self.before[:-1]):
+            text = f"the reading before, {last['spin_frequency_hz']:.4g} Hz, was a miscount"
+            self.session.event("miscounted", text, **_spin_of(last))
+            return reading
+        times = next((k for k in (2, 3) if _coasts(last, reading, k)), None)
+        seen, before = reading["spin_frequency_hz"], last["spin_frequency_hz"]
+        if times is None:
+            self._faster = reading
+            text = f"{seen:.4g} Hz after {before:.4g} Hz: a top that coasts gains no spin; no reading"
+            self.session.event("not taken", text, **_spin_of(reading))
+            return Missed.FASTER
+        if not self._warned:
+            self._warned = True
+            self.session.warn(
+                f"the counter sees {seen:.4g} Hz after {before:.4g} Hz, {times} times what follows: such counts are no "
+                "readings; is there a second bright mark, or is the trigger level too low?"
+            )
+        return Missed.MULTIPLE
 
     def _count(self) -> Row | None:
         """What the counter counts; its time is the middle of the exchange, which is the gate's."""
@@ -134,7 +197,20 @@ def is_plausible(last: Row, reading: Row) -> bool:
     share = reading["spin_frequency_hz"] / last["spin_frequency_hz"]
     gap = reading["time_s"] - last["time_s"]
     lowest: float = 0.5 ** (1 + gap / _HALVING_S)
-    return lowest < share < _HIGHEST_SHARE
+    return lowest < share < _HIGHEST_SHARE * math.exp(-_LEAST_LOSS_PER_S * gap)
+
+
+def _is_drop(before: Row, last: Row) -> bool:
+    """Whether the spin fell from one reading to a later one by more than a coasting top's does."""
+    gap = last["time_s"] - before["time_s"]
+    lowest: float = 0.5 ** (gap / _HALVING_S) / _HIGHEST_SHARE
+    return last["spin_frequency_hz"] / before["spin_frequency_hz"] < lowest
+
+
+def _coasts(last: Row, reading: Row, times: int) -> bool:
+    """Whether a reading is so many times the spin of a top that coasts since the last one."""
+    one = reading | {"spin_frequency_hz": reading["spin_frequency_hz"] / times}
+    return is_plausible(last, one) and not _is_drop(last, one)
 
 
 def _is_same_spin(first: Row, second: Row) -> bool:

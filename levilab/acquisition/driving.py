@@ -1,8 +1,14 @@
-"""Driving a top: a drive takes hold of it, raises its spin, holds it while the motion settles, and lets it go."""
+"""Driving a top: a drive takes hold of it, raises its spin, holds it while the motion settles, and lets it go.
+
+A sweep takes a held top from one frequency of the drive to the next; a point at which it is lost is recorded as failed,
+and the sweep goes on.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, TypeVar
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
@@ -12,9 +18,10 @@ from levilab.acquisition.counting import spin_now
 from levilab.acquisition.experiment import CounterSettings
 from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import ConfigError
+from levilab.bench.person import FloatTop
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable, Sequence
 
     from levilab.acquisition.session import Session
     from levilab.bench.config import Limits
@@ -25,11 +32,15 @@ RAMP_STEP_S = 1.0
 #: top's mass fits its place for as long as the room keeps its temperature, which is no longer than some hours.
 _LONGEST_RAMP_S = 6 * 3600.0
 #: A held top swings about the drive's frequency by what the drive can hold at most, 0.5 Hz at 0.4 mT [Hz].
-_HELD_WITHIN_HZ = 1.0
+HELD_WITHIN_HZ = 1.0
 #: Whether the drive takes hold depends on how the top happens to point when it comes on, and one time in four it does
 #: not.  So the top is looked at so often on the way [s] (one that is not held loses 0.1 Hz/s to the air), and tried
 #: again with the drive so many turns later: a reading ends with a pulse, so without that it would point as before.
 _LOOK_EVERY_S, _TURNS_LATER = 10.0, (0.0, 0.5, 0.25, 0.75)
+#: A top that a person was asked for is looked for so often [s].
+_LOOK_FOR_TOP_S = 2.0
+#: A point of a sweep is tried so often, and so many that fail one after the other end the sweep.
+TRIES, MOST_FAILED = 2, 3
 
 
 class DriveSettings(CounterSettings):
@@ -47,22 +58,33 @@ class DriveSettings(CounterSettings):
 
     def check(self, table: str, limits: Limits) -> None:
         """Raise ConfigError for a drive that the bench does not allow."""
-        for name in ("drive_amplitude_vpp", "drive_frequency_hz"):
-            wanted, limit = getattr(self, name), getattr(limits, name)
-            if wanted > limit:
-                raise ConfigError(
-                    f"{table}.{name} = {wanted:g} is more than this bench allows, limits.{name} = {limit:g}"
-                )
-        if self.drive_frequency_hz < limits.drive_lowest_hz:
-            raise ConfigError(
-                f"{table}.drive_frequency_hz = {self.drive_frequency_hz:g} is less than this bench allows, "
-                f"limits.drive_lowest_hz = {limits.drive_lowest_hz:g}"
-            )
+        check_drive(table, limits, self.drive_amplitude_vpp, [("drive_frequency_hz", self.drive_frequency_hz)])
         slowest = self.drive_frequency_hz / _LONGEST_RAMP_S
         if self.ramp_hz_per_s < slowest:
             raise ConfigError(
                 f"{table}.ramp_hz_per_s = {self.ramp_hz_per_s:g} would raise the top for hours to "
                 f"{table}.drive_frequency_hz = {self.drive_frequency_hz:g}: at least {slowest:.2g} is expected"
+            )
+
+
+def check_drive(table: str, limits: Limits, amplitude_vpp: float, frequencies: Iterable[tuple[str, float]]) -> None:
+    """Raise ConfigError for a drive that the bench does not allow.
+
+    table: of the settings in the bench file; frequencies: names of its settings, with what they ask for [Hz].
+    """
+    asked = [("drive_amplitude_vpp", amplitude_vpp, "drive_amplitude_vpp")]
+    asked += [(name, frequency, "drive_frequency_hz") for name, frequency in frequencies]
+    for name, wanted, limit in asked:
+        if wanted > getattr(limits, limit):
+            raise ConfigError(
+                f"{table}.{name} = {wanted:g} is more than this bench allows, limits.{limit} = "
+                f"{getattr(limits, limit):g}"
+            )
+    for name, wanted, _ in asked[1:]:
+        if wanted < limits.drive_lowest_hz:
+            raise ConfigError(
+                f"{table}.{name} = {wanted:g} is less than this bench allows, limits.drive_lowest_hz = "
+                f"{limits.drive_lowest_hz:g}"
             )
 
 
@@ -74,29 +96,34 @@ class DidNotFollow(ExperimentFailed):
 
 
 class NotHeld(Exception):
-    """The top does not spin with the drive; what is seen instead.  spin [Hz]: None where no light pulses are seen."""
+    """The top does not spin with the drive; what is seen instead.
+
+    spin: None where no light pulses are seen; drive [Hz].
+    """
 
     def __init__(self, spin: float | None, drive: float) -> None:
-        self.spin = spin
+        self.spin, self.drive = spin, drive
         seen = "no light pulses" if spin is None else f"a spin of {spin:.2f} Hz"
         super().__init__(f"{seen} under a drive of {drive:.2f} Hz")
+
+
+# --- up ---
 
 
 def drive_until(session: Session[D], steps: Callable[[Session[D]], None]) -> None:
     """Drive the top up, go through steps while it is held, and switch the drive off.
 
-    If the generator fails meanwhile, all of it is done once more, from the top's new spin.
+    If the generator fails meanwhile, all of it is done once more, from the top's new spin; but not if it fails when it
+    is switched off after the steps: what they measured counts.
     """
     while True:
         try:
             drive_up(session)
             steps(session)
-            session.bench.outputs_off()
         except InstrumentError as error:
-            if error.address != session.bench.address("generator") or isinstance(error, OutOfRange):
-                raise
-            session.reconnect("generator", error, session.bench.outputs_off)
+            reach_generator_again(session, error)
         else:
+            drive_off(session)
             return
 
 
@@ -106,12 +133,32 @@ def drive_up_and_let_go(session: Session[D]) -> None:
     session.event("drive off", "drive off, the top spins down freely")
 
 
-def drive_up(session: Session[D]) -> None:
-    """Let the drive take hold of the top, raise it, and hold it.  Raises DidNotFollow; ExperimentFailed in the dark."""
+def drive_off(session: Session[D]) -> None:
+    """Switch the drive off; a generator that fails meanwhile is reached again.  Raises InstrumentError."""
+    try:
+        session.bench.outputs_off()
+    except InstrumentError as error:
+        reach_generator_again(session, error)
+
+
+def reach_generator_again(session: Session[D], error: InstrumentError) -> None:
+    """Reach a generator that failed again, its output off.  Raises an error of another instrument, or of a setting."""
+    if error.address != session.bench.address("generator") or isinstance(error, OutOfRange):
+        raise error
+    session.reconnect("generator", error, session.bench.outputs_off)
+
+
+def drive_up(session: Session[D], to: float | None = None) -> None:
+    """Let the drive take hold of the top at its own spin, bring it to a frequency, and hold it there.
+
+    to: that frequency [Hz]; None: as the settings say.  Raises DidNotFollow, with the drive off; ExperimentFailed in
+    the dark.
+    """
     settings = session.settings
+    target = settings.drive_frequency_hz if to is None else to
     seen = ""
     for tries, later in enumerate(_TURNS_LATER, 1):
-        spin = _free_spin(session, seen)
+        spin = _free_spin(session, target, seen)
         session.wait(later / spin)
         session.stop.check()  # the drive does not go on once the end was asked for
         session.bench.generator.prepare(
@@ -120,31 +167,31 @@ def drive_up(session: Session[D]) -> None:
         session.event("drive on", f"drive on at the top's spin, {spin:.2f} Hz", frequency_hz=spin)
         session.bench.generator.output = True
         try:
-            held = _ramp(session, spin)
+            held = _ramp(session, spin, target)
             session.event("locked", f"the top follows the drive at {held:.2f} Hz", frequency_hz=held)
-            _hold(session)
+            _hold(session, target)
         except NotHeld as lost:
             session.bench.outputs_off()
             seen = str(lost)
             session.event("not held", f"try {tries} of {len(_TURNS_LATER)}: the drive does not hold the top, {seen}")
         else:
             return
-    raise _did_not_follow(session, seen)
+    raise _did_not_follow(session, target, seen)
 
 
-def _did_not_follow(session: Session[D], seen: str) -> DidNotFollow:
+def _did_not_follow(session: Session[D], target: float, seen: str) -> DidNotFollow:
     name = session.writer.record.experiment
     return DidNotFollow(
-        f"the top did not follow the drive to {session.settings.drive_frequency_hz:g} Hz ({seen}): ramp slower "
-        f"({name}.ramp_hz_per_s) or drive harder ({name}.drive_amplitude_vpp)"
+        f"the top did not follow the drive to {target:g} Hz ({seen}): ramp slower ({name}.ramp_hz_per_s) or drive "
+        f"harder ({name}.drive_amplitude_vpp)"
     )
 
 
-def _free_spin(session: Session[D], before: str) -> float:
+def _free_spin(session: Session[D], target: float, before: str) -> float:
     """The spin before the drive is on.  before: what the last try ended with.  Raises ExperimentFailed in the dark."""
     spin = spin_now(session)
     if spin is None and before:
-        raise _did_not_follow(session, f"{before}; then it fell")
+        raise _did_not_follow(session, target, f"{before}; then it fell")
     if spin is None:
         raise no_light(session)
     return spin
@@ -159,12 +206,11 @@ def no_light(session: Session[D]) -> ExperimentFailed:
     )
 
 
-def _ramp(session: Session[D], start: float) -> float:
-    """Raise the drive's frequency in steps that the top can follow; its spin then.  Raises NotHeld."""
-    settings = session.settings
-    target = settings.drive_frequency_hz
-    steps = max(1, round(abs(target - start) / (settings.ramp_hz_per_s * RAMP_STEP_S)))
+def _ramp(session: Session[D], start: float, target: float) -> float:
+    """Move the drive in steps that the top can follow; its spin then [Hz].  Raises NotHeld."""
+    steps = max(1, round(abs(target - start) / (session.settings.ramp_hz_per_s * RAMP_STEP_S)))
     for k in range(1, steps + 1):
+        session.stop.check()
         drive = start + (target - start) * k / steps
         session.bench.generator.frequency = drive
         session.progress(f"drive at {drive:.2f} Hz", k / steps)
@@ -177,15 +223,14 @@ def _ramp(session: Session[D], start: float) -> float:
 def held_spin(session: Session[D], drive: float) -> float:
     """The spin of a top that is held by a drive [Hz].  Raises NotHeld."""
     spin = spin_now(session)
-    if spin is None or abs(spin - drive) > _HELD_WITHIN_HZ:
+    if spin is None or abs(spin - drive) > HELD_WITHIN_HZ:
         raise NotHeld(spin, drive)
     return spin
 
 
-def _hold(session: Session[D]) -> None:
+def _hold(session: Session[D], drive: float) -> None:
     """Let the motion settle, and compare the counted spin with the drive's frequency meanwhile.  Raises NotHeld."""
-    settings = session.settings
-    drive, n = settings.drive_frequency_hz, round(settings.hold_s / settings.gate_s)
+    n = round(session.settings.hold_s / session.settings.gate_s)
     counts = []
     for k in range(n):
         counts.append(held_spin(session, drive))
@@ -200,3 +245,147 @@ def compare_with_drive(session: Session[D], slip: Slip) -> None:
     session.event("held", text, spin_frequency_hz=slip.spin, drive_frequency_hz=slip.drive, u_hz=slip.u)
     if slip.warning:
         session.warn(slip.warning)
+
+
+# --- a top, and time, for a series or a sweep ---
+
+
+def have_a_top(session: Session[D], text: str, number: int, *, within_s: float) -> None:
+    """See that a top floats; where none does, ask a person for one.
+
+    Args:
+        session: the acquisition.
+        text: what the person reads.
+        number: how many tops of the run came before.
+        within_s: how long it is waited for [s].
+
+    Raises:
+        ExperimentFailed: the counter still sees none.
+    """
+    if spin_now(session) is not None:
+        return
+    session.ask(FloatTop(text, number))
+    end = session.now() + within_s
+    while spin_now(session) is None:
+        if session.now() >= end:
+            raise no_light(session)
+        session.wait(_LOOK_FOR_TOP_S)
+
+
+def is_over(session: Session[D]) -> bool:
+    """Whether the time that the run may take is over; says so."""
+    longest = session.settings.longest_s
+    if session.spent() <= longest:
+        return False
+    session.event("longest", f"{longest:g} s are over ({session.writer.record.experiment}.longest_s)")
+    return True
+
+
+# --- a sweep ---
+
+
+@dataclass(frozen=True)
+class FailedPoint:
+    """A point of a sweep at which nothing was measured.  drive: its frequency [Hz]; reason: of the last try."""
+
+    drive: float
+    reason: str
+
+
+def sweep_drive(
+    session: Session[D],
+    points: Sequence[float],
+    measure: Callable[[float], None],
+    *,
+    within_s: float = 600.0,
+    most_failed: int = MOST_FAILED,
+) -> tuple[FailedPoint, ...]:
+    """Bring the drive with a held top from point to point of a sweep, and measure at each.
+
+    Where the top is lost, at a point or on the way to it, the drive goes off, takes hold of the top at its own spin and
+    brings it back to the last frequency that held it; where it is down, a person is asked to float it first.  After
+    TRIES tries the point is recorded as failed, an event with its reason, and the sweep goes on to the next one.  A
+    generator that fails is reached again and costs no try.  The drive is off at the end.
+
+    Args:
+        session: the acquisition.
+        points: frequencies of the drive, in order [Hz].
+        measure: measures at a frequency at which the drive now is, and keeps the reading itself.  Raises NotHeld where
+            the top is lost, or not locked.
+        within_s: how long a person has to float a top [s].
+        most_failed: so many points that fail one after the other end the sweep.
+
+    Returns:
+        The points that failed.
+
+    Raises:
+        ExperimentFailed: no top was floated, or measure raised it.  What was measured is kept.
+    """
+    sweep = _Sweep(session, measure, within_s, held=session.settings.drive_frequency_hz)
+    failed: list[FailedPoint] = []
+    in_a_row = 0
+    for k, drive in enumerate(points):
+        if in_a_row == most_failed:
+            left = ", ".join(f"{drive:g}" for drive in points[k:])
+            text = f"{most_failed} points one after the other failed: the sweep ends here; not tried: {left} Hz"
+            session.event("ended", text)
+            break
+        reason = sweep.carry_out(drive)
+        if reason is None:
+            break
+        in_a_row = in_a_row + 1 if reason else 0
+        if reason:
+            failed.append(FailedPoint(drive, reason))
+            session.event("left out", f"the point of {drive:g} Hz is left out: {reason}", drive_frequency_hz=drive)
+    drive_off(session)
+    return tuple(failed)
+
+
+@dataclass
+class _Sweep:
+    """Where a sweep is.
+
+    session, measure, within_s: as `sweep_drive` has them; held: the last frequency that held the top [Hz]; at: the
+    drive's frequency [Hz], None while it is off.
+    """
+
+    session: Session[Any]
+    measure: Callable[[float], None]
+    within_s: float
+    held: float
+    at: float | None = None
+
+    def carry_out(self, drive: float) -> str | None:
+        """Try a point until it is measured; returns why it failed, empty if it did not, None if time is over."""
+        session, reason = self.session, ""
+        tries = 0
+        while tries < TRIES:
+            if is_over(session):
+                return None
+            try:
+                self._go_to(drive)
+                self.measure(drive)
+            except (NotHeld, DidNotFollow) as lost:
+                self.at, tries, reason = None, tries + 1, str(lost)
+                text = f"the top was lost at the point of {drive:g} Hz, or on the way to it: {reason}"
+                session.event("lock lost", f"{text}; try {tries} of {TRIES}", drive_frequency_hz=drive)
+                drive_off(session)
+            except InstrumentError as error:
+                self.at = None
+                reach_generator_again(session, error)
+            else:
+                self.at = self.held = drive
+                return ""
+        return reason
+
+    def _go_to(self, drive: float) -> None:
+        """Bring the drive to a point, with a held top.  Raises NotHeld, DidNotFollow, ExperimentFailed."""
+        session = self.session
+        if self.at is None:
+            text = "The counter sees no top: spin the top and let it float."
+            have_a_top(session, text, len(session.rows), within_s=self.within_s)
+            drive_up(session, self.held)
+            self.at = self.held
+        if not math.isclose(self.at, drive, rel_tol=1e-9):
+            _ramp(session, self.at, drive)
+            self.at = drive

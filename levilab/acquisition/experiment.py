@@ -77,7 +77,7 @@ class Experiment(Generic[S]):
     about: one line; instruments: the kinds that it needs; settings: its table in the bench file; channels: the columns
     that it writes, given its settings; run: carries it out; also_needs: the kinds of instrument that it needs only
     with some settings, given these; mock_scene: the scene of a mock unless another is asked
-    for, None: a top that only spins.
+    for, None: a top that only spins; called: what one reading of it is called.
     """
 
     name: str
@@ -88,6 +88,7 @@ class Experiment(Generic[S]):
     run: Callable[[Session[S]], None]
     mock_scene: str | None = None
     also_needs: Callable[[S], tuple[str, ...]] = lambda _: ()
+    called: str = "reading"
 
     def kinds(self, settings: S) -> tuple[str, ...]:
         """The kinds of instrument that it needs with these settings."""

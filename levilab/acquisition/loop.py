@@ -114,6 +114,7 @@ def _at_the_bench(
             person=wiring.person,
             earlier=earlier,
             rows=list(earlier.rows) if earlier else [],
+            called=experiment.called,
         )
         try:
             _note_instruments(session, "start")

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from instruments.clock import VirtualClock
 from levilab.acquisition.experiment import CounterSettings
+from levilab.acquisition.keys import refusal, refuse_unknown
 from levilab.acquisition.loop import AcquisitionRequest
 from levilab.acquisition.table import EXPERIMENTS, Configuration, settings_of, with_settings
 from levilab.bench.config import BenchConfig, ConfigError, read_bench
@@ -110,6 +111,11 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
     return request
 
 
+def chosen_settings(experiment: str, options: AcquisitionOptions) -> BenchConfig:
+    """The configuration with which a new run on a virtual bench would begin.  Raises ConfigError, UsageError."""
+    return _configuration(experiment, options, None, virtual=True)
+
+
 def _check_options(options: AcquisitionOptions, run: Run | None, *, virtual: bool) -> None:
     for name in ("seed", "scene"):
         if getattr(options, name) is not None and (run or not options.mock):
@@ -124,7 +130,8 @@ def _configuration(experiment: str, options: AcquisitionOptions, run: Run | None
     """What the bench file says; a run is resumed as it was begun, only where the instruments are may have changed."""
     config = _as_it_was(run) if run else Configuration()
     if options.bench or not virtual:
-        described = read_bench(options.bench or Path("bench.toml"), Configuration)
+        instead = "" if virtual else ", or try `mock`"
+        described = read_bench(options.bench or Path("bench.toml"), Configuration, instead=instead)
         places = {kind: getattr(described, kind) for kind in ("visa_library", "limits", *VIRTUAL)}
         config = config.model_copy(update=places) if run else described
     return _with_given_settings(config, experiment, options.settings)
@@ -135,20 +142,26 @@ def _with_given_settings(config: BenchConfig, experiment: str, settings: Sequenc
     if not settings:
         return config
     table = config.model_dump(mode="json")
+    given: dict[str, str] = {}
     for setting in settings:
         key, equals, text = setting.partition("=")
         name, dot, field = key.strip().partition(".")
         if not (equals and dot and name in EXPERIMENTS):
-            instead = f": {experiment}.{setting}?" if equals and not dot else ""
-            raise UsageError("settings", f"{experiment}.KEY=VALUE is expected{instead}", value=setting)
+            instead = f", {experiment}.{setting}?" if equals and not dot else ""
+            expected = f"{experiment}.KEY=VALUE is expected{instead}"
+            raise UsageError(
+                "settings", f"{expected}; levilab acquire {experiment} --settings lists all", value=setting
+            )
         if name != experiment:
-            expected = f"is a setting of `levilab acquire {name}`, this is `levilab acquire {experiment}`"
+            expected = f"is a setting of levilab acquire {name}, this is levilab acquire {experiment}"
             raise UsageError("settings", expected, value=setting)
+        refuse_unknown(config, experiment, field)
         table[name][field] = parsed(f"{field}={text}")[1]
+        given[field] = text
     try:
         return Configuration.model_validate(table)
     except ValidationError as error:
-        raise UsageError("settings", in_one_line(error)) from error
+        raise refusal(error, given, config, experiment) from error
 
 
 def _as_it_was(run: Run) -> BenchConfig:

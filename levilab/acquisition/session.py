@@ -67,6 +67,7 @@ class Session(Generic[S]):
         rows: the readings so far, those of the resumed run included.
         zero: bench time of time_s = 0 [s], None before it is reached.
         asked: when the last reading was asked for [s].
+        called: what one reading of this experiment is called.
         began: when this session began to measure: at time zero, or when it resumed the run, maybe days later [s].
     """
 
@@ -82,9 +83,11 @@ class Session(Generic[S]):
     zero: float | None = None
     asked: float = 0.0
     began: float = 0.0
+    called: str = "reading"
     _replaying: bool = False
     _losses: int = 0  # since the last reading
     _lost: bool = False  # since the last reading was asked for
+    _headed: bool = False  # whether the heads of the readings were shown
 
     # --- time ---
 
@@ -129,7 +132,7 @@ class Session(Generic[S]):
             self.zero = self.bench.clock.now() - self.earlier.run.elapsed()
         self.began = self.now()
         count = len(self.rows)
-        self.event("resumed", f"resumed after {count} reading{'s' * (count != 1)}, {resumed}")
+        self.event("resumed", f"resumed after {count} {self.called}{'s' * (count != 1)}, {resumed}")
 
     @contextlib.contextmanager
     def _replay(self) -> Iterator[None]:
@@ -198,6 +201,9 @@ class Session(Generic[S]):
         self.writer.reading(row)
         self.rows.append(row)
         self._losses = 0
+        if not self._headed:
+            self._headed = True
+            self.show.message("  ".join(f"{_head(one):>{_width(one)}}" for one in self._shown))
         self.show.reading(self._in_words(row), row["time_s"], time_left_s)
 
     def keep_trace(self, trace: Trace, channel: str) -> int:
@@ -205,13 +211,14 @@ class Session(Generic[S]):
         return self.writer.trace(self.now(), trace, channel)
 
     def _in_words(self, row: Row) -> str:
-        """The values of a reading without their uncertainties, as they stand in a line."""
-        texts = [f"{row['time_s']:8.2f} s"]
-        for channel in self.channels:
-            if channel.name in row and channel.name != "time_s" and "_u_" not in channel.name:
-                value = row[channel.name]
-                texts.append(f"{value:9.4f} Hz" if channel.unit == "Hz" else f"{value:11.6g} {channel.unit}")
-        return "  ".join(texts)
+        """The values of a reading as they stand in a line, below their heads."""
+        texts = (_with_unit(row[one.name], one) if one.name in row else "" for one in self._shown)
+        return "  ".join(f"{text:>{_width(one)}}" for text, one in zip(texts, self._shown, strict=True))
+
+    @property
+    def _shown(self) -> tuple[Channel, ...]:
+        """The channels that stand in a line; uncertainties do not."""
+        return tuple(channel for channel in self.channels if "_u_" not in channel.name)
 
     # --- instruments that lose their link, or their settings ---
 
@@ -240,3 +247,23 @@ class Session(Generic[S]):
                 self.event("found again", f"{kind} answers again and is set up as before")
                 return
         raise error
+
+
+# --- the line of a reading ---
+
+
+def _head(channel: Channel) -> str:
+    """What stands above a channel's values: its name, without the unit, which stands beside each value."""
+    name = channel.name.removesuffix(f"_{channel.unit.lower()}")
+    return name.removesuffix("_frequency").replace("_", " ")
+
+
+def _width(channel: Channel) -> int:
+    """Of a channel's values with their unit, and of its head."""
+    width = 10 if channel.unit == "s" else 12 if channel.unit == "Hz" else 12 + len(channel.unit)
+    return max(width, len(_head(channel)))
+
+
+def _with_unit(value: float, channel: Channel) -> str:
+    digits = {"s": ".2f", "Hz": ".4f"}.get(channel.unit, ".6g")
+    return f"{value:{digits}} {channel.unit}".rstrip()

@@ -145,6 +145,6 @@ def open_bench(
 def connected(kind: Kind[I], wiring: Wiring, *, log: TrafficLog | None = None) -> I:
     """A driver on an open link.  Raises ConfigError for an unknown model, InstrumentError."""
     settings = wiring.described(kind.name)
-    driver = kind.driver(settings.model)
+    driver = kind.model(settings.model).driver
     transport = transport_to(driver, settings, library=wiring.library, clock=wiring.clock, log=log)
     return driver(transport, clock=wiring.clock)

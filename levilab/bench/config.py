@@ -82,18 +82,21 @@ class BenchConfig(Settings):
 C = TypeVar("C", bound=BenchConfig)
 
 
-def read_bench(path: Path, tables: type[C]) -> C:
+def read_bench(path: Path, tables: type[C], *, instead: str = ", or try `mock`") -> C:
     """The bench described in a TOML file.
 
-    tables: what the file may hold; `BenchConfig`, or one with more tables.  Raises ConfigError.
+    tables: what the file may hold; `BenchConfig`, or one with more tables; instead: what else can be done where there
+    is no file.  Raises ConfigError.
     """
     try:
         table = parse_toml(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise ConfigError(
-            f"{path}: there is no such file: describe your bench in it (docs/bench.md), or try `mock`"
+            f"{path}: there is no such file: describe your bench in it (docs/bench.md){instead}"
         ) from None
     except OSError as error:
+        if path.is_dir():
+            raise ConfigError(f"{path}: is a folder; a TOML file is expected") from None
         raise ConfigError(f"{path}: cannot be read ({error.strerror}): a TOML file is expected") from error
     except ValueError as error:
         raise ConfigError(f"{path}: not readable as TOML: {error}") from error

@@ -77,15 +77,15 @@ def identify(address: str, library: str) -> Found:
 def _lines_to_try(address: str) -> Iterator[tuple[type[Instrument], dict[str, Any]]]:
     """The drivers whose links are tried, and their lines: for a serial port one of each line, else any driver."""
     if "::" in address and not address.upper().startswith("ASRL"):
-        yield next(iter(COUNTER.drivers.values())), {}
+        yield COUNTER.models[0].driver, {}
         return
     seen: list[dict[str, Any]] = []
     for kind in KINDS.values():
-        for driver in kind.drivers.values():
-            line = dict(driver.SERIAL)
+        for model in kind.models:
+            line = dict(model.driver.SERIAL)
             if line and line not in seen:
                 seen.append(line)
-                yield driver, line
+                yield model.driver, line
 
 
 def _printable(identity: str) -> str:
@@ -104,10 +104,15 @@ def driver_for_identity(identity: str) -> tuple[str, str] | None:
     fields = identity.split(",")
     field = fields[1].strip() if len(fields) > 1 else ""
     fitting = [
-        (kind.name, model)
+        (
+            model.name.upper() not in field.upper() and not re.fullmatch(model.answers_as, field, re.IGNORECASE),
+            kind,
+            model,
+        )
         for kind in KINDS.values()
-        for model, driver in kind.drivers.items()
-        if re.fullmatch(driver.MODELS, field, re.IGNORECASE)
+        for model in kind.models
+        if re.fullmatch(model.driver.MODELS, field, re.IGNORECASE)
     ]
-    # of several names for one driver the one that the instrument gives itself
-    return min(fitting, key=lambda what: what[1].upper() not in field.upper(), default=None)
+    # of several models of one driver the one that the instrument says it is
+    found = min(fitting, key=lambda row: row[0], default=None)
+    return (found[1].name, found[2].name) if found else None

@@ -63,9 +63,9 @@ def bench_text(found: Sequence[Found], library: str, tables: Sequence[SettingsTa
     about = {
         kind.name: {
             "what": kind.purpose,
-            "address": kind.example,
-            "model": next(iter(kind.drivers)),
-            "models": ", ".join(kind.drivers),
+            "address": kind.models[0].address,
+            "model": kind.models[0].name,
+            "models": ", ".join(model.name for model in kind.models),
         }
         for kind in KINDS.values()
     }

@@ -35,7 +35,7 @@ class Wiring:
         if kind not in self.instruments:
             raise ConfigError(f"the bench file describes no {kind}: add a table [{kind}] with model and address")
         settings = self.instruments[kind]
-        KINDS[kind].driver(settings.model)
+        KINDS[kind].model(settings.model)
         return settings
 
 

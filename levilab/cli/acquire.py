@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from levilab.cli import exit_codes
+from levilab.cli.later import Later
 from levilab.cli.options import Json
 from levilab.cli.output import message, print_json
 
 if TYPE_CHECKING:
+    from levilab.bench.config import BenchConfig
     from levilab.bench.person import Task
 
-acquire_app = typer.Typer(no_args_is_help=True, help="Run an experiment on the bench and write a run folder.")
+acquire_app = typer.Typer(no_args_is_help=True, add_completion=False)
 
 
 #: Experiment → what its command does.  The table of experiments itself takes too long to import for a help page.
@@ -65,11 +67,15 @@ def acquire_experiment(
             "--set", metavar="KEY=VALUE", help="Change a setting of the experiment, as limit.which=upper; repeatable."
         ),
     ] = None,
+    list_settings: Annotated[
+        bool, typer.Option("--settings", help="List the settings that --set changes, with units and ranges, and exit.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Carry out the experiment that the command is named after."""
     from levilab.acquisition.loop import acquire
-    from levilab.acquisition.request import AcquisitionOptions, request_for
+    from levilab.acquisition.request import AcquisitionOptions, chosen_settings, request_for
+    from levilab.acquisition.table import EXPERIMENTS
     from levilab.bench.person import ask_no_person
     from levilab.present.progress import to_stderr
 
@@ -88,22 +94,41 @@ def acquire_experiment(
         settings=tuple(settings or ()),
     )
     experiment = str(context.info_name)
+    if list_settings:
+        _print_settings(chosen_settings(experiment, options), experiment, as_json=as_json)
+        return
     run = acquire(request_for(experiment, options), to_stderr())
     readings = run.count()
     if as_json:
         print_json({"run": str(run.folder), "status": run.status, "readings": readings}, indent=None)
     else:
-        typer.echo(f"{run.status}: {readings} reading{'s' * (readings != 1)} in {run.folder}")
+        called = EXPERIMENTS[experiment].called
+        typer.echo(f"{run.status}: {readings} {called}{'s' * (readings != 1)} in {run.folder}")
     if run.status == "interrupted":
         if readings:
             message(f"go on with it: levilab acquire {experiment} --resume {run.folder}")
         raise typer.Exit(exit_codes.INTERRUPTED)
 
 
+def _print_settings(config: "BenchConfig", experiment: str, *, as_json: bool) -> None:
+    from levilab.acquisition.keys import keys_of, keys_table
+
+    keys = keys_of(config, experiment)
+    if as_json:
+        print_json({"settings": [vars(one) for one in keys]})
+        return
+    from levilab.present.terminal import draw, terminal  # with rich
+
+    terminal().print(draw(keys_table(keys, experiment)))
+
+
 for _name, _help in EXPERIMENT_HELP.items():
     acquire_app.command(
-        _name, help=f"{_help}\n\n{_ENDING}", epilog=f"Example: levilab acquire {_name} --mock --note 'first try'"
-    )(acquire_experiment)
+        _name,
+        cls=Later,
+        help=f"{_help}\n\n{_ENDING}",
+        epilog=f"Example: levilab acquire {_name} --mock --note 'first try'",
+    )(lambda: acquire_experiment)
 
 
 def _ask(task: "Task") -> str:

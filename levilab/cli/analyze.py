@@ -1,28 +1,21 @@
 """Analyze: runs and data files.  Heavy imports happen inside the commands that need them."""
 
-import re
+import inspect
+import math
 from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 import typer.core
 
-from levilab.cli.options import (
-    Channel,
-    Columns,
-    Json,
-    KeepOutliers,
-    Paths,
-    Rate,
-    ReadingU,
-    option_names,
-    with_options,
-)
-from levilab.cli.output import message, print_json
-from levilab.errors import LevilabError, UsageError
+from levilab.cli.later import Later
+from levilab.cli.options import Channel, Columns, Json, KeepOutliers, Paths, Rate, ReadingU
+from levilab.cli.output import interruptible, message, print_json
+from levilab.cli.quantities import with_options
+from levilab.errors import DoesNotSuit, LevilabError, UsageError
 
 if TYPE_CHECKING:
     from levilab.pipelines.catalogue import Analysis
@@ -36,12 +29,13 @@ class AnalyzeGroup(typer.core.TyperGroup):
         if args and args[0] not in ctx.help_option_names:
             k = self._first_word(args)
             named = k is not None and (args[k] in self.commands or self._is_misspelt(args[k]))
-            args = [args[k], *args[:k], *args[k + 1 :]] if k is not None and named else ["each", *args]
+            args = [args[k], *args[:k], *args[k + 1 :]] if k is not None and named else [_EACH, *args]
         return super().parse_args(ctx, args)
 
     def _first_word(self, args: list[str]) -> int | None:
         """Where the first word stands that is no option, nor the value of one."""
-        options = [one for one in self.commands["each"].params if not getattr(one, "is_flag", True)]
+        each: Any = self.commands[_EACH]
+        options = [one for one in each.command.params if not getattr(one, "is_flag", True)]
         with_value = {name for option in options for name in option.opts}
         numbered = iter(enumerate(args))
         for k, word in numbered:
@@ -58,11 +52,7 @@ class AnalyzeGroup(typer.core.TyperGroup):
         return bool(get_close_matches(word, self.commands)) and not Path(word).exists()
 
 
-analyze_app = typer.Typer(
-    cls=AnalyzeGroup,
-    no_args_is_help=True,
-    help="Analyze runs or data files.  Without a COMMAND: each analysis that suits, as levilab analyze runs/.",
-)
+analyze_app = typer.Typer(cls=AnalyzeGroup, no_args_is_help=True, add_completion=False)
 
 
 class Uncertainty(StrEnum):
@@ -82,194 +72,208 @@ class Method(StrEnum):
     LIKELIHOOD = "likelihood"
 
 
-PulseMethod = Annotated[
-    Method, typer.Option("--method", help="How pulses are found: edges is the fastest, likelihood for weak ones.")
-]
-UncertaintyKind = Annotated[
-    Uncertainty, typer.Option("--uncertainty", help="profile and bootstrap add 68 % intervals, and take longer.")
-]
-Orthogonal = Annotated[
-    bool, typer.Option("--orthogonal", help="Let the uncertainty of the drive's frequency count, too.")
-]
-Save = Annotated[bool, typer.Option(help="Write the result and figures beside the run.")]
-ResultFolder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Write them there instead.")]
+class Option(NamedTuple):
+    """An option of some analyses.
+
+    kind: its type, as typer reads it; default: where it is not given; read: from what was given, unless that is None,
+    to what the analysis takes (raises UsageError); to: how the analysis calls it, if otherwise.
+    """
+
+    kind: Any
+    default: Any = None
+    read: Callable[[Any], Any] = lambda given: given
+    to: str = ""
 
 
-#: Analysis → what its command does.  The catalogue itself takes too long to import for a help page.
-ANALYSIS_HELP = {
-    "spindown": (
-        "Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude."
-    ),
-    "spin": (
-        "Spin frequency and chirp from traces of a detector (WAV, scopes' CSV, .npy), lists of pulse times, runs with "
-        "traces."
-    ),
-    "field": "The base from a Hall scan: strength, origin, thickness; heights, masses and spins of tops that float.",
-    "precession": (
-        "Precession against drive: slope and intercept, tested against a locked top, and what 1.05 would take."
-    ),
-    "limit": "Limits of the spin, lower and upper: mean, scatter, trend and outliers, beside the window of the top.",
-}
-#: The command that stands for no name, and is not listed.
-_EACH = "each"
-_EACH_HELP = "Each analysis that suits the runs or data files; --json prints a list where several suit."
-
-
-def spindown(
-    context: typer.Context,
-    paths: Paths,
-    columns: Columns = "",
-    channel: Channel = None,
-    rate: Rate = None,
-    reading_u: ReadingU = None,
-    uncertainty: UncertaintyKind = Uncertainty.COVARIANCE,
-    keep_outliers: KeepOutliers = False,
-    save: Save = True,
-    out: ResultFolder = None,
-    as_json: Json = False,
-) -> None:
-    """Fit the drag laws."""
-    given = inputs(columns, channel, rate) | spindown_options(reading_u, uncertainty.value, keep_outliers)
-    _analyze(context, paths, given, save=save, out=out, as_json=as_json)
-
-
-def spin(
-    context: typer.Context,
-    paths: Paths,
-    columns: Columns = "",
-    channel: Channel = None,
-    rate: Rate = None,
-    method: PulseMethod = Method.AUTO,
-    save: Save = True,
-    out: ResultFolder = None,
-    as_json: Json = False,
-) -> None:
-    """Find the spin frequency."""
-    given = inputs(columns, channel, rate) | {"method": method.value}
-    _analyze(context, paths, given, save=save, out=out, as_json=as_json)
-
-
-def field(
-    context: typer.Context,
-    paths: Paths,
-    columns: Columns = "",
-    device: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Describes base and top, as sample_data/device.toml does; see levilab top."),
-    ] = None,
-    height: Annotated[
-        float | None,
-        typer.Option(metavar="MM", help="Where the top was seen to float: its moment follows, if its mass is known."),
-    ] = None,
-    height_u: Annotated[
-        float | None,
-        typer.Option(metavar="MM", help="Standard uncertainty of --height.", show_default="that of the scan's heights"),
-    ] = None,
-    free_radii: Annotated[
-        bool, typer.Option("--free-radii", help="Let the scan move the radii, too, within what the calliper says.")
-    ] = False,
-    save: Save = True,
-    out: ResultFolder = None,
-    as_json: Json = False,
-) -> None:
-    """Fit scans of the base's field, and work out what follows."""
-    from levilab.formats.device import read_device
-
-    for name, value, lowest in (("height", height, -1000.0), ("height_u", height_u, 0.0)):
-        if value is not None and not lowest <= value <= 2000.0:
-            raise UsageError(name, f"a number of millimetres from {lowest:g} to 2000 is expected", value=value)
-    if height_u is not None and height is None:
-        raise UsageError("height_u", "goes with `height` alone")
-    given = {
-        "columns": inputs(columns, None, None)["columns"],
-        "device": None if device is None else read_device(device),
-        "height_m": None if height is None else height / 1000,
-        "height_u_m": None if height_u is None else height_u / 1000,
-        "free_radii": free_radii,
-    }
-    _analyze(context, paths, given, save=save, out=out, as_json=as_json)
-
-
-def limit(
-    context: typer.Context,
-    paths: Paths,
-    columns: Columns = "",
-    reading_u: ReadingU = None,
-    save: Save = True,
-    out: ResultFolder = None,
-    as_json: Json = False,
-) -> None:
-    """Find the mean and the scatter of limits."""
-    given = inputs(columns, None, None) | {"reading_u": positive_u(reading_u)}
-    _analyze(context, paths, given, save=save, out=out, as_json=as_json)
-
-
-def precession(
-    context: typer.Context,
-    paths: Paths,
-    columns: Columns = "",
-    reading_u: ReadingU = None,
-    keep_outliers: KeepOutliers = False,
-    orthogonal: Orthogonal = False,
-    save: Save = True,
-    out: ResultFolder = None,
-    as_json: Json = False,
-) -> None:
-    """Fit the line of precession against drive."""
-    given = inputs(columns, None, None) | {
-        "reading_u": positive_u(reading_u),
-        "keep_outliers": keep_outliers,
-        "orthogonal": orthogonal,
-    }
-    _analyze(context, paths, given, save=save, out=out, as_json=as_json)
-
-
-def each(
-    context: typer.Context,
-    paths: Paths,
-    columns: Columns = "",
-    channel: Channel = None,
-    rate: Rate = None,
-    reading_u: ReadingU = None,
-    uncertainty: UncertaintyKind = Uncertainty.COVARIANCE,
-    keep_outliers: KeepOutliers = False,
-    method: PulseMethod = Method.AUTO,
-    save: Save = True,
-    out: ResultFolder = None,
-    as_json: Json = False,
-) -> None:
-    """Carry out each analysis that suits; an option goes to those that know it."""
-    given = inputs(columns, channel, rate) | spindown_options(reading_u, uncertainty.value, keep_outliers)
-    _analyze(context, paths, given | {"method": method.value}, save=save, out=out, as_json=as_json)
-
-
-_COMMANDS: dict[str, Callable[..., None]] = {
-    command.__name__: command for command in (spindown, spin, field, limit, precession)
-}
-for _name, _help in ANALYSIS_HELP.items():
-    analyze_app.command(_name, help=_help, epilog=f"Example: levilab analyze {_name} sample_data/")(_COMMANDS[_name])
-analyze_app.command(_EACH, help=_EACH_HELP, hidden=True, epilog="Example: levilab analyze sample_data/")(each)
-
-
-def inputs(columns: str, channel: str | None, rate: float | None) -> dict[str, Any]:
-    """How inputs are read, from the options of the commands.  Raises UsageError."""
+def _columns(text: str) -> Any:
     from levilab.formats.table import parse_columns
 
-    if rate is not None and not 0 < rate < float("inf"):
-        raise UsageError("rate", "samples per second are expected, a number above 0 [Hz]", value=rate)
-    return {"columns": parse_columns(columns), "channel": channel, "rate": rate}
+    return parse_columns(text)
 
 
-def positive_u(reading_u: float | None) -> float | None:
-    """The uncertainty of a reading [Hz].  Raises UsageError for one that is not positive."""
-    if reading_u is not None and not 0 < reading_u < float("inf"):
-        raise UsageError("reading_u", "a standard uncertainty above 0 [Hz] is expected", value=reading_u)
-    return reading_u
+def _device(path: Path) -> Any:
+    from levilab.formats.device import read_device
+
+    return read_device(path)
 
 
-def spindown_options(reading_u: float | None, uncertainty: str, keep_outliers: bool) -> dict[str, Any]:
-    """How to analyze spin-downs, from the options of the commands.  Raises UsageError."""
-    return {"reading_u": positive_u(reading_u), "uncertainty": uncertainty, "keep_outliers": keep_outliers}
+def _positive(name: str, what: str) -> Callable[[float], float]:
+    """A check of a number."""
+
+    def check(value: float) -> float:
+        if not 0 < value < math.inf:
+            raise UsageError(name, what, value=value)
+        return value
+
+    return check
+
+
+def _metres(name: str, lowest: float) -> Callable[[float], float]:
+    """From millimetres to metres."""
+
+    def read(value: float) -> float:
+        if not lowest <= value <= 2000.0:
+            raise UsageError(name, f"a number of millimetres from {lowest:g} to 2000 is expected", value=value)
+        return value / 1000
+
+    return read
+
+
+OPTIONS = {
+    "columns": Option(Columns, "", _columns),
+    "channel": Option(Channel),
+    "rate": Option(
+        Rate,
+        read=_positive("rate", "samples per second are expected, a number above 0 [Hz]"),
+    ),
+    "reading_u": Option(
+        ReadingU,
+        read=_positive("reading_u", "a standard uncertainty above 0 [Hz] is expected"),
+    ),
+    "uncertainty": Option(
+        Annotated[
+            Uncertainty,
+            typer.Option("--uncertainty", help="profile and bootstrap add 68 % intervals, and take longer."),
+        ],
+        Uncertainty.COVARIANCE,
+        str,
+    ),
+    "keep_outliers": Option(KeepOutliers, False),
+    "method": Option(
+        Annotated[
+            Method,
+            typer.Option("--method", help="How pulses are found: edges is the fastest, likelihood for weak ones."),
+        ],
+        Method.AUTO,
+        str,
+    ),
+    "orthogonal": Option(
+        Annotated[bool, typer.Option("--orthogonal", help="Let the uncertainty of the drive's frequency count, too.")],
+        False,
+    ),
+    "device": Option(
+        Annotated[
+            Path | None,
+            typer.Option(
+                metavar="FILE", help="Describes base and top, as sample_data/device.toml does; see levilab top."
+            ),
+        ],
+        read=_device,
+    ),
+    "height": Option(
+        Annotated[
+            float | None,
+            typer.Option(
+                metavar="MM", help="Where the top was seen to float: its moment follows, if its mass is known."
+            ),
+        ],
+        read=_metres("height", -1000.0),
+        to="height_m",
+    ),
+    "height_u": Option(
+        Annotated[
+            float | None,
+            typer.Option(
+                metavar="MM",
+                help="Standard uncertainty of --height.",
+                show_default="that of the scan's heights",
+            ),
+        ],
+        read=_metres("height_u", 0.0),
+        to="height_u_m",
+    ),
+    "free_radii": Option(
+        Annotated[
+            bool,
+            typer.Option("--free-radii", help="Let the scan move the radii, too, within what the calliper says."),
+        ],
+        False,
+    ),
+}
+
+
+class Command(NamedTuple):
+    """An analysis: what its command does, and its options."""
+
+    help: str
+    options: tuple[str, ...]
+
+
+#: The command that stands for no name, and is not listed.  An option goes to those analyses that know it.
+_EACH = "each"
+#: The catalogue itself takes too long to import for a help page.
+COMMANDS = {
+    "spindown": Command(
+        "Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude.",
+        ("columns", "channel", "rate", "reading_u", "uncertainty", "keep_outliers"),
+    ),
+    "spin": Command(
+        "Spin frequency and chirp from traces of a detector (WAV, scopes' CSV, .npy), lists of pulse times, runs with "
+        "traces.",
+        ("columns", "channel", "rate", "method"),
+    ),
+    "field": Command(
+        "The base from a Hall scan: strength, origin, thickness; heights, masses and spins of tops that float.",
+        ("columns", "device", "height", "height_u", "free_radii"),
+    ),
+    "precession": Command(
+        "Precession against drive: slope and intercept, tested against a locked top, and what 1.05 would take.",
+        ("columns", "reading_u", "keep_outliers", "orthogonal"),
+    ),
+    "limit": Command(
+        "Limits of the spin, lower and upper: mean, scatter, trend and outliers, beside the window of the top.",
+        ("columns", "reading_u"),
+    ),
+    _EACH: Command(
+        "Each analysis that suits the runs or data files; --json prints a list where several suit.",
+        ("columns", "channel", "rate", "reading_u", "uncertainty", "keep_outliers", "method"),
+    ),
+}
+
+
+def _command(options: Sequence[str]) -> Callable[..., None]:
+    """The command of an analysis: these options stand in its signature, where typer reads them, before --save."""
+
+    def analyze(
+        context: typer.Context,
+        paths: Paths,
+        save: Annotated[bool, typer.Option(help="Write the result and figures beside the run.")] = True,
+        out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Write them there instead.")] = None,
+        as_json: Json = False,
+        **given: Any,
+    ) -> None:
+        _analyze(context, paths, as_analyses_take(given), save=save, out=out, as_json=as_json)
+
+    context, paths, *shared, _ = inspect.signature(analyze).parameters.values()
+    own = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=option.default, annotation=option.kind)
+        for name, option in OPTIONS.items()
+        if name in options
+    ]
+    shared = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in shared]
+    analyze.__signature__ = inspect.Signature([context, paths, *own, *shared])  # type: ignore[attr-defined]
+    return analyze
+
+
+def _add(name: str, row: Command) -> None:
+    words = "levilab analyze" if name == _EACH else f"levilab analyze {name}"
+
+    @analyze_app.command(name, cls=Later, help=row.help, epilog=f"Example: {words} sample_data/", hidden=name == _EACH)
+    def command() -> Callable[..., None]:
+        return _command(row.options)
+
+
+for _name, _row in COMMANDS.items():
+    _add(_name, _row)
+
+
+def as_analyses_take(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Options as analyses take them, in SI, from those of the command line.  Raises UsageError."""
+    if given.get("height_u") is not None and given.get("height") is None:
+        raise UsageError("height_u", "goes with `height` alone")
+    return {
+        OPTIONS[name].to or name: None if value is None else OPTIONS[name].read(value) for name, value in given.items()
+    }
 
 
 def _analyze(
@@ -285,12 +289,56 @@ def _analyze(
     from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
 
     left_out: list[str] = []
-    if context.info_name == _EACH:
-        results = analyze_suiting(paths, given, left_out.append)
-    else:
-        analysis = ANALYSES[str(context.info_name)]
-        results = [(analysis, analysis.analyze(paths, analysis.options_from(given)))]
-    _write_and_print(context, results, left_out, save=save, out=out, as_json=as_json)
+    with interruptible("what was fitted so far is lost, nothing is written"):
+        if context.info_name == _EACH:
+            results = analyze_suiting(paths, given, left_out.append)
+        else:
+            analysis = ANALYSES[str(context.info_name)]
+            results = [(analysis, _analyze_as(analysis, paths, given))]
+    with interruptible("look which results are written: each one is whole"):
+        _write_and_print(context, results, left_out, save=save, out=out, as_json=as_json)
+
+
+def _analyze_as(analysis: "Analysis[Any]", paths: Sequence[Path], given: Mapping[str, Any]) -> Any:
+    """The result of one analysis; where the inputs do not suit it, the error names those that they suit.
+
+    Raises:
+        DoesNotSuit: with the analyses that read the inputs.
+    """
+    try:
+        return analysis.analyze(paths, analysis.options_from(given))
+    except DoesNotSuit as error:
+        advice = "" if "levilab analyze" in str(error) else _suiting(analysis, paths, given)
+        raise DoesNotSuit(f"{error}{advice}") from error
+
+
+def _suiting(analysis: "Analysis[Any]", paths: Sequence[Path], given: Mapping[str, Any]) -> str:
+    """Which other analyses read what lies at the paths, as the end of a sentence; empty if none does."""
+    from levilab.pipelines.catalogue import ANALYSES
+    from levilab.runs.run import find_run
+
+    for path in paths:
+        others = [
+            other.name
+            for other in ANALYSES.values()
+            if other is not analysis and _reads(other, find_run(path), other.options_from(given))
+        ]
+        if others:
+            return f"; levilab analyze {' or '.join(others)} {path} reads it"
+    return ""
+
+
+def _reads(analysis: "Analysis[Any]", path: Path, options: Any) -> bool:
+    """Whether an analysis takes a run or a file, or one of the runs in a folder."""
+    from analysis.errors import AnalysisError
+    from levilab.runs.run import Run, find_runs
+
+    try:
+        if path.is_dir():
+            return any(analysis.needs.take(Run.load(folder)) for folder in find_runs(path))
+        return bool(analysis.needs.read_file(path, options))
+    except (LevilabError, AnalysisError):
+        return False
 
 
 def _write_and_print(
@@ -306,11 +354,11 @@ def _write_and_print(
 
     left_out: why other analyses have no result.
     """
-    from levilab.pipelines.catalogue import print_analysis
+    from levilab.pipelines.catalogue import print_analysis, remarks
 
-    in_words = partial(with_options, names=option_names(context.find_root().command))
+    in_words = partial(with_options, app=context.find_root().command)
     failures: list[LevilabError] = []
-    messages = [*left_out, *_remarks([found.remarks for _, found in results])]
+    messages = [*left_out, *remarks([found.remarks for _, found in results])]
     for analysis, found in results:
         if save:
             failure, written = _save(analysis, found, out)
@@ -326,14 +374,6 @@ def _write_and_print(
         message(in_words(text))
     if failures:
         raise failures[0]
-
-
-def _remarks(of_each: Sequence[Sequence[str]]) -> list[str]:
-    """What the analyses say, each once; runs that one of them passed over count only if all did."""
-    told = list(dict.fromkeys(text for remarks in of_each for text in remarks))
-    kinds = [text for text in told if re.fullmatch(r"passed over: \d+ \w+ runs?", text)]
-    taken = {text for text in kinds if not all(text in remarks for remarks in of_each)}
-    return [text for text in told if text not in taken]
 
 
 def _save(analysis: "Analysis[Any]", found: Any, out: Path | None) -> tuple[LevilabError | None, list[Path]]:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from levilab.bench.discover import Found
     from levilab.world.serve import Served
 
-bench_app = typer.Typer(no_args_is_help=True, help="The instruments: what answers, and a virtual bench to practise.")
+bench_app = typer.Typer(no_args_is_help=True, add_completion=False)
 
 
 @bench_app.command("init", epilog="Example: levilab bench init --address TCPIP0::192.168.1.20::5025::SOCKET")

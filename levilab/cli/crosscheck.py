@@ -10,11 +10,6 @@ from levilab.cli.options import Json
 from levilab.cli.output import message
 
 
-def add_to(app: typer.Typer) -> None:
-    """Make the command known to the application."""
-    app.command(epilog="Example: levilab crosscheck spindown --trials 100")(crosscheck)
-
-
 def crosscheck(
     subjects: Annotated[
         list[str] | None, typer.Argument(metavar="[SUBJECT]…", help="What is checked.", show_default="everything")
@@ -26,11 +21,7 @@ def crosscheck(
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write crosscheck.json and .png there.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Check the analyses: simulate, acquire through the real drivers, analyze, and compare with the truth, many times.
-
-    A pull is (estimate − truth)/u.  Where estimates and uncertainties are right, pulls have the mean 0 and the standard
-    deviation 1, and 68 % of the truths lie within u.  Ends with 1 where they do not.
-    """
+    """Check the analyses, and end with 1 where an estimate or an uncertainty is wrong."""
     from levilab.crosscheck import command
 
     checked = command.check(subjects or [], trials, seed)

@@ -1,35 +1,60 @@
-"""The application and its console script.  Heavy imports happen inside the commands that need them."""
+"""The application, the help of its commands, and its console script.  What a command needs is imported by its call."""
 
 import codecs
 import contextlib
 import os
+import re
 import sys
-from typing import Annotated, NoReturn
+from collections.abc import Callable
+from typing import Annotated, Any, NoReturn
 
 import typer
+import typer.core
 
-from levilab.cli import crosscheck, exit_codes, report, simulate, top
-from levilab.cli.acquire import acquire_app
-from levilab.cli.analyze import analyze_app
-from levilab.cli.bench import bench_app
-from levilab.cli.options import in_options
+from levilab.cli import exit_codes
+from levilab.cli.later import Later
 from levilab.cli.output import message
+from levilab.cli.quantities import in_options
+
+#: How typer, which reads values with pydantic, begins and ends what it says of a wrong one.
+_SHOULD_BE = re.compile(r"Input should be (a valid )?(.*?)(, unable to .*|, got .*)?")
+
+
+class Commands(typer.core.TyperGroup):
+    """All commands.  The wrong value of an option is refused in plain words."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Carry out what was called."""
+        try:
+            return super().invoke(ctx)
+        except typer.BadParameter as error:
+            error.message = in_plain_words(error.message)
+            raise
+
+
+def in_plain_words(text: str) -> str:
+    """What typer says of a wrong value.
+
+    >>> in_plain_words("Input should be a valid number, unable to parse string as a number")
+    'a number is expected'
+    >>> in_plain_words("Input should be greater than or equal to 10")
+    'a number greater than or equal to 10 is expected'
+    """
+    if found := _SHOULD_BE.fullmatch(text):
+        what = found[2].replace("integer", "whole number")
+        return f"a {what} is expected" if found[1] else f"a number {what} is expected"
+    return text.removeprefix("Value error, ")
+
 
 app = typer.Typer(
     name="levilab",
+    cls=Commands,
     help="The lab application for experiments on the Levitron: acquire, analyze, report.",
     epilog="Try: levilab acquire spin --mock",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.add_typer(acquire_app, name="acquire")
-app.add_typer(analyze_app, name="analyze")
-app.add_typer(bench_app, name="bench")
-report.add_to(app)
-simulate.add_to(app)
-crosscheck.add_to(app)
-top.add_to(app)
 
 
 def _print_version(asked: bool) -> None:
@@ -50,6 +75,100 @@ def levilab(
     """The lab application for experiments on the Levitron: acquire, analyze, report."""
 
 
+@app.command(cls=Later, epilog="Example: levilab report sample_data/ -o report.html")
+def report() -> Callable[..., None]:
+    """Report runs in one self-contained file: what was measured, with what, figures, numbers, warnings.
+
+    The numbers are those that levilab analyze wrote beside the runs, of every analysis; where it wrote them elsewhere
+    (--out), give that folder or result.json.  What has no result, or one of other readings or options than the given,
+    is analyzed for the page.
+    """
+    from levilab.cli.report import report
+
+    return report
+
+
+@app.command(cls=Later, epilog="Example: levilab runs runs/")
+def runs() -> Callable[..., None]:
+    """List runs: when, what, status, length."""
+    from levilab.cli.report import runs
+
+    return runs
+
+
+@app.command(
+    cls=Later, epilog="Example: levilab simulate driven --duration 60 --set drive.frequency_hz=30.1 --out runs"
+)
+def simulate() -> Callable[..., None]:
+    """Simulate the motion: does the top stay up, where and how fast does it turn, which frequencies are in it.
+
+    The first run for a kind of scene compiles for 4 to 7 s.  Ctrl-C ends it, and nothing is written then.
+    """
+    from levilab.cli.simulate import simulate
+
+    return simulate
+
+
+@app.command(cls=Later, epilog="Example: levilab stability undriven --set top.mass_kg=0.0255")
+def stability() -> Callable[..., None]:
+    """Where the top floats: heights, masses and spins, from the field and the theory of small motions."""
+    from levilab.cli.simulate import stability
+
+    return stability
+
+
+@app.command(cls=Later, epilog="Example: levilab crosscheck spindown --trials 100")
+def crosscheck() -> Callable[..., None]:
+    """Check the analyses: simulate, acquire through the real drivers, analyze, and compare with the truth, many times.
+
+    A pull is (estimate − truth)/u.  Where estimates and uncertainties are right, pulls have the mean 0 and the standard
+    deviation 1, and 68 % of the truths lie within u.  Ends with 1 where they do not.
+    """
+    from levilab.cli.crosscheck import crosscheck
+
+    return crosscheck
+
+
+@app.command(cls=Later, epilog="Example: levilab top sample_data/device.toml")
+def top() -> Callable[..., None]:
+    """Mass and moments of inertia of a top from its parts, taken as cylinders, with uncertainties."""
+    from levilab.cli.top import top
+
+    return top
+
+
+@app.command(cls=Later)
+def acquire() -> typer.Typer:
+    """Run an experiment on the bench and write a run folder."""
+    from levilab.cli.acquire import acquire_app
+
+    return acquire_app
+
+
+@app.command(cls=Later)
+def analyze() -> typer.Typer:
+    """Analyze runs or data files.  Without a COMMAND: each analysis that suits, as levilab analyze runs/."""
+    from levilab.cli.analyze import analyze_app
+
+    return analyze_app
+
+
+@app.command(cls=Later)
+def bench() -> typer.Typer:
+    """The instruments: what answers, and a virtual bench to practise."""
+    from levilab.cli.bench import bench_app
+
+    return bench_app
+
+
+@app.command(cls=Later)
+def benchmark() -> typer.Typer:
+    """Speed against error, with other programs beside."""
+    from levilab.cli.simulate import benchmark_app
+
+    return benchmark_app
+
+
 def main() -> None:
     """The console script: known failures become one line and an exit status, everything else stays loud."""
     _prepare_output()
@@ -64,13 +183,13 @@ def main() -> None:
 
 def _exit_with(error: Exception) -> NoReturn:
     try:
-        status = exit_codes.exit_status(error)
+        status, text = exit_codes.exit_status(error), in_options(error, app)
     except OSError:  # no file can be opened any more, not even that of a module
-        status = exit_codes.FAILED
+        status, text = exit_codes.FAILED, str(error)
     if status is None:
         raise error
     with contextlib.suppress(OSError):
-        message("levilab: " + _in_one_line(in_options(error, app)))
+        message("levilab: " + _in_one_line(text))
     sys.exit(status)
 
 

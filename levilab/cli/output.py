@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+import contextlib
+from typing import TYPE_CHECKING, Any
 
 import typer
+
+from levilab.cli import exit_codes
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 
 def print_json(document: Any, *, indent: int | None = 2, sort_keys: bool = False) -> None:
@@ -17,3 +23,13 @@ def print_json(document: Any, *, indent: int | None = 2, sort_keys: bool = False
 def message(text: str) -> None:
     """A line on standard error."""
     typer.echo(text, err=True)
+
+
+@contextlib.contextmanager
+def interruptible(what_is_left: str) -> Iterator[None]:
+    """Ctrl-C ends the command with one line."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        message(f"levilab: interrupted, {what_is_left}")
+        raise typer.Exit(exit_codes.INTERRUPTED) from None

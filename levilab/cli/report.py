@@ -5,18 +5,14 @@ from typing import Annotated
 
 import typer
 
-from levilab.cli.analyze import inputs, spindown_options
+from levilab.cli.analyze import OPTIONS, as_analyses_take
 from levilab.cli.options import Channel, Columns, Json, KeepOutliers, Paths, Rate, ReadingU
-from levilab.cli.output import message, print_json
-
-
-def add_to(app: typer.Typer) -> None:
-    """Make the commands known to the application."""
-    app.command(epilog="Example: levilab report sample_data/ -o report.html")(report)
-    app.command(epilog="Example: levilab runs runs/")(runs)
+from levilab.cli.output import interruptible, message, print_json
+from levilab.cli.quantities import with_options
 
 
 def report(
+    context: typer.Context,
     paths: Paths,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE.html", help="The file to write.")] = Path(
         "report.html"
@@ -27,23 +23,28 @@ def report(
     reading_u: ReadingU = None,
     keep_outliers: KeepOutliers = False,
 ) -> None:
-    """Report runs in one self-contained file: what was measured, with what, figures, numbers, warnings.
-
-    The numbers are those that levilab analyze wrote beside the runs.  What has no result there, or one of other
-    readings or options than the given, is analyzed for the page.  A page is of one analysis; where a folder holds runs
-    of several kinds it is of the first, and the others are named.
-    """
+    """Write the report."""
     from levilab.report.page import write_report
 
-    given = inputs(columns, channel, rate) | spindown_options(reading_u, "covariance", keep_outliers)
-    typer.echo(f"the report is in {write_report(paths, output, given, message)}")
+    given = {
+        "columns": columns,
+        "channel": channel,
+        "rate": rate,
+        "reading_u": reading_u,
+        "uncertainty": OPTIONS["uncertainty"].default,
+        "keep_outliers": keep_outliers,
+    }
+    app = context.find_root().command
+    with interruptible("no report is written"):
+        written = write_report(paths, output, as_analyses_take(given), lambda text: message(with_options(text, app)))
+    typer.echo(f"the report is in {written}")
 
 
 def runs(
     folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="The folder to search.")] = Path("runs"),
     as_json: Json = False,
 ) -> None:
-    """List runs: when, what, status, length."""
+    """List the runs in a folder."""
     from levilab.runs.listing import list_runs, print_runs
 
     found = list_runs(folder)

@@ -6,28 +6,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from levilab.cli import exit_codes
 from levilab.cli.options import Json, Presets, Settings
-from levilab.cli.output import message, print_json
+from levilab.cli.output import interruptible, message, print_json
 from levilab.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from levilab.motion.effects import Effect
     from levilab.simulator.scene import Scene
     from levilab.stability.map import Span
 
-benchmark_app = typer.Typer(no_args_is_help=True, help="Speed against error, with other programs beside.")
-
-
-def add_to(app: typer.Typer) -> None:
-    """Make the commands known to the application."""
-    app.command(epilog="Example: levilab simulate driven --duration 60 --set drive.frequency_hz=30.1 --out runs")(
-        simulate
-    )
-    app.command(epilog="Example: levilab stability undriven --set top.mass_kg=0.0255")(stability)
-    app.add_typer(benchmark_app, name="benchmark")
+benchmark_app = typer.Typer(no_args_is_help=True, add_completion=False)
 
 
 def _scene(name: str, settings: list[str] | None) -> "Scene":
@@ -62,10 +50,7 @@ def simulate(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Simulate the motion: does the top stay up, where and how fast does it turn, which frequencies are in it.
-
-    The first run for a kind of scene compiles for 4 to 7 s.  Ctrl-C ends it, and nothing is written then.
-    """
+    """Simulate a scene, and print what the motion is like."""
     chosen = _scene(scene, settings)
 
     from levilab.files import finite
@@ -74,7 +59,7 @@ def simulate(
     from levilab.present.progress import Share
 
     order = SimulationOrder(chosen, duration, tolerance, rate, out)
-    with _interruptible("nothing was written"), contextlib.closing(Share("simulating")) as share:
+    with interruptible("nothing was written"), contextlib.closing(Share("simulating")) as share:
         done = carry_out(order, message, share)
     if done.folder:
         message(f"wrote {done.folder}")
@@ -82,7 +67,7 @@ def simulate(
         from levilab.motion.table import print_motion
 
         print_motion(done.summary)
-    with _interruptible("the effects are not known"):
+    with interruptible("the effects are not known"):
         effects = _explained(chosen, duration) if explain else ()
     if as_json:
         from dataclasses import asdict
@@ -94,16 +79,6 @@ def simulate(
         from levilab.motion.table import print_effects
 
         print_effects(effects)
-
-
-@contextlib.contextmanager
-def _interruptible(what_is_left: str) -> "Iterator[None]":
-    """Ctrl-C ends the command with one line."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        message(f"levilab: interrupted, {what_is_left}")
-        raise typer.Exit(exit_codes.INTERRUPTED) from None
 
 
 def _explained(scene: "Scene", duration: float) -> "tuple[Effect, ...]":
@@ -136,7 +111,7 @@ def stability(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Where the top floats: heights, masses and spins, from the field and the theory of small motions."""
+    """Find where the top floats."""
     chosen = _scene(scene, settings)
     of_map = {"spins": spins, "masses": masses, "duration": duration, "out": out}
     if not survival and (without := [name for name, given in of_map.items() if given is not None]):
@@ -172,7 +147,7 @@ def _mapped(scene: "Scene", spans: "tuple[Span | None, Span | None]", duration: 
     from levilab.stability.table import place_for_map, write_map
 
     place_for_map(out)
-    with _interruptible("no map was written"), contextlib.closing(Share("simulating the map")) as share:
+    with interruptible("no map was written"), contextlib.closing(Share("simulating the map")) as share:
         found = survival_map(scene, *spans, duration=duration, progress=share)
     for path in write_map(found, out):
         message(f"wrote {path}")
@@ -223,5 +198,5 @@ def benchmark_estimators(
     """
     from levilab.benchmark.estimators.command import run_and_tell
 
-    with _interruptible("nothing was written"):
+    with interruptible("nothing was written"):
         run_and_tell(trials=trials, out=out, as_json=as_json)

@@ -9,18 +9,13 @@ from levilab.cli.options import Json
 from levilab.cli.output import print_json
 
 
-def add_to(app: typer.Typer) -> None:
-    """Make the command known to the application."""
-    app.command(epilog="Example: levilab top sample_data/device.toml")(top)
-
-
 def top(
     device: Annotated[
         Path, typer.Argument(metavar="FILE", help="Describes the top's parts, as sample_data/device.toml does.")
     ],
     as_json: Json = False,
 ) -> None:
-    """Mass and moments of inertia of a top from its parts, taken as cylinders, with uncertainties."""
+    """Calculate mass and moments of inertia."""
     from levilab.pipelines.top import calculate_top, top_document, top_table, top_text
 
     found = calculate_top(device)

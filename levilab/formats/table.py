@@ -17,7 +17,7 @@ from levilab.formats.columns import SHORTHANDS, Column, NoSuchColumn, TableError
 from levilab.formats.dialect import Dialect
 from levilab.formats.layout import Layout, sniff
 from levilab.formats.rows import Rows, read_rows
-from levilab.formats.titles import CANONICAL, COMPANIONS, companion
+from levilab.formats.titles import CANONICAL, COMPANIONS, EXAMPLES, companion
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -83,13 +83,12 @@ def read_table(
         header, wanted, warnings = _titles(path, layout, columns or {}, guess=guess)
         chosen, doubts = choose_columns(path, header, layout.units, wanted, quantities)
         if not chosen:
-            known = ", ".join(
-                [*(name for name in quantities if name not in COMPANIONS), "t, f [Hz], rpm, z [mm], B [mT] …"]
-            )
+            examples = [EXAMPLES[name] for name in quantities if name in EXAMPLES]
+            known = ", ".join([*(name for name in quantities if name not in COMPANIONS), *examples])
             wanted_names = needed or [name for name in SHORTHANDS.values() if name in quantities][:2]
             raise NoSuchColumn(
                 path,
-                f"no title is known ({known}) among {listed(header)}: say `columns` = "
+                f"no title is known ({known} …) among {listed(header)}: say `columns` = "
                 + ",".join(f"{_key(name)}=NAME" for name in wanted_names),
                 line=layout.header_line or layout.first_line,
             )

@@ -104,6 +104,15 @@ def companion(column: str) -> str:
     return f"{name}_u_{unit}"
 
 
+#: Titles that a message shows beside the canonical one.
+EXAMPLES: Mapping[str, str] = {
+    "time_s": "t",
+    "spin_frequency_hz": "f [Hz], rpm",
+    "precession_frequency_hz": "f_p [Hz]",
+    "drive_frequency_hz": "f_d [Hz]",
+    "height_m": "z [mm]",
+    "flux_density_t": "B [mT]",
+}
 COMPANIONS: Mapping[str, str] = {companion(column): column for column in QUANTITIES}
 CANONICAL = (*QUANTITIES, *COMPANIONS)
 

@@ -2,109 +2,66 @@
 
 from __future__ import annotations
 
-import itertools
-from dataclasses import dataclass, fields
+import re
+from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic
 
 from levilab.errors import DoesNotSuit, NoneUsable, unquoted
-from levilab.pipelines.field.analysis import NEEDS as FIELD_NEEDS
-from levilab.pipelines.field.analysis import FieldAnalysis, analyze_scans
-from levilab.pipelines.field.device import FieldOptions
-from levilab.pipelines.field.document import as_document as field_document
-from levilab.pipelines.field.document import recall_scans
-from levilab.pipelines.field.document import save_result as save_field
+from levilab.pipelines.analyzed import A
+from levilab.pipelines.field.document import DOCUMENT as FIELD
 from levilab.pipelines.field.report import field_part
 from levilab.pipelines.field.table import field_tables
-from levilab.pipelines.limit.analysis import NEEDS as LIMIT_NEEDS
-from levilab.pipelines.limit.analysis import LimitAnalysis, LimitOptions, analyze_limits
-from levilab.pipelines.limit.document import limit_document, recall_limits, save_limits
+from levilab.pipelines.limit.document import DOCUMENT as LIMIT
 from levilab.pipelines.limit.report import limit_part
 from levilab.pipelines.limit.table import limit_tables
-from levilab.pipelines.precession.analysis import NEEDS as PRECESSION_NEEDS
-from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionOptions, analyze_precessions
-from levilab.pipelines.precession.document import as_document as precession_document
-from levilab.pipelines.precession.document import recall_precessions
-from levilab.pipelines.precession.document import save_result as save_precession
+from levilab.pipelines.precession.document import DOCUMENT as PRECESSION
 from levilab.pipelines.precession.report import precession_part
 from levilab.pipelines.precession.table import precession_tables
-from levilab.pipelines.spin.analysis import NEEDS as SPIN_NEEDS
-from levilab.pipelines.spin.analysis import SpinAnalysis, SpinOptions, analyze_spins
-from levilab.pipelines.spin.document import as_document as spin_document
-from levilab.pipelines.spin.document import recall_spins
-from levilab.pipelines.spin.document import save_result as save_spin
+from levilab.pipelines.result import Place, read_inputs, results_in
+from levilab.pipelines.result import save as save_files
+from levilab.pipelines.sources import data_files
+from levilab.pipelines.spin.document import DOCUMENT as SPIN
 from levilab.pipelines.spin.report import spin_part
 from levilab.pipelines.spin.table import spin_tables
-from levilab.pipelines.spindown.analysis import NEEDS as SPINDOWN_NEEDS
-from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions, analyze_spindowns
-from levilab.pipelines.spindown.document import as_document, recall_spindowns, save_result
+from levilab.pipelines.spindown.document import DOCUMENT as SPINDOWN
 from levilab.pipelines.spindown.report import spindown_part
 from levilab.pipelines.spindown.table import spindown_tables
+from levilab.present.clock import moment
+from levilab.present.numbers import short_name
+from levilab.runs.run import RECORD, find_runs
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
     from pathlib import Path
 
+    from levilab.pipelines.document import Document, Looked
     from levilab.pipelines.part import ReportPart
+    from levilab.pipelines.result import Written
     from levilab.pipelines.sources import InputOptions, Needs, Source
     from levilab.present.tables import Table
     from levilab.runs.run import Run
 
-
-class Analyzed(Protocol):
-    """What results of all analyses have in common."""
-
-    @property
-    def sources(self) -> tuple[Source[Any], ...]:
-        """The inputs."""
-
-    @property
-    def home(self) -> Path:
-        """The folder that the result belongs to."""
-
-    @property
-    def text(self) -> str:
-        """What the data say, in a few sentences."""
-
-    @property
-    def all_warnings(self) -> list[str]:
-        """What to know before using the numbers."""
-
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """What does not belong to the analysis, and is no cause for a warning."""
-
-
-A = TypeVar("A", bound=Analyzed)
-A_contra = TypeVar("A_contra", bound=Analyzed, contravariant=True)
-
-
-class Save(Protocol[A_contra]):
-    """How an analysis writes."""
-
-    def __call__(self, found: A_contra, folder: Path | None, /, *, first: bool) -> list[Path]:
-        """Write the result and the figure, beside the inputs or into a folder; first: whether result.json is its."""
+#: Starts of runs that the terminal shows; the report has all.
+MOST_STARTS = 6
 
 
 @dataclass(frozen=True)
 class Analysis(Generic[A]):
     """One analysis.
 
-    needs: its name, the experiments whose runs suit it, and how it reads runs and data files; options: its own;
-    analyze: what lies at the paths; recall: the same, from result.json where it holds; document: the content of
-    result.json for a folder; save: see the function of that name; tables: for the terminal; svg: the figure; part: of a
-    report.
+    result: how it is carried out, and its result.json; tables: for the terminal; part: of a report.  Its figure is in
+    `levilab.pipelines.figures`.
     """
 
-    needs: Needs[Any]
-    options: type[InputOptions]
-    analyze: Callable[[Sequence[Path], Any], A]
-    recall: Callable[[Sequence[Path], Any], A]
-    document: Callable[[A, Path], dict[str, Any]]
-    save: Save[A]
+    result: Document[Any, Any, Any, A, Any]
     tables: Callable[[A], tuple[Table, ...]]
-    svg: Callable[[A], str]
     part: Callable[[A], ReportPart]
+
+    @property
+    def needs(self) -> Needs[Any]:
+        """Its name, the experiments whose runs suit it, and how it reads runs and data files."""
+        return self.result.method.needs
 
     @property
     def name(self) -> str:
@@ -113,101 +70,44 @@ class Analysis(Generic[A]):
 
     def options_from(self, given: Mapping[str, Any]) -> InputOptions:
         """Its options, out of those that were given, some of which belong to other analyses."""
-        own = {field.name for field in fields(self.options)}
-        return self.options(**{name: value for name, value in given.items() if name in own})
+        kind = self.result.method.options
+        own = {field.name for field in fields(kind)}
+        return kind(**{name: value for name, value in given.items() if name in own})  # type: ignore[no-any-return]
 
+    def analyze(self, paths: Sequence[Path], options: InputOptions) -> A:
+        """What lies at the paths.  Raises DataError."""
+        return self.result.method.analyze(paths, options)
 
-def _spindown_svg(analysis: SpinDownAnalysis) -> str:
-    from levilab.pipelines.spindown.figure import spindown_figure  # with matplotlib
-    from levilab.present.style import as_svg
+    def recall(self, paths: Sequence[Path], options: InputOptions) -> A:
+        """The same, from result.json where it holds.  Raises DataError."""
+        return self.result.recall(self.result.look(paths, options))
 
-    return as_svg(spindown_figure(analysis))
+    def document(self, found: A, folder: Path) -> dict[str, Any]:
+        """The content of result.json for a folder."""
+        content: dict[str, Any] = self.result.of(found, Place(folder)).as_dict()
+        return content
 
+    def png(self, found: A) -> bytes:
+        """The figure."""
+        from levilab.pipelines.figures import FIGURES  # with matplotlib
+        from levilab.present.style import as_png
 
-def _spin_svg(analysis: SpinAnalysis) -> str:
-    from levilab.pipelines.spin.figure import spin_figure  # with matplotlib
-    from levilab.present.style import as_svg
+        return as_png(FIGURES[self.name](found))
 
-    return as_svg(spin_figure(analysis))
+    def svg(self, found: A) -> str:
+        """The figure."""
+        from levilab.pipelines.figures import FIGURES  # with matplotlib
+        from levilab.present.style import as_svg
 
-
-def _field_svg(analysis: FieldAnalysis) -> str:
-    from levilab.pipelines.field.figure import field_figure  # with matplotlib
-    from levilab.present.style import as_svg
-
-    return as_svg(field_figure(analysis))
-
-
-def _limit_svg(analysis: LimitAnalysis) -> str:
-    from levilab.pipelines.limit.figure import limit_figure  # with matplotlib
-    from levilab.present.style import as_svg
-
-    return as_svg(limit_figure(analysis))
-
-
-def _precession_svg(analysis: PrecessionAnalysis) -> str:
-    from levilab.pipelines.precession.figure import precession_figure  # with matplotlib
-    from levilab.present.style import as_svg
-
-    return as_svg(precession_figure(analysis))
+        return as_svg(FIGURES[self.name](found))
 
 
 _TABLE: tuple[Analysis[Any], ...] = (
-    Analysis[SpinDownAnalysis](
-        SPINDOWN_NEEDS,
-        SpinDownOptions,
-        analyze_spindowns,
-        recall_spindowns,
-        as_document,
-        save_result,
-        spindown_tables,
-        _spindown_svg,
-        spindown_part,
-    ),
-    Analysis[SpinAnalysis](
-        SPIN_NEEDS,
-        SpinOptions,
-        analyze_spins,
-        recall_spins,
-        spin_document,
-        save_spin,
-        spin_tables,
-        _spin_svg,
-        spin_part,
-    ),
-    Analysis[FieldAnalysis](
-        FIELD_NEEDS,
-        FieldOptions,
-        analyze_scans,
-        recall_scans,
-        field_document,
-        save_field,
-        field_tables,
-        _field_svg,
-        field_part,
-    ),
-    Analysis[LimitAnalysis](
-        LIMIT_NEEDS,
-        LimitOptions,
-        analyze_limits,
-        recall_limits,
-        limit_document,
-        save_limits,
-        limit_tables,
-        _limit_svg,
-        limit_part,
-    ),
-    Analysis[PrecessionAnalysis](
-        PRECESSION_NEEDS,
-        PrecessionOptions,
-        analyze_precessions,
-        recall_precessions,
-        precession_document,
-        save_precession,
-        precession_tables,
-        _precession_svg,
-        precession_part,
-    ),
+    Analysis(SPINDOWN, spindown_tables, spindown_part),
+    Analysis(SPIN, spin_tables, spin_part),
+    Analysis(FIELD, field_tables, field_part),
+    Analysis(LIMIT, limit_tables, limit_part),
+    Analysis(PRECESSION, precession_tables, precession_part),
 )
 ANALYSES = MappingProxyType({analysis.name: analysis for analysis in _TABLE})
 
@@ -225,23 +125,72 @@ def analyze_suiting(
     return list(_suiting(lambda analysis: analysis.analyze(paths, analysis.options_from(given)), tell))
 
 
-def recall_suiting(paths: Sequence[Path], given: Mapping[str, Any]) -> tuple[Analysis[Any], Any]:
-    """The first analysis that suits, with what it found or had found before.  Raises DataError if none does.
+def recall_suiting(
+    paths: Sequence[Path], given: Mapping[str, Any], tell: Callable[[str], None] | None = None
+) -> list[tuple[Analysis[Any], Any]]:
+    """Each analysis that has a result of what lies at the paths, as it was found; in the order of the catalogue.
 
-    An analysis that is for the runs' experiment goes before one that suits only because a run keeps records, too.
+    An input that has no result is analyzed by those that are for its experiment, and a data file by all that suit.
+    Raises DataError: none suits, or damage.
+
+    Args:
+        paths: run folders, data files, folders to search, and results that lie elsewhere: their files, or a folder with
+            nothing to analyze in it.
+        given: options by their names, of any analysis.
+        tell: called with the reason why an analysis found nothing usable in a folder.
     """
-    suiting = _suiting(lambda analysis: analysis.recall(paths, analysis.options_from(given)))
-    first = next(suiting)
-    return next((one for one in itertools.chain([first], suiting) if _is_for(*one)), first)
+    places, written = _split(paths)
+
+    def look(analysis: Analysis[Any]) -> Looked[Any, Any, Any]:
+        own = [one for one in written if one.analysis == analysis.name]
+        inputs = [*places, *(path for one in own for path in one.inputs)]
+        if not inputs:
+            raise DoesNotSuit(f"{written[0].file}: is no result of {analysis.name}")
+        return analysis.result.look(inputs, analysis.options_from(given), [one.file for one in own])
+
+    looked = list(_suiting(look, tell))
+    have = {source.path for _, at in looked for source in at.found.sources if at.has_result(source)}
+
+    def is_wanted(analysis: Analysis[Any], at: Looked[Any, Any, Any]) -> bool:
+        return any(
+            at.has_result(source) or (source.path not in have and _is_for(analysis, source))
+            for source in at.found.sources
+        )
+
+    wanted = [(analysis, at) for analysis, at in looked if is_wanted(analysis, at)] or looked[:1]
+    return [(analysis, analysis.result.recall(at)) for analysis, at in wanted]
 
 
-def _is_for(analysis: Analysis[A], found: A) -> bool:
+def _split(paths: Sequence[Path]) -> tuple[list[Path], list[Written]]:
+    """What is to be read or searched, and the results that were named by their own paths.  Raises DataError."""
+    places: list[Path] = []
+    written: list[Written] = []
+    for path in paths:
+        results = []
+        if path.suffix == ".json" and path.is_file():
+            results = [read_inputs(path)]
+        elif path.is_dir() and not (path / RECORD).exists() and not find_runs(path) and not data_files(path):
+            results = results_in(path)
+        written += results
+        places += [] if results else [path]
+    return places, written
+
+
+def _is_for(analysis: Analysis[Any], source: Source[Any]) -> bool:
     """Whether an input is a data file, or a run of an experiment that the analysis is for."""
-    return any(source.run is None or _is_for_run(analysis, source.run) for source in found.sources)
+    return source.run is None or _is_for_run(analysis, source.run)
 
 
 def _is_for_run(analysis: Analysis[Any], run: Run) -> bool:
     return run.record.experiment in analysis.needs.experiments
+
+
+def remarks(of_each: Sequence[Sequence[str]]) -> list[str]:
+    """What several analyses say, each once; runs that one of them passed over count only if all did."""
+    said = list(dict.fromkeys(text for texts in of_each for text in texts))
+    kinds = [text for text in said if re.fullmatch(r"passed over: \d+ \w+ runs?", text)]
+    taken = {text for text in kinds if not all(text in texts for texts in of_each)}
+    return [text for text in said if text not in taken]
 
 
 def _suiting(
@@ -277,7 +226,9 @@ def save(analysis: Analysis[A], found: A, folder: Path | None = None) -> list[Pa
     rows = [row for row in ANALYSES.values() if run is None or row.needs.take(run)]
     if run is not None:
         rows = [row for row in rows if _is_for_run(row, run)] or rows
-    return analysis.save(found, folder, first=rows[0].name == analysis.name)
+    place = replace(found.place, folder=folder or found.home)
+    result = analysis.result.of(found, place)
+    return save_files(result, place, analysis.png(found), first=rows[0].name == analysis.name)
 
 
 def print_analysis(analysis: Analysis[A], found: A, in_words: Callable[[str], str] = unquoted) -> None:
@@ -289,6 +240,10 @@ def print_analysis(analysis: Analysis[A], found: A, in_words: Callable[[str], st
     console = terminal()
     for table in analysis.tables(found):
         console.print(draw(table))
+    starts = [f"{short_name(one.name)} {moment(one.start)}" for one in found.sources if one.start]
+    if starts:
+        more = f"; and {len(starts) - MOST_STARTS} more" if len(starts) > MOST_STARTS else ""
+        console.print(f"[bold]Start, local time.[/bold] {escape('; '.join(starts[:MOST_STARTS]))}{more}")
     console.print(f"[bold]What the data say.[/bold] {escape(found.text)}")
     for warning in found.all_warnings:
         console.print(f"[yellow]note:[/yellow] {escape(in_words(warning))}")

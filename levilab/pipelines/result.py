@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, Self, TypeVar
 
@@ -19,13 +19,14 @@ from levilab.settings import in_one_line
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from levilab.pipelines.sources import Source
 
 SCHEMA: Literal["levilab-result/1"] = "levilab-result/1"
 RESULT = "result.json"
 ANEW = "analyze anew with levilab analyze"
+_ANEW_OR_AWAY = f"{ANEW}, or move the file away"
 
 
 # --- what is in it -------------------------------------------------------------------------------------
@@ -179,6 +180,7 @@ def save(result: Result, place: Place, picture: bytes, *, first: bool = True) ->
 # --- reading it back -----------------------------------------------------------------------------------
 
 R = TypeVar("R", bound=Result)
+T = TypeVar("T")
 
 
 class NoResult(DataError):
@@ -192,24 +194,76 @@ def read_result(path: Path, model: type[R]) -> R | None:
     """
     if not path.is_file():
         return None
-    advice = f"{ANEW}, or move the file away"
-    try:
-        data = parse_json(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror}); {advice}") from error
-    except ValueError as error:
-        raise NoResult(f"{path}: is cut off or not JSON ({error}); {advice}") from error
-    if not isinstance(data, dict) or data.get("schema") != SCHEMA:
-        seen = data.get("schema") if isinstance(data, dict) else type(data).__name__
-        ours = isinstance(seen, str) and seen.startswith("levilab-result/")
-        text = f"{path}: schema is {repr(seen)[:60]}, expected {SCHEMA!r} of this version; {advice}"
-        raise DataError(text) if ours else NoResult(text)
+    data = _read(path)
     if data.get("analysis") != model.model_fields["analysis"].default:
         return None
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        raise DataError(f"{path}: {in_one_line(error)}; {advice}") from error
+        raise DataError(f"{path}: {in_one_line(error)}; {_ANEW_OR_AWAY}") from error
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """A result as it stands in the file.  Raises NoResult for another program's file, else DataError."""
+    try:
+        data = parse_json(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror}); {_ANEW_OR_AWAY}") from error
+    except ValueError as error:
+        raise NoResult(f"{path}: is cut off or not JSON ({error}); {_ANEW_OR_AWAY}") from error
+    if not isinstance(data, dict) or data.get("schema") != SCHEMA:
+        seen = data.get("schema") if isinstance(data, dict) else type(data).__name__
+        ours = isinstance(seen, str) and seen.startswith("levilab-result/")
+        text = f"{path}: schema is {repr(seen)[:60]}, expected {SCHEMA!r} of this version; {_ANEW_OR_AWAY}"
+        raise DataError(text) if ours else NoResult(text)
+    return data
+
+
+@dataclass(frozen=True)
+class Written:
+    """A result that was named by its own path.  inputs: the run folders and data files that it says it is of."""
+
+    file: Path
+    analysis: str
+    inputs: tuple[Path, ...]
+
+
+def read_inputs(path: Path) -> Written:
+    """Of what a result is.
+
+    Raises NoResult for another program's file, DataError for damage or an input that is gone.
+    """
+    data = _read(path)
+    try:
+        written = _Head.model_validate(data)
+    except ValidationError as error:
+        raise DataError(f"{path}: {in_one_line(error)}; {_ANEW_OR_AWAY}") from error
+    inputs = tuple(path.parent / run.path for run in written.runs)
+    for one in inputs:
+        if not one.exists():
+            raise DataError(f"{path}: is of {one}, which is not there: name the run or data file where it lies now")
+    return Written(path, written.analysis, inputs)
+
+
+class _Run(Part):
+    path: str
+
+
+class _Head(Part):
+    """What says of which analysis and inputs a result is."""
+
+    analysis: str
+    runs: tuple[_Run, ...]
+
+
+def results_in(folder: Path) -> list[Written]:
+    """The results that lie in a folder, by name; files of other programs are passed over.  Raises DataError."""
+    found = []
+    for file in sorted(folder.glob("*.json")):
+        if "result" in file.name.split("."):
+            with suppress(NoResult):
+                found.append(read_inputs(file))
+    return found
 
 
 @dataclass(frozen=True)
@@ -218,12 +272,17 @@ class Earlier(Generic[R]):
 
     file: Path
     result: R
-    number: int
+    number: int = 0
 
     @property
     def sha256(self) -> str:
         """Of the data file at that time."""
         return self.result.inputs[self.number].sha256
+
+    @property
+    def part(self) -> Any:
+        """What the result says of the input."""
+        return self.result.runs[self.number]
 
     @property
     def text(self) -> str:
@@ -232,16 +291,35 @@ class Earlier(Generic[R]):
         by = f", by levilab {then.get('levilab', '?')}" if then != software_versions() else ""
         return f"as levilab analyze found it{by}: {self.file}"
 
+    def of(self, source: Source[Any]) -> Earlier[R]:
+        """The same of another input of the result."""
+        number = next(k for k, given in enumerate(self.result.inputs) if given.sha256 == source.sha256)
+        return replace(self, number=number)
+
+    def restore(self, read: Callable[[], T]) -> T:
+        """What is read from the result.  Raises DataError, which names the file, where that raises ValueError."""
+        try:
+            return read()
+        except ValueError as error:
+            raise DataError(f"{self.file}: {error}: {ANEW}") from error
+
 
 class Archive(Generic[R]):
-    """The results that were written before, where the paths of a command lead to them."""
+    """The results that were written before, where the paths of a command lead to them.
 
-    def __init__(self, paths: Sequence[Path], model: type[R]) -> None:
+    Args:
+        paths: run folders, data files, folders to search.
+        model: of the analysis.
+        files: results that lie elsewhere; they go before all others.
+    """
+
+    def __init__(self, paths: Sequence[Path], model: type[R], files: Sequence[Path] = ()) -> None:
         self._model = model
         self._analysis: str = model.model_fields["analysis"].default
         self._read: dict[Path, R | None] = {}
         self._known: dict[Path, dict[str | Path, int]] = {}
         several = len(paths) > 1 or (paths[0].is_dir() and not (paths[0] / RECORD).exists())
+        self._named = tuple(files)
         self._together = _together(paths).results(self._analysis) if several else ()
         if len(paths) > 1:
             for file in self._together:  # what lies in the present folder may as well be another program's
@@ -249,14 +327,14 @@ class Archive(Generic[R]):
                     self._result(file)
                 self._read.setdefault(file, None)
 
-    def whole(self, sources: Sequence[Source[Any]]) -> tuple[Path, R] | None:
+    def whole(self, sources: Sequence[Source[Any]]) -> Earlier[R] | None:
         """The result of just these inputs, unchanged."""
         files = beside(sources[0].path).results(self._analysis) if len(sources) == 1 else self._together
         wanted = sorted(source.sha256 for source in sources)
-        for file in files:
+        for file in (*self._named, *files):
             result = self._result(file)
             if result and sorted(given.sha256 for given in result.inputs) == wanted:
-                return file, result
+                return Earlier(file, result)
         return None
 
     def earlier(self, path: Path, data: Path, sha256: str | None = None) -> Earlier[R] | None:
@@ -280,7 +358,7 @@ class Archive(Generic[R]):
 
     def _files(self, path: Path) -> list[Path]:
         """Where an input's result may lie."""
-        own = [*self._together, *beside(path).results(self._analysis)]
+        own = [*self._named, *self._together, *beside(path).results(self._analysis)]
         above = Place(path.parent).results(self._analysis)
         for file in above:
             if file not in own:

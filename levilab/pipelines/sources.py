@@ -13,10 +13,12 @@ from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, TypeVar
 from levilab.errors import DataError, DoesNotSuit, NoneUsable
 from levilab.formats.waveforms.header import NoRate
 from levilab.formats.waveforms.record import SEARCHED
+from levilab.present.clock import local
 from levilab.runs.run import READINGS, RECORD, Run, find_runs
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
+    from datetime import datetime
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,16 @@ class Source(Generic[R]):
     def synthetic(self) -> bool:
         """Whether any of it is known to be simulated or made up."""
         return bool(self.run and self.run.record.synthetic)
+
+    @property
+    def time_zero(self) -> datetime | None:
+        """When the clock of the readings was zero, in local time; None where that is not known."""
+        return local(self.run.record.time_zero_utc) if self.run else None
+
+    @property
+    def start(self) -> datetime | None:
+        """When it was measured, in local time: time zero, or else the start of the run."""
+        return self.time_zero or (local(self.run.record.started_utc) if self.run else None)
 
 
 @dataclass(frozen=True)
@@ -211,7 +223,9 @@ def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]
         chosen = options(folder)
         try:
             run = Run.load(folder)
-            if needs.take(run):
+            if goes_on := run.continued_in:
+                remarks.append(f"passed over: {folder} was broken off, its run goes on in {goes_on.name}")
+            elif needs.take(run):
                 found.append(_of_run(run, needs, chosen))
             else:
                 others[run.record.experiment] += 1
@@ -259,5 +273,6 @@ def _nothing_found(needs: Needs[Any], others: Counter[str], broken: list[str], f
     seen = [f"{count} {kind} run{'s' * (count > 1)}" for kind, count in sorted(others.items())]
     seen += [f"{len(broken)} that cannot be used, as {broken[0].removeprefix('passed over: ')}"] if broken else []
     seen += [f"{len(files)} data file{'s' * (len(files) > 1)}, as {files[0]}"] if files else []
-    what = f"found only {'; '.join(seen)}" if seen else "found nothing"
-    return f"no {needs.runs} to analyze in this folder ({what}); name a run folder or a data file"
+    if not seen:
+        return "holds no run and no data file; name a run folder, a data file, or a folder with some of them"
+    return f"no {needs.runs} to analyze in this folder (found only {'; '.join(seen)}); name a run folder or a data file"

@@ -5,7 +5,11 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
+from analysis.numbers import digits
+
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from analysis.uncertainty import Estimate
 
 #: Units as people write them, where the files' plain text is harder to read.
@@ -16,6 +20,9 @@ UNITS = {
     "(rad/s)^-1/2/s": "(rad/s)^−½/s",
     "(rad/s)^(1-exponent)/s": "(rad/s)^(1−n)/s",
 }
+
+#: A column where a smaller uncertainty stands has numbers of very different size.
+MOST_DECIMALS = 1e-6
 
 
 def with_uncertainty(estimate: Estimate) -> str:
@@ -36,13 +43,46 @@ def without_unit(estimate: Estimate) -> str:
     return "—" if estimate.value is None else _number(estimate.value, estimate.u)
 
 
+def column(estimates: Iterable[Estimate | None]) -> list[str]:
+    """Values and standard uncertainties for one column, all with a power of ten or none; a dash for None.
+
+    >>> from analysis.uncertainty import Estimate
+    >>> column([Estimate(0.008, 0.007, "Hz"), Estimate(0.013, 0.008, "Hz"), None])
+    ['0.008(7)', '0.013(8)', '—']
+    >>> column([Estimate(9.9e-3, 1e-4, "1/s"), Estimate(1.02e-2, 1e-4, "1/s")])
+    ['0.00990(10)', '0.01020(10)']
+    """
+    cells = list(estimates)
+    known = [(abs(one.value), one.u) for one in cells if one and one.value is not None and one.u]
+    largest = max((max(value, u) for value, u in known), default=0.0)
+    ordinary = 1e-2 <= largest < 1e5
+    if ordinary and min(u for _, u in known) < MOST_DECIMALS:
+        return [without_unit(one) if one else "—" for one in cells]
+    return ["—" if one is None or one.value is None else _number(one.value, one.u, ordinary=ordinary) for one in cells]
+
+
+def ends(estimate: Estimate) -> tuple[str, str] | None:
+    """The ends of the 68 % interval, where there is one, with the digits that u gives the value.
+
+    >>> from analysis.uncertainty import Estimate
+    >>> ends(Estimate(2.3687e-4, 3.0e-7, "1/s", (2.365e-4, 2.371e-4)))
+    ('2.3650×10⁻⁴', '2.3710×10⁻⁴')
+    """
+    if not estimate.interval or not estimate.u:
+        return None
+    low, high = (re.sub(r"\(.*?\)", "", _number(end, estimate.u)) for end in estimate.interval)
+    return low, high
+
+
 def in_words(unit: str) -> str:
     """A unit as people write it."""
     return UNITS.get(unit, unit)
 
 
-def _number(value: float, u: float | None) -> str:
+def _number(value: float, u: float | None, *, ordinary: bool | None = None) -> str:
     """By the rule of the Particle Data Group, with a power of ten for what would begin with zeros.
+
+    ordinary: whether without one, where that is not for the number alone to say.
 
     >>> _number(-0.0012, 0.05), _number(-0.012, 0.05)
     ('0.00(5)', '-0.01(5)')
@@ -51,7 +91,8 @@ def _number(value: float, u: float | None) -> str:
 
     if not u:
         return f"{value:.4g}"
-    ordinary = 1e-2 <= abs(value) < 1e5 or abs(value) < u < 1e5
+    if ordinary is None:
+        ordinary = 1e-2 <= abs(value) < 1e5 or abs(value) < u < 1e5
     text = f"{ufloat(value, u):SP}" if ordinary else f"{ufloat(value, u):eSP}"
     return re.sub(r"^-(?=0(\.0*)?\()", "", text)
 
@@ -65,15 +106,15 @@ def short_name(name: str) -> str:
     return re.sub(r"^\d{8}T\d{6}Z-", "", name)
 
 
-def plain(value: float | None, digits: int = 3) -> str:
+def plain(value: float | None, count: int = 3) -> str:
     """A statistic in a few digits; a dash where there is none.
 
-    >>> plain(0.0312345), plain(4478.2), plain(None)
-    ('0.0312', '4478', '—')
+    >>> plain(0.0312345), plain(4478.2), plain(2.34e-14, 2), plain(None)
+    ('0.0312', '4478', '2.3×10⁻¹⁴', '—')
     """
     if value is None:
         return "—"
-    return f"{value:.0f}" if 10**digits <= abs(value) < 1e6 else f"{value:.{digits}g}"
+    return f"{value:.0f}" if 10**count <= abs(value) < 1e6 else digits(value, count)
 
 
 def share(weight: float | None) -> str:

@@ -7,22 +7,27 @@ import sys
 from typing import TYPE_CHECKING
 
 from rich import box
-from rich.console import Console
+from rich.console import Console, Group
 from rich.markup import escape
+from rich.measure import Measurement, measure_renderables
+from rich.padding import Padding
 from rich.table import Table as RichTable
 
 from levilab.present.characters import for_encoding
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from typing import Any
 
+    from rich.console import ConsoleOptions, RenderableType
     from rich.text import Text
 
     from levilab.present.tables import Table
 
 #: SIMPLE_HEAD in plain ASCII; rich itself would draw a frame.
 _ASCII_HEAD = box.Box("    \n    \n -- \n    \n    \n -- \n    \n    \n", ascii=True)
+#: Columns below which no text can be read, and more than any table has.
+_NARROWEST, _UNLIMITED = 20, 10_000
 
 
 class _Terminal(Console):
@@ -33,15 +38,54 @@ class _Terminal(Console):
         return super().render_str(for_encoding(text, self.encoding), **options)
 
 
+class _Table(RichTable):
+    """A table; where the terminal is too narrow for its words, a list: row after row, a line for each column."""
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Any]:
+        """As rich asks for it."""
+        fits = _share_width(self, console, options)
+        yield from super().__rich_console__(console, options) if fits else self._rows(console, options)
+
+    def _rows(self, console: Console, options: ConsoleOptions) -> Iterator[RenderableType]:
+        if self.title:
+            yield Padding(self.title, (0, 0, 1, 0), style="bold")
+        heads = [column.header for column in self.columns]
+        for first, *cells in zip(*(column.cells for column in self.columns), strict=True):
+            if first:
+                yield Padding(first, 0, style="bold")
+            row = RichTable.grid("", "", padding=(0, 1))
+            for head, cell in zip(heads[1:], cells, strict=True):
+                if cell:
+                    row.add_row(head, cell)
+            if console.measure(Group(*heads[1:])).maximum > options.max_width // 2:
+                _share_width(row, console, options.update(width=options.max_width - 1))
+            yield Padding(row, (0, 0, 1, 1))
+
+
+def _share_width(table: RichTable, console: Console, options: ConsoleOptions) -> bool:
+    """Share the width among the columns, none of them narrower than its longest word, which rich itself would cut.
+
+    Returns whether there is width enough.
+    """
+    unlimited = options.update(width=_UNLIMITED)
+    whole = Measurement.get(console, unlimited, table)
+    free, wanted = options.max_width - whole.minimum, whole.maximum - whole.minimum
+    if 0 <= free < wanted:
+        for column in table.columns:
+            needed = measure_renderables(console, unlimited, [column.header, *column.cells])
+            column.width = needed.minimum + needed.span * free // wanted
+    return free >= 0
+
+
 def terminal() -> Console:
     """As wide as the terminal; into a pipe or file as wide as the tables need."""
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 160
-    return _Terminal(width=max(width, 80), highlight=False)
+    return _Terminal(width=max(width, _NARROWEST), highlight=False)
 
 
 def new_table(title: str | None, *columns: str, numbers: Sequence[str] = ()) -> RichTable:
     """An empty table; numbers: the columns that are aligned to the right."""
-    table = RichTable(
+    table = _Table(
         box=box.SIMPLE_HEAD if _is_unicode(sys.stdout.encoding) else _ASCII_HEAD,
         padding=(0, 1, 0, 0),
         pad_edge=False,

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
+from levilab.present.clock import moment
 from levilab.present.words import setting_in_words, settings_in_words, value_in_words
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
-    from levilab.pipelines.part import InputPart
+    from levilab.pipelines.part import InputPart, ReportPart
     from levilab.pipelines.sources import Source
     from levilab.runs.run import RunRecord
 
@@ -22,34 +23,45 @@ _DRIVE = ("drive_waveform", "drive_frequency_hz", "drive_amplitude_vpp")
 
 
 @dataclass(frozen=True)
+class About:
+    """What one analysis says of an input.  whole: of all its inputs; part: of this one; several: if it has more."""
+
+    source: Source[Any]
+    whole: ReportPart
+    part: InputPart
+    several: bool
+
+
+@dataclass(frozen=True)
 class Input:
     """One input as the page shows it.
 
-    facts: (what, in words), in the order of the page; events: (when, text); part: what the analysis says of it.
+    facts: (what, in words), in the order of the page; events: (when, text); parts: what each analysis says of it.
     """
 
     name: str
     facts: tuple[tuple[str, tuple[str, ...]], ...]
     events: tuple[tuple[str, str], ...]
     events_left_out: int
-    part: InputPart
+    parts: tuple[About, ...]
 
 
-def describe(source: Source[Any], part: InputPart) -> Input:
-    """What is known of an input."""
+def describe(parts: Sequence[About]) -> Input:
+    """What is known of an input, of which several analyses may say something."""
+    source = parts[0].source
     events = source.run.events() if source.run else []
     zero = source.run.record.time_zero_utc if source.run else None
     return Input(
         name=source.name,
-        facts=tuple((what, texts) for what, texts in _facts(source, part) if texts),
+        facts=tuple((what, texts) for what, texts in _facts(source, parts) if texts),
         events=tuple((_moment(event, zero), event["text"]) for event in events[:MOST_EVENTS]),
         events_left_out=max(0, len(events) - MOST_EVENTS),
-        part=part,
+        parts=tuple(parts),
     )
 
 
-def _facts(source: Source[Any], part: InputPart) -> list[tuple[str, tuple[str, ...]]]:
-    about_readings = [("Readings", part.readings), ("Analysis", (part.origin,))]
+def _facts(source: Source[Any], parts: Sequence[About]) -> list[tuple[str, tuple[str, ...]]]:
+    about_readings = _of_one(parts[0]) if len(parts) == 1 else [_of_several(part) for part in parts]
     if source.run is None:
         return [*about_readings, ("Instruments", ("no instruments recorded",))]
     record = source.run.record
@@ -58,13 +70,26 @@ def _facts(source: Source[Any], part: InputPart) -> list[tuple[str, tuple[str, .
     return [
         ("Synthetic", made_up),
         ("Note", (record.note,) if record.note else ()),
-        ("When", _when(record)),
+        ("When", (*_when(record), *_local_start(source))),
         ("Status", (source.run.status,)),
         *about_readings,
         ("Drive", _drive(record)),
         *(instruments or [("Instruments", ("no instruments recorded",))]),
         ("Command", (" ".join(record.command_line),) if record.command_line else ()),
     ]
+
+
+def _of_one(about: About) -> list[tuple[str, tuple[str, ...]]]:
+    """What the only analysis says."""
+    alone = [("This run alone", (about.part.alone,))] if about.several else []
+    return [*alone, ("Readings", about.part.readings), ("Analysis", (about.part.origin,))]
+
+
+def _of_several(about: About) -> tuple[str, tuple[str, ...]]:
+    """What one of several analyses says."""
+    subject = about.whole.subject
+    alone = (about.part.alone,) if about.several else ()
+    return subject[0].upper() + subject[1:], (*alone, *about.part.readings, about.part.origin)
 
 
 def _sentence(how: str, seed: int | None) -> str:
@@ -80,6 +105,13 @@ def _when(record: RunRecord) -> tuple[str, ...]:
     """Begin and end, as far as they are known; a virtual clock may have made one of them."""
     ends = [_time(utc) for utc in (record.started_utc, record.ended_utc) if utc]
     return (" to ".join(dict.fromkeys(ends)),) if ends else ()
+
+
+def _local_start(source: Source[Any]) -> tuple[str, ...]:
+    """The start on the clock of the person who reads."""
+    if source.start is None:
+        return ()
+    return (f"{'time zero' if source.time_zero else 'started'} at {moment(source.start)}, local time",)
 
 
 def _time(utc: str) -> str:

@@ -6,20 +6,30 @@ Nothing is fetched when it is opened, and everything that a person typed is esca
 from __future__ import annotations
 
 import base64
-from typing import TYPE_CHECKING, Any, TypeVar
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from levilab.errors import UsageError, unquoted
 from levilab.files import CannotWrite, replace_atomically
-from levilab.pipelines.catalogue import Analysis, Analyzed, recall_suiting
-from levilab.report.inputs import describe
+from levilab.pipelines.catalogue import recall_suiting, remarks
+from levilab.pipelines.document import NO_RESULT
+from levilab.report.inputs import About, describe
 from levilab.runs.run import utc_now
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from pathlib import Path
 
-A = TypeVar("A", bound=Analyzed)
+    from levilab.pipelines.analyzed import Analyzed
+    from levilab.pipelines.catalogue import Analysis
+    from levilab.pipelines.part import ReportPart
+    from levilab.pipelines.sources import Source
+
+    Results = Sequence[tuple[Analysis[Any], Any]]
+
+#: Inputs that a message names at most.
+MOST_NAMES = 4
 
 
 class UnknownFormat(UsageError):
@@ -35,14 +45,15 @@ def write_report(
     """Report what was found of the inputs at the paths; what has no result yet is analyzed, and nothing is stored.
 
     given: options by their names; those at their defaults count as not given, see
-    `levilab.pipelines.spindown.document.recall_spindowns`; tell: called with what lies there and is not in the report.
+    `levilab.pipelines.document.Document.look`; tell: called with what lies there and is not in the report, and
+    with what has no result.
     Raises DataError, UnknownFormat, CannotWrite.
     """
     if output.suffix.lower() not in {".html", ".htm"}:
         expected = "reports are written as HTML, name the file report.html; a browser prints it to PDF"
         raise UnknownFormat("output", expected, value=output)
-    analysis, found = recall_suiting(paths, given or {})
-    page = render(analysis, found)
+    results = recall_suiting(paths, given or {}, tell)
+    page = render(results)
     try:
         output.parent.mkdir(parents=True, exist_ok=True)
         replace_atomically(output, page)
@@ -50,14 +61,46 @@ def write_report(
         raise CannotWrite(
             f"{output}: could not be written ({error.strerror or error}): choose another place with `output`"
         ) from error
-    if tell and found.remarks:
-        for remark in found.remarks:
+    if tell:
+        for remark in remarks([found.remarks for _, found in results]):
             tell(remark)
-        tell(f"a report is of one analysis, here {analysis.name}: for others name their runs")
+        for text in _without_result(results):
+            tell(text)
     return output
 
 
-def render(analysis: Analysis[A], found: A) -> str:
+def _without_result(results: Results) -> Iterator[str]:
+    """What was analyzed for the page since it has no result where it lies."""
+    lacking = {
+        source.name: None
+        for _, found in results
+        for source, origin in zip(found.sources, found.origins, strict=True)
+        if origin.text.endswith(NO_RESULT)
+    }
+    names = [*lacking][:MOST_NAMES] + (["…"] if len(lacking) > MOST_NAMES else [])
+    if names:
+        yield (
+            f"no result lies beside {', '.join(names)}: analyzed for the page; if levilab analyze wrote one elsewhere "
+            "(`out`), give that folder or file"
+        )
+
+
+@dataclass(frozen=True)
+class Section:
+    """What the page says of one analysis.
+
+    part: in its own words; count: of its inputs; banner: which of them are synthetic, where that matters here; figure:
+    as an address of data.
+    """
+
+    part: ReportPart
+    count: int
+    banner: tuple[str, str] | None
+    figure: str
+    warnings: tuple[str, ...]
+
+
+def render(results: Results) -> str:
     """The page's text."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -68,21 +111,35 @@ def render(analysis: Analysis[A], found: A) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    part = analysis.part(found)
+    sections = [_section(analysis, found, alone=len(results) == 1) for analysis, found in results]
+    abouts: dict[Path, list[About]] = {}
+    for (_, found), section in zip(results, sections, strict=True):
+        for source, part in zip(found.sources, section.part.inputs, strict=True):
+            abouts.setdefault(source.path.resolve(), []).append(About(source, section.part, part, section.count > 1))
     return environment.get_template("report/page.html.j2").render(
-        part=part,
-        banner=_banner(found),
-        inputs=[describe(*pair) for pair in zip(found.sources, part.inputs, strict=True)],
-        figure=_as_image(analysis.svg(found)),
-        warnings=[unquoted(text) for text in found.all_warnings],
+        sections=sections,
+        banner=sections[0].banner if len(sections) == 1 else _banner([one[0].source for one in abouts.values()]),
+        inputs=[describe(of_input) for of_input in abouts.values()],
         software=software_versions(),
         written=utc_now()[:19].replace("T", " ") + " UTC",
     )
 
 
-def _banner(found: Analyzed) -> tuple[str, str] | None:
-    """Which inputs are synthetic, and what that does to the result."""
-    total, made_up = len(found.sources), [source.name for source in found.sources if source.synthetic]
+def _section(analysis: Analysis[Any], found: Analyzed[Any, Any, Any, Any], *, alone: bool) -> Section:
+    """alone: there is no other, so that it says which inputs are synthetic even where they are not mixed."""
+    mixes = any(0 < sum(one.synthetic for one in together) < len(together) for together in found.averaged)
+    return Section(
+        part=analysis.part(found),
+        count=len(found.sources),
+        banner=_banner(found.sources, mixed=mixes) if alone or mixes else None,
+        figure=_as_image(analysis.svg(found)),
+        warnings=tuple(unquoted(text) for text in found.all_warnings),
+    )
+
+
+def _banner(sources: Sequence[Source[Any]], *, mixed: bool = False) -> tuple[str, str] | None:
+    """Which inputs are synthetic, and what that does to numbers that are of both together."""
+    total, made_up = len(sources), [source.name for source in sources if source.synthetic]
     if not made_up:
         return None
     below = "How it was made stands below, under its name."
@@ -91,9 +148,11 @@ def _banner(found: Analyzed) -> tuple[str, str] | None:
     below = "How each was made stands below, under its name."
     if len(made_up) == total:
         return "SYNTHETIC.", f"None of these {total} runs came from a real bench. {below}"
-    said = f"{len(made_up)} of {total} runs did not come from a real bench ({', '.join(made_up)})"
-    mixed = "Means, comparisons and figure are of both together and so no measurement: report the real runs "
-    return "REAL AND SYNTHETIC RUNS MIXED.", f"{said}. {mixed}by themselves. {below}"
+    said = f"{len(made_up)} of {total} runs did not come from a real bench ({', '.join(made_up)})."
+    if not mixed:
+        return "REAL AND SYNTHETIC RUNS.", f"{said} {below}"
+    consequence = "Means, comparisons and figure are of both together and so no measurement: report the real runs "
+    return "REAL AND SYNTHETIC RUNS MIXED.", f"{said} {consequence}by themselves. {below}"
 
 
 def _as_image(svg: str) -> str:

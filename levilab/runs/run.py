@@ -105,6 +105,13 @@ class Run:
         alive = record.status != "running" or _is_alive(folder)
         return cls(folder, record, record.status if alive else "interrupted")
 
+    @property
+    def continued_in(self) -> Path | None:
+        """The folder that all of it was written to anew, where this one was damaged under way."""
+        name = (self.record.model_extra or {}).get("continued_in")
+        folder = self.folder.with_name(Path(str(name)).name) if name else None
+        return folder if folder and (folder / RECORD).exists() else None
+
     def readings(self) -> Table:
         """The readings so far, every declared channel; a torn last line is left out, with a warning."""
         declared = [channel["name"] for channel in self.record.channels if "name" in channel]

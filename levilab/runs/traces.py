@@ -12,7 +12,7 @@ from pydantic import Field, ValidationError
 
 from instruments.drivers.oscilloscope import Trace
 from levilab.errors import DataError
-from levilab.files import parse_json, replace_atomically
+from levilab.files import parse_json, replace_atomically, sync_folder
 from levilab.settings import Settings, in_one_line
 
 if TYPE_CHECKING:
@@ -59,7 +59,9 @@ class StoredTrace:
 
 def save_codes(folder: Path, number: int, time_s: float, trace: Trace, channel: str) -> str:
     """Write the codes of a record; returns its line for the index.  Raises OSError."""
-    (folder / FOLDER).mkdir(exist_ok=True)
+    if not (folder / FOLDER).is_dir():
+        (folder / FOLDER).mkdir(exist_ok=True)
+        sync_folder(folder)
     buffer = io.BytesIO()
     np.save(buffer, trace.codes, allow_pickle=False)
     content = buffer.getvalue()
@@ -88,17 +90,46 @@ def has_codes(folder: Path, line: str) -> bool:
     return (folder / _line(folder / INDEX, line).path).is_file()
 
 
-def load_traces(folder: Path) -> list[StoredTrace]:
-    """The records of a run folder, in the order in which they were kept; a torn last line is left out.
+def last_number(folder: Path) -> int:
+    """The number of the last record whose codes are in a run folder, 0 where there are none.
 
-    Raises DataError for codes that are missing or are not those that were written.
+    A process that was killed between codes and line has left codes that no line describes: their number is not given
+    again, so that they stay as they are.
     """
+    numbers = [int(path.stem) for path in (folder / FOLDER).glob("*.npy") if path.stem.isdecimal()]
+    return max(numbers, default=0)
+
+
+def described_times(folder: Path) -> list[float]:
+    """When the records that the index of a run folder describes were kept [s].  Raises DataError."""
+    return [_line(folder / INDEX, line).time_s for line in _lines(folder)]
+
+
+def undescribed_codes(folder: Path) -> list[str]:
+    """Codes in a run folder that no line of the index describes, as their paths in it.  Raises DataError."""
+    described = {_line(folder / INDEX, line).path for line in _lines(folder)}
+    there = sorted(path.relative_to(folder).as_posix() for path in (folder / FOLDER).glob("*.npy"))
+    return [path for path in there if path not in described]
+
+
+def load_traces(folder: Path) -> list[StoredTrace]:
+    """The records of a run folder, in the order in which they were kept.
+
+    The codes of a record are on the disk before its line: a process that was killed between the two, or in the middle
+    of the line, has left codes without a line, and these are left out.  Raises DataError for codes that are missing or
+    are not those that were written.
+    """
+    return [_load(folder, _line(folder / INDEX, line)) for line in _lines(folder)]
+
+
+def _lines(folder: Path) -> list[str]:
+    """The whole lines of the index."""
     index = folder / INDEX
     try:
         text = index.read_text(encoding="utf-8", errors="replace") if index.exists() else ""
     except OSError as error:
         raise DataError(f"{index}: cannot be read ({error.strerror})") from error
-    return [_load(folder, _line(index, line)) for line in text.split("\n")[:-1]]
+    return text.split("\n")[:-1]
 
 
 def _line(index: Path, line: str) -> Record:
@@ -115,7 +146,8 @@ def _load(folder: Path, record: Record) -> StoredTrace:
     try:
         content = path.read_bytes()
     except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror}): {INDEX} names it") from error
+        advice = f"{INDEX} names it; bring it back, or remove its line there"
+        raise DataError(f"{path}: cannot be read ({error.strerror}): {advice}") from error
     if hashlib.sha256(content).hexdigest() != record.sha256:
         raise DataError(f"{path}: is not what was recorded: its sha256 differs from the one in {INDEX}")
     trace = Trace(

@@ -20,6 +20,7 @@ from datetime import UTC, datetime
 from itertools import count
 from typing import TYPE_CHECKING, Any, Self
 
+from levilab.errors import DataError
 from levilab.files import CannotWrite, replace_atomically, sync_folder
 from levilab.runs import traces
 from levilab.runs.run import (
@@ -81,10 +82,14 @@ class RunWriter:
             _make_folder(out)
             writer = cls(_new_folder(out, record.experiment), record, tell)
             writer._created = True
-            writer._lock.acquire(blocking=False)
-            writer._append(table, writer._header())
-            replace_atomically(writer.folder / RECORD, record.as_json())
-            sync_folder(out)
+            try:
+                writer._lock.acquire(blocking=False)
+                writer._append(table, writer._header())
+                replace_atomically(writer.folder / RECORD, record.as_json())
+                sync_folder(out)
+            except BaseException:
+                writer._close()
+                raise
         return writer
 
     @classmethod
@@ -114,7 +119,7 @@ class RunWriter:
             _refuse_special(self.folder / name)
             _cut_torn_line(self.folder / name)
         self._check_header()
-        self._records = len(list((self.folder / traces.FOLDER).glob("*.npy")))
+        self._records = traces.last_number(self.folder)
         for name in _KEPT:
             if name not in self._files and (self.folder / name).exists():
                 self._open(name)
@@ -273,8 +278,18 @@ class RunWriter:
         kept = [file for name, file in self._files.items() if name in self._kept and name != STATES]
         if any(file.is_lost() for file in kept):
             self._rescue()
-        elif kept and not (self.folder / RECORD).exists():
+        elif kept and not self._record_is_whole():
             replace_atomically(self.folder / RECORD, self.record.as_json())
+
+    def _record_is_whole(self) -> bool:
+        """Whether run.json is there and can be read; a person may have changed it."""
+        try:
+            if (self.folder / RECORD).stat().st_size == len(self.record.as_json().encode(errors="replace")):
+                return True
+            read_record(self.folder)
+        except (OSError, DataError):
+            return False
+        return True
 
     def _rescue(self) -> None:
         old = self.folder
@@ -283,6 +298,7 @@ class RunWriter:
         self._lock = lock_of(self.folder)
         self._lock.acquire(blocking=False)
         _copy_others(old, self.folder, {*self._kept, RECORD, LOCK, PACKAGE})
+        kept = {name: b"".join(blocks) for name, blocks in self._kept.items()}
         lost = self._forget_lost_records()
         for name, blocks in self._kept.items():
             self._files[name] = _GrowingFile(self.folder / name)
@@ -291,6 +307,7 @@ class RunWriter:
         self.record = self.record.model_copy(update={"rescued_from": str(old)})
         replace_atomically(self.folder / RECORD, self.record.as_json())
         sync_folder(self.folder.parent)
+        self._leave_readable(old, kept)
         readings = self._lines_kept(READINGS) - 1
         text = (
             f"{old} was removed, replaced or cut while it was being written: all {readings} readings "
@@ -300,6 +317,19 @@ class RunWriter:
         event = {"utc": utc_now(), "time_s": None, "kind": "rescued", "text": text}
         self._append(EVENTS, json.dumps(event, ensure_ascii=False))
         self.tell(text)
+
+    def _leave_readable(self, old: Path, kept: Mapping[str, bytes]) -> None:
+        """Leave whole lines in what remains of the old folder, and a run.json that says where the run goes on.
+
+        What another program has put there stays as it is.
+        """
+        with contextlib.suppress(OSError):
+            if not (old / RECORD).is_file() or not _is_of(old, self.record):
+                return
+            for name, ours in kept.items():
+                _cut_foreign_tail(old / name, ours)
+            gone_on = {"status": "interrupted", "ended_utc": utc_now(), "continued_in": self.folder.name}
+            replace_atomically(old / RECORD, self.record.model_copy(update=gone_on).as_json())
 
     def _forget_lost_records(self) -> int:
         """Take records whose codes are gone out of the index; returns how many.
@@ -375,6 +405,26 @@ def _folder_beside(old: Path) -> Path:
             folder.mkdir()
             return folder
     raise AssertionError
+
+
+def _is_of(folder: Path, record: RunRecord) -> bool:
+    """Whether a folder's run.json is of this run, or so damaged that it says nothing."""
+    try:
+        return read_record(folder).started_utc == record.started_utc
+    except DataError:
+        return True
+
+
+def _cut_foreign_tail(path: Path, ours: bytes) -> None:
+    """Cut a file that was cut within a line, and then written to, back to its last whole line."""
+    if not path.is_file() or path.is_symlink():
+        return
+    data = path.read_bytes()
+    differ = (k for k, pair in enumerate(zip(data, ours, strict=False)) if pair[0] != pair[1])
+    same = next(differ, min(len(data), len(ours)))
+    if ours.endswith(data[same:]):  # else another program wrote it
+        with path.open("rb+") as file:
+            file.truncate(data.rfind(b"\n", 0, same) + 1)
 
 
 def _copy_others(old: Path, new: Path, ours: set[str]) -> None:

@@ -291,6 +291,8 @@ def _described(file: Traversable | Path, name: str) -> Scene:
             "each a TOML file to copy and change"
         ) from None
     except OSError as error:
+        if file.is_dir():
+            raise SceneError(f"{file}: is a folder; a TOML file is expected, or the name of a scene") from None
         raise SceneError(f"{file}: cannot be read ({error.strerror}): a TOML file is expected") from error
     except ValueError as error:
         raise SceneError(f"{file}: not readable as TOML: {error}") from error

@@ -6,19 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from instruments.catalogue import CATALOGUE
 from instruments.clock import VirtualClock
 from instruments.virtual.bench.bus import Bus
 from instruments.virtual.bench.protocol_levilab import plug_in
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.core.device import VirtualInstrument
-from instruments.virtual.counter.keysight_53230a import Virtual53230A
-from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
-from instruments.virtual.generator.agilent_33220a import Virtual33220A
-from instruments.virtual.generator.keysight_33500b import Virtual33500B
-from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
-from instruments.virtual.magnetometer.lakeshore_475 import Virtual475
-from instruments.virtual.oscilloscope.keysight_dsox import VirtualDSOX1000
-from instruments.virtual.oscilloscope.rigol_ds1000z import VirtualDS1000Z
 from levilab.bench.config import ConfigError, InstrumentSettings, Limits
 from levilab.bench.wiring import Wiring
 from levilab.world.person import VirtualPerson
@@ -34,10 +27,11 @@ if TYPE_CHECKING:
 
 #: Where the virtual instruments are plugged in, and what they are unless other models are asked for.
 VIRTUAL = {
-    "counter": InstrumentSettings(model="53230A", address="TCPIP0::counter.levilab::inst0::INSTR"),
-    "generator": InstrumentSettings(model="33500B", address="TCPIP0::generator.levilab::inst0::INSTR"),
-    "oscilloscope": InstrumentSettings(model="DS1000Z", address="TCPIP0::oscilloscope.levilab::inst0::INSTR"),
-    "magnetometer": InstrumentSettings(model="425", address="ASRLmagnetometer.levilab::INSTR"),
+    kind: InstrumentSettings(
+        model=models[0].name,
+        address=f"ASRL{kind}.levilab::INSTR" if models[0].driver.SERIAL else f"TCPIP0::{kind}.levilab::inst0::INSTR",
+    )
+    for kind, models in CATALOGUE.items()
 }
 
 #: Field of the virtual bench's coil at the top, per volt of the generator [T/V]: 10 Vpp make 0.4 mT.
@@ -93,12 +87,16 @@ def in_the_field(model: Callable[..., VirtualInstrument]) -> Maker:
     return lambda world: model(world.clock, flux_density=world.flux_density)
 
 
+#: How the virtual instruments of each kind are connected to the world.
+_CONNECTED: dict[str, Callable[[Callable[..., VirtualInstrument]], Maker]] = {
+    "counter": at_the_light,
+    "generator": at_the_coil,
+    "oscilloscope": at_light_and_coil,
+    "magnetometer": in_the_field,
+}
 #: Kind → model → what makes it.
 MODELS: dict[str, dict[str, Maker]] = {
-    "counter": {"53230A": at_the_light(Virtual53230A), "CNT-91": at_the_light(VirtualCNT91)},
-    "generator": {"33500B": at_the_coil(Virtual33500B), "33220A": at_the_coil(Virtual33220A)},
-    "oscilloscope": {"DS1000Z": at_light_and_coil(VirtualDS1000Z), "DSOX1000": at_light_and_coil(VirtualDSOX1000)},
-    "magnetometer": {"425": in_the_field(Virtual425), "475": in_the_field(Virtual475)},
+    kind: {model.name: _CONNECTED[kind](model.twin) for model in models} for kind, models in CATALOGUE.items()
 }
 
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from analysis.errors import NotPositive, TooFewReadings
-from analysis.limits import compare, outliers_of, spin_at_fall, summarize
+from analysis.limits import Sample, combine, compare, outliers_of, spin_at_fall, summarize
 
 THESIS = np.array([21.7, 21.4, 21.7, 21.9, 21.8, 22.3, 21.8, 22.0, 22.1, 21.9])
 
 
 def test_the_published_limits_have_the_published_statistics() -> None:
-    found = summarize(THESIS)
+    found = summarize(Sample(THESIS))
     assert found.scatter
     assert found.scatter.value == pytest.approx(0.25, abs=0.005)
     assert (found.mean.value, found.mean.u) == pytest.approx((21.86, 0.08), abs=0.005)
@@ -57,9 +57,62 @@ def test_outliers_are_those_of_grubbs_table(n: int, critical: float) -> None:
     assert outliers_of(with_deviation(critical + 0.01)) == (n - 1,)
 
 
+@pytest.mark.parametrize("scatter", [0.0, 0.02, 0.05, 0.1, 0.4])
+def test_the_standard_error_holds_the_steps_of_the_drive(scatter: float) -> None:
+    """Eight tops, steps of 0.2 Hz, true limits anywhere in a step: u predicts how far the mean is from the truth."""
+    random, pulls, naive = np.random.default_rng(7), [], []
+    for _ in range(400):
+        truth = 67.0 + random.uniform(0, 0.2)
+        limits = truth + scatter * random.standard_normal(8)
+        seen = (np.floor(limits / 0.2) + 0.5) * 0.2
+        found = summarize(Sample(seen, np.full(8, 0.2 / math.sqrt(12)), np.full(8, 0.2)))
+        assert found.mean.value
+        assert found.mean.u
+        pulls.append((found.mean.value - truth) / found.mean.u)
+        naive.append(abs(found.mean.value - truth) > 2 * seen.std(ddof=1) / math.sqrt(8))
+    # 3 standard errors of a standard deviation of 400, and what a scatter of 8 adds (Student's t: 1.18);
+    # where the tops just leave a step, u is on the safe side
+    assert 0.75 < np.sqrt(np.mean(np.square(pulls))) < 1.18 + 0.12
+    if scatter < 0.05:
+        assert np.mean(naive) > 0.5  # s/√n alone is far too small
+
+
+def test_a_mean_of_runs_holds_the_scatter_between_them() -> None:
+    """Four runs of five tops, which differ by 0.5 Hz from day to day and by 0.25 Hz from top to top."""
+    random, wrong, pooled, betweens = np.random.default_rng(3), 0, 0, []
+    for _ in range(400):
+        runs = [67.0 + 0.5 * random.standard_normal() + 0.25 * random.standard_normal(5) for _ in range(4)]
+        found = combine([Sample(run) for run in runs])
+        assert found.between
+        wrong += not compare(found, "truth", 67.0).agrees
+        pooled += not compare(summarize(Sample(np.concatenate(runs))), "truth", 67.0).agrees
+        betweens.append(found.between.value)
+    assert wrong / 400 == pytest.approx(0.05, abs=0.033)  # 3 standard errors
+    assert pooled / 400 > 0.2  # as one sample of 20 they are not
+    assert np.sqrt(np.mean(np.square(betweens))) == pytest.approx(0.5, abs=0.05)
+
+
+def test_runs_that_agree_are_as_good_as_one() -> None:
+    random = np.random.default_rng(4)
+    ratios = []
+    for _ in range(100):
+        values = 67.0 + 0.25 * random.standard_normal(20)
+        found, whole = combine([Sample(part) for part in np.split(values, [4, 9])]), summarize(Sample(values))
+        assert found.mean.u
+        assert whole.mean.u
+        ratios.append(found.mean.u / whole.mean.u)
+    assert np.median(ratios) == pytest.approx(1, abs=0.15)  # three runs tell their own scatter to half of it
+
+
+def test_runs_of_a_single_top_are_one_sample() -> None:
+    found = combine([Sample(THESIS[k : k + 1]) for k in range(10)])
+    assert found.mean == summarize(Sample(THESIS)).mean
+    assert (found.runs, found.between, found.trend) == (10, None, None)
+
+
 def test_limits_that_go_down_top_by_top_drift() -> None:
     limits = 22.0 - 0.1 * np.arange(8) + np.array([0.01, -0.02, 0.02, 0.0, -0.01, 0.01, -0.02, 0.01])
-    found = summarize(limits)
+    found = summarize(Sample(limits))
     assert found.drifts
     assert found.trend
     assert found.trend.value == pytest.approx(-0.1, abs=0.01)
@@ -67,7 +120,7 @@ def test_limits_that_go_down_top_by_top_drift() -> None:
 
 def test_a_mean_two_standard_errors_off_of_ten_is_no_chance_by_students_t() -> None:
     """Student's table: of 9 degrees of freedom 2.262 has 5 %."""
-    found = summarize(THESIS)
+    found = summarize(Sample(THESIS))
     assert found.mean.value
     assert found.mean.u
     at = compare(found, "theory", found.mean.value - 2.262 * found.mean.u)
@@ -77,12 +130,12 @@ def test_a_mean_two_standard_errors_off_of_ten_is_no_chance_by_students_t() -> N
 
 
 def test_one_limit_has_no_scatter_and_none_is_no_statistic() -> None:
-    single = summarize(np.array([21.9]), np.array([0.05]))
+    single = summarize(Sample(np.array([21.9]), np.array([0.05])))
     assert (single.mean.u, single.scatter) == (0.05, None)
     assert compare(single, "theory", 21.0).agrees is None
     with pytest.raises(TooFewReadings):
-        summarize(np.array([]))
+        summarize(Sample(np.array([])))
     with pytest.raises(NotPositive):
-        summarize(np.array([21.9, -1.0]))
+        summarize(Sample(np.array([21.9, -1.0])))
     with pytest.raises(TooFewReadings):
         spin_at_fall(np.arange(2.0), np.array([23.0, 22.9]), 0.03, (1.0, 2.0))

@@ -24,9 +24,9 @@ class Ended:
     err: str
 
 
-def command(*words: str | Path, cwd: Path) -> Ended:
+def command(*words: str | Path, cwd: Path, encoding: str = "utf-8") -> Ended:
     """Run `levilab` with some words in a folder.  Raises what would be a traceback."""
-    out, err = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8") for _ in range(2))
+    out, err = (io.TextIOWrapper(io.BytesIO(), encoding=encoding) for _ in range(2))
     argv, here = sys.argv, os.getcwd()  # noqa: PTH109 - also if it is gone
     sys.argv = ["levilab", *map(str, words)]
     os.chdir(cwd)

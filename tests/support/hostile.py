@@ -76,7 +76,12 @@ def spellings(pattern):
 
     >>> spellings("[SOURce[1]:]FREQuency[:CW|:FIXed]")
     ['FREQ', 'SOURCE1:FREQUENCY:CW', 'source:freq:fix']
+    >>> spellings("C1:(VDIV|VOLT_DIV)")
+    ['C1:VDIV', 'C1:VOLT_DIV', 'c1:vdiv']
     """
+    first, second = (re.sub(r"\(([^|)]*)\|?([^)]*)\)", place, pattern) for place in (r"\1", r"\2"))
+    if first != pattern:  # one word or the other, as the LeCroy dialect has them
+        return [first, second, first.lower()]
     bare = _without_brackets(pattern)
     whole = re.sub(r"\|[^\]|]*", "", pattern).replace("[", "").replace("]", "")
     other = re.sub(r"\[[^\]|]*\|", "[", pattern)

@@ -23,7 +23,7 @@ from instruments.drivers.magnetometer.lakeshore_475 import LakeShore475
 from instruments.drivers.oscilloscope.keysight_dsox import KeysightDSOX
 from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.errors import CommandRefused, InstrumentError, NotConnected
-from instruments.ieee488 import block_of
+from instruments.ieee488 import PLAIN_BLOCK, block_of
 from instruments.links.serial_port import SerialTransport
 from instruments.links.visa import VisaTransport
 from instruments.virtual.bench.bus import Bus
@@ -322,8 +322,8 @@ class _Hasty(VisaTransport):
     def query(self, message, *, patience=0.0):
         return super().query(message)
 
-    def query_block(self, message, *, patience=0.0):
-        return super().query_block(message)
+    def query_block(self, message, *, patience=0.0, form=PLAIN_BLOCK):
+        return super().query_block(message, form=form)
 
 
 class _HastySerial(SerialTransport):

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from instruments.drivers.counter.reciprocal import IMPEDANCES, READINGS_AT_ONCE, ReciprocalCounter
+from instruments.drivers.counter.reciprocal import IMPEDANCES, IMPEDANCES_OHM, READINGS_AT_ONCE, ReciprocalCounter
 from instruments.drivers.scpi import Setting
 from instruments.ieee488 import Form
 
@@ -37,9 +37,9 @@ class Keysight53230A(ReciprocalCounter):
 
     gate = Setting("SENS:FREQ:GATE:TIME", float, unit="s", low=100e-6, high=1000.0)
     coupling = Setting("INP1:COUP", str, choices=("AC", "DC"))
-    impedance = Setting("INP1:IMP", float, unit="ohm", low=50.0, high=1e6, form=_IMPEDANCE)
-    probe_factor = Setting("INP1:PROB", float, low=1.0, high=10.0, form=_PROBE)
-    input_range = Setting("INP1:RANG", float, unit="V", low=5.0, high=50.0, form=_RANGE)
+    impedance = Setting("INP1:IMP", float, unit="ohm", values=IMPEDANCES_OHM, form=_IMPEDANCE)
+    probe_factor = Setting("INP1:PROB", float, values=(1.0, 10.0), form=_PROBE)
+    input_range = Setting("INP1:RANG", float, unit="V", values=(5.0, 50.0), form=_RANGE)
     #: Resolution: data sheet, for the range of 5 V.
     trigger_level = Setting("INP1:LEV1", float, unit="V", low=-5.125, high=5.125, resolution=2.5e-3)
     automatic_level = Setting("INP1:LEV:AUTO", bool)

@@ -6,7 +6,13 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from instruments.drivers.counter.reciprocal import IMPEDANCES, LONGEST_WAIT_S, READINGS_AT_ONCE, ReciprocalCounter
+from instruments.drivers.counter.reciprocal import (
+    IMPEDANCES,
+    IMPEDANCES_OHM,
+    LONGEST_WAIT_S,
+    READINGS_AT_ONCE,
+    ReciprocalCounter,
+)
 from instruments.drivers.scpi import Setting
 from instruments.errors import OutOfRange
 from instruments.ieee488 import Form
@@ -39,8 +45,8 @@ class PendulumCNT91(ReciprocalCounter):
 
     gate = Setting("ACQ:APER", float, unit="s", low=20e-9, high=1000.0)
     coupling = Setting("INP1:COUP", str, choices=("AC", "DC"))
-    impedance = Setting("INP1:IMP", float, unit="ohm", low=50.0, high=1e6, form=_IMPEDANCE)
-    attenuation = Setting("INP1:ATT", float, low=1.0, high=10.0, form=Form(r"\+?(10?|1\.0+E\+0[01])", "10"))
+    impedance = Setting("INP1:IMP", float, unit="ohm", values=IMPEDANCES_OHM, form=_IMPEDANCE)
+    attenuation = Setting("INP1:ATT", float, values=(1.0, 10.0), form=Form(r"\+?(10?|1\.0+E\+0[01])", "10"))
     low_pass_filter = Setting("INP1:FILT", bool)
     #: Resolution: data sheet, without attenuation.
     trigger_level = Setting("INP1:LEV", float, unit="V", low=-5.0, high=5.0, resolution=3e-3)

@@ -19,7 +19,8 @@ READINGS_AT_ONCE = 1000
 LONGEST_WAIT_S = 30 * 86400.0
 #: The inputs that count slow pulses: 1 and 2, which the CNT-91 has as A and B on its front.
 CHANNELS = (1, 2)
-#: The impedances of an input [ohm], printed short (regular expression, without a sign).
+#: The impedances of an input [ohm]; the same printed short (regular expression, without a sign).
+IMPEDANCES_OHM = (50.0, 1e6)
 IMPEDANCES = r"50|1000000|5\.0{1,9}E\+01|1\.0{1,9}E\+06"
 
 

@@ -86,11 +86,12 @@ class DriveGenerator(ScpiInstrument):
     amplitude: Setting[float]
     offset: Setting[float]
     output: Setting[bool]
+    #: Whether the signal that is set is one of :meth:`prepare`, under the limits as they are.
+    prepared_here: bool
 
     def __init__(self, transport: Transport, *, clock: Clock | None = None) -> None:
         super().__init__(transport, clock=clock)
         self._limits = NO_LIMITS
-        #: Whether the signal that is set is one of :meth:`prepare`, under the limits as they are.
         self.prepared_here = False
 
     @property
@@ -107,6 +108,13 @@ class DriveGenerator(ScpiInstrument):
         self._limits = limits
         self.prepared_here = False
 
+    def __exit__(self, *_error: object) -> None:
+        """Outputs off, then closed.  Raises CommandRefused if one is still on."""
+        try:
+            self.off()
+        finally:
+            self.close()
+
     def command(self, message: str) -> None:
         """As every instrument; after a reset, or one that was cut off, no program answers for the signal."""
         if message.upper().startswith("*RST"):
@@ -121,13 +129,17 @@ class DriveGenerator(ScpiInstrument):
         address = self.transport.address
         self.limits.check(address, frequency_hz=frequency_hz, amplitude_vpp=amplitude_vpp, offset_v=offset_v)
         check_peak(address, amplitude_vpp, offset_v)
-        self.command("*RST")
-        self.command(f"{self.OUTPUT}:LOAD INF")
-        self.command("VOLT:UNIT VPP")
+        self._reset()
         self._shape(waveform)
         self.frequency = frequency_hz
         self._level(amplitude_vpp, offset_v)
         self.prepared_here = True
+
+    def _reset(self) -> None:
+        """All outputs off, nothing but a plain signal, voltages peak to peak at the open terminals."""
+        self.command("*RST")
+        self.command(f"{self.OUTPUT}:LOAD INF")
+        self.command("VOLT:UNIT VPP")
 
     def _level(self, amplitude_vpp: float, offset_v: float) -> None:
         """The offset that was there leaves no room for the amplitude, nor the amplitude after a reset for much."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 from instruments.drivers.oscilloscope import Preamble
-from instruments.drivers.oscilloscope.scope import Scope
+from instruments.drivers.oscilloscope.scope import TRIGGER_MODES, TRIGGER_SOURCES, Scope
 from instruments.drivers.oscilloscope.setup import SLOPES, Channel, Setup
 from instruments.drivers.scpi import Setting
 from instruments.errors import OutOfRange
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from instruments.drivers.oscilloscope.setup import Value
+    from instruments.drivers import Value
 
 
 #: Programmer's Guides, <NR3>: a sign, one to three digits, with or without a point, an exponent of two or three digits.
@@ -29,6 +29,8 @@ class _KeysightChannel(Channel):
 
     NUMBER: ClassVar[Form] = _NUMBER
 
+    display = Setting("DISP", bool)
+    inverted = Setting("INV", bool)
     probe_factor = Setting("PROB", float, low=0.1, high=1e4)
     coupling = Setting("COUP", str, choices=("AC", "DC"))
     scale = Setting("SCAL", float, unit="V", low=5e-4, high=1e5)
@@ -58,6 +60,10 @@ class KeysightDSOX(Scope):
     SLOPES: ClassVar[Mapping[str, str]] = SLOPES | {"either": "EITH"}
     SWEEPS: ClassVar[Mapping[str, str]] = {"normal": "NORM", "single": "NORM", "auto": "AUTO"}
 
+    time_mode = Setting(":TIM:MODE", str, choices=("MAIN", "WINDow", "XY", "ROLL"))
+    trigger_mode = Setting(":TRIG:MODE", str, choices=TRIGGER_MODES)
+    trigger_source = Setting(":TRIG:EDGE:SOUR", str, choices=TRIGGER_SOURCES)
+    trigger_level = Setting(":TRIG:EDGE:LEV", float, unit="V", low=-1e5, high=1e5)
     time_range = Setting(":TIM:RANG", float, unit="s", low=50e-9, high=500.0)
     time_position = Setting(":TIM:POS", float, unit="s", low=-500.0, high=500.0)
     time_reference = Setting(":TIM:REF", str, choices=("LEFT", "CENTer", "RIGHt"))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from instruments.drivers.oscilloscope import Preamble
-from instruments.drivers.oscilloscope.scope import Scope
+from instruments.drivers.oscilloscope.scope import TRIGGER_MODES, TRIGGER_SOURCES, Scope
 from instruments.drivers.oscilloscope.setup import SLOPES, Channel, Setup
 from instruments.drivers.scpi import Setting
 from instruments.errors import OutOfRange
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from instruments.drivers.oscilloscope.setup import Value
+    from instruments.drivers import Value
 
 
 #: Programming Guide, "scientific notation": six digits behind the point, two of exponent, a sign where it is negative.
@@ -42,6 +42,8 @@ class _RigolChannel(Channel):
 
     NUMBER: ClassVar[Form] = _NUMBER
 
+    display = Setting("DISP", bool)
+    inverted = Setting("INV", bool)
     #: The guide prints it with six digits; other firmware may print it short, which is not confirmed.
     probe_factor = Setting(
         *("PROB", float),
@@ -81,6 +83,10 @@ class RigolDS1000Z(Scope):
     #: `:SINGle` does that.
     PASSING: ClassVar[Mapping[str, str]] = {"sweep": "SING"}
 
+    time_mode = Setting(":TIM:MODE", str, choices=("MAIN", "WINDow", "XY", "ROLL"))
+    trigger_mode = Setting(":TRIG:MODE", str, choices=TRIGGER_MODES)
+    trigger_source = Setting(":TRIG:EDGE:SOUR", str, choices=TRIGGER_SOURCES)
+    trigger_level = Setting(":TRIG:EDGE:LEV", float, unit="V", low=-1e5, high=1e5)
     time_scale = Setting(":TIM:SCAL", float, unit="s", low=5e-9, high=50.0)
     time_offset = Setting(":TIM:OFFS", float, unit="s", low=-300.0, high=5000.0)
     memory_depth = _Depth(

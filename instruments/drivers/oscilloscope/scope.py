@@ -8,15 +8,17 @@ it hands a record out and before it says that the signal never triggered.
 from __future__ import annotations
 
 import contextlib
+import functools
 import re
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from instruments.drivers.oscilloscope import NeverTriggered, NothingAcquired, Preamble, Trace
-from instruments.drivers.oscilloscope.setup import Channel, Setup, is_still
+from instruments.drivers.oscilloscope.setup import Channel, Setup
 from instruments.drivers.scpi import ScpiInstrument, Setting
 from instruments.errors import InstrumentError, NoAnswer, OutOfRange, SettingsLost
+from instruments.ieee488 import PLAIN_BLOCK
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -24,18 +26,18 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from instruments.clock import Clock
-    from instruments.drivers.oscilloscope.setup import Value
-    from instruments.ieee488 import Form
+    from instruments.drivers import Value
+    from instruments.ieee488 import BlockForm, Form
     from instruments.links.transport import Transport
 
 #: Between two questions whether the record is complete [s].
 _POLL = 0.02
-#: What the scopes of both families can trigger on, and where: words of both guides' :TRIGger chapters.
-_TRIGGER_MODES = (
+#: What the scopes of Rigol and Keysight can trigger on, and where: words of both guides' :TRIGger chapters.
+TRIGGER_MODES = (
     *("EDGE", "GLITch", "PATTern", "TV", "DELay", "EBURst", "OR", "RUNT", "SHOLd", "TRANsition", "USB"),
     *("SBUS1", "SBUS2", "PULSe", "SLOPe", "VIDeo", "TIMeout", "WINDows", "NEDGe", "DURATion", "RS232", "IIC", "SPI"),
 )
-_TRIGGER_SOURCES = (
+TRIGGER_SOURCES = (
     *(f"CHANnel{n}" for n in range(1, 5)),
     *("EXTernal", "EXT5", "AC", "ACLine", "LINE", "WGEN", "WMOD", "NONE"),
     *(f"D{n}" for n in range(16)),
@@ -48,13 +50,18 @@ _BLOCK_PATIENCE = 10.0
 class Scope(ScpiInstrument):
     """What the drivers do in the same way; a subclass gives headers, time base, states and blocks.
 
-    CHANNEL: the class of its inputs; OFFSET_SIGN: of the voltage in the middle of the screen, in its offset; READY: how
-    it acquires while it is set up; SLOPES, SWEEPS: its words for them; CODES: of a clipped trace, and of no sample;
-    PASSING: settings that acquire() leaves in another state than they were prepared; PREAMBLE: the form of each of its
-    ten fields.
+    CHANNEL: the class of its inputs; SOURCE: how an input is called as the trigger's source; STOP: ends every
+    acquisition; MAIN, EDGE: the settings that choose the time base, and the trigger on edges; OFFSET_SIGN: of the
+    voltage in the middle of the screen, in its offset; READY: how it acquires while it is set up; SLOPES, SWEEPS: its
+    words for them; CODES: of a clipped trace, and of no sample; PASSING: settings that acquire() leaves in another
+    state than they were prepared; PREAMBLE: the form of each of its ten fields.
     """
 
     CHANNEL: ClassVar[type[Channel]]
+    SOURCE: ClassVar[str] = "CHAN{}"
+    STOP: ClassVar[str] = ":STOP"
+    MAIN: ClassVar[Mapping[str, Value]] = {"time_mode": "MAIN"}
+    EDGE: ClassVar[Mapping[str, Value]] = {"trigger_mode": "EDGE"}
     OFFSET_SIGN: ClassVar[float] = 1.0
     READY: ClassVar[str]
     SLOPES: ClassVar[Mapping[str, str]]
@@ -63,10 +70,8 @@ class Scope(ScpiInstrument):
     PASSING: ClassVar[Mapping[str, str]] = {}
     PREAMBLE: ClassVar[tuple[Form, ...]]
 
-    time_mode = Setting(":TIM:MODE", str, choices=("MAIN", "WINDow", "XY", "ROLL"))
-    trigger_mode = Setting(":TRIG:MODE", str, choices=_TRIGGER_MODES)
-    trigger_source = Setting(":TRIG:EDGE:SOUR", str, choices=_TRIGGER_SOURCES)
-    trigger_level = Setting(":TRIG:EDGE:LEV", float, unit="V", low=-1e5, high=1e5)
+    trigger_source: Setting[str]
+    trigger_level: Setting[float]
 
     def __init__(self, transport: Transport, *, clock: Clock | None = None) -> None:
         """Drive the scope.  clock: the one its trigger is waited for with; by default the wall's."""
@@ -74,7 +79,7 @@ class Scope(ScpiInstrument):
         self._acquired = False
         self._duration = 0.0
         self._setup: Setup | None = None
-        self._wanted: dict[ScpiInstrument, dict[str, Value]] = {}
+        self._prepared: tuple[ScpiInstrument, ...] = ()
 
     def identity(self) -> str:
         """The answer to ``*IDN?``; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
@@ -83,6 +88,20 @@ class Scope(ScpiInstrument):
         return answer
 
     _inputs: int | None = None
+
+    @functools.cached_property
+    def channel(self) -> dict[int, Channel]:
+        """Its inputs by number: ``scope.channel[1].scale``.  Asked for its identity, where it was not yet."""
+        if self._inputs is None:
+            self.identity()
+        return {n: self.CHANNEL(self, n) for n in range(1, (self._inputs or 4) + 1)}
+
+    def command(self, message: str) -> None:
+        """As every instrument; a reset takes the inputs' settings, too."""
+        super().command(message)
+        if message.upper().startswith("*RST") and self._inputs:
+            for channel in self.channel.values():
+                channel.set_to.clear()
 
     @staticmethod
     def _number_of_inputs(model: str) -> int:
@@ -93,9 +112,7 @@ class Scope(ScpiInstrument):
     def settings(self) -> dict[str, bool | float | str]:
         """Every declared setting, those of the prepared channels as ``channel1_…``."""
         channels = {
-            f"channel{n}_{name}": value
-            for n in self._channels
-            for name, value in self.CHANNEL(self, n).settings().items()
+            f"channel{n}_{name}": value for n in self._channels for name, value in self.channel[n].settings().items()
         }
         return super().settings() | channels
 
@@ -136,11 +153,17 @@ class Scope(ScpiInstrument):
         inputs = self._check_setup(setup)
         times = self._times(setup)
         self._setup = setup
-        self._wanted = {self.CHANNEL(self, n): self._scaling(setup) for n in setup.shown}
-        self._wanted[self] = {"time_mode": "MAIN"} | times | self._trigger(setup)
+        self._prepared = (*(self.channel[n] for n in setup.shown), self)
+        for part in self._prepared:
+            part.set_to.clear()
         self.forget_errors()
         self.command(self.READY)
-        self._set(inputs)
+        for n in range(1, inputs + 1):  # first, for the trigger's level depends on their scales
+            if n in setup.shown:
+                self._give(self.channel[n], self._scaling(setup))
+            else:
+                self.channel[n].display = False
+        self._give(self, {**self.MAIN} | times | self._trigger(setup))
         self._check_taken()
 
     def _check_setup(self, setup: Setup) -> int:
@@ -175,40 +198,34 @@ class Scope(ScpiInstrument):
 
     def _trigger(self, setup: Setup) -> dict[str, Value]:
         return {
-            "trigger_mode": "EDGE",
-            "trigger_source": f"CHAN{setup.trigger_source}",
+            **self.EDGE,
+            "trigger_source": self.SOURCE.format(setup.trigger_source),
             "trigger_slope": self.SLOPES[setup.trigger_slope],
             "trigger_level": setup.trigger_level_v,
             "sweep": self.SWEEPS[setup.sweep],
         }
 
-    def _set(self, inputs: int) -> None:
-        """Send what is wanted: the inputs first, for the trigger's level depends on their scales."""
-        wanted = {part.number: part for part in self._wanted if isinstance(part, Channel)}
-        for n in range(1, inputs + 1):
-            if n in wanted:
-                self._give(wanted[n])
-            else:
-                self.CHANNEL(self, n).display = False
-        self._give(self)
-
-    def _give(self, part: ScpiInstrument) -> None:
-        for name, value in self._wanted[part].items():
+    def _give(self, part: ScpiInstrument, wanted: Mapping[str, Value]) -> None:
+        for name, value in wanted.items():
             setattr(part, name, value)
 
     # --- comparing ---
 
     def lost(self) -> dict[str, tuple[object, object]]:
-        """Settings that are no longer as prepare() wanted them: name → (as prepared, now)."""
+        """Settings that are no longer as they were set: name → (as set, now).
+
+        Those of the prepared inputs as ``channel1_…``; what acquire() changes by itself is none of them.
+        """
         differing: dict[str, tuple[object, object]] = {}
-        for part, rows in self._wanted.items():
+        for part in self._prepared:
             head = f"channel{part.number}_" if isinstance(part, Channel) else ""
-            declared = {row.name: row for row in part.declared()}
-            for name, value in rows.items():
-                now = getattr(part, name)
-                if now != self.PASSING.get(name) and not is_still(self._setup, declared[name], value, now):
-                    differing[head + declared[name].full_name] = (value, now)
+            found = part.unlike()
+            differing |= {head + name: both for name, both in found.items() if both[1] != self.PASSING.get(name)}
         return differing
+
+    def rounding(self, row: Setting[Any]) -> float:
+        """A part of a division, and of the record."""
+        return self._setup.rounding(row.unit) if self._setup else 0.0
 
     def _check_taken(self) -> None:
         """Check that the scope has set what was sent to it.
@@ -251,7 +268,7 @@ class Scope(ScpiInstrument):
     def off(self) -> None:
         """Acquire no more; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
         self.forget_errors()
-        self.command(":STOP")
+        self.command(self.STOP)
 
     def acquire(self, *, timeout_s: float) -> None:
         """Take one record; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
@@ -337,15 +354,15 @@ class Scope(ScpiInstrument):
     def _pieces(self, preamble: Preamble) -> Iterator[NDArray[np.uint8]]:
         raise NotImplementedError
 
-    def _block(self, points: int) -> NDArray[np.uint8]:
+    def _block(self, points: int, question: str = ":WAV:DATA?", form: BlockForm = PLAIN_BLOCK) -> NDArray[np.uint8]:
         """The next block, which must hold so many codes.  Raises BadAnswer, CommandRefused."""
-        self.raise_errors(":WAV:DATA?")
+        self.raise_errors(question)
         try:
             with self.resynchronised():
-                block = self.transport.query_block(":WAV:DATA?", patience=_BLOCK_PATIENCE)
+                block = self.transport.query_block(question, patience=_BLOCK_PATIENCE, form=form)
         except NoAnswer:
-            self.raise_errors(":WAV:DATA?")  # the reason stands in the queue, if there is one
+            self.raise_errors(question)  # the reason stands in the queue, if there is one
             raise
         if len(block) != points:
-            self.reject(":WAV:DATA?", f"{len(block)} bytes", f"{points} bytes")
+            self.reject(question, f"{len(block)} bytes", f"{points} bytes")
         return np.frombuffer(block, dtype=np.uint8)

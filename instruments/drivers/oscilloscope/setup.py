@@ -1,19 +1,14 @@
-"""What an oscilloscope was asked for, its inputs' settings, and whether an answer is what was set."""
+"""What an oscilloscope was asked for, and its inputs' settings."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NoReturn, cast
+from typing import Any, ClassVar, NoReturn
 
 from instruments.drivers.scpi import ScpiInstrument, Setting
 
-if TYPE_CHECKING:
-    from instruments.links.transport import Transport
-
-    Value = bool | float | str
-
-#: Scopes round what they are given: by so much of a division, of the record, and of the number itself.
-_OF_A_DIVISION, _OF_THE_RECORD, _OF_ITSELF = 0.1, 0.01, 0.01
+#: Scopes round what they are given: by so much of a division and of the record, beside what all instruments do.
+_OF_A_DIVISION, _OF_THE_RECORD = 0.1, 0.01
 
 SLOPES = {"rising": "POS", "falling": "NEG"}
 
@@ -44,40 +39,37 @@ class Setup:
 
 
 class Channel(ScpiInstrument):
-    """The settings of one input: headers that begin with its name."""
+    """The settings of one input: headers that begin with its name.  number: of the input; scope: whose it is."""
 
-    display = Setting("DISP", bool)
-    inverted = Setting("INV", bool)
+    #: How its headers begin.
+    HEAD: ClassVar[str] = "CHAN{}:"
+
+    display: Setting[bool]
+    inverted: Setting[bool]
+
+    scope: ScpiInstrument
+    number: int
+    head: str
 
     def __init__(self, scope: ScpiInstrument, number: int) -> None:
-        super().__init__(scope.transport)
-        self.scope, self.number = scope, number
-        self.head = f"CHAN{number}:"
-        # only its question is used here: commands go through the scope, which reads its error queue
-        self.transport = cast("Transport", _Headed(scope.transport, self.head))
+        super().__init__(scope.transport, clock=scope.clock)
+        self.scope, self.number, self.head = scope, number, self.HEAD.format(number)
+
+    def header_in_use(self, header: str) -> str:
+        """With the name of the input."""
+        return self.head + header
 
     def command(self, message: str) -> None:
-        """Send a command of this input."""
-        self.scope.command(self.head + message)
+        """Send a command of this input; the scope reads its error queue."""
+        self.scope.command(message)
 
     def reject(self, question: str, answer: str, expected: str) -> NoReturn:
-        """As every instrument; the question is named whole."""
-        self.scope.reject(self.head + question, answer, expected)
+        """As the scope does."""
+        self.scope.reject(question, answer, expected)
 
+    def rounding(self, row: Setting[Any]) -> float:
+        """As the scope does."""
+        return self.scope.rounding(row)
 
-class _Headed:
-    """A transport for questions that begin with the same header."""
-
-    def __init__(self, transport: Transport, head: str) -> None:
-        self.address, self._transport, self._head = transport.address, transport, head
-
-    def query(self, message: str, *, patience: float = 0.0) -> str:
-        return self._transport.query(self._head + message, patience=patience)
-
-
-def is_still(setup: Setup | None, setting: Setting[Any], wanted: Value, now: Value) -> bool:
-    """Whether an answer is what was set, rounding aside."""
-    if setting.kind is float:
-        rounding = setup.rounding(setting.unit) if setup else 0.0
-        return abs(float(now) - float(wanted)) <= rounding + _OF_ITSELF * abs(float(wanted))
-    return not setting.differs(wanted, now)
+    def __repr__(self) -> str:
+        return f"<input {self.number} of {self.scope!r}>"

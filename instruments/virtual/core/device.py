@@ -5,17 +5,18 @@ An answer may take long to be worked out, so an instrument works on a message in
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
-from instruments.virtual.core.parameters import at_most_one, boolean, choice, limit, none, nr3, number, one
+from instruments.virtual.core.parameters import at_most_one, boolean, choice, limit, none, nr3, number, one, one_of
 from instruments.virtual.core.parser import Command, Parser
 from instruments.virtual.core.status import OPERATION_COMPLETE, Status
 from instruments.virtual.core.steps import at_once
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from instruments.clock import Clock
+    from instruments.virtual.core.rows import Row
     from instruments.virtual.core.steps import Steps, Work
 
 Value = float | str | bool
@@ -38,17 +39,24 @@ class VirtualInstrument:
 
     A subclass gives its identity and extends `table()` and, where it reacts to settings, `changed()`.
 
-    clock: of the bench; pace: time for one message [s].
+    clock: of the bench; identity: the answer to ``*IDN?`` of another model of the family; pace: time for one
+    message [s].
     """
 
     identity = "levilab,virtual,0,0"
     #: What ``SYST:ERR?`` answers when there is nothing to tell, how many entries it keeps, and what ends an answer.
     no_error, queue_size, line_end = '+0,"No error"', 20, "\n"
-    #: Whether it knows blocks (IEEE 488.2, 7.7.6).
-    takes_blocks = True
+    #: Whether it knows blocks (IEEE 488.2, 7.7.6), and path memory (SCPI-1999, volume 1, 6.2.4).
+    takes_blocks = path_memory = True
+    #: Its commands beyond the common ones, and those of each channel.
+    ROWS: ClassVar[tuple[Row, ...]] = ()
+    CHANNEL_ROWS: ClassVar[tuple[Row, ...]] = ()
+    #: The numbers of the channels that CHANNEL_ROWS are for.
+    numbered: Sequence[int] = ()
 
-    def __init__(self, clock: Clock, *, pace: float = 2e-3) -> None:
+    def __init__(self, clock: Clock, *, identity: str | None = None, pace: float = 2e-3) -> None:
         self.clock, self.pace = clock, pace
+        self.identity = identity or self.identity
         self.settings: dict[str, Value] = {}
         self._defaults: dict[str, Value] = {}
         self.status = Status()
@@ -56,7 +64,12 @@ class VirtualInstrument:
         self._ready = 0.0
         #: On the message that came last, if it is worked on in slices: it may not be done yet.
         self.work: Work[None] | None = None
-        self.parser = Parser(queue_size=self.queue_size, no_error=self.no_error, noted=self.status.note_error)
+        self.parser = Parser(
+            queue_size=self.queue_size,
+            no_error=self.no_error,
+            noted=self.status.note_error,
+            path_memory=self.path_memory,
+        )
         self.parser.commands = (*self._common(), *self.table())
         self.settings |= self._defaults
 
@@ -103,7 +116,24 @@ class VirtualInstrument:
 
     def table(self) -> tuple[Command, ...]:
         """The commands beyond the common ones."""
-        return ()
+        of_channels = (row.of_channel(n).bind(self) for n in self.numbered for row in self.CHANNEL_ROWS)
+        return (*of_channels, *(row.bind(self) for row in self.ROWS))
+
+    def declare(self, name: str, header: str, default: Value) -> None:
+        """There is this setting, with this value after ``*RST``."""
+        self._defaults[name] = default
+
+    def spell(self, value: float) -> str:
+        """A number as this instrument prints it."""
+        return nr3(value)
+
+    def reply(self, header: str, text: str, unit: str = "") -> str:
+        """What is answered to the question of a row: the text alone."""
+        return text
+
+    def adjusted(self, name: str, before: float) -> None:
+        """A number has changed from what it was before."""
+        self.changed(name)
 
     def changed(self, name: str) -> None:
         """Called after a setting has changed."""
@@ -119,7 +149,7 @@ class VirtualInstrument:
         return (
             Command("*IDN", get=answers(lambda: self.identity)),
             Command("*RST", set=does(self.reset)),
-            Command("*CLS", set=does(self._clear_status)),
+            Command("*CLS", set=does(self.clear_status)),
             Command("*OPC", set=does(self._note_completion), get=answers(lambda: "1")),
             Command("*WAI", set=none),
             Command("*TRG", set=does(self.trigger)),
@@ -137,7 +167,8 @@ class VirtualInstrument:
         """The status byte (IEEE 488.2, 11.2)."""
         return self.status.byte(errors_waiting=bool(self.parser.errors), message_available=message_available)
 
-    def _clear_status(self) -> None:
+    def clear_status(self) -> None:
+        """``*CLS``: no errors, no events."""
         self.parser.errors.clear()
         self.status.events = 0
 
@@ -150,12 +181,25 @@ class VirtualInstrument:
 
         return Command(pattern, set_, answers(lambda: f"{getattr(self.status, name):+d}"))
 
-    def numeric(self, pattern: str, name: str, *, low: float, high: float, default: float, unit: str = "") -> Command:
-        """A row for a number that can be set and asked for, ``MIN``, ``MAX`` and ``DEF`` included."""
+    def numeric(
+        self,
+        pattern: str,
+        name: str,
+        *,
+        low: float,
+        high: float,
+        default: float,
+        unit: str = "",
+        values: tuple[float, ...] = (),
+    ) -> Command:
+        """A row for a number that can be set and asked for, ``MIN``, ``MAX`` and ``DEF`` included.
+
+        values: the only ones that there are.
+        """
         self._defaults[name] = default
 
         def read(text: str) -> float:
-            return number(text, low=low, high=high, default=default, unit=unit)
+            return one_of(number(text, low=low, high=high, default=default, unit=unit), values)
 
         def ask(parameters: list[str]) -> str:
             asked = at_most_one(parameters)

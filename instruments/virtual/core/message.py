@@ -23,9 +23,10 @@ _SPECIAL = re.compile(r"[\"'();,]|(?<![^\x00-\x20,])#[1-9]")
 _AT_A_STRETCH = 1000
 
 
-def read_units(message: str) -> Iterator[tuple[str, list[str]] | None]:
+def read_units(message: str, *, path_memory: bool = True) -> Iterator[tuple[str, list[str]] | None]:
     """The units of a compound message: the full header of each, and its parameters.
 
+    path_memory: whether a header goes on from the one before it, as SCPI has it, or stands for itself.
     Yields None where the work may be interrupted: between units, and now and then in one of many signs.
 
     >>> list(read_units("SOUR:FREQ 40;*OPC?;VOLT 1,2"))
@@ -38,7 +39,7 @@ def read_units(message: str) -> Iterator[tuple[str, list[str]] | None]:
         if not unit:
             continue
         first = False
-        header, rest, path = read_unit(unit, path)
+        header, rest, path = read_unit(unit, path if path_memory else "")
         parameters: list[str] = []
         for parameter in split_parameters(rest):
             if parameter is None:

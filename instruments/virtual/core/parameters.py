@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+from instruments.ieee488 import BrokenBlock, block, block_of
 from instruments.virtual.core.parser import ScpiError
 
 _MULTIPLIERS = {"": 1.0, "N": 1e-9, "U": 1e-6, "M": 1e-3, "K": 1e3, "MA": 1e6, "G": 1e9}
@@ -69,6 +70,34 @@ def number(text: str, *, low: float, high: float, default: float, unit: str = ""
     if not low <= value <= high:
         raise ScpiError(-222)
     return value
+
+
+def one_of(value: float, values: tuple[float, ...]) -> float:
+    """A number of an input that has these values and no other, any where there are none.  Raises ScpiError.
+
+    >>> one_of(50.0, (50.0, 1e6))
+    50.0
+    """
+    if values and value not in values:
+        raise ScpiError(-224, f"{value:g}")
+    return value
+
+
+def block_text(data: bytes, digits: int = 0) -> str:
+    """A definite-length block as an answer has it, a character for each byte; see `instruments.ieee488.block`."""
+    return block(data, digits).decode("latin-1")
+
+
+def block_content(text: str, error: int = -104) -> bytes:
+    """The bytes of a block that was sent as a parameter.  error: what is reported for anything else, raises ScpiError.
+
+    >>> block_content("#13abc")
+    b'abc'
+    """
+    try:
+        return block_of(text.encode("latin-1") + b"\n")
+    except BrokenBlock:
+        raise ScpiError(error) from None
 
 
 def _value(match: re.Match[str]) -> float:

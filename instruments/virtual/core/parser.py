@@ -103,13 +103,14 @@ class Parser:
     """Takes messages apart and runs them on a table of commands.
 
     commands: the table; queue_size: entries of the error queue before it overflows; no_error: what an empty one
-    answers; noted: called with the number of each error.
+    answers; noted: called with the number of each error; path_memory: see `message`.
     """
 
     commands: tuple[Command, ...] = ()
     queue_size: int = 20
     no_error: str = '+0,"No error"'
     noted: Callable[[int], None] = lambda _: None
+    path_memory: bool = True
     errors: deque[str] = field(default_factory=deque)
     _known: dict[str, Command] = field(default_factory=dict)
 
@@ -121,7 +122,7 @@ class Parser:
         """Do what run() does, in steps: a message may be interrupted after each of its units."""
         answers: list[str] = []
         length = 0
-        for unit in read_units(message):
+        for unit in read_units(message, path_memory=self.path_memory):
             if unit is None:
                 yield
                 continue

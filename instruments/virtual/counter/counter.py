@@ -63,7 +63,7 @@ class VirtualCounter(VirtualInstrument):
     #: What CONFigure, MEASure and FUNCtion know, by the short name that they answer.
     functions: ClassVar[dict[str, Function]]
 
-    def __init__(self, clock: Clock, *, signal: Signal, second: Signal = darkness) -> None:
+    def __init__(self, clock: Clock, *, signal: Signal, second: Signal = darkness, identity: str | None = None) -> None:
         self._signals = {1: signal, 2: second}
         self._run: Run | None = None
         self._memory = Memory()
@@ -71,7 +71,7 @@ class VirtualCounter(VirtualInstrument):
         self._channels: tuple[int, ...] = (1,)
         self._counted_from = 0
         self._completion_awaited = False
-        super().__init__(clock)
+        super().__init__(clock, identity=identity)
 
     # --- what goes on while nobody asks ---
 

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from instruments.virtual.core.trigger import fires
+
 Array = NDArray[np.float64]
 
 #: The voltage at an input: (start [s], step [s], n) → shape (n,) [V].  One may have a method `crossings` beside, which
@@ -26,35 +28,6 @@ RATE = 20_000.0
 _SHORTEST, _LONGEST = 1 << 10, 1 << 17
 #: What the mean is taken over that a.c. coupling removes, and how long a level that was found is good for [s].
 _SETTLING, _LEVEL_AGE = 1.0, 1.0
-
-
-def crossings(voltage: Array, level: float, hysteresis: float) -> Array:
-    """Where a sampled voltage rises through a level, in samples, interpolated.
-
-    A crossing counts when the voltage was below level − hysteresis since the last one (a Schmitt trigger).
-
-    >>> crossings(np.array([0.0, 1.0, 0.0, 4.0]), 0.5, 0.1)
-    array([0.5  , 2.125])
-    """
-    return _fires(voltage, level, level - hysteresis, armed=False)[0]
-
-
-def _fires(voltage: Array, level: float, below: float, *, armed: bool) -> tuple[Array, bool]:
-    """Where the trigger fires [samples], and whether it is armed at the end."""
-    above = voltage >= level
-    # +1 where the trigger fires, -1 where it is armed again, 0 where it keeps its state
-    state = above.view(np.int8) - (voltage < below).view(np.int8)
-    decided = np.flatnonzero(state)
-    if not decided.size:
-        return np.empty(0), armed
-    signs = state[decided]
-    turns = decided[1:][np.diff(signs) > 0]
-    if armed and signs[0] > 0:
-        turns = np.concatenate((decided[:1], turns))
-    before, after = voltage[np.maximum(turns - 1, 0)], voltage[turns]
-    # the very first sample can only fire if the level has moved since it was armed
-    rise = np.where(after > before, after - before, 1.0)
-    return np.maximum(turns - 1 + np.clip((level - before) / rise, 0.0, 1.0), 0.0), bool(signs[-1] < 0)
 
 
 @dataclass(frozen=True)
@@ -188,7 +161,7 @@ class EdgeFinder:
         voltage = self._signal(self._start + self._samples / RATE, 1 / RATE, count)
         joined = self._triggers.sign * np.concatenate((self._last, voltage))
         sign = self._triggers.sign
-        places, self._armed = _fires(joined, sign * self._triggers.fire, sign * self._triggers.arm, armed=self._armed)
+        places, self._armed = fires(joined, sign * self._triggers.fire, sign * self._triggers.arm, armed=self._armed)
         times = self._start + (self._samples - self._last.size + places) / RATE
         self._last = voltage[-1:]
         return times

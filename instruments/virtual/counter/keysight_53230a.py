@@ -10,12 +10,12 @@ import numpy as np
 
 from instruments.ieee488 import INFINITY, NOT_A_NUMBER
 from instruments.virtual.core.device import answers, does
-from instruments.virtual.core.parameters import at_most_one, choice, limit, none, nr3, number, one
+from instruments.virtual.core.parameters import at_most_one, block_text, choice, limit, none, nr3, number, one
 from instruments.virtual.core.parser import Command, ScpiError
 from instruments.virtual.counter.counter import DARK, Function, VirtualCounter, darkness
 from instruments.virtual.counter.edges import Input
 from instruments.virtual.counter.measurements import Looks, Measurement, Span
-from instruments.virtual.counter.parameters import block, channels_of, without_channels
+from instruments.virtual.counter.parameters import channels_of, without_channels
 from instruments.virtual.counter.run import Run
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ _HYSTERESIS = 0.04
 class Virtual53230A(VirtualCounter):
     """A reciprocal counter: whole periods between the first edge and the first one after the gate, over their time.
 
-    signal, second: the voltages at the inputs 1 and 2.
+    signal, second: the voltages at the inputs 1 and 2; resolution: of a gate of 1 s, relative.
 
     Sources: Keysight 53220A/53230A Programmer's Reference and User's Guide.  The guide gives readings a three-digit
     exponent; here it has two, as for every other instrument on this bench.  The time-out is 1 s in the guide and off
@@ -55,8 +55,17 @@ class Virtual53230A(VirtualCounter):
         "TOT": Function("TOTalize:TIMed"),
     }
 
-    def __init__(self, clock: Clock, *, signal: Signal, second: Signal = darkness) -> None:
-        super().__init__(clock, signal=signal, second=second)
+    def __init__(
+        self,
+        clock: Clock,
+        *,
+        signal: Signal,
+        second: Signal = darkness,
+        identity: str | None = None,
+        resolution: float = _RESOLUTION,
+    ) -> None:
+        self._resolution = resolution
+        super().__init__(clock, signal=signal, second=second, identity=identity)
         self.settings["timeout"] = 1.0
 
     def table(self) -> tuple[Command, ...]:
@@ -121,8 +130,7 @@ class Virtual53230A(VirtualCounter):
         self.settings |= {f"automatic{channel}": True for channel in self._channels}
         self.settings |= {f"relative{channel}": 50.0 for channel in self._channels}
 
-    @staticmethod
-    def _gate_for(name: str, plain: list[str]) -> float:
+    def _gate_for(self, name: str, plain: list[str]) -> float:
         """The gate that resolves this [s].  Raises ScpiError."""
         expected, resolution = (
             math.nan
@@ -134,7 +142,7 @@ class Virtual53230A(VirtualCounter):
             return 0.1 if math.isnan(expected) else min(max(expected, 1e-6), 1e3)
         if math.isnan(expected) or math.isnan(resolution) or not resolution:
             return 0.1
-        return min(max(_RESOLUTION * expected / resolution, 1e-4), 1e3)
+        return min(max(self._resolution * expected / resolution, 1e-4), 1e3)
 
     def _configuration(self) -> str:
         where = ",".join(f"(@{channel})" for channel in self._channels)
@@ -206,9 +214,11 @@ class Virtual53230A(VirtualCounter):
         level = f"{head}LEVel[1]"
         return (
             self.word(head + "COUPling", "coupling" + name, ("AC", "DC"), "AC"),
-            self.numeric(head + "IMPedance", "impedance" + name, low=50, high=1e6, default=1e6, unit="OHM"),
-            self.numeric(head + "PROBe", "probe_factor" + name, low=1, high=10, default=1),
-            self.numeric(head + "RANGe", "range" + name, low=5, high=50, default=5, unit="V"),
+            self.numeric(
+                head + "IMPedance", "impedance" + name, low=50, high=1e6, default=1e6, unit="OHM", values=(50, 1e6)
+            ),
+            self.numeric(head + "PROBe", "probe_factor" + name, low=1, high=10, default=1, values=(1, 10)),
+            self.numeric(head + "RANGe", "range" + name, low=5, high=50, default=5, unit="V", values=(5, 50)),
             self.word(head + "SLOPe[1]", "slope" + name, ("POSitive", "NEGative"), "POS"),
             self.toggle(head + "NREJect", "noise_rejection" + name),
             self.toggle(head + "FILTer[:LPASs][:STATe]", "filter" + name),
@@ -368,7 +378,7 @@ class Virtual53230A(VirtualCounter):
         self._memory.fetched += count
         values, _ = self._memory.part(start, start + count)
         if as_block and self.settings["format"] == "ASC":
-            return block(",".join(map(nr3, values)).encode())
+            return block_text(",".join(map(nr3, values)).encode())
         return self._spell(values)
 
     def _last(self) -> str:
@@ -382,7 +392,7 @@ class Virtual53230A(VirtualCounter):
         if self.settings["format"] == "ASC":
             return ",".join(map(nr3, values))
         data = values.astype("<f8" if self.settings["byte_order"] == "SWAP" else ">f8").tobytes()
-        return head + data.decode("latin-1") if head else block(data)
+        return head + data.decode("latin-1") if head else block_text(data)
 
     def _set_format(self, parameters: list[str]) -> None:
         words = without_channels(parameters)

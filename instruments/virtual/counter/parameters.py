@@ -1,4 +1,4 @@
-"""What the commands of the virtual counters are given and answer: channel lists, numbers in brackets, blocks."""
+"""What the commands of the virtual counters are given and answer: channel lists, numbers in brackets."""
 
 from __future__ import annotations
 
@@ -47,13 +47,3 @@ def truth(text: str) -> bool:
         return round(float(text)) != 0
     except (ValueError, OverflowError):
         raise ScpiError(-224, text[:20]) from None
-
-
-def block(data: bytes) -> str:
-    """A definite-length block (IEEE 488.2, 8.7.9), a character for each byte.
-
-    >>> block(b"abc"), block(b"")
-    ('#13abc', '#10')
-    """
-    size = str(len(data))
-    return f"#{len(size)}{size}" + data.decode("latin-1")

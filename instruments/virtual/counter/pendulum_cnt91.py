@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, ClassVar
 
 from instruments.ieee488 import INFINITY, NOT_A_NUMBER
 from instruments.virtual.core.device import answers, does
-from instruments.virtual.core.parameters import at_most_one, choice, limit, none, number, one
+from instruments.virtual.core.parameters import at_most_one, block_text, choice, limit, none, number, one
 from instruments.virtual.core.parser import Command, ScpiError
+from instruments.virtual.core.rows import Number
 from instruments.virtual.counter.counter import DARK, Function, VirtualCounter, darkness
 from instruments.virtual.counter.edges import Input
 from instruments.virtual.counter.measurements import Looks, Measurement, Span, Wish, first_edge
-from instruments.virtual.counter.parameters import block, channels_of, without_channels
+from instruments.virtual.counter.parameters import channels_of, without_channels
 from instruments.virtual.counter.run import Run
 
 if TYPE_CHECKING:
@@ -47,6 +48,14 @@ def number_text(value: float) -> str:
     ('+2.0000000000000E-08', '+9.9100000000000E+37')
     """
     return f"{value:+.13E}"
+
+
+def _input_values(head: str, name: str) -> tuple[Number, ...]:
+    """The rows of an input that has some values and no other."""
+    return (
+        Number(head + "IMPedance", "impedance" + name, 1e6, (50, 1e6), "OHM", spell=number_text, values=(50, 1e6)),
+        Number(head + "ATTenuation", "attenuation" + name, 1.0, (1, 10), spell="{:+.0f}".format, values=(1, 10)),
+    )
 
 
 @dataclass
@@ -91,9 +100,17 @@ class VirtualCNT91(VirtualCounter):
         "NDUT": Function("NDUTycycle"),
     }
 
-    def __init__(self, clock: Clock, *, signal: Signal, second: Signal = darkness, native: bool = False) -> None:
+    def __init__(
+        self,
+        clock: Clock,
+        *,
+        signal: Signal,
+        second: Signal = darkness,
+        identity: str | None = None,
+        native: bool = False,
+    ) -> None:
         self._native = native
-        super().__init__(clock, signal=signal, second=second)
+        super().__init__(clock, signal=signal, second=second, identity=identity)
 
     def table(self) -> tuple[Command, ...]:
         """Its commands; sources: see the class."""
@@ -234,8 +251,7 @@ class VirtualCNT91(VirtualCounter):
         head, name = f"INPut{suffix}:", str(channel)
         return (
             self.word(head + "COUPling", "coupling" + name, ("AC", "DC"), "AC"),
-            self._number(head + "IMPedance", "impedance" + name, low=50, high=1e6, default=1e6, unit="OHM"),
-            self.integer(head + "ATTenuation", "attenuation" + name, low=1, high=10, default=1),
+            *(row.bind(self) for row in _input_values(head, name)),
             self.toggle(head + "FILTer[:LPASs][:STATe]", "filter" + name),
             self.toggle(head + "FILTer:DIGital", "digital_filter" + name),
             self._number(head + "FILTer:DIGital:FREQuency", "cutoff" + name, low=1, high=5e7, default=1e5, unit="HZ"),
@@ -471,13 +487,13 @@ class VirtualCNT91(VirtualCounter):
         missing = math.nan if self._native else NOT_A_NUMBER
         if kind == "REAL":
             reals = (missing if value == NOT_A_NUMBER else value for value in numbers)
-            return ",".join(block(struct.pack(order + "d", value)) for value in reals)
+            return ",".join(block_text(struct.pack(order + "d", value)) for value in reals)
         data = b"".join(
             struct.pack(order + "d", missing if value == NOT_A_NUMBER else value)
             + (struct.pack(order + "q", round(stamp * 1e12)) if stamped else b"")
             for value, stamp in pairs
         )
-        return block(data) if size_known else f"#6{len(data):06d}" + data.decode("latin-1")
+        return block_text(data) if size_known else f"#6{len(data):06d}" + data.decode("latin-1")
 
     def _missing(self, value: float) -> str:
         return "" if self._native and value == NOT_A_NUMBER else number_text(value)

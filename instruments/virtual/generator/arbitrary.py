@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from instruments.virtual.core.parameters import block_content
 from instruments.virtual.core.parser import ScpiError
 
 if TYPE_CHECKING:
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 #: Samples of a built-in waveform: 40 kSa/s after *RST make 160 Hz of it.
 _BUILT_IN_POINTS = 250
 _NAME = re.compile(r"[A-Z0-9_.\-:\\/]{1,255}")
-_DIGITS = frozenset("123456789")
 
 
 class Refused(ScpiError):
@@ -94,12 +94,7 @@ def samples(data: Sequence[str], *, full_scale: float, block: str, least: int, m
 
 
 def _from_block(text: str, kind: str) -> Samples:
-    digits = int(text[1]) if text[1:2] in _DIGITS else 0
-    length = text[2 : 2 + digits]
-    data = text[2 + digits :].encode("latin-1")
-    # ² is a digit to Python, but no number
-    if not length.isascii() or not length.isdigit() or int(length) != len(data):
-        raise ScpiError(-102)
+    data = block_content(text, -102)
     if len(data) % np.dtype(kind).itemsize:
         raise Refused(800, "Block length must be even")
     return np.frombuffer(data, dtype=kind).astype(np.float64)

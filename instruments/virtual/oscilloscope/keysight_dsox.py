@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from instruments.virtual.core.device import answers, does
-from instruments.virtual.core.parameters import choice, number, one
+from instruments.virtual.core.parameters import block_content, choice, number, one
 from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.oscilloscope.scope import VirtualOscilloscope, block_content
+from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope
 from instruments.virtual.oscilloscope.screenshot import bmp8, bmp24, draw, grey, png
 
 if TYPE_CHECKING:
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from instruments.clock import Clock
     from instruments.virtual.oscilloscope.record import Record, Signal
 
-#: Points of the memory; the fastest rate [1/s].
-_MEMORY, _FASTEST = 1_000_000, 2e9
+#: The fastest rate [1/s].
+_FASTEST = 2e9
 _CODES_ON_SCREEN = 199
 #: Bits of the operation status register.
 _RUN, _WAIT_TRIGGER, _OVERLOAD = 8, 32, 2048
@@ -72,7 +72,7 @@ _EMPTY_SOURCES = ("FUNCtion", "MATH", "FFT", "WMEMory1", "WMEMory2", "EXTernal",
 
 
 class VirtualDSOX1000(VirtualOscilloscope):
-    """A DSOX1102G: two channels, a million points, 100 MHz."""
+    """A DSOX1102G: two channels, a million points, 100 MHz.  memory: points of another model's."""
 
     identity = "KEYSIGHT TECHNOLOGIES,DSO-X 1102G,VIRTUAL,01.20.2019061038"
     queue_size = 30
@@ -80,8 +80,15 @@ class VirtualDSOX1000(VirtualOscilloscope):
     transfer = 5e6
 
     def __init__(
-        self, clock: Clock, *, signals: Mapping[int, Signal], channels: int = 2, identity: str | None = None
+        self,
+        clock: Clock,
+        *,
+        signals: Mapping[int, Signal],
+        channels: int = 2,
+        memory: int = 1_000_000,
+        identity: str | None = None,
     ) -> None:
+        self._memory = memory
         super().__init__(clock, signals=signals, channels=channels, identity=identity)
 
     def spell(self, value: float) -> str:
@@ -114,7 +121,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
             Command("RSTate", get=answers(self._state)),
             Command("*LRN", get=answers(lambda: ":SYST:SET " + self.block(self.setup()))),
             Command("*OPT", get=answers(lambda: "0")),
-            *self.presets(),
+            *(row.bind(self) for row in PRESETS),
         )
 
     def _digitize(self, parameters: list[str]) -> None:
@@ -286,7 +293,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
     def full_scale(self) -> tuple[float, int]:
         """The record fills the screen and nothing else."""
         length = 10 * self.value("time_scale")
-        rate = min(_FASTEST / (1 if len(self.shown()) <= 1 else 2), _MEMORY / length)
+        rate = min(_FASTEST / (1 if len(self.shown()) <= 1 else 2), self._memory / length)
         return rate, max(2, round(rate * length))
 
     def screen(self) -> tuple[float, float]:
@@ -433,7 +440,11 @@ class VirtualDSOX1000(VirtualOscilloscope):
             self.switch("HARDcopy:INKSaver", "ink_saver", default=True),
             self.switch("DISPlay:LABel", "labels"),
             self.word("MEASure:STATistics", "statistics", ("ON", "CURRent", "MEAN"), "ON"),
-            Command("SYSTem:SETup", set=lambda p: self.restore(block_content(one(p))), get=answers(self._setup)),
+            Command(
+                "SYSTem:SETup",
+                set=lambda p: self.restore(block_content(one(p)).decode("latin-1")),
+                get=answers(self._setup),
+            ),
             Command("SYSTem:PRESet", set=does(self.reset)),
         )
 

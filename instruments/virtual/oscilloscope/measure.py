@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from instruments.virtual.core.trigger import crossings
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -48,7 +50,7 @@ class Measured:
         amplitude = self.top - self.base
         sign = 1.0 if rising else -1.0
         level = sign * (self.base + part * amplitude)
-        return edges(sign * self.volts, level, _HYSTERESIS * amplitude) if amplitude > 0 else np.empty(0)
+        return crossings(sign * self.volts, level, _HYSTERESIS * amplitude) if amplitude > 0 else np.empty(0)
 
     @cached_property
     def rises(self) -> Volts:
@@ -114,19 +116,6 @@ def _level(volts: Volts, *, upper: bool) -> float:
     if counts[most] < _FLAT * volts.size:
         return high if upper else low
     return float(np.median(half[(half >= places[most]) & (half <= places[most + 1])]))
-
-
-def edges(volts: Volts, level: float, hysteresis: float) -> Volts:
-    """Where a sampled voltage rises through a level, in samples, interpolated (a Schmitt trigger).
-
-    >>> edges(np.array([0.0, 1.0, 0.0, 4.0]), 0.5, 0.1)
-    array([0.5  , 2.125])
-    """
-    state = np.where(volts >= level, 1, np.where(volts < level - hysteresis, -1, 0))
-    decided = np.flatnonzero(state)
-    turns = decided[1:][np.diff(state[decided]) > 0]
-    before, after = volts[turns - 1], volts[turns]
-    return np.asarray(turns - 1 + (level - before) / (after - before), dtype=np.float64)
 
 
 def _mean_gap(starts: Volts, ends: Volts) -> float:

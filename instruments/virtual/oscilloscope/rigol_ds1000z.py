@@ -9,17 +9,15 @@ numbers within the limits that the guide of a sister series gives, with 12 divis
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
-from instruments.virtual.core.device import answers, does
-from instruments.virtual.core.parameters import boolean, choice, number, one
-from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.oscilloscope.scope import VirtualOscilloscope, block_content, one_two_five
+from instruments.virtual.core.parameters import at_most_one, block_content, boolean, choice, limit, number, one
+from instruments.virtual.core.parser import ScpiError
+from instruments.virtual.core.rows import Ask, Both, Do, Number, Row, Switch, Word, whole
+from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope, one_two_five
 from instruments.virtual.oscilloscope.screenshot import bmp8, bmp24, draw, grey, png
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from instruments.virtual.oscilloscope.record import Codes, Record
 
 #: Points of the record for one channel shown; half of it for two, a quarter for more.
@@ -27,7 +25,6 @@ _DEPTHS = (12_000, 120_000, 1_200_000, 12_000_000, 24_000_000)
 _FASTEST = 1e9
 _CODES_PER_DIVISION = 25
 
-_SUPPLIES = ("EXT", "EXT5", "ACLine")
 #: The code in the middle of the screen, and how many points a trace on the screen has.
 _MIDDLE, _ON_SCREEN = 127, 1200
 #: Points that one block may have, by format.
@@ -72,7 +69,131 @@ _ITEMS = {
 }
 _WORDS = tuple(_ITEMS)
 _STATISTICS = ("MAXimum", "MINimum", "CURRent", "AVERages", "DEViation")
-_PERSISTENCES = ("MIN", "0.1", "0.2", "0.5", "1", "5", "10", "INF")
+
+
+def _probe(scope: VirtualDS1000Z, n: int) -> float:
+    return scope.value(f"chan{n}_probe")
+
+
+def _scales(scope: VirtualDS1000Z, n: int) -> tuple[float, float]:
+    return 1e-3 * _probe(scope, n), 10 * _probe(scope, n)
+
+
+def _ranges(scope: VirtualDS1000Z, n: int) -> tuple[float, float]:
+    return 8e-3 * _probe(scope, n), 80 * _probe(scope, n)
+
+
+def _offsets(scope: VirtualDS1000Z, n: int) -> tuple[float, float]:
+    reach = (100.0 if scope.value(f"chan{n}_scale") / _probe(scope, n) >= 0.5 else 2.0) * _probe(scope, n)
+    return -reach, reach
+
+
+def _times(scope: VirtualDS1000Z) -> tuple[float, float]:
+    return -6 * scope.value("time_scale"), max(1.0, 100 * scope.value("time_scale"))
+
+
+def _levels(scope: VirtualDS1000Z) -> tuple[float, float]:
+    channel = scope.source_channel() or 1
+    reach, offset = 5 * scope.division(channel), scope.value(f"chan{channel}_offset")
+    return -reach - offset, reach - offset
+
+
+def _names(scope: VirtualDS1000Z) -> str:
+    return " ".join(f"CHANnel{n}" for n in scope.channels)
+
+
+_CHANNEL: tuple[Row, ...] = (
+    Number("CHANnel{n}:PROBe", "chan{n}_probe", 10.0, (0.01, 1000.0), rounded=one_two_five),
+    Number("CHANnel{n}:SCALe", "chan{n}_scale", 1.0, _scales, "V"),
+    Number("CHANnel{n}:OFFSet", "chan{n}_offset", 0.0, _offsets, "V"),
+    Number("CHANnel{n}:RANGe", "chan{n}_scale", 1.0, _ranges, "V", factor=8, alias=True),
+    Number("CHANnel{n}:TCAL", "chan{n}_delay", 0.0, (-1e-7, 1e-7), "S"),
+    Word("CHANnel{n}:COUPling", "chan{n}_coupling", "AC *DC GND"),
+    Word("CHANnel{n}:BWLimit", "chan{n}_bandwidth", "20M *OFF"),
+    Word("CHANnel{n}:UNITs", "chan{n}_unit", "VOLTage WATT AMPere UNKNown"),
+    Switch("CHANnel{n}:DISPlay", "chan{n}_display", lambda n: n == 1),
+    Switch("CHANnel{n}:INVert", "chan{n}_invert"),
+    Switch("CHANnel{n}:VERNier", "chan{n}_vernier"),
+)
+_CONTROL: tuple[Row, ...] = (
+    Do("RUN", lambda s: s.run()),
+    Do("STOP", lambda s: s.stop()),
+    Do("SINGle", lambda s: s.take_one()),
+    Do("TFORce", lambda s: s.force()),
+    Do("AUToscale", lambda s: s.autoscale()),
+    Do("CLEar", lambda s: s.clear_screen()),
+    Do("DISPlay:CLEar", lambda s: s.clear_screen()),
+    Do("CLS", lambda s: s.clear_status()),
+    Do("CALibrate:STARt"),
+    Do("CALibrate:QUIT"),
+    *PRESETS,
+)
+_TIME: tuple[Row, ...] = (
+    Number("TIMebase[:MAIN]:SCALe", "time_scale", 1e-6, (5e-9, 50.0), "S", rounded=one_two_five),
+    Number("TIMebase[:MAIN]:OFFSet", "time_offset", 0.0, _times, "S"),
+    Word("TIMebase:MODE", "time_mode", "MAIN XY ROLL"),
+    Switch("TIMebase:DELay:ENABle", "zoom"),
+    Word("ACQuire:TYPE", "acquisition", "NORMal AVERages PEAK HRESolution"),
+    whole("ACQuire:AVERages", "averages", 2.0, (2, 1024)),
+    Ask("ACQuire:SRATe", lambda s: s.spell(s.full_scale()[0])),
+    Both("ACQuire:MDEPth", lambda s, p: s.set_depth(p), lambda s, p: s.depth(p), keeps=("depth", "AUTO")),
+    # behind all that the sample rate depends on, so that a setup can be restored row by row
+    Number("TIMebase:DELay:SCALe", "zoom_scale", 5e-7, lambda s: s.zoom_scales(), "S", rounded=one_two_five),
+    Number("TIMebase:DELay:OFFSet", "zoom_offset", 0.0, lambda s: s.zoom_offsets(), "S"),
+)
+_TRIGGER: tuple[Row, ...] = (
+    Word("TRIGger:MODE", "trigger_mode", "EDGE PULSe SLOPe VIDeo TIMeout"),
+    Word("TRIGger:EDGe:SOURce", "trigger_source", lambda s: _names(s) + " EXT EXT5 ACLine"),
+    Word("TRIGger:EDGe:SLOPe", "trigger_slope", "POSitive NEGative RFALl"),
+    Number("TRIGger[:EDGe]:LEVel", "trigger_level", 0.0, _levels, "V"),
+    Word("TRIGger:SWEep", "trigger_sweep", "AUTO NORMal SINGle"),
+    Word("TRIGger:COUPling", "trigger_coupling", "AC *DC LFReject HFReject"),
+    Number("TRIGger:HOLDoff", "holdoff", 16e-9, (16e-9, 10.0), "S"),
+    Switch("TRIGger:NREJect", "noise_rejection"),
+    Ask("TRIGger:STATus", lambda s: s.status_word()),
+    Do("TLHAlf", lambda s: s.half_level()),
+)
+_PARTS = ("XINCrement", "XORigin", "XREFerence", "YINCrement", "YORigin", "YREFerence")
+_WAVEFORM: tuple[Row, ...] = (
+    Word("WAVeform:SOURce", "wav_source", _names),
+    Word("WAVeform:MODE", "wav_mode", "NORMal MAXimum RAW"),
+    Word("WAVeform:FORMat", "wav_format", "WORD *BYTE ASCii"),
+    whole("WAVeform:STARt", "wav_start", 1.0, (1, 24e6)),
+    whole("WAVeform:STOP", "wav_stop", float(_ON_SCREEN), (1, 24e6)),
+    Ask("WAVeform:PREamble", lambda s: ",".join(s.preamble())),
+    *(Ask(f"WAVeform:{word}", lambda s, k=k: s.preamble()[k]) for k, word in enumerate(_PARTS, start=4)),
+    Ask("WAVeform:DATA", lambda s: s.data()),
+    Ask("WAVeform:POINts", lambda s: str(s.sequence()[3])),
+)
+#: What only changes the picture.
+_IGNORED = ("CLEar", "RECover", "ADISplay", "AMSource", "STATistic:DISPlay", "STATistic:RESet")
+_REST: tuple[Row, ...] = (
+    Word("MEASure:SOURce", "measure_source", _names),
+    Both("MEASure:ITEM", lambda s, p: s.install(p), lambda s, p: s.item(p)),
+    Both("MEASure:STATistic:ITEM", lambda s, p: s.install(p), lambda s, p: s.statistic(p)),
+    *(
+        Both(f"MEASure:{word}", lambda s, p, w=word: s.install([w, *p]), lambda s, p, w=word: s.item([w, *p]))
+        for word in _WORDS
+    ),
+    *(Both(f"MEASure:{word}", lambda _s, _p: None) for word in _IGNORED),
+    Word("MEASure:STATistic:MODE", "statistic_mode", "DIFFerence *EXTRemum"),
+    Ask("MEASure:COUNter:VALue", lambda s: s.item(["FREQ"])),
+    Word("DISPlay:TYPE", "display_type", "VECTors DOTS"),
+    Word("DISPlay:GRID", "grid", "FULL HALF NONE"),
+    Word("DISPlay:GRADing:TIME", "persistence", "MIN 0.1 0.2 0.5 1 5 10 INF"),
+    whole("DISPlay:WBRightness", "brightness", 50.0, (0, 100)),
+    whole("DISPlay:GBRightness", "grid_brightness", 50.0, (0, 100)),
+    Both("DISPlay:DATA", None, lambda s, p: s.picture(p)),
+    Both(
+        "SYSTem:SETup",
+        lambda s, p: s.restore(block_content(one(p)).decode("latin-1")),
+        lambda s, _p: s.block(s.setup()),
+    ),
+    Ask("SYSTem:ERRor:COUNt", lambda s: str(len(s.parser.errors))),
+    Ask("SYSTem:GAM", lambda _s: "12"),
+    Ask("SYSTem:RAM", lambda s: str(len(s.channels))),
+    Both("MATH:DISPlay", lambda _s, p: _never(boolean(one(p))), lambda _s, _p: "0"),
+)
 
 
 class VirtualDS1000Z(VirtualOscilloscope):
@@ -81,160 +202,24 @@ class VirtualDS1000Z(VirtualOscilloscope):
     identity = "RIGOL TECHNOLOGIES,DS1054Z,DS1ZVIRTUAL,00.04.04.SP4"
     no_error = '0,"No error"'
     columns, lowest, digits, keeps_old = 12, 0, 9, True
+    CHANNEL_ROWS: ClassVar = _CHANNEL
+    ROWS: ClassVar = (*_CONTROL, *_TIME, *_TRIGGER, *_WAVEFORM, *_REST)
 
     def spell(self, value: float) -> str:
         """As in the preamble that public drivers quote: 2.000000e-05."""
         return f"{value:.6e}"
 
-    def table(self) -> tuple[Command, ...]:
-        """Its commands."""
-        channels = tuple(row for n in self.channels for row in self._channel(n))
-        return (*self._control(), *channels, *self._time(), *self._trigger(), *self._waveform(), *self._rest())
+    # --- acquiring ---
 
-    def _control(self) -> tuple[Command, ...]:
-        return (
-            Command("RUN", set=does(self.run)),
-            Command("STOP", set=does(self.stop)),
-            Command("SINGle", set=does(self._single)),
-            Command("TFORce", set=does(self.force)),
-            Command("AUToscale", set=does(self.autoscale)),
-            Command("CLEar", set=does(self._clear_screen)),
-            Command("DISPlay:CLEar", set=does(self._clear_screen)),
-            Command("CLS", set=does(self._clear_status)),
-            *(Command(f"CALibrate:{word}", set=does(lambda: None)) for word in ("STARt", "QUIT")),
-            *self.presets(),
-        )
-
-    def _clear_screen(self) -> None:
+    def clear_screen(self) -> None:
+        """CLEar: what is under way begins anew."""
         if self.running():
             self.run()
 
-    def _single(self) -> None:
+    def take_one(self) -> None:
+        """SINGle: the sweep says so, too."""
         self.settings["trigger_sweep"] = "SING"
         self.single()
-
-    def _channel(self, n: int) -> tuple[Command, ...]:
-        head, name = f"CHANnel{n}:", f"chan{n}_"
-
-        def probe() -> float:
-            return self.value(name + "probe")
-
-        def offsets() -> tuple[float, float]:
-            reach = (100.0 if self.value(name + "scale") / probe() >= 0.5 else 2.0) * probe()
-            return -reach, reach
-
-        return (
-            self.quantity(head + "PROBe", name + "probe", 10.0, limits=lambda: (0.01, 1000.0), rounded=one_two_five),
-            self.quantity(head + "SCALe", name + "scale", 1.0, unit="V", limits=lambda: (1e-3 * probe(), 10 * probe())),
-            self.quantity(head + "OFFSet", name + "offset", 0.0, unit="V", limits=offsets),
-            self.full_range(
-                head + "RANGe",
-                name + "scale",
-                divisions=8,
-                limits=lambda: (8e-3 * probe(), 80 * probe(), 8 * probe()),
-                unit="V",
-            ),
-            self.quantity(head + "TCAL", name + "delay", 0.0, unit="S", limits=lambda: (-1e-7, 1e-7)),
-            self.word(head + "COUPling", name + "coupling", ("AC", "DC", "GND"), "DC"),
-            self.word(head + "BWLimit", name + "bandwidth", ("20M", "OFF"), "OFF"),
-            self.word(head + "UNITs", name + "unit", ("VOLTage", "WATT", "AMPere", "UNKNown"), "VOLT"),
-            self.switch(head + "DISPlay", name + "display", default=n == 1),
-            self.switch(head + "INVert", name + "invert"),
-            self.switch(head + "VERNier", name + "vernier"),
-        )
-
-    def _time(self) -> tuple[Command, ...]:
-        def offsets() -> tuple[float, float]:
-            return -6 * self.value("time_scale"), max(1.0, 100 * self.value("time_scale"))
-
-        return (
-            self.quantity(
-                "TIMebase[:MAIN]:SCALe",
-                "time_scale",
-                1e-6,
-                unit="S",
-                limits=lambda: (5e-9, 50.0),
-                rounded=one_two_five,
-            ),
-            self.quantity("TIMebase[:MAIN]:OFFSet", "time_offset", 0.0, unit="S", limits=offsets),
-            self.word("TIMebase:MODE", "time_mode", ("MAIN", "XY", "ROLL"), "MAIN"),
-            self.switch("TIMebase:DELay:ENABle", "zoom"),
-            self.word("ACQuire:TYPE", "acquisition", ("NORMal", "AVERages", "PEAK", "HRESolution"), "NORM"),
-            self.whole("ACQuire:AVERages", "averages", 2.0, low=2, high=1024),
-            Command("ACQuire:SRATe", get=answers(lambda: self.spell(self.full_scale()[0]))),
-            self._depth(),
-            # behind all that the sample rate depends on, so that a setup can be restored row by row
-            self.quantity(
-                "TIMebase:DELay:SCALe",
-                "zoom_scale",
-                5e-7,
-                unit="S",
-                limits=self._zoom_scales,
-                rounded=one_two_five,
-            ),
-            self.quantity("TIMebase:DELay:OFFSet", "zoom_offset", 0.0, unit="S", limits=self._zoom_offsets),
-        )
-
-    def _zoom_scales(self) -> tuple[float, float]:
-        """The delayed sweep: no coarser than the main one, no finer than a fortieth of 50 sample intervals."""
-        return one_two_five(50 / self.full_scale()[0] / 40, up=True), self.value("time_scale")
-
-    def _zoom_offsets(self) -> tuple[float, float]:
-        """The delayed sweep: all of it within the main one."""
-        reach = 6 * (self.value("time_scale") - self.value("zoom_scale"))
-        return self.value("time_offset") - reach, self.value("time_offset") + reach
-
-    def _keep_zoom_within(self) -> None:
-        for name, limits in (("zoom_scale", self._zoom_scales), ("zoom_offset", self._zoom_offsets)):
-            low, high = limits()
-            self.settings[name] = min(max(self.value(name), low), high)
-
-    def _depth(self) -> Command:
-        self._defaults["depth"] = "AUTO"
-        self._headers["depth"] = ":ACQ:MDEP"
-
-        def set_(parameters: list[str]) -> None:
-            text = one(parameters).upper()
-            if text != "AUTO":
-                depths = self._depths()
-                points = int(number(text, low=depths[0], high=depths[-1], default=depths[0]))
-                if points not in depths:
-                    raise ScpiError(-222)
-                text = str(points)
-            self.settings["depth"] = text
-            self.changed("depth")
-
-        return Command("ACQuire:MDEPth", set_, answers(lambda: str(self.settings["depth"])))
-
-    def _depths(self) -> tuple[int, ...]:
-        share = self._share()
-        return tuple(depth // share for depth in _DEPTHS)
-
-    def _share(self) -> int:
-        """By how many the converter and the memory are shared: 1, 2 or 4."""
-        return {0: 1, 1: 1, 2: 2}.get(len(self.shown()), 4)
-
-    def _trigger(self) -> tuple[Command, ...]:
-        sources = (*(f"CHANnel{n}" for n in self.channels), *_SUPPLIES)
-
-        def levels() -> tuple[float, float]:
-            source = str(self.settings["trigger_source"])
-            channel = int(source[4:]) if source.startswith("CHAN") else 1
-            reach, offset = 5 * self.division(channel), self.value(f"chan{channel}_offset")
-            return -reach - offset, reach - offset
-
-        return (
-            self.word("TRIGger:MODE", "trigger_mode", ("EDGE", "PULSe", "SLOPe", "VIDeo", "TIMeout"), "EDGE"),
-            self.word("TRIGger:EDGe:SOURce", "trigger_source", sources, "CHAN1"),
-            self.word("TRIGger:EDGe:SLOPe", "trigger_slope", ("POSitive", "NEGative", "RFALl"), "POS"),
-            self.quantity("TRIGger[:EDGe]:LEVel", "trigger_level", 0.0, unit="V", limits=levels),
-            self.word("TRIGger:SWEep", "trigger_sweep", ("AUTO", "NORMal", "SINGle"), "AUTO"),
-            self.word("TRIGger:COUPling", "trigger_coupling", ("AC", "DC", "LFReject", "HFReject"), "DC"),
-            self.quantity("TRIGger:HOLDoff", "holdoff", 16e-9, unit="S", limits=lambda: (16e-9, 10.0)),
-            self.switch("TRIGger:NREJect", "noise_rejection"),
-            Command("TRIGger:STATus", get=answers(self._status)),
-            Command("TLHAlf", set=does(self.half_level)),
-        )
 
     def adjusted(self, name: str, before: float) -> None:
         """A sweep of SINGle waits for one record, the others go on."""
@@ -254,7 +239,8 @@ class VirtualDS1000Z(VirtualOscilloscope):
             self.settings["trigger_sweep"] = "NORM"
         super().run()
 
-    def _status(self) -> str:
+    def status_word(self) -> str:
+        """TRIGger:STATus?: STOP, RUN (filling), WAIT, TD (triggered) or AUTO."""
         acquisition = self.acquisition
         if not self.running():
             return "STOP"
@@ -267,6 +253,51 @@ class VirtualDS1000Z(VirtualOscilloscope):
         if latest.forced and self.settings["trigger_sweep"] == "AUTO":
             return "AUTO"
         return "TD" if self.now - latest.done < max(0.1, latest.points / latest.rate) else "WAIT"
+
+    # --- time base and memory ---
+
+    def zoom_scales(self) -> tuple[float, float]:
+        """The delayed sweep: no coarser than the main one, no finer than a fortieth of 50 sample intervals."""
+        return one_two_five(50 / self.full_scale()[0] / 40, up=True), self.value("time_scale")
+
+    def zoom_offsets(self) -> tuple[float, float]:
+        """The delayed sweep: all of it within the main one."""
+        reach = 6 * (self.value("time_scale") - self.value("zoom_scale"))
+        return self.value("time_offset") - reach, self.value("time_offset") + reach
+
+    def _keep_zoom_within(self) -> None:
+        for name, limits in (("zoom_scale", self.zoom_scales), ("zoom_offset", self.zoom_offsets)):
+            low, high = limits()
+            self.settings[name] = min(max(self.value(name), low), high)
+
+    def set_depth(self, parameters: list[str]) -> None:
+        """ACQuire:MDEPth: AUTO, or one of the depths.  Raises ScpiError."""
+        text = one(parameters).upper()
+        if text != "AUTO":
+            depths = self._depths()
+            points = int(number(text, low=depths[0], high=depths[-1], default=depths[0]))
+            if points not in depths:
+                raise ScpiError(-222)
+            text = str(points)
+        self.settings["depth"] = text
+        self.changed("depth")
+
+    def depth(self, parameters: list[str]) -> str:
+        """ACQuire:MDEPth?: what is set, or its limits.  Raises ScpiError."""
+        asked, depths = at_most_one(parameters), self._depths()
+        return (
+            str(int(limit(asked, low=depths[0], high=depths[-1], default=depths[0])))
+            if asked
+            else str(self.settings["depth"])
+        )
+
+    def _depths(self) -> tuple[int, ...]:
+        share = self._share()
+        return tuple(depth // share for depth in _DEPTHS)
+
+    def _share(self) -> int:
+        """By how many the converter and the memory are shared: 1, 2 or 4."""
+        return {0: 1, 1: 1, 2: 2}.get(len(self.shown()), 4)
 
     # --- scaling ---
 
@@ -301,33 +332,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
 
     # --- reading the record ---
 
-    def _waveform(self) -> tuple[Command, ...]:
-        """The rows for reading the record."""
-        sources = tuple(f"CHANnel{n}" for n in self.channels)
-        parts: tuple[tuple[str, int], ...] = (
-            ("XINCrement", 4),
-            ("XORigin", 5),
-            ("XREFerence", 6),
-            ("YINCrement", 7),
-            ("YORigin", 8),
-            ("YREFerence", 9),
-        )
-        return (
-            self.word("WAVeform:SOURce", "wav_source", sources, "CHAN1"),
-            self.word("WAVeform:MODE", "wav_mode", ("NORMal", "MAXimum", "RAW"), "NORM"),
-            self.word("WAVeform:FORMat", "wav_format", ("WORD", "BYTE", "ASCii"), "BYTE"),
-            self.whole("WAVeform:STARt", "wav_start", 1.0, low=1, high=24e6),
-            self.whole("WAVeform:STOP", "wav_stop", float(_ON_SCREEN), low=1, high=24e6),
-            Command("WAVeform:PREamble", get=answers(lambda: ",".join(self._preamble()))),
-            *(Command(f"WAVeform:{word}", get=answers(self._part(k))) for word, k in parts),
-            Command("WAVeform:DATA", get=answers(self._data)),
-            Command("WAVeform:POINts", get=answers(lambda: str(self._sequence()[3]))),
-        )
-
-    def _part(self, k: int) -> Callable[[], str]:
-        return lambda: self._preamble()[k]
-
-    def _sequence(self) -> tuple[Record, float, float, int]:
+    def sequence(self) -> tuple[Record, float, float, int]:
         """The record, and of the points that can be read: where they begin [s], their distance [s], how many.
 
         Raises ScpiError: the memory can only be read when the scope has stopped.
@@ -344,8 +349,9 @@ class VirtualDS1000Z(VirtualOscilloscope):
     def _source(self) -> int:
         return int(str(self.settings["wav_source"])[4:])
 
-    def _preamble(self) -> list[str]:
-        record, start, step, points = self._sequence()
+    def preamble(self) -> list[str]:
+        """WAVeform:PREamble?: format, mode, points, averages; distance, first, reference of times and of voltages."""
+        record, start, step, points = self.sequence()
         scale = record.inputs[self._source()]
         kind = {"BYTE": 0, "WORD": 1, "ASC": 2}[str(self.settings["wav_format"])]
         mode = {"NORM": 0, "MAX": 1, "RAW": 2}[str(self.settings["wav_mode"])]
@@ -354,8 +360,9 @@ class VirtualDS1000Z(VirtualOscilloscope):
         volts = (self.spell(scale.volts_per_code), str(scale.zero - _MIDDLE), str(_MIDDLE))
         return [str(kind), str(mode), str(points), str(averages), *times, *volts]
 
-    def _data(self) -> str:
-        record, start, step, points = self._sequence()
+    def data(self) -> str:
+        """WAVeform:DATA?: the points from STARt to STOP, as a block.  Raises ScpiError if they are too many."""
+        record, start, step, points = self.sequence()
         first = round(self.value("wav_start"))
         last = min(points, round(self.value("wav_stop")))
         form = str(self.settings["wav_format"])
@@ -374,76 +381,35 @@ class VirtualDS1000Z(VirtualOscilloscope):
         volts = (codes.astype(float) - scale.zero) * scale.volts_per_code
         return ",".join(self.spell(v) for v in volts).encode()
 
-    # --- measurements, pictures, setups ---
-
-    def _rest(self) -> tuple[Command, ...]:
-        """The rows for measurements, pictures and setups."""
-
-        def ignored(_: list[str]) -> None:
-            """What only changes the picture."""
-
-        sources = tuple(f"CHANnel{n}" for n in self.channels)
-        return (
-            self.word("MEASure:SOURce", "measure_source", sources, "CHAN1"),
-            Command("MEASure:ITEM", set=self._install, get=self._item),
-            Command("MEASure:STATistic:ITEM", set=self._install, get=self._statistic),
-            *(Command(f"MEASure:{word}", set=self._install_one(word), get=self._one_item(word)) for word in _WORDS),
-            *(
-                Command(f"MEASure:{header}", set=ignored)
-                for header in ("CLEar", "RECover", "ADISplay", "AMSource", "STATistic:DISPlay", "STATistic:RESet")
-            ),
-            self.word("MEASure:STATistic:MODE", "statistic_mode", ("DIFFerence", "EXTRemum"), "EXTR"),
-            Command("MEASure:COUNter:VALue", get=answers(self._counter)),
-            self.word("DISPlay:TYPE", "display_type", ("VECTors", "DOTS"), "VECT"),
-            self.word("DISPlay:GRID", "grid", ("FULL", "HALF", "NONE"), "FULL"),
-            self.word("DISPlay:GRADing:TIME", "persistence", _PERSISTENCES, "MIN"),
-            self.percent("DISPlay:WBRightness", "brightness"),
-            self.percent("DISPlay:GBRightness", "grid_brightness"),
-            Command("DISPlay:DATA", get=self._picture),
-            Command("SYSTem:SETup", set=lambda p: self.restore(block_content(one(p))), get=answers(self._setup)),
-            Command("SYSTem:ERRor:COUNt", get=answers(lambda: str(len(self.parser.errors)))),
-            Command("SYSTem:GAM", get=answers(lambda: "12")),
-            Command("SYSTem:RAM", get=answers(lambda: str(len(self.channels)))),
-            Command("MATH:DISPlay", set=lambda p: _never(boolean(one(p))), get=answers(lambda: "0")),
-        )
-
-    def _setup(self) -> str:
-        return self.block(self.setup())
+    # --- measurements and pictures ---
 
     def _where(self, parameters: list[str]) -> int:
         if len(parameters) > 1:
             raise ScpiError(-108)
         return self.channel_of(parameters[0] if parameters else str(self.settings["measure_source"]))
 
-    def _install(self, parameters: list[str]) -> None:
+    def install(self, parameters: list[str]) -> None:
+        """MEASure:ITEM: a measurement for the screen; it must exist.  Raises ScpiError."""
         if not parameters:
             raise ScpiError(-109)
         _named(parameters[0])
         self._where(parameters[1:])
 
-    def _install_one(self, word: str) -> Callable[[list[str]], None]:
-        return lambda parameters: self._install([word, *parameters])
-
-    def _one_item(self, word: str) -> Callable[[list[str]], str]:
-        return lambda parameters: self._item([word, *parameters])
-
-    def _item(self, parameters: list[str]) -> str:
+    def item(self, parameters: list[str]) -> str:
+        """MEASure:ITEM?: what is measured.  Raises ScpiError."""
         if not parameters:
             raise ScpiError(-109)
         name, channel = _named(parameters[0]), self._where(parameters[1:])
         return self.spell(self.measured(name, channel))
 
-    def _statistic(self, parameters: list[str]) -> str:
+    def statistic(self, parameters: list[str]) -> str:
         """Statistics of one: every value but the deviation is the present one."""
         if not parameters:
             raise ScpiError(-109)
         kind = choice(parameters[0], _STATISTICS)
-        return self.spell(0.0) if kind == "DEV" else self._item(parameters[1:])
+        return self.spell(0.0) if kind == "DEV" else self.item(parameters[1:])
 
-    def _counter(self) -> str:
-        return self.spell(self.measured("FREQUENCY", self._where([])))
-
-    def _picture(self, parameters: list[str]) -> str:
+    def picture(self, parameters: list[str]) -> str:
         """``[<colour>[,<invert>[,<format>]]]``; without, a picture with 24 bits in colours."""
         if len(parameters) > 3:
             raise ScpiError(-108)

@@ -13,10 +13,12 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from instruments.virtual.core.device import Value, VirtualInstrument, answers
-from instruments.virtual.core.parameters import at_most_one, choice, limit, number, one
+from instruments.virtual.core.parameters import at_most_one, block_text, choice, limit, number, one
 from instruments.virtual.core.parser import Command, ScpiError
+from instruments.virtual.core.rows import Both, short_header
+from instruments.virtual.core.trigger import crossings
 from instruments.virtual.oscilloscope.acquisition import LOOK_AHEAD, Acquisition, Plan
-from instruments.virtual.oscilloscope.measure import Measured, edges, measure
+from instruments.virtual.oscilloscope.measure import Measured, measure
 from instruments.virtual.oscilloscope.record import COARSEST, Edge, Input, Record, open_input
 
 if TYPE_CHECKING:
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
 
 #: Below the level by this part of a division the trigger is armed again.
 _HYSTERESIS = 0.3
+_CHANNEL = re.compile(r"C(?:HAN)?([1-8])")
 #: How the words of the trigger slope are meant.
 _SLOPES: dict[str, tuple[float, ...]] = {
     "POS": (1.0,),
@@ -36,6 +39,7 @@ _SLOPES: dict[str, tuple[float, ...]] = {
     "RFAL": (1.0, -1.0),
     "EITH": (1.0, -1.0),
     "ALT": (1.0, -1.0),
+    "WINDOW": (1.0, -1.0),
 }
 #: What would end a string or a message.
 _NOT_IN_LABELS = dict.fromkeys(map(ord, "\"';\n"))
@@ -65,13 +69,13 @@ class VirtualOscilloscope(VirtualInstrument):
     def __init__(
         self, clock: Clock, *, signals: Mapping[int, Signal], channels: int = 4, identity: str | None = None
     ) -> None:
-        self.channels = range(1, channels + 1)
+        self.channels = self.numbered = range(1, channels + 1)
         self._signals = signals
-        self.identity = identity or self.identity
         self.acquisition = Acquisition(self._plan, keeps_old=self.keeps_old)
         self._headers: dict[str, str] = {}
         self._restoring = False
-        super().__init__(clock)
+        self._kept: dict[int, str] = {}
+        super().__init__(clock, identity=identity)
         self.run()
 
     # --- what a subclass says of its numbers and its scaling ---
@@ -185,12 +189,28 @@ class VirtualOscilloscope(VirtualInstrument):
         return Command(pattern, set_, answers(lambda: f'"{self.settings[name]}"'))
 
     def _remember(self, pattern: str, name: str) -> None:
-        short = re.sub(r"\[[^\]]*\]", "", pattern)
-        self._headers[name] = ":" + re.sub("[a-z]", "", short)
+        self._headers[name] = ":" + short_header(pattern)
+
+    def declare(self, name: str, header: str, default: Value) -> None:
+        """There is this setting; it is part of the setup."""
+        super().declare(name, header, default)
+        self._remember(header, name)
 
     def value(self, name: str) -> float:
         """A setting that is a number."""
         return float(self.settings[name])
+
+    def level_name(self, channel: int) -> str:
+        """The setting that holds the trigger level of a channel."""
+        return "trigger_level"
+
+    def source_word(self, channel: int) -> str:
+        """A channel as a source of the trigger."""
+        return f"CHAN{channel}"
+
+    def slope_name(self, channel: int) -> str:
+        """The setting that holds the trigger slope of a channel."""
+        return "trigger_slope"
 
     def division(self, channel: int) -> float:
         """Volts per division."""
@@ -199,6 +219,11 @@ class VirtualOscilloscope(VirtualInstrument):
     def shown(self) -> list[int]:
         """The channels that are on."""
         return [n for n in self.channels if self.settings[f"chan{n}_display"]]
+
+    def source_channel(self) -> int | None:
+        """The channel that triggers, None where it is something else."""
+        found = _CHANNEL.fullmatch(str(self.settings["trigger_source"]))
+        return int(found[1]) if found else None
 
     def channel_of(self, text: str) -> int:
         """The channel of ``CHAN1`` or ``CHANnel1``.  Raises ScpiError."""
@@ -222,8 +247,10 @@ class VirtualOscilloscope(VirtualInstrument):
         """With another probe the same volts at the input are other volts at its tip: scale and offset go with it."""
         for what in ("scale", "offset"):
             self.settings[f"{channel}_{what}"] = ratio * float(self.settings[f"{channel}_{what}"])
-        if self.settings["trigger_source"] == channel.upper():
-            self.settings["trigger_level"] = ratio * float(self.settings["trigger_level"])
+        number = int(channel.removeprefix("chan"))
+        level = self.level_name(number)
+        if level != "trigger_level" or self.source_channel() == number:
+            self.settings[level] = ratio * float(self.settings[level])
 
     def reset(self) -> None:
         """The state after ``*RST``: it runs."""
@@ -260,22 +287,14 @@ class VirtualOscilloscope(VirtualInstrument):
         finally:
             self._restoring = False
 
-    def presets(self) -> tuple[Command, ...]:
-        """Setups as blocks and in ten places."""
-        kept: dict[int, str] = {}
+    def keep(self, parameters: list[str]) -> None:
+        """*SAV: the setup in one of ten places."""
+        self._kept[_place(parameters)] = self.setup().decode("latin-1")
 
-        def place(parameters: list[str]) -> int:
-            return int(number(one(parameters), low=0, high=9, default=0))
-
-        def keep(parameters: list[str]) -> None:
-            kept[place(parameters)] = self.setup().decode("latin-1")
-
-        def recall(parameters: list[str]) -> None:
-            where = place(parameters)
-            if where in kept:
-                self.restore(kept[where])
-
-        return (Command("*SAV", set=keep), Command("*RCL", set=recall))
+    def recall(self, parameters: list[str]) -> None:
+        """*RCL: the setup of a place, if there is one."""
+        if (where := _place(parameters)) in self._kept:
+            self.restore(self._kept[where])
 
     # --- acquiring ---
 
@@ -307,7 +326,7 @@ class VirtualOscilloscope(VirtualInstrument):
         if coupling == "GND":
             signal = open_input
         mean = 0.0
-        if coupling == "AC":
+        if str(coupling).startswith("A"):
             begin = max(0.0, start - 0.5)
             mean = float(np.mean(signal(begin, COARSEST, round(1 / COARSEST))))
         factor = self.value(f"chan{channel}_probe") * (-1.0 if self.settings[f"chan{channel}_invert"] else 1.0)
@@ -316,16 +335,15 @@ class VirtualOscilloscope(VirtualInstrument):
 
     def _search(self, record: Record, start: float) -> Edge | None:
         """A search for the trigger of this record from a time on [s], or None if the source never triggers."""
-        source = str(self.settings["trigger_source"])
-        if not source.startswith("CHAN"):
+        channel = self.source_channel()
+        if channel is None:
             return None
-        channel = int(source[4:])
         step = max(min(COARSEST, record.points / record.rate / 1000), 1 / record.rate)
         return Edge(
             volts=record.inputs[channel].volts,
-            level=self.value("trigger_level"),
+            level=self.value(self.level_name(channel)),
             hysteresis=_HYSTERESIS * self.division(channel),
-            slopes=_SLOPES[str(self.settings["trigger_slope"])],
+            slopes=_SLOPES[str(self.settings[self.slope_name(channel)])],
             step=step,
             fine=0.01 / record.rate,
             position=start,
@@ -389,7 +407,7 @@ class VirtualOscilloscope(VirtualInstrument):
     def block(self, data: bytes) -> str:
         """A definite-length block as text, and the time that it takes."""
         self.busy_until(self._ready + len(data) / self.transfer)
-        return f"#{self.digits}{len(data):0{self.digits}d}" + data.decode("latin-1")
+        return block_text(data, self.digits)
 
     def on_screen(self, channel: int, points: int = 50_000) -> Measured:
         """The trace on the screen, from its codes.  Raises ScpiError if there is none."""
@@ -421,11 +439,11 @@ class VirtualOscilloscope(VirtualInstrument):
 
     def half_level(self) -> None:
         """The trigger level half way between the lowest and the highest voltage on the screen."""
-        source = str(self.settings["trigger_source"])
-        if source.startswith("CHAN"):
-            trace = self.on_screen(int(source[4:]))
-            self.settings["trigger_level"] = float(trace.volts.max() + trace.volts.min()) / 2
-            self.changed("trigger_level")
+        channel = self.source_channel()
+        if channel is not None:
+            trace, name = self.on_screen(channel), self.level_name(channel)
+            self.settings[name] = float(trace.volts.max() + trace.volts.min()) / 2
+            self.changed(name)
 
     def autoscale(self) -> None:
         """Scale, offset, time base and level to fit what stands at the inputs."""
@@ -437,25 +455,23 @@ class VirtualOscilloscope(VirtualInstrument):
                 continue
             self.settings |= {f"chan{n}_display": True, f"chan{n}_coupling": "DC"}
             self.fit(n, (low + high) / 2, one_two_five((high - low) / 6, up=True))
-            found = edges(volts, (low + high) / 2, 0.1 * (high - low))
+            found = crossings(volts, (low + high) / 2, 0.1 * (high - low))
             if found.size > 1:
                 period = float(np.diff(found).mean()) * COARSEST
                 self.settings["time_scale"] = one_two_five(3 * period / self.columns, up=True)
-            self.settings |= {"trigger_source": f"CHAN{n}", "trigger_level": (low + high) / 2, "trigger_slope": "POS"}
+            self.settings |= {"trigger_source": self.source_word(n), self.level_name(n): (low + high) / 2}
+            self.settings[self.slope_name(n)] = "POS"
             break
         self.settings |= {"time_offset": 0.0, "trigger_sweep": "AUTO"}
         self.run()
 
 
-def block_content(text: str) -> str:
-    """The content of a definite-length block that was sent as a parameter.  Raises ScpiError."""
-    if len(text) < 2 or text[0] != "#" or not "1" <= text[1] <= "9":
-        raise ScpiError(-104)
-    begin = 2 + int(text[1])
-    digits = text[2:begin]
-    if not digits.isascii() or not digits.isdigit() or len(text) - begin != int(digits):
-        raise ScpiError(-104)
-    return text[begin:]
+def _place(parameters: list[str]) -> int:
+    return int(number(one(parameters), low=0, high=9, default=0))
+
+
+#: Setups in ten places.
+PRESETS = (Both("*SAV", lambda s, p: s.keep(p)), Both("*RCL", lambda s, p: s.recall(p)))
 
 
 def one_two_five(value: float, *, up: bool = False) -> float:

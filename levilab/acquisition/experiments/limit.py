@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
@@ -10,22 +11,23 @@ from pydantic import Field, PositiveFloat, PositiveInt
 
 from analysis.limits import spin_at_fall
 from analysis.locked import slip_of
-from levilab.acquisition.counting import FreeTop, Missed, prepare_counter, spin_now
+from levilab.acquisition.counting import NO_TOP, AnotherTop, FreeTop, Missed, prepare_counter, spin_now
 from levilab.acquisition.driving import (
     RAMP_STEP_S,
     DidNotFollow,
     DriveSettings,
     NotHeld,
+    check_drive,
     compare_with_drive,
     drive_until,
     drive_up_and_let_go,
+    have_a_top,
     held_spin,
-    no_light,
+    is_over,
 )
 from levilab.acquisition.experiment import Experiment
 from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import ConfigError
-from levilab.bench.person import FloatTop
 from levilab.runs.channel import Channel
 
 if TYPE_CHECKING:
@@ -34,8 +36,6 @@ if TYPE_CHECKING:
     from levilab.acquisition.session import Row, Session
     from levilab.bench.config import Limits
 
-#: A top that a person was asked for is looked for so often [s].
-_LOOK_S = 2.0
 #: A top that the drive does not take up is given up after so many falls.
 _MOST_FALLS = 3
 #: The tape of a creeping top is compared with the drive by so many counts, so far below the limit [Hz]: nearer to it
@@ -61,11 +61,8 @@ class LimitSettings(DriveSettings):
     def check(self, table: str, limits: Limits) -> None:
         """Raise ConfigError for a drive that the bench does not allow."""
         super().check(table, limits)
-        if self.which == "upper" and self.highest_hz > limits.drive_frequency_hz:
-            raise ConfigError(
-                f"{table}.highest_hz = {self.highest_hz:g} is more than this bench allows, "
-                f"limits.drive_frequency_hz = {limits.drive_frequency_hz:g}"
-            )
+        if self.which == "upper":
+            check_drive(table, limits, self.drive_amplitude_vpp, [("highest_hz", self.highest_hz)])
         if self.which == "upper" and self.highest_hz <= self.drive_frequency_hz:
             raise ConfigError(
                 f"{table}.highest_hz = {self.highest_hz:g}: more than {table}.drive_frequency_hz = "
@@ -93,48 +90,57 @@ def run(session: Session[LimitSettings]) -> None:
     prepare_counter(session)
     session.begin(lambda: None, resumed="going on with the next top")
     measure = _lower if settings.which == "lower" else _upper
-    done = len(session.rows)
-    for number in range(done, settings.repetitions):
-        row = _with_a_top(session, number, measure)
-        if row is None:
+    keep = _Keeper(session, len(session.rows))
+    while len(session.rows) < settings.repetitions and not is_over(session):
+        if not _with_a_top(session, measure, keep):
             return
-        left = settings.repetitions - number - 1
-        session.keep(row, left * session.spent() / (number + 1 - done))
+
+
+@dataclass
+class _Keeper:
+    """Keeps the limit of a top as soon as it is known.  before: tops of the run that is resumed."""
+
+    session: Session[LimitSettings]
+    before: int
+
+    def __call__(self, row: Row) -> None:
+        session = self.session
+        done = len(session.rows) + 1
+        session.keep(row, (session.settings.repetitions - done) * session.spent() / (done - self.before))
 
 
 def _with_a_top(
-    session: Session[LimitSettings], number: int, measure: Callable[[Session[LimitSettings]], Row | None]
-) -> Row | None:
-    """The limit of a top; one that the drive does not take up falls after a while, and is floated again."""
+    session: Session[LimitSettings],
+    measure: Callable[[Session[LimitSettings], Callable[[Row], None]], bool],
+    keep: Callable[[Row], None],
+) -> bool:
+    """Measure the limit of a top; one that the drive does not take up falls after a while, and is floated again.
+
+    Returns False where the time is over.  Raises DidNotFollow after so many falls: what was measured is kept, and the
+    run can be resumed.
+    """
     falls = 0
-    while not _is_over(session):
-        _have_a_top(session, number)
+    while not is_over(session):
+        _have_the_next_top(session)
         try:
-            return measure(session)
-        except DidNotFollow as failed:
+            return measure(session, keep)
+        except (DidNotFollow, AnotherTop) as failed:
             fell = spin_now(session) is None
             falls += fell
             if falls == _MOST_FALLS:
                 raise
             session.event("once more", f"{failed}; it {'fell' if fell else 'is still up'}, once more")
-    return None
+    return False
 
 
-def _have_a_top(session: Session[LimitSettings], number: int) -> None:
-    """See that a top floats; where none does, ask for one.  Raises ExperimentFailed."""
-    settings = session.settings
+def _have_the_next_top(session: Session[LimitSettings]) -> None:
+    """See that the next top floats; where none does, ask for one.  Raises ExperimentFailed."""
+    settings, number = session.settings, len(session.rows)
     session.progress(f"top {number + 1} of {settings.repetitions}", number / settings.repetitions)
-    if number == 0 and spin_now(session) is not None:
-        return
     if number and _spins_freely(session):
         _coast_down(session)
-    if spin_now(session) is None:
-        session.ask(FloatTop(f"Top {number + 1} of {settings.repetitions}: spin the top and let it float.", number))
-    end = session.now() + settings.float_s
-    while (spin := spin_now(session)) is None and session.now() < end:
-        session.wait(_LOOK_S)
-    if spin is None:
-        raise no_light(session)
+    text = f"Top {number + 1} of {settings.repetitions}: spin the top and let it float."
+    have_a_top(session, text, number, within_s=settings.float_s)
 
 
 def _spins_freely(session: Session[LimitSettings]) -> bool:
@@ -154,25 +160,17 @@ def _coast_down(session: Session[LimitSettings]) -> None:
         session.wait(settings.interval_s)
 
 
-def _is_over(session: Session[LimitSettings]) -> bool:
-    longest = session.settings.longest_s
-    if session.spent() <= longest:
-        return False
-    session.event("longest", f"{longest:g} s are over ({session.writer.record.experiment}.longest_s)")
-    return True
-
-
 # --- lower ---
 
 
-def _lower(session: Session[LimitSettings]) -> Row | None:
-    """Drive the top up, let it go, and watch it until it falls; None where the time is over."""
+def _lower(session: Session[LimitSettings], keep: Callable[[Row], None]) -> bool:
+    """Drive the top up, let it go, watch it until it falls, and keep its limit; False where the time is over."""
     settings = session.settings
     drive_up_and_let_go(session)
     top = FreeTop(session)
     seen: list[Row] = []
     missed_since: float | None = None
-    while not _is_over(session):
+    while not is_over(session):
         asked = session.now()
         if reading := top.read():
             seen.append(reading)
@@ -180,12 +178,13 @@ def _lower(session: Session[LimitSettings]) -> Row | None:
             session.progress(f"free at {reading['spin_frequency_hz']:.2f} Hz", 1.0)
         else:
             # a counter that was lost saw nothing of the top, which may have been up all that time
-            if top.missed[-1] is not Missed.LOST and missed_since is None:
+            if top.missed[-1] in NO_TOP and missed_since is None:
                 missed_since = asked
             if end := top.fall(asked):
-                return _limit_of_fall(session, seen, asked if missed_since is None else missed_since, end)
+                keep(_limit_of_fall(session, seen, asked if missed_since is None else missed_since, end))
+                return True
         session.wait(settings.interval_s - (session.now() - asked))
-    return None
+    return False
 
 
 def _limit_of_fall(session: Session[LimitSettings], seen: list[Row], missed_since: float, text: str) -> Row:
@@ -217,29 +216,36 @@ def _limit_of_fall(session: Session[LimitSettings], seen: list[Row], missed_sinc
 # --- upper ---
 
 
-def _upper(session: Session[LimitSettings]) -> Row | None:
-    """Drive the top up, and creep on until it is lost."""
-    found: list[Row] = []
-
-    def creep(session: Session[LimitSettings]) -> None:
-        if row := _creep_up(session):
-            found.append(row)
-
-    drive_until(session, creep)
-    return found[0] if found else None
+def _upper(session: Session[LimitSettings], keep: Callable[[Row], None]) -> bool:
+    """Drive the top up, creep on until it is lost, and keep its limit; False where the time is over."""
+    before = len(session.rows)
+    drive_until(session, lambda session: _creep_up(session, keep))
+    return len(session.rows) > before
 
 
-def _creep_up(session: Session[LimitSettings]) -> Row | None:
-    """Raise the drive until the top does not follow; None where the time is over."""
+def _creep_up(session: Session[LimitSettings], keep: Callable[[Row], None]) -> None:
+    """Raise the drive until the top does not follow, or time is over; the limit is kept before the drive goes off."""
     settings = session.settings
     start, drive, at = settings.drive_frequency_hz, settings.drive_frequency_hz, session.now()
-    # a counter that is reached again after a while must not make the drive jump
-    longest_step_s = RAMP_STEP_S + 2 * settings.gate_s
-    every = max(1, round(settings.interval_s / RAMP_STEP_S))
+    # A step lasts as long as a count, so the drive goes up evenly whether the top is looked at or not: uneven steps
+    # make it swing about the drive, until it is lost early.  A counter that is reached again must not make it jump.
+    every, longest_step_s = max(1, round(settings.interval_s / settings.gate_s)), 2 * settings.gate_s
     held = start
     seen: list[tuple[float, float]] = []
     for k in itertools.count(1):
-        session.wait(RAMP_STEP_S)
+        if k % every:
+            session.wait(settings.gate_s)
+        else:
+            try:
+                seen.append((held_spin(session, drive), drive))
+            except NotHeld as lost:
+                limit = _limit_of_loss(settings, (held, drive), seen)
+                keep({"time_s": session.now()} | limit)
+                _say_how_it_was_lost(session, lost, limit, seen)
+                return
+            held = drive
+            if is_over(session):
+                return
         before, at = at, session.now()
         drive += settings.creep_hz_per_s * min(at - before, longest_step_s)
         if drive > settings.highest_hz:
@@ -250,48 +256,41 @@ def _creep_up(session: Session[LimitSettings]) -> Row | None:
             )
         session.bench.generator.frequency = drive
         session.progress(f"drive at {drive:.2f} Hz", (drive - start) / (settings.highest_hz - start))
-        if k % every:
-            continue
-        try:
-            seen.append((held_spin(session, drive), drive))
-        except NotHeld as lost:
-            session.bench.outputs_off()
-            return _limit_of_loss(session, lost, (held, drive), seen)
-        held = drive
-        if _is_over(session):
-            return None
-    return None
 
 
-def _limit_of_loss(
-    session: Session[LimitSettings], lost: NotHeld, between: tuple[float, float], seen: list[tuple[float, float]]
-) -> Row:
-    """The reading of a top that no longer follows.
+def _limit_of_loss(settings: LimitSettings, between: tuple[float, float], seen: list[tuple[float, float]]) -> Row:
+    """The reading of a top that no longer follows, without its time.
 
     between: the drive's frequencies at the last look at which it did, and at the first one at which it did not [Hz];
     seen: each count until then, with the drive's frequency [Hz].
     """
-    settings, (held, drive) = session.settings, between
-    top = FreeTop(session)
-    is_up = lost.spin is not None or top.read() is not None or top.missed[-1] is Missed.UNSTEADY
+    held, drive = between
     # a top that slips is taken for held until it is far behind; but it only slows, so its limit is above what was seen
     low = min(held, seen[-1][0]) if seen else held
-    limit, u = (low + drive) / 2, (drive - low) / 12**0.5
-    kind, what = ("lock lost", "the drive lost the top") if is_up else ("top lost", "the top fell")
-    session.event(kind, f"{what} at {limit:.2f} Hz: {lost}", spin_frequency_hz=limit, drive_frequency_hz=drive)
-    safely_held = [(spin, drive) for spin, drive in seen if drive < held - _BELOW_HZ][-_COMPARED:]
-    if len(safely_held) > 1:
-        spins, drives = zip(*safely_held, strict=True)
-        # each step makes the top swing, and the counts see the swing at the same phase
-        compare_with_drive(session, slip_of(spins, drives, least=2 * settings.creep_hz_per_s * RAMP_STEP_S))
     return {
-        "time_s": session.now(),
-        "spin_frequency_hz": limit,
-        "spin_frequency_u_hz": u,
+        "spin_frequency_hz": (low + drive) / 2,
+        "spin_frequency_u_hz": (drive - low) / 12**0.5,
         "spin_seen_hz": seen[-1][0] if seen else held,
         "drive_frequency_hz": held,
         "drive_amplitude_v": settings.drive_amplitude_vpp / 2,
     }
+
+
+def _say_how_it_was_lost(
+    session: Session[LimitSettings], lost: NotHeld, limit: Row, seen: list[tuple[float, float]]
+) -> None:
+    """Whether the top is still up, and whether its tape slipped on the way; once the limit is kept."""
+    top = FreeTop(session)
+    is_up = lost.spin is not None or top.read() is not None or top.missed[-1] is Missed.UNSTEADY
+    kind, what = ("lock lost", "the drive lost the top") if is_up else ("top lost", "the top fell")
+    spin, held = limit["spin_frequency_hz"], limit["drive_frequency_hz"]
+    session.event(kind, f"{what} at {spin:.2f} Hz: {lost}", spin_frequency_hz=spin, drive_frequency_hz=lost.drive)
+    safely_held = [(spin, drive) for spin, drive in seen if drive < held - _BELOW_HZ][-_COMPARED:]
+    if len(safely_held) > 1:
+        spins, drives = zip(*safely_held, strict=True)
+        # each step makes the top swing, and the counts see the swing at the same phase
+        step = session.settings.creep_hz_per_s * RAMP_STEP_S
+        compare_with_drive(session, slip_of(spins, drives, least=2 * step))
 
 
 EXPERIMENT = Experiment(

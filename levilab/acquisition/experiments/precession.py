@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 from pydantic_core import PydanticCustomError
 
-from instruments.errors import InstrumentError, OutOfRange
-from levilab.acquisition.counting import prepare_counter, spin_now
-from levilab.acquisition.driving import RAMP_STEP_S, DriveSettings, NotHeld, drive_up, held_spin, no_light
+from analysis.precession.gates import FEWEST, Gates, Rate, Swing, pulses_too_many, rates_at_point, swing_of
+from instruments.errors import InstrumentError
+from levilab.acquisition.counting import prepare_counter
+from levilab.acquisition.driving import DriveSettings, NotHeld, check_drive, held_spin, sweep_drive
 from levilab.acquisition.experiment import Experiment
 from levilab.acquisition.session import ExperimentFailed
-from levilab.bench.config import ConfigError
-from levilab.bench.person import FloatTop, Task
+from levilab.bench.person import Task
 from levilab.runs.channel import Channel
+from levilab.runs.gates import COUNTED, gates_event
 
 if TYPE_CHECKING:
     from typing import Self
@@ -32,21 +32,18 @@ if TYPE_CHECKING:
 
 #: Points of a sweep, at most.
 _MOST_POINTS = 1000
-#: While the drive creeps the top is looked at so often [s].
-_LOOK_EVERY_S = 10.0
 #: A locked top swings about the drive, by some tenths of a hertz: so many looks in a row have a mean this near to it
 #: [Hz]; after so many looks it is not locked.
 _LOOKS, _LOCKED_WITHIN_HZ, _MOST_LOOKS = 3, 0.25, 12
-#: How often a point is tried, and so many points lost one after the other end the sweep.
-_TRIES, _MOST_LOST = 2, 2
-#: A person who floated the top has pressed Enter: after so many looks in the dark there is none.
-_DARK_LOOKS = 5
-#: Spreads gates evenly over a period, however many there are.
-_GOLDEN = (math.sqrt(5) - 1) / 2
+#: Gates have so many lengths, in parts of `gate_s`, and so long a pause before them, in periods of the drive.
+_GATES, _PAUSES = (0.75, 1.25), 4.0
 #: No count is better than that: the resolution of the counters over a second [Hz].
 _LEAST_U_HZ = 1e-7
-#: A gate so many standard deviations off the others, and by half a count at least, has miscounted.
-_FAR = 5.0
+#: A swing of more than this [turns] is taken off by a step of the drive's phase that lasts so long [s], if that is at
+#: most such a part of its period.  From half a turn on a top is lost.
+_CALM, _STEP_S, _SHORT = 0.12, 0.3, 0.25
+#: No top's pulses are so many in a gate: what is counted then is something else.
+_MOST_PERIODS = 1e9
 #: Of an oscilloscope's record of laser and drive: samples a second, and volts of a division; the drive has ±5 V.
 _RATE, _VOLTS_PER_DIVISION = 1000.0, 2.0
 
@@ -105,12 +102,9 @@ class PrecessionSettings(DriveSettings):
     def check(self, table: str, limits: Limits) -> None:
         """Raise ConfigError for a drive that the bench does not allow."""
         super().check(table, limits)
-        for frequency in (min(self.sweep), max(self.sweep)):
-            if not limits.drive_lowest_hz <= frequency <= limits.drive_frequency_hz:
-                raise ConfigError(
-                    f"{table}: the sweep goes to {frequency:g} Hz, this bench allows {limits.drive_lowest_hz:g} to "
-                    f"{limits.drive_frequency_hz:g} Hz (limits.drive_lowest_hz, limits.drive_frequency_hz)"
-                )
+        names = ("first_hz", "last_hz") if self.frequencies_hz is None else ("frequencies_hz", "frequencies_hz")
+        ends = (self.sweep[0], self.sweep[-1]) if self.frequencies_hz is None else (min(self.sweep), max(self.sweep))
+        check_drive(table, limits, self.drive_amplitude_vpp, zip(names, ends, strict=True))
 
 
 def also_needs(settings: PrecessionSettings) -> tuple[str, ...]:
@@ -123,6 +117,8 @@ def channels(settings: PrecessionSettings) -> tuple[Channel, ...]:
     over = f"{settings.counts} gates of {settings.gate_s:g} s"
     one = "that of one count in the configuration" if settings.reading_u_hz else f"scatter of {over}"
     u = f"{one} over √{settings.counts}"
+    if not settings.reading_u_hz and settings.counts >= FEWEST:
+        u = f"{one}, the swing about the drive taken off"
     return (
         Channel("time_s", "s", "bench clock, from the beginning of the sweep, at the end of the point"),
         Channel("drive_frequency_hz", "Hz", "generator, as set"),
@@ -137,15 +133,6 @@ def channels(settings: PrecessionSettings) -> tuple[Channel, ...]:
 # --- the sweep ---
 
 
-@dataclass
-class _Place:
-    """Where the sweep is.  next: point; tries: of it so far; lost: points left out one after the other."""
-
-    next: int
-    tries: int = 0
-    lost: int = 0
-
-
 def run(session: Session[PrecessionSettings]) -> None:
     """Drive the top up and through the sweep; where it is lost, drive it up anew."""
     settings = session.settings
@@ -155,20 +142,8 @@ def run(session: Session[PrecessionSettings]) -> None:
         )
     prepare_counter(session)
     session.begin(lambda: None, resumed="the top is driven up anew")
-    place = _Place(_points_done(session.rows, settings.sweep))
-    while place.next < len(settings.sweep) and place.lost < _MOST_LOST and not _is_over(session):
-        try:
-            _have_a_top(session, place)
-            drive_up(session)
-            _go_on(session, place)
-        except NotHeld as lost:
-            session.bench.outputs_off()
-            _note_loss(session, place, lost)
-        except InstrumentError as error:
-            if error.address != session.bench.address("generator") or isinstance(error, OutOfRange):
-                raise
-            session.reconnect("generator", error, session.bench.outputs_off)
-    session.bench.outputs_off()
+    left = settings.sweep[_points_done(session.rows, settings.sweep) :]
+    sweep_drive(session, left, lambda drive: _point(session, drive))
     session.event("drive off", f"drive off, {len(session.rows)} of {len(settings.sweep)} points were measured")
 
 
@@ -180,56 +155,6 @@ def _points_done(rows: list[Row], sweep: tuple[float, ...]) -> int:
         same = [k for k in range(done, len(sweep)) if math.isclose(sweep[k], drive, rel_tol=1e-9)]
         done = same[0] + 1 if same else done
     return done
-
-
-def _go_on(session: Session[PrecessionSettings], place: _Place) -> None:
-    """From where the top was driven up to, through the points that are left.  Raises NotHeld."""
-    settings = session.settings
-    drive = settings.drive_frequency_hz
-    while place.next < len(settings.sweep) and session.spent() <= settings.longest_s:
-        target = settings.sweep[place.next]
-        _creep(session, place, drive, target)
-        _wait_for_lock(session, target)
-        row = _measure(session, target)
-        if settings.record_s:
-            _record(session, target)
-        session.keep(row | {"time_s": session.now()}, _time_left(settings, place.next + 1))
-        place.next, place.tries, place.lost, drive = place.next + 1, 0, 0, target
-
-
-def _note_loss(session: Session[PrecessionSettings], place: _Place, lost: NotHeld) -> None:
-    """Write down that the lock was lost at a point; after the last try the point is left out."""
-    settings = session.settings
-    drive = settings.sweep[place.next]
-    place.tries += 1
-    text = f"the lock was lost on the way to the point of {drive:g} Hz, or at it: {lost}"
-    session.event("lock lost", f"{text}; try {place.tries} of {_TRIES}", drive_frequency_hz=drive)
-    if place.tries < _TRIES:
-        return
-    place.next, place.tries, place.lost = place.next + 1, 0, place.lost + 1
-    session.event("left out", f"the point of {drive:g} Hz is left out", drive_frequency_hz=drive)
-    if place.lost == _MOST_LOST and place.next < len(settings.sweep):
-        session.event("ended", f"{_MOST_LOST} points one after the other were lost: the sweep ends here")
-
-
-def _have_a_top(session: Session[PrecessionSettings], place: _Place) -> None:
-    """See that a top floats; where none does, ask for one.  Raises ExperimentFailed."""
-    session.progress(f"point {place.next + 1}", place.next / len(session.settings.sweep))
-    if spin_now(session) is not None:
-        return
-    session.ask(FloatTop("The counter sees no top: spin the top and let it float.", len(session.rows)))
-    for _ in range(_DARK_LOOKS):
-        if spin_now(session) is not None:
-            return
-    raise no_light(session)
-
-
-def _is_over(session: Session[PrecessionSettings]) -> bool:
-    longest = session.settings.longest_s
-    if session.spent() <= longest:
-        return False
-    session.event("longest", f"{longest:g} s are over (precession.longest_s)")
-    return True
 
 
 def _time_left(settings: PrecessionSettings, done: int) -> float:
@@ -244,19 +169,18 @@ def _time_left(settings: PrecessionSettings, done: int) -> float:
 # --- one point ---
 
 
-def _creep(session: Session[PrecessionSettings], place: _Place, start: float, target: float) -> None:
-    """Move the drive in steps that a locked top can follow.  Raises NotHeld."""
+def _point(session: Session[PrecessionSettings], drive: float) -> None:
+    """Wait for the lock, measure, and keep the reading.  Raises NotHeld, ExperimentFailed."""
     settings = session.settings
-    steps = math.ceil(abs(target - start) / (settings.ramp_hz_per_s * RAMP_STEP_S) - 1e-9)
-    for k in range(1, steps + 1):
-        session.stop.check()
-        drive = start + (target - start) * k / steps
-        session.bench.generator.frequency = drive
-        share = (place.next + k / steps) / len(settings.sweep)
-        session.progress(f"point {place.next + 1} of {len(settings.sweep)}: drive at {drive:.2f} Hz", min(share, 1.0))
-        session.wait(RAMP_STEP_S)
-        if k % round(_LOOK_EVERY_S / RAMP_STEP_S) == 0:
-            held_spin(session, drive)
+    _wait_for_lock(session, drive)
+    row, counts = _measure(session, drive)
+    if settings.record_s:
+        _record(session, drive)
+    text = f"spin and laser were counted at {drive:g} Hz"
+    session.writer.event(session.now(), COUNTED, text, drive_frequency_hz=drive, **counts)
+    session.keep(
+        row | {"time_s": session.now()}, _time_left(settings, _points_done([*session.rows, row], settings.sweep))
+    )
 
 
 def _wait_for_lock(session: Session[PrecessionSettings], drive: float) -> None:
@@ -275,11 +199,12 @@ def _wait_for_lock(session: Session[PrecessionSettings], drive: float) -> None:
     raise NotHeld(seen[-1], drive)
 
 
-def _measure(session: Session[PrecessionSettings], drive: float) -> Row:
-    """Spin and precession of a locked top.  Raises NotHeld, ExperimentFailed."""
+def _measure(session: Session[PrecessionSettings], drive: float) -> tuple[Row, dict[str, Any]]:
+    """Spin and precession of a locked top, and the gates that they are from.  Raises NotHeld, ExperimentFailed."""
     settings = session.settings
     spins = _counted(session, drive, settings.trigger_level_v, 1)
-    _still_held(session, drive, spins)
+    _still_held(session, drive, spins.frequency)
+    _calm(session, drive, swing_of(spins))
     if settings.laser_input == 1:
         session.ask(Task("Connect the laser's phototransistor to the counter's input 1, in place of the tape's."))
     laser = _counted(session, drive, settings.laser_trigger_level_v, settings.laser_input)
@@ -287,16 +212,36 @@ def _measure(session: Session[PrecessionSettings], drive: float) -> Row:
         session.ask(Task("Connect the tape's phototransistor to the counter's input 1 again."))
     _count_the_tape_again(session)
     held_spin(session, drive)  # else what the laser counted is of a top on its way down
-    spin, u_spin = _mean(spins, settings)
-    precession, u_precession = _mean(_checked(session, laser, drive), settings)
-    return {
+    _check_pulses(settings, laser)
+    spin, precession = rates_at_point(spins, laser)
+    _say_what_was_miscounted(session, laser, precession, drive)
+    row = {
         "drive_frequency_hz": drive,
         "drive_frequency_u_hz": settings.clocks_u * drive,
-        "spin_frequency_hz": spin,
-        "spin_frequency_u_hz": u_spin,
-        "precession_frequency_hz": precession,
-        "precession_frequency_u_hz": u_precession,
+        "spin_frequency_hz": spin.value,
+        "spin_frequency_u_hz": _u(spin, settings),
+        "precession_frequency_hz": precession.value,
+        "precession_frequency_u_hz": _u(precession, settings),
     }
+    return row, gates_event(spins, laser)
+
+
+def _calm(session: Session[PrecessionSettings], drive: float, swing: Swing | None) -> None:
+    """Take the swing about the drive off, which hardly anything damps and each change of the drive may enlarge.
+
+    Where the top is farthest ahead of the drive, or behind it, it turns as fast as the drive: set forward or back by as
+    much, the drive finds it at rest where it belongs.  The drive is set so by a frequency that differs for a moment.
+    """
+    if swing is None or swing.size < _CALM or not swing.frequency * _STEP_S < _SHORT:
+        return
+    half = 0.5 / swing.frequency
+    number = math.ceil((session.now() + _STEP_S - swing.crest) / half)
+    ahead = swing.size if number % 2 == 0 else -swing.size
+    session.wait(swing.crest + number * half - _STEP_S / 2 - session.now())
+    session.bench.generator.frequency = drive + ahead / _STEP_S
+    session.wait(_STEP_S)
+    session.bench.generator.frequency = drive
+    session.event("calmed", f"the top swung {swing.size:.2f} turns about the drive: the drive was moved by as much")
 
 
 def _count_the_tape_again(session: Session[PrecessionSettings]) -> None:
@@ -307,24 +252,31 @@ def _count_the_tape_again(session: Session[PrecessionSettings]) -> None:
         session.reconnect("counter", error, lambda: prepare_counter(session))
 
 
-def _counted(session: Session[PrecessionSettings], drive: float, level_v: float, channel: int) -> Array:
-    """Counts at an input of the counter, shape (counts,) [Hz], NaN where there was none.
+def _counted(session: Session[PrecessionSettings], drive: float, level_v: float, channel: int) -> Gates:
+    """The gates of an input of the counter.
 
-    Their gates differ by parts of a period.  A gate begins and ends with a pulse, and a late pulse is the likelier one.
-    If a gate is a whole number of periods, its last pulse is one that came no earlier in its period than the first, so
-    the count is too low by up to half the scatter of the gates; over gates of all lengths both ends are late alike.
+    A gate begins and ends with a pulse.  Pulses come early and late where a nutation goes on beside the wobble in step,
+    at the beats of the two, and a late pulse is the likelier one to begin or end a gate.  Both ends are late alike, and
+    no beat meets one gate as it meets the next, where gates begin and end at times that have nothing to do with pulses:
+    so their lengths and the pauses between them are drawn.  Numbers that are spread more evenly than by chance make the
+    mean better and its uncertainty unknown.
     """
     settings = session.settings
     counter = session.bench.counter
-    counts: list[float] = []
+    found: list[tuple[float, float, float]] = []
+    seed = session.writer.record.seed  # of a virtual run, which is the same each time
+    random = np.random.default_rng(None if seed is None else (seed, round(1e6 * drive), channel))
 
     def prepare(gate_s: float = settings.gate_s) -> None:
         counter.prepare(gate_s=gate_s, trigger_level_v=level_v, channel=channel)
 
-    while len(counts) < settings.counts:
+    while len(found) < settings.counts:
         session.stop.check()
+        length, pause = random.random(2).tolist()
+        gate_s = round(settings.gate_s * (_GATES[0] + (_GATES[1] - _GATES[0]) * length), 6)
         try:
-            prepare(round(settings.gate_s + len(counts) * _GOLDEN % 1 / drive, 6))
+            prepare(gate_s)
+            session.wait(pause * _PAUSES / drive)
             count = counter.frequency()
             session.bench.record_settings("counter")  # raises if they are not as they were set
         except InstrumentError as error:
@@ -332,8 +284,16 @@ def _counted(session: Session[PrecessionSettings], drive: float, level_v: float,
                 raise
             session.reconnect("counter", error, prepare)
         else:
-            counts.append(math.nan if count is None else count)
-    return np.array(counts)
+            found.append(_gate(session.now(), gate_s, count))
+    begin, end, frequency = np.array(found).T
+    return Gates(begin, end, frequency)
+
+
+def _gate(end: float, gate_s: float, count: float | None) -> tuple[float, float, float]:
+    """Begin, end [s] and frequency [Hz] of a gate that ended now: it lasts up to the first pulse behind its length."""
+    if count is None or not count * gate_s < _MOST_PERIODS:
+        return end - gate_s, end, math.nan if count is None else count
+    return end - math.ceil(count * gate_s - 1e-6) / count, end, count
 
 
 def _still_held(session: Session[PrecessionSettings], drive: float, spins: Array) -> None:
@@ -346,29 +306,31 @@ def _still_held(session: Session[PrecessionSettings], drive: float, spins: Array
         raise NotHeld(worst, drive)
 
 
-def _checked(session: Session[PrecessionSettings], laser: Array, drive: float) -> Array:
-    """The counts of the laser; a likely miscount gives an event, and stays in the mean.  Raises ExperimentFailed."""
-    settings = session.settings
-    seen = laser[np.isfinite(laser)]
-    if seen.size < 3:
+def _check_pulses(settings: PrecessionSettings, laser: Gates) -> None:
+    """Raise ExperimentFailed where the laser is hardly ever cut."""
+    if np.isfinite(laser.frequency).sum() < 3:
         raise ExperimentFailed(
             f"the counter sees no laser pulses at {settings.laser_trigger_level_v:g} V, input {settings.laser_input}: "
             "does the stem cut the beam, and is the trigger level between free and cut "
             "(precession.laser_trigger_level_v)?"
         )
-    middle = float(np.median(seen))
-    usual = 1.4826 * float(np.median(np.abs(seen - middle)))
-    far = np.abs(seen - middle) > max(_FAR * usual, 0.5 / settings.gate_s)
-    if far.any() or seen.size < laser.size:
-        values = ", ".join(f"{value:.4g}" for value in laser)
-        session.event("miscounted", f"the laser's counts at {drive:g} Hz differ: {values} Hz", drive_frequency_hz=drive)
-    return seen
 
 
-def _mean(counts: Array, settings: PrecessionSettings) -> tuple[float, float]:
-    """Mean of counts and its standard uncertainty [Hz]."""
-    one = float(counts.std(ddof=1)) if settings.reading_u_hz is None else settings.reading_u_hz
-    return float(counts.mean()), max(one / math.sqrt(counts.size), _LEAST_U_HZ)
+def _say_what_was_miscounted(session: Session[PrecessionSettings], laser: Gates, found: Rate, drive: float) -> None:
+    """An event where gates of the laser were left out, or had no count."""
+    said = [f"gate {gate + 1} has {pulses_too_many(pulses)}" for gate, pulses in found.wrong]
+    if found.missing:
+        said.append(f"{found.missing} of {len(laser)} gates have no count")
+    if said:
+        text = f"the laser's gates at {drive:g} Hz: {', '.join(said)}; left out"
+        session.event("miscounted", text, drive_frequency_hz=drive)
+
+
+def _u(rate: Rate, settings: PrecessionSettings) -> float:
+    """Standard uncertainty of a rate [Hz]; one that the configuration gives is that of one count."""
+    if settings.reading_u_hz is not None:
+        return settings.reading_u_hz / math.sqrt(settings.counts)
+    return max(rate.u, _LEAST_U_HZ)
 
 
 def _record(session: Session[PrecessionSettings], drive: float) -> None:

@@ -37,7 +37,7 @@ def run(session: Session[SpinSettings]) -> None:
     settings = session.settings
     prepare_counter(session)
     session.begin(lambda: drive_up_and_let_go(session))
-    top = FreeTop(session, last=session.rows[-1] if session.rows else None)
+    top = FreeTop(session, session.rows[-3:])
     for asked in session.readings_every(settings.interval_s, settings.longest_s):
         reading = top.read()
         if reading:

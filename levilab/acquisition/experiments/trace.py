@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 import numpy as np
 from pydantic import AfterValidator, Field, PositiveFloat, PositiveInt
 
 from instruments.drivers.oscilloscope import NeverTriggered
-from instruments.errors import InstrumentError, OutOfRange
+from instruments.errors import CommandRefused, InstrumentError, OutOfRange
+from levilab.acquisition.driving import HELD_WITHIN_HZ, check_drive
 from levilab.acquisition.experiment import Experiment, ExperimentSettings
 from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import ConfigError
 from levilab.runs.channel import Channel
+from levilab.runs.traces import INDEX, described_times, undescribed_codes
 
 if TYPE_CHECKING:
     from instruments.drivers.oscilloscope import Trace
@@ -23,6 +26,15 @@ if TYPE_CHECKING:
 
 #: A signal that moves by fewer codes than this is none: nothing is plugged in, or it is far too small for the scale.
 _FEWEST_CODES = 3
+#: So many divisions from its middle a scope records and triggers: the DS1000Z 5, others more.
+_HALF_SCREEN = 5
+#: Added where the oscilloscope refuses a setting (manuals of the DS1000Z, :CHANnel<n>:OFFSet, and of the DSO-X 1000).
+_OFFSETS = (
+    "a DS1000Z takes trace.offset_v from -2 to 2 V, and from 0.5 V a division (trace.volts_per_division) on from -100 "
+    "to 100 V; a DSOX1000 from -2 to 2 V, and from 0.2 V a division on from -50 to 50 V"
+)
+#: What the light of the tape is called, and so few of its pulses say how fast it turns.
+TAPE, _FEWEST_PULSES = "tape", 3
 #: A record of which more than this share lies beyond the screen is worth a warning.
 _CLIPPED_SHARE = 1e-3
 
@@ -42,11 +54,11 @@ class TraceSettings(ExperimentSettings):
     channels: Annotated[tuple[PositiveInt, ...], Field(min_length=1), AfterValidator(_distinct)] = Field(
         default=(1,), description="channels of the oscilloscope to record,"
     )
-    shows: tuple[str, ...] = Field(default=("tape",), description="what each of them shows")
+    shows: tuple[str, ...] = Field(default=(TAPE,), description="what each of them shows")
     duration_s: PositiveFloat = Field(default=0.5, description="a record is at least so long")
     points: PositiveInt = Field(default=6000, description="and has at least so many points")
-    volts_per_division: PositiveFloat = 0.2
-    offset_v: float = Field(default=0.65, description="voltage in the middle of the screen")
+    volts_per_division: float = Field(default=0.2, ge=1e-3, le=10.0)
+    offset_v: float = Field(default=0.65, ge=-100.0, le=100.0, description="voltage in the middle of the screen")
     coupling: Literal["DC", "AC"] = Field(default="DC", description="DC or AC")
     trigger_channel: PositiveInt | None = Field(
         default=None, description="the first of the channels, if not given", examples=[1]
@@ -74,29 +86,21 @@ class TraceSettings(ExperimentSettings):
         return self.shows[k] if k < len(self.shows) else f"channel {channel}"
 
     def check(self, table: str, limits: Limits) -> None:
-        """Raise ConfigError for a drive that the bench does not allow."""
-        frequency = self.drive_frequency_hz
-        if frequency is None:
-            return
-        for name, wanted, limit in (
-            ("drive_amplitude_vpp", self.drive_amplitude_vpp, limits.drive_amplitude_vpp),
-            ("drive_frequency_hz", frequency, limits.drive_frequency_hz),
-        ):
-            if wanted > limit:
-                raise ConfigError(
-                    f"{table}.{name} = {wanted:g} is more than this bench allows, limits.{name} = {limit:g}"
-                )
-        if frequency < limits.drive_lowest_hz:
+        """Raise ConfigError for a trigger beyond the screen, and for a drive that the bench does not allow."""
+        low, high = (self.offset_v + k * self.volts_per_division for k in (-_HALF_SCREEN, _HALF_SCREEN))
+        if self.trigger_source in self.channels and not low <= self.trigger_level_v <= high:
             raise ConfigError(
-                f"{table}.drive_frequency_hz = {frequency:g} is less than this bench allows, "
-                f"limits.drive_lowest_hz = {limits.drive_lowest_hz:g}"
+                f"{table}.trigger_level_v = {self.trigger_level_v:g} is beyond what the oscilloscope records, {low:g} "
+                f"to {high:g} V: change it, {table}.offset_v or {table}.volts_per_division"
             )
+        if self.drive_frequency_hz is not None:
+            check_drive(table, limits, self.drive_amplitude_vpp, [("drive_frequency_hz", self.drive_frequency_hz)])
 
     def for_scene(self, scene: Scene) -> Self:
         """See the base: the laser beside the tape, and the scene's drive, where neither was set."""
         changes: dict[str, object] = {}
         if not {"channels", "shows"} & self.model_fields_set:
-            changes |= {"channels": (1, 3), "shows": ("tape", "laser")}
+            changes |= {"channels": (1, 3), "shows": (TAPE, "laser")}
         if "drive_frequency_hz" not in self.model_fields_set and scene.drive.waveform != "off":
             changes["drive_frequency_hz"] = scene.drive.frequency_hz
         return self.model_copy(update=changes)
@@ -126,18 +130,32 @@ def run(session: Session[TraceSettings]) -> None:
     _prepare_scope(session)
     _drive(session)
     session.begin(lambda: None, resumed=f"the next record is number {len(session.rows) + 1}")
-    while len(session.rows) < settings.records:
-        _take_records(session)
-
-
-def _take_records(session: Session[TraceSettings]) -> None:
-    """Records at the interval until there are all, or one is lost with the oscilloscope."""
-    settings = session.settings
+    if session.earlier:
+        _note_what_was_cut_short(session)
+    if len(session.rows) >= settings.records:
+        return
+    watch = _Watch(session)
     for _ in session.readings_every(settings.interval_s, math.inf):
         if traces := _take(session):
             _keep(session, traces)
+            watch.look(traces)
         if len(session.rows) >= settings.records:
             return
+
+
+def _note_what_was_cut_short(session: Session[TraceSettings]) -> None:
+    """A process that was killed in the middle of a record has left codes without a line, or channels without a row."""
+    folder = session.writer.folder
+    if left := undescribed_codes(folder):
+        text = f"{', '.join(left)}: the run was cut short before {INDEX} said how to read it; it stays, and is left out"
+        session.event("cut short", text)
+    number, channels = len(session.rows) + 1, len(session.settings.channels)
+    last = session.rows[-1]["time_s"] if session.rows else -math.inf
+    # the channels of a record are kept after its time was noted, and before its row
+    more = sum(time >= last for time in described_times(folder)) - (channels if session.rows else 0)
+    if more > 0:
+        text = f"record {number} was cut short after {more} of {channels} channels; it is taken anew"
+        session.event("cut short", text, record=number)
 
 
 # --- setting up ---
@@ -145,18 +163,22 @@ def _take_records(session: Session[TraceSettings]) -> None:
 
 def _prepare_scope(session: Session[TraceSettings], sweep: str = "normal") -> None:
     settings = session.settings
-    session.bench.oscilloscope.prepare(
-        channels=settings.channels,
-        duration_s=settings.duration_s,
-        points=settings.points,
-        volts_per_division=settings.volts_per_division,
-        offset_v=settings.offset_v,
-        coupling=settings.coupling,
-        trigger_level_v=settings.trigger_level_v,
-        trigger_slope=settings.trigger_slope,
-        trigger_source=settings.trigger_source,
-        sweep=sweep,
-    )
+    try:
+        session.bench.oscilloscope.prepare(
+            channels=settings.channels,
+            duration_s=settings.duration_s,
+            points=settings.points,
+            volts_per_division=settings.volts_per_division,
+            offset_v=settings.offset_v,
+            coupling=settings.coupling,
+            trigger_level_v=settings.trigger_level_v,
+            trigger_slope=settings.trigger_slope,
+            trigger_source=settings.trigger_source,
+            sweep=sweep,
+        )
+    except CommandRefused as refused:
+        address = session.bench.address("oscilloscope")
+        raise InstrumentError(address, f"{str(refused).removeprefix(address + ': ')}: {_OFFSETS}") from refused
 
 
 def _drive(session: Session[TraceSettings]) -> None:
@@ -170,6 +192,57 @@ def _drive(session: Session[TraceSettings]) -> None:
     )
     session.event("drive on", f"drive on at {settings.drive_frequency_hz:g} Hz")
     session.bench.generator.output = True
+    session.bench.record_settings("generator")
+
+
+# --- the drive, between records ---
+
+
+@dataclass
+class _Watch:
+    """Looks at the drive after each record: whether the generator is as it was set, and whether the top follows it.
+
+    lost: whether the last record showed a top that does not.
+    """
+
+    session: Session[TraceSettings]
+    lost: bool = False
+
+    def look(self, traces: list[Trace]) -> None:
+        """What a record that is kept says of the drive; a generator that was changed or is lost is set up anew."""
+        session, drive = self.session, self.session.settings.drive_frequency_hz
+        if drive is None:
+            return
+        number = len(session.rows)
+        try:
+            session.check_settings("generator")
+        except InstrumentError as error:
+            session.warn(f"record {number} may be of another drive: the generator was changed, or failed ({error})")
+            session.reconnect("generator", error, lambda: _drive(session))
+            return
+        tape = next((one for one in traces if session.settings.label(one.channel) == TAPE), None)
+        spin = None if tape is None else spin_of_record(tape, session.settings.trigger_level_v)
+        lost = spin is not None and abs(spin - drive) > HELD_WITHIN_HZ
+        if spin is not None and lost and not self.lost:
+            session.warn(f"record {number} shows a tape of {spin:.2f} Hz: the drive of {drive:g} Hz lost the top")
+        elif spin is not None and self.lost and not lost:
+            session.event("locked", f"record {number} shows a tape of {spin:.2f} Hz: the top follows the drive again")
+        self.lost = lost
+
+
+def spin_of_record(trace: Trace, level_v: float) -> float | None:
+    """How often a second the signal passes a level upwards: the median of the intervals [Hz]; None of fewer than three.
+
+    It passes once more only after it was below by a quarter of its range: noise on a flank is no pulse.
+    """
+    volts = trace.volts[~np.isnan(trace.volts)]
+    if not volts.size:
+        return None
+    lower = level_v - 0.25 * float(np.ptp(volts))
+    side = np.where(volts > level_v, 1, np.where(volts < lower, -1, 0))
+    seen = np.flatnonzero(side)  # between the two levels it stays on the side where it was
+    up = seen[1:][np.diff(side[seen]) > 0]
+    return None if up.size < _FEWEST_PULSES else 1 / (float(np.median(np.diff(up))) * trace.dt_s)
 
 
 # --- records ---
@@ -260,4 +333,5 @@ EXPERIMENT = Experiment(
     channels=channels,
     run=run,
     also_needs=also_needs,
+    called="record",
 )

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import math
-import sys
 from typing import TYPE_CHECKING
 
 from levilab.benchmark.estimators.study import OURS, Study, as_document, study
-from levilab.files import CannotWrite, replace_atomically
+from levilab.benchmark.found import give, tell
 from levilab.present.terminal import new_table, terminal
 
 if TYPE_CHECKING:
@@ -17,30 +15,15 @@ if TYPE_CHECKING:
 
 def run_and_tell(*, trials: int, out: Path | None, as_json: bool) -> None:
     """The whole command.  Raises CannotWrite."""
-    found = study(trials=trials, tell=lambda text: print(f"measuring {text}", file=sys.stderr))  # noqa: T201
-    document = json.dumps(as_document(found), indent=2, allow_nan=False)
-    if as_json:
-        print(document)  # noqa: T201
-    else:
-        print_study(found)
-    if out is not None:
-        _write(found, document, out)
+    found = study(trials=trials, tell=tell)
 
+    def save_figure(path: Path) -> None:
+        from levilab.benchmark.estimators.figure import estimators_figure
+        from levilab.present.style import save_png
 
-def _write(found: Study, document: str, out: Path) -> None:
-    # matplotlib, which a benchmark that is not written does not need
-    from levilab.benchmark.estimators.figure import estimators_figure
-    from levilab.present.style import save_png
+        save_png(estimators_figure(found), path)
 
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        replace_atomically(out / "estimators.json", document + "\n")
-        save_png(estimators_figure(found), out / "estimators.png")
-    except OSError as error:
-        raise CannotWrite(
-            f"{out}: the result cannot be written ({error.strerror or error}): choose another place"
-        ) from None
-    print(f"wrote {out / 'estimators.json'} and {out / 'estimators.png'}", file=sys.stderr)  # noqa: T201
+    give("estimators", as_document(found), lambda: print_study(found), save_figure, out=out, as_json=as_json)
 
 
 def print_study(found: Study) -> None:

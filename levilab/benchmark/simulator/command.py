@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
-import sys
 from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
+from levilab.benchmark.found import give, tell
 from levilab.benchmark.simulator.work_precision import Comparison, as_document, compare
-from levilab.files import CannotWrite, replace_atomically
 from levilab.present.terminal import new_table, terminal
 
 if TYPE_CHECKING:
@@ -19,30 +17,15 @@ if TYPE_CHECKING:
 
 def run_and_tell(*, quick: bool, out: Path | None, as_json: bool) -> None:
     """The whole command.  Raises CannotWrite."""
-    found = compare(quick=quick, tell=lambda name: print(f"measuring {name}", file=sys.stderr))  # noqa: T201
-    document = json.dumps(as_document(found), indent=2, allow_nan=False)
-    if as_json:
-        print(document)  # noqa: T201
-    else:
-        print_comparison(found)
-    if out is not None:
-        _write(found, document, out)
+    found = compare(quick=quick, tell=tell)
 
+    def save_figure(path: Path) -> None:
+        from levilab.benchmark.simulator.figure import work_precision_figure
+        from levilab.present.style import save_png
 
-def _write(found: Comparison, document: str, out: Path) -> None:
-    # matplotlib, which a benchmark that is not written does not need
-    from levilab.benchmark.simulator.figure import work_precision_figure
-    from levilab.present.style import save_png
+        save_png(work_precision_figure(found), path)
 
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        replace_atomically(out / "simulator.json", document + "\n")
-        save_png(work_precision_figure(found), out / "simulator.png")
-    except OSError as error:
-        raise CannotWrite(
-            f"{out}: the result cannot be written ({error.strerror or error}): choose another place"
-        ) from None
-    print(f"wrote {out / 'simulator.json'} and {out / 'simulator.png'}", file=sys.stderr)  # noqa: T201
+    give("simulator", as_document(found), lambda: print_comparison(found), save_figure, out=out, as_json=as_json)
 
 
 def print_comparison(found: Comparison) -> None:

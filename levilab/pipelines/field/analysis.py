@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 from analysis.errors import AnalysisError
 from analysis.field.fit import LEARNS_NOTHING, fit_scan
 from analysis.field.floating import FERRITE_PER_K, Floating, follow
+from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
+from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.field.device import FieldOptions, known_of, known_top, usual
 from levilab.pipelines.field.quantities import SHOWN
 from levilab.pipelines.field.readings import FieldReadings, read_scan_file, read_scan_run
-from levilab.pipelines.result import Place, place_of
-from levilab.pipelines.sources import Needs, Source, collect
+from levilab.pipelines.sources import Needs
 from levilab.present.numbers import with_uncertainty
-from levilab.runs.run import find_run
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from analysis.field.fit import FieldScan
     from analysis.field.floating import KnownTop
+    from levilab.pipelines.sources import Source
 
 FIELD = "field"
 #: The runs that suit, and what is needed of a data file.
@@ -36,14 +37,6 @@ NEEDS = Needs(
 )
 #: Correlations above this are worth a word.
 _STRONG = 0.9
-
-
-@dataclass(frozen=True)
-class Origin:
-    """Where the fit of one run comes from.  options: how it was made; text: for people."""
-
-    options: FieldOptions
-    text: str = "analyzed now"
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,26 +67,8 @@ class Mean(Estimate):
     runs: int = 1
 
 
-@dataclass(frozen=True)
-class FieldAnalysis:
-    """Scans, each by itself and together.
-
-    runs, origins: one per source; place: where the result belongs; warnings: about the inputs; remarks: what does not
-    belong to the analysis.
-    """
-
-    sources: tuple[Source[FieldReadings], ...]
-    runs: tuple[FieldRun, ...]
-    options: FieldOptions
-    place: Place
-    warnings: tuple[str, ...]
-    remarks: tuple[str, ...]
-    origins: tuple[Origin, ...]
-
-    @property
-    def home(self) -> Path:
-        """The folder that the result belongs to."""
-        return self.place.folder
+class FieldAnalysis(Analyzed[FieldReadings, FieldRun, None, FieldOptions]):
+    """Scans, each by itself and together."""
 
     @property
     def values(self) -> Mapping[str, Estimate]:
@@ -109,32 +84,9 @@ class FieldAnalysis:
         agree = _scatter_in_words(strength)
         return f"{len(self.runs)} scans: {_shown('strength', strength)} in the mean; {agree}. {_advice(self.values)}"
 
-    @property
-    def all_warnings(self) -> list[str]:
-        """Every warning once, a run's with its name where there are several runs."""
-        several = len(self.runs) > 1
-        texts = list(self.warnings)
-        common = set.intersection(*(set(run.warnings) for run in self.runs))
-        for source, run in zip(self.sources, self.runs, strict=True):
-            prefix = f"{source.name}: " if several else ""
-            texts += [text if text in common else prefix + text for text in (*source.warnings, *run.warnings)]
-        return list(dict.fromkeys(texts))
-
-
-def analyze_scans(paths: Sequence[Path], options: FieldOptions) -> FieldAnalysis:
-    """Fit the field of a ring to every scan found at the paths.  Raises DataError for what cannot be used."""
-    paths = [find_run(path) for path in paths]
-    found = collect(paths, NEEDS, lambda _: options)
-    runs = tuple(analyze_source(source, options) for source in found.sources)
-    return FieldAnalysis(
-        sources=found.sources,
-        runs=runs,
-        options=options,
-        place=place_of(paths, found.sources),
-        warnings=(*found.warnings, *about_inputs(found.sources, options)),
-        remarks=found.remarks,
-        origins=(Origin(options),) * len(runs),
-    )
+    def about_run(self, run: FieldRun) -> Iterable[str]:
+        """What to know of one scan."""
+        return run.warnings
 
 
 def analyze_source(source: Source[FieldReadings], options: FieldOptions) -> FieldRun:
@@ -164,16 +116,18 @@ def analyze_source(source: Source[FieldReadings], options: FieldOptions) -> Fiel
     return FieldRun(scan, top, floating, _in_words(scan, floating), every)
 
 
-def about_inputs(sources: Sequence[Source[FieldReadings]], options: FieldOptions) -> Iterable[str]:
-    """What to know of the inputs before using the numbers."""
-    synthetic = sum(source.synthetic for source in sources)
-    if 0 < synthetic < len(sources):
-        yield (
-            f"{synthetic} of {len(sources)} inputs are SYNTHETIC, the others are not known to be: "
-            "a mean over both says nothing about a real base"
-        )
-    if options.columns and all(source.run for source in sources):
-        yield "names of columns were given, but none of the inputs is a data file"
+METHOD = Method(
+    needs=NEEDS,
+    kind=FieldAnalysis,
+    options=FieldOptions,
+    fit=analyze_source,
+    mixed="a mean over both says nothing about a real base",
+)
+
+
+def analyze_scans(paths: Sequence[Path], options: FieldOptions) -> FieldAnalysis:
+    """Fit the field of a ring to every scan found at the paths.  Raises DataError for what cannot be used."""
+    return METHOD.analyze(paths, options)
 
 
 def means(runs: Sequence[Mapping[str, Estimate]]) -> dict[str, Mean]:
@@ -204,7 +158,7 @@ def _shown(name: str, estimate: Estimate) -> str:
 def _scatter_in_words(strength: Estimate) -> str:
     assert isinstance(strength, Mean)
     share = 100 * strength.scatter / abs(strength.value or 1.0)
-    return f"one differs from another by {share:.2g} %"
+    return f"one differs from another by {digits(share)} %"
 
 
 def _in_words(scan: FieldScan, floating: Floating | None) -> str:

@@ -1,28 +1,30 @@
-"""Limits at some paths: each run by itself, and all lower and all upper ones together."""
+"""Limits at some paths: each run by itself, and those of the same conditions together."""
 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from analysis import stability
 from analysis.errors import AnalysisError
-from analysis.limits import Comparison, Statistics, compare, nearest_edge, spins_of_window, summarize
+from analysis.limits import Comparison, Sample, Statistics, combine, compare, nearest_edge, spins_of_window, summarize
+from analysis.numbers import digits
 from levilab.errors import DataError
+from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.limit.readings import LimitReadings, read_limit_file, read_limit_run
-from levilab.pipelines.result import Place, place_of
-from levilab.pipelines.sources import InputOptions, Needs, Source, collect
+from levilab.pipelines.sources import InputOptions, Needs
 from levilab.present.numbers import with_uncertainty
-from levilab.runs.run import find_run
 from levilab.simulator.keys import SceneError
 from levilab.simulator.scene import Scene, scene_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
+
+    from levilab.pipelines.sources import Source
 
 Which = Literal["lower", "upper"]
 
@@ -36,6 +38,8 @@ NEEDS = Needs(
 )
 #: Kinds of events that say how a top was lost, in words.
 ENDS = {"fell": "fell freely", "lock lost": "was lost by the drive", "top lost": "fell under the drive"}
+#: Waveforms of a drive in words.
+_WAVEFORMS = {"SIN": "sine", "SQU": "square", "TRI": "triangle"}
 #: Names of what theory says, of each limit.
 LOWER_EDGE, UPPER_EDGE = "lower edge of the linear window", "upper edge of the linear window"
 RESONANCE = "resonance of the wobble"
@@ -71,24 +75,56 @@ class Device:
 
 
 @dataclass(frozen=True)
-class Limits:
-    """What was found of one run, or of several of one kind.
+class Conditions:
+    """Under which limits were measured; limits under other conditions are no repetitions of these.
 
     Attributes:
         which: of the two limits.
-        statistics: of the repetitions.
-        comparisons: with theory.
-        device: that theory is of; None of runs whose tops differ.
-        ends: kind of event → how often a top was lost so.
-        runs: numbers of the inputs that it is of, from 0.
+        top: where the parameters of the top come from, in words.
+        waveform, amplitude_vpp, creep_hz_per_s, step_hz: the drive of an upper limit, and how far it goes between two
+            looks at the top; None where the data do not say, and of lower limits: a free top falls without a drive.
     """
 
     which: Which
+    top: str
+    waveform: str | None = None
+    amplitude_vpp: float | None = None
+    creep_hz_per_s: float | None = None
+    step_hz: float | None = None
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        drive = [
+            "" if self.waveform is None else _WAVEFORMS.get(self.waveform, self.waveform),
+            "" if self.amplitude_vpp is None else f"{self.amplitude_vpp:g} Vpp",
+            "" if self.creep_hz_per_s is None else f"{self.creep_hz_per_s:g} Hz/s",
+            "" if self.step_hz is None else f"a look each {self.step_hz:g} Hz",
+        ]
+        return ", ".join([*filter(None, drive), self.top])
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What was found of one run, or of several under the same conditions.
+
+    Attributes:
+        which: of the two limits.
+        conditions: of them.
+        statistics: of the repetitions.
+        comparisons: with theory.
+        device: that theory is of.
+        ends: kind of event → how often a top was lost so.
+        runs: of a group, the numbers of the inputs, from 0.
+    """
+
+    which: Which
+    conditions: Conditions
     statistics: Statistics
     comparisons: tuple[Comparison, ...]
-    device: Device | None
+    device: Device
     ends: Mapping[str, int]
-    runs: tuple[int, ...]
+    runs: tuple[int, ...] = ()
 
     @property
     def text(self) -> str:
@@ -96,34 +132,13 @@ class Limits:
         return " ".join(_sentences(self))
 
 
-@dataclass(frozen=True)
-class LimitAnalysis:
-    """Limits, each run by itself and those of a kind together.
-
-    Attributes:
-        sources: the inputs.
-        runs: one per source.
-        groups: one for each of the limits, lower and upper, that there are runs of.
-        options: how it was analyzed.
-        place: where the result belongs.
-        warnings: about the inputs.
-        remarks: what does not belong to the analysis.
-        origins: where each run's numbers come from, in words.
-    """
-
-    sources: tuple[Source[LimitReadings], ...]
-    runs: tuple[Limits, ...]
-    groups: tuple[Limits, ...]
-    options: LimitOptions
-    place: Place
-    warnings: tuple[str, ...]
-    remarks: tuple[str, ...]
-    origins: tuple[str, ...]
+class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOptions]):
+    """Limits, each run by itself and those of the same conditions together."""
 
     @property
-    def home(self) -> Path:
-        """The folder that the result belongs to."""
-        return self.place.folder
+    def groups(self) -> tuple[Limits, ...]:
+        """One for each of the conditions that there are runs of, lower limits first."""
+        return self.combined
 
     @property
     def text(self) -> str:
@@ -131,100 +146,135 @@ class LimitAnalysis:
         return "  ".join(group.text for group in self.groups)
 
     @property
-    def all_warnings(self) -> list[str]:
-        """Every warning once, a run's with its name where there are several runs."""
-        texts = list(self.warnings)
-        for source, run in zip(self.sources, self.runs, strict=True):
-            prefix = f"{source.name}: " if len(self.runs) > 1 else ""
-            texts += [prefix + text for text in (*source.warnings, *warnings_of(run.statistics))]
+    def averaged(self) -> Sequence[Sequence[Source[LimitReadings]]]:
+        """Those of the same conditions."""
+        return tuple(tuple(self.sources[k] for k in group.runs) for group in self.groups)
+
+    def number(self, group: Limits) -> int | None:
+        """The number of a group among those of its kind, from 1; None where it is the only one."""
+        alike = [one for one in self.groups if one.which == group.which]
+        return alike.index(group) + 1 if len(alike) > 1 else None
+
+    def about_all(self) -> Iterable[str]:
+        """What to know of the limits of the same conditions, and of conditions that differ."""
+        for which in ("lower", "upper"):
+            texts = [group.conditions.text for group in self.groups if group.which == which]
+            if len(texts) > 1:
+                listed = "; ".join(texts)
+                yield f"the {which} limits are of {len(texts)} conditions and are not put together: {listed}"
         for group in self.groups:
+            yield from self._about_tops(group)
             if len(group.runs) > 1:
-                texts += warnings_of(group.statistics)
-        return list(dict.fromkeys(texts))
+                yield from warnings_of(group.statistics)
+
+    def _about_tops(self, group: Limits) -> Iterable[str]:
+        synthetic = sum(self.sources[k].synthetic for k in group.runs)
+        if 0 < synthetic < len(group.runs):
+            yield (
+                f"{synthetic} of {len(group.runs)} runs of {group.which} limits are SYNTHETIC, the others are not "
+                "known to be: a mean over both says nothing about a real top"
+            )
+
+    def about_run(self, run: Limits) -> Iterable[str]:
+        """What to know of one run."""
+        return warnings_of(run.statistics)
 
 
-def analyze_limits(paths: Sequence[Path], options: LimitOptions) -> LimitAnalysis:
-    """Statistics of the limits found at the paths, and what theory says of them.
-
-    Raises DataError for what cannot be used; the text names the file.
-    """
-    paths = [find_run(path) for path in paths]
-    found = collect(paths, NEEDS, lambda _: options)
-    runs = tuple(limits_of(source, options, k) for k, source in enumerate(found.sources))
-    groups = together(found.sources, runs, options)
-    return LimitAnalysis(
-        sources=found.sources,
-        runs=runs,
-        groups=groups,
-        options=options,
-        place=place_of(paths, found.sources),
-        warnings=(*found.warnings, *about_inputs(found.sources, groups)),
-        remarks=found.remarks,
-        origins=("analyzed now",) * len(runs),
-    )
-
-
-def limits_of(source: Source[LimitReadings], options: LimitOptions, number: int = 0) -> Limits:
+def limits_of(source: Source[LimitReadings], options: LimitOptions) -> Limits:
     """One input.  Raises DataError, which names the file."""
     device = device_of(source)
+    which = _which(source, device)
     try:
-        statistics = summarize(source.readings.limit, _u(source.readings, options))
+        statistics = summarize(_sample(source, which, options))
     except AnalysisError as error:
         raise DataError(f"{source.data}: {error}") from error
-    which = _which(source, statistics, device)
     kinds = Counter(str(event["kind"]) for event in source.run.events()) if source.run else Counter[str]()
     ends = {kind: kinds[kind] for kind in ENDS if kinds[kind]}
-    return Limits(which, statistics, _comparisons(statistics, device, which), device, ends, (number,))
+    return Limits(
+        which,
+        _conditions(source, which, device),
+        statistics,
+        _comparisons(statistics, device, which),
+        device,
+        ends,
+    )
 
 
 def together(
     sources: Sequence[Source[LimitReadings]], runs: Sequence[Limits], options: LimitOptions
 ) -> tuple[Limits, ...]:
-    """All lower limits, and all upper ones."""
-    groups = []
-    kinds: tuple[Which, ...] = ("lower", "upper")
-    for which in kinds:
-        numbers = tuple(k for k, run in enumerate(runs) if run.which == which)
-        if len(numbers) == 1:
-            groups.append(runs[numbers[0]])
-        elif numbers:
-            groups.append(_combined(which, numbers, sources, runs, options))
-    return tuple(groups)
+    """The limits of each of the conditions, lower ones first, else in the order in which they are given."""
+    groups: dict[tuple[Conditions, Device], list[int]] = {}
+    for k, run in sorted(enumerate(runs), key=lambda one: one[1].which):
+        groups.setdefault((run.conditions, run.device), []).append(k)
+    return tuple(
+        replace(runs[numbers[0]], runs=tuple(numbers))
+        if len(numbers) == 1
+        else _combined(tuple(numbers), sources, runs, options)
+        for numbers in groups.values()
+    )
 
 
 def _combined(
-    which: Which,
     numbers: tuple[int, ...],
     sources: Sequence[Source[LimitReadings]],
     runs: Sequence[Limits],
     options: LimitOptions,
 ) -> Limits:
-    us = [_u(sources[k].readings, options) for k in numbers]
-    known = [u for u in us if u is not None]
-    u = np.concatenate(known) if len(known) == len(us) else None
-    statistics = summarize(np.concatenate([sources[k].readings.limit for k in numbers]), u)
-    devices = {runs[k].device for k in numbers}
-    device = devices.pop() if len(devices) == 1 else None
+    first = runs[numbers[0]]
+    which, device = first.which, first.device
+    statistics = combine([_sample(sources[k], which, options) for k in numbers])
     ends = sum((Counter(runs[k].ends) for k in numbers), Counter[str]())
-    return Limits(which, statistics, _comparisons(statistics, device, which), device, dict(ends), numbers)
+    comparisons = _comparisons(statistics, device, which)
+    return replace(first, statistics=statistics, comparisons=comparisons, ends=dict(ends), runs=numbers)
 
 
-def _u(readings: LimitReadings, options: LimitOptions) -> np.ndarray | None:
-    return readings.u if options.reading_u is None else np.full(len(readings), options.reading_u)
+def _sample(source: Source[LimitReadings], which: Which, options: LimitOptions) -> Sample:
+    """The limits of a source; of an upper limit that levilab measured, u is a step of the drive over √12."""
+    readings = source.readings
+    if options.reading_u is not None:
+        return Sample(readings.limit, np.full(len(readings), options.reading_u))
+    stepped = which == "upper" and source.run is not None and readings.u is not None
+    return Sample(readings.limit, readings.u, readings.u * 12**0.5 if stepped and readings.u is not None else None)
 
 
-def _comparisons(statistics: Statistics, device: Device | None, which: Which) -> tuple[Comparison, ...]:
-    expected = device.expected(which) if device else {}
-    return tuple(compare(statistics, name, spin) for name, spin in expected.items())
+def _conditions(source: Source[LimitReadings], which: Which, device: Device) -> Conditions:
+    """As the run's configuration says."""
+    said = _settings_of(source)
+    if which == "lower" or not said:
+        return Conditions(which, device.name)
+    creep, interval = (_number(said.get(name)) for name in ("creep_hz_per_s", "interval_s"))
+    waveform = said.get("drive_waveform")
+    return Conditions(
+        which,
+        device.name,
+        waveform=waveform if isinstance(waveform, str) else None,
+        amplitude_vpp=_number(said.get("drive_amplitude_vpp")),
+        creep_hz_per_s=creep,
+        step_hz=None if creep is None or interval is None else round(creep * interval, 9),
+    )
 
 
-def _which(source: Source[LimitReadings], statistics: Statistics, device: Device) -> Which:
-    """As the run says; else the limit whose edge is nearer."""
+def _settings_of(source: Source[LimitReadings]) -> Mapping[str, Any]:
+    """The settings of the experiment, empty of a file."""
     table = source.run.record.configuration.get(LIMIT) if source.run else None
-    said = table.get("which") if isinstance(table, dict) else None
+    return table if isinstance(table, dict) else {}
+
+
+def _number(value: object) -> float | None:
+    return float(value) if isinstance(value, int | float) else None
+
+
+def _comparisons(statistics: Statistics, device: Device, which: Which) -> tuple[Comparison, ...]:
+    return tuple(compare(statistics, name, spin) for name, spin in device.expected(which).items())
+
+
+def _which(source: Source[LimitReadings], device: Device) -> Which:
+    """As the run says; else the limit whose edge is nearer."""
+    said = _settings_of(source).get("which")
     if said in {"lower", "upper"}:
         return "upper" if said == "upper" else "lower"
-    mean = statistics.mean.value or 0.0
+    mean = float(source.readings.limit.mean())
     return "upper" if nearest_edge(mean, (device.lower, device.upper)) == "upper" else "lower"
 
 
@@ -268,20 +318,24 @@ def warnings_of(statistics: Statistics) -> list[str]:
         )
     if statistics.scatter is None:
         texts.append("a single repetition: its scatter is not known, repeat it")
+    if statistics.mean.u and statistics.step**2 > 0.5 * statistics.mean.u**2 and statistics.scatter:
+        texts.append(
+            "the tops scatter by less than the drive's steps, which leave "
+            f"{statistics.step:.2g} Hz to the mean however often it is repeated: creep slower, or look more often "
+            "(limit.creep_hz_per_s, limit.interval_s)"
+        )
     return texts
 
 
-def about_inputs(sources: Sequence[Source[LimitReadings]], groups: Sequence[Limits]) -> Iterable[str]:
-    """What to know of the inputs before using the numbers."""
-    for group in groups:
-        synthetic = sum(sources[k].synthetic for k in group.runs)
-        if 0 < synthetic < len(group.runs):
-            yield (
-                f"{synthetic} of {len(group.runs)} runs of {group.which} limits are SYNTHETIC, the others are not "
-                "known to be: a mean over both says nothing about a real top"
-            )
-        if group.device is None:
-            yield f"the {group.which} limits are of tops that differ: their mean is not compared with theory"
+METHOD = Method(needs=NEEDS, kind=LimitAnalysis, options=LimitOptions, fit=limits_of, combine=together)
+
+
+def analyze_limits(paths: Sequence[Path], options: LimitOptions) -> LimitAnalysis:
+    """Statistics of the limits found at the paths, and what theory says of them.
+
+    Raises DataError for what cannot be used; the text names the file.
+    """
+    return METHOD.analyze(paths, options)
 
 
 # --- in words ---
@@ -290,8 +344,12 @@ def about_inputs(sources: Sequence[Source[LimitReadings]], groups: Sequence[Limi
 def _sentences(limits: Limits) -> Iterable[str]:
     found = limits.statistics
     many = f"{found.n} {limits.which} limits have the mean" if found.n > 1 else f"one {limits.which} limit,"
-    scatter = f" and scatter by {with_uncertainty(found.scatter)}" if found.scatter else ""
-    yield f"{many} {with_uncertainty(found.mean)}{scatter}."
+    scatter = f" and scatter by {with_uncertainty(found.scatter)}" if found.scatter and found.scatter.value else ""
+    scatter = scatter or " and do not scatter" * (found.scatter is not None)
+    yield f"{many} {with_uncertainty(found.mean)}{scatter} ({limits.conditions.text})."
+    if found.between:
+        beyond = with_uncertainty(found.between) if found.between.value else "no more than their tops do"
+        yield f"They are of {found.runs} runs, which differ by {beyond}."
     if limits.ends:
         yield "The top " + ", ".join(f"{ENDS[kind]} {_times(n)}" for kind, n in limits.ends.items()) + "."
     for one in limits.comparisons:
@@ -308,4 +366,4 @@ def _compared(one: Comparison) -> str:
     if one.p is None:
         return f"That is {where}."
     verdict = "which chance explains" if one.agrees else "more than chance makes"
-    return f"The mean lies {where}, {verdict} (p = {one.p:.2g})."
+    return f"The mean lies {where}, {verdict} (p = {digits(one.p)})."

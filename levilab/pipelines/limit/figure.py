@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
@@ -21,80 +21,124 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: One a run; colours of Okabe and Ito.
+#: One a run; colours of Okabe and Ito that theory does not have.
 _MARKERS = "osD^vP*X"
-_COLOURS = ("#0072B2", "#009E73", "#56B4E9", "#CC79A7", "#E69F00", "#000000")
+_COLOURS = ("#0072B2", "#009E73", "#56B4E9", "#E69F00", "#F0E442", "#000000")
 _MEAN = "#000000"
 _THEORY = {LOWER_EDGE: ("#D55E00", "--"), UPPER_EDGE: ("#D55E00", "--"), RESONANCE: ("#CC79A7", ":")}
-#: A line of theory so many times farther from the mean than the farthest limit would squeeze the limits.
-_NEAR = 5.0
-#: Height of a panel and of what lies about it [inch].
-_PANEL, _ABOUT = 3.4, 1.3
+#: A line of theory so many times farther from the mean than the farthest limit would squeeze the limits: it is named at
+#: the edge of the panel.
+_NEAR = 2.5
+#: Width of the figure; above a panel, a panel, and below it, where axis and legend are [inch].
+_WIDTH, _ABOVE, _PANEL, _BELOW = 9.0, 0.5, 2.9, 1.45
+#: Bins of the distribution, a scatter from the mean on either side, and fewer limits than this have none.
+_BINS, _REACH, _FEWEST = 14, 3.5, 5
 
 
 def limit_figure(analysis: LimitAnalysis) -> Figure:
-    """The limits top by top with mean, scatter and theory; beside them how they are distributed."""
+    """For each of the conditions the limits top by top with mean, scatter and theory, and how they are distributed."""
     with mpl.rc_context(STYLE):
-        n = len(analysis.groups)
-        height = n * (_PANEL + _ABOUT)
-        figure = Figure(figsize=(9, height))
+        each = _ABOVE + _PANEL + _BELOW
+        height = each * len(analysis.groups)
+        figure = Figure(figsize=(_WIDTH, height))
         for k, group in enumerate(analysis.groups):
-            bottom = (height - (k + 1) * (_PANEL + _ABOUT) + 0.6) / height
-            left = figure.add_axes((0.085, bottom, 0.685, _PANEL / height))
-            right = figure.add_axes((0.79, bottom, 0.195, _PANEL / height), sharey=left)
+            bottom = 1 - (k * each + _ABOVE + _PANEL) / height
+            left = figure.add_axes((0.085, bottom, 0.7, _PANEL / height))
+            right = figure.add_axes((0.805, bottom, 0.18, _PANEL / height), sharey=left)
             _draw_limits(left, analysis, group)
             _draw_distribution(right, analysis, group)
     return figure
 
 
 def _draw_limits(axes: Axes, analysis: LimitAnalysis, group: Limits) -> None:
-    found = group.statistics
-    mean, start = found.mean.value or 0.0, 1
-    several = len(group.runs) > 1
-    for k, number in enumerate(group.runs):
-        source = analysis.sources[number]
-        limit, u = source.readings.limit, source.readings.u
-        axes.errorbar(
-            np.arange(start, start + len(limit)),
-            limit,
-            u,
-            color=_COLOURS[k % len(_COLOURS)],
-            marker=_MARKERS[k % len(_MARKERS)],
-            linestyle="none",
-            markersize=5,
-            elinewidth=0.9,
-            zorder=3,
-            label=short_name(source.name).replace("$", r"\$").replace("_", " ") if several else "one top each",
-        )
-        start += len(limit)
+    found, mean = group.statistics, group.statistics.mean.value or 0.0
     every = _limits(analysis, group)
+    start = 1
+    for k in range(len(group.runs)):
+        start = _draw_run(axes, analysis, group, k, start)
     outliers = list(found.outliers)
     if outliers:
-        style = {"marker": "o", "markersize": 12, "markerfacecolor": "none", "color": "red", "linestyle": "none"}
-        axes.plot(np.array(outliers) + 1, every[outliers], label="outlier, in the mean", **style)  # type: ignore[arg-type]
-    reach = max(float(np.abs(every - mean).max()), 0.2)
+        style: Any = {"marker": "o", "markersize": 12, "markerfacecolor": "none", "color": "red", "linestyle": "none"}
+        axes.plot(np.array(outliers) + 1, every[outliers], label="outlier, in the mean", **style)
     axes.axhline(mean, color=_MEAN, linewidth=1.2, label=f"mean {with_uncertainty(found.mean)}")
-    if found.scatter and found.mean.u is not None and found.scatter.value is not None:
-        axes.axhspan(mean - found.mean.u, mean + found.mean.u, color=_MEAN, alpha=0.18, linewidth=0)
-        for side in (-1, 1):
-            axes.axhline(mean + side * found.scatter.value, color=_MEAN, linewidth=0.6, alpha=0.6)
+    if found.scatter and found.scatter.value is not None and found.mean.u is not None:
+        band = (mean - found.mean.u, mean + found.mean.u)
+        axes.axhspan(*band, color=_MEAN, alpha=0.18, linewidth=0, label="± its standard error")
+        for side, label in ((-1, "± scatter from top to top"), (1, None)):
+            axes.axhline(mean + side * found.scatter.value, color=_MEAN, linewidth=0.6, alpha=0.7, label=label)
+    reach = max(float(np.abs(every - mean).max()), 2 * (found.mean.u or 0.0), 0.05)
+    low, high = mean - 1.25 * reach, mean + 1.25 * reach
     for one in group.comparisons:
-        colour, dashes = _THEORY[one.name]
-        label = f"{one.name}, {one.expected:.2f} Hz"
         if abs(one.expected - mean) <= _NEAR * reach:
-            axes.axhline(one.expected, color=colour, linestyle=dashes, label=label)
-        else:
-            axes.plot([], [], color=colour, linestyle=dashes, label=f"{label} (off the figure)")
-    low, high = axes.get_ylim()
-    low, high = min(low, mean - reach), max(high, mean + reach)
-    axes.set_ylim(low - 0.05 * (high - low), high + 0.42 * (high - low))  # room for the legend
+            low, high = min(low, one.expected - 0.3 * reach), max(high, one.expected + 0.3 * reach)
+    axes.set_ylim(low, high)
+    for one in group.comparisons:
+        _draw_theory(axes, one.name, one.expected)
+    _shade_beyond_window(axes, group)
     axes.set_xlim(0.4, len(every) + 0.6)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set(xlabel="top", ylabel="spin frequency  [Hz]")
-    kind = "Lower limit: the spin at which a free top falls" if group.which == "lower" else _upper_title(group)
+    axes.ticklabel_format(axis="y", useOffset=False)
+    axes.set(xlabel="top, one after another", ylabel="spin frequency ν  [Hz]")
     synthetic = all(analysis.sources[number].synthetic for number in group.runs)
-    axes.set_title(kind + "  (SYNTHETIC)" * synthetic, loc="left", fontsize=10)
-    axes.legend(loc="upper left", ncols=2, fontsize=8)
+    title = ("Lower limit: the spin at which a free top falls", _upper_title(group))[group.which == "upper"]
+    axes.set_title(title + "  (SYNTHETIC)" * synthetic + "\n" + group.conditions.text, loc="left", fontsize=9)
+    axes.legend(loc="upper left", bbox_to_anchor=(-0.02, -0.16), ncols=2, fontsize=8, borderaxespad=0)
+
+
+def _draw_run(axes: Axes, analysis: LimitAnalysis, group: Limits, k: int, start: int) -> int:
+    """The limits of a group's run, and where there are several its mean; returns the number of the next top."""
+    source = analysis.sources[group.runs[k]]
+    limit, u = source.readings.limit, source.readings.u
+    colour = _COLOURS[k % len(_COLOURS)]
+    several = len(group.runs) > 1
+    name = short_name(source.name).replace("$", r"\$").replace("_", " ")
+    axes.errorbar(
+        np.arange(start, start + len(limit)),
+        limit,
+        u,
+        color=colour,
+        marker=_MARKERS[k % len(_MARKERS)],
+        linestyle="none",
+        markersize=5,
+        elinewidth=0.9,
+        capsize=2,
+        zorder=3,
+        label=name if several else "a top" + " ± u" * (u is not None),
+    )
+    if several:
+        axes.plot([start - 0.4, start + len(limit) - 0.6], [limit.mean()] * 2, color=colour, linewidth=1.2)
+    return start + len(limit)
+
+
+def _draw_theory(axes: Axes, name: str, expected: float) -> None:
+    """A line where it is within the panel, else its name at the edge beyond which it lies."""
+    colour, dashes = _THEORY[name]
+    low, high = axes.get_ylim()
+    text = f"{name}, {expected:.2f} Hz"
+    if low <= expected <= high:
+        axes.axhline(expected, color=colour, linestyle=dashes, label=text)
+        return
+    above = expected > high
+    axes.annotate(
+        f"{'↑' if above else '↓'} {text}",
+        (0.99, 0.98 if above else 0.02),
+        xycoords="axes fraction",
+        ha="right",
+        va="top" if above else "bottom",
+        fontsize=8,
+        color=colour,
+    )
+
+
+def _shade_beyond_window(axes: Axes, group: Limits) -> None:
+    """Where small motions of the top grow, so that no spin keeps it up."""
+    window = (group.device.lower, group.device.upper)
+    low, high = axes.get_ylim()
+    label: str | None = f"small motions grow: outside the linear window, {window[0]:.2f} to {window[1]:.2f} Hz"
+    for begin, end in ((low, min(window[0], high)), (max(window[1], low), high)):
+        if begin < end:
+            axes.axhspan(begin, end, color="#D55E00", alpha=0.08, linewidth=0, zorder=0, label=label)
+            label = None
 
 
 def _upper_title(group: Limits) -> str:
@@ -109,16 +153,19 @@ def _limits(analysis: LimitAnalysis, group: Limits) -> Array:
 
 def _draw_distribution(axes: Axes, analysis: LimitAnalysis, group: Limits) -> None:
     """A histogram on its side, with the normal law of the same mean and scatter."""
-    limits, found = _limits(analysis, group), group.statistics
+    limits, mean = _limits(analysis, group), group.statistics.mean.value or 0.0
+    s = float(np.std(limits, ddof=1)) if len(limits) >= _FEWEST else 0.0
     axes.tick_params(labelleft=False)
     axes.set_xlabel("tops")
-    if not (found.scatter and found.scatter.value):
-        return
-    s, mean = found.scatter.value, found.mean.value or 0.0
-    bins = mean + s * np.arange(-3.5, 4.0, 0.5)
-    axes.hist(limits, bins=bins.tolist(), orientation="horizontal", color=_COLOURS[0], alpha=0.55, edgecolor="white")
-    y = np.linspace(mean - 3.5 * s, mean + 3.5 * s, 200)
-    normal = np.exp(-0.5 * ((y - mean) / s) ** 2) / np.sqrt(2 * np.pi)
-    axes.plot(len(limits) * 0.5 * normal, y, color=_MEAN, linewidth=1)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set_title("band: ±standard error\nthin lines: ±scatter", loc="left", fontsize=8)
+    if s == 0:
+        axes.text(0.5, 0.5, "too few for\na distribution" if len(limits) < _FEWEST else "all alike", ha="center",
+                  va="center", fontsize=8, color="0.35", transform=axes.transAxes)  # fmt: skip
+        axes.set_xlim(0, 1)
+        return
+    bins = np.linspace(mean - _REACH * s, mean + _REACH * s, _BINS + 1)
+    axes.hist(limits, bins=bins.tolist(), orientation="horizontal", histtype="stepfilled", color="0.75")
+    y = np.linspace(*axes.get_ylim(), 200)
+    normal = np.exp(-0.5 * ((y - mean) / s) ** 2) / np.sqrt(2 * np.pi)
+    axes.plot(len(limits) * (2 * _REACH / _BINS) * normal, y, color=_MEAN, linewidth=1)
+    axes.set_title("and a normal law", loc="left", fontsize=8)

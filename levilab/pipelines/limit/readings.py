@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from levilab.errors import DoesNotSuit
-from levilab.formats.columns import TableError
-from levilab.formats.table import must_be_positive, read_table
-from levilab.formats.titles import read_title
+from levilab.formats.columns import NoSuchColumn, NoTable, TableError
+from levilab.formats.table import Table, must_be_positive, read_table
+from levilab.formats.titles import read_title, unit_factor
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-    from levilab.formats.table import Table
     from levilab.pipelines.sources import InputOptions
     from levilab.runs.run import Run
 
@@ -29,6 +29,8 @@ QUANTITIES = ("spin_frequency_hz", "spin_frequency_u_hz")
 _MOST_SPREAD = 0.25
 #: So many steps in a row do not all go the same way by chance.
 _FEWEST_STEPS = 4
+#: A number on a line of its own, with a decimal point or comma, and what is read of a file that holds nothing else.
+_NUMBER, _MOST_BYTES = re.compile(r"[+-]?\d+(?:[.,]\d*)?(?:[eE][+-]?\d+)?"), 1 << 20
 #: Relative: units and printed digits round in about the tenth digit.
 _SAME = 1e-9
 
@@ -57,7 +59,15 @@ class LimitReadings:
 
 def read_limit_file(path: Path, options: InputOptions) -> LimitReadings:
     """The limits in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
-    table = read_table(path, columns=options.columns, quantities=QUANTITIES, needed=QUANTITIES[:1], guess=options.guess)
+    try:
+        table = read_table(
+            path, columns=options.columns, quantities=QUANTITIES, needed=QUANTITIES[:1], guess=options.guess
+        )
+    except (NoTable, NoSuchColumn) as error:
+        single = _single_column(path, guess=options.guess)
+        if single is None:
+            raise error from None
+        table = single
     readings = limit_readings(table)
     steps = np.diff(readings.limit)
     timed = any(read_title(title).column == "time_s" for title in table.header)
@@ -68,6 +78,32 @@ def read_limit_file(path: Path, options: InputOptions) -> LimitReadings:
             "expected (leave out the column of times if these are limits)"
         )
     return readings
+
+
+def _single_column(path: Path, *, guess: bool) -> Table | None:
+    """The table of a file with one number a line, which are limits by its title or, if guess, for want of one.
+
+    None of a file that holds anything else.
+    """
+    text = path.read_bytes()[:_MOST_BYTES].decode("utf-8-sig", errors="replace")
+    lines = [(k, line.strip()) for k, line in enumerate(text.splitlines(), 1)]
+    filled = [(k, line) for k, line in lines if line and not line.startswith("#")]
+    titles = [line for _, line in filled if not _NUMBER.fullmatch(line)]
+    numbers = filled[len(titles) :]
+    if not numbers or len(titles) > 1 or not all(_NUMBER.fullmatch(line) for _, line in numbers):
+        return None
+    title = read_title(titles[0]) if titles else None
+    named = title is not None and title.column == QUANTITIES[0]
+    if title is not None and title.column not in {None, QUANTITIES[0]}:
+        return None
+    factor = 1.0 if title is None or title.unit is None else unit_factor(title.unit, "frequency")
+    if factor is None or not (guess or named):
+        return None
+    import pandas as pd
+
+    values = np.array([float(line.replace(",", ".")) for _, line in numbers])
+    frame = pd.DataFrame({QUANTITIES[0]: values * factor})
+    return Table(path, frame, (), tuple(titles), np.array([k for k, _ in numbers], dtype=np.int64))
 
 
 def read_limit_run(run: Run, _: InputOptions) -> LimitReadings:

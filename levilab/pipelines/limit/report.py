@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from analysis.numbers import digits
 from levilab.pipelines.limit.table import runs_table, theory_table
 from levilab.pipelines.part import InputPart, ReportPart
 from levilab.present.tables import Row, table
@@ -34,7 +35,7 @@ def limit_part(analysis: LimitAnalysis) -> ReportPart:
             "theory": theory_table(analysis),
         },
         inputs=tuple(
-            InputPart(_in_words(source, run), origin, run.text, _readings(source, run))
+            InputPart(_in_words(source, run), origin.text, run.text, _readings(source, run))
             for source, run, origin in zip(analysis.sources, analysis.runs, analysis.origins, strict=True)
         ),
     )
@@ -43,8 +44,8 @@ def limit_part(analysis: LimitAnalysis) -> ReportPart:
 def _in_words(source: Source[LimitReadings], run: Limits) -> tuple[str, ...]:
     limit, u = source.readings.limit, source.readings.u
     span = f"{run.statistics.n} {run.which} limits, {limit.min():.2f} Hz to {limit.max():.2f} Hz"
-    known = "not known" if u is None else f"{u.min():.2g} Hz to {u.max():.2g} Hz"
-    return span, f"u of a limit: {known}; the mean's comes from the scatter"
+    known = "not known" if u is None else f"{digits(u.min())} Hz to {digits(u.max())} Hz"
+    return span, f"u of a limit: {known}"
 
 
 def _readings(source: Source[LimitReadings], run: Limits) -> Mapping[str, object]:
@@ -54,7 +55,7 @@ def _readings(source: Source[LimitReadings], run: Limits) -> Mapping[str, object
     heads = ("top", "limit [Hz]", "u [Hz]")
     rows = [
         Row(
-            (str(i + 1), f"{limit[i]:.4f}", "—" if u is None else f"{u[i]:.2g}"),
+            (str(i + 1), f"{limit[i]:.4f}", "—" if u is None else f"{digits(u[i])}"),
             "outlier" if i in run.statistics.outliers else "",
         )
         for i in range(shown)

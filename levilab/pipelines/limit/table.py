@@ -23,11 +23,13 @@ def runs_table(analysis: LimitAnalysis) -> Table:
     total, synthetic = len(analysis.runs), sum(source.synthetic for source in analysis.sources)
     made_up = "" if not synthetic else ", SYNTHETIC" if synthetic == total else f", {synthetic} of them SYNTHETIC"
     rows = [
-        Row((f"{short_name(source.name)} ({run.which})", *_cells(run)))
-        for source, run in zip(analysis.sources, analysis.runs, strict=True)
+        Row((f"{short_name(source.name)} ({_group(analysis, k)})", *_cells(run)))
+        for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True))
     ]
     rows += [
-        Row((f"all {group.which} ones", *_cells(group)), "together") for group in analysis.groups if len(group.runs) > 1
+        Row((f"{group.statistics.runs} runs ({_group(analysis, group.runs[0])})", *_cells(group)), "together")
+        for group in analysis.groups
+        if len(group.runs) > 1
     ]
     return table(f"Limits of the spin, {total} run{'s' * (total > 1)}{made_up}", HEADS, rows, numbers=["tops"])
 
@@ -49,7 +51,7 @@ def theory_table(analysis: LimitAnalysis) -> Table:
     rows = [
         Row(
             (
-                f"{one.name}",
+                one.name if analysis.number(group) is None else f"{analysis.number(group)}: {one.name}",
                 f"{one.expected:.2f}",
                 without_unit(one.difference),
                 plain(one.p, 2),
@@ -59,6 +61,13 @@ def theory_table(analysis: LimitAnalysis) -> Table:
         for group in analysis.groups
         for one in group.comparisons
     ]
-    devices = " and ".join(dict.fromkeys(group.device.name for group in analysis.groups if group.device))
+    devices = " and ".join(dict.fromkeys(group.device.name for group in analysis.groups))
     heads = ("theory", "[Hz]", "mean − theory [Hz]", "p", "agrees")
-    return table(f"Beside theory, for {devices or 'no top'}", heads, rows)
+    return table(f"Beside theory, for {devices}", heads, rows)
+
+
+def _group(analysis: LimitAnalysis, run: int) -> str:
+    """The group that a run is of: its kind, and its number where there are several, as in result.json."""
+    group = next(group for group in analysis.groups if run in group.runs)
+    number = analysis.number(group)
+    return group.which if number is None else f"{group.which} {number}"

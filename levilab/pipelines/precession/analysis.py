@@ -10,21 +10,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.errors import AnalysisError
+from analysis.numbers import digits
 from analysis.precession.coherence import Coherence, coherence, pulse_times
 from analysis.precession.sweep import EXCLUDED_P, Sweep, SweepFit, fit_sweep
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
+from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.precession.readings import Readings, read_sweep_file, read_sweep_run
-from levilab.pipelines.result import Place, place_of
-from levilab.pipelines.sources import InputOptions, Needs, Source, collect
+from levilab.pipelines.sources import InputOptions, Needs
 from levilab.present.numbers import plain, with_uncertainty
-from levilab.runs.run import find_run
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from pathlib import Path
 
     from analysis.precession.power import Power
+    from levilab.pipelines.sources import Source
     from levilab.runs.traces import StoredTrace
 
     Array = np.ndarray[tuple[int], np.dtype[np.float64]]
@@ -59,14 +60,6 @@ DIFFERENT_P = 0.01
 
 
 @dataclass(frozen=True)
-class Origin:
-    """Where the fit of one run comes from.  options: how it was made; text: for people."""
-
-    options: PrecessionOptions
-    text: str = "analyzed now"
-
-
-@dataclass(frozen=True)
 class PointCoherence:
     """How firmly the laser's pulses follow the drive at a point.  point: its number, from 0 on."""
 
@@ -83,62 +76,21 @@ class PrecessionRun:
     warnings: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class PrecessionAnalysis:
-    """Sweeps, each by itself and together.
-
-    runs, origins: one per source; combined: the line through the points of all of them; place: where the result
-    belongs; warnings: about the inputs; remarks: what does not belong to the analysis.
-    """
-
-    sources: tuple[Source[Readings], ...]
-    runs: tuple[PrecessionRun, ...]
-    combined: SweepFit
-    options: PrecessionOptions
-    place: Place
-    warnings: tuple[str, ...]
-    remarks: tuple[str, ...]
-    origins: tuple[Origin, ...]
-
-    @property
-    def home(self) -> Path:
-        """The folder that the result belongs to."""
-        return self.place.folder
+class PrecessionAnalysis(Analyzed[Readings, PrecessionRun, SweepFit, PrecessionOptions]):
+    """Sweeps, each by itself and together: the line through the points of all of them."""
 
     @property
     def text(self) -> str:
         """What the data say, in a few sentences."""
         return verdict(self.combined)
 
-    @property
-    def all_warnings(self) -> list[str]:
-        """Every warning once, a run's with its name where there are several runs."""
-        several = len(self.runs) > 1
-        texts = [*self.warnings, *(self.combined.warnings if several else ())]
-        for source, run in zip(self.sources, self.runs, strict=True):
-            prefix = f"{source.name}: " if several else ""
-            texts += [prefix + text for text in (*source.warnings, *run.fit.warnings, *run.warnings)]
-        return list(dict.fromkeys(texts))
+    def about_all(self) -> Iterable[str]:
+        """What to know of the line through all points."""
+        return self.combined.warnings if len(self.runs) > 1 else ()
 
-
-def analyze_precessions(paths: Sequence[Path], options: PrecessionOptions) -> PrecessionAnalysis:
-    """Fit a line to every sweep found at the paths, and to all points together.
-
-    Raises DataError for what cannot be used; the text names the file.
-    """
-    paths = [find_run(path) for path in paths]
-    found = collect(paths, NEEDS, lambda _: options)
-    runs = tuple(fit_source(source, options) for source in found.sources)
-    return PrecessionAnalysis(
-        sources=found.sources,
-        runs=runs,
-        combined=combine(runs, options),
-        options=options,
-        place=place_of(paths, found.sources),
-        warnings=(*found.warnings, *about_inputs(found.sources, options)),
-        remarks=found.remarks,
-        origins=(Origin(options),) * len(runs),
-    )
+    def about_run(self, run: PrecessionRun) -> Iterable[str]:
+        """What to know of one sweep."""
+        return (*run.fit.warnings, *run.warnings)
 
 
 def fit_source(source: Source[Readings], options: PrecessionOptions) -> PrecessionRun:
@@ -153,6 +105,7 @@ def fit_source(source: Source[Readings], options: PrecessionOptions) -> Precessi
         spin=readings.spin,
         u_spin=readings.u_spin,
         gate_s=_gate(source),
+        gates=readings.laser,
     )
     try:
         fit = fit_sweep(sweep, orthogonal=options.orthogonal, keep_miscounts=options.keep_outliers)
@@ -205,25 +158,27 @@ def _about_slopes(fits: Sequence[SweepFit]) -> Iterable[str]:
     p = float(chdtrc(len(slope) - 1, float(np.sum(((slope - mean) / u) ** 2))))
     if p < DIFFERENT_P:
         yield (
-            f"the slopes of the {len(slope)} runs differ by more than their u says (p = {p:.1g}): the line through all "
-            "points has too small a u; look at the runs one by one"
+            f"the slopes of the {len(slope)} runs differ by more than their u says (p = {digits(p, 1)}): the line "
+            "through all points has too small a u; look at the runs one by one"
         )
 
 
-def about_inputs(sources: Sequence[Source[Readings]], options: PrecessionOptions) -> Iterable[str]:
-    """What to know of the inputs before using the numbers."""
-    synthetic = sum(source.synthetic for source in sources)
-    if 0 < synthetic < len(sources):
-        yield (
-            f"{synthetic} of {len(sources)} inputs are SYNTHETIC, the others are not known to be: "
-            "a line through both says nothing about a real top"
-        )
-    given = [source.name for source in sources if source.readings.u is not None]
-    if options.reading_u is not None and given:
-        names = ", ".join(given)
-        yield f"the given u of a reading, {options.reading_u:g} Hz, takes the place of the uncertainties in {names}"
-    if options.columns and all(source.run for source in sources):
-        yield "names of columns were given, but none of the inputs is a data file"
+METHOD = Method(
+    needs=NEEDS,
+    kind=PrecessionAnalysis,
+    options=PrecessionOptions,
+    fit=fit_source,
+    combine=lambda _, runs, options: combine(runs, options),
+    mixed="a line through both says nothing about a real top",
+)
+
+
+def analyze_precessions(paths: Sequence[Path], options: PrecessionOptions) -> PrecessionAnalysis:
+    """Fit a line to every sweep found at the paths, and to all points together.
+
+    Raises DataError for what cannot be used; the text names the file.
+    """
+    return METHOD.analyze(paths, options)
 
 
 # --- phase lock ----------------------------------------------------------------------------------------
@@ -258,8 +213,8 @@ def _coherences(source: Source[Readings]) -> tuple[tuple[PointCoherence, ...], t
 
 def _coherence(laser: StoredTrace, drive: StoredTrace, frequency: float) -> Coherence:
     record, beside = laser.trace, drive.trace
-    pulses = pulse_times(record.volts[np.isfinite(record.volts)], record.dt_s, record.t0_s)
-    return coherence(pulses, beside.volts[np.isfinite(beside.volts)], beside.dt_s, frequency, beside.t0_s)
+    pulses = pulse_times(record.volts, record.dt_s, record.t0_s)
+    return coherence(pulses, beside.volts, beside.dt_s, frequency, beside.t0_s)
 
 
 # --- in words ------------------------------------------------------------------------------------------

@@ -55,9 +55,15 @@ def _draw_line(axes: Axes, analysis: PrecessionAnalysis) -> None:
     )
     label = f"line: slope {without_unit(slope_of(fit))}, intercept {without_unit(intercept_of(fit))} Hz"
     axes.plot(x, fit.line.at(x), color=LINE, linewidth=1.6, label=label, zorder=2.6)
-    robust = fit.robust
-    y = float(robust.intercept.value or 0.0) + float(robust.slope.value or 0.0) * x
-    axes.plot(x, y, color=ROBUST, linestyle="dotted", linewidth=1.6, label="median line, robust", zorder=2.5)
+    axes.plot(
+        x,
+        median_line(fit, x),
+        color=ROBUST,
+        linestyle=(0, (1, 2)),
+        linewidth=1.8,
+        label="median line, robust",
+        zorder=2.7,
+    )
     _draw_bands(axes, x, fit.line.at(x), fit, labels=True)
     inside = np.concatenate([run.fit.column("precession")[_used(run.fit)] for run in analysis.runs])
     low, high = min(float(inside.min()), float(x[0])), max(float(inside.max()), float(x[-1]))
@@ -74,6 +80,11 @@ def _draw_line(axes: Axes, analysis: PrecessionAnalysis) -> None:
     mark = "" if not made_up else "  (SYNTHETIC)" if made_up == len(analysis.sources) else f"  ({made_up} SYNTHETIC)"
     axes.set_title(f"{_finding(fit)}{mark}", loc="left", fontsize=11)
     axes.legend(loc="upper left")
+
+
+def median_line(fit: SweepFit, x: Array) -> Array:
+    """The median line at x [Hz]."""
+    return np.asarray(float(fit.robust.intercept.value or 0.0) + float(fit.robust.slope.value or 0.0) * x)
 
 
 def _finding(fit: SweepFit) -> str:
@@ -99,17 +110,16 @@ def _usual_u(fit: SweepFit) -> float:
     return float(np.median(u)) if np.isfinite(u).all() else 1.0
 
 
-def _draw_bands(axes: Axes, x: Array, y: Array, fit: SweepFit, *, unit: float = 1.0, labels: bool = False) -> None:
-    """The bands of 95 % about a line at y.  unit: of y [Hz]."""
+def _draw_bands(axes: Axes, x: Array, y: Array, fit: SweepFit, *, labels: bool = False) -> None:
+    """The bands of 95 % about a line at y [Hz]."""
     if fit.line.u_slope is None:
         return
+    usual = fit.line.scale * _usual_u(fit)
     for half, alpha, what in (
-        (fit.line.prediction_band(x, _usual_u(fit)), 0.10, "95 % of further points"),
+        (fit.line.prediction_band(x, _usual_u(fit)), 0.10, f"95 % of further points of u = {usual:.2g} Hz"),
         (fit.line.confidence_band(x), 0.28, "95 % confidence of the line"),
     ):
-        axes.fill_between(
-            x, y - half / unit, y + half / unit, color=LINE, alpha=alpha, linewidth=0, label=what if labels else None
-        )
+        axes.fill_between(x, y - half, y + half, color=LINE, alpha=alpha, linewidth=0, label=what if labels else None)
 
 
 def _draw_points(
@@ -144,32 +154,28 @@ def _draw_left_out(axes: Axes, fit: SweepFit) -> None:
 
 
 def _draw_departures(axes: Axes, analysis: PrecessionAnalysis) -> None:
-    """ν_p − ν_d in units of u: noise about zero for a locked top."""
+    """ν_p − ν_d with the u of each point, which differ: noise about zero for a locked top."""
     fit = analysis.combined
-    unit = fit.line.scale * _usual_u(fit) if fit.line.u_slope else 1.0
-    known = fit.line.chi_square is not None
-    for bound, alpha in ((2, 0.08), (1, 0.14)):
-        axes.axhspan(-bound, bound, color="black", alpha=alpha, linewidth=0)
     axes.axhline(0, color="black", linestyle="dashed", linewidth=1)
     x = _span(fit)
-    y = (fit.line.at(x) - x) / unit
+    y = fit.line.at(x) - x
     axes.plot(x, y, color=LINE, linewidth=1.6)
-    if fit.line.u_slope:
-        half = fit.line.confidence_band(x) / unit
-        axes.fill_between(x, y - half, y + half, color=LINE, alpha=0.28, linewidth=0)
-    tallest = 3.0
+    axes.plot(x, median_line(fit, x) - x, color=ROBUST, linestyle=(0, (1, 2)), linewidth=1.8, zorder=2.7)
+    _draw_bands(axes, x, y, fit)
+    scatter = fit.line.scale if fit.line.u_slope else 0.0
+    tallest = 0.0
     for k, run in enumerate(analysis.runs):
         u = run.fit.column("u") * fit.line.scale
-        own = np.where(np.isfinite(u), u, unit)
-        off = (run.fit.column("precession") - run.fit.column("drive")) / own
-        _draw_points(axes, run.fit, k, off, bars=np.ones_like(off))
-        tallest = max(tallest, 1.15 * float(np.abs(off[_used(run.fit)]).max()) + 1)
-    axes.set_ylim(-tallest, tallest)
-    what = "u" if known else "scatter"
-    axes.set(xlabel="frequency of the drive ν$_d$  [Hz]", ylabel=f"(ν$_p$ − ν$_d$) / {what}")
-    size = f"{what} of a point {unit:.2g} Hz" if fit.line.u_slope else "in Hz"
+        bars = np.where(np.isfinite(u), u, scatter)
+        off = run.fit.column("precession") - run.fit.column("drive")
+        _draw_points(axes, run.fit, k, off, bars=bars)
+        tallest = max(tallest, 1.1 * float((np.abs(off) + 2 * bars)[_used(run.fit)].max()))
+    if tallest > 0:
+        axes.set_ylim(-tallest, tallest)
+    axes.set(xlabel="frequency of the drive ν$_d$  [Hz]", ylabel="ν$_p$ − ν$_d$  [Hz]")
+    bar = "their u" if fit.line.chi_square is not None else "the scatter"
     axes.set_title(
-        f"Departures from a locked top, {size}; grey: ±1 and ±2; blue: the line and where it lies with 95 %", loc="left"
+        f"Departures from a locked top, bars: {bar}; blue: the line with its bands; orange: the median line", loc="left"
     )
 
 

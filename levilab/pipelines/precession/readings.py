@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.precession.gates import pulses_too_many, rates_at_point, shared_scatter
 from levilab.formats.columns import TableError
 from levilab.formats.table import FEWEST, read_table
+from levilab.runs.gates import gates_of
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
 
+    from analysis.precession.gates import Gates, Rate
     from levilab.formats.table import Table
     from levilab.pipelines.sources import InputOptions
     from levilab.runs.run import Run
@@ -30,6 +34,8 @@ QUANTITIES = (
 NEEDED = ("drive_frequency_hz", "precession_frequency_hz")
 #: Relative: units and printed digits round in about the tenth digit, but no two sweeps agree so far in all points.
 SAME = 1e-9
+#: Relative: a reading is that of its gates, but for rounding.
+_SAME_RATE = 1e-6
 #: Beyond these a number is no measurement, and its powers would leave the range of floating point [Hz].
 SLOWEST_HZ, HIGHEST_HZ = 1e-9, 1e12
 #: No sweep has more points; a recording of all counts has.
@@ -41,7 +47,10 @@ _OF = {"precession_frequency_hz": "precession", "drive_frequency_hz": "drive", "
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """The points of a sweep, each array of shape (n,) [Hz], None where the table has no such column."""
+    """The points of a sweep, each array of shape (n,) [Hz], None where the table has no such column.
+
+    laser: the gates of each point, which a run holds.
+    """
 
     drive: Array
     precession: Array
@@ -51,6 +60,7 @@ class Readings:
     u_spin: Array | None
     time: Array | None
     warnings: tuple[str, ...]
+    laser: tuple[Gates, ...] | None = None
 
     def __len__(self) -> int:
         return len(self.drive)
@@ -68,8 +78,50 @@ def read_sweep_file(path: Path, options: InputOptions) -> Readings:
 
 
 def read_sweep_run(run: Run, _: InputOptions) -> Readings:
-    """The sweep of a run."""
-    return sweep_readings(run.readings())
+    """The sweep of a run; where it holds the gates, rates and uncertainties are computed from those of all points."""
+    readings = sweep_readings(run.readings())
+    if readings.time is None:
+        return readings
+    gates = gates_of(run, readings.time.tolist(), readings.drive.tolist())
+    return readings if gates is None else _from_gates(readings, gates, _given_u(run))
+
+
+def _given_u(run: Run) -> float | None:
+    """What the configuration says a count scatters by [Hz]."""
+    settings = run.record.configuration.get("precession")
+    u = settings.get("reading_u_hz") if isinstance(settings, dict) else None
+    return float(u) if isinstance(u, int | float) else None
+
+
+def _from_gates(readings: Readings, gates: Sequence[tuple[Gates, Gates]], given_u: float | None) -> Readings:
+    """The points with the rates of their gates.  given_u: if the points keep the u that follows from it [Hz]."""
+    spins, lasers = zip(*(rates_at_point(spin, laser) for spin, laser in gates), strict=True)
+    counted = np.array([rate.value for rate in lasers])
+    if not np.allclose(counted, readings.precession, rtol=_SAME_RATE, atol=0):
+        text = "the readings are not those of the gates in events.jsonl: the gates are not used"
+        return replace(readings, warnings=(*readings.warnings, text))
+
+    def u_of(rates: Sequence[Rate]) -> Array:
+        return shared_scatter(rates, readings.drive) * [rate.per_scatter for rate in rates]
+
+    return replace(
+        readings,
+        precession=counted,
+        u=u_of(lasers) if given_u is None else readings.u,
+        spin=np.array([rate.value for rate in spins]),
+        u_spin=u_of(spins) if given_u is None else readings.u_spin,
+        laser=tuple(laser for _, laser in gates),
+        warnings=(*readings.warnings, *_about_gates(readings, lasers)),
+    )
+
+
+def _about_gates(readings: Readings, lasers: Sequence[Rate]) -> Iterable[str]:
+    """Which gates were left out."""
+    for k, (rate, drive) in enumerate(zip(lasers, readings.drive.tolist(), strict=True), 1):
+        for gate, pulses in rate.wrong:
+            yield f"point {k}, at {drive:.5g} Hz: gate {gate + 1} counted {pulses_too_many(pulses)}, and is left out"
+        if rate.missing:
+            yield f"point {k}, at {drive:.5g} Hz: {rate.missing} of its gates have no count"
 
 
 def sweep_readings(table: Table) -> Readings:

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 
 from analysis.uncertainty import Estimate
 from levilab.pipelines.precession.analysis import at_most, intercept_of, slope_of
-from levilab.present.numbers import plain, without_unit
+from levilab.present.numbers import column, plain, without_unit
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from analysis.precession.sweep import Point, SweepFit
     from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionRun
 
@@ -92,23 +94,34 @@ def power_table(fit: SweepFit) -> Table:
     return table(title, ("", "now", "needed"), rows, numbers=("now", "needed"))
 
 
-def points_table(run: PrecessionRun, name: str = "", most: int = MOST_POINTS) -> Table:
-    """The points, the first of many."""
+def points_table(
+    run: PrecessionRun,
+    name: str = "",
+    most: int = MOST_POINTS,
+    clock: tuple[Sequence[str], Sequence[tuple[str, ...]]] = ((), ()),
+) -> Table:
+    """The points, the first of many.  clock: heads and, of each point, cells that go before the others."""
     fit = run.fit
-    rows = [Row(_point_cells(fit, point), "" if point.used else "outlier") for point in fit.points[:most]]
+    shown = fit.points[:most]
+    departures = column(
+        Estimate(one.precession - one.drive, None if one.u is None else math.hypot(one.u, one.u_drive or 0.0), "Hz")
+        for one in shown
+    )
+    rows = [
+        Row((*when, *_point_cells(fit, point, departure)), "" if point.used else "outlier")
+        for point, departure, when in zip(shown, departures, clock[1] or [()] * len(shown), strict=False)
+    ]
     more = f" (the first {most} of {len(fit.points)})" if len(fit.points) > most else ""
-    return table(f"Points{name}{more}", POINT_HEADS, rows, numbers=POINT_HEADS)
+    return table(f"Points{name}{more}", (*clock[0], *POINT_HEADS), rows, numbers=(*clock[0], *POINT_HEADS))
 
 
-def _point_cells(fit: SweepFit, point: Point) -> tuple[str, ...]:
-    u = point.u
-    both = None if u is None else math.hypot(u, point.u_drive or 0.0)
+def _point_cells(fit: SweepFit, point: Point, departure: str) -> tuple[str, ...]:
     change = None if point.slope_change is None or not fit.line.u_slope else point.slope_change / fit.line.u_slope
     return (
         without_unit(Estimate(point.drive, point.u_drive, "Hz")) if point.u_drive else f"{point.drive:.7g}",
-        without_unit(Estimate(point.precession, u, "Hz")),
+        without_unit(Estimate(point.precession, point.u, "Hz")),
         "—" if point.spin is None else without_unit(Estimate(point.spin, point.u_spin, "Hz")),
-        without_unit(Estimate(point.precession - point.drive, both, "Hz")),
+        departure,
         plain(point.leverage, 2) if point.used else "left out",
         "—" if change is None else f"{change:+.2f}",
     )
@@ -116,17 +129,18 @@ def _point_cells(fit: SweepFit, point: Point) -> tuple[str, ...]:
 
 def coherence_table(run: PrecessionRun, name: str = "") -> Table:
     """How firmly the laser's pulses follow the drive, record by record."""
+    drifts = column(Estimate(one.coherence.drift_hz, one.coherence.u_drift_hz, "Hz") for one in run.coherences)
     rows = [
         (
             f"{run.fit.points[one.point].drive:.6g}",
             str(one.coherence.pulses),
             f"{one.coherence.length:.4f}",
             f"{math.degrees(one.coherence.phase_rad):.0f}",
-            without_unit(Estimate(one.coherence.drift_hz, one.coherence.u_drift_hz, "Hz")),
+            drift,
             f"{one.coherence.excursion_turns:.2f}",
             "yes" if one.coherence.locked else "no",
         )
-        for one in run.coherences
+        for one, drift in zip(run.coherences, drifts, strict=True)
     ]
     heads = ("ν_d [Hz]", "pulses", "mean vector", "phase [°]", "drift [Hz]", "turns", "locked")
     return table(f"Phase of the laser's pulses on the drive{name}", heads, rows, numbers=heads[:6])

@@ -4,33 +4,31 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, TypeVar
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from analysis.errors import AnalysisError
 from analysis.pulses import Finding, phases, spin_of_times, spin_of_trace, track_of_blocks, track_of_times
 from levilab.errors import DataError
-from levilab.pipelines.result import Place, place_of
-from levilab.pipelines.sources import InputOptions, Needs, Source, collect
+from levilab.pipelines.analyzed import Analyzed, Method
+from levilab.pipelines.sources import InputOptions, Needs
 from levilab.pipelines.spin.readings import Records, read_spin_file, read_spin_run
 from levilab.present.numbers import with_uncertainty
-from levilab.runs.run import find_run
 from levilab.runs.traces import INDEX
 from levilab.runs.waveforms import has_traces
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Iterable, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
 
     from analysis.pulses import Phase, SpinFrequency, Track
     from levilab.formats.waveforms.waveform import Waveform
+    from levilab.pipelines.sources import Source
 
     Array = NDArray[np.float64]
-
-T = TypeVar("T")
 
 SPIN = "spin"
 #: The runs and files that suit.
@@ -55,14 +53,6 @@ class SpinOptions(InputOptions):
     """How pulses are found, see `analysis.pulses.spin_of_trace`."""
 
     method: Literal["auto", "edges", "matched", "likelihood"] = "auto"
-
-
-@dataclass(frozen=True)
-class Origin:
-    """Where the numbers of one input come from.  options: how they were made; text: for people."""
-
-    options: SpinOptions
-    text: str = "analyzed now"
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,26 +86,8 @@ class SpinRun:
     notes: tuple[Finding, ...]
 
 
-@dataclass(frozen=True)
-class SpinAnalysis:
-    """Spin frequencies, each by itself.
-
-    runs, origins: one per source; place: where the result belongs; warnings: about the inputs; remarks: what does not
-    belong to the analysis.
-    """
-
-    sources: tuple[Source[Records], ...]
-    runs: tuple[SpinRun, ...]
-    options: SpinOptions
-    place: Place
-    warnings: tuple[str, ...]
-    remarks: tuple[str, ...]
-    origins: tuple[Origin, ...]
-
-    @property
-    def home(self) -> Path:
-        """The folder that the result belongs to."""
-        return self.place.folder
+class SpinAnalysis(Analyzed[Records, SpinRun, None, SpinOptions]):
+    """Spin frequencies, each by itself."""
 
     @property
     def text(self) -> str:
@@ -128,63 +100,23 @@ class SpinAnalysis:
         return " ".join(named) + (f" And {more} more, in the table." if more > 0 else "")
 
     @property
-    def all_warnings(self) -> list[str]:
-        """Every warning once, an input's with its name where there are several."""
-        several = len(self.runs) > 1
-        texts = list(self.warnings)
-        for source, run in zip(self.sources, self.runs, strict=True):
-            prefix = f"{source.name}: " if several else ""
-            texts += [*source.warnings, *(f"{prefix}{note.text} ({note.name})" for note in run.notes)]
-        return list(dict.fromkeys(texts))
+    def averaged(self) -> tuple[()]:
+        """None: nothing is averaged over different tops or times."""
+        return ()
+
+    def about_all(self) -> Iterable[str]:
+        """What to know of the method."""
+        method = self.options.method
+        if method != "auto" and all(source.readings.pulses for source in self.sources):
+            yield f"the method {method} was chosen, but a list of pulse times leaves no choice"
+
+    def about_run(self, run: SpinRun) -> Iterable[str]:
+        """What to know of one input."""
+        return (f"{note.text} ({note.name})" for note in run.notes)
 
 
 #: The text describes so many inputs at most.
 MOST_SENTENCES = 4
-
-
-def analyze_spins(paths: Sequence[Path], options: SpinOptions) -> SpinAnalysis:
-    """Find the spin frequency of every record found at the paths.
-
-    Raises DataError for what cannot be used; the text names the file.
-    """
-    paths = [find_run(path) for path in paths]
-    found = collect(paths, NEEDS, lambda _: options)
-    done, warnings = of_each(found.sources, lambda source: (source, spin_of_source(source, options)))
-    sources, runs = (tuple(part) for part in zip(*done, strict=True))
-    return SpinAnalysis(
-        sources=sources,
-        runs=runs,
-        options=options,
-        place=place_of(paths, sources),
-        warnings=(*found.warnings, *warnings, *about_inputs(sources, options)),
-        remarks=found.remarks,
-        origins=(Origin(options),) * len(runs),
-    )
-
-
-def of_each(sources: Sequence[Source[Records]], find: Callable[[Source[Records]], T]) -> tuple[list[T], list[str]]:
-    """What is found of each input, and warnings about those that are passed over: of several, none has to be sound.
-
-    Raises DataError where nothing is found of any.
-    """
-    done, warnings = [], []
-    for source in sources:
-        try:
-            done.append(find(source))
-        except DataError as error:
-            if len(sources) == 1:
-                raise
-            warnings.append(f"passed over: {error}")
-    if not done:
-        raise DataError(warnings[-1].removeprefix("passed over: "))
-    return done, warnings
-
-
-def about_inputs(sources: Sequence[Source[Records]], options: SpinOptions) -> list[str]:
-    """What to know of the inputs before using the numbers."""
-    if options.method != "auto" and all(source.readings.pulses for source in sources):
-        return [f"the method {options.method} was chosen, but a list of pulse times leaves no choice"]
-    return []
 
 
 def spin_of_source(source: Source[Records], options: SpinOptions) -> SpinRun:
@@ -198,6 +130,24 @@ def spin_of_source(source: Source[Records], options: SpinOptions) -> SpinRun:
         return _of_several(records, options)
     except AnalysisError as error:
         raise DataError(f"{source.path}: {error}") from error
+
+
+METHOD = Method(
+    needs=NEEDS,
+    kind=SpinAnalysis,
+    options=SpinOptions,
+    fit=spin_of_source,
+    of_files=frozenset({"columns", "rate"}),  # a run may have records of several channels
+    passes_over=True,
+)
+
+
+def analyze_spins(paths: Sequence[Path], options: SpinOptions) -> SpinAnalysis:
+    """Find the spin frequency of every record found at the paths.
+
+    Raises DataError for what cannot be used; the text names the file.
+    """
+    return METHOD.analyze(paths, options)
 
 
 def _of_times(times: Array) -> SpinRun:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
@@ -10,41 +9,12 @@ from pydantic import Field, model_validator
 
 from analysis.pulses import Finding, SpinFrequency
 from analysis.uncertainty import Estimate
-from levilab.errors import unquoted
-from levilab.files import finite
-from levilab.pipelines.result import (
-    SCHEMA,
-    Archive,
-    Earlier,
-    Part,
-    Place,
-    Result,
-    RunPart,
-    Value,
-    place_of,
-    relative,
-)
-from levilab.pipelines.result import save as save_files
-from levilab.pipelines.sources import Source, collect
-from levilab.pipelines.spin.analysis import (
-    NEEDS,
-    SPIN,
-    Origin,
-    Series,
-    SpinAnalysis,
-    SpinOptions,
-    SpinRun,
-    about_inputs,
-    of_each,
-    spin_of_source,
-)
-from levilab.runs.run import find_run
-from levilab.software import software_versions
+from levilab.pipelines.document import Document, Settings, number
+from levilab.pipelines.result import Part, Result, RunPart, Value
+from levilab.pipelines.spin.analysis import METHOD, Series, SpinAnalysis, SpinRun
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
-
+    from levilab.pipelines.sources import Source
     from levilab.pipelines.spin.readings import Records
 
 Method = Literal["edges", "matched", "likelihood"]
@@ -84,7 +54,7 @@ class SeriesPart(Part):
 
 
 #: Values that a run has, and their units.
-_VALUES = {
+_UNITS = {
     "frequency": "Hz", "chirp": "Hz/s", "phase": "1", "reference_time": "s", "bound": "Hz", "scatter": "s", "snr": "dB",
 }  # fmt: skip
 
@@ -108,18 +78,12 @@ class SpinPart(RunPart):
         return self
 
 
-class SettingsPart(Part):
+class SettingsPart(Settings):
     """How the records were analyzed."""
 
-    columns: dict[str, str]
     channel: str | None
-    rate_hz: float | None = Field(gt=0)
+    rate: float | None = Field(gt=0, alias="rate_hz")
     method: Literal["auto", "edges", "matched", "likelihood"]
-
-    @property
-    def options(self) -> SpinOptions:
-        """The same as options."""
-        return SpinOptions(columns=self.columns or None, channel=self.channel, rate=self.rate_hz, method=self.method)
 
 
 class SpinResult(Result):
@@ -135,70 +99,23 @@ class SpinResult(Result):
 # --- writing -------------------------------------------------------------------------------------------
 
 
-def save_result(analysis: SpinAnalysis, folder: Path | None = None, *, first: bool = True) -> list[Path]:
-    """Write the result and the figure beside the inputs, or into a folder; returns the files.  Raises CannotWrite.
-
-    Args:
-        analysis: what was found.
-        folder: in the place of that of the inputs.
-        first: whether this is the first analysis of the inputs, see `levilab.pipelines.catalogue.save`.
-    """
-    from levilab.pipelines.spin.figure import spin_figure
-    from levilab.present.style import as_png
-
-    place = replace(analysis.place, folder=folder or analysis.home)
-    return save_files(result_of(analysis, place), place, as_png(spin_figure(analysis)), first=first)
-
-
-def as_document(analysis: SpinAnalysis, folder: Path) -> dict[str, Any]:
-    """The content of result.json; paths in it are relative to the folder that it is for."""
-    return result_of(analysis, Place(folder)).as_dict()
-
-
-def result_of(analysis: SpinAnalysis, place: Place) -> SpinResult:
-    """The result for a place."""
-    sources, runs = analysis.sources, analysis.runs
-    one = runs[0] if len(runs) == 1 else None
-    document = {
-        "schema": SCHEMA,
-        "analysis": SPIN,
-        "inputs": [{"path": relative(source.data, place.folder), "sha256": source.sha256} for source in sources],
-        "synthetic": any(source.synthetic for source in sources),
-        "software": software_versions(),
-        "settings": _settings(analysis.options),
-        "values": _values(one.spin) if one else {},
-        "method": one.spin.method if one else None,
-        "models": [],
-        "runs": [_run(source, run, place.folder) for source, run in zip(sources, runs, strict=True)],
-        "warnings": [unquoted(text) for text in analysis.all_warnings],
-    }
-    return SpinResult.model_validate(finite(document))
-
-
-def _settings(options: SpinOptions) -> dict[str, Any]:
-    return {
-        "columns": dict(options.columns or {}),
-        "channel": options.channel,
-        "rate_hz": options.rate,
-        "method": options.method,
-    }
+def _entries(analysis: SpinAnalysis) -> dict[str, Any]:
+    one = analysis.runs[0].spin if len(analysis.runs) == 1 else None
+    return {"values": _values(one) if one else {}, "method": one.method if one else None}
 
 
 def _values(spin: SpinFrequency) -> dict[str, Any]:
-    plain = {"reference_time": spin.reference_time, "bound": spin.bound, "scatter": spin.scatter, "snr": spin.snr_db}
     estimates = {"frequency": spin.frequency, "chirp": spin.chirp, "phase": spin.phase}
-    values = {name: {"value": one.value, "u": one.u, "unit": _VALUES[name]} for name, one in estimates.items()}
-    return values | {name: {"value": value, "u": None, "unit": _VALUES[name]} for name, value in plain.items()}
+    plain = {"reference_time": spin.reference_time, "bound": spin.bound, "scatter": spin.scatter, "snr": spin.snr_db}
+    values = {name: number(one.value, _UNITS[name], one.u) for name, one in estimates.items()}
+    return values | {name: number(value, _UNITS[name]) for name, value in plain.items()}
 
 
-def _run(source: Source[Records], run: SpinRun, folder: Path) -> dict[str, Any]:
+def _run_entries(_: Source[Records], run: SpinRun) -> dict[str, Any]:
     spin, series = run.spin, run.series
     return {
-        "path": relative(source.path, folder),
-        "synthetic": source.synthetic,
         "values": _values(spin),
         "method": spin.method,
-        "models": [],
         "pulses": int(spin.pulses),
         "missing": int(spin.missing),
         "doubled": int(spin.doubled),
@@ -210,66 +127,13 @@ def _run(source: Source[Records], run: SpinRun, folder: Path) -> dict[str, Any]:
             "phases": [{"kind": kind, "start_s": start, "end_s": end} for kind, start, end in series.phases],
         },
         "notes": [{"name": note.name, "text": note.text} for note in run.notes],
-        "warnings": [unquoted(text) for text in source.warnings],
     }
 
 
 # --- reading it back -----------------------------------------------------------------------------------
 
 
-def recall_spins(paths: Sequence[Path], options: SpinOptions) -> SpinAnalysis:
-    """What `analyze` found at the paths, from its result.json; analyzed anew is only what has none that holds.
-
-    As of `levilab.pipelines.spindown.document.recall_spindowns`: the same bytes, and the given options.
-
-    Raises DataError for what cannot be used, a damaged result.json included.
-    """
-    paths = [find_run(path) for path in paths]
-    archive = Archive(paths, SpinResult)
-    given = {f.name: getattr(options, f.name) for f in fields(SpinOptions) if getattr(options, f.name) != f.default}
-
-    def reading(path: Path) -> SpinOptions:
-        earlier = archive.earlier(path, path)
-        return replace(earlier.result.settings.options, **given) if earlier else options
-
-    found = collect(paths, NEEDS, reading)
-    recalled, warnings = of_each(found.sources, lambda source: _recalled(source, archive, given))
-    sources = tuple(source for source, _, _ in recalled)
-    return SpinAnalysis(
-        sources=sources,
-        runs=tuple(run for _, run, _ in recalled),
-        options=options,
-        place=place_of(paths, sources),
-        warnings=(*found.warnings, *warnings, *about_inputs(sources, options)),
-        remarks=found.remarks,
-        origins=tuple(origin for _, _, origin in recalled),
-    )
-
-
-def _recalled(
-    source: Source[Records], archive: Archive[SpinResult], given: Mapping[str, Any]
-) -> tuple[Source[Records], SpinRun, Origin]:
-    """One input: what was found of it, or its analysis."""
-    earlier = archive.earlier(source.path, source.data, source.sha256)
-    if earlier is None:
-        options = SpinOptions(**given)
-        origin = Origin(options, "analyzed for this page: there was no result yet")
-        return source, spin_of_source(source, options), origin
-    made_with = earlier.result.settings.options
-    options = replace(made_with, **given)
-    if earlier.sha256 == source.sha256 and _settings(options) == _settings(made_with):
-        return source, _restored(earlier), _origin(earlier)
-    why = "the record is another than in" if earlier.sha256 != source.sha256 else "other options than those of"
-    origin = Origin(options, f"analyzed for this page: {why} {earlier.file}")
-    return source, spin_of_source(source, options), origin
-
-
-def _origin(earlier: Earlier[SpinResult]) -> Origin:
-    return Origin(earlier.result.settings.options, earlier.text)
-
-
-def _restored(earlier: Earlier[SpinResult]) -> SpinRun:
-    part = earlier.result.runs[earlier.number]
+def _run(part: SpinPart, *_: object) -> SpinRun:
     values, notes = part.values, tuple(Finding(note.name, note.text) for note in part.notes)
     spin = SpinFrequency(
         frequency=values["frequency"].estimate,
@@ -286,12 +150,10 @@ def _restored(earlier: Earlier[SpinResult]) -> SpinRun:
         notes=notes,
     )
     series = part.series
-    columns = (
-        np.array(column, dtype=np.float64) for column in (series.time_s, series.frequency_hz, series.frequency_u_hz)
-    )
-    told = tuple((phase.kind, phase.start_s, phase.end_s) for phase in series.phases)
+    columns = (series.time_s, series.frequency_hz, series.frequency_u_hz)
     time, frequency, u = (np.array(column, dtype=np.float64) for column in columns)
-    return SpinRun(spin, Series(time, frequency, u, told, series.of), notes)
+    phases = tuple((phase.kind, phase.start_s, phase.end_s) for phase in series.phases)
+    return SpinRun(spin, Series(time, frequency, u, phases, series.of), notes)
 
 
 def _number(value: Value) -> float:
@@ -301,3 +163,6 @@ def _number(value: Value) -> float:
 
 def _estimate(value: Value) -> Estimate:
     return Estimate(value.value, value.u, "turns")
+
+
+DOCUMENT = Document(method=METHOD, result=SpinResult, entries=_entries, run_entries=_run_entries, run=_run)

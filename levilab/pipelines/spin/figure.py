@@ -13,6 +13,8 @@ from levilab.present.numbers import short_name, with_uncertainty
 from levilab.present.style import STYLE
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
@@ -35,7 +37,10 @@ BINS = 240
 
 @dataclass(frozen=True, eq=False)
 class _Excerpt:
-    """Samples about the reference time: time [s], signal [unit], turns; arrivals and residuals of the pulses [s]."""
+    """Samples about the reference time: time [s], signal [unit], turns; arrivals and residuals of the pulses [s].
+
+    bend: how the slope changes [Hz/s²].
+    """
 
     time: Array
     signal: Array
@@ -43,6 +48,7 @@ class _Excerpt:
     unit: str
     arrivals: Array
     residuals: Array
+    bend: float
 
 
 def spin_figure(analysis: SpinAnalysis) -> Figure:
@@ -88,29 +94,57 @@ def _draw(panels: list[Axes], source: Source[Records], run: SpinRun) -> None:
         _draw_trace(panels[0], excerpt, run.spin)
         _draw_folded(panels[1], excerpt)
     _draw_residuals(panels[2], excerpt, run.spin)
-    _draw_series(panels[3], run)
+    _draw_series(panels[3], run, excerpt)
 
 
 # --- what is drawn -------------------------------------------------------------------------------------
 
 
-def turns_of(spin: SpinFrequency, time: Array) -> Array:
-    """Turns at given times [s] since the pulse before the reference time: along the slope."""
+def turns_of(spin: SpinFrequency, time: Array, bend: float = 0.0) -> Array:
+    """Turns at given times [s] since the pulse before the reference time.  bend: how the slope changes [Hz/s²]."""
     away = time - spin.reference_time
     values = spin.phase.value, spin.frequency.value, spin.chirp.value
     phase, frequency, chirp = (value or 0.0 for value in values)
-    turns: Array = phase + frequency * away + chirp * away**2 / 2
+    turns: Array = phase + frequency * away + chirp * away**2 / 2 + bend * away**3 / 6
     return turns
+
+
+def _bend(spin: SpinFrequency, pulses: Callable[[float], tuple[Array, Array]]) -> float:
+    """How the slope itself changes [Hz/s²]; 0 where no third degree was fitted.
+
+    A fit of the third degree gives phase, frequency and slope at the reference time, and those are kept.  The one
+    number that is not is found again from the pulses: from those near the reference time first, where none is mistaken
+    for the next, then from all.
+
+    pulses: a bend [Hz/s²] → times of the pulses and how late they are by a fit with it [s], shape (n,) each.
+    """
+    bend = 0.0
+    for share in (0.3, 0.6, 1.0, 1.0) if _is_curved(spin) else ():
+        times, late = pulses(bend)
+        away = times - spin.reference_time
+        near = np.abs(away) <= share * np.abs(away).max(initial=0.0)
+        cubes = away[near] ** 3 / 6
+        if cubes.any():
+            bend -= float(cubes @ late[near]) * (spin.frequency.value or 1.0) / float(cubes @ cubes)
+    return bend
+
+
+def _is_curved(spin: SpinFrequency) -> bool:
+    return any(note.name == "curved" for note in spin.notes)
 
 
 def _excerpt(records: Records, spin: SpinFrequency) -> _Excerpt:
     """The part about the reference time to which the numbers belong."""
     if records.pulses:
         times = records.pulses.times
-        near = _near(times, spin)
-        turns = turns_of(spin, times[near])
-        residuals = (turns - np.rint(turns)) / (spin.frequency.value or 1.0)
-        return _Excerpt(times[near], np.zeros(near.sum()), turns, "", times[near], residuals)
+        times = times[_near(times, spin)]
+
+        def late(bend: float) -> tuple[Array, Array]:
+            turns = turns_of(spin, times, bend)
+            return times, (turns - np.rint(turns)) / (spin.frequency.value or 1.0)
+
+        bend = _bend(spin, late)
+        return _Excerpt(times, np.zeros(len(times)), turns_of(spin, times, bend), "", *late(bend), bend)
     waveform = min(records.waveforms, key=lambda w: abs(w.start + w.duration / 2 - spin.reference_time))
     first = 0
     if waveform.duration > LONGEST_FOLDED_S:
@@ -119,10 +153,13 @@ def _excerpt(records: Records, spin: SpinFrequency) -> _Excerpt:
     channel = records.channel if len(records.waveforms) == 1 else None
     signal = _part(waveform, channel, first, count)
     time = waveform.start + (first + np.arange(len(signal), dtype=np.float64)) * waveform.step
-    turns = turns_of(spin, time)
-    arrivals, residuals = _arrivals(signal, turns, spin)
+
+    def arrivals(bend: float) -> tuple[Array, Array]:
+        return _arrivals(time, signal, turns_of(spin, time, bend), spin)
+
+    bend = _bend(spin, arrivals)
     unit = waveform.signals[waveform.signal(channel)].unit
-    return _Excerpt(time, signal, turns, unit, arrivals, residuals)
+    return _Excerpt(time, signal, turns_of(spin, time, bend), unit, *arrivals(bend), bend)
 
 
 def _near(times: Array, spin: SpinFrequency) -> NDArray[np.bool_]:
@@ -145,7 +182,7 @@ def _part(waveform: Waveform, channel: str | None, first: int, count: int) -> Ar
     return np.concatenate(kept)
 
 
-def _arrivals(signal: Array, turns: Array, spin: SpinFrequency) -> tuple[Array, Array]:
+def _arrivals(time: Array, signal: Array, turns: Array, spin: SpinFrequency) -> tuple[Array, Array]:
     """Times of pulses [s] and how far they are from the fit [s]: the centre of what rises out of the noise."""
     base, height = _levels(signal, turns)
     level = (signal - base) / height
@@ -160,9 +197,8 @@ def _arrivals(signal: Array, turns: Array, spin: SpinFrequency) -> tuple[Array, 
     seen = np.flatnonzero(weight > 0.2 * np.median(weight[weight > 0])) if (weight > 0).any() else np.zeros(0, np.intp)
     number = seen + whole.min()
     seen = seen[(number - 0.25 >= turns.min()) & (number + 0.25 <= turns.max())]  # the ends may cut a pulse
-    frequency = spin.frequency.value or 1.0
     shift = moment[seen] / weight[seen]
-    return (seen + whole.min() - (spin.phase.value or 0.0)) / frequency + spin.reference_time, shift / frequency
+    return np.interp(seen + whole.min(), turns, time), shift / (spin.frequency.value or 1.0)
 
 
 def _levels(signal: Array, turns: Array) -> tuple[float, float]:
@@ -256,24 +292,25 @@ def _draw_residuals(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:
     if limit > 0:
         axes.set_ylim(-1.1 * limit, 1.1 * limit)
     axes.set(xlabel="time  [s]", ylabel=f"time of a pulse − fit  [{unit}]")
-    curved = any(note.name == "curved" for note in spin.notes)
-    bend = ", with the bend of a third degree" if curved else ""
-    axes.set_title(f"Residuals of the pulses' times{bend}", loc="left")
+    degree = " from a fit of the third degree" if _is_curved(spin) else ""
+    axes.set_title(f"Residuals of the pulses' times{degree}", loc="left")
 
 
-def _draw_series(axes: Axes, run: SpinRun) -> None:
-    """Frequency against time: of windows or records, or along the slope of the only one."""
+def _draw_series(axes: Axes, run: SpinRun, excerpt: _Excerpt) -> None:
+    """Frequency against time: of windows or records, or by the fit of the only one."""
     series, spin = run.series, run.spin
     if len(series) == 1:
-        half = 0.5 * spin.pulses / (spin.frequency.value or 1.0)
-        t = np.linspace(spin.reference_time - half, spin.reference_time + half, 50)
+        t = np.linspace(float(excerpt.time[0]), float(excerpt.time[-1]), 50)
         along = [spin.at(float(x)) for x in t]
         nu = np.array([one.value for one in along], dtype=np.float64)
+        nu += excerpt.bend * (t - spin.reference_time) ** 2 / 2
         u = np.array([one.u if one.u is not None else np.nan for one in along])
-        axes.fill_between(t, nu - u, nu + u, color=BLUE, alpha=0.25, linewidth=0)
+        if not excerpt.bend:
+            axes.fill_between(t, nu - u, nu + u, color=BLUE, alpha=0.25, linewidth=0)
         axes.plot(t, nu, color=BLUE)
         axes.plot(spin.reference_time, spin.frequency.value or 0.0, "o", color="black", markersize=5)
-        axes.set_title("Frequency along the slope, ± u", loc="left")
+        curve = "with its change" if excerpt.bend else "± u"
+        axes.set_title(f"Frequency along the slope, {curve}", loc="left")
     else:
         axes.errorbar(series.time, series.frequency, series.u, color=BLUE, fmt=".", markersize=3, elinewidth=0.8)
         colours = {"coasting": GREEN, "held": VERMILION, "speeding-up": "#E69F00"}

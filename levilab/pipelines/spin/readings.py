@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes, Waveform
+from levilab.runs.traces import INDEX, undescribed_codes
 from levilab.runs.waveforms import run_waveforms
 
 if TYPE_CHECKING:
@@ -84,7 +85,10 @@ def read_spin_run(run: Run, options: InputOptions) -> Records:
         raise DataError(
             f"{run.folder}: has no record of {chosen!r}, but of {', '.join(names)}: name one with `channel`"
         )
-    warnings = []
+    warnings = [
+        f"{run.folder.name}: {path} has no line in {INDEX}, as a process that was killed leaves it: it is left out"
+        for path in undescribed_codes(run.folder)
+    ]
     if options.channel is None and len(names) > 1:
         warnings.append(
             f"{run.folder.name}: has records of {', '.join(names)}; {chosen} is analyzed, `channel` chooses another"

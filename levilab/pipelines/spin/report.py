@@ -32,7 +32,7 @@ def spin_part(analysis: SpinAnalysis) -> ReportPart:
             "pulses": pulse_table(analysis),
         },
         inputs=tuple(
-            InputPart(_in_words(source, run), origin.text, in_a_sentence(run), _series(run))
+            InputPart(_in_words(source, run), origin.text, in_a_sentence(run), _series(source, run))
             for source, run, origin in zip(analysis.sources, analysis.runs, analysis.origins, strict=True)
         ),
     )
@@ -44,5 +44,5 @@ def _in_words(source: Source[Records], run: SpinRun) -> tuple[str, ...]:
     return f"{records.kind}; {count} {what}", f"{run.spin.pulses} pulses, {run.spin.missing} missing"
 
 
-def _series(run: SpinRun) -> dict[str, object]:
-    return {"series": series_table(run, MOST_VALUES) if len(run.series) > 1 else None}
+def _series(source: Source[Records], run: SpinRun) -> dict[str, object]:
+    return {"series": series_table(source, run, MOST_VALUES) if len(run.series) > 1 else None}

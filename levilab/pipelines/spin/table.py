@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from levilab.present.numbers import plain, short_name, without_unit
+from levilab.present.clock import with_clock
+from levilab.present.numbers import column, plain, short_name
 from levilab.present.tables import Table, table
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
+    from levilab.pipelines.sources import Source
     from levilab.pipelines.spin.analysis import SpinAnalysis, SpinRun
+    from levilab.pipelines.spin.readings import Records
 
 #: Values of a series that are printed; result.json has all.
 MOST_VALUES = 12
@@ -20,7 +21,7 @@ def spin_tables(analysis: SpinAnalysis) -> tuple[Table, ...]:
     """Frequency, slope and time of each input; how its pulses are; of one input its series."""
     tables = [frequency_table(analysis), pulse_table(analysis)]
     if len(analysis.runs) == 1 and len(analysis.runs[0].series) > 1:
-        tables.append(series_table(analysis.runs[0], MOST_VALUES))
+        tables.append(series_table(analysis.sources[0], analysis.runs[0], MOST_VALUES))
     return tuple(tables)
 
 
@@ -28,16 +29,17 @@ def frequency_table(analysis: SpinAnalysis) -> Table:
     """The result."""
     total, synthetic = len(analysis.runs), sum(source.synthetic for source in analysis.sources)
     made_up = "" if not synthetic else ", SYNTHETIC" if synthetic == total else f", {synthetic} of them SYNTHETIC"
+    spins, slopes = (column(getattr(run.spin, name) for run in analysis.runs) for name in ("frequency", "chirp"))
     rows = [
         (
             short_name(source.name),
-            without_unit(run.spin.frequency),
-            without_unit(run.spin.chirp),
+            spin,
+            slope,
             f"{run.spin.reference_time:.4f}",
             run.spin.method,
             plain(None if run.spin.bound is None else 1e3 * run.spin.bound, 2),
         )
-        for source, run in zip(analysis.sources, analysis.runs, strict=True)
+        for source, run, spin, slope in zip(analysis.sources, analysis.runs, spins, slopes, strict=True)
     ]
     heads = ("input", "spin [Hz]", "slope [Hz/s]", "at [s]", "method", "bound\n[mHz]")
     return table(
@@ -63,14 +65,14 @@ def pulse_table(analysis: SpinAnalysis) -> Table:
     return table("The pulses", heads, rows, numbers=heads[2:])
 
 
-def series_table(run: SpinRun, most: int) -> Table:
+def series_table(source: Source[Records], run: SpinRun, most: int) -> Table:
     """Frequency against time, thinned out evenly."""
     series = run.series
     step = max(-(-len(series) // most), 1)
-    rows: Sequence[tuple[str, str, str]] = [
-        (f"{series.time[k]:.2f}", f"{series.frequency[k]:.4f}", plain(1e3 * float(series.u[k]), 2))
+    heads, clocks = with_clock(source.time_zero, series.time.tolist(), ("time [s]", "spin [Hz]", "u [mHz]"))
+    rows = [
+        (*clocks[k], f"{series.time[k]:.2f}", f"{series.frequency[k]:.4f}", plain(1e3 * float(series.u[k]), 2))
         for k in range(0, len(series), step)
     ]
     which = "each" if step == 1 else f"every {step}th"
-    heads = ("time [s]", "spin [Hz]", "u [mHz]")
     return table(f"Frequency against time, {which} of {len(series)} {series.of}s", heads, rows, numbers=heads)

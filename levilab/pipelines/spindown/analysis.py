@@ -9,16 +9,17 @@ from analysis.errors import AnalysisError
 from analysis.spindown.combine import Combined, combine, tilt_demanded
 from analysis.spindown.fit import SpinDown, fit_spin_down
 from levilab.errors import DataError
-from levilab.pipelines.result import Place, place_of
-from levilab.pipelines.sources import InputOptions, Needs, Source, collect
+from levilab.pipelines.analyzed import Analyzed, Method
+from levilab.pipelines.sources import InputOptions, Needs
 from levilab.pipelines.spindown.readings import Readings, read_run_readings, read_spin_file
-from levilab.runs.run import find_run
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from pathlib import Path
 
-    from analysis.spindown.lawfit import Uncertainty
+    from analysis.spindown.combine import CombinedLaw
+    from analysis.spindown.lawfit import LawFit, Uncertainty
+    from levilab.pipelines.sources import Source
 
 SPINDOWN = "spindown"
 #: The runs and files that suit.
@@ -45,78 +46,25 @@ class SpinDownOptions(InputOptions):
     seed: int = 0
 
 
-@dataclass(frozen=True)
-class Origin:
-    """Where the fits of one run come from.  options: how they were made; text: for people."""
-
-    options: SpinDownOptions
-    text: str = "analyzed now"
-
-
-@dataclass(frozen=True)
-class SpinDownAnalysis:
-    """Spin-downs, each by itself and together.
-
-    runs, origins: one per source; place: where the result belongs; warnings: about the inputs; remarks: what does not
-    belong to the analysis.
-    """
-
-    sources: tuple[Source[Readings], ...]
-    runs: tuple[SpinDown, ...]
-    combined: Combined
-    options: SpinDownOptions
-    place: Place
-    warnings: tuple[str, ...]
-    remarks: tuple[str, ...]
-    origins: tuple[Origin, ...]
-
-    @property
-    def home(self) -> Path:
-        """The folder that the result belongs to."""
-        return self.place.folder
+class SpinDownAnalysis(Analyzed[Readings, SpinDown, Combined, SpinDownOptions]):
+    """Spin-downs, each by itself and together."""
 
     @property
     def text(self) -> str:
         """What the data say, in a few sentences."""
         return self.combined.verdict.text
 
-    @property
-    def all_warnings(self) -> list[str]:
-        """Every warning once, a run's with its name where there are several runs."""
-        several = len(self.runs) > 1
-        texts = [*self.warnings, *self.combined.warnings]
+    def about_all(self) -> Iterable[str]:
+        """What to know of the means, and of the laws that are not excluded."""
+        return (*self.combined.warnings, *self._of_laws(self.combined.fits))
+
+    def about_run(self, run: SpinDown) -> Iterable[str]:
+        """What to know of one run."""
+        return (*run.warnings, *self._of_laws(run.fits))
+
+    def _of_laws(self, fits: Iterable[LawFit | CombinedLaw]) -> Iterable[str]:
         excluded = {name for name, _ in self.combined.verdict.excluded}  # what they lack is of no interest any more
-        texts += [text for fit in self.combined.fits if fit.name not in excluded for text in fit.warnings]
-        for source, run in zip(self.sources, self.runs, strict=True):
-            of_laws = [warning for fit in run.fits if fit.name not in excluded for warning in fit.warnings]
-            prefix = f"{source.name}: " if several else ""
-            texts += [prefix + text for text in (*source.warnings, *run.warnings, *of_laws)]
-        return list(dict.fromkeys(texts))
-
-
-def analyze_spindowns(paths: Sequence[Path], options: SpinDownOptions) -> SpinDownAnalysis:
-    """Fit the drag laws to every spin-down found at the paths.
-
-    Raises DataError for what cannot be used; the text names the file.
-    """
-    paths = [find_run(path) for path in paths]
-    found = collect(paths, NEEDS, lambda _: options)
-    runs = tuple(fit_source(source, options) for source in found.sources)
-    if tilt_demanded(runs):
-        runs = tuple(
-            run if run.has_tilt else fit_source(source, options, tilt=True)
-            for source, run in zip(found.sources, runs, strict=True)
-        )
-    return SpinDownAnalysis(
-        sources=found.sources,
-        runs=runs,
-        combined=combine(runs),
-        options=options,
-        place=place_of(paths, found.sources),
-        warnings=(*found.warnings, *about_inputs(found.sources, options)),
-        remarks=found.remarks,
-        origins=(Origin(options),) * len(runs),
-    )
+        return (warning for fit in fits if fit.name not in excluded for warning in fit.warnings)
 
 
 def fit_source(source: Source[Readings], options: SpinDownOptions, *, tilt: bool | None = None) -> SpinDown:
@@ -140,17 +88,30 @@ def fit_source(source: Source[Readings], options: SpinDownOptions, *, tilt: bool
         raise DataError(f"{source.data}: {error}") from error
 
 
-def about_inputs(sources: Sequence[Source[Readings]], options: SpinDownOptions) -> Iterable[str]:
-    """What to know of the inputs before using the numbers."""
-    synthetic = sum(source.synthetic for source in sources)
-    if 0 < synthetic < len(sources):
-        yield (
-            f"{synthetic} of {len(sources)} inputs are SYNTHETIC, the others are not known to be: "
-            "a mean over both says nothing about a real top"
-        )
-    given = [source.name for source in sources if source.readings.u is not None]
-    if options.reading_u is not None and given:
-        names = ", ".join(given)
-        yield f"the given u of a reading, {options.reading_u:g} Hz, takes the place of the uncertainties in {names}"
-    if options.columns and all(source.run for source in sources):
-        yield "names of columns were given, but none of the inputs is a data file"
+def fit_with_tilt(
+    sources: Sequence[Source[Readings]], runs: Sequence[SpinDown], options: Sequence[SpinDownOptions]
+) -> dict[int, SpinDown]:
+    """Number → fit with the tilt, of those that lack it where the runs together demand it."""
+    if not tilt_demanded(runs):
+        return {}
+    return {k: fit_source(sources[k], options[k], tilt=True) for k, run in enumerate(runs) if not run.has_tilt}
+
+
+METHOD = Method(
+    needs=NEEDS,
+    kind=SpinDownAnalysis,
+    options=SpinDownOptions,
+    fit=fit_source,
+    combine=lambda _, runs, __: combine(runs),
+    mixed="a mean over both says nothing about a real top",
+    refit=fit_with_tilt,
+    refit_text="the runs show a tilt of the top together, not each by itself",
+)
+
+
+def analyze_spindowns(paths: Sequence[Path], options: SpinDownOptions) -> SpinDownAnalysis:
+    """Fit the drag laws to every spin-down found at the paths.
+
+    Raises DataError for what cannot be used; the text names the file.
+    """
+    return METHOD.analyze(paths, options)

@@ -2,57 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from analysis.residuals import Correlation
-from analysis.spindown.combine import Combined, CombinedLaw, Mean, combine, tilt_demanded
+from analysis.spindown.combine import Combined, CombinedLaw, Mean
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import SpinDown
 from analysis.spindown.lawfit import LawFit
 from analysis.spindown.selection import Statistics
 from analysis.spindown.tilt import PARAMETERS, counted
 from analysis.spindown.verdict import Verdict
-from levilab.errors import DataError, unquoted
-from levilab.files import finite
 from levilab.formats.table import FEWEST
-from levilab.pipelines.result import (
-    ANEW,
-    SCHEMA,
-    Archive,
-    Earlier,
-    Part,
-    Place,
-    Result,
-    RunPart,
-    Value,
-    place_of,
-    relative,
-)
-from levilab.pipelines.result import save as save_files
-from levilab.pipelines.sources import Found, Source, collect
-from levilab.pipelines.spindown.analysis import (
-    NEEDS,
-    SPINDOWN,
-    Origin,
-    SpinDownAnalysis,
-    SpinDownOptions,
-    about_inputs,
-    fit_source,
-)
+from levilab.pipelines.document import Document, Settings, number, value_of, values_of
+from levilab.pipelines.result import Part, Result, RunPart, Value
+from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis, SpinDownOptions
 from levilab.pipelines.spindown.laws import SHOWN_LAWS
 from levilab.pipelines.spindown.readings import EARLIEST_S, HIGHEST_HZ, SLOWEST_HZ
-from levilab.runs.run import find_run
-from levilab.software import software_versions
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
+    from collections.abc import Mapping
 
-    from analysis.uncertainty import Estimate
+    from levilab.pipelines.sources import InputOptions, Source
     from levilab.pipelines.spindown.readings import Readings
 
 
@@ -218,32 +192,28 @@ class BootstrapPart(Part):
     seed: int = Field(ge=0)
 
 
-class SettingsPart(Part):
+class SettingsPart(Settings):
     """How the readings were analyzed."""
 
-    columns: dict[str, str]
     channel: str | None = None
-    rate_hz: float | None = Field(default=None, gt=0)
-    reading_u_hz: float | None = Field(gt=0)
+    rate: float | None = Field(default=None, gt=0, alias="rate_hz")
+    reading_u: float | None = Field(gt=0, alias="reading_u_hz")
     uncertainty: Literal["covariance", "profile", "bootstrap"]
     keep_outliers: bool
     bootstrap: BootstrapPart | None
 
-    @property
-    def options(self) -> SpinDownOptions:
+    @classmethod
+    def of(cls, options: InputOptions, **more: Any) -> Self:
+        """From options."""
+        assert isinstance(options, SpinDownOptions)
+        drawn = BootstrapPart(samples=options.bootstrap_samples, seed=options.seed)
+        return super().of(options, bootstrap=drawn if options.uncertainty == "bootstrap" else None, **more)
+
+    def arguments(self) -> dict[str, Any]:
         """The same as options."""
-        drawn: dict[str, Any] = (
-            {"bootstrap_samples": self.bootstrap.samples, "seed": self.bootstrap.seed} if self.bootstrap else {}
-        )
-        return SpinDownOptions(
-            columns=self.columns or None,
-            channel=self.channel,
-            rate=self.rate_hz,
-            reading_u=self.reading_u_hz,
-            uncertainty=self.uncertainty,
-            keep_outliers=self.keep_outliers,
-            **drawn,
-        )
+        given = super().arguments()
+        drawn: BootstrapPart | None = given.pop("bootstrap")
+        return given | ({"bootstrap_samples": drawn.samples, "seed": drawn.seed} if drawn else {})
 
 
 class SpinDownResult(Result, _WithLaws):
@@ -257,56 +227,12 @@ class SpinDownResult(Result, _WithLaws):
 # --- writing -------------------------------------------------------------------------------------------
 
 
-def save_result(analysis: SpinDownAnalysis, folder: Path | None = None, *, first: bool = True) -> list[Path]:
-    """Write the result and the figure beside the inputs, or into a folder; returns the files.  Raises CannotWrite.
-
-    Args:
-        analysis: what was found.
-        folder: in the place of that of the inputs.
-        first: whether this is the first analysis of the inputs, see `levilab.pipelines.catalogue.save`.
-    """
-    from levilab.pipelines.spindown.figure import spindown_figure
-    from levilab.present.style import as_png
-
-    place = replace(analysis.place, folder=folder or analysis.home)
-    return save_files(result_of(analysis, place), place, as_png(spindown_figure(analysis)), first=first)
-
-
-def as_document(analysis: SpinDownAnalysis, folder: Path) -> dict[str, Any]:
-    """The content of result.json; paths in it are relative to the folder that it is for."""
-    return result_of(analysis, Place(folder)).as_dict()
-
-
-def result_of(analysis: SpinDownAnalysis, place: Place) -> SpinDownResult:
-    """The result for a place."""
-    combined, sources = analysis.combined, analysis.sources
-    document = {
-        "schema": SCHEMA,
-        "analysis": SPINDOWN,
-        "inputs": [{"path": relative(source.data, place.folder), "sha256": source.sha256} for source in sources],
-        "synthetic": any(source.synthetic for source in sources),
-        "software": software_versions(),
-        "settings": _settings(analysis.options),
-        "values": _combined_values(analysis),
-        "models": _combined_models(analysis),
-        "runs": [_run(analysis, k, place.folder) for k in range(len(sources))],
-        "warnings": [unquoted(text) for text in analysis.all_warnings],
-    }
-    said = _verdict(combined.best, combined.verdict, combined.correlation)
-    return SpinDownResult.model_validate(finite(document | said))
-
-
-def _settings(options: SpinDownOptions) -> dict[str, Any]:
-    drawn = {"samples": options.bootstrap_samples, "seed": options.seed}
+def _entries(analysis: SpinDownAnalysis) -> dict[str, Any]:
+    combined = analysis.combined
     return {
-        "columns": dict(options.columns or {}),
-        "channel": options.channel,
-        "rate_hz": options.rate,
-        "reading_u_hz": options.reading_u,
-        "uncertainty": options.uncertainty,
-        "keep_outliers": options.keep_outliers,
-        "bootstrap": drawn if options.uncertainty == "bootstrap" else None,
-    }
+        "values": _combined_values(combined),
+        "models": _combined_models(analysis),
+    } | _verdict(combined.best, combined.verdict, combined.correlation)
 
 
 def _verdict(best: str, verdict: Verdict, correlation: Correlation | None) -> dict[str, Any]:
@@ -325,20 +251,20 @@ def _verdict(best: str, verdict: Verdict, correlation: Correlation | None) -> di
     }
 
 
-def _combined_values(analysis: SpinDownAnalysis) -> dict[str, Any]:
+def _combined_values(combined: Combined) -> dict[str, Any]:
     """The favoured law's constants, and by how much they differ from run to run."""
-    best = analysis.combined.fit(analysis.combined.best)
+    best = combined.fit(combined.best)
     scatter = {
-        f"{name}_scatter": {"value": mean.scatter, "u": None, "unit": mean.unit, "runs": mean.degrees_of_freedom + 1}
+        f"{name}_scatter": number(mean.scatter, mean.unit) | {"runs": mean.degrees_of_freedom + 1}
         for name, mean in best.constants.items()
         if mean.scatter is not None
     }
-    tilt = {"moment_tilt": _value(analysis.combined.tilt)} if analysis.combined.tilt else {}
-    return _values(best.constants) | scatter | tilt | _residual_correlation(analysis.combined.correlation)
+    tilt = {"moment_tilt": _mean_value(combined.tilt)} if combined.tilt else {}
+    return _means(best.constants) | scatter | tilt | _residual_correlation(combined.correlation)
 
 
 def _residual_correlation(found: Correlation | None) -> dict[str, Any]:
-    return {"residual_correlation": {"value": found.value, "u": found.u, "unit": "1"}} if found else {}
+    return {"residual_correlation": number(found.value, "1", found.u)} if found else {}
 
 
 def _combined_models(analysis: SpinDownAnalysis) -> list[dict[str, Any]]:
@@ -348,14 +274,14 @@ def _combined_models(analysis: SpinDownAnalysis) -> list[dict[str, Any]]:
     return [
         {
             "name": fit.name,
-            "parameters": _values(fit.constants),
+            "parameters": _means(fit.constants),
             "covariance": None,
             "scatter": {name: mean.scatter for name, mean in fit.constants.items()},
             "statistics": _some(fit.statistics, StatisticsPart),
             "fit": _some(fit.statistics, FitPart),
             "warnings": list(fit.warnings),
         }
-        | ({"linearised": _values(fit.linearised)} if fit.linearised else {})
+        | ({"linearised": _means(fit.linearised)} if fit.linearised else {})
         for fit in analysis.combined.fits
     ]
 
@@ -364,25 +290,22 @@ def _model(fit: LawFit) -> dict[str, Any]:
     """One law fitted to one run."""
     return {
         "name": fit.name,
-        "parameters": _values(fit.parameters),
+        "parameters": values_of(fit.parameters),
         "covariance": None if fit.covariance is None else fit.covariance.tolist(),
         "statistics": _some(fit.statistics, StatisticsPart),
         "fit": _some(fit.statistics, FitPart) | {"solution": fit.solution.tolist()},
         "warnings": list(fit.warnings),
-    } | ({"linearised": _values(fit.linearised)} if fit.linearised else {})
+    } | ({"linearised": values_of(fit.linearised)} if fit.linearised else {})
 
 
-def _run(analysis: SpinDownAnalysis, k: int, folder: Path) -> dict[str, Any]:
-    source, run = analysis.sources[k], analysis.runs[k]
+def _run_entries(source: Source[Readings], run: SpinDown) -> dict[str, Any]:
     frequency, duration = run.fits[0].reference
     return {
-        "path": relative(source.path, folder),
-        "synthetic": source.synthetic,
         "values": {
-            "start_time": {"value": run.start_time, "u": None, "unit": "s"},
-            "duration": {"value": float(run.time[-1] - run.time[0]), "u": None, "unit": "s"},
+            "start_time": number(run.start_time, "s"),
+            "duration": number(float(run.time[-1] - run.time[0]), "s"),
         }
-        | _values(run.fit(run.best).parameters)
+        | values_of(run.fit(run.best).parameters)
         | _residual_correlation(run.correlation),
         "tilt_gain": run.tilt_gain,
         "models": [_model(fit) for fit in run.fits],
@@ -395,21 +318,17 @@ def _run(analysis: SpinDownAnalysis, k: int, folder: Path) -> dict[str, Any]:
             }
             for i in run.outliers
         ],
-        "warnings": [unquoted(text) for text in (*source.warnings, *run.warnings)],
+        "warnings": run.warnings,
     } | _verdict(run.best, run.verdict, run.correlation)
 
 
-def _values(estimates: Mapping[str, Estimate]) -> dict[str, Any]:
-    return {name: _value(estimate) for name, estimate in estimates.items()}
+def _means(means: Mapping[str, Mean]) -> dict[str, Any]:
+    return {name: _mean_value(mean) for name, mean in means.items()}
 
 
-def _value(estimate: Estimate) -> dict[str, Any]:
-    value: dict[str, Any] = {"value": estimate.value, "u": estimate.u, "unit": estimate.unit}
-    if estimate.interval:
-        value["interval_68"] = list(estimate.interval)
-    if isinstance(estimate, Mean) and estimate.scatter is not None:
-        value |= {"scatter": estimate.scatter, "runs": estimate.degrees_of_freedom + 1}
-    return value
+def _mean_value(mean: Mean) -> dict[str, Any]:
+    scatter = {} if mean.scatter is None else {"scatter": mean.scatter, "runs": mean.degrees_of_freedom + 1}
+    return value_of(mean) | scatter
 
 
 def _some(statistics: Statistics, part: type[Part]) -> dict[str, Any]:
@@ -420,106 +339,7 @@ def _some(statistics: Statistics, part: type[Part]) -> dict[str, Any]:
 # --- reading -------------------------------------------------------------------------------------------
 
 
-#: Options that say nothing about runs, whose columns are known.
-_OF_FILES = frozenset({"columns", "channel", "rate"})
-
-
-def recall_spindowns(paths: Sequence[Path], options: SpinDownOptions) -> SpinDownAnalysis:
-    """What `analyze` found at the paths, from its result.json; analyzed anew is only what has none that holds.
-
-    A result holds as long as the readings are the same bytes, and it was made with the given options.  Options that are
-    at their defaults are not given: those of the result then count, for what is analyzed anew, too.
-
-    Raises DataError for what cannot be used, a damaged result.json included.
-    """
-    paths = [find_run(path) for path in paths]
-    archive = Archive(paths, SpinDownResult)
-    given = {f.name: getattr(options, f.name) for f in fields(SpinDownOptions) if getattr(options, f.name) != f.default}
-
-    def reading(path: Path) -> SpinDownOptions:
-        earlier = archive.earlier(path, path)
-        return replace(earlier.result.settings.options, **given) if earlier else options
-
-    found = collect(paths, NEEDS, reading)
-    place = place_of(paths, found.sources)
-    whole = archive.whole(found.sources)
-    if all(source.run for source in found.sources):
-        given = {name: value for name, value in given.items() if name not in _OF_FILES}
-    if whole and _holds(whole[1].settings.options, given):
-        return _restored(whole[1], whole[0], found, place)
-    recalled = [_recalled(source, archive, given) for source in found.sources]
-    if tilt_demanded([run for _, run, _ in recalled]):
-        recalled = [
-            one if one[1].has_tilt else _with_tilt(source, one[2].options)
-            for source, one in zip(found.sources, recalled, strict=True)
-        ]
-    runs = tuple(run for _, run, _ in recalled)
-    sources = tuple(source for source, _, _ in recalled)
-    return SpinDownAnalysis(
-        sources=sources,
-        runs=runs,
-        combined=combine(runs),
-        options=options,
-        place=place,
-        warnings=(*found.warnings, *about_inputs(sources, options)),
-        remarks=found.remarks,
-        origins=tuple(origin for _, _, origin in recalled),
-    )
-
-
-def _holds(made_with: SpinDownOptions, given: Mapping[str, Any]) -> bool:
-    return _settings(replace(made_with, **given)) == _settings(made_with)
-
-
-def _recalled(
-    source: Source[Readings], archive: Archive[SpinDownResult], given: Mapping[str, Any]
-) -> tuple[Source[Readings], SpinDown, Origin]:
-    """One input: what was found of it, or its fit."""
-    if source.run:  # the columns of a run are known
-        given = {name: value for name, value in given.items() if name not in _OF_FILES}
-    earlier = archive.earlier(source.path, source.data, source.sha256)
-    if earlier is None:
-        options = SpinDownOptions(**given)
-        return source, fit_source(source, options), Origin(options, "analyzed for this page: there was no result yet")
-    made_with = earlier.result.settings.options
-    if earlier.sha256 == source.sha256 and _holds(made_with, given):
-        run = _spin_down(earlier.result.runs[earlier.number], source, made_with, earlier.file)
-        return replace(source, warnings=()), run, _origin(earlier)
-    options = replace(made_with, **given)
-    why = "the readings are others than in" if earlier.sha256 != source.sha256 else "other options than those of"
-    return source, fit_source(source, options), Origin(options, f"analyzed for this page: {why} {earlier.file}")
-
-
-def _with_tilt(source: Source[Readings], options: SpinDownOptions) -> tuple[Source[Readings], SpinDown, Origin]:
-    """One input fitted with the count's tilt, which it shows only together with the others."""
-    origin = Origin(options, "analyzed for this page: the runs show a tilt of the top together, not each by itself")
-    return source, fit_source(source, options, tilt=True), origin
-
-
-def _origin(earlier: Earlier[SpinDownResult]) -> Origin:
-    return Origin(earlier.result.settings.options, earlier.text)
-
-
-def _restored(result: SpinDownResult, file: Path, found: Found[Readings], place: Place) -> SpinDownAnalysis:
-    """All of it as it was found."""
-    numbers = {given.sha256: k for k, given in enumerate(result.inputs)}
-    options = result.settings.options
-    order = [numbers[source.sha256] for source in found.sources]
-    return SpinDownAnalysis(
-        sources=tuple(replace(source, warnings=()) for source in found.sources),
-        runs=tuple(
-            _spin_down(result.runs[k], source, options, file) for k, source in zip(order, found.sources, strict=True)
-        ),
-        combined=_combined(result),
-        options=options,
-        place=place,
-        warnings=tuple(dict.fromkeys((*result.warnings, *map(unquoted, found.warnings)))),
-        remarks=found.remarks,
-        origins=tuple(_origin(Earlier(file, result, k)) for k in order),
-    )
-
-
-def _combined(result: SpinDownResult) -> Combined:
+def _combined(result: SpinDownResult, *_: object) -> Combined:
     fits = tuple(
         CombinedLaw(
             name=model.name,
@@ -546,23 +366,23 @@ def _mean(value: Value) -> Mean:
     )
 
 
-def _spin_down(part: SpinDownPart, source: Source[Readings], options: SpinDownOptions, file: Path) -> SpinDown:
-    """One run; its curves and what they leave over from the readings."""
+def _spin_down(part: SpinDownPart, source: Source[Readings], options: SpinDownOptions) -> SpinDown:
+    """One run; its curves and what they leave over from the readings.  Raises ValueError where these belie it."""
     readings = source.readings
     outliers = [one.index for one in part.outliers]
     if max(outliers, default=0) >= len(readings):
-        raise DataError(f"{file}: names an outlier that {source.data} does not hold: {ANEW}")
+        raise ValueError(f"names an outlier that {source.data} does not hold")
     used = np.ones(len(readings), dtype=bool)
     if not options.keep_outliers:
         used[outliers] = False
     if used.sum() < FEWEST:
-        raise DataError(f"{file}: names so many outliers that {used.sum()} readings of {source.data} are left: {ANEW}")
+        raise ValueError(f"names so many outliers that {used.sum()} readings of {source.data} are left")
     time, frequency = readings.time[used], readings.frequency[used]
     u = readings.u if options.reading_u is None else np.full(len(readings), options.reading_u)
     with np.errstate(all="ignore"):
         fits = tuple(_law_fit(model, part.reference, time, frequency, part.start_time) for model in part.models)
     if not all(np.isfinite(fit.residuals).all() for fit in fits):
-        raise DataError(f"{file}: its fits leave the range of numbers at the readings of {source.data}: {ANEW}")
+        raise ValueError(f"its fits leave the range of numbers at the readings of {source.data}")
     return SpinDown(
         fits=fits,
         best=part.best_model,
@@ -572,7 +392,7 @@ def _spin_down(part: SpinDownPart, source: Source[Readings], options: SpinDownOp
         u=None if u is None else u[used],
         outliers=tuple(outliers),
         start_time=part.start_time,
-        warnings=part.warnings,
+        warnings=(),  # they are those of the source
         correlation=_correlation_of(part),
         tilt_gain=part.tilt_gain,
     )
@@ -617,3 +437,13 @@ def _verdict_of(part: _WithLaws) -> Verdict:
         text=part.verdict,
         describes=part.describes,
     )
+
+
+DOCUMENT = Document(
+    method=METHOD,
+    result=SpinDownResult,
+    entries=_entries,
+    run_entries=_run_entries,
+    run=_spin_down,
+    combined=_combined,
+)

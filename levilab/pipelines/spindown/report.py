@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.pipelines.part import InputPart, ReportPart
 from levilab.pipelines.spindown.laws import SYMBOLS
@@ -17,7 +18,8 @@ from levilab.pipelines.spindown.table import (
     quality_table,
     straight_quantity,
 )
-from levilab.present.numbers import in_words, plain, short_name, with_uncertainty, without_unit
+from levilab.present.clock import with_clock
+from levilab.present.numbers import column, ends, in_words, short_name, with_uncertainty
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
@@ -100,7 +102,8 @@ def _law_cells(analysis: SpinDownAnalysis, law: CombinedLaw) -> tuple[str, ...]:
 
 def interval(estimate: Estimate) -> str:
     """The 68 % interval where one was asked for."""
-    return "[{}, {}]".format(*(plain(end, 5) for end in estimate.interval)) if estimate.interval else ""
+    found = ends(estimate)
+    return f"[{found[0]} … {found[1]}]" if found else ""
 
 
 @dataclass(frozen=True)
@@ -112,26 +115,31 @@ class _Column:
     mean: Mean | None = None
 
     @property
-    def together(self) -> tuple[str, str]:
-        """Mean and scatter."""
-        spread = scatter(self.mean) if self.mean else None
-        return without_unit(self.mean) if self.mean else "", without_unit(spread) if spread else ""
+    def cells(self) -> list[str]:
+        """The runs, with their intervals; of several runs mean and scatter, empty where there is none."""
+        together = [self.mean, scatter(self.mean) if self.mean else None] if len(self.estimates) > 1 else []
+        shown = column([*self.estimates, *together])
+        intervals = [interval(one) for one in self.estimates] + [""] * len(together)
+        return [
+            f"{cell}\n{more}".rstrip() if cell != "—" or more else ""
+            for cell, more in zip(shown, intervals, strict=True)
+        ]
 
 
 def _by_run_table(analysis: SpinDownAnalysis) -> Table:
     columns = _columns(analysis)
-    rows = [
-        Row((short_name(source.name), str(len(run.time)), *(_with_interval(c.estimates[k]) for c in columns)))
-        for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True))
+    heads = ("run", "readings\nused", *(one.head for one in columns))
+    names = [
+        (short_name(source.name), str(len(run.time)), "")
+        for source, run in zip(analysis.sources, analysis.runs, strict=True)
     ]
     if len(analysis.runs) > 1:
-        means, scatters = zip(*(column.together for column in columns), strict=True)
-        rows += [Row(("mean", "", *means), "together"), Row(("scatter s", "", *scatters), "together")]
-    return table("", ("run", "readings\nused", *(c.head for c in columns)), rows, numbers=["readings\nused"])
-
-
-def _with_interval(estimate: Estimate) -> str:
-    return f"{without_unit(estimate)}\n{interval(estimate)}".rstrip()
+        names += [("mean", "", "together"), ("scatter s", "", "together")]
+    rows = [
+        Row((name, count, *cells), kind)
+        for (name, count, kind), *cells in zip(names, *(one.cells for one in columns), strict=True)
+    ]
+    return table("", heads, rows, numbers=heads[1:2])
 
 
 def _columns(analysis: SpinDownAnalysis) -> list[_Column]:
@@ -182,7 +190,7 @@ def _uncertainty(source: Source[Readings], fit: SpinDown, options: SpinDownOptio
     if fit.u is None:
         return "u of a reading: not known, taken from the scatter about each law"
     low, high = float(fit.u.min()), float(fit.u.max())
-    size = f"{low:.2g} Hz" if low == high else f"{low:.2g} Hz to {high:.2g} Hz"
+    size = f"{digits(low)} Hz" if low == high else f"{digits(low)} Hz to {digits(high)} Hz"
     if options.reading_u is not None:
         return f"u of a reading: {size}, as given to the analysis"
     channels = source.run.record.channels if source.run else []
@@ -191,16 +199,19 @@ def _uncertainty(source: Source[Readings], fit: SpinDown, options: SpinDownOptio
 
 
 def _readings(source: Source[Readings], fit: SpinDown, options: SpinDownOptions) -> Mapping[str, object]:
-    """The first readings in blocks; rows of time [s], spin [Hz] and u [Hz]."""
+    """The first readings in blocks; rows of clock time, if it is known, time [s], spin [Hz] and u [Hz]."""
     readings, given_u = source.readings, options.reading_u
     shown = min(len(readings), MOST_READINGS)
     u = [given_u] * shown if readings.u is None or given_u is not None else readings.u[:shown].tolist()
     outliers = frozenset(fit.outliers)
+    heads, clocks = with_clock(source.time_zero, readings.time[:shown].tolist(), ("t [s]", "ν [Hz]", "u [Hz]"))
     rows = [
-        Row((f"{t:.3f}", f"{nu:.5f}", "—" if u_ is None else f"{u_:.2g}"), "outlier" if i in outliers else "")
+        Row(
+            (*clocks[i], f"{t:.3f}", f"{nu:.5f}", "—" if u_ is None else f"{digits(u_)}"),
+            "outlier" if i in outliers else "",
+        )
         for i, (t, nu, u_) in enumerate(zip(readings.time[:shown], readings.frequency[:shown], u, strict=True))
     ]
-    heads = ("t [s]", "ν [Hz]", "u [Hz]")
     blocks = [table("", heads, rows[k : k + BLOCK], numbers=heads) for k in range(0, shown, BLOCK)]
     return {"blocks": blocks, "shown": shown, "count": len(readings)}
 

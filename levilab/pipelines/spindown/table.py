@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from analysis.spindown.tilt import counted
 from levilab.pipelines.spindown.laws import SHOWN_LAWS, SYMBOLS
-from levilab.present.numbers import in_words, plain, share, short_name, with_uncertainty, without_unit
+from levilab.present.numbers import column, ends, in_words, plain, share, short_name, with_uncertainty, without_unit
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
@@ -140,14 +139,19 @@ def _lines_table(analysis: SpinDownAnalysis) -> Table:
     best = analysis.combined.fit(analysis.combined.best)
     lines = [fit for fit in analysis.combined.fits if fit.linearised]
     heads = [f"{straight_quantity(fit.name)}\n{_head(fit.linearised or {})}" for fit in lines]
-    rows = []
-    for source, run in zip(analysis.sources, analysis.runs, strict=True):
-        cells = [_first(run.fit(fit.name).linearised or {}) for fit in lines]
-        fitted = run.fit(best.name).parameters
-        rows.append(Row((short_name(source.name), *cells, _first({name: fitted[name] for name in best.constants}))))
-    if len(analysis.runs) > 1:
-        means = (_first(fit.linearised or {}) for fit in lines)
-        rows.append(Row(("mean", *means, _first(best.constants)), "together"))
+    means = [_first(fit.linearised or {}) for fit in lines] + [_first(best.constants)]
+    of_runs = [
+        [_first(run.fit(fit.name).linearised or {}) for fit in lines]
+        + [run.fit(best.name).parameters[next(iter(best.constants))]]
+        for run in analysis.runs
+    ]
+    several = len(analysis.runs) > 1
+    columns = [column(cells) for cells in zip(*of_runs, *([means] if several else []), strict=True)]
+    names = [*(short_name(source.name) for source in analysis.sources), *(["mean"] if several else [])]
+    rows = [
+        Row((name, *cells), "together" if several and name is names[-1] else "")
+        for name, *cells in zip(names, *columns, strict=True)
+    ]
     title = "Run by run: unweighted straight lines, and the fit of the best law"
     return table(title, ("run", *heads, f"{best.name} fit\n{_head(best.constants)}"), rows)
 
@@ -165,15 +169,9 @@ def _equations(estimates: Mapping[str, Estimate]) -> list[str]:
 
 
 def _interval(estimate: Estimate) -> str:
-    """The 68 % interval where one was asked for, in the digits that u gives."""
-    if not estimate.interval or not estimate.u:
-        return ""
-    low, high = (without_unit(replace(estimate, value=end)) for end in estimate.interval)
-    return f", 68 %: {low.split('(')[0]}{_power(low)} … {high.split('(')[0]}{_power(high)}"
-
-
-def _power(text: str) -> str:
-    return text.partition(")")[2]
+    """The 68 % interval where one was asked for."""
+    found = ends(estimate)
+    return f", 68 %: {found[0]} … {found[1]}" if found else ""
 
 
 def _head(estimates: Mapping[str, Estimate]) -> str:
@@ -181,5 +179,5 @@ def _head(estimates: Mapping[str, Estimate]) -> str:
     return f"{SYMBOLS[name]} [{in_words(estimate.unit)}]"
 
 
-def _first(estimates: Mapping[str, Estimate]) -> str:
-    return without_unit(next(iter(estimates.values())))
+def _first(estimates: Mapping[str, Estimate]) -> Estimate:
+    return next(iter(estimates.values()))

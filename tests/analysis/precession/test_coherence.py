@@ -69,3 +69,17 @@ def test_cuts_of_a_noisy_beam_are_found_once_each():
     found = found[(found > 0.02) & (found < TIME[-1] - 0.02)]
     # noise over the slope of a flank at half height, by two flanks: 0.03/(0.2/ms)/√2 = 0.1 ms; five of them
     np.testing.assert_allclose(found, inside, atol=5e-4)
+
+
+def test_missing_samples_do_not_shift_the_pulses():
+    beam = 1.0 - (np.cos(2 * np.pi * DRIVE_HZ * TIME + PHASE - 0.5) > 0.8)
+    whole = coherence(pulse_times(beam, DT), DRIVE, DT, 30.0)
+    holed, drive = beam.copy(), DRIVE.copy()
+    holed[1000:1010] = drive[3000:3777] = np.nan
+    found = coherence(pulse_times(holed, DT), drive, DT, 30.0)
+    assert whole.pulses - 1 <= found.pulses <= whole.pulses
+    assert found.phase_rad == pytest.approx(whole.phase_rad, abs=0.002)  # samples left out would shift it by a radian
+    assert found.length == pytest.approx(whole.length, abs=0.002)
+    for signal, beside in ((np.full_like(beam, np.nan), DRIVE), (beam, np.full_like(DRIVE, np.nan))):
+        with pytest.raises(TooFewReadings):
+            coherence(pulse_times(signal, DT), beside, DT, 30.0)

@@ -47,8 +47,8 @@ def test_the_median_line_has_the_median_of_all_slopes():
     [
         ({"p3": 0.5}, "half the frequency was counted"),
         ({"p3": 2.0}, "twice the frequency was counted"),
-        ({"n3": 1.0}, "2 pulses a gate too many"),
-        ({"n3": -0.5}, "1 pulse a gate too few"),
+        ({"n3": 1.0}, "2 pulses too many in each gate"),
+        ({"n3": -0.5}, "1 pulse too few in each gate"),
     ],
 )
 def test_a_miscount_is_named_and_the_line_goes_on_without_it(wrong, text):

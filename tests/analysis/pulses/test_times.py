@@ -93,7 +93,7 @@ def test_wrong_lists_are_refused_with_the_reason():
         spin_of_times([0.0, 0.2, 0.1, 0.3, 0.4])
 
 
-@pytest.mark.parametrize("power", [0.0, 1.0, 2.0])
+@pytest.mark.parametrize("power", [1.0, 1.5, 2.0])
 def test_a_slope_that_changes_as_under_drag_is_allowed_for(power):
     """ν′ = −0.1 Hz/s (ν/30 Hz)^n over 4 s, to the third order of time; the parabola alone is off by ν″T²/40."""
     slope, spin = -0.1, 30.0
@@ -105,6 +105,6 @@ def test_a_slope_that_changes_as_under_drag_is_allowed_for(power):
     plain = spin_of_times(times, degree=2)
     found = plain.under_drag()
     truth = spin + slope * found.reference_time
-    assert found.frequency.u == pytest.approx(0.6 * slope**2 / spin * 16 / 40, rel=0.05)  # 0.6 ν′²/ν T²/40
+    assert found.frequency.u == pytest.approx(0.5 * slope**2 / spin * 16 / 40, rel=0.05)  # 0.5 ν′²/ν T²/40
     assert abs(found.frequency.value - truth) < 2 * found.frequency.u
     assert abs(plain.frequency.value - truth) == pytest.approx(change * 16 / 40, abs=2e-6)

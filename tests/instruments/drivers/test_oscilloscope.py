@@ -23,7 +23,7 @@ KEYSIGHT_PREAMBLE = "+0,+0,+5,+1,+1.60000000E-008,-5.00000000E-004,+0,+2.0100502
 class BlockScript(Script):
     """A script whose answers may be blocks; they stand there as bytes."""
 
-    def query_block(self, message, *, patience=0.0):
+    def query_block(self, message, *, patience=0.0, form=None):
         answer = self._next(message)
         self.waited.append(patience)
         if answer == SILENCE:

@@ -55,11 +55,18 @@ def test_a_setting_is_asked_for_with_the_same_header(driver, name, value, sent, 
     assert type(got) is type(value)
 
 
+def _beyond(setting):
+    """Numbers that a setting does not take; between two of its values there is none that it takes."""
+    if setting.values:
+        return [setting.values[0] - 1, sum(setting.values) / 2, math.nan, -math.inf]
+    return [setting.low - 1, setting.high * 1.01, math.nan, -math.inf]
+
+
 REFUSED = [
     pytest.param(driver, setting, value, id=f"{driver.__name__}-{setting.name}-{value}")
     for driver, setting in SETTINGS
     if setting.kind is not bool
-    for value in (["FOO", ""] if setting.choices else [setting.low - 1, setting.high * 1.01, math.nan, -math.inf])
+    for value in (["FOO", ""] if setting.choices else _beyond(setting))
 ]
 
 
@@ -72,7 +79,8 @@ def test_a_value_out_of_range_is_refused_before_a_byte_is_sent(driver, setting, 
         setattr(instrument, setting.name, value)
     assert refusal.value.name == setting.name
     assert setting.name in str(refusal.value)
-    assert (setting.choices[0] if setting.choices else f"{setting.high:g}") in refusal.value.allowed
+    largest = f"{setting.values[-1] if setting.values else setting.high:g}"
+    assert (setting.choices[0] if setting.choices else largest) in refusal.value.allowed
 
 
 def test_choices_are_taken_in_any_case_and_sent_in_capitals():

@@ -37,6 +37,7 @@ class Box(ScpiInstrument):
     """Its driver."""
 
     MODELS = "box"
+    bus: object
     level = Setting("LEV", float, unit="V", low=-5.0, high=5.0)
 
     def reading(self):

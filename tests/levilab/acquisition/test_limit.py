@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
+from instruments.drivers.generator.keysight_33500b import Keysight33500B
 from instruments.errors import NoAnswer
 from levilab.acquisition.counting import FreeTop
 from levilab.acquisition.driving import DidNotFollow, held_spin
@@ -92,6 +93,32 @@ def test_a_top_that_slips_before_it_is_missed_has_its_limit_within_u(tmp_path: P
     assert "lock lost" in kinds(run)
     assert abs(limit - 36) < 2 * u  # an even distribution ends at 1.7 u
     assert u < 0.5
+
+
+def test_a_limit_is_kept_though_the_generator_fails_as_it_is_switched_off(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Twice: the bench itself tries once more over a new link.  The top is not driven up again for it."""
+    off = Keysight33500B.off
+    faults: list[int] = []
+
+    class Watchful(Silent):
+        def reading(self, text: str, elapsed: float, remaining: float) -> None:
+            super().reading(text, elapsed, remaining)
+            faults.extend([1, 2])
+
+    def switched_off(self: Keysight33500B) -> None:
+        if faults:
+            faults.pop()
+            raise NoAnswer(self.transport.address, "OUTP1?", 1.0)
+        off(self)
+
+    monkeypatch.setattr(Keysight33500B, "off", switched_off)
+    run = acquire(in_world(mock(tmp_path, *SLIPS), Slipping(SpinScene(), VirtualClock())), Watchful())
+    assert (run.status, run.count()) == ("finished", 1)
+    assert "found again" in kinds(run)
+    assert kinds(run).count("drive on") == 1
+    assert run.record.instruments["generator"]["settings_end"]["output"] is False
 
 
 def test_a_drive_does_not_jump_after_a_counter_was_away(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -226,12 +253,16 @@ def test_a_series_ends_when_its_time_is_over(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("settings", "says"),
     [
-        ("limit.which=middle", "limit.which = 'middle': Input should be 'lower' or 'upper'"),
-        ("limit.repetitions=0", "greater than 0"),
-        ("limit.wich=upper", "limit.wich is no key known here"),
-        ("which=upper", "limit.KEY=VALUE is expected: limit.which=upper?"),
+        ("limit.which=middle", "lower or upper is expected; levilab acquire limit --settings lists all"),
+        ("limit.repetitions=0", "a whole number above 0 is expected"),
+        ("limit.drive_frequency_hz=fast", "a number above 0 up to 100 [Hz] is expected"),
+        ("limit.gate_s=0,5", "a number above 0 [s] is expected; write a decimal point, not a comma"),
+        ("limit.wich=upper", "there is no such setting, did you mean limit.which? levilab acquire limit --settings"),
+        ("limit.colour=red", "there is no such setting; levilab acquire limit --settings lists all"),
+        ("limit.gate_s=3", "gate_s = 3 must be shorter than interval_s = 2"),
+        ("which=upper", "limit.KEY=VALUE is expected, limit.which=upper?"),
         ("limit.which", "limit.KEY=VALUE is expected"),
-        ("spin.hold_s=1", "is a setting of `levilab acquire spin`, this is `levilab acquire limit`"),
+        ("spin.hold_s=1", "is a setting of levilab acquire spin, this is levilab acquire limit"),
     ],
 )
 def test_settings_on_the_command_line_that_cannot_be_are_refused(tmp_path: Path, settings: str, says: str) -> None:
@@ -261,7 +292,7 @@ def test_settings_on_the_command_line_go_before_the_bench_files(tmp_path: Path) 
 
 def test_loose_washers_are_warned_of_in_the_run_and_in_its_result(tmp_path: Path) -> None:
     """In full motion; the slip is that of the washers' drag against their coupling, I₃ C ω^1.5/k."""
-    given = ("spin.drive_frequency_hz=30.2", "spin.longest_s=21")
+    given = ("spin.drive_frequency_hz=30.2", "spin.interval_s=2", "spin.longest_s=5", "spin.hold_s=12")
     options = AcquisitionOptions(mock=True, out=tmp_path, seed=1, scene="loose-washers", settings=given)
     show = Silent()
     run = acquire(request_for("spin", options), show)

@@ -246,10 +246,10 @@ def test_a_miscount_that_could_be_stands_for_the_analysis_to_find(
 
 @pytest.mark.parametrize(
     ("gap_s", "share", "plausible"),
-    [(10.0, 1.049, True), (10.0, 1.051, False), (10.0, 0.467, True), (10.0, 0.466, False), (100.0, 0.251, True)],
+    [(1.0, 1.048, True), (1.0, 1.05, False), (600.0, 0.58, False), (10.0, 0.467, True), (10.0, 0.466, False)],
 )
 def test_a_free_top_keeps_its_spin_within_what_air_takes(gap_s: float, share: float, plausible: bool) -> None:
-    """At most 5 % more; at least half of it, and half again for each 100 s: 0.4665 after 10 s, 0.25 after 100 s."""
+    """At most 5 % more, less 0.1 %/s (1.049 after 1 s, 0.576 after 600 s); at least 0.4665 after 10 s."""
     last = {"time_s": 50.0, "spin_frequency_hz": 30.0}
     reading = {"time_s": 50.0 + gap_s, "spin_frequency_hz": 30.0 * share}
     assert is_plausible(last, reading) is plausible

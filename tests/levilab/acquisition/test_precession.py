@@ -60,7 +60,14 @@ def kept(out: Path) -> Run:
 def test_a_sweep_in_full_motion_finds_a_locked_top(tmp_path: Path) -> None:
     options = AcquisitionOptions(mock=True, out=tmp_path, seed=1)
     asked = request_for("precession", options)
-    quick = QUICK | {"hold_s": 5.0, "gate_s": 1.0, "interval_s": 2.0, "record_s": 5.0}
+    quick = QUICK | {
+        "hold_s": 5.0,
+        "gate_s": 1.0,
+        "interval_s": 2.0,
+        "record_s": 5.0,
+        "counts": 8,
+        "ramp_hz_per_s": 0.1,
+    }
     settings = PrecessionSettings(drive_frequency_hz=45.0, frequencies_hz=(45.0, 44.5, 44.0), **quick)
     show = Silent()
     run = acquire(replace(asked, config=with_settings(asked.config, "precession", settings)), show)
@@ -71,13 +78,17 @@ def test_a_sweep_in_full_motion_finds_a_locked_top(tmp_path: Path) -> None:
     np.testing.assert_array_equal(readings.column("drive_frequency_hz"), [45.0, 44.5, 44.0])
     for quantity in ("spin", "precession"):
         off = readings.column(f"{quantity}_frequency_hz") - readings.column("drive_frequency_hz")
-        # three gates in a row of a top that swings about the drive: their scatter is known to a factor of two
-        assert (np.abs(off) < 8 * readings.column(f"{quantity}_frequency_u_hz") + 0.02).all()
+        # eight gates of a top that swings about the drive by a tenth of a turn or more: four or five beyond the swing
+        assert (np.abs(off) < 5 * readings.column(f"{quantity}_frequency_u_hz") + 0.005).all()
     assert run.record.instruments["generator"]["settings_end"]["output"] is False
     assert show.left == sorted(show.left, reverse=True)
     assert show.left[-1] == 0
     (found,) = analyze_precessions([run.folder], PrecessionOptions()).runs
     assert [one.point for one in found.coherences] == [0, 1, 2]
+    # of this run's gates; their u is the line's, the first estimate of the value stands in the readings
+    np.testing.assert_allclose(found.fit.column("precession"), readings.column("precession_frequency_hz"), rtol=1e-9)
+    assert not np.allclose(found.fit.column("u"), readings.column("precession_frequency_u_hz"))
+    assert len(events(run, "calmed")) == 1
     assert all(one.coherence.locked for one in found.coherences)
 
 
@@ -131,11 +142,11 @@ def test_a_sweep_whose_time_is_over_says_so_once(tmp_path: Path) -> None:
 def test_where_the_lock_is_lost_the_top_is_driven_up_anew(tmp_path: Path) -> None:
     # 8 Hz in two steps of a second: no drive pulls a top so fast
     world = Wobbling(SpinScene(drag="stokes", constants=(1e-5,)), VirtualClock())
-    run = acquire(request(tmp_path, world, frequencies_hz=(30.1, 38.0, 46.0, 54.0), ramp_hz_per_s=4.0), Silent())
+    run = acquire(request(tmp_path, world, frequencies_hz=(30.1, 38.0, 46.0, 54.0, 62.0), ramp_hz_per_s=4.0), Silent())
     assert run.status == "finished"
     assert run.count() == 1
-    assert len(events(run, "lock lost")) == 4
-    assert [text.split(" Hz")[0] for text in events(run, "left out")] == ["the point of 38", "the point of 46"]
+    assert len(events(run, "lock lost")) == 6
+    assert [text.split()[3] for text in events(run, "left out")] == ["38", "46", "54"]
     assert "the sweep ends here" in events(run, "ended")[0]
     assert run.record.instruments["generator"]["settings_end"]["output"] is False
 
@@ -179,7 +190,7 @@ def test_a_beam_that_is_never_cut_ends_the_sweep_in_one_line(tmp_path: Path) -> 
         ("frequencies_hz = [30, 31]", "at least three drive frequencies"),
         ("step_hz = 0.001", "a sweep of 16001 points is more than 1000"),
         ("step_hz = 20", "at least three drive frequencies"),
-        ("frequencies_hz = [30, 31, 200]", "precession: the sweep goes to 200 Hz, this bench allows 0 to 100 Hz"),
+        ("frequencies_hz = [30, 31, 200]", "precession.frequencies_hz = 200 is more than this bench allows"),
         ("counts = 2", "counts"),
         ("laser_input = 1", "no person who could change the counter's cable"),
         ("laser_input = 3", "laser_input"),

@@ -11,14 +11,14 @@ import pytest
 from instruments.clock import VirtualClock
 from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.errors import OutOfRange
-from instruments.virtual.counter.edges import crossings
+from instruments.virtual.core.trigger import crossings
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import ConfigError
 from levilab.runs.listing import list_runs
 from levilab.world.bench import VIRTUAL, virtual_wiring
-from levilab.world.spin_world import SpinWorld, drawn
+from levilab.world.spin_world import SpinScene, SpinWorld, drawn
 from support.acquisitions import Impatient, Silent
 
 if TYPE_CHECKING:
@@ -105,7 +105,10 @@ def test_a_resumed_run_keeps_its_records_and_counts_on(tmp_path: Path) -> None:
     assert len(after) == 4
     assert after[:2] == before
     assert len(show.readings) == 2
-    assert show.messages == ["resumed after 2 readings, the next record is number 3"]
+    assert show.messages[0] == "resumed after 2 records, the next record is number 3"
+    heads = show.messages[1]
+    assert heads.split() == ["time", "record", "lowest", "highest"]
+    assert len(heads) == len(show.readings[0])
     whole = acquire(mock_trace(tmp_path, "records = 4\ninterval_s = 2.0", seed=3), Silent())
     # the virtual top is where it would have been: a question or two earlier or later
     assert frequency(run, 3) == pytest.approx(frequency(whole, 3), abs=0.15)
@@ -174,6 +177,58 @@ def test_a_channel_that_another_program_turns_off_is_turned_on_again(tmp_path: P
     assert run.status == "finished"
     assert [event["kind"] for event in run.events()] == ["instrument lost", "found again"]
     assert len(run.traces()) == 2
+
+
+def watched(tmp_path: Path, message: str, scene: SpinScene | None = None) -> Run:
+    """Three driven records; after the first the generator gets this message from its front panel."""
+    settings = "records = 3\ninterval_s = 2.0\npoints = 1000\ndrive_frequency_hz = 30.0"
+    wiring = virtual_wiring(SpinWorld(scene or SpinScene(), VirtualClock()))
+
+    class Meddler(Silent):
+        def reading(self, text: str, elapsed: float, remaining: float) -> None:
+            super().reading(text, elapsed, remaining)
+            if len(self.readings) == 1:
+                wiring.library.bus.instruments[VIRTUAL["generator"].address].execute(message)
+
+    return acquire(replace(mock_trace(tmp_path, settings, seed=1), wiring=lambda: wiring), Meddler())
+
+
+@pytest.mark.parametrize("message", ["FREQ 35", "OUTP1 OFF", "VOLT 1"])
+def test_a_drive_that_is_changed_by_hand_is_seen_after_the_record(tmp_path: Path, message: str) -> None:
+    run = watched(tmp_path, message)
+    assert run.count() == 3
+    told = [event["kind"] for event in run.events()]
+    assert told == ["drive on", "warning", "instrument lost", "drive on", "found again"]
+    (warning,) = run.warnings()
+    assert warning.startswith("record 1 may be of another drive: the generator was changed")
+    settings = run.record.instruments["generator"]["settings_end"]
+    assert (settings["frequency_hz"], settings["output"]) == (30.0, False)
+
+
+def test_a_top_that_the_drive_does_not_hold_is_warned_of_once(tmp_path: Path) -> None:
+    """It begins at 27 Hz, which no drive of 30 Hz takes hold of."""
+    run = watched(tmp_path, "*CLS", SpinScene(start_hz=27.0))
+    (warning,) = run.warnings()
+    assert "record 1 shows a tape of 2" in warning
+    assert "the drive of 30 Hz lost the top" in warning
+
+
+def test_what_was_cut_short_is_said_and_taken_anew(tmp_path: Path) -> None:
+    """Killed in the second record: codes of its first channel with a line, those of its second without."""
+    settings = "records = 2\ninterval_s = 2.0\npoints = 1000\nchannels = [1, 2]"
+    whole = acquire(mock_trace(tmp_path, settings, seed=3), Silent())
+    for name, kept in (("readings.csv", 2), ("traces.jsonl", 3)):
+        lines = (whole.folder / name).read_text(encoding="utf-8").splitlines(keepends=True)
+        (whole.folder / name).write_text("".join(lines[:kept]), encoding="utf-8")
+    record = (whole.folder / "run.json").read_text(encoding="utf-8")
+    killed = record.replace('"status": "finished"', '"status": "interrupted"')
+    (whole.folder / "run.json").write_text(killed, encoding="utf-8")
+    run = acquire(request_for("trace", AcquisitionOptions(resume=whole.folder, out=tmp_path)), Silent())
+    cut = [event["text"] for event in run.events() if event["kind"] == "cut short"]
+    assert cut[0].startswith("traces/000004.npy: the run was cut short before traces.jsonl said how to read it")
+    assert cut[1] == "record 2 was cut short after 1 of 2 channels; it is taken anew"
+    assert [one.number for one in run.traces()] == [1, 2, 3, 5, 6]
+    assert run.count() == 2
 
 
 def test_the_generator_is_needed_only_by_a_drive(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from levilab.cli import exit_codes
 from levilab.cli.main import app, main
-from levilab.cli.options import in_options, option_names
+from levilab.cli.quantities import in_options, option_names
 from levilab.errors import LevilabError, UsageError
 from support.commands import command
 from support.paths import ROOT, SAMPLE_DATA
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 SAMPLE = str(SAMPLE_DATA / "spin-down-1")
+LIMITS = str(SAMPLE_DATA / "lower-limits")
 SCOPE = str(SAMPLE_DATA / "scope-files" / "rigol-ds1000z.csv")
 
 #: The command → what its line says. What stands in "file" is a file, in "bench.toml" a bench that is not there.
@@ -25,6 +26,10 @@ WRONG_USAGE = {
     "acquire spin --seed 1": "--mock",
     "acquire spin --realtime": "--mock",
     "acquire spin --scene spindown": "--mock",
+    "acquire trace --mock --set trace.duration=1": "did you mean trace.duration_s",
+    "acquire trace --mock --set trace.points=1.5": "--set trace.points=1.5: a whole number above 0 is expected",
+    "acquire trace --mock --set trace.volts_per_division=50": "a number from 0.001 to 10 [V] is expected",
+    "acquire trace --mock --set records=2": "trace.records=2?; levilab acquire trace --settings lists all",
     f"analyze spindown {SAMPLE} --reading-u 0": "--reading-u 0: ",
     f"analyze spindown {SAMPLE} --reading-u -0.1": "--reading-u -0.1: ",
     f"analyze spindown {SAMPLE} --reading-u nan": "--reading-u nan: ",
@@ -86,12 +91,15 @@ NOT_UNDERSTOOD = (
 )
 FAILURES = {
     "acquire spin --bench other.toml": "other.toml: there is no such file",
+    "acquire trace --mock --set trace.trigger_level_v=5": "beyond what the oscilloscope records, -0.35 to 1.65 V",
     "acquire spin --mock --resume nowhere": "nowhere/run.json: cannot be read",
     f"acquire spin --mock --resume {SAMPLE}": "is finished",
     "acquire spin --mock --scene spindwon": "did you mean spindown?",
     "acquire spin --mock --out file": "choose another place with --out",
+    f"analyze spindown {LIMITS}": f"spindown needs a spin run; levilab analyze limit {LIMITS} reads it",
+    f"analyze limit {SCOPE}": f"levilab analyze spin {SCOPE} reads it",
     "analyze spindown nowhere": "nowhere: there is no such file or folder",
-    "analyze spindown .": "found nothing",
+    "analyze spindown .": "holds no run and no data file",
     "analyze spindown file": "file: is empty",
     "report nowhere": "nowhere: there is no such file or folder",
     "runs nowhere": "nowhere: there is no such folder",
@@ -146,6 +154,19 @@ def test_each_mistake_has_its_exit_status_and_one_line(place: Path, words: str, 
     assert {path.name for path in place.iterdir()} <= {"file", "bench.toml", "runs"}
 
 
+def test_only_titles_of_the_analysis_that_was_asked_for_are_named(tmp_path: Path) -> None:
+    (tmp_path / "odd.csv").write_text("p,q\n1,2\n2,3\n3,4\n", encoding="utf-8")
+    spins = command("analyze", "spindown", "odd.csv", cwd=tmp_path).err
+    assert "(time_s, spin_frequency_hz, t, f [Hz], rpm …) among 'p', 'q'" in spins
+    assert "(height_m, flux_density_t, z [mm], B [mT] …)" in command("analyze", "field", "odd.csv", cwd=tmp_path).err
+
+
+def test_the_virtual_bench_is_no_advice_to_those_who_use_it(place: Path) -> None:
+    advice = ", or try --mock"
+    assert advice in command("acquire", "spin", "--bench", "other.toml", cwd=place).err
+    assert advice not in command("acquire", "spin", "--mock", "--bench", "other.toml", cwd=place).err
+
+
 @pytest.mark.parametrize("words", NOT_UNDERSTOOD)
 def test_what_is_not_understood_is_wrong_usage(place: Path, words: str) -> None:
     assert command(*words.split(), cwd=place).status == exit_codes.WRONG_USAGE
@@ -157,6 +178,21 @@ def test_an_interrupted_command_ends_with_130(monkeypatch: pytest.MonkeyPatch, t
 
     monkeypatch.setattr("levilab.runs.listing.list_runs", interrupted)
     assert command("runs", ".", cwd=tmp_path).status == exit_codes.INTERRUPTED
+
+
+def test_an_interrupted_analysis_says_in_one_line_what_is_lost(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, sample_data: Path
+) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("levilab.pipelines.spindown.analysis.fit_spin_down", interrupted)
+    run = sample_data / "spin-down-1"
+    for words, says in (("analyze spindown", "is lost, nothing is written"), ("report", "no report is written")):
+        ended = command(*words.split(), str(run), cwd=tmp_path)
+        assert (ended.status, ended.out) == (exit_codes.INTERRUPTED, "")
+        assert len(ended.err.splitlines()) == 1
+        assert says in ended.err
 
 
 def test_a_defect_of_the_program_stays_loud(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import html
 import json
-import os
 import re
 import shutil
 import subprocess
 import sys
+from dataclasses import fields
 from typing import TYPE_CHECKING
 
 import pytest
 
 from levilab.acquisition.table import EXPERIMENTS
 from levilab.cli.acquire import EXPERIMENT_HELP
-from levilab.cli.analyze import ANALYSIS_HELP
+from levilab.cli.analyze import COMMANDS, OPTIONS
 from levilab.pipelines.catalogue import ANALYSES
+from support.commands import command
 from support.spin_downs import spin_down_csv
 from support.waiting import HANG_GUARD_S
 
@@ -26,10 +27,10 @@ if TYPE_CHECKING:
 
     Command = Callable[..., subprocess.CompletedProcess[str]]
 
-COMMANDS = ["", "acquire", "acquire spin", "analyze", "analyze spindown", "analyze spin", "report", "simulate", "runs"]
+HELP = ["", "acquire", "acquire spin", "analyze", "analyze spindown", "analyze spin", "report", "simulate", "runs"]
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", HELP)
 def test_every_command_has_help_and_the_ones_that_do_something_an_example(levilab: Command, command: str) -> None:
     text = levilab(*command.split(), "--help").stdout
     assert "Usage:" in text
@@ -39,7 +40,13 @@ def test_every_command_has_help_and_the_ones_that_do_something_an_example(levila
 
 def test_each_experiment_and_each_analysis_has_its_command() -> None:
     assert EXPERIMENT_HELP.keys() == EXPERIMENTS.keys()
-    assert ANALYSIS_HELP.keys() == ANALYSES.keys()
+    assert COMMANDS.keys() - {"each"} == ANALYSES.keys()
+
+
+def test_an_analysis_takes_each_option_of_its_command() -> None:
+    for name, analysis in ANALYSES.items():
+        taken = {field.name for field in fields(analysis.options_from({}))}
+        assert {OPTIONS[option].to or option for option in COMMANDS[name].options} <= taken, name
 
 
 def test_the_version_is_printed(levilab: Command) -> None:
@@ -313,18 +320,13 @@ def test_a_result_that_cannot_be_written_is_shown_all_the_same(levilab: Command,
 
 @pytest.mark.parametrize("encoding", ["cp1252", "ascii"])
 def test_an_old_code_page_costs_no_number_its_exponent(tmp_path: Path, encoding: str) -> None:
+    """As PYTHONIOENCODING and an old Windows have it: such streams refuse what they cannot carry."""
     path = spin_down_csv(tmp_path / "my.csv")
-    done = subprocess.run(
-        [sys.executable, "-m", "levilab", "analyze", "spindown", str(path), "--no-save"],
-        capture_output=True,
-        env=os.environ | {"PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"},
-        check=True,
-        timeout=HANG_GUARD_S,
-    )
-    text = done.stdout.decode(encoding)
-    assert "?" not in text
-    assert re.search(r"C3/2 = 2\.\d+\(\d+\)e-4 \(rad/s\)\^-(1/2|½)/s", text)
-    assert "chi2/dof" in text
+    done = command("analyze", "spindown", path, "--no-save", cwd=tmp_path, encoding=encoding)
+    assert done.status == 0, done.err
+    assert "?" not in done.out
+    assert re.search(r"C3/2 = 2\.\d+\(\d+\)e-4 \(rad/s\)\^-(1/2|½)/s", done.out)
+    assert "chi2/dof" in done.out
 
 
 def test_a_decoy_in_the_present_folder_is_not_imported(levilab: Command, tmp_path: Path) -> None:
@@ -337,24 +339,26 @@ def test_a_decoy_in_the_present_folder_is_not_imported(levilab: Command, tmp_pat
 HEAVY = {"numpy", "scipy", "pandas", "matplotlib", "lmfit", "pyvisa", "jinja2", "numba", "rich.progress"}
 
 
-@pytest.mark.parametrize(
-    ("words", "allowed"),
-    [
-        (["--help"], set[str]()),
-        (["acquire", "spin", "--help"], set[str]()),
-        (["simulate", "--help"], set[str]()),
-        (["simulate", "nowhere"], set[str]()),
-        (["--version"], set[str]()),
-        (["acquire", "spin", "--mock"], {"numpy", "pandas", "pyvisa"}),
-        (["runs", "."], {"numpy", "pandas"}),
-        (["analyze", "nowhere"], {"numpy", "pandas"}),
-    ],
-)
-def test_nothing_heavy_is_imported_where_it_is_not_used(tmp_path: Path, words: list[str], allowed: set[str]) -> None:
+#: What commands that follow each other in one process may have imported by then.
+IMPORTS: list[tuple[list[list[str]], set[str]]] = [
+    (
+        [["--help"], ["acquire", "spin", "--help"], ["simulate", "--help"], ["simulate", "nowhere"], ["--version"]],
+        set[str](),
+    ),
+    ([["runs", "."], ["analyze", "nowhere"]], {"numpy", "pandas"}),
+    ([["acquire", "spin", "--mock"]], {"numpy", "pandas", "pyvisa"}),
+]
+
+
+@pytest.mark.parametrize(("commands", "allowed"), IMPORTS, ids=["help", "runs", "acquire"])
+def test_nothing_heavy_is_imported_where_it_is_not_used(
+    tmp_path: Path, commands: list[list[str]], allowed: set[str]
+) -> None:
     program = (
-        f"import sys\nsys.argv = ['levilab', *{words!r}]\nfrom levilab.cli.main import main\n"
-        "try:\n    main()\nexcept SystemExit:\n    pass\n"
-        f"print('HEAVY', *sorted({HEAVY!r} & set(sys.modules)))"
+        "import sys\nfrom levilab.cli.main import main\n"
+        f"for words in {commands!r}:\n    sys.argv = ['levilab', *words]\n"
+        "    try:\n        main()\n    except SystemExit:\n        pass\n"
+        f"    print('HEAVY', *sorted({HEAVY!r} & set(sys.modules)))"
     )
     done = subprocess.run(
         [sys.executable, "-c", program],
@@ -365,5 +369,7 @@ def test_nothing_heavy_is_imported_where_it_is_not_used(tmp_path: Path, words: l
         check=True,
         timeout=HANG_GUARD_S,
     )
-    heavy = set(done.stdout.splitlines()[-1].split()[1:])
-    assert heavy <= allowed
+    heavy = [set(line.split()[1:]) for line in done.stdout.splitlines() if line.startswith("HEAVY")]
+    assert len(heavy) == len(commands)
+    for words, seen in zip(commands, heavy, strict=True):
+        assert seen <= allowed, words

@@ -1,11 +1,12 @@
 """What `--explain` says of an effect is what switching it on does, measured in another way."""
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
 
-from levilab.motion.effects import KINDS, explain, field_kinds
+from levilab.motion.effects import KINDS, LONGEST, explain, field_kinds
 from levilab.motion.table import print_effects
 from levilab.simulator.scene import SceneError, preset
 from levilab.simulator.single import simulate
@@ -17,6 +18,12 @@ SCENES = {
     "wide": preset("undriven").changed({"start.position_m": [0.004, 0.0, 0.0725]}),
     "tilted": preset("tilted"),
 }
+
+
+@cache
+def explained(name, duration=LONGEST):
+    """The effects of a scene; several tests look at the same."""
+    return explain(SCENES.get(name) or preset(name), duration)
 
 
 def measured(scene):
@@ -44,7 +51,7 @@ def test_switching_an_effect_on_changes_the_motion_by_what_was_said(name):
     scene = SCENES[name]
     height, precession = measured(scene)
     compared = 0
-    for kind, effect in zip((*field_kinds(scene), *KINDS), explain(scene), strict=True):
+    for kind, effect in zip((*field_kinds(scene), *KINDS), explained(name), strict=True):
         assert effect.name == kind.name
         assert effect.included == kind.included(scene)
         if effect.included or kind.name == "drag of the air":  # its change grows with the time
@@ -65,30 +72,30 @@ def test_switching_an_effect_on_changes_the_motion_by_what_was_said(name):
 
 
 def test_drag_is_said_to_slow_the_spin_as_its_law_does():
-    (drag,) = [effect for effect in explain(preset("undriven"), 20.0) if effect.name == "drag of the air"]
+    (drag,) = [effect for effect in explained("undriven") if effect.name == "drag of the air"]
     spin = ((2 * np.pi * 30) ** -0.5 + 0.5 * 2.34e-4 * 20) ** -2 / (2 * np.pi)
     assert drag.spin_hz == pytest.approx(spin - 30, rel=1e-6)
     assert not drag.included
 
 
 def test_an_effect_that_ends_the_levitation_says_so_with_the_mass_that_would_float():
-    thick = next(e for e in explain(preset("undriven")) if e.name == "thickness of the base")
+    thick = next(e for e in explained("undriven") if e.name == "thickness of the base")
     assert math.isnan(thick.height_m)
     assert "with it the top is lost after" in thick.remark
     assert "the nearest that does has 25." in thick.remark
 
 
 def test_what_is_in_is_told_by_what_its_absence_changes():
-    effects = {e.name: e for e in explain(preset("driven"))}
+    effects = {e.name: e for e in explained("driven", 2.0)}
     assert effects["tilt of the moment"].included
     assert effects["drive"].included
     assert effects["drive"].spin_hz != 0
-    without = {e.name: e for e in explain(preset("tilted"))}
+    without = {e.name: e for e in explained("tilted", 2.0)}
     assert without["drive"].included is False
 
 
 def test_the_table_names_every_effect(capsys):
-    print_effects(explain(preset("undriven"), 2.0))
+    print_effects(explained("undriven"))
     shown = capsys.readouterr().out
     assert all(kind.name in shown for kind in KINDS)
     assert "out" in shown
@@ -98,6 +105,6 @@ def test_a_series_is_told_by_what_it_has_and_by_what_it_lacks():
     has, lacks = explain(preset("undriven").changed({"base.field": "paraxial-4"}), 5.0)[:2]
     assert (has.name, has.included) == ("field from r⁴ to r^4", True)
     assert (lacks.name, lacks.included) == ("field beyond r^4", False)
-    whole = explain(preset("undriven"), 5.0)[0]
+    whole = explained("undriven", 5.0)[0]
     assert has.height_m + lacks.height_m == pytest.approx(whole.height_m, rel=0.05)
     assert abs(lacks.precession_hz) < abs(has.precession_hz) / 10

@@ -14,9 +14,9 @@ from levilab.errors import DataError
 from levilab.pipelines import catalogue
 from levilab.pipelines.catalogue import ANALYSES, Analysis, analyze_suiting, recall_suiting
 from levilab.pipelines.catalogue import save as save_found
-from levilab.pipelines.result import Archive, save
-from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions, analyze_spindowns
-from levilab.pipelines.spindown.document import SpinDownResult, result_of
+from levilab.pipelines.result import Archive
+from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
+from levilab.pipelines.spindown.document import SpinDownResult
 from support.spin_downs import spin_down_csv
 
 SPINDOWN = ANALYSES["spindown"]
@@ -28,32 +28,37 @@ class SecondResult(SpinDownResult):
     analysis: Literal["second"] = "second"  # type: ignore[assignment]
 
 
-def save_spindown(found: SpinDownAnalysis, folder: Path | None = None, *, first: bool) -> list[Path]:
-    """Without drawing."""
-    place = replace(found.place, folder=folder or found.home)
-    return save(result_of(found, place), place, b"", first=first)
-
-
-def save_second(found: SpinDownAnalysis, folder: Path | None = None, *, first: bool) -> list[Path]:
-    place = replace(found.place, folder=folder or found.home)
-    result = SecondResult.model_validate(result_of(found, place).as_dict() | {"analysis": "second"})
-    return save(result, place, b"", first=first)
-
-
 def second_row(*experiments: str) -> Analysis[Any]:
     """Another analysis that reads spin-downs."""
     needs = replace(SPINDOWN.needs, analysis="second", experiments=frozenset(experiments))
-    return replace(SPINDOWN, needs=needs, save=save_second)
+    result = replace(SPINDOWN.result, result=SecondResult, method=replace(SPINDOWN.result.method, needs=needs))
+    return replace(SPINDOWN, result=result)
+
+
+class Content(Analysis[Any]):
+    """An analysis that is content with anything."""
+
+    def analyze(self, *_: object) -> Any:
+        return "other"
+
+    recall = analyze
+
+
+def content_row(*experiments: str) -> Analysis[Any]:
+    row = second_row(*experiments)
+    return Content(row.result, row.tables, row.part)
 
 
 def use(monkeypatch: pytest.MonkeyPatch, *rows: Analysis[Any]) -> None:
+    """These rows, without drawing."""
+    monkeypatch.setattr(Analysis, "png", lambda *_: b"")
     monkeypatch.setattr(catalogue, "ANALYSES", {row.name: row for row in rows})
 
 
 @pytest.fixture
 def two(monkeypatch: pytest.MonkeyPatch) -> None:
     """A second analysis of the same runs and files, below the first."""
-    use(monkeypatch, replace(SPINDOWN, save=save_spindown), second_row("spin"))
+    use(monkeypatch, SPINDOWN, second_row("spin"))
 
 
 @pytest.fixture
@@ -84,13 +89,13 @@ def test_each_analysis_finds_its_own_result_again(tmp_path: Path, runs: Path, na
     spin_down_csv(tmp_path / "my.csv")
     path = runs.parent / name
     analyzed(path)
-    row, recalled = recall_suiting([path], {})
-    assert row.name == "spindown"
+    (row, recalled), (second, _) = recall_suiting([path], {})
+    assert (row.name, second.name) == ("spindown", "second")
     assert all(origin.text.startswith("as levilab analyze found it") for origin in recalled.origins)
     archive = Archive([path], SecondResult)
     whole = archive.whole(recalled.sources)
     assert whole
-    assert whole[0].name.endswith("result.second.json")
+    assert whole.file.name.endswith("result.second.json")
     source = recalled.sources[-1]
     earlier = Archive([source.path], SecondResult).earlier(source.path, source.data, source.sha256)
     assert earlier
@@ -98,8 +103,7 @@ def test_each_analysis_finds_its_own_result_again(tmp_path: Path, runs: Path, na
 
 
 def test_result_json_belongs_to_the_first_row_for_the_experiment(monkeypatch: pytest.MonkeyPatch, runs: Path) -> None:
-    field = replace(SPINDOWN, needs=replace(SPINDOWN.needs, analysis="field", experiments=frozenset({"field"})))
-    use(monkeypatch, field, second_row("spin"), replace(SPINDOWN, save=save_spindown))
+    use(monkeypatch, ANALYSES["field"], second_row("spin"), SPINDOWN)
     found = analyze_spindowns([runs / "run-1"], SpinDownOptions())
     rows = catalogue.ANALYSES
     assert save_found(rows["second"], found)[0].name == "result.json"
@@ -111,7 +115,8 @@ def test_result_json_belongs_to_the_first_row_for_the_experiment(monkeypatch: py
 def test_several_inputs_leave_the_result_of_the_present_run_alone(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(runs / "run-1")
     paths = [Path(), Path("../run-2")]
-    written = save_spindown(analyze_spindowns(paths, SpinDownOptions()), first=True)[0]
+    monkeypatch.setattr(Analysis, "png", lambda *_: b"")
+    written = save_found(SPINDOWN, analyze_spindowns(paths, SpinDownOptions()))[0]
     assert written.resolve() == runs / "result.json"
     assert SPINDOWN.recall(paths, SpinDownOptions()).origins[1].text.endswith(str(written))
 
@@ -122,8 +127,7 @@ def test_damage_is_not_passed_over_because_another_analysis_runs(
     monkeypatch: pytest.MonkeyPatch, runs: Path, name: str
 ) -> None:
     """The second row is content with anything; the first one finds its result damaged."""
-    second = replace(second_row("spin"), recall=SPINDOWN.analyze)
-    use(monkeypatch, SPINDOWN, second)
+    use(monkeypatch, SPINDOWN, content_row("spin"))
     (runs / name / "result.json").write_text("{", encoding="utf-8")
     with pytest.raises(DataError, match="is cut off"):
         recall_suiting([runs / name], {})
@@ -143,14 +147,13 @@ def test_what_one_analysis_cannot_use_keeps_no_other_from_its_own(tmp_path: Path
 
 def test_the_analysis_made_for_an_experiment_goes_before_one_that_takes_its_records(sample_data: Path) -> None:
     for name, wanted in (("precession-sweep", "precession"), ("trace-tape", "spin"), ("scope-files", "spin")):
-        assert recall_suiting([sample_data / name], {})[0].name == wanted, name
+        assert [row.name for row, _ in recall_suiting([sample_data / name], {})] == [wanted], name
 
 
 def test_an_analysis_that_does_not_suit_is_passed_over(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, sample_data: Path
 ) -> None:
-    other = replace(second_row("limit"), analyze=lambda *_: "other")
-    use(monkeypatch, SPINDOWN, other)
+    use(monkeypatch, SPINDOWN, content_row("limit"))
     (tmp_path / "empty").mkdir()
     table = tmp_path / "field.csv"
     table.write_text("time_s,field_t\n0,1\n1,2\n2,3\n", encoding="utf-8")
@@ -165,7 +168,7 @@ def test_an_analysis_that_does_not_suit_is_passed_over(
 def test_a_sweep_that_keeps_records_is_a_sweep_first(tmp_path: Path, sample_data: Path) -> None:
     """Its records suit the analysis of spins, too, which stands above that of sweeps."""
     run = shutil.copytree(sample_data / "precession-sweep", tmp_path / "sweep")
-    row, found = recall_suiting([run], {})
+    ((row, found),) = recall_suiting([run], {})
     assert row.name == "precession"
     assert save_found(row, found)[0].name == "result.json"
     spin = ANALYSES["spin"]

@@ -13,14 +13,16 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from levilab.errors import DataError
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.catalogue import save as save_found
 from levilab.pipelines.result import Place, beside, read_result, save
 from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
-from levilab.pipelines.spindown.document import SpinDownResult, result_of, save_result
+from levilab.pipelines.spindown.document import DOCUMENT, SpinDownResult
 from support.spin_downs import spin_down_csv
 
 
 def saved(*paths: Path) -> list[str]:
-    return [file.name for file in save_result(analyze_spindowns(paths, SpinDownOptions()))]
+    return [file.name for file in save_found(ANALYSES["spindown"], analyze_spindowns(paths, SpinDownOptions()))]
 
 
 def test_results_of_two_files_in_one_folder_stand_side_by_side(tmp_path: Path) -> None:
@@ -77,7 +79,7 @@ def test_the_result_of_a_run_folder_is_result_json_in_it(tmp_path: Path, sample_
 def write_result(tmp_path: Path) -> Path:
     """The result of a data file, without its figure."""
     analysis = analyze_spindowns([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions())
-    return save(result_of(analysis, analysis.place), analysis.place, picture=b"")[0]
+    return save(DOCUMENT.of(analysis, analysis.place), analysis.place, picture=b"")[0]
 
 
 def damaged(content: dict[str, Any], *keys: str | int, value: object = ...) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 from typing import TYPE_CHECKING
@@ -69,6 +70,18 @@ def test_runs_that_differ_in_one_reading_are_two_runs(tmp_path: Path) -> None:
     lines[7] = f"{time},{float(frequency) * (1 + 1e-6)!r},{u}"
     (tmp_path / "second.csv").write_text("\n".join([*lines, ""]), encoding="utf-8")
     assert len(analyze_spindowns([first, tmp_path / "second.csv"], SpinDownOptions()).sources) == 2
+
+
+def test_a_run_that_goes_on_in_another_folder_counts_once(tmp_path: Path, sample_data: Path) -> None:
+    for name in ("run", "run-rescued"):
+        shutil.copytree(sample_data / "spin-down-1", tmp_path / name)
+    record = json.loads((tmp_path / "run" / "run.json").read_text(encoding="utf-8"))
+    (tmp_path / "run" / "run.json").write_text(json.dumps(record | {"continued_in": "run-rescued"}), encoding="utf-8")
+    lines = (tmp_path / "run" / "readings.csv").read_text(encoding="utf-8").splitlines(keepends=True)
+    (tmp_path / "run" / "readings.csv").write_text("".join(lines[:-2]), encoding="utf-8")
+    analysis = analyze_spindowns([tmp_path], SpinDownOptions())
+    assert [source.name for source in analysis.sources] == ["run-rescued"]
+    assert analysis.remarks == (f"passed over: {tmp_path / 'run'} was broken off, its run goes on in run-rescued",)
 
 
 def test_runs_of_another_experiment_are_a_remark_and_no_warning(sample_data: Path) -> None:

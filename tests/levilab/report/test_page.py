@@ -7,16 +7,16 @@ import re
 import shutil
 import subprocess
 import sys
+from datetime import datetime, timedelta
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from levilab.errors import LevilabError
-from levilab.pipelines.catalogue import ANALYSES
+from levilab.errors import DataError, LevilabError
+from levilab.pipelines.catalogue import ANALYSES, Analysis, save
 from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions, analyze_spindowns
-from levilab.pipelines.spindown.document import recall_spindowns, save_result
 from levilab.report.inputs import _drive
 from levilab.report.page import render as render_found
 from levilab.report.page import write_report
@@ -27,7 +27,7 @@ from support.waiting import HANG_GUARD_S
 
 
 def render(found: SpinDownAnalysis) -> str:
-    return render_found(ANALYSES["spindown"], found)
+    return render_found([(ANALYSES["spindown"], found)])
 
 
 class Page(HTMLParser):
@@ -152,6 +152,11 @@ def test_times_are_to_the_second_and_what_is_not_known_is_left_out(run: Path) ->
     started, ended = "2026-11-21T00:52:00.123456Z", "2026-11-21T00:55:10.5Z"
     text = text_of(changed(run, started_utc=started, ended_utc=ended))
     assert "2026-11-21 00:52:00 UTC to 2026-11-21 00:55:10 UTC" in text
+    zero = "2026-11-21T00:52:00Z"
+    parsed = text_of(changed(run, started_utc=started, time_zero_utc=zero))
+    here = datetime.fromisoformat(zero).astimezone()
+    assert f"time zero at {here:%Y-%m-%d %H:%M:%S} " in parsed
+    assert f"{here + timedelta(seconds=190):%H:%M:%S} 190.000 21.75" in parsed  # the last reading
 
 
 def test_what_happened_tells_the_fall(run: Path) -> None:
@@ -190,7 +195,7 @@ def test_intervals_are_shown_where_they_were_asked_for(run: Path) -> None:
     assert "68 % interval" not in text_of(run)
     text = text_of(run, options=SpinDownOptions(uncertainty="profile"))
     assert "68 % interval (profile)" in text
-    assert re.search(r"\[0\.0002365\d*, 0\.0002371\d*\]|\[0\.0002366\d*, 0\.0002372\d*\]", text)
+    assert re.search(r"\[2\.365\d×10⁻⁴ … 2\.371\d×10⁻⁴\]|\[2\.366\d×10⁻⁴ … 2\.372\d×10⁻⁴\]", text)
 
 
 @pytest.mark.parametrize("readings", [3, 20])
@@ -202,26 +207,26 @@ def test_a_law_is_marked_best_only_where_the_readings_decide(tmp_path: Path, rea
     assert ("(best)" in parsed.text) == analysis.combined.verdict.decided
 
 
-def reported(*paths: Path, output: Path, **options: Any) -> str:
-    page = write_report(paths, output, options).read_text(encoding="utf-8")
+def reported(*paths: Path, output: Path, tell: Any = None, **options: Any) -> str:
+    page = write_report(paths, output, options, tell).read_text(encoding="utf-8")
     return " ".join(Page(page).text.split())
 
 
 def test_the_report_shows_what_analyze_found_intervals_included(run: Path, tmp_path: Path) -> None:
-    save_result(analyze_spindowns([run], SpinDownOptions(uncertainty="bootstrap", bootstrap_samples=50)))
+    save(ANALYSES["spindown"], analyze_spindowns([run], SpinDownOptions(uncertainty="bootstrap", bootstrap_samples=50)))
     result = json.loads((run / "result.json").read_text(encoding="utf-8"))
     low, high = result["models"][2]["parameters"]["c32"]["interval_68"]
     text = reported(run, output=tmp_path / "report.html")
     assert "68 % interval (bootstrap)" in text
-    assert f"[{low:.5g}, {high:.5g}]" in text
+    assert f"[{1e4 * low:.4f}×10⁻⁴ … {1e4 * high:.4f}×10⁻⁴]" in text  # as the terminal shows it
     assert f"as levilab analyze found it: {run / 'result.json'}" in text
 
 
 def test_the_report_does_not_fit_what_has_a_result(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     analysis = analyze_spindowns([run], SpinDownOptions())
-    save_result(analysis)
-    monkeypatch.setattr("levilab.pipelines.spindown.document.fit_source", pytest.fail)
-    recalled = render(recall_spindowns([run], SpinDownOptions()))
+    save(ANALYSES["spindown"], analysis)
+    monkeypatch.setattr("levilab.pipelines.spindown.analysis.fit_spin_down", pytest.fail)
+    recalled = render(ANALYSES["spindown"].recall([run], SpinDownOptions()))
     anew = render(analysis)
     differ = [pair for pair in zip(recalled.split("\n"), anew.split("\n"), strict=True) if pair[0] != pair[1]]
     assert all("Analysis" in here or "written" in here for here, _ in differ)
@@ -231,7 +236,7 @@ def test_the_report_says_what_it_had_to_analyze(run: Path, tmp_path: Path) -> No
     before = sorted(run.rglob("*"))
     assert "analyzed for this page: there was no result yet" in reported(run, output=tmp_path / "report.html")
     assert sorted(run.rglob("*")) == before
-    save_result(analyze_spindowns([run], SpinDownOptions()))
+    save(ANALYSES["spindown"], analyze_spindowns([run], SpinDownOptions()))
     text = reported(run, output=tmp_path / "report.html", reading_u=0.05)
     assert f"analyzed for this page: other options than those of {run / 'result.json'}" in text
     assert "u of a reading: 0.05 Hz, as given to the analysis" in text
@@ -249,7 +254,7 @@ def test_the_page_needs_nothing_of_the_terminal() -> None:
 
 
 def test_one_p_value_is_the_same_number_on_the_page_and_the_terminal(page: Page) -> None:
-    assert "2.3e-14" in page.text
+    assert "2.3×10⁻¹⁴" in page.text
 
 
 def test_nothing_is_folded_away_so_that_all_is_printed(page: Page) -> None:
@@ -275,7 +280,69 @@ def test_many_readings_are_cut_in_the_page_and_the_figure_stays_small(tmp_path: 
     assert len(html) < 3e6
 
 
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures take longer than all the rest."""
+    monkeypatch.setattr(Analysis, "svg", lambda *_: "<svg/>")
+    monkeypatch.setattr(Analysis, "png", lambda *_: b"")
+
+
+def headings(page: Path) -> list[str]:
+    return re.findall("<h1>(.*)</h1>", page.read_text(encoding="utf-8"))
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_all_analyses_of_a_folder_are_on_the_page_in_their_order(tmp_path: Path, sample_data: Path) -> None:
+    for name in ("upper-limits", "spin-down-1"):
+        shutil.copytree(sample_data / name, tmp_path / "runs" / name)
+    told: list[str] = []
+    page = write_report([tmp_path / "runs"], tmp_path / "page.html", tell=told.append)
+    assert headings(page) == [
+        "Report of 2 runs",
+        "Spin-down of a levitated top",
+        "Limits of the spin of a levitated top",
+        "What was measured, and with what",
+    ]
+    assert len(told) == 1  # no run is passed over by all analyses
+    assert "no result lies beside spin-down-1, upper-limits" in told[0]
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_run_that_has_two_results_is_described_once(tmp_path: Path, sample_data: Path) -> None:
+    run = shutil.copytree(sample_data / "precession-sweep", tmp_path / "sweep")
+    options = {"reading_u": 0.1}
+    for name in ("precession", "spin"):
+        analysis = ANALYSES[name]
+        page = write_report([run], tmp_path / "page.html", options)
+        assert headings(page)[1:2] != ["Spin frequency of a top"]  # whose analysis is for other experiments
+        save(analysis, analysis.analyze([run], analysis.options_from(options)))
+    page = write_report([run], tmp_path / "page.html", options)
+    assert headings(page)[1:3] == ["Spin frequency of a top", "Precession of a driven top"]
+    text = page.read_text(encoding="utf-8")
+    assert text.count("<h3>sweep</h3>") == 1
+    assert text.count("as levilab analyze found it") == 2
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_result_that_lies_elsewhere_is_found_by_its_own_path(tmp_path: Path, run: Path) -> None:
+    elsewhere = tmp_path / "elsewhere"
+    spindown = ANALYSES["spindown"]
+    save(spindown, analyze_spindowns([run], SpinDownOptions(reading_u=0.07)), elsewhere)
+    told: list[str] = []
+    text = reported(run, output=tmp_path / "page.html", tell=told.append)
+    assert "as levilab analyze found it" not in text
+    assert "(`out`), give that folder or file" in told[0]
+    for path in (elsewhere, elsewhere / "result.json"):
+        text = reported(path, output=tmp_path / "page.html", tell=pytest.fail)
+        assert f"as levilab analyze found it: {elsewhere / 'result.json'}" in text
+        assert "u of a reading: 0.07 Hz" in text
+    run.rename(tmp_path / "renamed")
+    with pytest.raises(DataError, match=r"elsewhere.result\.json: is of .*spin-c893, which is not there"):
+        reported(elsewhere, output=tmp_path / "page.html")
+
+
+@pytest.mark.usefixtures("undrawn")
 def test_a_report_that_cannot_be_written_is_told_in_one_line(tmp_path: Path, sample_data: Path) -> None:
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     with pytest.raises(LevilabError, match="`output`"):
-        write_report([sample_data], tmp_path / "file" / "report.html")
+        write_report([sample_data / "spin-down-1"], tmp_path / "file" / "report.html")

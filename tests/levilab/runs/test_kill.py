@@ -1,22 +1,27 @@
 """A real acquiring process is killed: every reading that it had shown is in the run folder.
 
-The process is a real `levilab acquire spin --mock`; what it shows is read from its standard error as it comes.
+A few processes are really killed: a `levilab acquire spin --mock`, of which what it shows is read from its standard
+error.  What a kill would leave at each other moment is copied in this process.
 """
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 import pytest
 
 from levilab.runs.listing import list_runs
 from levilab.runs.run import Run
+from support.commands import Ended, command
 from support.waiting import HANG_GUARD_S
 
 SHOWN = re.compile(r"^ *(\d+\.\d\d) s +(\d+\.\d{4}) Hz")
@@ -67,35 +72,59 @@ os.fsync = counting
 KILL = "os.kill(os.getpid(), 9)"
 
 
-@pytest.mark.parametrize("before", [True, False], ids=["before", "after"])
-@pytest.mark.parametrize("n", [3, 5, 8, 11, 12, 13, 17, 22])
+def loses_nothing(out: Path, shown: list[tuple[str, str]], *, finished: bool = False) -> None:
+    """What a killed process has left holds each reading that it had shown."""
+    listed = list_runs(out)
+    assert listed or not shown  # killed before the record is there, it has shown nothing
+    for one in listed:
+        assert one.status == ("finished" if finished else "interrupted")
+        assert stored_in(Run.load(Path(one.path)))[: len(shown)] == shown
+
+
+@pytest.mark.parametrize(("n", "before"), [(5, True), (12, False), (17, True)])
 def test_a_killed_process_loses_no_reading_that_it_had_shown(tmp_path: Path, n: int, before: bool) -> None:
     """Killed before or after the n-th sync: one of the record, or of a reading, or of an event."""
     process = start(tmp_path, before=AT_THE_NTH.format(n=n, before=before, act=KILL))
     _, told = process.communicate(timeout=HANG_GUARD_S)
     assert process.returncode
-    shown = shown_in(told)
-    listed = list_runs(tmp_path)
-    assert listed or not shown  # killed before the record is there, it has shown nothing
-    for one in listed:
-        run = Run.load(Path(one.path))
-        assert one.status == "interrupted"
-        assert stored_in(run)[: len(shown)] == shown
-        if len(shown) >= 3:
-            assert analyzed(run.folder) >= len(shown)
+    loses_nothing(tmp_path, shown_in(told))
 
 
-def analyzed(folder: Path) -> int:
-    """How many readings `levilab analyze spindown` uses."""
-    done = subprocess.run(
-        [sys.executable, "-m", "levilab", "analyze", "spindown", str(folder), "--json", "--no-save"],
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-        check=True,
-        timeout=HANG_GUARD_S,
-    )
-    return int(json.loads(done.stdout)["models"][0]["statistics"]["n"])
+def test_at_no_moment_would_a_kill_lose_a_reading_that_was_shown(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A kill leaves the files as they are: they are copied before and after each sync, with what was shown by then."""
+    out, sync = tmp_path / "runs", os.fsync
+    going_on: list[bool] = []
+    analyzed: dict[int, int] = {}
+
+    def copying(descriptor: int) -> None:
+        copy()
+        sync(descriptor)
+        copy()
+
+    def copy() -> None:
+        sys.stderr.flush()
+        shown = shown_in(sys.stderr.buffer.getvalue().decode("utf-8"))  # type: ignore[attr-defined]
+        left = tmp_path / "left"
+        shutil.copytree(out, left)
+        record = next(left.rglob("run.json"), None)
+        finished = record is not None and '"finished"' in record.read_text(encoding="utf-8")
+        loses_nothing(left, shown, finished=finished)
+        going_on.append(not finished)
+        if len(shown) % 6 == 3 and len(shown) not in analyzed:
+            ended = command("analyze", "spindown", left, "--json", "--no-save", cwd=tmp_path)
+            assert ended.status == 0, ended.err
+            analyzed[len(shown)] = json.loads(ended.out)["models"][0]["statistics"]["n"]
+        shutil.rmtree(left)
+
+    monkeypatch.setattr(os, "fsync", copying)
+    ended = command("acquire", "spin", "--mock", "--seed", "7", "--out", out, cwd=tmp_path)
+    assert ended.status == 0, ended.err
+    assert going_on.count(True) > 60
+    assert going_on == sorted(going_on, reverse=True)
+    assert len(analyzed) >= 3
+    assert all(used >= shown for shown, used in analyzed.items())
 
 
 @posix_only
@@ -113,30 +142,51 @@ def test_a_signal_ends_the_process_with_130_and_the_run_kept(tmp_path: Path, nam
     assert record.instruments["generator"]["settings_end"]["output"] is False
 
 
-FULL = """
-import builtins, errno, os
-left = {room}
-after_readings = []
+class Disk:
+    """A disk with little room.  left: bytes; seen: how much had been written after each line of readings.csv."""
+
+    def __init__(self, left: int) -> None:
+        self.left, self.written, self.seen = left, 0, list[int]()
+
+    def put_in(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """From now on the files of runs are written to this disk."""
+        opened = Path.open
+
+        def small(path: Path, mode: str = "r", *args: Any, **named: Any) -> Any:
+            file = opened(path, mode, *args, **named)
+            on_it = path.name.endswith((".csv", ".jsonl", ".part")) and mode[0] in "awx"
+            return Small(file, self) if on_it else file
+
+        monkeypatch.setattr(Path, "open", small)
+
+
 class Small:
-    '''A file on a disk with little room: what no longer fits is half written, then refused, as write(2) does.'''
-    def __init__(self, file): self.file = file
-    def __getattr__(self, name): return getattr(self.file, name)
-    def __enter__(self): return self
-    def __exit__(self, *_): self.file.close()
-    def write(self, text):
-        global left
-        self.file.write(text[:left]); self.file.flush()
-        short, left = len(text) > left, max(0, left - len(text))
-        if self.file.name.endswith('readings.csv'): after_readings.append({room} - left)
-        if short: raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    """A file on it: what no longer fits is half written, then refused, as write(2) does."""
+
+    def __init__(self, file: Any, disk: Disk) -> None:
+        self.file, self.disk = file, disk
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.file, name)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.file.close()
+
+    def write(self, text: str) -> int:
+        disk = self.disk
+        self.file.write(text[: disk.left])
+        self.file.flush()
+        short, put = len(text) > disk.left, min(len(text), disk.left)
+        disk.left, disk.written = disk.left - put, disk.written + put
+        if self.file.name.endswith("readings.csv"):
+            disk.seen.append(disk.written)
+        if short:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         return len(text)
-from pathlib import Path
-opened = Path.open
-def small(self, mode="r", *args, **named):
-    file = opened(self, mode, *args, **named)
-    return Small(file) if self.name.endswith((".csv", ".jsonl", ".part")) and mode[0] in "awx" else file
-Path.open = small
-"""
+
 
 LIMITED = """
 import os, resource, signal
@@ -153,16 +203,14 @@ os.fsync = limiting
 """
 
 
-def survives(tmp_path: Path, before: str, reason: str) -> int:
-    """The process ends with one line and status 1, and what it had shown is there; returns how much that was."""
-    process = start(tmp_path, before=before)
-    _, err = process.communicate(timeout=HANG_GUARD_S)
-    assert process.returncode == 1, err
+def survives(out: Path, status: int, err: str, reason: str) -> int:
+    """The command has ended with one line and status 1, and what it had shown is there; returns how much that was."""
+    assert status == 1, err
     assert "Traceback" not in err
     assert err.splitlines()[-1].startswith("levilab: could not ")
     assert reason in err.splitlines()[-1]
     shown = shown_in(err)
-    runs = list_runs(tmp_path)
+    runs = list_runs(out)
     for listed in runs:
         assert stored_in(Run.load(Path(listed.path)))[: len(shown)] == shown
         assert listed.status in {"interrupted", "failed"}
@@ -170,19 +218,22 @@ def survives(tmp_path: Path, before: str, reason: str) -> int:
     return len(shown)
 
 
-def written_after_readings(out: Path) -> list[int]:
-    """How much a run has written after each line of readings.csv, in the reckoning of FULL."""
-    told = "import atexit, sys; atexit.register(lambda: print(*after_readings, file=sys.stderr))\n"
-    process = start(out, before=FULL.format(room=10**9) + told)
-    _, err = process.communicate(timeout=HANG_GUARD_S)
-    assert process.returncode == 0, err
-    return [int(number) for number in err.splitlines()[-1].split()]
+def acquire_on(disk: Disk, out: Path) -> Ended:
+    with pytest.MonkeyPatch.context() as patch:
+        disk.put_in(patch)
+        out.mkdir()
+        return command("acquire", "spin", "--mock", "--seed", "7", "--out", out, cwd=out)
 
 
 def test_a_disk_that_fills_up_at_any_moment_loses_no_reading_that_was_shown(tmp_path: Path) -> None:
-    header, *readings = written_after_readings(tmp_path / "whole")
-    rooms = (0, 40, header + 1000, *np.linspace(readings[0] - 20, readings[-1] + 20, 9).astype(int))
-    shown = [survives(tmp_path / str(room), FULL.format(room=room), "No space left") for room in rooms]
+    large = Disk(10**9)
+    assert acquire_on(large, tmp_path / "whole").status == 0
+    header, *readings = large.seen
+    shown = []
+    for room in (0, 40, header + 1000, *np.linspace(readings[0] - 20, readings[-1] + 20, 9).astype(int)):
+        out = tmp_path / str(room)
+        ended = acquire_on(Disk(int(room)), out)
+        shown.append(survives(out, ended.status, ended.err, "No space left"))
     assert shown[0] == 0
     assert max(shown) > 3
     assert len(set(shown)) > 2
@@ -190,6 +241,11 @@ def test_a_disk_that_fills_up_at_any_moment_loses_no_reading_that_was_shown(tmp_
 
 @posix_only
 def test_a_write_error_at_any_moment_loses_no_reading_that_was_shown(tmp_path: Path) -> None:
-    shown = [survives(tmp_path / str(room), LIMITED.format(room=room), "File too large") for room in (300, 444, 512)]
+    shown = []
+    for room in (300, 444, 512):
+        out = tmp_path / str(room)
+        process = start(out, before=LIMITED.format(room=room))
+        _, err = process.communicate(timeout=HANG_GUARD_S)
+        shown.append(survives(out, process.returncode, err, "File too large"))
     assert shown == sorted(shown)
     assert 3 < shown[0] < shown[-1]

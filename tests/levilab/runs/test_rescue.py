@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -130,6 +128,35 @@ def test_a_run_that_is_lost_twice_is_rescued_twice(tmp_path: Path) -> None:
 
 
 @posix_only
+@pytest.mark.parametrize("torn", [False, True])
+def test_a_folder_that_was_cut_stays_readable_after_each_rescue(tmp_path: Path, torn: bool) -> None:
+    folders = []
+    with create(tmp_path, []) as writer:
+        writer.reading(row(0))
+        for k in range(1, 3):
+            folders.append(writer.folder)
+            size = (writer.folder / "readings.csv").stat().st_size
+            os.truncate(writer.folder / "readings.csv", size - 3)  # within the last line, onto which the next one goes
+            if torn:
+                (writer.folder / "run.json").write_text('{"schema', encoding="utf-8")
+            writer.reading(row(k))
+        writer.finish("finished")
+    for k, folder in enumerate(folders):
+        run = Run.load(folder)
+        assert (run.status, times(folder)) == ("interrupted", [10 * i for i in range(k)])
+        assert run.continued_in == [*folders, writer.folder][k + 1]
+    assert times(writer.folder) == [0, 10, 20]
+
+
+def test_a_torn_record_is_written_anew_with_the_next_reading(tmp_path: Path) -> None:
+    with create(tmp_path, []) as writer:
+        writer.reading(row(0))
+        (writer.folder / "run.json").write_text('{"schema', encoding="utf-8")
+        writer.reading(row(1))
+        assert Run.load(writer.folder).status == "running"
+
+
+@posix_only
 def test_a_resumed_run_is_rescued_with_its_earlier_readings(tmp_path: Path) -> None:
     with create(tmp_path, []) as writer:
         writer.reading(row(0))
@@ -232,45 +259,39 @@ def test_a_resume_at_a_bench_that_does_not_answer_keeps_the_run(tmp_path: Path) 
     assert (folder / "readings.csv").read_bytes() == before
 
 
-# --- a real process ---
+# --- a whole acquisition ---
 
-#: The process itself removes its run at the n-th time that it puts something on the disk.
-REMOVING = """
-import os, pathlib, shutil, sys
-sync, count = os.fsync, 0
-def removing(descriptor):
-    global count
-    sync(descriptor)
-    count += 1
-    if count == {at}:
-        (folder,) = pathlib.Path({out!r}).iterdir()
-        {act}
-os.fsync = removing
-sys.argv = ["levilab", "acquire", "spin", "--mock", "--seed", "7", "--out", {out!r}, "--json"]
-from levilab.cli.main import main
-main()
-"""
-ACTS = {
-    "folder": "shutil.rmtree(folder)",
-    "readings": "(folder / 'readings.csv').unlink()",
-    "all runs": "shutil.rmtree(folder.parent)",
+ACTS: dict[str, Callable[[Path], object]] = {
+    "folder": shutil.rmtree,
+    "readings": lambda folder: (folder / "readings.csv").unlink(),
+    "all runs": lambda folder: shutil.rmtree(folder.parent),
 }
 
 
 @posix_only
 @pytest.mark.parametrize("act", ACTS)
 @pytest.mark.parametrize("at", [12, 20, 30])
-def test_a_process_whose_run_is_removed_loses_no_reading(tmp_path: Path, act: str, at: int) -> None:
-    out = tmp_path / "runs"
-    program = REMOVING.format(at=at, out=str(out), act=ACTS[act])
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, encoding="utf-8", check=False
-    )
-    assert done.returncode == 0, done.stderr
-    result = json.loads(done.stdout)
+def test_an_acquisition_whose_run_is_removed_loses_no_reading(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, act: str, at: int
+) -> None:
+    """Removed when something is put on the disk for the n-th time."""
+    out, sync, count = tmp_path / "runs", os.fsync, 0
+
+    def removing(descriptor: int) -> None:
+        nonlocal count
+        sync(descriptor)
+        count += 1
+        if count == at:
+            (folder,) = out.iterdir()
+            ACTS[act](folder)
+
+    monkeypatch.setattr(os, "fsync", removing)
+    done = command("acquire", "spin", "--mock", "--seed", "7", "--out", out, "--json", cwd=tmp_path)
+    assert done.status == 0, done.err
+    result = json.loads(done.out)
     folder = Path(result["run"])
     assert folder.name.endswith("-rescued")
-    shown = [line.split() for line in done.stderr.splitlines() if " Hz" in line and line.lstrip()[:1].isdigit()]
+    shown = [line.split() for line in done.err.splitlines() if " Hz" in line and line.lstrip()[:1].isdigit()]
     assert len(shown) == result["readings"] > 15
     frame = Run.load(folder).readings().frame
     assert [f"{t:.2f}" for t in frame["time_s"]] == [words[0] for words in shown]

@@ -11,6 +11,7 @@ import pytest
 from instruments.drivers.oscilloscope import Trace
 from levilab.errors import DataError
 from levilab.runs.run import Run, RunRecord, utc_now
+from levilab.runs.traces import undescribed_codes
 from levilab.runs.writer import RunWriter
 
 if TYPE_CHECKING:
@@ -60,6 +61,35 @@ def test_a_resumed_run_numbers_its_records_on(writer: RunWriter) -> None:
         assert again.trace(1.0, record_of(1), "light") == 2
         again.finish("finished")
     assert [one.number for one in Run.load(writer.folder).traces()] == [1, 2]
+
+
+def test_codes_without_a_line_are_left_out_and_never_written_over(writer: RunWriter) -> None:
+    """As a kill leaves them: between codes and line, and in the middle of the line."""
+    with writer:
+        for k in range(3):
+            writer.trace(float(k), record_of(k), "light")
+    index, folder = writer.folder / "traces.jsonl", writer.folder
+    lines = index.read_text(encoding="utf-8").splitlines(keepends=True)
+    index.write_text("".join([*lines[:2], lines[2][:40]]), encoding="utf-8")
+    (folder / "traces" / "000001.npy").unlink()
+    index.write_text("".join([lines[1], lines[2][:40]]), encoding="utf-8")  # numbers 1 gone, 2 whole, 3 torn
+    assert [one.number for one in Run.load(folder).traces()] == [2]
+    assert undescribed_codes(folder) == ["traces/000003.npy"]
+    before = (folder / "traces" / "000003.npy").read_bytes()
+    with RunWriter.reopen(Run.load(folder)) as again:
+        assert again.trace(3.0, record_of(3), "light") == 4
+        again.finish("finished")
+    assert [one.number for one in Run.load(folder).traces()] == [2, 4]
+    assert (folder / "traces" / "000003.npy").read_bytes() == before
+
+
+def test_a_line_without_codes_is_an_error_that_says_what_to_do(writer: RunWriter) -> None:
+    """No crash makes one: codes are on the disk before their line."""
+    with writer:
+        writer.trace(0.0, record_of(0), "light")
+    (writer.folder / "traces" / "000001.npy").unlink()
+    with pytest.raises(DataError, match=r"000001\.npy: cannot be read .*bring it back, or remove its line there"):
+        Run.load(writer.folder).traces()
 
 
 def test_a_folder_removed_before_a_record_costs_the_records_before_it_alone(writer: RunWriter, said: list[str]) -> None:

@@ -11,7 +11,7 @@ from instruments.links.visa import VisaTransport
 from instruments.virtual.bench import serial_line
 from instruments.virtual.bench.visa_library import library_for
 from levilab.bench.config import ConfigError
-from levilab.world.bench import MODELS, VIRTUAL, own_world, plug_in_serial, virtual_bus
+from levilab.world.bench import VIRTUAL, own_world, plug_in_serial, virtual_bus
 
 LINE = {"baudrate": 57600, "bytesize": 7, "parity": "O", "timeout": 1.0}
 
@@ -50,14 +50,8 @@ def test_the_bench_given_is_the_one_that_pyserial_finds_however_often_it_is_plug
     assert bus.instruments[VIRTUAL["magnetometer"].address].clock.now() > before
 
 
-@pytest.mark.parametrize(("kind", "model"), [(kind, model) for kind, models in MODELS.items() for model in models])
-def test_every_model_can_be_chosen_in_any_case(kind, model):
-    bus = virtual_bus(models={kind: model.lower()})
-    assert model.rstrip("ABZ0-")[:3] in bus.instruments[VIRTUAL[kind].address].identity
-
-
 def test_what_there_is_not_is_told_with_what_there_is():
-    with pytest.raises(ConfigError, match="no virtual counter 'DVM': known are 53230A, CNT-91"):
+    with pytest.raises(ConfigError, match="no virtual counter 'DVM': known are 53230A, 53220A, CNT-91"):
         virtual_bus(models={"counter": "DVM"})
     with pytest.raises(ConfigError, match="no virtual 'piano': known are counter"):
         virtual_bus(models={"piano": "1"})

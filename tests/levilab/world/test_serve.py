@@ -109,7 +109,7 @@ def test_a_signal_ends_it_and_threads_and_handlers_are_as_before(name):
     assert serve(Service(), interrupt_when(said, name)) == name
     assert {served.kind for served in said} >= {"counter", "generator"}
     assert signal.getsignal(signal.SIGINT) is before
-    assert threading.active_count() == threads
+    assert threading.active_count() <= threads  # one of another test may have ended meanwhile
 
 
 def test_models_are_chosen_by_kind_in_any_case():

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from instruments.clock import VirtualClock
-from instruments.virtual.counter.edges import Thresholds, crossings
+from instruments.virtual.core.trigger import crossings
+from instruments.virtual.counter.edges import Thresholds
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.generator.channel import Burst, Output
 from instruments.virtual.generator.voltage import fundamental, voltage

@@ -5,7 +5,6 @@ import itertools
 import math
 import tracemalloc
 
-import numpy as np
 import pytest
 import serial
 from hypothesis import HealthCheck, given, settings
@@ -13,15 +12,6 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, rule, run_state_machine_as_test
 
 from fuzz_targets import TARGETS
-from instruments.drivers.counter.keysight_53230a import Keysight53230A
-from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
-from instruments.drivers.generator.agilent_33220a import Agilent33220A
-from instruments.drivers.generator.keysight_33500b import Keysight33500B
-from instruments.drivers.magnetometer.lakeshore_425 import LakeShore425
-from instruments.drivers.magnetometer.lakeshore_475 import LakeShore475
-from instruments.drivers.oscilloscope import Trace
-from instruments.drivers.oscilloscope.keysight_dsox import KeysightDSOX
-from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.errors import BadAnswer, InstrumentError
 from instruments.links.serial_port import SerialTransport
 from instruments.links.visa import VisaTransport
@@ -32,11 +22,19 @@ from instruments.virtual.bench.session import MOST_ANSWERS
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.core.device import Answer
 from support import hostile
+from support.models import FAMILIES, KIND_OF, ROWS, SERIAL, calls, measure
 
 #: `make explore` draws 1000: here 30 examples reach as many lines of instruments/ (4968) as 60 do (4975), in half the
 #: time.  A machine that is busy is no reason to fail.
 EXPLORING = settings.get_current_profile_name() == "explore"
 FEW = settings(max_examples=1000 if EXPLORING else 30, deadline=None, suppress_health_check=list(HealthCheck))
+#: For a model whose twin is another one's with other numbers.
+VERY_FEW = settings(FEW, max_examples=1000 if EXPLORING else 4)
+
+
+def some(name):
+    """How many examples a model is worth."""
+    return FEW if name in FAMILIES else VERY_FEW
 
 
 # --- messages ---
@@ -79,7 +77,7 @@ MESSAGES = {name: messages(hostile.instrument(name)) for name in hostile.NAMES}
 @pytest.mark.parametrize("stream", [False, True], ids=["messages", "stream"])
 @pytest.mark.parametrize("name", hostile.NAMES)
 def test_no_message_makes_an_instrument_crash_hang_or_grow(name, stream):
-    @FEW
+    @some(name)
     @given(st.lists(st.tuples(MESSAGES[name], st.sampled_from([None, 0.0, 0.01, 1.0, 30.0])), max_size=12))
     def any_messages(sent):
         bench = hostile.Bench(name, stream=stream)
@@ -92,7 +90,7 @@ def test_no_message_makes_an_instrument_crash_hang_or_grow(name, stream):
     any_messages()
 
 
-@pytest.mark.parametrize("name", hostile.NAMES)
+@pytest.mark.parametrize("name", FAMILIES)
 def test_bytes_cut_anywhere_make_the_same_messages(name):
     @FEW
     @given(st.lists(MESSAGES[name], min_size=1, max_size=4).map(b"\n".join), st.lists(st.integers(1, 30), min_size=1))
@@ -261,108 +259,6 @@ REPLIES = st.lists(
 )
 
 
-def is_settings(value):
-    return isinstance(value, dict) and all(isinstance(setting, bool | float | str) for setting in value.values())
-
-
-def is_number(value):
-    return isinstance(value, float) and math.isfinite(value)
-
-
-def is_reading(value):
-    return value is None or is_number(value)
-
-
-def is_nothing(value):
-    return value is None
-
-
-def is_text(value):
-    return isinstance(value, str)
-
-
-def are_readings(shape):
-    return lambda value: value.shape == shape and not np.isinf(value).any()
-
-
-def is_trace(value):
-    numbers = (value.dt_s, value.t0_s, value.volts_per_code, value.offset_v)
-    return isinstance(value, Trace) and value.codes.size >= 1 and all(map(math.isfinite, numbers))
-
-
-def _prepared(driver):
-    driver.prepare(channels=[1], duration_s=0.1, points=1000, volts_per_division=0.5, trigger_level_v=0.6)
-
-
-ANY = {
-    "identity": (lambda driver: driver.identity(), is_text),
-    "settings": (lambda driver: driver.settings(), is_settings),
-    "forget_errors": (lambda driver: driver.forget_errors(), is_nothing),
-    "clear": (lambda driver: driver.transport.clear(), is_nothing),
-}
-COUNTER = ANY | {
-    "prepare": (lambda driver: driver.prepare(gate_s=0.5, trigger_level_v=0.6), is_nothing),
-    "frequency": (lambda driver: driver.frequency(), is_reading),
-    "readings": (lambda driver: driver.readings(3), are_readings((3,))),
-}
-GENERATOR = ANY | {
-    "prepare": (lambda driver: driver.prepare(waveform="TRI", frequency_hz=25.0, amplitude_vpp=2.0), is_nothing),
-    "on": (lambda driver: setattr(driver, "output", True), is_nothing),
-    "is it on": (lambda driver: driver.output, lambda value: isinstance(value, bool)),
-    "off": (lambda driver: driver.off(), is_nothing),
-}
-SCOPE = ANY | {
-    "prepare": (_prepared, is_nothing),
-    "acquire": (lambda driver: driver.acquire(timeout_s=0.5), is_nothing),
-    "trace": (lambda driver: driver.trace(1), is_trace),
-    "blocks": (lambda driver: sum(piece.size for piece in driver.blocks(1)), lambda size: size >= 1),
-    "off": (lambda driver: driver.off(), is_nothing),
-}
-MAGNETOMETER = ANY | {
-    "prepare": (lambda driver: driver.prepare(range_t=0.035), is_nothing),
-    "prepare, any range": (lambda driver: driver.prepare(range_t=None), is_nothing),
-    "flux_density": (lambda driver: driver.flux_density(), is_reading),
-    "probe": (lambda driver: driver.probe(), is_text),
-    "zero": (lambda driver: driver.zero(), is_nothing),
-}
-#: Model → its driver, what can be called, and in what a measurement with a good far end must end.
-DRIVERS = {
-    "53230A": (Keysight53230A, COUNTER | {"gate": (lambda driver: driver.gate, lambda v: isinstance(v, float))}),
-    "CNT-91": (PendulumCNT91, COUNTER | {"timed": (lambda driver: driver.timed_readings(3), are_readings((3, 2)))}),
-    "33500B": (Keysight33500B, GENERATOR),
-    "33220A": (Agilent33220A, GENERATOR),
-    "DS1000Z": (RigolDS1000Z, SCOPE),
-    "DSOX1000": (KeysightDSOX, SCOPE),
-    "425": (LakeShore425, MAGNETOMETER),
-    "475": (LakeShore475, MAGNETOMETER),
-}
-
-
-def good(name, driver):
-    """A measurement as a program makes it, with a far end that is in order."""
-    driver.forget_errors()
-    if name in {"53230A", "CNT-91"}:
-        driver.prepare(gate_s=0.5, trigger_level_v=0.6)
-        assert driver.frequency() == pytest.approx(30.0, rel=1e-3)
-        assert driver.readings(2) == pytest.approx([30.0, 30.0], rel=1e-3)
-    elif name in {"33500B", "33220A"}:
-        driver.prepare(waveform="SIN", frequency_hz=30.0, amplitude_vpp=3.0)
-        driver.output = True
-        assert (driver.frequency, driver.amplitude, driver.output) == (30.0, 3.0, True)
-        driver.off()
-        assert driver.output is False
-    elif name in {"DS1000Z", "DSOX1000"}:
-        _prepared(driver)
-        driver.acquire(timeout_s=1.0)
-        volts = driver.trace(1).volts
-        assert -0.1 < volts.min() < 0.1
-        assert 1.1 < volts.max() < 1.3
-    else:
-        driver.transport.write("ZCLEAR")  # it may have been zeroed in the field
-        driver.prepare(range_t=0.035)
-        assert driver.flux_density() == pytest.approx(0.019, abs=2e-4)
-
-
 ADDRESSES = {
     "messages": "TCPIP0::box.levilab::inst0::INSTR",
     "stream": "TCPIP0::box.levilab::5025::SOCKET",
@@ -385,7 +281,7 @@ class Pair:
         self.liar = Liar(hostile.instrument(name, self.room))
         address = ADDRESSES["serial" if way == "pyserial" else way]
         self.bus = Bus({address: self.liar})
-        kind = DRIVERS[name][0]
+        kind = ROWS[name].driver
         line = dict(getattr(kind, "SERIAL", {})) | {"pause": 0.0}
         if way == "pyserial":
             self.bench = f"fuzz{next(_bench_numbers)}"
@@ -394,8 +290,7 @@ class Pair:
         else:
             del line["pause"]
             self.transport = VisaTransport(address, library=library_for(self.bus), line=line)
-        clock = {"clock": self.room.clock} if name in {"DS1000Z", "DSOX1000"} else {}
-        self.driver = kind(self.transport, **clock)
+        self.driver = kind(self.transport, clock=self.room.clock)
         self.liar.replies = list(replies)
 
     def close(self):
@@ -404,29 +299,29 @@ class Pair:
 
 
 WAYS = [
-    *((name, way) for name in DRIVERS if name not in {"425", "475"} for way in ("messages", "stream")),
-    *((name, way) for name in ("425", "475") for way in ("serial", "pyserial")),
+    *((name, way) for name in FAMILIES if name not in SERIAL for way in ("messages", "stream")),
+    *((name, way) for name in FAMILIES if name in SERIAL for way in ("serial", "pyserial")),
     ("475", "messages"),
 ]
 
 
 @pytest.mark.parametrize(("name", "way"), WAYS)
 def test_a_driver_whose_instrument_answers_anything_gives_a_value_or_an_instrument_error(name, way):
-    calls = DRIVERS[name][1]
+    known = calls(name)
 
     @FEW
-    @given(REPLIES, st.lists(st.sampled_from(sorted(calls)), min_size=1, max_size=6))
+    @given(REPLIES, st.lists(st.sampled_from(sorted(known)), min_size=1, max_size=6))
     def any_answers(replies, wanted):
         pair = Pair(name, way, replies)
         try:
             for call in wanted:
-                act, is_right = calls[call]
+                act, is_right = known[call]
                 with contextlib.suppress(InstrumentError):
                     value = act(pair.driver)
                     assert is_right(value), (call, value)
             pair.liar.replies.clear()
             pair.room.clock.sleep(MOST_LATE)  # what is late has come, and nobody may take it for an answer
-            good(name, pair.driver)
+            measure(name, pair.driver)
         finally:
             pair.close()
 
@@ -446,17 +341,18 @@ def test_a_driver_whose_instrument_answers_anything_gives_a_value_or_an_instrume
 )
 def test_an_answer_that_was_misheard_ends_in_an_instrument_error(name, call, line):
     pair = Pair(name, "serial" if name == "425" else "messages")
-    prepare = DRIVERS[name][1]["prepare"][0]
+    known = calls(name)
+    prepare, _ = known["prepare"]
     prepare(pair.driver)
-    if name in {"DS1000Z", "DSOX1000"}:
+    if KIND_OF[name] == "oscilloscope":
         pair.driver.acquire(timeout_s=1.0)
-    act, _ = DRIVERS[name][1][call]
+    act, _ = known[call]
     for honest in range(60):  # whichever question it is
         pair.liar.replies = [None] * honest + [(line + b"\n", 0.0, True)]
         with contextlib.suppress(InstrumentError):
             act(pair.driver)
     pair.liar.replies.clear()
-    good(name, pair.driver)
+    measure(name, pair.driver)
     pair.close()
 
 
@@ -472,7 +368,7 @@ def test_what_no_setting_and_no_name_can_be_is_refused(line, ask):
     pair = Pair("33500B", "messages", [(line + b"\n", 0.0, True)])
     with pytest.raises(BadAnswer):
         ask(pair.driver)
-    good("33500B", pair.driver)
+    measure("33500B", pair.driver)
     pair.close()
 
 
@@ -481,7 +377,7 @@ def test_an_identity_without_its_four_fields_is_refused_and_the_next_one_taken()
     with pytest.raises(BadAnswer, match="four fields"):
         pair.driver.identity()
     assert "DS1054Z" in pair.driver.identity()
-    good("DS1000Z", pair.driver)
+    measure("DS1000Z", pair.driver)
     pair.close()
 
 
@@ -505,11 +401,12 @@ class Pairing(RuleBasedStateMachine):
         self.pair.bus.faults.clear()
         self.pair.room.clock.sleep(10 * LATE)
         self.come_back()
-        good(self.name, self.driver)
+        measure(self.name, self.driver)
         self.pair.close()
 
     def prepare(self):
-        DRIVERS[self.name][1]["prepare"][0](self.driver)
+        prepare, _ = calls(self.name)["prepare"]
+        prepare(self.driver)
 
     def is_as_prepared(self):
         """Whether no reset has come in between: the application looks for that itself, see `Bench.forgotten`."""
@@ -610,7 +507,7 @@ class ScopePairing(Pairing):
         self.driver.acquire(timeout_s=1.0)
         trace = self.driver.trace(1)
         volts, whole = trace.volts, trace.dt_s * trace.codes.size
-        return volts.min() > -0.1 and volts.max() < 1.3 and whole == pytest.approx(0.1, rel=0.3)
+        return volts.min() > -0.1 and volts.max() < 1.3 and 0.1 <= whole < 0.25
 
 
 class MagnetometerPairing(Pairing):
@@ -620,18 +517,14 @@ class MagnetometerPairing(Pairing):
 
 
 PAIRINGS = {
-    "53230A": CounterPairing,
-    "CNT-91": CounterPairing,
-    "33500B": GeneratorPairing,
-    "33220A": GeneratorPairing,
-    "DS1000Z": ScopePairing,
-    "DSOX1000": ScopePairing,
-    "425": MagnetometerPairing,
-    "475": MagnetometerPairing,
+    "counter": CounterPairing,
+    "generator": GeneratorPairing,
+    "oscilloscope": ScopePairing,
+    "magnetometer": MagnetometerPairing,
 }
 
 
 @pytest.mark.parametrize(("name", "way"), WAYS)
 def test_no_fault_at_any_time_makes_a_reading_that_the_world_could_not_give(name, way):
-    machine = type("Pairing", (PAIRINGS[name],), {"name": name, "way": way})
+    machine = type("Pairing", (PAIRINGS[KIND_OF[name]],), {"name": name, "way": way})
     run_state_machine_as_test(machine, settings=settings(FEW, stateful_step_count=12))

@@ -6,7 +6,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from instruments.virtual.counter.edges import RATE, EdgeFinder, Input, crossings
+from instruments.virtual.core.trigger import crossings
+from instruments.virtual.counter.edges import RATE, EdgeFinder, Input
 
 
 def brute_force(voltage, level, hysteresis):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,10 +12,10 @@ import pytest
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.device import Device, DeviceError, read_device
 from levilab.formats.table import parse_columns
-from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.catalogue import ANALYSES, Analysis
 from levilab.pipelines.field.analysis import FieldAnalysis, analyze_scans
 from levilab.pipelines.field.device import FieldOptions
-from levilab.pipelines.field.document import as_document, recall_scans, result_of
+from levilab.pipelines.field.document import DOCUMENT
 from levilab.pipelines.field.figure import field_figure
 from levilab.pipelines.field.report import field_part
 from levilab.pipelines.field.table import field_tables
@@ -52,8 +51,8 @@ def device(sample_data: Path) -> Path:
 
 
 def keep(found: FieldAnalysis) -> Path:
-    """Write the result as `save_result` does, but for the figure."""
-    return save(result_of(found, found.place), found.place, b"")[0]
+    """Write the result, but for the figure."""
+    return save(DOCUMENT.of(found, found.place), found.place, b"")[0]
 
 
 def csv(path: Path, header: str, *columns: np.ndarray) -> Path:
@@ -85,10 +84,10 @@ def test_a_result_holds_what_was_found_and_is_read_not_computed(
     assert {"origin", "thickness", "moment", "mass_to_set"} <= set(document["values"])
     assert document["models"][0]["name"] == "ring"
     assert document["synthetic"] is True
-    monkeypatch.setattr("levilab.pipelines.field.document.analyze_source", None)
-    recalled = recall_scans([scan], FieldOptions())
+    monkeypatch.setattr("levilab.pipelines.field.analysis.fit_scan", None)
+    recalled = ANALYSES["field"].recall([scan], FieldOptions())
     assert recalled.origins[0].text.startswith("as levilab analyze found it")
-    assert as_document(recalled, scan) == document
+    assert ANALYSES["field"].document(recalled, scan) == document
     assert field_tables(recalled) == field_tables(found)
     for name in ("height", "flux_density", "u", "residuals", "covariance"):  # all that is drawn comes from these
         assert np.array_equal(getattr(recalled.runs[0].scan, name), getattr(found.runs[0].scan, name)), name
@@ -97,7 +96,7 @@ def test_a_result_holds_what_was_found_and_is_read_not_computed(
 
 def test_other_options_are_computed_anew_with_those_of_the_result(scan: Path) -> None:
     keep(analyze_scans([scan], FieldOptions(device=TOP_OF_THESIS)))
-    recalled = recall_scans([scan], FieldOptions(free_radii=True))
+    recalled = ANALYSES["field"].recall([scan], FieldOptions(free_radii=True))
     assert recalled.origins[0].text.startswith("analyzed for this page: other options")
     assert recalled.origins[0].options.device == TOP_OF_THESIS
     assert "inner_radius" in recalled.runs[0].scan.fitted
@@ -109,10 +108,12 @@ def test_a_result_that_does_not_go_with_the_readings_is_refused(scan: Path) -> N
     del document["runs"][0]["models"][0]["parameters"]["origin"]
     file.write_text(json.dumps(document), encoding="utf-8")
     with pytest.raises(DataError, match="each with a value"):
-        recall_scans([scan], FieldOptions())
+        ANALYSES["field"].recall([scan], FieldOptions())
 
 
-def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(tmp_path: Path, scan: Path) -> None:
+def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, scan: Path
+) -> None:
     other = shutil.copytree(scan, tmp_path / "other")
     text = (other / "readings.csv").read_text(encoding="utf-8").replace(",0.035,", ",0.0352,")
     (other / "readings.csv").write_text(text, encoding="utf-8")
@@ -123,9 +124,10 @@ def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(tmp
     assert mean.u is not None
     assert alone[0].u is not None
     assert mean.u > 0.99 * alone[0].u
-    page = render(replace(ANALYSES["field"], svg=lambda _: "<svg/>"), found)
+    monkeypatch.setattr(Analysis, "svg", lambda *_: "<svg/>")
+    page = render([(ANALYSES["field"], found)])
     assert "None of these 2 runs came from a real bench" in page
-    assert as_document(found, tmp_path)["values"]["strength"]["runs"] == 2
+    assert ANALYSES["field"].document(found, tmp_path)["values"]["strength"]["runs"] == 2
     assert len(field_figure(found).axes) == 4
     assert len(field_part(found).inputs) == 2
 

@@ -6,13 +6,13 @@ import json
 import shutil
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
-from levilab.pipelines.catalogue import analyze_suiting
+from levilab.pipelines.catalogue import ANALYSES, analyze_suiting, save
 from levilab.pipelines.limit.analysis import LOWER_EDGE, RESONANCE, UPPER_EDGE, LimitOptions, analyze_limits
-from levilab.pipelines.limit.document import limit_document, recall_limits, save_limits
 from levilab.pipelines.limit.table import limit_tables
 from levilab.report.page import write_report
 from support.spin_downs import spin_down_csv
@@ -23,29 +23,32 @@ if TYPE_CHECKING:
 
 def test_the_published_limits_give_the_published_statistics(sample_data: Path) -> None:
     analysis = analyze_limits([sample_data / "lower-limits"], LimitOptions())
-    values = limit_document(analysis, sample_data)["values"]
+    values = ANALYSES["limit"].document(analysis, sample_data)["values"]
     assert round(values["mean"]["value"], 2) == 21.86
     assert round(values["scatter"]["value"], 2) == 0.25
     assert round(values["standard_error"]["value"], 2) == 0.08
     assert analysis.all_warnings == []
 
 
-def test_theory_beside_them_is_that_of_the_thesis_top(sample_data: Path) -> None:
+def test_theory_beside_them_is_that_of_the_thesis_top(sample_data: Path, tmp_path: Path) -> None:
     """PHYSICS: window 21.65 to 80.6 Hz at z = 7.30 cm, computed there from the quartic; resonance 22.1 Hz."""
-    (lower, upper) = analyze_limits([sample_data], LimitOptions()).groups
+    file = tmp_path / "upper.csv"  # with no scene of its own
+    file.write_text("61.2\n60.9\n61.0\n", encoding="utf-8")
+    (lower, upper) = analyze_limits([sample_data / "lower-limits", file], LimitOptions()).groups
     expected = {one.name: one.expected for group in (lower, upper) for one in group.comparisons}
     assert expected == pytest.approx({LOWER_EDGE: 21.65, RESONANCE: 22.1, UPPER_EDGE: 80.6}, abs=0.06)
     assert "0.21 Hz above the lower edge of the linear window" in lower.text
-    assert "The top was lost by the drive 16 times." in upper.text
 
 
 def test_both_kinds_together_have_values_of_both(sample_data: Path, tmp_path: Path) -> None:
     analysis = analyze_limits([sample_data], LimitOptions())
-    document = limit_document(analysis, tmp_path)
-    assert {"lower_mean", "upper_mean", "upper_standard_error"} <= document["values"].keys()
+    document = ANALYSES["limit"].document(analysis, tmp_path)
+    assert {"lower_mean", "upper_1_mean", "upper_2_standard_error"} <= document["values"].keys()
+    assert "The top was lost by the drive 8 times." in analysis.groups[1].text
     assert [run["which"] for run in document["runs"]] == ["upper", "lower", "upper"]
-    assert [group["repetitions"] for group in document["groups"]] == [10, 16]
-    (warning,) = analysis.all_warnings  # spin-downs in the same folder are a remark
+    assert [group["repetitions"] for group in document["groups"]] == [10, 8, 8]
+    warning, conditions = sorted(analysis.all_warnings)  # spin-downs in the same folder are a remark
+    assert "the upper limits are of 2 conditions" in conditions
     assert "LOOSE WASHERS" in warning
     assert warning.endswith("(the first of 16 such warnings)")
     assert "passed over: 4 spin runs" in analysis.remarks
@@ -54,26 +57,26 @@ def test_both_kinds_together_have_values_of_both(sample_data: Path, tmp_path: Pa
 def test_what_was_written_is_what_a_report_shows(sample_data: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(sample_data / "loose-washers", tmp_path / "run")
     analysis = analyze_limits([folder], LimitOptions())
-    assert [file.name for file in save_limits(analysis)] == ["result.json", "limit.png"]
-    again = recall_limits([folder], LimitOptions())
-    assert again.origins[0].startswith("as levilab analyze found it")
+    assert [file.name for file in save(ANALYSES["limit"], analysis)] == ["result.json", "limit.png"]
+    again = ANALYSES["limit"].recall([folder], LimitOptions())
+    assert again.origins[0].text.startswith("as levilab analyze found it")
     assert again.groups == analysis.groups
     assert again.all_warnings == analysis.all_warnings
     assert limit_tables(again) == limit_tables(analysis)
     page = write_report([folder], tmp_path / "page.html").read_text(encoding="utf-8")
     assert "LOOSE WASHERS" in page
     assert analysis.groups[0].text.split(".")[0] in page
-    other = recall_limits([folder], LimitOptions(reading_u=0.5))  # other options than the result's
-    assert other.origins[0].startswith("analyzed for this page")
+    other = ANALYSES["limit"].recall([folder], LimitOptions(reading_u=0.5))  # other options than the result's
+    assert other.origins[0].text.startswith("analyzed for this page")
 
 
 def test_a_result_that_is_damaged_is_an_error(sample_data: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(sample_data / "lower-limits", tmp_path / "run")
-    document = limit_document(analyze_limits([folder], LimitOptions()), folder)
+    document = ANALYSES["limit"].document(analyze_limits([folder], LimitOptions()), folder)
     document["runs"][0]["which"] = "middle"
     (folder / "result.json").write_text(json.dumps(document), encoding="utf-8")
     with pytest.raises(DataError, match=r"result\.json: runs\.0\.which = 'middle'"):
-        recall_limits([folder], LimitOptions())
+        ANALYSES["limit"].recall([folder], LimitOptions())
 
 
 def test_a_file_of_ones_own_needs_nothing_but_the_spins(tmp_path: Path) -> None:
@@ -81,6 +84,67 @@ def test_a_file_of_ones_own_needs_nothing_but_the_spins(tmp_path: Path) -> None:
     file.write_text("top,f [Hz]\n1,80.1\n2,80.3\n3,79.9\n", encoding="utf-8")
     (group,) = analyze_limits([file], LimitOptions()).groups
     assert (group.which, group.statistics.n) == ("upper", 3)  # by the nearer edge of the window
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "21.7\n21.4\n21.9\n",
+        "limit [Hz]\n21,7\n21,4\n21,9\n",
+        "# ours\nf [mHz]\n21700\n21400\n\n21900\n",
+        "1302\n1284\n1314",
+    ],
+    ids=["numbers", "a title", "another unit", "rpm"],
+)
+def test_a_column_of_limits_alone_is_enough(tmp_path: Path, text: str, request: pytest.FixtureRequest) -> None:
+    file = tmp_path / "my.csv"
+    file.write_text(("rpm\n" if request.node.callspec.id == "rpm" else "") + text, encoding="utf-8")
+    (group,) = analyze_limits([file], LimitOptions()).groups
+    assert group.statistics.mean.value == pytest.approx(65.0 / 3)
+    assert (group.which, group.statistics.n) == ("lower", 3)
+
+
+@pytest.mark.parametrize("text", ["time [s]\n21.7\n21.4\n", "21.7\nhigh\n21.9\n", "height [mm]\n21.7\n"])
+def test_another_column_is_no_limit(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "my.csv"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(TableError):
+        analyze_limits([file], LimitOptions())
+
+
+def test_runs_of_other_conditions_stand_apart(sample_data: Path, tmp_path: Path) -> None:
+    """The same drive twice is one group, with the scatter between the runs; a stronger one or another creep is not."""
+    changed: dict[str, dict[str, float]] = {"strong": {"drive_amplitude_vpp": 20.0}, "slow": {"creep_hz_per_s": 0.05}}
+    names = {"one": {}, "two": {}} | changed
+    for k, (name, changes) in enumerate(names.items()):
+        folder = shutil.copytree(sample_data / "upper-limits", tmp_path / name)
+        record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        record["configuration"]["limit"] |= changes
+        (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
+        off = 4.0 * k + np.tile([-0.1, 0.1], 4)
+        rows = ["spin_frequency_hz,spin_frequency_u_hz", *(f"{67 + one},0.05" for one in off)]
+        (folder / "readings.csv").write_text("\n".join([*rows, ""]), encoding="utf-8")
+    analysis = analyze_limits([tmp_path / name for name in names], LimitOptions())
+    assert sorted(group.runs for group in analysis.groups) == [(0, 1), (2,), (3,)]
+    both = next(group for group in analysis.groups if group.runs == (0, 1))
+    assert both.statistics.between
+    assert both.statistics.between.value == pytest.approx(8**0.5, rel=0.01)  # 4 Hz apart
+    assert both.statistics.mean.u == pytest.approx(2.0, rel=0.01)  # their scatter over the root of 2
+    assert "which differ by" in both.text
+    assert any("are of 3 conditions and are not put together" in text for text in analysis.all_warnings)
+    values = ANALYSES["limit"].document(analysis, tmp_path)["values"]
+    assert {"upper_1_mean", "upper_2_mean", "upper_3_standard_error", "upper_1_between_runs"} <= values.keys()
+
+
+def test_upper_limits_that_do_not_scatter_are_no_better_than_a_step(sample_data: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(sample_data / "upper-limits", tmp_path / "run")
+    header, *rows = (folder / "readings.csv").read_text(encoding="utf-8").splitlines()
+    alike = [",".join([row.split(",")[0], *rows[0].split(",")[1:]]) for row in rows]
+    (folder / "readings.csv").write_text("\n".join([header, *alike, ""]), encoding="utf-8")
+    analysis = analyze_limits([folder], LimitOptions())
+    (run,) = analysis.runs
+    assert run.statistics.mean.u == pytest.approx(float(rows[0].split(",")[2]))
+    assert any("however often it is repeated: creep slower" in text for text in analysis.all_warnings)
 
 
 def test_a_spin_down_is_no_limit_and_runs_without_limits_are_told(tmp_path: Path, sample_data: Path) -> None:

@@ -11,7 +11,7 @@ from instruments.drivers.oscilloscope import Trace
 from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
 from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionOptions, analyze_precessions
-from levilab.pipelines.precession.document import as_document, recall_precessions, result_of
+from levilab.pipelines.precession.document import DOCUMENT
 from levilab.pipelines.result import save
 from levilab.report.page import render
 from levilab.runs.run import RunRecord, utc_now
@@ -37,14 +37,14 @@ def sweep_csv(path: Path, *, slope: float = 1.0, u: bool = True, seed: int = 1, 
 
 
 def save_without_picture(found: PrecessionAnalysis) -> Path:
-    return save(result_of(found, found.place), found.place, b"", first=False)[0]
+    return save(DOCUMENT.of(found, found.place), found.place, b"", first=False)[0]
 
 
 def test_a_file_of_ones_own_is_analyzed_without_naming_its_columns(tmp_path: Path) -> None:
     file = sweep_csv(tmp_path / "mine.csv", half=3)
     ((row, found),) = analyze_suiting([file], {})
     assert row.name == "precession"
-    document = as_document(found, tmp_path)
+    document = ANALYSES["precession"].document(found, tmp_path)
     values = document["values"]
     assert values["slope"]["value"] == pytest.approx(1, abs=3 * values["slope"]["u"])
     assert values["intercept"]["unit"] == "Hz"
@@ -80,19 +80,19 @@ def test_a_result_is_read_and_not_computed_anew(tmp_path: Path) -> None:
     files = [sweep_csv(tmp_path / f"{k}.csv", seed=k, half=k) for k in (1, 2)]
     found = analyze_precessions(files[:1], PrecessionOptions(orthogonal=True))
     result = save_without_picture(found)
-    again = recall_precessions(files[:1], PrecessionOptions())
+    again = ANALYSES["precession"].recall(files[:1], PrecessionOptions())
     assert again.runs == found.runs
     assert again.combined == found.combined
     assert again.all_warnings == found.all_warnings
     assert again.origins[0].text.startswith("as levilab analyze found it")
-    other_options = recall_precessions(files[:1], PrecessionOptions(keep_outliers=True))
+    other_options = ANALYSES["precession"].recall(files[:1], PrecessionOptions(keep_outliers=True))
     assert other_options.origins[0].text.startswith("analyzed for this page: other options")
     assert other_options.combined.line.orthogonal  # what is not given is as it was
     # of another sweep's points
     text = result.read_text(encoding="utf-8").replace('"drive": 30.0', '"drive": 30.5')
     result.write_text(text, encoding="utf-8")
     with pytest.raises(DataError, match=r"its points are not those of .*analyze anew"):
-        recall_precessions(files[:1], PrecessionOptions())
+        ANALYSES["precession"].recall(files[:1], PrecessionOptions())
 
 
 @pytest.mark.parametrize(
@@ -154,7 +154,7 @@ def test_figure_and_page_show_what_was_found(tmp_path: Path) -> None:
     found = analysis.analyze(
         [sweep_csv(tmp_path / "mine.csv", half=3), run_with_records(tmp_path / "runs", 0.0)], PrecessionOptions()
     )
-    page = render(analysis, found)
+    page = render([(analysis, found)])
     assert found.text.split(". ")[0].replace("−", "-") in page.replace("−", "-")
     assert "mean vector" in page
     assert "half the frequency was counted" in page

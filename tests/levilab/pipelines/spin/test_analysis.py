@@ -15,7 +15,6 @@ from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
 from levilab.pipelines.catalogue import save as save_found
 from levilab.pipelines.spin.analysis import SpinOptions, analyze_spins
-from levilab.pipelines.spin.document import as_document, recall_spins
 from levilab.pipelines.spin.figure import spin_figure
 from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
 from levilab.runs.run import Run, RunRecord, utc_now
@@ -121,7 +120,7 @@ def test_the_traces_of_a_run_are_read_in_volts_on_its_clock(traced: Path) -> Non
     series = analysis.runs[0].series
     assert series.frequency == pytest.approx([30, 29, 28], abs=0.01)
     assert series.time == pytest.approx([0, 10, 20], abs=0.05)
-    document = as_document(analysis, traced)
+    document = ANALYSES["spin"].document(analysis, traced)
     assert document["inputs"][0]["path"] == "traces.jsonl"
     assert save_found(ANALYSES["spin"], analysis)[0] == traced / "result.json"
 
@@ -151,16 +150,16 @@ def test_the_result_says_what_the_interface_promises(sample_data: Path, tmp_path
     assert result["values"]["reference_time"]["value"] == analysis.runs[0].spin.reference_time
     assert result["values"]["bound"]["value"] > 0
     assert result["method"] == result["runs"][0]["method"] == "matched"
-    recalled = recall_spins([tmp_path / "keysight-dsox.csv"], SpinOptions())
+    recalled = ANALYSES["spin"].recall([tmp_path / "keysight-dsox.csv"], SpinOptions())
     assert recalled.origins[0].text.startswith("as levilab analyze found it")
-    assert as_document(recalled, tmp_path) == result
-    anew = recall_spins([tmp_path / "keysight-dsox.csv"], SpinOptions(method="edges"))
+    assert ANALYSES["spin"].document(recalled, tmp_path) == result
+    anew = ANALYSES["spin"].recall([tmp_path / "keysight-dsox.csv"], SpinOptions(method="edges"))
     assert "other options" in anew.origins[0].text
     written.write_text(
         written.read_text(encoding="utf-8").replace('"method": "matched"', '"method": "guessed"'), encoding="utf-8"
     )
     with pytest.raises(DataError, match="guessed"):
-        recall_spins([tmp_path / "keysight-dsox.csv"], SpinOptions())
+        ANALYSES["spin"].recall([tmp_path / "keysight-dsox.csv"], SpinOptions())
     assert path
 
 
@@ -179,7 +178,7 @@ def test_a_record_without_pulses_is_refused_in_one_line(tmp_path: Path) -> None:
         analyze_spins([path], SpinOptions())
 
 
-@pytest.mark.parametrize("find", [analyze_spins, recall_spins])
+@pytest.mark.parametrize("find", [analyze_spins, ANALYSES["spin"].recall])
 def test_a_record_without_pulses_among_others_is_passed_over(find: Any, tmp_path: Path) -> None:
     """By a report, too, which recalls."""
     write_wav(tmp_path / "dark.wav", np.full(4000, 0.1), 1000)
@@ -234,3 +233,30 @@ def test_the_figure_shows_the_trace_the_turns_the_residuals_and_the_frequency(
     residuals = np.concatenate([np.asarray(line.get_ydata(), float) for line in panels[2].get_lines()[1:]])
     assert len(residuals) > 10
     assert np.abs(residuals).max() < 200  # µs: a fifth of a pulse's width
+
+
+@pytest.mark.parametrize("what", ["trace", "times"])
+def test_residuals_from_a_third_degree_have_no_bend_left(what: str, tmp_path: Path) -> None:
+    """The slope changes by 0.6 Hz/s in a second, 1.5 turns at the ends: a parabola leaves milliseconds."""
+    random, time = np.random.default_rng(5), np.arange(10_000) / 2000
+    away = time - 2.5
+    turns = 0.3 + 30 * away - 0.3 * away**2 / 2 + 0.6 * away**3 / 6
+    if what == "times":
+        number = np.arange(np.ceil(turns[0]), np.floor(turns[-1]))
+        passes = np.interp(number, turns, time) + random.normal(0, 2e-5, number.size)
+        text = "pulse time [s]\n" + "".join(f"{one:.7f}\n" for one in passes)
+    else:
+        light = np.exp(-0.5 * (((turns + 0.5) % 1 - 0.5) / 0.02) ** 2) + random.normal(0, 0.02, time.size)
+        text = "time [s],signal [V]\n" + "".join(f"{a:.4f},{b:.4f}\n" for a, b in zip(time, light, strict=True))
+    file = tmp_path / "curved.csv"
+    file.write_text(text, encoding="utf-8")
+    analysis = analyze_spins([file], SpinOptions())
+    assert any(note.name == "curved" for note in analysis.runs[0].spin.notes)
+    panel = spin_figure(analysis).get_axes()[2]
+    (dots,) = [line for line in panel.get_lines() if line.get_marker() == "."]
+    at, residuals = (np.asarray(values, dtype=float) for values in (dots.get_xdata(), dots.get_ydata()))
+    assert len(at) > 140  # of 150 turns
+    third = np.polynomial.Polynomial.fit(at, residuals, 3)
+    assert np.ptp(third(at)) < 40  # µs: twice the noise of one pulse, and 8 of its standard errors at an end
+    assert residuals.std() < 30
+    assert panel.get_title(loc="left").endswith("from a fit of the third degree")

@@ -11,8 +11,8 @@ import pytest
 
 from levilab.errors import DataError, LevilabError
 from levilab.files import CannotWrite
+from levilab.pipelines.catalogue import ANALYSES, save
 from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
-from levilab.pipelines.spindown.document import as_document, save_result
 from levilab.runs.run import Run
 from support.spin_downs import spin_down_csv
 
@@ -75,7 +75,7 @@ def test_the_four_runs_exclude_stokes_and_newton_and_favour_the_disc(sample_data
 
 
 def test_the_result_is_written_as_the_interface_says(sample_data: Path, tmp_path: Path) -> None:
-    save_result(analyze_spindowns([sample_data], SpinDownOptions()), tmp_path)
+    save(ANALYSES["spindown"], analyze_spindowns([sample_data], SpinDownOptions()), tmp_path)
     text = (tmp_path / "result.json").read_text(encoding="utf-8")
     result = json.loads(text, parse_constant=pytest.fail)
     assert list(result) == sorted(result)
@@ -98,7 +98,7 @@ def test_the_result_is_written_as_the_interface_says(sample_data: Path, tmp_path
 
 def test_one_run_has_its_start_and_covariance_at_the_top(sample_data: Path) -> None:
     analysis = analyze_spindowns([sample_data / "spin-down-1"], SpinDownOptions())
-    result = as_document(analysis, analysis.home)
+    result = ANALYSES["spindown"].document(analysis, analysis.home)
     disc = next(model for model in result["models"] if model["name"] == "disc")
     assert set(disc["parameters"]) == {"start_frequency", "c32"}
     assert np.array(disc["covariance"]).shape == (2, 2)
@@ -108,7 +108,7 @@ def test_one_run_has_its_start_and_covariance_at_the_top(sample_data: Path) -> N
 
 def test_a_plain_csv_is_analyzed_and_knows_nothing_of_synthetic(tmp_path: Path) -> None:
     analysis = analyze_spindowns([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions())
-    result = as_document(analysis, analysis.home)
+    result = ANALYSES["spindown"].document(analysis, analysis.home)
     assert analysis.home == tmp_path
     assert (result["synthetic"], result["best_model"]) == (False, "disc")
     assert result["values"]["c32"]["value"] == pytest.approx(2.34e-4, abs=4 * result["values"]["c32"]["u"])
@@ -149,7 +149,7 @@ def test_inputs_of_the_same_name_are_told_apart(tmp_path: Path) -> None:
 
 
 def test_the_hash_in_the_result_is_that_of_the_file(sample_data: Path, tmp_path: Path) -> None:
-    result = as_document(analyze_spindowns([sample_data], SpinDownOptions()), tmp_path)
+    result = ANALYSES["spindown"].document(analyze_spindowns([sample_data], SpinDownOptions()), tmp_path)
     for given in result["inputs"]:
         assert hashlib.sha256((tmp_path / given["path"]).read_bytes()).hexdigest() == given["sha256"]
 
@@ -171,14 +171,15 @@ def test_a_stated_reading_uncertainty_takes_the_place_of_the_scatter(tmp_path: P
     assert without.statistics.reduced_chi_square is None
     assert with_u.statistics.reduced_chi_square == pytest.approx(1, abs=1)
     ratio = without.parameters["c32"].u / with_u.parameters["c32"].u  # type: ignore[operator]
-    assert ratio**2 == pytest.approx(with_u.statistics.reduced_chi_square)
+    # 0.1: what a hidden tilt adds to u is not proportional to the readings' own
+    assert ratio**2 == pytest.approx(with_u.statistics.reduced_chi_square, rel=0.1)
 
 
 @pytest.mark.parametrize("how", ["profile", "bootstrap"])
 def test_intervals_are_there_when_asked_for(tmp_path: Path, how: str) -> None:
     path = spin_down_csv(tmp_path / "my.csv", u=False)
     analysis = analyze_spindowns([path], SpinDownOptions(uncertainty=how))  # type: ignore[arg-type]
-    c = as_document(analysis, tmp_path)["runs"][0]["values"]["c32"]
+    c = ANALYSES["spindown"].document(analysis, tmp_path)["runs"][0]["values"]["c32"]
     low, high = c["interval_68"]
     assert low < c["value"] < high
     # no u was stated: both stand on the residuals' own scatter; 1000 samples tell a quantile to some 5 %
@@ -200,7 +201,7 @@ def test_a_run_of_another_experiment_is_refused_by_name(sample_data: Path) -> No
 
 
 def test_a_folder_without_runs_says_what_it_found(sample_data: Path, tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="found nothing"):
+    with pytest.raises(DataError, match="holds no run and no data file"):
         analyze_spindowns([tmp_path], SpinDownOptions())
     shutil.copytree(sample_data / "lower-limits", tmp_path / "limits")
     with pytest.raises(DataError, match="found only 1 limit"):
@@ -211,7 +212,7 @@ def test_a_folder_that_cannot_be_written_is_told_in_one_line(sample_data: Path, 
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     analysis = analyze_spindowns([sample_data], SpinDownOptions())
     with pytest.raises(CannotWrite, match="`out`") as caught:
-        save_result(analysis, tmp_path / "file" / "below")
+        save(ANALYSES["spindown"], analysis, tmp_path / "file" / "below")
     assert isinstance(caught.value, LevilabError)
     assert "\n" not in str(caught.value)
 
@@ -219,5 +220,5 @@ def test_a_folder_that_cannot_be_written_is_told_in_one_line(sample_data: Path, 
 @pytest.mark.parametrize("n", [3, 4, 5, 7])
 def test_few_readings_give_a_result_without_nan_that_says_what_it_cannot_tell(tmp_path: Path, n: int) -> None:
     analysis = analyze_spindowns([spin_down_csv(tmp_path / "my.csv", n=n)], SpinDownOptions())
-    text = json.dumps(as_document(analysis, tmp_path), allow_nan=False)
+    text = json.dumps(ANALYSES["spindown"].document(analysis, tmp_path), allow_nan=False)
     assert json.loads(text)["warnings"]

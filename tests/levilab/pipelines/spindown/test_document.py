@@ -13,10 +13,10 @@ import pytest
 from analysis.spindown.drag import LAWS
 from analysis.spindown.tilt import count
 from levilab.errors import DataError
+from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.result import save
-from levilab.pipelines.spindown import document
-from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions, analyze_spindowns
-from levilab.pipelines.spindown.document import as_document, recall_spindowns, result_of
+from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis, SpinDownOptions, analyze_spindowns
+from levilab.pipelines.spindown.document import DOCUMENT
 from levilab.pipelines.spindown.table import count_table, tilt_part
 from support.spin_downs import spin_down_csv
 
@@ -24,17 +24,21 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
+SPINDOWN = ANALYSES["spindown"]
+recall_spindowns = SPINDOWN.recall
+
+
 @pytest.fixture
 def fitted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Names of the inputs that `recall_spindowns` fits."""
     names: list[str] = []
-    fit = document.fit_source
 
-    def noted(source: Any, options: SpinDownOptions, **more: Any) -> Any:
+    def noted(source: Any, options: SpinDownOptions) -> Any:
         names.append(source.path.name)
-        return fit(source, options, **more)
+        return METHOD.fit(source, options)
 
-    monkeypatch.setattr(document, "fit_source", noted)
+    row = replace(SPINDOWN, result=replace(DOCUMENT, method=replace(METHOD, fit=noted)))
+    monkeypatch.setitem(globals(), "recall_spindowns", row.recall)
     return names
 
 
@@ -49,7 +53,7 @@ def runs(tmp_path: Path, sample_data: Path) -> Path:
 def analyzed(*paths: Path, **options: Any) -> SpinDownAnalysis:
     """The analysis, and its result.json; the figure takes longer than all the rest."""
     analysis = analyze_spindowns(paths, SpinDownOptions(**options))
-    save(result_of(analysis, analysis.place), analysis.place, picture=b"")
+    save(DOCUMENT.of(analysis, analysis.place), analysis.place, picture=b"")
     return analysis
 
 
@@ -89,7 +93,7 @@ def test_several_runs_are_recalled_to_the_last_bit(runs: Path, fitted: list[str]
     assert same(after.combined.fits, before.combined.fits)
     assert same(after.combined.verdict, before.combined.verdict)
     assert after.all_warnings == before.all_warnings
-    assert as_document(after, runs) == as_document(before, runs)
+    assert SPINDOWN.document(after, runs) == SPINDOWN.document(before, runs)
 
 
 @pytest.mark.parametrize("n", [3, 4, 5, 7])
@@ -97,7 +101,7 @@ def test_results_that_lack_numbers_are_recalled_too(tmp_path: Path, fitted: list
     before = analyzed(spin_down_csv(tmp_path / "my.csv", n=n, u=n != 4))
     after = recall_spindowns([tmp_path / "my.csv"], SpinDownOptions())
     assert fitted == []
-    assert as_document(after, tmp_path) == as_document(before, tmp_path)
+    assert SPINDOWN.document(after, tmp_path) == SPINDOWN.document(before, tmp_path)
 
 
 def test_what_is_shown_is_what_stands_in_the_result(tmp_path: Path) -> None:
@@ -265,7 +269,9 @@ def test_a_warning_about_an_input_is_recalled_once_however_it_is_named(
         analyzed(path)
     monkeypatch.chdir(tmp_path)
     after = recall_spindowns([path.relative_to(tmp_path) for path in paths], SpinDownOptions())
-    assert sum("no header" in text for text in after.all_warnings) == 2
+    about = [text for text in after.all_warnings if "no header" in text]
+    assert len(about) == 2
+    assert [text.count("one.csv") + text.count("two.csv") for text in about] == [1, 1]  # named once
 
 
 def test_a_tilt_that_runs_show_together_is_in_a_recall_without_result(tmp_path: Path) -> None:

@@ -1,0 +1,262 @@
+"""The gates of a counter at one point of a sweep: the rate of the pulses, the swing of a locked top taken off.
+
+A locked top swings about its drive like a pendulum, with a period of some seconds: gates in a row are not independent,
+and their scatter over √n is up to three times the uncertainty of their mean.  The swing moves the phase, and so in a
+gate from b to e there are
+
+    n = ν (e − b) + φ(e) − φ(b) + noise,  φ(t) = p cos 2πft + q sin 2πft  [turns]
+
+periods; ν, p and q by least squares, f where both series, spin and laser, leave the least.  The noise is that of the
+pulses at both ends of a gate: as large for a long gate as for a short one.
+
+Source of the joint choice of f: Seber & Wild, Nonlinear Regression (1989), §2.1.5 (scatters that are not known).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Array = NDArray[np.float64]
+
+#: Gates below which a swing is not looked for: rate, swing and its frequency are four numbers.
+FEWEST = 7
+#: The swing is looked for from so many periods in the series on, in steps of so much, up to so many in a gate.
+_LEAST_PERIODS, _STEP_PERIODS, _MOST_IN_A_GATE = 1.5, 0.1, 0.9
+#: A gate has miscounted where it is within so much of whole pulses, and so many standard deviations off; no more than
+#: this share of them is left out.
+_OF_A_PULSE, _STANDS_OUT, _MOST_WRONG = 0.25, 5.0, 0.25
+#: A swing stands out where the scatter of a gate is less than this share of it.
+_CLEAR = 0.3
+#: Points from which on their scatter is taken as a power of the drive's frequency.
+_FEWEST_POINTS = 5
+#: A point's own scatter counts where it is larger than that of all by less chance than this.
+_LARGER_P = 1e-3
+#: The scatter is never less: the rounding of the counts [turns].
+_LEAST_SCATTER = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class Gates:
+    """What a counter counted, shape (n,) each: begin and end of the gates [s], frequency [Hz] or NaN."""
+
+    begin: Array
+    end: Array
+    frequency: Array
+
+    def __len__(self) -> int:
+        return self.frequency.size
+
+    @property
+    def length(self) -> Array:
+        """Of the gates [s]."""
+        return self.end - self.begin
+
+    @property
+    def periods(self) -> Array:
+        """Counted in each."""
+        return self.frequency * self.length
+
+    def part(self, which: NDArray[np.bool_]) -> Gates:
+        """Some of them."""
+        return Gates(self.begin[which], self.end[which], self.frequency[which])
+
+
+@dataclass(frozen=True)
+class Swing:
+    """The phase of a locked top about its drive: size·cos 2πf(t − crest) [turns], ahead of the drive where it is > 0.
+
+    frequency: f [Hz]; size: [turns]; crest: [s].
+    """
+
+    frequency: float
+    size: float
+    crest: float
+
+
+@dataclass(frozen=True)
+class Rate:
+    """The rate of the pulses at a point.
+
+    value: [Hz]; scatter: standard deviation of the periods in a gate [turns], with so many degrees of freedom;
+    per_scatter: u(value) over it [Hz]; swing: that was taken off, None where it was not looked for; wrong: gates that
+    are left out, with the pulses that they have too many; missing: gates without a count.
+    """
+
+    value: float
+    scatter: float
+    freedom: int
+    per_scatter: float
+    swing: Swing | None
+    wrong: tuple[tuple[int, int], ...]
+    missing: int
+
+    @property
+    def u(self) -> float:
+        """Standard uncertainty by this point's own scatter [Hz]."""
+        return self.scatter * self.per_scatter
+
+
+def rates_at_point(spin: Gates, laser: Gates) -> tuple[Rate, Rate]:
+    """The rates of the tape's and of the laser's pulses, counted one after the other at one drive.
+
+    Args:
+        spin: three counts at least.
+        laser: likewise.
+    """
+    series = (spin, laser)
+    first = _swing_frequency([_counted(gates) for gates in series])
+    kept = [_without_miscounts(gates, first) for gates in series]
+    frequency = _swing_frequency([gates for gates, _ in kept])
+    rates = [_rate(gates, frequency, wrong, len(all_)) for (gates, wrong), all_ in zip(kept, series, strict=True)]
+    return rates[0], rates[1]
+
+
+def swing_of(gates: Gates) -> Swing | None:
+    """The swing that the gates of one series show; None where there are few gates, or it does not stand out."""
+    used = _counted(gates)
+    if len(used) <= FEWEST:
+        return None
+    rate = _rate(used, _swing_frequency([used]), (), len(used))
+    return rate.swing if rate.swing and rate.scatter < _CLEAR * rate.swing.size else None
+
+
+def shared_scatter(rates: Sequence[Rate], drive: Array) -> Array:
+    """The scatter of a gate at each point of a sweep, from the gates of all points, shape (n,) [turns].
+
+    One point has few gates, and a line that weighs its points by what few gates say believes too much in those that
+    agree by chance.  The scatter changes with the drive, for the wobble gets smaller and the nutation does not: it is
+    a power of the frequency.  A point whose own scatter is larger than that, by no chance, keeps it.
+
+    Args:
+        rates: of the points.
+        drive: shape (n,) [Hz].
+    """
+    from scipy.special import chdtrc, digamma
+
+    own = np.maximum([rate.scatter for rate in rates], _LEAST_SCATTER)
+    freedom = np.array([rate.freedom for rate in rates], dtype=np.float64)
+    if own.size < _FEWEST_POINTS or not np.ptp(drive) > 0:
+        shared = np.full(own.size, math.sqrt(float(np.average(own**2, weights=freedom))))
+    else:
+        # the mean of log χ²/dof lies below 0 by this; its variance is 2/dof about
+        logs = np.log(own**2) - (digamma(freedom / 2) - np.log(freedom / 2))
+        columns = np.column_stack([np.ones(own.size), np.log(drive / drive.mean())])
+        root = np.sqrt(freedom / 2)
+        found, *_ = np.linalg.lstsq(columns * root[:, None], logs * root, rcond=None)
+        shared = np.exp(columns @ found / 2)
+    return np.where(chdtrc(freedom, freedom * (own / shared) ** 2) < _LARGER_P, own, shared)
+
+
+# --- one series ---
+
+
+def _columns(gates: Gates, frequency: float | None) -> Array:
+    """The periods of a gate by the rate and, with a frequency, by the swing, shape (n, 1) or (n, 3)."""
+    if frequency is None:
+        return gates.length[:, None]
+    begin, end = (2 * np.pi * frequency * (times - gates.begin[0]) for times in (gates.begin, gates.end))
+    return np.column_stack([gates.length, np.cos(end) - np.cos(begin), np.sin(end) - np.sin(begin)])
+
+
+def _left(gates: Gates, frequency: float) -> float:
+    """Σ residual² [turns²]."""
+    columns = _columns(gates, frequency)
+    found, *_ = np.linalg.lstsq(columns, gates.periods, rcond=None)
+    return float(np.sum((gates.periods - columns @ found) ** 2))
+
+
+def _swing_frequency(series: Sequence[Gates]) -> float | None:
+    """Where Σ n log(what is left) of the series is least: each has a scatter of its own [Hz]; None if all are short."""
+    series = [gates for gates in series if len(gates) >= FEWEST]
+    if not series:
+        return None
+    span = max(float(gates.end[-1] - gates.begin[0]) for gates in series)
+    most = _MOST_IN_A_GATE / max(float(gates.length.mean()) for gates in series)
+    tried = np.arange(_LEAST_PERIODS / span, most, _STEP_PERIODS / span)
+    least = _LEAST_SCATTER**2
+    totals = [sum(len(gates) * math.log(_left(gates, f) + least) for gates in series) for f in tried.tolist()]
+    return float(tried[int(np.argmin(totals))]) if totals else None
+
+
+def _rate(gates: Gates, frequency: float | None, wrong: tuple[tuple[int, int], ...], count: int) -> Rate:
+    frequency = frequency if len(gates) >= FEWEST else None
+    columns = _columns(gates, frequency)
+    found, *_ = np.linalg.lstsq(columns, gates.periods, rcond=None)
+    freedom = len(gates) - columns.shape[1]
+    scatter = math.sqrt(float(np.sum((gates.periods - columns @ found) ** 2)) / freedom)
+    swing = None
+    if frequency is not None:
+        cosine, sine = found[1:].tolist()
+        crest = float(gates.begin[0]) + math.atan2(sine, cosine) / (2 * math.pi * frequency)
+        swing = Swing(frequency, math.hypot(cosine, sine), crest)
+    per_scatter = math.sqrt(float(np.linalg.pinv(columns.T @ columns)[0, 0]))
+    return Rate(float(found[0]), scatter, freedom, per_scatter, swing, wrong, missing=count - len(gates) - len(wrong))
+
+
+def _counted(gates: Gates) -> Gates:
+    """Those that have a count."""
+    return gates.part(np.isfinite(gates.frequency))
+
+
+def _without_miscounts(gates: Gates, frequency: float | None) -> tuple[Gates, tuple[tuple[int, int], ...]]:
+    """The gates that counted, and those that counted whole pulses too many or too few: (gate, pulses).
+
+    Gate after gate, the one without which the others fit best.  frequency: of the swing [Hz].
+    """
+    place = np.flatnonzero(np.isfinite(gates.frequency))
+    used, most = _counted(gates), int(_MOST_WRONG * len(gates))
+    wrong: list[tuple[int, int]] = []
+    while len(wrong) < most and len(used) > FEWEST:
+        columns = _columns(used, frequency)
+        orthonormal, _ = np.linalg.qr(columns)
+        alone = 1 - np.sum(orthonormal**2, axis=1)  # 1 − leverage
+        left = used.periods - orthonormal @ (orthonormal.T @ used.periods)
+        gains = left**2 / alone
+        k = int(np.argmax(gains))
+        off = float(left[k] / alone[k])  # from what the others say
+        pulses = round(off)
+        freedom = len(used) - 1 - columns.shape[1]
+        scatter = math.sqrt(max(float(np.sum(left**2) - gains[k]), 0.0) / freedom / float(alone[k]))
+        if not pulses or abs(off - pulses) > _OF_A_PULSE or abs(off) < _STANDS_OUT * scatter:
+            break
+        wrong.append((int(place[k]), pulses))
+        place, used = np.delete(place, k), used.part(np.arange(len(used)) != k)
+    return used, tuple(sorted(wrong))
+
+
+def whole_counts(gates: Gates, expected: float) -> int:
+    """Pulses that every gate has too many, or too few, where whole counts explain a point better than another rate.
+
+    Gates differ in length: a rate that is off takes the more pulses the longer the gate, a miscount as many in each.
+    0 where it explains nothing.
+
+    Args:
+        gates: at a point.
+        expected: its rate by the line through the other points [Hz].
+    """
+    some = _counted(gates)
+    off = some.periods - expected * some.length
+    mean = float(off.mean())
+    rate = float(np.sum(off * some.length) / np.sum(some.length**2))
+    as_counts = float(np.sum((off - mean) ** 2))
+    as_rate = float(np.sum((off - rate * some.length) ** 2))
+    pulses = round(mean)
+    return pulses if pulses and abs(mean - pulses) < _OF_A_PULSE and as_counts < as_rate else 0
+
+
+def pulses_too_many(pulses: int) -> str:
+    """A miscount in words.
+
+    >>> pulses_too_many(1), pulses_too_many(-2)
+    ('1 pulse too many', '2 pulses too few')
+    """
+    size = abs(pulses)
+    return f"{size} pulse{'s' * (size > 1)} too {'many' if pulses > 0 else 'few'}"

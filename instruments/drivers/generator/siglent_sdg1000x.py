@@ -1,0 +1,140 @@
+"""The driver of Siglent's SDG1000X generators."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from instruments.drivers.generator import OPEN_V
+from instruments.drivers.generator.drive import DriveGenerator, LimitedSetting, LoadSetting, OutputSwitch
+from instruments.drivers.scpi import Setting
+from instruments.errors import CommandRefused
+from instruments.ieee488 import INFINITY, Form
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+#: "1000HZ", "0.001S", "4V", "-2V": as few digits as the number needs (answers that were seen in public).
+_NUMBER = Form(r"-?\d{1,12}(\.\d{1,15})?([eE][+-]?\d{1,3})?", "1000HZ", suffix="HZ|S|V|Vrms|dBm|OHM")
+#: The only word that is no number: the load of an open circuit.
+_OPEN = "HZ"
+#: A reset, and so the answer to *OPC?, may take this long [s] (assumed).
+_RESET = 5.0
+#: The symmetry of a ramp that is a triangle [%].
+_TRIANGLE = 50.0
+
+
+@dataclass(eq=False)
+class _LongWord(Setting[str]):
+    """A word that is sent in its long form."""
+
+    def _spell(self, value: str) -> str:
+        return next(word.upper() for word in self.choices if self._canonical(word) == self._canonical(value))
+
+
+@dataclass(eq=False)
+class _Load(LoadSetting):
+    """The load, which is HZ (high impedance) for open terminals."""
+
+    def _parse(self, answer: str, form: Form) -> bool | float | str:
+        return INFINITY if answer == _OPEN else super()._parse(answer, form)
+
+    def _spell(self, value: float) -> str:
+        return _OPEN if value >= INFINITY else super()._spell(value)
+
+
+class SiglentSDG1000X(DriveGenerator):
+    """Siglent SDG1000X: SDG1032X, SDG1062X; two channels, of which the first drives the coil.
+
+    Source: SDG Programming Guide PG02-E04A as public drivers and an emulator that was compared with an SDG1032X quote
+    it; the answers to ``C1:BSWV?`` and ``C1:OUTP?`` after a reset as a public driver of the SDG2042X has them from the
+    instrument.
+
+    - One header has many fields, each with its name: ``C1:BSWV FRQ,30.5`` sets one, ``C1:BSWV?`` answers with all of
+      them behind the header: ``C1:BSWV WVTP,SINE,FRQ,30.5HZ,…``.
+    - A number beyond its limits becomes the limit without a word, and the guide has no error queue: each setting is
+      asked for after it was sent.
+    - A triangle is a ramp of 50 % symmetry; so `waveform` answers RAMP for it.
+    """
+
+    MODELS: ClassVar[str] = r"SDG1\d{3}X( Plus)?"
+    NUMBER: ClassVar[Form] = _NUMBER
+    OUTPUT: ClassVar[str] = "C1:OUTP"
+    #: The first field of an output's answer, and the switch that it stands for.
+    _STATES: ClassVar[Mapping[str, str]] = {"ON": "1", "OFF": "0"}
+
+    waveform = _LongWord(
+        *("C1:BSWV", str),
+        choices=("SINe", "SQUare", "RAMP"),
+        answers=("PULSE", "NOISE", "ARB", "DC", "PRBS", "IQ"),
+        key="WVTP",
+    )
+    frequency = LimitedSetting(
+        "C1:BSWV", float, unit="Hz", low=1e-6, high=60e6, resolution=1e-6, quantity="frequency_hz", key="FRQ"
+    )
+    amplitude = LimitedSetting(
+        "C1:BSWV", float, unit="Vpp", low=2e-3, high=20.0, quantity="amplitude_vpp", partner="offset_v", key="AMP"
+    )
+    offset = LimitedSetting(
+        *("C1:BSWV", float, "V", -OPEN_V, OPEN_V),
+        resolution=1e-3,
+        quantity="offset_v",
+        partner="amplitude_vpp",
+        key="OFST",
+    )
+    load = _Load("C1:OUTP", float, unit="ohm", low=50.0, high=INFINITY, key="LOAD")
+    output = OutputSwitch("C1:OUTP", bool)
+
+    def field_of(self, answer: str, header: str, key: str) -> str:
+        """The value behind its name; that of an output, which has none, is the first field."""
+        head, _, rest = answer.partition(" ")
+        fields = rest.split(",")
+        if head != header:
+            raise ValueError(answer)
+        if not key:
+            return self._STATES.get(fields[0], answer)
+        named = fields[fields[0] in self._STATES :]  # names and values follow each other, behind the state of an output
+        pairs = dict(zip(named[::2], named[1::2], strict=True))
+        return pairs.get(key, answer)
+
+    def confirm(self, setting: Setting[Any], value: bool | float | str) -> None:  # noqa: FBT001
+        """Ask for it: there is no error queue."""
+        self.ask_back(setting, value)
+
+    def forget_errors(self) -> None:
+        """There is no error queue."""
+
+    def raise_errors(self, after: str) -> None:
+        """There is no error queue."""
+
+    def _reset(self) -> None:
+        self.command("*RST")
+        answer = self.transport.query("*OPC?", patience=_RESET)
+        if answer != "1":
+            self.reject("*OPC?", answer, "1")
+        self.load = INFINITY
+
+    def _shape(self, waveform: str) -> None:
+        triangle = waveform.upper() == "TRI"
+        self.waveform = "RAMP" if triangle else waveform
+        if not triangle:
+            return
+        self.command("C1:BSWV SYM,50")  # an answer has it for ramps alone: it is no setting like the others
+        answer = self.transport.query("C1:BSWV?")
+        try:
+            symmetry = _NUMBER.number(self.field_of(answer, "C1:BSWV", "SYM"))
+        except ValueError:
+            self.reject("C1:BSWV?", answer, "the fields of a ramp, SYM among them")
+        if symmetry != _TRIANGLE:
+            raise CommandRefused(self.transport.address, "C1:BSWV SYM,50", (f"SYM is {symmetry:g} afterwards",))
+
+    def outputs(self) -> tuple[str, ...]:
+        """How the headers of both outputs begin."""
+        return ("C1:OUTP", "C2:OUTP")
+
+    def _is_on(self, output: str) -> bool:
+        answer = self.transport.query(f"{output}?")
+        try:
+            return {"1": True, "0": False}[self.field_of(answer, output, "")]
+        except (ValueError, KeyError):
+            self.reject(f"{output}?", answer, f"{output} ON or {output} OFF, and more")

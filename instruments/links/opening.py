@@ -1,0 +1,44 @@
+"""The link to an address: pyserial's where it is a port, else PyVISA's."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from instruments.links.serial_port import SerialTransport
+from instruments.links.visa import VisaTransport
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from instruments.clock import Clock
+    from instruments.links.transport import TrafficLog, Transport
+
+
+def open_link(
+    address: str,
+    *,
+    line: Mapping[str, Any],
+    library: Any = "@py",
+    timeout: float = 2.0,
+    clock: Clock | None = None,
+    log: TrafficLog | None = None,
+) -> Transport:
+    """An open link: pyserial's where the address is a port or its URL, else PyVISA's.
+
+    Args:
+        address: a port (``COM3``), a URL (``socket://host:port``) or the name of a VISA resource.
+        line: how a serial line is set, and the pause that the instrument wants between messages.
+        library: PyVISA's, by its name or itself.
+        timeout: of one answer [s].
+        clock: by which the pauses between messages are kept, the wall's by default.
+        log: is given all bytes.
+
+    Raises:
+        NotConnected: nothing could be opened there.
+    """
+    options = dict(line)
+    serial_name = address.upper().startswith("ASRL") and library == "@py"
+    if "::" not in address or serial_name:
+        return SerialTransport(address, timeout=timeout, clock=clock, log=log, **options)
+    pause = options.pop("pause", 0.0)
+    return VisaTransport(address, library=library, timeout=timeout, line=options, pause=pause, clock=clock, log=log)

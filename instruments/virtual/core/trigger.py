@@ -1,0 +1,37 @@
+"""Where a Schmitt trigger fires in a sampled voltage: the one edge finder of counters and oscilloscopes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def crossings(voltage: Array, level: float, hysteresis: float) -> Array:
+    """Where a sampled voltage rises through a level, in samples, interpolated.
+
+    A crossing counts when the voltage was below level − hysteresis since the last one (a Schmitt trigger).
+
+    >>> crossings(np.array([0.0, 1.0, 0.0, 4.0]), 0.5, 0.1)
+    array([0.5  , 2.125])
+    """
+    return fires(voltage, level, level - hysteresis, armed=False)[0]
+
+
+def fires(voltage: Array, level: float, below: float, *, armed: bool) -> tuple[Array, bool]:
+    """Where the trigger fires [samples], and whether it is armed at the end."""
+    above = voltage >= level
+    # +1 where the trigger fires, -1 where it is armed again, 0 where it keeps its state
+    state = above.view(np.int8) - (voltage < below).view(np.int8)
+    decided = np.flatnonzero(state)
+    if not decided.size:
+        return np.empty(0), armed
+    signs = state[decided]
+    turns = decided[1:][np.diff(signs) > 0]
+    if armed and signs[0] > 0:
+        turns = np.concatenate((decided[:1], turns))
+    before, after = voltage[np.maximum(turns - 1, 0)], voltage[turns]
+    # the very first sample can only fire if the level has moved since it was armed
+    rise = np.where(after > before, after - before, 1.0)
+    return np.maximum(turns - 1 + np.clip((level - before) / rise, 0.0, 1.0), 0.0), bool(signs[-1] < 0)

@@ -1,0 +1,234 @@
+"""A virtual SDG1032X.
+
+Sources: SDG Programming Guide PG02-E04A as public drivers quote it; an emulator that its authors compared with an
+SDG1032X (state after ``*RST``, forms of the answers, amplitudes that are clipped, the load that halves what is shown);
+an answer of an SDG2042X to ``C1:BSWV?`` as a public driver keeps it.  Inferred: which field gives way where amplitude
+and offset together go beyond 10 V (the one that is set), that a message has no path memory, limits of the ramp.
+Modulation, sweep, burst and arbitrary waveforms are missing.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+from instruments.virtual.core.device import VirtualInstrument
+from instruments.virtual.core.parameters import choice, number
+from instruments.virtual.core.parser import ScpiError
+from instruments.virtual.core.rows import Both, Do, Row
+from instruments.virtual.generator.channel import INFINITE, OPEN_V, SOURCE_OHM, Output
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from instruments.clock import Clock
+    from instruments.virtual.core.device import Value
+
+#: WVTP → the waveform as the other generators call it, its highest frequency [Hz], peak to peak over r.m.s.
+_WAVEFORMS = {
+    "SINE": ("SIN", 30e6, 2 * math.sqrt(2)),
+    "SQUARE": ("SQU", 30e6, 2.0),
+    "RAMP": ("RAMP", 500e3, 2 * math.sqrt(3)),
+    "PULSE": ("PULS", 12.5e6, 2.0),
+    "NOISE": ("NOIS", 30e6, 6.6),
+    "DC": ("DC", 30e6, 2.0),
+}
+_LEAST_VPP, _GREATEST_LOAD = 2e-3, 1e5
+#: Words of OUTP: for a load that is none, and for its polarity.
+_OPEN, _POLARITIES = "HZ", ("NOR", "INVT")
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field of BSWV that is a number.
+
+    key: its name on the wire; name: the setting; default; unit; shown: whether it is printed at the load; only: the
+    waveforms that have it, all by default.
+    """
+
+    key: str
+    name: str
+    default: float
+    unit: str = ""
+    shown: bool = False
+    only: tuple[str, ...] = ()
+
+
+_FIELDS = {
+    field.key: field
+    for field in (
+        Field("FRQ", "frequency", 1000.0, "HZ"),
+        Field("PERI", "frequency", 1000.0, "S"),
+        Field("AMP", "amplitude", 4.0, "V", shown=True),
+        Field("OFST", "offset", 0.0, "V", shown=True),
+        Field("PHSE", "phase", 0.0),
+        Field("DUTY", "duty", 50.0, only=("SQUARE", "PULSE")),
+        Field("SYM", "symmetry", 50.0, only=("RAMP",)),
+    )
+}
+_CHANNEL: tuple[Row, ...] = (
+    Both("C{n}:(BSWV|BASIC_WAVE)", lambda s, n, p: s.set_wave(n, p), lambda s, n, p: s.wave(n, p)),
+    Both("C{n}:(OUTP|OUTPUT)", lambda s, n, p: s.set_output(n, p), lambda s, n, p: s.output(n, p)),
+)
+
+
+def _key(n: int, name: str) -> str:
+    """The name of a channel's setting; those of channel 1 have no prefix, as in the other generators."""
+    return name if n == 1 else f"{n}:{name}"
+
+
+def _pairs(parameters: list[str]) -> list[tuple[str, str]]:
+    """Names and what stands behind each.  Raises ScpiError."""
+    if not parameters or len(parameters) % 2:
+        raise ScpiError(-109)
+    return [(name.upper(), value) for name, value in zip(parameters[::2], parameters[1::2], strict=True)]
+
+
+class VirtualSDG1000X(VirtualInstrument):
+    """An SDG1032X: two channels, 30 MHz.  The coil hangs on channel 1.
+
+    listener: called with the time [s] and the new Output of channel 1 at each change.
+    """
+
+    identity = "Siglent Technologies,SDG1032X,VIRTUAL,1.01.01.33R1B6"
+    path_memory = False
+    numbered = (1, 2)
+    CHANNEL_ROWS: ClassVar = _CHANNEL
+    ROWS: ClassVar[tuple[Row, ...]] = (Do("(BUZZ|BUZZER)"),)
+
+    def __init__(
+        self, clock: Clock, *, listener: Callable[[float, Output], None] | None = None, identity: str | None = None
+    ) -> None:
+        self._listener = listener
+        super().__init__(clock, identity=identity)
+        for n in self.numbered:
+            self._defaults |= {_key(n, field.name): field.default for field in _FIELDS.values()}
+            others: dict[str, Value] = {"waveform": "SINE", "output": False, "load": INFINITE, "polarity": "NOR"}
+            self._defaults |= {_key(n, name): value for name, value in others.items()}
+        self.settings |= self._defaults
+
+    def spell(self, value: float) -> str:
+        """As few digits as the number needs: 1000, 0.001."""
+        return f"{value:.12g}"
+
+    def changed(self, name: str) -> None:
+        """What stands at the terminals of channel 1 is told to the listener."""
+        if self._listener and ":" not in name:
+            self._listener(self.clock.now(), self.signal())
+
+    def reset(self) -> None:
+        """The state after ``*RST``: all outputs off."""
+        self.settings |= self._defaults
+        self.changed("output")
+
+    def _number(self, n: int, name: str) -> float:
+        return float(self.settings[_key(n, name)])
+
+    def _share(self, n: int) -> float:
+        """Of the open-circuit voltage at the load."""
+        load = self._number(n, "load")
+        return 1.0 if load >= INFINITE else load / (load + SOURCE_OHM)
+
+    # --- BSWV ---
+
+    def set_wave(self, n: int, parameters: list[str]) -> None:
+        """BSWV: the fields that are named; a number beyond its limits becomes the limit.  Raises ScpiError."""
+        for key, text in _pairs(parameters):
+            if key == "WVTP":
+                self.settings[_key(n, "waveform")] = choice(text, tuple(_WAVEFORMS))
+                self._set_number(n, _FIELDS["FRQ"], self._number(n, "frequency"))
+            elif key in _FIELDS:
+                field = _FIELDS[key]
+                sent = number(text, low=-1e99, high=1e99, default=field.default, unit=field.unit)
+                self._set_number(n, field, sent / self._share(n) if field.shown else sent)
+            else:
+                raise ScpiError(-224, key[:20])
+        self.changed(_key(n, "waveform"))
+
+    def _set_number(self, n: int, field: Field, value: float) -> None:
+        if field.key == "PERI":
+            value = 1 / max(value, 1e-12)
+        low, high = self._limits(n, field.name)
+        self.settings[_key(n, field.name)] = min(max(value, low), high)
+
+    def _limits(self, n: int, name: str) -> tuple[float, float]:
+        if name == "frequency":
+            return 1e-6, _WAVEFORMS[str(self.settings[_key(n, "waveform")])][1]
+        if name == "amplitude":
+            return _LEAST_VPP, max(_LEAST_VPP, 2 * (OPEN_V - abs(self._number(n, "offset"))))
+        if name == "offset":
+            reach = OPEN_V - self._number(n, "amplitude") / 2
+            return -reach, reach
+        return (0.0, 360.0) if name == "phase" else (0.0, 100.0)
+
+    def wave(self, n: int, parameters: list[str]) -> str:
+        """BSWV?: all fields of the waveform.  Raises ScpiError."""
+        if parameters:
+            raise ScpiError(-108)
+        kind = str(self.settings[_key(n, "waveform")])
+        share, frequency = self._share(n), self._number(n, "frequency")
+        amplitude, offset = share * self._number(n, "amplitude"), share * self._number(n, "offset")
+        fields = {
+            "WVTP": kind,
+            "FRQ": self.spell(frequency) + "HZ",
+            "PERI": f"{1 / frequency:.6g}S",
+            "AMP": self.spell(amplitude) + "V",
+            "AMPVRMS": f"{amplitude / _WAVEFORMS[kind][2]:.4g}Vrms",
+            "OFST": self.spell(offset) + "V",
+            "HLEV": self.spell(offset + amplitude / 2) + "V",
+            "LLEV": self.spell(offset - amplitude / 2) + "V",
+            "PHSE": self.spell(self._number(n, "phase")),
+        }
+        own = (field for field in _FIELDS.values() if kind in field.only)
+        fields |= {field.key: self.spell(self._number(n, field.name)) for field in own}
+        return f"C{n}:BSWV " + ",".join(f"{key},{value}" for key, value in fields.items())
+
+    # --- OUTP ---
+
+    def set_output(self, n: int, parameters: list[str]) -> None:
+        """OUTP ON,LOAD,HZ,PLRT,NOR: the state, where it is named, and the fields that are.  Raises ScpiError."""
+        if not parameters:
+            raise ScpiError(-109)
+        states = {"ON": True, "OFF": False}
+        named = parameters
+        wanted: dict[str, bool | float | str] = {}
+        if parameters[0].upper() in states:
+            wanted["output"], named = states[parameters[0].upper()], parameters[1:]
+        for key, text in _pairs(named) if named else ():
+            if key == "LOAD":
+                open_circuit = text.upper() == _OPEN
+                ohm = INFINITE if open_circuit else number(text, low=0, high=1e99, default=50, unit="OHM")
+                wanted["load"] = ohm if open_circuit else min(max(ohm, 50.0), _GREATEST_LOAD)
+            elif key == "PLRT":
+                wanted["polarity"] = choice(text, _POLARITIES)
+            else:
+                raise ScpiError(-224, key[:20])
+        self.settings |= {_key(n, name): value for name, value in wanted.items()}
+        self.changed(_key(n, "output"))
+
+    def output(self, n: int, parameters: list[str]) -> str:
+        """OUTP?: state, load, polarity.  Raises ScpiError."""
+        if parameters:
+            raise ScpiError(-108)
+        load = self._number(n, "load")
+        state = "ON" if self.settings[_key(n, "output")] else "OFF"
+        shown = _OPEN if load >= INFINITE else self.spell(load)
+        polarity = self.settings[_key(n, "polarity")]
+        return f"C{n}:OUTP {state},LOAD,{shown},PLRT,{polarity}"
+
+    # --- the terminals ---
+
+    def signal(self, n: int = 1) -> Output:
+        """What stands at the open terminals of a channel."""
+        on, short = bool(self.settings[_key(n, "output")]), _WAVEFORMS[str(self.settings[_key(n, "waveform")])][0]
+        return Output(
+            waveform=short,
+            frequency=self._number(n, "frequency"),
+            amplitude=self._number(n, "amplitude") / 2 if on and short != "DC" else 0.0,
+            offset=self._number(n, "offset") if on else 0.0,
+            phase=self._number(n, "phase"),
+            duty=self._number(n, "duty") / 100,
+            symmetry=self._number(n, "symmetry") / 100 if short == "RAMP" else 1.0,
+            inverted=self.settings[_key(n, "polarity")] == "INVT",
+        )

@@ -1,0 +1,48 @@
+"""What every benchmark does with what it found: prints it, or writes it with its figure."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import TYPE_CHECKING, Any
+
+from levilab.files import CannotWrite, replace_atomically
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from pathlib import Path
+
+
+def tell(what: str) -> None:
+    """Say on standard error what is being measured."""
+    print(f"measuring {what}", file=sys.stderr)  # noqa: T201
+
+
+def give(
+    name: str,
+    document: Mapping[str, Any],
+    print_tables: Callable[[], None],
+    save_figure: Callable[[Path], None],
+    *,
+    out: Path | None,
+    as_json: bool,
+) -> None:
+    """Print the tables, or the document as JSON; write name.json and name.png into a folder, if one is given.
+
+    save_figure: draws and writes it; imports matplotlib, which takes long.  Raises CannotWrite.
+    """
+    text = json.dumps(document, indent=2, allow_nan=False)
+    if as_json:
+        print(text)  # noqa: T201
+    else:
+        print_tables()
+    if out is not None:
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+            replace_atomically(out / f"{name}.json", text + "\n")
+            save_figure(out / f"{name}.png")
+        except OSError as error:
+            raise CannotWrite(
+                f"{out}: the result cannot be written ({error.strerror or error}): choose another place with `out`"
+            ) from None
+        print(f"wrote {out / name}.json and {out / name}.png", file=sys.stderr)  # noqa: T201

@@ -1,0 +1,66 @@
+"""Messages name quantities, as `duration`; on the command line they have the names of options, as --duration."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from levilab.cli.later import Later
+from levilab.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+#: A quantity in a message, and what it is set to, as in "take `rate` = 500 or less".
+_QUANTITY = re.compile(r"`([a-z]\w*)`( = False\b| = True\b| = )?")
+
+
+def option_names(app: Any) -> dict[str, tuple[str, str]]:
+    """Quantity → the option that sets it, and the one that switches it off (empty if there is none), of all commands.
+
+    app: the application, or the command of its name.
+
+    A quantity has the name of the parameter by which a command takes it.
+    """
+    return {
+        parameter.name: (parameter.opts[0], next(iter(parameter.secondary_opts), ""))
+        for parameter in _parameters(typer.main.get_command(app) if isinstance(app, typer.Typer) else app)
+        if parameter.opts[0].startswith("--")
+    }
+
+
+def _parameters(command: Any) -> Iterator[Any]:
+    if isinstance(command, Later):
+        command = command.command
+    yield from command.params
+    for below in getattr(command, "commands", {}).values():
+        yield from _parameters(below)
+
+
+def in_options(error: Exception, app: Any) -> str:
+    """The text of an error with options in the place of quantities: "duration = -1: …" is "--duration -1: …"."""
+    if not isinstance(error, UsageError):
+        return with_options(str(error), app)
+    head = option_names(app).get(error.name, (error.name, ""))[0]
+    given = head if error.value is None else f"{head} {error.value}"
+    return f"{given}: {with_options(error.text, app)}"
+
+
+def with_options(text: str, app: Any) -> str:
+    """A text with options in the place of quantities.  app: see `option_names`, which makes every command."""
+    if not _QUANTITY.search(text):
+        return text
+    names = option_names(app)
+
+    def option(match: re.Match[str]) -> str:
+        name, setting = match[1], match[2] or ""
+        if name not in names:
+            return match[0]
+        on, off = names[name]
+        if setting == " = False" and off:
+            return off
+        return on if setting in {"", " = True"} else on + " "
+
+    return _QUANTITY.sub(option, text)

@@ -1,0 +1,205 @@
+"""From inputs to what is found of each and of all together: what every analysis does alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from levilab.errors import DataError
+from levilab.pipelines.result import Place, place_of
+from levilab.pipelines.sources import InputOptions, Needs, Readings, Source, collect
+from levilab.runs.run import find_run
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from pathlib import Path
+
+    from levilab.pipelines.sources import Found
+
+#: Readings of an input, what is found of it, of all together; options of the analysis.
+S = TypeVar("S", bound=Readings)
+R = TypeVar("R")
+T = TypeVar("T")
+Opt = TypeVar("Opt", bound=InputOptions)
+
+#: Where numbers come from that no result had.
+NOW = "analyzed now"
+FOR_THIS_PAGE = "analyzed for this page"
+
+
+@dataclass(frozen=True)
+class Origin(Generic[Opt]):
+    """Where the numbers of one input come from.  options: how they were made; text: for people."""
+
+    options: Opt
+    text: str = NOW
+
+
+@dataclass(frozen=True)
+class Analyzed(Generic[S, R, T, Opt]):
+    """Inputs, each by itself and together.
+
+    Attributes:
+        sources: the inputs.
+        runs: what was found of each.
+        combined: what was found of all together; None where an analysis combines nothing.
+        options: how they were analyzed.
+        place: where the result belongs.
+        warnings: about the inputs.
+        remarks: what does not belong to the analysis, and is no cause for a warning.
+        origins: one per source.
+    """
+
+    sources: tuple[Source[S], ...]
+    runs: tuple[R, ...]
+    combined: T
+    options: Opt
+    place: Place
+    warnings: tuple[str, ...]
+    remarks: tuple[str, ...]
+    origins: tuple[Origin[Opt], ...]
+
+    @property
+    def home(self) -> Path:
+        """The folder that the result belongs to."""
+        return self.place.folder
+
+    @property
+    def text(self) -> str:
+        """What the data say, in a few sentences."""
+        raise NotImplementedError
+
+    @property
+    def averaged(self) -> Sequence[Sequence[Source[S]]]:
+        """Inputs whose numbers are taken together."""
+        return (self.sources,)
+
+    def about_all(self) -> Iterable[str]:
+        """What to know of all inputs together before using the numbers."""
+        return ()
+
+    def about_run(self, run: R) -> Iterable[str]:
+        """What to know of one input."""
+        raise NotImplementedError
+
+    @property
+    def all_warnings(self) -> list[str]:
+        """Every warning once; an input's with its name, unless it says it or is of every input."""
+        texts = [*self.warnings, *self.about_all()]
+        of_runs = [
+            [*source.warnings, *self.about_run(run)] for source, run in zip(self.sources, self.runs, strict=True)
+        ]
+        of_every = set.intersection(*map(set, of_runs))
+        for source, said in zip(self.sources, of_runs, strict=True):
+            texts += [text if text in of_every else _with_name(source, text) for text in said]
+        return list(dict.fromkeys(texts))
+
+
+A = TypeVar("A", bound=Analyzed[Any, Any, Any, Any])
+
+
+def _with_name(source: Source[Any], text: str) -> str:
+    """The text with the input's name before it, unless it begins with that or with its path."""
+    return text if source.path.name in text.partition(": ")[0] else f"{source.name}: {text}"
+
+
+@dataclass(frozen=True)
+class Method(Generic[S, R, Opt, A]):
+    """How an analysis is carried out.
+
+    Attributes:
+        needs: its name, and what it needs of its inputs.
+        kind: what was found, an Analyzed.
+        options: of the analysis.
+        fit: one input; raises DataError, which names the file.
+        combine: all inputs together.
+        mixed: what is wrong with numbers over real and synthetic inputs; empty where there are none.
+        of_files: names of options that say nothing about runs, whose columns are known.
+        passes_over: whether of several inputs one that cannot be used is passed over with a warning.
+        refit: number of each input to analyze once more, for what only all together show → what is found then.
+        refit_text: why, in words.
+    """
+
+    needs: Needs[Any]
+    kind: type[A]
+    options: type[Opt]
+    fit: Callable[[Source[S], Opt], R]
+    combine: Callable[[Sequence[Source[S]], Sequence[R], Opt], Any] = lambda *_: None
+    mixed: str = ""
+    of_files: frozenset[str] = frozenset({"columns", "channel", "rate"})
+    passes_over: bool = False
+    refit: Callable[[Sequence[Source[S]], Sequence[R], Sequence[Opt]], Mapping[int, R]] = lambda *_: {}
+    refit_text: str = ""
+
+    def analyze(self, paths: Sequence[Path], options: Opt) -> A:
+        """What is found of the inputs at the paths.  Raises DataError for what cannot be used; it names the file."""
+        paths = [find_run(path) for path in paths]
+        found = collect(paths, self.needs, lambda _: options)
+        return self.gather(
+            paths, found, options, lambda source: (source, self.fit(source, options), Origin(options, NOW))
+        )
+
+    def gather(
+        self,
+        paths: Sequence[Path],
+        found: Found[Any],
+        options: Opt,
+        one: Callable[[Source[S]], tuple[Source[S], R, Origin[Opt]]],
+        recall: Callable[[Sequence[R]], Any] | None = None,
+    ) -> A:
+        """All inputs, each by itself and together.  Raises DataError.
+
+        Args:
+            paths: run folders, data files, folders that were searched.
+            found: what lies there.
+            options: as they were given.
+            one: from one input to what is found of it.
+            recall: from what is found of each to what was found of all together; None where it is not known.
+        """
+        done, warnings = self._each(found.sources, one)
+        sources, runs, origins = (list(column) for column in zip(*done, strict=True))
+        if recall is None:
+            for k, run in self.refit(sources, runs, [origin.options for origin in origins]).items():
+                runs[k] = run
+                if origins[k].text != NOW:
+                    origins[k] = replace(origins[k], text=f"{FOR_THIS_PAGE}: {self.refit_text}")
+        used = origins[0].options if all(origin.options == origins[0].options for origin in origins) else options
+        return self.kind(
+            sources=tuple(sources),
+            runs=tuple(runs),
+            combined=recall(runs) if recall else self.combine(sources, runs, used),
+            options=used,
+            place=place_of(paths, sources),
+            warnings=(*found.warnings, *warnings, *self.about_inputs(sources, used)),
+            remarks=found.remarks,
+            origins=tuple(origins),
+        )
+
+    def _each(
+        self, sources: Sequence[Source[S]], one: Callable[[Source[S]], tuple[Source[S], R, Origin[Opt]]]
+    ) -> tuple[list[tuple[Source[S], R, Origin[Opt]]], list[str]]:
+        """What is found of each input, and warnings about those that are passed over."""
+        if not self.passes_over or len(sources) == 1:
+            return [one(source) for source in sources], []
+        done, warnings = [], []
+        for source in sources:
+            try:
+                done.append(one(source))
+            except DataError as error:
+                warnings.append(f"passed over: {error}")
+        if not done:
+            raise DataError(warnings[-1].removeprefix("passed over: "))
+        return done, warnings
+
+    def about_inputs(self, sources: Sequence[Source[S]], options: Opt) -> Iterable[str]:
+        """What to know of the inputs before using the numbers."""
+        synthetic = sum(source.synthetic for source in sources)
+        if self.mixed and 0 < synthetic < len(sources):
+            yield f"{synthetic} of {len(sources)} inputs are SYNTHETIC, the others are not known to be: {self.mixed}"
+        reading_u = getattr(options, "reading_u", None)
+        given = [source.name for source in sources if getattr(source.readings, "u", None) is not None]
+        if reading_u is not None and given:
+            names = ", ".join(given)
+            yield f"the given u of a reading, {reading_u:g} Hz, takes the place of the uncertainties in {names}"
+        if options.columns and all(source.run for source in sources):
+            yield "names of columns were given, but none of the inputs is a data file"

@@ -1,0 +1,135 @@
+"""Siglent's own dialect: answers with headers, settings asked back, a descriptor before the data.
+
+The bytes are those that users of an SDS1204X-E and of SDG generators wrote down; see the drivers.
+"""
+
+import struct
+
+import numpy as np
+import pytest
+
+from instruments.clock import VirtualClock
+from instruments.drivers.generator.siglent_sdg1000x import SiglentSDG1000X
+from instruments.drivers.oscilloscope.siglent_sds1000xe import SiglentSDS1000XE
+from instruments.errors import BadAnswer, CommandRefused, OutOfRange
+from instruments.ieee488 import BlockForm, BrokenBlock, block_of
+from instruments.links.visa import VisaTransport
+from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.visa_library import library_for
+from instruments.virtual.generator.siglent_sdg1000x import VirtualSDG1000X
+from instruments.virtual.oscilloscope.siglent_sds1000xe import VirtualSDS1000XE
+from support.conversation import CLEAR, conversation
+from support.scopes import pulses
+from support.wire import ask, received, send
+
+AFTER_RESET = "C1:BSWV WVTP,SINE,FRQ,1000HZ,PERI,0.001S,AMP,4V,AMPVRMS,1.414Vrms,OFST,0V,HLEV,2V,LLEV,-2V,PHSE,0"
+
+
+def scope(*messages, signal=pulses):
+    device = VirtualSDS1000XE(VirtualClock(), signals={1: signal, 2: signal})
+    for message in messages:
+        send(device, message.encode() + b"\n")
+    return device
+
+
+def test_a_generator_answers_after_a_reset_as_a_real_one_did():
+    device = VirtualSDG1000X(VirtualClock())
+    assert ask(device, "C1:BSWV?") == AFTER_RESET
+    assert ask(device, "C2:OUTP?") == "C2:OUTP OFF,LOAD,HZ,PLRT,NOR"
+    send(device, b"C1:OUTP LOAD,50\n")
+    assert "AMP,2V" in ask(device, "C1:BSWV?")  # at the load half of the open voltage
+
+
+def test_a_field_is_read_by_its_name_and_the_state_by_its_place():
+    with conversation(SiglentSDG1000X, ("C1:BSWV?", AFTER_RESET), ("C1:OUTP?", "C1:OUTP ON,LOAD,HZ,PLRT,NOR")) as it:
+        assert it.amplitude == 4.0
+        assert it.output is True
+
+
+@pytest.mark.parametrize("answer", ["C2:BSWV WVTP,SINE,FRQ,1000HZ", "C1:BSWV WVTP,SINE,PERI,0.001S", "1000HZ"])
+def test_the_answer_to_another_question_is_no_frequency(answer):
+    with conversation(SiglentSDG1000X, ("C1:BSWV?", answer), (CLEAR, None)) as generator, pytest.raises(BadAnswer):
+        _ = generator.frequency
+
+
+def test_an_amplitude_that_the_generator_clips_is_refused():
+    lines = (("C1:BSWV AMP,12.0", None), ("C1:BSWV?", AFTER_RESET.replace("AMP,4V", "AMP,10V")))
+    with (
+        conversation(SiglentSDG1000X, *lines) as generator,
+        pytest.raises(OutOfRange, match=r"12\.0 is refused.*10\.0"),
+    ):
+        generator.amplitude = 12.0
+
+
+def test_a_switch_that_did_not_move_is_refused():
+    lines = (("C1:OUTP ON", None), ("C1:OUTP?", "C1:OUTP OFF,LOAD,HZ,PLRT,NOR"))
+    with conversation(SiglentSDG1000X, *lines) as generator, pytest.raises(CommandRefused, match="is False afterwards"):
+        generator.output = True
+
+
+@pytest.mark.parametrize(
+    ("setting", "answers"),
+    [("SHORT", ("C1:VDIV 1.00E+00V", "TDIV 1.00E-06S")), ("OFF", ("1.00E+00", "1.00E-06"))],
+)
+def test_a_scope_answers_with_header_and_unit_unless_CHDR_is_OFF(setting, answers):
+    device = scope(f"CHDR {setting}")
+    assert (ask(device, "C1:VDIV?"), ask(device, "TIME_DIV?")) == answers
+    # a header stands for itself: there is no path memory
+    assert ask(device, "C1:TRA?;C1:TRA?") is not None
+
+
+def test_the_descriptor_says_how_the_codes_are_read():
+    device = scope("C1:ATTN 1", "C1:VDIV 0.2V;C1:OFST -0.6V;C1:TRLV 0.65V", "TDIV 10MS", "TRMD STOP", "MSIZ 14K", "ARM")
+    device.clock.sleep(3.0)
+    assert int(ask(device, "INR?").split()[1]) & 1
+    send(device, b"CHDR OFF\n")
+    send(device, b"C1:WF? DESC\n")
+    descriptor = block_of(received(device, 100.0), BlockForm(longest_head=16, ends=2))
+    assert descriptor[:8] == b"WAVEDESC"
+    assert len(descriptor) == 346
+    assert struct.unpack_from("<i", descriptor, 116) == (14_000,)
+    assert struct.unpack_from("<ff", descriptor, 156) == pytest.approx((0.2, -0.6))
+    send(device, b"C1:WF? DAT2\n")
+    codes = np.frombuffer(block_of(received(device, 100.0), BlockForm(longest_head=16, ends=2)), np.int8)
+    volts = codes * 0.2 / 25 + 0.6
+    assert (volts.min(), volts.max()) == pytest.approx((0.1, 1.2), abs=0.01)
+
+
+def test_a_block_behind_a_header_that_never_ends_is_no_block():
+    form = BlockForm(longest_head=16, ends=2)
+    assert block_of(b"C1:WF DAT2,#15ab#\n1\n\n", form) == b"ab#\n1"
+    for broken in (b"C1:WF DAT2,and so on without a block\n", b"C1:WF DAT2,#15abcde\n", b"\n#15abcde\n\n", b""):
+        with pytest.raises(BrokenBlock):
+            block_of(broken, form)
+
+
+class KeepsItsMemory(VirtualSDS1000XE):
+    """As the measured firmware: MSIZ is ignored without a word."""
+
+    def set_depth(self, parameters):
+        pass
+
+
+def test_a_scope_that_keeps_its_memory_gives_all_its_points():
+    device = KeepsItsMemory(VirtualClock(), signals={1: pulses, 2: pulses})
+    device.settings["depth"] = "140K"
+    address = "TCPIP0::scope::inst0::INSTR"
+    driver = SiglentSDS1000XE(VisaTransport(address, library=library_for(Bus({address: device}))), clock=device.clock)
+    wanted = {"duration_s": 0.1, "points": 1000, "volts_per_division": 0.2, "offset_v": 0.65, "trigger_level_v": 0.65}
+    driver.prepare(channels=(1, 2), **wanted)
+    driver.acquire(timeout_s=1.0)
+    trace = driver.trace(2)
+    assert trace.codes.size == 70_000  # 1 and 2 share it
+    assert trace.dt_s == 2e-6
+    # the trigger is in the middle, where the light rises through the level
+    middle = trace.volts[trace.codes.size // 2 + np.array([-100, 100])]
+    assert middle[0] < 0.65 < middle[1]
+
+
+def test_a_record_without_a_trigger_is_forced_where_auto_is_asked_for():
+    device = scope(signal=lambda _start, _step, n: np.full(n, 0.4))
+    address = "TCPIP0::scope::inst0::INSTR"
+    driver = SiglentSDS1000XE(VisaTransport(address, library=library_for(Bus({address: device}))), clock=device.clock)
+    driver.prepare(duration_s=0.1, points=1000, volts_per_division=0.2, trigger_level_v=0.65, sweep="auto")
+    driver.acquire(timeout_s=1.0)
+    assert driver.trace(1).volts == pytest.approx(0.4, abs=0.01)

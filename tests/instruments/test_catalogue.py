@@ -1,0 +1,77 @@
+"""Each row of the catalogue: a model is named in the docs, and its driver works with its virtual twin.
+
+What messages do to a twin is in virtual/bench/test_fuzz.py, which takes each row, too.
+"""
+
+import re
+
+import pytest
+
+from instruments.catalogue import CATALOGUE
+from instruments.ieee488 import identity_fields
+from instruments.links.visa import VisaTransport
+from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.visa_library import library_for
+from levilab.bench.discover import driver_for_identity
+from levilab.world.bench import own_world, virtual_bus
+from support import hostile
+from support.models import KIND_OF, ROWS, calls, measure
+from support.paths import ROOT
+
+EACH = pytest.mark.parametrize("name", ROWS)
+
+
+class Opened:
+    """A model's twin in a room of its own, and its driver at a link to it."""
+
+    def __init__(self, name):
+        self.room = hostile.Room()
+        self.twin = hostile.instrument(name, self.room)
+        address = "ASRLbox::INSTR" if ROWS[name].driver.SERIAL else "TCPIP0::box::inst0::INSTR"
+        line = {key: value for key, value in ROWS[name].driver.SERIAL.items() if key != "pause"}
+        transport = VisaTransport(address, library=library_for(Bus({address: self.twin})), line=line)
+        self.driver = ROWS[name].driver(transport, clock=self.room.clock)
+
+
+@EACH
+def test_a_model_and_its_driver_stand_on_the_page_of_their_kind(name):
+    page = (ROOT / "docs" / "instruments" / f"{KIND_OF[name]}.md").read_text(encoding="utf-8")
+    assert f"`{name}`" in page
+    assert f"`{ROWS[name].driver.__name__}`" in page
+
+
+@EACH
+def test_a_twin_gives_the_identity_by_which_its_driver_is_found(name):
+    opened = Opened(name)
+    identity = opened.driver.identity()
+    assert driver_for_identity(identity) == (KIND_OF[name], name)
+    assert "VIRTUAL" in identity_fields(identity)[2]  # so that a run with it is known as synthetic
+
+
+@EACH
+def test_a_driver_prepares_and_reads_its_twin(name):
+    measure(name, Opened(name).driver)
+
+
+@EACH
+def test_settings_survive_a_round_trip(name):
+    opened = Opened(name)
+    driver = opened.driver
+    prepare, _ = calls(name)["prepare"]
+    prepare(driver)
+    rows = [row.name for row in driver.declared()]
+    before = {row: getattr(driver, row) for row in rows}
+    opened.twin.execute("*RST")
+    for _ in range(2):  # a load changes the amplitude that was set before it
+        for row in rows:
+            setattr(driver, row, before[row])
+    assert {row: getattr(driver, row) for row in rows} == before
+    assert driver.unlike(driver.settings()) == {}
+
+
+@pytest.mark.parametrize("kind", CATALOGUE)
+def test_a_model_is_chosen_in_any_case_of_its_letters(kind):
+    for model in CATALOGUE[kind]:
+        bus = virtual_bus(own_world(), {kind: model.name.lower()})
+        found = [twin.identity for twin in bus.instruments.values() if re.search(model.driver.MODELS, twin.identity)]
+        assert driver_for_identity(found[0]) == (kind, model.name)

@@ -1,0 +1,81 @@
+"""Counts of a coasting top, one after another, and which of them are readings."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from levilab.acquisition.counting import AnotherTop, FreeTop, Missed
+
+
+class Bench:
+    """A counter that counts these spins [Hz], one each 10 s, and what was said of them."""
+
+    def __init__(self, *spins: float | None) -> None:
+        self.spins, self.time = iter(spins), 90.0
+        self.events: list[tuple[str, str]] = []
+        self.warnings: list[str] = []
+
+    def frequency(self) -> float | None:
+        self.time += 5.0
+        return next(self.spins)
+
+    def top(self, *before: tuple[float, float]) -> FreeTop[Any]:
+        session: Any = SimpleNamespace(
+            bench=SimpleNamespace(counter=self),
+            settings=SimpleNamespace(reading_u_hz=None),
+            now=lambda: self.time,
+            check_settings=lambda _: None,
+            event=lambda kind, text, **_: self.events.append((kind, text)),
+            warn=self.warnings.append,
+        )
+        return FreeTop(session, [{"time_s": time, "spin_frequency_hz": spin} for time, spin in before])
+
+
+def test_a_top_that_was_set_spinning_meanwhile_is_recognised() -> None:
+    """As after a resume: 31 Hz, then 39 Hz twice; a single pair of such counts may be a disturbance."""
+    bench = Bench(39.0, 39.0, 30.3, 39.0, 39.0, 38.9, 38.8, 38.7, 38.6)
+    top = bench.top((70.0, 31.6), (80.0, 31.3), (90.0, 31.0))
+    assert top.read() is None
+    assert top.missed == [Missed.FASTER]
+    reading = top.read()
+    assert reading
+    assert reading["spin_frequency_hz"] == 30.3
+    assert (top.read(), top.read()) == (None, None)
+    with pytest.raises(AnotherTop, match=r"38\.6 Hz, \d+ s after 30\.3 Hz.*coasts gains no spin.*begin a new run"):
+        top.read()
+    assert top.fall(200.0) == ""
+
+
+def test_counts_of_twice_the_spin_are_no_readings_and_warned_of_once() -> None:
+    bench = Bench(61.8, 61.7, 61.4, 61.3, 30.1)
+    top = bench.top((90.0, 31.0))
+    assert (top.read(), top.read()) == (None, None)
+    assert top.missed == [Missed.MULTIPLE] * 2
+    assert top.fall(120.0) == ""  # it is up
+    (warning,) = bench.warnings
+    assert "61.7 Hz after 31 Hz, 2 times what follows" in warning
+    assert "second bright mark" in warning
+    reading = top.read()
+    assert reading
+    assert reading["spin_frequency_hz"] == 30.1
+
+
+def test_after_a_miscount_the_true_spin_is_taken_again() -> None:
+    """15.5 Hz could be; 30.8 Hz twice after it shows that it was not."""
+    bench = Bench(30.8, 30.7, 30.4)
+    top = bench.top((80.0, 31.2), (90.0, 15.5))
+    reading = top.read()
+    assert reading
+    assert reading["spin_frequency_hz"] == 30.7
+    assert bench.events[-1] == ("miscounted", "the reading before, 15.5 Hz, was a miscount")
+    assert top.read()
+
+
+def test_a_lower_spin_that_two_counts_agree_on_is_a_reading() -> None:
+    top = Bench(12.0, 12.0).top((90.0, 31.0))  # touched
+    reading = top.read()
+    assert reading
+    assert reading["spin_frequency_hz"] == 12.0

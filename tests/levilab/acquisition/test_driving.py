@@ -1,0 +1,134 @@
+"""A sweep of the drive, by a plain experiment: a point that fails is recorded, and the sweep goes on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from instruments.clock import VirtualClock
+from instruments.errors import NoAnswer
+from levilab.acquisition.counting import prepare_counter
+from levilab.acquisition.driving import DriveSettings, FailedPoint, NotHeld, held_spin, sweep_drive
+from levilab.acquisition.experiment import Experiment
+from levilab.acquisition.loop import AcquisitionRequest, acquire
+from levilab.acquisition.table import EXPERIMENTS, Configuration, with_settings
+from levilab.runs.channel import Channel
+from levilab.world.bench import virtual_wiring
+from levilab.world.spin_world import SpinScene, SpinWorld
+from support.acquisitions import Silent
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    from levilab.acquisition.session import Session
+    from levilab.runs.run import Run
+
+CHANNELS = (Channel("time_s", "s", "bench clock"), Channel("drive_frequency_hz", "Hz", "generator"))
+#: Up to 30 Hz, where the top of a SpinScene begins, and on in quick steps; a top that has lost its lock is soon down.
+SETTINGS = DriveSettings(drive_frequency_hz=30.0, ramp_hz_per_s=0.25, hold_s=0.0, gate_s=0.5, longest_s=20_000.0)
+SCENE = SpinScene(fall_hz=24.0)
+
+
+def swept(
+    out: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    points: Sequence[float],
+    at_point: Callable[[Session[DriveSettings], float], None] = lambda _, __: None,
+) -> tuple[Run, tuple[FailedPoint, ...]]:
+    """A sweep that keeps a row a point, in the place of the experiment `precession`."""
+    failed: list[FailedPoint] = []
+
+    def run(session: Session[DriveSettings]) -> None:
+        def measure(drive: float) -> None:
+            at_point(session, drive)
+            held_spin(session, drive)
+            session.keep({"time_s": session.now(), "drive_frequency_hz": drive}, 0.0)
+
+        prepare_counter(session)
+        session.begin(lambda: None)
+        failed.extend(sweep_drive(session, points, measure))
+
+    row = Experiment("precession", "a sweep", ("counter", "generator"), DriveSettings, lambda _: CHANNELS, run)
+    monkeypatch.setitem(EXPERIMENTS, "precession", row)
+    config = with_settings(Configuration(), "precession", SETTINGS)
+    world = SpinWorld(SCENE, VirtualClock())
+    wiring = virtual_wiring(world, config.limits)
+    request = AcquisitionRequest("precession", config, lambda: wiring, out=out, synthetic_how="a test")
+    return acquire(request, Silent()), tuple(failed)
+
+
+def measured(run: Run) -> list[float]:
+    return run.readings().column("drive_frequency_hz").tolist()
+
+
+def events(run: Run, kind: str) -> list[str]:
+    return [event["text"] for event in run.events() if event["kind"] == kind]
+
+
+def test_a_point_that_fails_is_recorded_and_the_sweep_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The drive comes back to 31 Hz, which held the top last, not to 30 Hz, where it began."""
+
+    def lose(_: Any, drive: float) -> None:
+        if drive == 32.0:
+            raise NotHeld(31.2, drive)
+
+    run, failed = swept(tmp_path, monkeypatch, [31.0, 32.0, 33.0], lose)
+    assert (run.status, measured(run)) == ("finished", [31.0, 33.0])
+    assert failed == (FailedPoint(32.0, "a spin of 31.20 Hz under a drive of 32.00 Hz"),)
+    assert "try 2 of 2" in events(run, "lock lost")[1]
+    (left_out,) = events(run, "left out")
+    assert left_out == "the point of 32 Hz is left out: a spin of 31.20 Hz under a drive of 32.00 Hz"
+    locked = [event["frequency_hz"] for event in run.events() if event["kind"] == "locked"]
+    assert locked == pytest.approx([30.0, 31.0, 31.0], abs=0.2)  # 0.06 Hz of noise
+    assert run.record.instruments["generator"]["settings_end"]["output"] is False
+
+
+def test_a_top_that_falls_is_asked_for_and_the_sweep_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At the first try of 31.5 Hz the drive is too weak, and the top falls while it is tried to take it up again."""
+    weak: list[float] = []
+
+    def weaken(session: Session[Any], drive: float) -> None:
+        if drive == 31.5 and not weak:
+            weak.append(drive)
+            session.bench.outputs_off()
+            session.wait(120.0)  # from 31.5 to below 24 Hz takes 90 s
+
+    run, failed = swept(tmp_path, monkeypatch, [31.0, 31.5, 32.0], weaken)
+    assert (run.status, measured(run), failed) == ("finished", [31.0, 31.5, 32.0], ())
+    assert len(events(run, "asked the person")) == 1
+    assert "no light pulses under a drive of 31.50 Hz; try 1 of 2" in events(run, "lock lost")[0]
+
+
+def test_a_top_that_no_drive_takes_up_again_ends_the_sweep_with_what_was_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """DidNotFollow costs tries of points, as a lost lock does."""
+
+    def forbid(session: Session[Any], drive: float) -> None:
+        if drive > 31.0:
+            session.bench.generator.off()
+            monkeypatch.setattr(SpinWorld, "_lock", lambda world, now, *_: world._lay(replace(now, rule="coasts")))
+            session.wait(20.0)  # 2 Hz
+
+    run, failed = swept(tmp_path, monkeypatch, [31.0, 31.5, 32.0, 32.5, 33.0], forbid)
+    assert (run.status, measured(run)) == ("finished", [31.0])
+    assert [point.drive for point in failed] == [31.5, 32.0, 32.5]
+    assert all("did not follow the drive to 31 Hz" in point.reason for point in failed)
+    assert events(run, "ended")[0].endswith("the sweep ends here; not tried: 33 Hz")
+
+
+def test_a_generator_that_fails_on_the_way_costs_no_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    lost: list[float] = []
+
+    def fail(session: Session[Any], drive: float) -> None:
+        if drive == 31.5 and not lost:
+            lost.append(drive)
+            raise NoAnswer(session.bench.address("generator"), "OUTP1?", 1.0)
+
+    run, failed = swept(tmp_path, monkeypatch, [31.0, 31.5], fail)
+    assert (measured(run), failed) == ([31.0, 31.5], ())
+    assert len(events(run, "found again")) == 1
+    assert events(run, "lock lost") == []

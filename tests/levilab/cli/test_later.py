@@ -1,0 +1,43 @@
+"""Commands are made when they are called: the first page of help makes none."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import typer.main
+from typer.testing import CliRunner
+
+from levilab.cli.later import Later
+from levilab.cli.main import app
+from support.commands import command
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def test_the_first_help_lists_every_command_and_makes_none(monkeypatch) -> None:
+    made = []
+    monkeypatch.setattr(Later, "command", property(lambda self: made.append(self.name)))
+    shown = CliRunner().invoke(app, ["--help"]).stdout
+    commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+    assert len(commands) >= 10
+    assert all(f" {name} " in shown for name in commands)
+    assert made == []
+
+
+def test_a_command_has_the_texts_of_its_stand_in_and_the_options_of_its_function() -> None:
+    stand_in = typer.main.get_command(app).commands["report"]  # type: ignore[attr-defined]
+    assert stand_in.params == []
+    assert {"paths", "output", "columns"} <= {one.name for one in stand_in.command.params}
+    assert stand_in.command.help == stand_in.help
+    assert stand_in.command.epilog == "Example: levilab report sample_data/ -o report.html"
+
+
+def test_a_misspelt_command_below_a_stand_in_gets_its_suggestion(tmp_path: Path) -> None:
+    assert "Did you mean 'spin'?" in command("acquire", "spni", cwd=tmp_path).err
+
+
+def test_a_wrong_value_is_refused_in_plain_words(tmp_path: Path) -> None:
+    said = command("bench", "serve", "--speed", "fast", cwd=tmp_path).err
+    assert "'--speed': a number is expected" in said
+    assert "Input should" not in said

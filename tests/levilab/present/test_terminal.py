@@ -1,0 +1,38 @@
+"""Tables on a narrow terminal: no word is cut, no line is wider than the terminal."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+
+from levilab.present import terminal
+from levilab.present.tables import table
+
+HEADS = ("what is set", "now", "what may stand there", "what it means to the person at the bench")
+ROWS = (
+    ("drive_amplitude_vpp", "10.0", "a number above 0 [V peak to peak]", ""),
+    ("trigger_patience_s", "5.0", "a number above 0 [s]", "give up where no trigger comes for so long"),
+)
+TABLE = table("Settings of an experiment", HEADS, ROWS, numbers=["now"])
+WORDS = {word for text in (*HEADS[1:], *ROWS[0], *ROWS[1]) for word in text.split()}
+
+
+def drawn(width: int) -> list[str]:
+    out = io.StringIO()
+    terminal._Terminal(width=width, file=out, highlight=False).print(terminal.draw(TABLE))
+    return [line.rstrip() for line in out.getvalue().splitlines()]
+
+
+@pytest.mark.parametrize("width", [200, 80, 60, 40])
+def test_no_line_is_wider_than_the_terminal_and_no_word_is_cut(width: int) -> None:
+    lines = drawn(width)
+    assert max(map(len, lines)) <= width
+    assert {word for line in lines for word in line.split()} >= WORDS
+
+
+def test_where_the_words_do_not_fit_beside_each_other_a_row_is_a_list() -> None:
+    lines = drawn(40)
+    assert lines[lines.index("drive_amplitude_vpp") + 1].split() == ["now", "10.0"]
+    assert not any("───" in line for line in lines)
+    assert any("───" in line for line in drawn(80))
