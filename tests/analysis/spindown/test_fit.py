@@ -221,7 +221,7 @@ def test_understated_uncertainties_are_enlarged_by_the_birge_ratio_and_exclude_n
     run, honest = fit_spin_down(T, y, 0.003), fit_spin_down(T, y)
     assert uncertainties(run.fit("disc")) == pytest.approx(uncertainties(honest.fit("disc")), rel=1e-6)
     assert "misses the readings by" in run.warnings[-1]
-    assert run.fit("newton").statistics.difference < 30  # it would be 1e4 if 0.003 Hz were believed
+    assert run.fit("newton").statistics.difference < 100  # it would be 1e4 if 0.003 Hz were believed
 
 
 def test_readings_without_uncertainty_are_warned_of():
