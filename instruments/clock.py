@@ -31,21 +31,26 @@ class Clock(Protocol):
 class WallClock:
     """The time of a real bench, or that time at a multiple.
 
-    speed: seconds of the bench per second of the wall, for a virtual bench that a person watches.  Raises ValueError
-    when it is not a positive number.
+    speed: seconds of the bench per second of the wall, for a virtual bench that a person watches; waits: time stands at
+    0 until :meth:`begin` is called.  Raises ValueError when the speed is not a positive number.
     """
 
     jumps = False
 
-    def __init__(self, *, speed: float = 1.0) -> None:
+    def __init__(self, *, speed: float = 1.0, waits: bool = False) -> None:
         if not 0 < speed < math.inf:
             raise ValueError(f"speed = {speed:g}, a number above 0 is expected")
         self.speed = speed
-        self._start = time.monotonic()
+        self._start: float | None = None if waits else time.monotonic()
+
+    def begin(self) -> None:
+        """Let time pass from now on, if it does not yet."""
+        if self._start is None:
+            self._start = time.monotonic()
 
     def now(self) -> float:
         """The time [s]."""
-        return self.speed * (time.monotonic() - self._start)
+        return 0.0 if self._start is None else self.speed * (time.monotonic() - self._start)
 
     def sleep(self, duration: float) -> None:
         """Wait until so much time has passed on the bench [s]."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import re
+from typing import Any, get_args
 
 from pydantic import (
     BaseModel,
@@ -17,18 +19,38 @@ class Settings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
-def in_one_line(error: ValidationError) -> str:
-    """The first thing that is wrong, with its path and what is allowed, and how many more there are."""
+def in_one_line(error: ValidationError, of: type[BaseModel] | None = None) -> str:
+    """The first thing that is wrong, with its path and what is allowed, and how many more there are.
+
+    of: what did not suit, so that an unknown key can be compared with those that it has.
+    """
     # a key that is unknown may be why another one is missing
     first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
     where = ".".join(str(part) for part in first["loc"]) or "the whole"
     more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
     if first["type"] == "extra_forbidden":
-        return f"{where} is no key known here{more}"
+        return f"{where} is no key known here{_meant(first['loc'], of)}{more}"
     hint = "" if first["type"] == "literal_error" else hint_about(first["input"])  # where words are expected
     whole_table = first["type"] == "missing" or isinstance(first["input"], dict)
     seen = "" if whole_table else f" = {str(first['input'])[:60]!r}"
     return f"{where}{seen}: {first['msg']}{hint}{more}"
+
+
+def _meant(where: tuple[int | str, ...], of: type[BaseModel] | None) -> str:
+    """The key that an unknown one is most like, or those that there are."""
+    *tables, key = where
+    for name in tables:
+        field = of.model_fields.get(str(name)) if of else None
+        of = next((kind for kind in _kinds(field.annotation) if issubclass(kind, BaseModel)), None) if field else None
+    if of is None:
+        return ""
+    near = difflib.get_close_matches(str(key), of.model_fields, n=1)
+    return f": did you mean {near[0]}?" if near else f": known are {', '.join(of.model_fields)}"
+
+
+def _kinds(annotation: Any) -> list[type]:
+    """The classes of an annotation such as ``Counter | None``."""
+    return [kind for kind in (annotation, *get_args(annotation)) if isinstance(kind, type)]
 
 
 #: Numbers as people write them and TOML does not, with what to say.

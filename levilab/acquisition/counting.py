@@ -26,6 +26,8 @@ _KEPT = 3
 #: A fallen top rattles: after so many times without a credible count it is taken for fallen; after so many counts in a
 #: row that are too high, for another one.
 _MOST_MISSED = 3
+#: No top's pulses are so many in a gate: what is counted then is something else.
+_MOST_PERIODS = 1e9
 
 
 class Missed(StrEnum):
@@ -176,13 +178,13 @@ class FreeTop(Generic[S]):
         return Missed.MULTIPLE
 
     def _count(self) -> Row | None:
-        """What the counter counts; its time is the middle of the exchange, which is the gate's."""
+        """What the counter counts; its time is the middle of the gate."""
         session = self.session
-        before = session.now()
         spin = session.bench.counter.frequency()
         if spin is None:
             return None
-        row = {"time_s": (before + session.now()) / 2, "spin_frequency_hz": spin}
+        end = session.now()
+        row = {"time_s": (gate_began(end, session.settings.gate_s, spin) + end) / 2, "spin_frequency_hz": spin}
         session.check_settings("counter")
         u = session.settings.reading_u_hz
         return row | ({"spin_frequency_u_hz": u} if u else {})
@@ -190,6 +192,23 @@ class FreeTop(Generic[S]):
     def _follows(self, reading: Row) -> bool:
         """Whether a reading is the first, or plausible after the last one."""
         return self.last is None or is_plausible(self.last, reading)
+
+
+def gate_began(end: float, gate_s: float, count: float) -> float:
+    """When a gate that has just ended began [s].
+
+    It lasts whole periods, up to the first pulse behind its length; before it the counter waits for a pulse, and reads
+    its errors, so the exchange begins some 40 ms earlier.
+
+    Args:
+        end: [s].
+        gate_s: its length as it was set.
+        count: the frequency that was counted [Hz].
+
+    >>> round(gate_began(10.0, 0.99, 25.0), 6)
+    9.0
+    """
+    return end - (math.ceil(count * gate_s - 1e-6) / count if 0 < count * gate_s < _MOST_PERIODS else gate_s)
 
 
 def is_plausible(last: Row, reading: Row) -> bool:

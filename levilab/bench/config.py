@@ -103,4 +103,4 @@ def read_bench(path: Path, tables: type[C], *, instead: str = ", or try `mock`")
     try:
         return tables.model_validate(table)
     except ValidationError as error:
-        raise ConfigError(f"{path}: {in_one_line(error)}") from error
+        raise ConfigError(f"{path}: {in_one_line(error, tables)}") from error

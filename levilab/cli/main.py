@@ -17,7 +17,7 @@ from levilab.cli.output import message
 from levilab.cli.quantities import in_options
 
 #: How typer, which reads values with pydantic, begins and ends what it says of a wrong one.
-_SHOULD_BE = re.compile(r"Input should be (a valid )?(.*?)(, unable to .*|, got .*)?")
+_SHOULD_BE = r"Input should be (a valid )?(.*?)(, unable to .*|, got .*)?"
 
 
 class Commands(typer.core.TyperGroup):
@@ -40,7 +40,7 @@ def in_plain_words(text: str) -> str:
     >>> in_plain_words("Input should be greater than or equal to 10")
     'a number greater than or equal to 10 is expected'
     """
-    if found := _SHOULD_BE.fullmatch(text):
+    if found := re.fullmatch(_SHOULD_BE, text):
         what = found[2].replace("integer", "whole number")
         return f"a {what} is expected" if found[1] else f"a number {what} is expected"
     return text.removeprefix("Value error, ")

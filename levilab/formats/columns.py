@@ -6,7 +6,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from levilab.errors import DataError, DoesNotSuit
-from levilab.formats.titles import CANONICAL, COMPANIONS, UNITS, Title, dimension, implied_unit, read_title, unit_factor
+from levilab.formats.titles import (
+    CANONICAL,
+    COMPANIONS,
+    UNITS,
+    Title,
+    dimension,
+    foreign_unit,
+    implied_unit,
+    nearly_a_frequency,
+    read_title,
+    unit_factor,
+)
 
 SHORTHANDS = {
     "t": "time_s",
@@ -96,9 +107,22 @@ def choose_columns(
     for name, index in chosen.items():
         # An uncertainty without a unit has that of its quantity: "rpm,u" gives both in 1/min.
         unit = written[name] or written.get(COMPANIONS.get(name, ""))
+        other = None if unit else foreign_unit(header[index], dimension(name))
+        if other:
+            raise TableError(
+                path,
+                f"column '{shown(header[index])}' is to be {name} and has the unit {other}, which is none of "
+                f"{dimension(name)}: {how_else(header[index])}",
+            )
         factor = unit_factor(unit, dimension(name)) if unit else 1
         columns.append(Column(name, index, header[index], factor or 1))
     return tuple(sorted(columns, key=lambda c: CANONICAL.index(c.name))), tuple(warnings)
+
+
+def how_else(title: str) -> str:
+    """What to do with a column that is not what is wanted."""
+    work_out = nearly_a_frequency(title)
+    return f"write {work_out} into the column, in Hz" if work_out else "say which unit it is, as NAME [Hz]"
 
 
 def _wanted_columns(

@@ -8,6 +8,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from functools import cached_property
 from typing import Literal
 
@@ -18,7 +19,13 @@ COMMENTS_UNLESS_SEMICOLON = (*COMMENTS, ";", "'")
 MISSING = frozenset(
     ("", "-", "--", "---", "n/a", "na", "n.a.", "nan", "#n/a", "#nv", "#num!", "#wert!", "#value!", "null", "none")
 )
-Kind = Literal["number", "missing", "text"]
+#: Thousands set apart by points before a decimal comma, as 2.394,0 has them; 2.394 alone could be either.
+THOUSANDS = re.compile(r"[+-]?\d{1,3}(\.\d{3})+,\d+")
+#: What a stopwatch or a clock shows: minutes and seconds, hours before them.
+CLOCK = re.compile(r"(?:(\d{1,3}):)?(\d{1,3}):(\d\d(?:[.,]\d+)?)")
+#: Date and time (ISO 8601).
+DATED = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(Z|[+-]\d\d:?\d\d)?")
+Kind = Literal["number", "clock", "missing", "text"]
 
 
 @dataclass(frozen=True)
@@ -56,19 +63,40 @@ class Dialect:
         Raises:
             ValueError: it is none, or it has the other decimal mark.
         """
+        if self.decimal == "," and THOUSANDS.fullmatch(text):
+            text = text.replace(".", "")
         if "_" in text or (self.decimal == "," and "." in text):
             raise ValueError(text)
         return float(text.replace(",", ".") if self.decimal == "," else text)
 
     def kind(self, text: str) -> Kind:
-        """Whether a field holds a number, a missed reading, or text."""
+        """Whether a field holds a number, a time of a clock, a missed reading, or text."""
         if text.casefold() in MISSING:
             return "missing"
         try:
             self.number(text)
         except ValueError:
-            return "text"
+            return "clock" if CLOCK.fullmatch(text) or DATED.fullmatch(text) else "text"
         return "number"
+
+
+def clock_time(text: str) -> float:
+    """Seconds that a clock, a stopwatch or a date stands for; a date's count from 1970.
+
+    >>> clock_time("0:10"), clock_time("14:05:12.5")
+    (10.0, 50712.5)
+
+    Raises:
+        ValueError: it is none of these.
+    """
+    if found := CLOCK.fullmatch(text):
+        hours, minutes, seconds = int(found[1] or 0), int(found[2]), float(found[3].replace(",", "."))
+        if seconds < 60 and (minutes < 60 or not found[1]):
+            return 3600 * hours + 60 * minutes + seconds
+    if DATED.fullmatch(text):
+        moment = datetime.fromisoformat(text)
+        return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+    raise ValueError(text)
 
 
 # Of two that do equally well the first is taken. Comma with decimal comma needs quoted fields.
@@ -139,7 +167,7 @@ def _score(lines: Iterable[Line], rank: int) -> tuple[int, int, int, int]:
     rows = [line for line in lines if line.is_row]
     width = usual(line.filled for line in rows)
     alike = [line for line in rows if line.filled == width]
-    clean = sum("text" not in line.kinds for line in alike)
+    clean = sum(not {"text", "clock"} & set(line.kinds) for line in alike)
     return clean, len(alike), -rank, sum(line.kinds.count("number") for line in alike)
 
 

@@ -5,6 +5,7 @@ a number or a missed reading; pandas then reads it at its full speed. All else (
 marks, blanks as separators, a damaged line) is read again line by line, so that an error can name its line.
 """
 
+import contextlib
 import csv
 import warnings
 from array import array
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from levilab.formats.columns import Column, TableError, shown
-from levilab.formats.dialect import MISSING
+from levilab.formats.dialect import DATED, MISSING, clock_time
 from levilab.formats.layout import Layout
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 BLOCK = 1 << 17  # bytes counted at once: small enough for the cache
 ONE_BYTE_ENCODINGS = ("utf-8", "utf-8-sig", "latin-1")  # those in which a line end is one byte, whatever precedes it
+_ITS_OWN_COLUMN = "write what stands behind the ± into a column of its own, with the title u"
 SPELLINGS = sorted({form for text in MISSING for form in (text, text.upper(), text.title(), "NaN")})
 
 
@@ -145,6 +147,7 @@ def _with_last(
 def _read_lines(path: Path, layout: Layout, chosen: Sequence[Column], *, drop_unended: bool) -> Rows:
     """All rows line by line; some 2 µs a number."""
     lines, values, torn = array("q"), [array("d") for _ in chosen], None
+    first = ""
     with path.open(encoding=layout.encoding, errors="replace", newline=None) as stream:
         for number, line in enumerate(stream, 1):
             if number < layout.first_line or _skips(layout, line):
@@ -157,10 +160,19 @@ def _read_lines(path: Path, layout: Layout, chosen: Sequence[Column], *, drop_un
             if row is None:
                 torn = _torn(number, line)
                 break
+            first = first or line
             lines.append(number)
             for column, value in zip(values, row, strict=True):
                 column.append(value)
-    return Rows(tuple(np.array(column, np.float64) for column in values), np.array(lines, np.int64), torn)
+    numbers = tuple(_from_first_date(layout, *pair, first) for pair in zip(chosen, values, strict=True))
+    return Rows(numbers, np.array(lines, np.int64), torn)
+
+
+def _from_first_date(layout: Layout, column: Column, values: "array[float]", first: str) -> "NDArray[np.float64]":
+    """Numbers of a column; dates, which count from 1970, count from the first one."""
+    numbers = np.array(values, np.float64)
+    dated = column.name == "time_s" and first and DATED.fullmatch(layout.dialect.split(first)[column.index])
+    return numbers - numbers[0] if dated else numbers
 
 
 def _row(path: Path, layout: Layout, chosen: Sequence[Column], line: int, text: str) -> list[float]:
@@ -190,11 +202,15 @@ def _number(path: Path, layout: Layout, column: Column, line: int, text: str) ->
     except ValueError:
         if text.casefold() in MISSING:
             return float("nan")
+    if column.name == "time_s":
+        with contextlib.suppress(ValueError):
+            return clock_time(text) / column.factor
     mark = "comma" if layout.dialect.decimal == "," else "point"
+    combined = "±" in text or "+/-" in text
+    do = _ITS_OWN_COLUMN if combined else "correct it, or leave it empty if the reading was missed"
     raise TableError(
         path,
-        f"'{shown(text)}' stands in column '{shown(column.label)}', a number with decimal {mark} is expected: correct "
-        "it, or leave it empty if the reading was missed",
+        f"'{shown(text)}' stands in column '{shown(column.label)}', a number with decimal {mark} is expected: {do}",
         line=line,
     )
 

@@ -13,11 +13,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from levilab.errors import UsageError
-from levilab.formats.columns import SHORTHANDS, Column, NoSuchColumn, TableError, choose_columns, listed, shown
+from levilab.formats.columns import (
+    SHORTHANDS,
+    Column,
+    NoSuchColumn,
+    TableError,
+    choose_columns,
+    how_else,
+    listed,
+    shown,
+)
 from levilab.formats.dialect import Dialect
 from levilab.formats.layout import Layout, sniff
 from levilab.formats.rows import Rows, read_rows
-from levilab.formats.titles import CANONICAL, COMPANIONS, EXAMPLES, companion
+from levilab.formats.titles import CANONICAL, COMPANIONS, EXAMPLES, companion, nearly_a_frequency
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -175,6 +184,9 @@ def _key(name: str) -> str:
 
 def _no_column(path: Path, name: str, header: Sequence[str]) -> NoSuchColumn:
     text = f"no column is known to be {name}; it has {listed(header)}: say `columns` = {_key(name)}=NAME"
+    nearly = next((title for title in header if nearly_a_frequency(title)), None) if "frequency" in name else None
+    if nearly:
+        text = f"no column is known to be {name}; '{shown(nearly)}' could become one: {how_else(nearly)}"
     return NoSuchColumn(path, text)
 
 

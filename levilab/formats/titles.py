@@ -18,6 +18,7 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     "frequency": {
         "Hz": 1, "kHz": 1e3, "MHz": 1e6, "mHz": 1e-3, "μHz": 1e-6, "1/s": 1, "s-1": 1, "rps": 1, "U/s": 1,
         "rpm": PER_MINUTE, "1/min": PER_MINUTE, "min-1": PER_MINUTE, "/min": PER_MINUTE, "U/min": PER_MINUTE,
+        "tr/min": PER_MINUTE, "tr/s": 1,
         "rad/s": PER_RADIAN, "rads-1": PER_RADIAN, "rad_s": PER_RADIAN, "rad_per_s": PER_RADIAN,
         "°/s": 1 / 360, "deg/s": 1 / 360, "deg_s": 1 / 360,
     },
@@ -30,12 +31,12 @@ UNITS: Mapping[str, Mapping[str, float]] = {
 QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "time_s": ("time", (
         "time", "t", "zeit", "elapsed", "elapsed_time", "timestamp", "seconds", "sekunden", "milliseconds", "minutes",
-        "ms")),
+        "ms", "x_value", "clock", "uhrzeit", "temps", "tiempo", "tempo")),
     "spin_frequency_hz": ("frequency", (
         "spin_frequency", "f", "freq", "frequency", "frequenz", "nu", "ν", "nu3", "ν3", "f3", "ν_3", "nu_3", "f_3",
         "spin", "spin_freq", "f_spin", "rotation_frequency", "rotation", "drehfrequenz", "hz", "rpm", "rad/s",
         "omega", "ω", "omega3", "ω3", "omega_3", "ω_3", "angular_velocity", "angular_frequency",
-        "winkelgeschwindigkeit", "drehzahl", "speed", "rotation_speed", "rotational_speed")),
+        "winkelgeschwindigkeit", "drehzahl", "speed", "rotation_speed", "rotational_speed", "vitesse", "fréquence")),
     "precession_frequency_hz": ("frequency", (
         "precession_frequency", "precession", "f_precession", "f_p", "fp", "νp", "ν_p", "nu_p", "präzession",
         "präzessionsfrequenz")),
@@ -67,7 +68,11 @@ IMPLIED_UNITS = {
     "rad/s",
 )
 # Names that could as well be in 1/s as in 1/min: known only with a unit.
-NEED_UNITS = ("drehzahl", "speed", "rotation_speed", "rotational_speed")
+NEED_UNITS = ("drehzahl", "speed", "rotation_speed", "rotational_speed", "vitesse")
+# Titles that begin so hold something from which a frequency is yet to be worked out.
+NEARLY_FREQUENCIES = {"period": "its inverse", "periode": "its inverse", "période": "its inverse",
+    "turns": "turns over the time that they took", "umdrehungen": "turns over the time that they took",
+}  # fmt: skip
 # A bare "u" belongs to the spin frequency; the others need their quantity's name in it (u_z, z_err …).
 BARE_UNCERTAINTIES = (
     "u", "sigma", "σ", "uncertainty", "unsicherheit", "error", "err", "fehler", "df", "δf", "sd", "std", "stddev", "se",
@@ -197,6 +202,22 @@ def read_title(text: str) -> Title:
 def known_titles(header: Sequence[str]) -> int:
     """How many of the fields name a column that we know."""
     return sum(read_title(text).column is not None for text in header)
+
+
+def nearly_a_frequency(text: str) -> str | None:
+    """How a frequency follows from what a column holds, None if none does."""
+    return next((how for word, how in NEARLY_FREQUENCIES.items() if _plain_name(text).startswith(word)), None)
+
+
+def foreign_unit(text: str, kind: str) -> str | None:
+    """The unit in a title, if it is one of another dimension.
+
+    >>> foreign_unit("period_ms", "frequency")
+    'ms'
+    """
+    form = re.fullmatch(r".*?[\[(]([^\[\]()]*)[\])]", text.strip())
+    unit = form[1] if form else text.rpartition("_")[2] if "_" in text else ""
+    return unit if unit and is_unit(unit) and unit_factor(unit, kind) is None else None
 
 
 def implied_unit(text: str) -> str | None:

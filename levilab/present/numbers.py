@@ -107,13 +107,15 @@ def short_name(name: str) -> str:
 
 
 def plain(value: float | None, count: int = 3) -> str:
-    """A statistic in a few digits; a dash where there is none.
+    """A statistic in so many digits, zeros at the end included; a larger number in whole ones; a dash for none.
 
-    >>> plain(0.0312345), plain(4478.2), plain(2.34e-14, 2), plain(None)
-    ('0.0312', '4478', '2.3×10⁻¹⁴', '—')
+    >>> plain(0.0312345), plain(0.21), plain(4478.2), plain(2.34e-14, 2), plain(None)
+    ('0.0312', '0.210', '4478', '2.3×10⁻¹⁴', '—')
     """
     if value is None:
         return "—"
+    if 1e-4 <= abs(value) < 10**count:
+        return f"{value:#.{count}g}".rstrip(".")
     return f"{value:.0f}" if 10**count <= abs(value) < 1e6 else digits(value, count)
 
 

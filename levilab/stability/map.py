@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from levilab.errors import UsageError
 from levilab.simulator.ensemble import simulate_many
-from levilab.simulator.equilibrium import stability_of
+from levilab.simulator.equilibrium import HEAVIEST_KG, stability_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -128,6 +128,11 @@ def _usual_masses(scene: Scene, floating: tuple[tuple[float, float], ...]) -> Sp
 def _check(spins: Span, masses: Span) -> None:
     if masses[0] <= 0:
         raise UsageError("masses", "masses above 0 are expected", value=f"from {masses[0]:g} kg")
+    if masses[0] > HEAVIEST_KG:
+        low, high = masses[0] / 1000, masses[1] / 1000
+        step = (high - low) / (masses[2] - 1)
+        meant = f"kilograms are expected.  Were grams meant?  They are {low:g}:{high:g}:{step:.3g}"
+        raise UsageError("masses", meant, value=f"from {masses[0]:g} kg")
     if (tops := spins[2] * masses[2]) > MOST_TOPS:
         raise UsageError(
             "masses",

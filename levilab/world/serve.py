@@ -97,6 +97,9 @@ def serve(
 
 async def _serve(service: Service, world: World, ready: Callable[[tuple[Served, ...]], None], end: _End) -> None:
     bus = virtual_bus(world, service.models)
+    # the top spins down from the first message on, not while no program is there
+    assert isinstance(world.clock, WallClock)
+    bus.heard = world.clock.begin
     place = _place(service, len(bus.instruments))
     async with contextlib.AsyncExitStack() as opened:
         try:
@@ -127,7 +130,7 @@ def _world(service: Service, tell: Callable[[str], None]) -> World:
 
 def _clock(service: Service) -> WallClock:
     try:
-        return WallClock(speed=service.speed)
+        return WallClock(speed=service.speed, waits=True)
     except ValueError as error:
         raise UsageError("speed", "a number above 0 is expected", value=service.speed) from error
 

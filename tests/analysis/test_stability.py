@@ -163,3 +163,12 @@ def test_a_moment_along_the_field_has_no_spin_that_helps():
     assert spin_windows(BASE, along, 0.073) == ()
     assert math.isnan(sleeping_limit(BASE, along, 0.073))
     assert np.all(np.isfinite(quartic(BASE, along, 0.073, 100.0)))
+
+
+def test_the_stiffnesses_over_the_mass_are_those_of_berrys_potential():
+    """U = mgz + |μ||B|, whose |B| bends sideways by B′²/4B − B″/2: M V Berry, Proc. R. Soc. A 452, 1207 (1996)."""
+    for found in equilibria(BASE, THESIS, 0.05, 0.09):
+        b, slope, bend = BASE(found.height)
+        push = abs(THESIS.moment) * np.sign(b) / THESIS.mass
+        assert found.axial == pytest.approx(push * bend)
+        assert found.radial == pytest.approx(push * (slope**2 / (4 * b) - bend / 2))

@@ -52,3 +52,15 @@ def test_a_wall_clock_at_a_multiple_sleeps_that_much_shorter(monkeypatch):
 def test_the_speed_of_a_clock_is_a_number_above_0(speed):
     with pytest.raises(ValueError, match="a number above 0"):
         WallClock(speed=speed)
+
+
+def test_a_clock_that_waits_stands_still_until_it_begins(monkeypatch):
+    wall = [100.0]
+    monkeypatch.setattr("instruments.clock.time.monotonic", lambda: wall[0])
+    clock = WallClock(speed=2.0, waits=True)
+    wall[0] += 4.0
+    assert clock.now() == 0.0
+    clock.begin()
+    wall[0] += 3.0
+    clock.begin()
+    assert clock.now() == 6.0

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from instruments.virtual.bench.session import Hold, Session
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from instruments.virtual.bench.faults import Fault
     from instruments.virtual.core.device import VirtualInstrument
@@ -20,13 +20,15 @@ class Bus:
     """The instruments of one virtual bench by resource name.
 
     lock: held while an instrument works; servers do so from several threads; faults: that are to happen;
-    away: until when [s] instruments cannot be reached, by the id of the device.
+    away: until when [s] instruments cannot be reached, by the id of the device; heard: called with each message that a
+    client of a server sends.
     """
 
     instruments: Mapping[str, VirtualInstrument]
     lock: threading.RLock = field(default_factory=threading.RLock)
     faults: list[Fault] = field(default_factory=list)
     away: dict[int, float] = field(default_factory=dict)
+    heard: Callable[[], None] = lambda: None
     _holds: dict[int, Hold] = field(default_factory=dict)
 
     def open(self, address: str) -> Session | None:

@@ -10,20 +10,21 @@ operation register; a single acquisition and a digitize begin with an empty memo
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from instruments.virtual.core.device import answers, does
-from instruments.virtual.core.parameters import block_content, choice, number, one
-from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope
+from instruments.virtual.core.parameters import choice, none, number, one
+from instruments.virtual.core.parser import ScpiError
+from instruments.virtual.core.rows import Ask, Both, Do, Number, Row, Switch, Text, Word, whole
+from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope
 from instruments.virtual.oscilloscope.screenshot import bmp8, bmp24, draw, grey, png
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
     from instruments.clock import Clock
+    from instruments.virtual.core.device import Value
     from instruments.virtual.oscilloscope.record import Record, Signal
 
 #: The fastest rate [1/s].
@@ -71,6 +72,134 @@ _INTERVALS = ("CYCLe", "DISPlay", "AC", "DC")
 _EMPTY_SOURCES = ("FUNCtion", "MATH", "FFT", "WMEMory1", "WMEMory2", "EXTernal", "ABUS")
 
 
+def _probe(scope: VirtualDSOX1000, n: int) -> float:
+    return scope.value(f"chan{n}_probe")
+
+
+def _scales(scope: VirtualDSOX1000, n: int) -> tuple[float, float]:
+    return 5e-4 * _probe(scope, n), 10 * _probe(scope, n)
+
+
+def _ranges(scope: VirtualDSOX1000, n: int) -> tuple[float, float]:
+    return 4e-3 * _probe(scope, n), 80 * _probe(scope, n)
+
+
+def _levels(scope: VirtualDSOX1000) -> tuple[float, float]:
+    """Three quarters of the full scale from the middle of the screen."""
+    channel = scope.source_channel() or 1
+    reach, middle = 6 * scope.division(channel), scope.value(f"chan{channel}_offset")
+    return middle - reach, middle + reach
+
+
+def _names(scope: VirtualDSOX1000) -> str:
+    return " ".join(f"CHANnel{n}" for n in scope.channels)
+
+
+_CHANNEL: tuple[Row, ...] = (
+    Number("CHANnel{n}:PROBe[:ATTenuation]", "chan{n}_probe", 10.0, (0.1, 1e4)),
+    Number("CHANnel{n}:SCALe", "chan{n}_scale", 5.0, _scales, "V"),
+    Number("CHANnel{n}:RANGe", "chan{n}_scale", 5.0, _ranges, "V", factor=8, alias=True),
+    Number("CHANnel{n}:OFFSet", "chan{n}_offset", 0.0, (-1e5, 1e5), "V"),
+    Number("CHANnel{n}:PROBe:SKEW", "chan{n}_skew", 0.0, (-1e-7, 1e-7), "S"),
+    Word("CHANnel{n}:PROBe:STYPe", "chan{n}_probe_kind", "DIFFerential *SINGle"),
+    Ask("CHANnel{n}:PROBe:ID", lambda _s, _n: "NONE"),
+    Word("CHANnel{n}:COUPling", "chan{n}_coupling", "AC *DC"),
+    Word("CHANnel{n}:IMPedance", "chan{n}_impedance", "ONEMeg"),
+    Word("CHANnel{n}:UNITs", "chan{n}_unit", "VOLT AMPere"),
+    Switch("CHANnel{n}:DISPlay", "chan{n}_display", lambda n: n == 1),
+    Switch("CHANnel{n}:BWLimit", "chan{n}_bandwidth"),
+    Switch("CHANnel{n}:INVert", "chan{n}_invert"),
+    Switch("CHANnel{n}:VERNier", "chan{n}_vernier"),
+    Text("CHANnel{n}:LABel", "chan{n}_label", "{n}", longest=10),
+    Ask("CHANnel{n}", lambda s, n: s.whole_channel(n)),
+)
+_CONTROL: tuple[Row, ...] = (
+    Do("RUN", lambda s: s.run()),
+    Do("STOP", lambda s: s.stop()),
+    Do("SINGle", lambda s: s.single()),
+    Both("DIGitize", lambda s, p: s.digitize_sources(p)),
+    Both("AUToscale", lambda s, _p: s.autoscale()),
+    Do("TRIGger:FORCe", lambda s: s.force()),
+    Do("CDISplay"),
+    Ask("TER", lambda s: s.trigger_event()),
+    Ask("AER", lambda s: s.arm_event()),
+    Ask("ADER", lambda s: s.complete_event()),
+    Ask("OPERegister:CONDition", lambda s: f"{s.condition():+d}"),
+    Ask("OPERation:CONDition", lambda s: f"{s.condition():+d}"),
+    Ask("OPERegister[:EVENt]", lambda s: f"{s.condition():+d}"),
+    Ask("RSTate", lambda s: s.state()),
+    Ask("*LRN", lambda s: ":SYST:SET " + s.block(s.setup())),
+    Ask("*OPT"),
+    *PRESETS,
+)
+_TIME: tuple[Row, ...] = (
+    Word("TIMebase:MODE", "time_mode", "MAIN WINDow XY ROLL"),
+    Number("TIMebase[:MAIN]:SCALe", "time_scale", 1e-4, (5e-9, 50.0), "S"),
+    Number("TIMebase[:MAIN]:RANGe", "time_scale", 1e-4, (50e-9, 500.0), "S", factor=10, alias=True),
+    Number("TIMebase:POSition", "time_offset", 0.0, (-500.0, 500.0), "S", spell="{:+.12E}".format),
+    Number("TIMebase:DELay", "time_offset", 0.0, (-500.0, 500.0), "S", alias=True),
+    Word("TIMebase:REFerence", "time_reference", "LEFT *CENTer RIGHt"),
+    Switch("TIMebase:VERNier", "time_vernier"),
+    Number("TIMebase:WINDow:SCALe", "zoom_scale", 5e-5, (5e-9, 50.0), "S"),
+    Number("TIMebase:WINDow:POSition", "zoom_offset", 0.0, (-500.0, 500.0), "S"),
+    Ask("TIMebase", lambda s: s.whole_time()),
+    Word("ACQuire:TYPE", "acquisition", "NORMal AVERage HRESolution PEAK"),
+    Word("ACQuire:MODE", "acquisition_mode", "RTIMe SEGMented ETIMe"),
+    whole("ACQuire:COUNt", "averages", 8.0, (2, 65536), sign="+"),
+    whole("ACQuire:COMPlete", "complete", 100.0, (100, 100), sign="+"),
+    whole("ACQuire:SEGMented:COUNt", "segments", 2.0, (2, 50), sign="+"),
+    Ask("ACQuire:POINts[:ANALog]", lambda s: f"{s.full_scale()[1]:+d}"),
+    Both("ACQuire:SRATe[:ANALog]", tell=lambda s, _p: s.spell(s.full_scale()[0])),
+)
+_TRIGGER: tuple[Row, ...] = (
+    Word("TRIGger:MODE", "trigger_mode", "EDGE GLITch PATTern TV SHOLd TRANsition SBUS1"),
+    Word("TRIGger[:EDGE]:SOURce", "trigger_source", lambda s: _names(s) + " EXTernal LINE WGEN"),
+    Word("TRIGger[:EDGE]:SLOPe", "trigger_slope", "NEGative *POSitive EITHer ALTernate"),
+    Number("TRIGger[:EDGE]:LEVel", "trigger_level", 0.0, _levels, "V"),
+    Do("TRIGger:LEVel:ASETup", lambda s: s.half_level()),
+    Word("TRIGger:SWEep", "trigger_sweep", "AUTO NORMal"),
+    Word("TRIGger[:EDGE]:COUPling", "trigger_coupling", "AC *DC LFReject"),
+    Word("TRIGger[:EDGE]:REJect", "trigger_rejection", "OFF LFReject HFReject"),
+    Number("TRIGger:HOLDoff", "holdoff", 60e-9, (60e-9, 10.0), "S"),
+    Switch("TRIGger:NREJect", "noise_rejection"),
+    Switch("TRIGger:HFReject", "high_rejection"),
+    Ask("TRIGger", lambda s: s.whole_trigger()),
+)
+#: Fields of the preamble that can be asked for by themselves, and their places in it.
+_PARTS = {"TYPE": 1, "COUNt": 3, "XINCrement": 4, "XORigin": 5, "XREFerence": 6}
+_PARTS |= {"YINCrement": 7, "YORigin": 8, "YREFerence": 9}
+_WAVEFORM: tuple[Row, ...] = (
+    Word("WAVeform:SOURce", "wav_source", lambda s: " ".join((_names(s), *_EMPTY_SOURCES))),
+    Word("WAVeform:FORMat", "wav_format", "WORD *BYTE ASCii"),
+    Word("WAVeform:BYTeorder", "wav_order", "LSBFirst *MSBFirst"),
+    Switch("WAVeform:UNSigned", "wav_unsigned", default=True),
+    Word("WAVeform:VIEW", "wav_view", "MAIN"),
+    Word("WAVeform:POINts:MODE", "wav_mode", "NORMal MAXimum RAW"),
+    Both("WAVeform:POINts", lambda s, p: s.set_points(p), lambda s, p: s.points(p)),
+    Ask("WAVeform:PREamble", lambda s: ",".join(s.preamble())),
+    *(Ask(f"WAVeform:{word}", lambda s, k=k: s.preamble()[k]) for word, k in _PARTS.items()),
+    Ask("WAVeform:DATA", lambda s: s.data()),
+)
+_REST: tuple[Row, ...] = (
+    Both("MEASure:SOURce", lambda s, p: s.set_source(p), lambda s, p: s.source(p)),
+    Word("MEASure:SHOW", "measure_shown", "1 ON"),
+    Do("MEASure:CLEar", lambda s: s.clear_results()),
+    Ask("MEASure:RESults", lambda s: s.all_results()),
+    *(
+        Both(f"MEASure:{word}", lambda s, p, m=name: s.install(m, p), lambda s, p, m=name: s.measurement(m, p))
+        for word, name in _MEASUREMENTS.items()
+    ),
+    Both("DISPlay:DATA", tell=lambda s, p: s.picture(p)),
+    # what only changes the picture
+    *(Both(header, lambda _s, _p: None) for header in ("DISPlay:CLEar", "SYSTem:DSP", "SYSTem:LOCK")),
+    Switch("HARDcopy:INKSaver", "ink_saver", default=True),
+    Switch("DISPlay:LABel", "labels"),
+    Word("MEASure:STATistics", "statistics", "ON CURRent MEAN"),
+    SETUP,
+    Do("SYSTem:PRESet", lambda s: s.reset()),
+)
+
+
 class VirtualDSOX1000(VirtualOscilloscope):
     """A DSOX1102G: two channels, a million points, 100 MHz.  memory: points of another model's."""
 
@@ -78,6 +207,8 @@ class VirtualDSOX1000(VirtualOscilloscope):
     queue_size = 30
     columns, lowest, digits = 10, 1, 8
     transfer = 5e6
+    CHANNEL_ROWS: ClassVar = _CHANNEL
+    ROWS: ClassVar = (*_CONTROL, *_TIME, *_TRIGGER, *_WAVEFORM, *_REST)
 
     def __init__(
         self,
@@ -89,42 +220,27 @@ class VirtualDSOX1000(VirtualOscilloscope):
         identity: str | None = None,
     ) -> None:
         self._memory = memory
+        self._results: list[tuple[str, int]] = []
         super().__init__(clock, signals=signals, channels=channels, identity=identity)
+        own: dict[str, Value] = {"wav_points": float(_FOR_SCREEN), "measure_source": "CHAN1"}
+        self._defaults |= own
+        self.settings |= own
 
     def spell(self, value: float) -> str:
         """Seven digits, as in the preamble of a real one."""
         return f"{value:+.6E}"
 
-    def table(self) -> tuple[Command, ...]:
-        """Its commands."""
-        channels = tuple(row for n in self.channels for row in self._channel(n))
-        return (*self._control(), *channels, *self._time(), *self._trigger(), *self._waveform(), *self._rest())
-
     # --- acquiring ---
 
-    def _control(self) -> tuple[Command, ...]:
-        registers = ("OPERegister:CONDition", "OPERation:CONDition", "OPERegister[:EVENt]")
-        return (
-            Command("RUN", set=does(self.run)),
-            Command("STOP", set=does(self.stop)),
-            Command("SINGle", set=does(self.single)),
-            Command("DIGitize", set=self._digitize),
-            Command("AUToscale", set=lambda _: self.autoscale()),
-            Command("TRIGger:FORCe", set=does(self.force)),
-            Command("CDISplay", set=does(lambda: None)),
-            Command("TER", get=answers(self._trigger_event)),
-            Command("AER", get=answers(self._arm_event)),
-            Command(
-                "ADER", get=answers(lambda: f"{int(not self.running() and self.acquisition.latest is not None):+d}")
-            ),
-            *(Command(header, get=answers(lambda: f"{self._condition():+d}")) for header in registers),
-            Command("RSTate", get=answers(self._state)),
-            Command("*LRN", get=answers(lambda: ":SYST:SET " + self.block(self.setup()))),
-            Command("*OPT", get=answers(lambda: "0")),
-            *(row.bind(self) for row in PRESETS),
-        )
+    def adjusted(self, name: str, before: float) -> None:
+        """An offset beyond what the range allows is set to the nearest that it does."""
+        if name.startswith("chan") and name.endswith("_offset"):
+            n = int(name[4])
+            reach = (2.0 if self.value(f"chan{n}_scale") / _probe(self, n) < 0.2 else 50.0) * _probe(self, n)
+            self.settings[name] = min(max(self.value(name), -reach), reach)
+        super().adjusted(name, before)
 
-    def _digitize(self, parameters: list[str]) -> None:
+    def digitize_sources(self, parameters: list[str]) -> None:
         """Raises ScpiError in roll and XY mode, where there is no record."""
         if self.settings["time_mode"] in {"ROLL", "XY"}:
             raise ScpiError(-221)
@@ -137,74 +253,43 @@ class VirtualDSOX1000(VirtualOscilloscope):
 
     def trigger(self) -> None:
         """``*TRG`` is the same as ``:DIGitize`` without a source."""
-        self._digitize([])
+        self.digitize_sources([])
 
-    def _trigger_event(self) -> str:
+    def trigger_event(self) -> str:
+        """TER?: whether it has triggered since this was asked."""
         acquisition = self.acquisition
         acquisition.follow(self.now)
         event, acquisition.was_triggered = acquisition.was_triggered, False
         return f"{int(event):+d}"
 
-    def _arm_event(self) -> str:
+    def arm_event(self) -> str:
+        """AER?: whether it was armed since this was asked."""
         acquisition = self.acquisition
         ready = self.running() and self.now >= acquisition.filled
         event = acquisition.was_armed and (ready or acquisition.armed is None)
         acquisition.was_armed = acquisition.was_armed and not event
         return f"{int(event):+d}"
 
-    def _complete_event(self) -> str:
+    def complete_event(self) -> str:
+        """ADER?: whether a record is complete."""
         return f"{int(not self.running() and self.acquisition.latest is not None):+d}"
 
-    def _condition(self) -> int:
+    def condition(self) -> int:
+        """The operation register: bit 3 while it runs, bit 5 while it waits for a trigger."""
         if not self.running():
             return 0
         waits = self.now >= self.acquisition.filled and self.acquisition.first(self.now) is None
         return _RUN + _WAIT_TRIGGER * waits
 
-    def _state(self) -> str:
+    def state(self) -> str:
+        """RSTate?: RUN, SING or STOP."""
         if not self.running():
             return "STOP"
         return "SING" if self.acquisition.once else "RUN"
 
-    # --- settings ---
+    # --- settings as a whole ---
 
-    def _channel(self, n: int) -> tuple[Command, ...]:
-        head, name = f"CHANnel{n}:", f"chan{n}_"
-
-        def probe() -> float:
-            return self.value(name + "probe")
-
-        def rounded(value: float) -> float:
-            """An offset beyond what the range allows is set to the nearest that it does."""
-            reach = (2.0 if self.value(name + "scale") / probe() < 0.2 else 50.0) * probe()
-            return min(max(value, -reach), reach)
-
-        return (
-            self.quantity(head + "PROBe[:ATTenuation]", name + "probe", 10.0, limits=lambda: (0.1, 1e4)),
-            self.quantity(head + "SCALe", name + "scale", 5.0, unit="V", limits=lambda: (5e-4 * probe(), 10 * probe())),
-            self.full_range(
-                head + "RANGe",
-                name + "scale",
-                divisions=8,
-                limits=lambda: (4e-3 * probe(), 80 * probe(), 40.0),
-                unit="V",
-            ),
-            self.quantity(head + "OFFSet", name + "offset", 0.0, unit="V", limits=lambda: (-1e5, 1e5), rounded=rounded),
-            self.quantity(head + "PROBe:SKEW", name + "skew", 0.0, unit="S", limits=lambda: (-1e-7, 1e-7)),
-            self.word(head + "PROBe:STYPe", name + "probe_kind", ("DIFFerential", "SINGle"), "SING"),
-            Command(head + "PROBe:ID", get=answers(lambda: "NONE")),
-            self.word(head + "COUPling", name + "coupling", ("AC", "DC"), "DC"),
-            self.word(head + "IMPedance", name + "impedance", ("ONEMeg",), "ONEM"),
-            self.word(head + "UNITs", name + "unit", ("VOLT", "AMPere"), "VOLT"),
-            self.switch(head + "DISPlay", name + "display", default=n == 1),
-            self.switch(head + "BWLimit", name + "bandwidth"),
-            self.switch(head + "INVert", name + "invert"),
-            self.switch(head + "VERNier", name + "vernier"),
-            self.text(head + "LABel", name + "label", str(n), longest=10),
-            Command(f"CHANnel{n}", get=answers(lambda: self._whole_channel(n))),
-        )
-
-    def _whole_channel(self, n: int) -> str:
+    def whole_channel(self, n: int) -> str:
         """As ``:CHAN1?`` answers after ``*RST``: ``:CHAN1:RANG +40.0E+00;OFFS +0.00000E+00;…``."""
         s, name = self.settings, f"chan{n}_"
         return (
@@ -215,71 +300,17 @@ class VirtualDSOX1000(VirtualOscilloscope):
             f"PROB:SKEW {self.value(name + 'skew'):+.2E};STYP {s[name + 'probe_kind']}"
         )
 
-    def _time(self) -> tuple[Command, ...]:
-        def whole() -> str:
-            s = self.settings
-            ten = 10 * self.value("time_scale")
-            return f":TIM:MODE {s['time_mode']};REF {s['time_reference']};MAIN:RANG {ten:+.5E};POS {self._position()}"
-
-        return (
-            self.word("TIMebase:MODE", "time_mode", ("MAIN", "WINDow", "XY", "ROLL"), "MAIN"),
-            self.quantity("TIMebase[:MAIN]:SCALe", "time_scale", 1e-4, unit="S", limits=lambda: (5e-9, 50.0)),
-            self.full_range(
-                "TIMebase[:MAIN]:RANGe", "time_scale", divisions=10, limits=lambda: (50e-9, 500.0, 1e-3), unit="S"
-            ),
-            self.quantity(
-                "TIMebase:POSition",
-                "time_offset",
-                0.0,
-                unit="S",
-                limits=lambda: (-500.0, 500.0),
-                spell=lambda value: f"{value:+.12E}",
-            ),
-            self.quantity("TIMebase:DELay", "time_offset", 0.0, unit="S", limits=lambda: (-500.0, 500.0)),
-            self.word("TIMebase:REFerence", "time_reference", ("LEFT", "CENTer", "RIGHt"), "CENT"),
-            self.switch("TIMebase:VERNier", "time_vernier"),
-            self.quantity("TIMebase:WINDow:SCALe", "zoom_scale", 5e-5, unit="S", limits=lambda: (5e-9, 50.0)),
-            self.quantity("TIMebase:WINDow:POSition", "zoom_offset", 0.0, unit="S", limits=lambda: (-500.0, 500.0)),
-            Command("TIMebase", get=answers(whole)),
-            self.word("ACQuire:TYPE", "acquisition", ("NORMal", "AVERage", "HRESolution", "PEAK"), "NORM"),
-            self.word("ACQuire:MODE", "acquisition_mode", ("RTIMe", "SEGMented", "ETIMe"), "RTIM"),
-            self.whole("ACQuire:COUNt", "averages", 8.0, low=2, high=65536, sign="+"),
-            self.whole("ACQuire:COMPlete", "complete", 100.0, low=100, high=100, sign="+"),
-            self.whole("ACQuire:SEGMented:COUNt", "segments", 2.0, low=2, high=50, sign="+"),
-            Command("ACQuire:POINts[:ANALog]", get=answers(lambda: f"{self.full_scale()[1]:+d}")),
-            Command("ACQuire:SRATe[:ANALog]", get=lambda _: self.spell(self.full_scale()[0])),
-        )
+    def whole_time(self) -> str:
+        """As ``:TIM?`` answers."""
+        s = self.settings
+        ten = 10 * self.value("time_scale")
+        return f":TIM:MODE {s['time_mode']};REF {s['time_reference']};MAIN:RANG {ten:+.5E};POS {self._position()}"
 
     def _position(self) -> str:
         return f"{self.value('time_offset'):+.6E}"
 
-    def _trigger(self) -> tuple[Command, ...]:
-        sources = (*(f"CHANnel{n}" for n in self.channels), "EXTernal", "LINE", "WGEN")
-        modes = ("EDGE", "GLITch", "PATTern", "TV", "SHOLd", "TRANsition", "SBUS1")
-
-        def levels() -> tuple[float, float]:
-            """Three quarters of the full scale from the middle of the screen."""
-            source = str(self.settings["trigger_source"])
-            channel = int(source[4:]) if source.startswith("CHAN") else 1
-            reach, middle = 6 * self.division(channel), self.value(f"chan{channel}_offset")
-            return middle - reach, middle + reach
-
-        return (
-            self.word("TRIGger:MODE", "trigger_mode", modes, "EDGE"),
-            self.word("TRIGger[:EDGE]:SOURce", "trigger_source", sources, "CHAN1"),
-            self.word("TRIGger[:EDGE]:SLOPe", "trigger_slope", ("NEGative", "POSitive", "EITHer", "ALTernate"), "POS"),
-            self.quantity("TRIGger[:EDGE]:LEVel", "trigger_level", 0.0, unit="V", limits=levels),
-            Command("TRIGger:LEVel:ASETup", set=does(self.half_level)),
-            self.word("TRIGger:SWEep", "trigger_sweep", ("AUTO", "NORMal"), "AUTO"),
-            self.word("TRIGger[:EDGE]:COUPling", "trigger_coupling", ("AC", "DC", "LFReject"), "DC"),
-            self.word("TRIGger[:EDGE]:REJect", "trigger_rejection", ("OFF", "LFReject", "HFReject"), "OFF"),
-            self.quantity("TRIGger:HOLDoff", "holdoff", 60e-9, unit="S", limits=lambda: (60e-9, 10.0)),
-            self.switch("TRIGger:NREJect", "noise_rejection"),
-            self.switch("TRIGger:HFReject", "high_rejection"),
-            Command("TRIGger", get=answers(self._whole_trigger)),
-        )
-
-    def _whole_trigger(self) -> str:
+    def whole_trigger(self) -> str:
+        """As ``:TRIG?`` answers."""
         s = self.settings
         return (
             f":TRIG:MODE {s['trigger_mode']};SWE {s['trigger_sweep']};NREJ {int(s['noise_rejection'])};"
@@ -317,38 +348,11 @@ class VirtualDSOX1000(VirtualOscilloscope):
 
     # --- reading the record ---
 
-    def _waveform(self) -> tuple[Command, ...]:
-        """The rows for reading the record."""
-        sources = (*(f"CHANnel{n}" for n in self.channels), *_EMPTY_SOURCES)
-        parts = ("FORMat", "TYPE", "POINts", "COUNt", "XINC", "XOR", "XREF", "YINC", "YOR", "YREF")
-        words = {"XINC": "XINCrement", "XOR": "XORigin", "XREF": "XREFerence", "YINC": "YINCrement", "YOR": "YORigin"}
-        words |= {"YREF": "YREFerence", "TYPE": "TYPE", "COUNt": "COUNt"}
-        self._defaults["wav_points"] = float(_FOR_SCREEN)
-        return (
-            self.word("WAVeform:SOURce", "wav_source", sources, "CHAN1"),
-            self.word("WAVeform:FORMat", "wav_format", ("WORD", "BYTE", "ASCii"), "BYTE"),
-            self.word("WAVeform:BYTeorder", "wav_order", ("LSBFirst", "MSBFirst"), "MSBF"),
-            self.switch("WAVeform:UNSigned", "wav_unsigned", default=True),
-            self.word("WAVeform:VIEW", "wav_view", ("MAIN",), "MAIN"),
-            self.word("WAVeform:POINts:MODE", "wav_mode", ("NORMal", "MAXimum", "RAW"), "NORM"),
-            Command("WAVeform:POINts", self._set_points, answers(lambda: f"{self._sequence()[2]:+d}")),
-            Command("WAVeform:PREamble", get=answers(lambda: ",".join(self._preamble()))),
-            *(
-                Command(f"WAVeform:{words[part]}", get=answers(self._part(k)))
-                for k, part in enumerate(parts)
-                if part in words
-            ),
-            Command("WAVeform:DATA", get=answers(self._data)),
-        )
-
-    def _part(self, k: int) -> Callable[[], str]:
-        return lambda: self._preamble()[k]
-
-    def _set_points(self, parameters: list[str]) -> None:
+    def set_points(self, parameters: list[str]) -> None:
         """A number, rounded to the next the scope can give when it is asked for; MAXimum takes all."""
         self.settings["wav_points"] = number(one(parameters), low=1, high=8e6, default=_FOR_SCREEN)
 
-    def _sequence(self) -> tuple[Record, float, int]:
+    def sequence(self) -> tuple[Record, float, int]:
         """The record, the distance of the points that can be read [s], how many.  Raises ScpiError."""
         if self.settings["time_mode"] in {"ROLL", "XY"}:
             raise ScpiError(-221)
@@ -366,8 +370,9 @@ class VirtualDSOX1000(VirtualOscilloscope):
             raise ScpiError(-230)
         return int(source[4:])
 
-    def _preamble(self) -> list[str]:
-        record, step, points = self._sequence()
+    def preamble(self) -> list[str]:
+        """WAVeform:PREamble?: its ten fields.  Raises ScpiError."""
+        record, step, points = self.sequence()
         form = str(self.settings["wav_format"])
         kind = {"BYTE": 0, "WORD": 1, "ASC": 4}[form]
         mode = {"NORM": 0, "PEAK": 1, "AVER": 2, "HRES": 3}[str(self.settings["acquisition"])]
@@ -391,8 +396,9 @@ class VirtualDSOX1000(VirtualOscilloscope):
         source = str(self.settings["wav_source"])
         return int(source[4:]) if source.startswith("CHAN") else 0
 
-    def _data(self) -> str:
-        record, step, points = self._sequence()
+    def data(self) -> str:
+        """WAVeform:DATA?: the points, as a block.  Raises ScpiError."""
+        record, step, points = self.sequence()
         channel = self._channel_or_none()
         codes = (
             record.codes(channel, 0, points, of=points, start=record.origin, step=step)
@@ -416,42 +422,14 @@ class VirtualDSOX1000(VirtualOscilloscope):
         scale = record.inputs[channel]
         return ",".join(f"{v:+.5E}" for v in (codes - scale.zero) * scale.volts_per_code).encode()
 
-    # --- measurements, pictures, setups ---
+    def points(self, parameters: list[str]) -> str:
+        """WAVeform:POINts?: how many there are."""
+        none(parameters)
+        return f"{self.sequence()[2]:+d}"
 
-    def _rest(self) -> tuple[Command, ...]:
-        """The rows for measurements, pictures and setups."""
+    # --- measurements and pictures ---
 
-        def ignored(_: list[str]) -> None:
-            """What only changes the picture."""
-
-        self._defaults["measure_source"] = "CHAN1"
-        self._results: list[tuple[str, int]] = []
-        return (
-            Command("MEASure:SOURce", set=self._set_source, get=answers(lambda: str(self.settings["measure_source"]))),
-            self.word("MEASure:SHOW", "measure_shown", ("1", "ON"), "1"),
-            Command("MEASure:CLEar", set=does(self._clear_results)),
-            Command("MEASure:RESults", get=answers(self._all_results)),
-            *(
-                Command(f"MEASure:{word}", set=self._install(name), get=self._ask(name))
-                for word, name in _MEASUREMENTS.items()
-            ),
-            Command("DISPlay:DATA", get=self._picture),
-            *(Command(header, set=ignored) for header in ("DISPlay:CLEar", "SYSTem:DSP", "SYSTem:LOCK")),
-            self.switch("HARDcopy:INKSaver", "ink_saver", default=True),
-            self.switch("DISPlay:LABel", "labels"),
-            self.word("MEASure:STATistics", "statistics", ("ON", "CURRent", "MEAN"), "ON"),
-            Command(
-                "SYSTem:SETup",
-                set=lambda p: self.restore(block_content(one(p)).decode("latin-1")),
-                get=answers(self._setup),
-            ),
-            Command("SYSTem:PRESet", set=does(self.reset)),
-        )
-
-    def _setup(self) -> str:
-        return self.block(self.setup())
-
-    def _set_source(self, parameters: list[str]) -> None:
+    def set_source(self, parameters: list[str]) -> None:
         """One source, or two, of which only the first is measured."""
         if not 1 <= len(parameters) <= 2:
             raise ScpiError(-109 if not parameters else -108)
@@ -465,26 +443,32 @@ class VirtualDSOX1000(VirtualOscilloscope):
             return self.channel_of(str(self.settings["measure_source"]))
         return self.channel_of(parameters[-1])
 
-    def _install(self, name: str) -> Callable[[list[str]], None]:
-        def set_(parameters: list[str]) -> None:
-            self._results = [*self._results, (name, self._where(parameters))][-8:]
+    def source(self, parameters: list[str]) -> str:
+        """MEASure:SOURce?."""
+        none(parameters)
+        return str(self.settings["measure_source"])
 
-        return set_
+    def install(self, name: str, parameters: list[str]) -> None:
+        """MEASure:FREQuency and its like: a measurement more on the screen.  Raises ScpiError."""
+        self._results = [*self._results, (name, self._where(parameters))][-8:]
 
-    def _clear_results(self) -> None:
+    def clear_results(self) -> None:
+        """MEASure:CLEar."""
         self._results = []
 
-    def _ask(self, name: str) -> Callable[[list[str]], str]:
-        return lambda parameters: self._value(name, self._where(parameters))
+    def measurement(self, name: str, parameters: list[str]) -> str:
+        """MEASure:FREQuency? and its like.  Raises ScpiError."""
+        return self._value(name, self._where(parameters))
 
     def _value(self, name: str, channel: int) -> str:
         value = self.measured(name, channel)
         return self.spell(100 * value if name in _PERCENT and value < self.no_measurement else value)
 
-    def _all_results(self) -> str:
+    def all_results(self) -> str:
+        """MEASure:RESults?: what was installed, one after the other."""
         return ",".join(self._value(name, channel) for name, channel in self._results) or "NONE"
 
-    def _picture(self, parameters: list[str]) -> str:
+    def picture(self, parameters: list[str]) -> str:
         """``[<format>[,<palette>]]``.  Raises ScpiError."""
         if len(parameters) > 2:
             raise ScpiError(-108)

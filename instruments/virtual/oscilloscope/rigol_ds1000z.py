@@ -11,10 +11,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
-from instruments.virtual.core.parameters import at_most_one, block_content, boolean, choice, limit, number, one
+from instruments.virtual.core.parameters import at_most_one, boolean, choice, limit, number, one
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Row, Switch, Word, whole
-from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope, one_two_five
+from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope, one_two_five
 from instruments.virtual.oscilloscope.screenshot import bmp8, bmp24, draw, grey, png
 
 if TYPE_CHECKING:
@@ -184,11 +184,7 @@ _REST: tuple[Row, ...] = (
     whole("DISPlay:WBRightness", "brightness", 50.0, (0, 100)),
     whole("DISPlay:GBRightness", "grid_brightness", 50.0, (0, 100)),
     Both("DISPlay:DATA", None, lambda s, p: s.picture(p)),
-    Both(
-        "SYSTem:SETup",
-        lambda s, p: s.restore(block_content(one(p)).decode("latin-1")),
-        lambda s, _p: s.block(s.setup()),
-    ),
+    SETUP,
     Ask("SYSTem:ERRor:COUNt", lambda s: str(len(s.parser.errors))),
     Ask("SYSTem:GAM", lambda _s: "12"),
     Ask("SYSTem:RAM", lambda s: str(len(s.channels))),

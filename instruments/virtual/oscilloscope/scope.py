@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from instruments.virtual.core.device import Value, VirtualInstrument, answers
-from instruments.virtual.core.parameters import at_most_one, block_text, choice, limit, number, one
-from instruments.virtual.core.parser import Command, ScpiError
+from instruments.virtual.core.device import Value, VirtualInstrument
+from instruments.virtual.core.parameters import block_content, block_text, choice, number, one
+from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Both, short_header
 from instruments.virtual.core.trigger import crossings
 from instruments.virtual.oscilloscope.acquisition import LOOK_AHEAD, Acquisition, Plan
@@ -22,7 +22,7 @@ from instruments.virtual.oscilloscope.measure import Measured, measure
 from instruments.virtual.oscilloscope.record import COARSEST, Edge, Input, Record, open_input
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
@@ -104,97 +104,12 @@ class VirtualOscilloscope(VirtualInstrument):
         """Show this voltage in the middle of the screen, with so many volts per division."""
         raise NotImplementedError
 
-    # --- rows of settings ---
-
-    def quantity(
-        self,
-        pattern: str,
-        name: str,
-        default: float,
-        *,
-        unit: str = "",
-        limits: Callable[[], tuple[float, float]],
-        rounded: Callable[[float], float] = lambda value: value,
-        spell: Callable[[float], str] | None = None,
-    ) -> Command:
-        """A row for a number whose limits depend on other settings.  rounded: to what the instrument can do."""
-        self._defaults[name] = default
-        self._remember(pattern, name)
-
-        def set_(parameters: list[str]) -> None:
-            if len(parameters) > 2:  # a second one, as the source of a level, changes nothing here
-                raise ScpiError(-108)
-            low, high = limits()
-            value = number(one(parameters[:1]), low=low, high=high, default=default, unit=unit)
-            before, self.settings[name] = self.settings[name], rounded(value)
-            self.adjusted(name, float(before))
-
-        def ask(parameters: list[str]) -> str:
-            asked = at_most_one(parameters[:1])
-            low, high = limits()
-            bound = asked.upper() in {"MIN", "MAX", "DEF", "MINIMUM", "MAXIMUM", "DEFAULT"}
-            value = limit(asked, low=low, high=high, default=default) if bound else float(self.settings[name])
-            return (spell or self.spell)(value)
-
-        return Command(pattern, set_, ask)
-
-    def whole(self, pattern: str, name: str, default: float, *, low: float, high: float, sign: str = "") -> Command:
-        """A row for a whole number.  sign: "+" where the maker prints it."""
-        return self.quantity(
-            pattern,
-            name,
-            default,
-            limits=lambda: (low, high),
-            rounded=lambda value: float(round(value)),
-            spell=lambda value: f"{value:{sign}.0f}",
-        )
-
-    def percent(self, pattern: str, name: str) -> Command:
-        """A row for a percentage, 50 % at first."""
-        return self.whole(pattern, name, 50.0, low=0, high=100)
-
-    def full_range(
-        self, pattern: str, name: str, *, divisions: int, limits: Callable[[], tuple[float, float, float]], unit: str
-    ) -> Command:
-        """A row for a scale times all its divisions.  limits: lowest, highest, default."""
-
-        def set_(parameters: list[str]) -> None:
-            low, high, default = limits()
-            self.settings[name] = number(one(parameters), low=low, high=high, default=default, unit=unit) / divisions
-            self.changed(name)
-
-        return Command(pattern, set_, answers(lambda: self.spell(divisions * self.value(name))))
-
-    def word(self, pattern: str, name: str, words: tuple[str, ...], default: str) -> Command:
-        """A row for one word of several, as everywhere; it is part of the setup."""
-        self._remember(pattern, name)
-        return super().word(pattern, name, words, default)
-
-    def switch(self, pattern: str, name: str, *, default: bool = False) -> Command:
-        """A row for ON or OFF, as everywhere; it is part of the setup."""
-        self._remember(pattern, name)
-        return super().switch(pattern, name, default=default)
-
-    def text(self, pattern: str, name: str, default: str, *, longest: int) -> Command:
-        """A row for a string in quotes, cut to its greatest length, in capitals."""
-        self._defaults[name] = default
-        self._remember(pattern, name)
-
-        def set_(parameters: list[str]) -> None:
-            given = one(parameters)
-            if len(given) < 2 or given[0] not in "\"'" or given[-1] != given[0]:
-                raise ScpiError(-104)
-            self.settings[name] = given[1:-1].translate(_NOT_IN_LABELS)[:longest].upper()
-
-        return Command(pattern, set_, answers(lambda: f'"{self.settings[name]}"'))
-
-    def _remember(self, pattern: str, name: str) -> None:
-        self._headers[name] = ":" + short_header(pattern)
+    # --- settings ---
 
     def declare(self, name: str, header: str, default: Value) -> None:
         """There is this setting; it is part of the setup."""
         super().declare(name, header, default)
-        self._remember(header, name)
+        self._headers[name] = ":" + short_header(header)
 
     def value(self, name: str) -> float:
         """A setting that is a number."""
@@ -470,7 +385,12 @@ def _place(parameters: list[str]) -> int:
     return int(number(one(parameters), low=0, high=9, default=0))
 
 
-#: Setups in ten places.
+#: The setup as a block, and setups in ten places.
+SETUP = Both(
+    "SYSTem:SETup",
+    lambda s, p: s.restore(block_content(one(p)).decode("latin-1")),
+    lambda s, _p: s.block(s.setup()),
+)
 PRESETS = (Both("*SAV", lambda s, p: s.keep(p)), Both("*RCL", lambda s, p: s.recall(p)))
 
 

@@ -234,6 +234,7 @@ class Link:
         The instrument goes on with them when this has returned.  Returns False if they were not taken within this
         time [s].
         """
+        self.station.bus.heard()
         if not self.cut_off_by(data, end=end) and not await self.finished(within, given_up=given_up):
             return False
         self._raise_error()

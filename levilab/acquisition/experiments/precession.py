@@ -12,7 +12,7 @@ from pydantic_core import PydanticCustomError
 
 from analysis.precession.gates import FEWEST, Gates, Rate, Swing, pulses_too_many, rates_at_point, swing_of
 from instruments.errors import InstrumentError
-from levilab.acquisition.counting import prepare_counter
+from levilab.acquisition.counting import gate_began, prepare_counter
 from levilab.acquisition.driving import DriveSettings, NotHeld, check_drive, held_spin, sweep_drive
 from levilab.acquisition.experiment import Experiment
 from levilab.acquisition.session import ExperimentFailed
@@ -42,8 +42,6 @@ _LEAST_U_HZ = 1e-7
 #: A swing of more than this [turns] is taken off by a step of the drive's phase that lasts so long [s], if that is at
 #: most such a part of its period.  From half a turn on a top is lost.
 _CALM, _STEP_S, _SHORT = 0.12, 0.3, 0.25
-#: No top's pulses are so many in a gate: what is counted then is something else.
-_MOST_PERIODS = 1e9
 #: Of an oscilloscope's record of laser and drive: samples a second, and volts of a division; the drive has ±5 V.
 _RATE, _VOLTS_PER_DIVISION = 1000.0, 2.0
 
@@ -290,10 +288,10 @@ def _counted(session: Session[PrecessionSettings], drive: float, level_v: float,
 
 
 def _gate(end: float, gate_s: float, count: float | None) -> tuple[float, float, float]:
-    """Begin, end [s] and frequency [Hz] of a gate that ended now: it lasts up to the first pulse behind its length."""
-    if count is None or not count * gate_s < _MOST_PERIODS:
-        return end - gate_s, end, math.nan if count is None else count
-    return end - math.ceil(count * gate_s - 1e-6) / count, end, count
+    """Begin, end [s] and frequency [Hz] of a gate that ended now, NaN where it had no count."""
+    if count is None:
+        return end - gate_s, end, math.nan
+    return gate_began(end, gate_s, count), end, count
 
 
 def _still_held(session: Session[PrecessionSettings], drive: float, spins: Array) -> None:

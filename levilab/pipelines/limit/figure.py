@@ -29,8 +29,8 @@ _THEORY = {LOWER_EDGE: ("#D55E00", "--"), UPPER_EDGE: ("#D55E00", "--"), RESONAN
 #: A line of theory so many times farther from the mean than the farthest limit would squeeze the limits: it is named at
 #: the edge of the panel.
 _NEAR = 2.5
-#: Width of the figure; above a panel, a panel, and below it, where axis and legend are [inch].
-_WIDTH, _ABOVE, _PANEL, _BELOW = 9.0, 0.5, 2.9, 1.45
+#: Width of the figure; above a panel, a panel, below it for the axis, and for a line of the legend there [inch].
+_WIDTH, _ABOVE, _PANEL, _BELOW, _LINE = 9.0, 0.5, 2.9, 0.6, 0.17
 #: Bins of the distribution, a scatter from the mean on either side, and fewer limits than this have none.
 _BINS, _REACH, _FEWEST = 14, 3.5, 5
 
@@ -38,19 +38,27 @@ _BINS, _REACH, _FEWEST = 14, 3.5, 5
 def limit_figure(analysis: LimitAnalysis) -> Figure:
     """For each of the conditions the limits top by top with mean, scatter and theory, and how they are distributed."""
     with mpl.rc_context(STYLE):
-        each = _ABOVE + _PANEL + _BELOW
-        height = each * len(analysis.groups)
-        figure = Figure(figsize=(_WIDTH, height))
-        for k, group in enumerate(analysis.groups):
-            bottom = 1 - (k * each + _ABOVE + _PANEL) / height
-            left = figure.add_axes((0.085, bottom, 0.7, _PANEL / height))
-            right = figure.add_axes((0.805, bottom, 0.18, _PANEL / height), sharey=left)
-            _draw_limits(left, analysis, group)
+        figure = Figure()
+        rows: list[tuple[Axes, Axes, float]] = []
+        for group in analysis.groups:
+            left = figure.add_axes((0.085, 0, 0.7, 1), label=f"limits {len(rows)}")
+            right = figure.add_axes((0.805, 0, 0.18, 1), label=f"distribution {len(rows)}", sharey=left)
+            lines = _draw_limits(left, analysis, group)
             _draw_distribution(right, analysis, group)
+            rows.append((left, right, _BELOW + _LINE * lines))
+        height = sum(_ABOVE + _PANEL + below for _, _, below in rows)
+        figure.set_size_inches(_WIDTH, height)
+        top = height
+        for left, right, below in rows:
+            top -= _ABOVE + _PANEL
+            left.set_position((0.085, top / height, 0.7, _PANEL / height))
+            right.set_position((0.805, top / height, 0.18, _PANEL / height))
+            top -= below
     return figure
 
 
-def _draw_limits(axes: Axes, analysis: LimitAnalysis, group: Limits) -> None:
+def _draw_limits(axes: Axes, analysis: LimitAnalysis, group: Limits) -> int:
+    """The limits of a group top by top; returns the number of lines of the legend."""
     found, mean = group.statistics, group.statistics.mean.value or 0.0
     every = _limits(analysis, group)
     start = 1
@@ -82,7 +90,8 @@ def _draw_limits(axes: Axes, analysis: LimitAnalysis, group: Limits) -> None:
     synthetic = all(analysis.sources[number].synthetic for number in group.runs)
     title = ("Lower limit: the spin at which a free top falls", _upper_title(group))[group.which == "upper"]
     axes.set_title(title + "  (SYNTHETIC)" * synthetic + "\n" + group.conditions.text, loc="left", fontsize=9)
-    axes.legend(loc="upper left", bbox_to_anchor=(-0.02, -0.16), ncols=2, fontsize=8, borderaxespad=0)
+    legend = axes.legend(loc="upper left", bbox_to_anchor=(-0.02, -0.16), ncols=2, fontsize=8, borderaxespad=0)
+    return (len(legend.get_texts()) + 1) // 2
 
 
 def _draw_run(axes: Axes, analysis: LimitAnalysis, group: Limits, k: int, start: int) -> int:
@@ -168,4 +177,4 @@ def _draw_distribution(axes: Axes, analysis: LimitAnalysis, group: Limits) -> No
     y = np.linspace(*axes.get_ylim(), 200)
     normal = np.exp(-0.5 * ((y - mean) / s) ** 2) / np.sqrt(2 * np.pi)
     axes.plot(len(limits) * (2 * _REACH / _BINS) * normal, y, color=_MEAN, linewidth=1)
-    axes.set_title("and a normal law", loc="left", fontsize=8)
+    axes.set_title("distribution, normal law", loc="left", fontsize=8)

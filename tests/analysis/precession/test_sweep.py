@@ -7,6 +7,7 @@ import pytest
 from scipy import stats
 
 from analysis.errors import NotPositive, ShapesDiffer
+from analysis.precession.gates import Gates
 from analysis.precession.line import fit_line
 from analysis.precession.miscounts import robust_line
 from analysis.precession.power import probability_of_telling, what_it_takes
@@ -147,3 +148,23 @@ def test_what_is_no_sweep_is_named():
         fit_sweep(sweep(counted(p1=-1.0)))
     with pytest.raises(ShapesDiffer, match="u of the drive"):
         fit_sweep(sweep(counted(), u_drive=np.ones(3)))
+
+
+def test_a_clock_that_is_off_by_one_share_does_not_ask_for_the_orthogonal_line():
+    exact = fit_sweep(sweep(counted(), u_drive=2e-5 * DRIVE))
+    assert not exact.warnings
+    (text,) = fit_sweep(sweep(counted(), u_drive=2e-3 * DRIVE)).warnings
+    assert "as that of a clock: the slope is uncertain by 0.002 beside its u" in text
+    assert "orthogonal" not in text
+
+
+def test_whole_counts_are_judged_by_the_gates_where_they_are_known():
+    begin = 1.2 * np.arange(10)
+    length = np.linspace(0.75, 1.25, 10)
+    gates = [Gates(begin, begin + length, np.full(10, f)) for f in DRIVE]
+    missed = [*gates[:3], Gates(begin, begin + length, DRIVE[3] - 1 / length), *gates[4:]]
+    precession = counted(n3=-1.0)
+    fit = fit_sweep(sweep(precession, gates=tuple(missed)))
+    assert fit.points[3].miscount == "1 pulse too few in each gate"
+    slower = [*gates[:3], Gates(begin, begin + length, np.full(10, DRIVE[3] - 1.0)), *gates[4:]]
+    assert fit_sweep(sweep(precession, gates=tuple(slower))).points[3].used  # 1 Hz less in all gates: no whole counts

@@ -5,6 +5,10 @@ import pytest
 
 from analysis.errors import NotPositive, OnlyHum, ShapesDiffer, TooFewPulses
 from analysis.pulses import spin_of_trace
+from analysis.pulses.clean import clean
+from analysis.pulses.regression import fit_turns
+from analysis.pulses.search import shorten
+from analysis.pulses.trace import Trace, _without_trap
 from levilab.benchmark.estimators.study import bound
 from levilab.benchmark.estimators.traces import DURATION, DUTY, HARD, RATE, Case, make
 
@@ -112,6 +116,62 @@ def test_what_runs_with_the_mains_is_named_and_hum_is_no_top():
     assert "mains" in names(locked)
     with pytest.raises(OnlyHum, match="hum of the mains"):
         spin_of_trace(np.sin(2 * np.pi * 50 * TIME) + noise(), RATE)
+
+
+def test_two_equal_marks_that_are_not_opposite_are_one_top():
+    found = spin_of_trace(light(PHASE) + light(PHASE, 0.1) + noise(), RATE)
+    assert found.frequency.value == pytest.approx(29.8, abs=0.01)
+    assert [note.text for note in found.notes if note.name == "double"] == [
+        "every second pulse is not half-way between its neighbours: two marks a turn, twice the frequency was not taken"
+    ]
+    opposite = spin_of_trace(light(PHASE) + light(PHASE, 0.0) + noise(), RATE)
+    assert opposite.frequency.value == pytest.approx(59.6, abs=0.02)  # nothing in the trace tells it from one mark
+    assert opposite.notes == ()
+
+
+def test_half_the_frequency_of_a_weak_trace_is_seen_and_named():
+    """A phase that starts at half the frequency, as a weak trace with missing pulses can have it."""
+    samples = light(PHASE) + noise(0.3)
+    trace = Trace(clean(samples, RATE, shorten(samples, 8), None), RATE)
+    fit = fit_turns(TIME[::400], 0.5 * PHASE[::400])
+    found, notes = _without_trap(trace, trace.match(fit, None), None)
+    assert found.fit.frequency(np.array([2.0]))[0] == pytest.approx(29.8, abs=0.001)
+    assert [note.text for note in notes] == [
+        "two equal pulses a turn: half the frequency fitted too, and was not taken"
+    ]
+
+
+@pytest.mark.parametrize(("spin", "reflection"), [(29.935, 0.6), (20.0, 0.6), (24.99, 0.0), (33.333, 0.6)])
+@pytest.mark.parametrize("method", ["auto", "edges"])
+def test_the_pulses_own_harmonics_are_no_hum(spin, reflection, method):
+    turns = spin * TIME  # held: 4 or 5 times the spin is a multiple of the mains, or nearly
+    samples = light(turns) + reflection * light(turns, 0.6) + noise()
+    found = spin_of_trace(samples, RATE, method=method)
+    assert "hum" not in names(found)
+    assert abs(found.frequency.value - spin) < 5 * found.frequency.u
+    hum = spin_of_trace(samples + 0.3 * np.sin(2 * np.pi * 100 * TIME + 1), RATE, method=method)
+    told = next(note.text for note in hum.notes if note.name == "hum")
+    assert float(told.split("at ")[1].split()[0]) == pytest.approx(100, abs=0.1)
+    assert abs(hum.frequency.value - spin) < 5 * hum.frequency.u
+
+
+def test_a_trace_without_noise_holds_no_hum_and_no_wandering_baseline():
+    for spin in (29.4, 99.9, 100.39):
+        found = spin_of_trace(light(spin * TIME), RATE)
+        assert found.frequency.value == pytest.approx(spin, abs=1e-5)
+        assert not {"hum", "wander"} & names(found)
+
+
+@pytest.mark.parametrize("method", ["auto", "edges"])
+@pytest.mark.parametrize("spin", [20.0, 25.0, 29.8507, 31.25])
+def test_flanks_between_samples_are_in_the_uncertainty(spin, method):
+    """Turns of a whole number of samples, or nearly: roundings do not average out, and no residual shows them."""
+    for part in (1e-6, 3e-6, 1e-5, 3e-5):  # of the frequency beside it: 0.08 to 2.4 samples in four seconds
+        turns = spin * (1 + part) * TIME
+        samples = np.where(np.abs(turns % 1 - 0.5) < 0.015, 1.0, 0.0)
+        found = spin_of_trace(samples, RATE, method=method)
+        assert abs(found.frequency.value - spin * (1 + part)) < 4 * found.frequency.u
+        assert found.frequency.u < spin / (TIME[-1] * RATE)  # one sample more or less in all of the record
 
 
 @pytest.mark.parametrize("shape", ["half a turn", "sine", "dark", "logic"])

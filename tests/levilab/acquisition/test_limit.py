@@ -21,6 +21,7 @@ from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import Configuration, settings_of, with_settings
 from levilab.bench.config import ConfigError
 from levilab.errors import UsageError
+from levilab.pipelines.limit.analysis import LimitOptions, analyze_limits
 from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
 from levilab.world.spin_world import SpinScene, SpinWorld, drawn
 from support.acquisitions import Impatient, Silent, in_world
@@ -93,6 +94,22 @@ def test_a_top_that_slips_before_it_is_missed_has_its_limit_within_u(tmp_path: P
     assert "lock lost" in kinds(run)
     assert abs(limit - 36) < 2 * u  # an even distribution ends at 1.7 u
     assert u < 0.5
+
+
+def test_the_mean_of_tops_that_are_all_alike_is_no_better_than_a_step(tmp_path: Path) -> None:
+    """Four tops that are lost at exactly 36 Hz: their limits hardly scatter, and all are wrong by the same."""
+    run = acquire(
+        in_world(mock(tmp_path, *SLIPS[:-1], "limit.repetitions=4"), Slipping(SpinScene(), VirtualClock())), Silent()
+    )
+    (found,) = (one.statistics for one in analyze_limits([run.folder], LimitOptions()).runs)
+    assert found.n == 4
+    assert found.mean.value is not None
+    assert found.mean.u is not None
+    assert found.scatter
+    assert found.scatter.value is not None
+    assert abs(found.mean.value - 36) < 2 * found.mean.u
+    assert found.mean.u > found.scatter.value / 2  # of four
+    assert found.step > 0.03  # a look each 0.2 Hz, a quarter of it
 
 
 def test_a_limit_is_kept_though_the_generator_fails_as_it_is_switched_off(

@@ -72,6 +72,12 @@ TABLES = {
     "UTF-16 little": (codecs.BOM_UTF16_LE + "Zeit;f\r\n0;61,5\r\n0,5;61,25\r\n1;61\r\n".encode("utf-16-le"), PLAIN),
     "UTF-16 big": (codecs.BOM_UTF16_BE + "t\tf\r\n0\t61.5\r\n.5\t61.25\r\n1\t61\r\n".encode("utf-16-be"), PLAIN),
     "angle": ("t,omega\n" + "".join(f"{t},{2 * np.pi * f!r}\n" for t, f in zip(*PLAIN.values(), strict=True)), PLAIN),
+    "stopwatch": ("t,f\n0:00,61.5\n0:00.5,61.25\n0:01,61\n", PLAIN),
+    "stopwatch in a column of minutes": ("t [min],f\n0:00,61.5\n0:00.5,61.25\n0:01,61\n", PLAIN),
+    "clock": ("Uhrzeit;f\n14:05:12;61,5\n14:05:12,5;61,25\n14:05:13;61\n", PLAIN | {T: [50712, 50712.5, 50713]}),
+    "dates": ("t,f\n2026-11-20T14:05:12Z,61.5\n2026-11-20T14:05:12.5Z,61.25\n2026-11-20T15:05:13+01:00,61\n", PLAIN),
+    "thousands with points": ("Temps (s);vitesse (tr/min)\n0;3.690,0\n0,5;3.675,0\n1;3.660,0\n", PLAIN),
+    "LabVIEW's title of the times": ("X_Value,f [Hz]\n0,61.5\n0.5,61.25\n1,61\n", PLAIN),
     "field scan": (
         "z/mm;u_z/mm;B [mT]\n10;0,5;20\n20;0,5;10\n30;0,5;5\n",
         {"height_m": [0.01, 0.02, 0.03], "height_u_m": [5e-4] * 3, "flux_density_t": [0.02, 0.01, 0.005]},
@@ -175,7 +181,7 @@ ERRORS = {
     "too few fields": ("t,f\n0,61.5\n0.5\n1,61\n", None, ["line 3", "'0.5'", "1 field,", "2 are expected"]),
     "too many fields": ("t,f\n0,61.5\n0.5,61,7\n1,61\n2,60\n", None, ["line 3", "3 fields"]),
     "second header": (GOOD + GOOD, None, ["line 5", "'t'"]),
-    "thousands separator": ("t;f\n0;1.061,5\n1;1.061,2\n2;1.061,1\n", None, ["line 2", "'1.061,5'"]),
+    "thousands separator": ("t;f\n0;1.061\n1;1.061,2\n2;1.061,1\n", None, ["line 2", "'1.061'"]),
     "underscore": ("t,f\n0,61\n1,6_1\n2,60\n", None, ["line 3", "'6_1'"]),
     "two frequencies": ("t,f,rpm\n0,1,60\n1,1,60\n2,1,60\n", None, ["'f', 'rpm'", "`columns` = f=2 or f=3"]),
     "wrong name": (GOOD, {"f": "nu"}, ["no column 'nu'", "'t', 'f'"]),
@@ -240,6 +246,28 @@ def test_an_unreadable_file_is_told(error, words, table_file, monkeypatch):
     for read in (read_table, read_run_readings):
         with pytest.raises(TableError, match=words):
             read(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "columns", "says"),
+    [
+        (
+            "t,period_ms\n0,25\n1,26\n2,27\n",
+            {},
+            "'period_ms' could become one: write its inverse into the column",
+        ),
+        ("t,turns in 10 s\n0,400\n1,390\n2,380\n", {}, "write turns over the time that they took into the column"),
+        ("t,period_ms\n0,25\n1,26\n2,27\n", {"f": "2"}, "has the unit ms, which is none of frequency"),
+        ("t,spin (ms)\n0,25\n1,26\n2,27\n", {"f": "2"}, "say which unit it is, as NAME [Hz]"),
+        ("t,f\n0,61.5 ± 0.1\n1,61.2 ± 0.1\n2,61\n", {}, "into a column of its own, with the title u"),
+        ("t,f\n0:00,61.5\n0:99,61.2\n0:10,61\n", {}, "line 3: '0:99' stands in column 't'"),
+        ("t,f\n0,0:10\n1,61.2\n2,61\n", {}, "'0:10' stands in column 'f'"),
+    ],
+)
+def test_what_is_nearly_a_reading_is_told_with_what_to_do(text, columns, says, table_file):
+    with pytest.raises(TableError) as error:
+        read_table(table_file(text), columns=columns, needed=[F])
+    assert says in str(error.value)
 
 
 def test_a_missing_column_is_told_with_those_there_are(table_file):

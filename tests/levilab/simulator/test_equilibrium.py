@@ -107,6 +107,11 @@ def test_a_map_is_written_as_a_table_and_a_picture(tmp_path):
     assert np.isnan(found.slowest[-1])  # nothing of 25.6 g floats
 
 
+def test_masses_of_a_map_in_grams_are_refused_with_the_same_in_kilograms():
+    with pytest.raises(UsageError, match=r"Were grams meant\?  They are 0\.0252:0\.0256:0\.0002"):
+        survival_map(UNDRIVEN, spins=(20.0, 32.0, 4), masses=(25.2, 25.6, 3), duration=2.0)
+
+
 def test_a_map_has_a_legend_and_marks_the_masses_at_which_the_theory_ends():
     found = survival_map(UNDRIVEN, spins=(20.0, 32.0, 4), masses=(0.0245, 0.0256, 3), duration=2.0)
     assert found.floating == ((pytest.approx(0.024742, abs=1e-6), pytest.approx(0.025485, abs=1e-6)),)

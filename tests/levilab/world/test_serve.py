@@ -13,10 +13,12 @@ import pytest
 import pyvisa
 from typer.testing import CliRunner
 
+from instruments.clock import WallClock
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
-from instruments.virtual.servers.server import LOOPBACK
+from instruments.virtual.servers.server import LOOPBACK, BenchServer
 from levilab.cli.bench import bench_app
 from levilab.errors import UsageError
+from levilab.world.bench import own_world, virtual_bus
 from levilab.world.serve import Service, chosen_models, serve
 
 #: How long something is waited for [s]; reached by a failure only, however busy the machine is.
@@ -68,6 +70,17 @@ def test_the_line_names_every_instrument_each_answers_and_sigterm_ends_it():
             assert ended(process, signal.SIGTERM) == (0, "", "")
             with contextlib.suppress(pyvisa.VisaIOError):
                 client.close()
+
+
+def test_a_served_top_begins_to_spin_down_with_the_first_message():
+    world = own_world(WallClock(waits=True))
+    bus = virtual_bus(world)
+    bus.heard = world.clock.begin
+    with BenchServer(bus) as server:
+        assert world.clock.now() == 0.0
+        (counter,) = (offer for offer in server.offers if "counter" in offer.address)
+        assert "53230A" in ask(counter.resources["socket"], "*IDN?")
+        assert world.clock.now() > 0.0
 
 
 @pytest.mark.parametrize(("spin", "low", "high"), [(30.0, 20, 31), (15.0, 9e37, 1e38)], ids=["up", "fallen"])

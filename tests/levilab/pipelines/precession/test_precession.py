@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from analysis.precession.gates import Gates, rates_at_point
 from instruments.drivers.oscilloscope import Trace
 from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
@@ -14,6 +15,7 @@ from levilab.pipelines.precession.analysis import PrecessionAnalysis, Precession
 from levilab.pipelines.precession.document import DOCUMENT
 from levilab.pipelines.result import save
 from levilab.report.page import render
+from levilab.runs.gates import COUNTED, gates_event
 from levilab.runs.run import RunRecord, utc_now
 from levilab.runs.writer import RunWriter
 from support.commands import command
@@ -159,3 +161,26 @@ def test_figure_and_page_show_what_was_found(tmp_path: Path) -> None:
     assert "mean vector" in page
     assert "half the frequency was counted" in page
     assert "left out" in page
+
+
+def test_a_reading_that_is_not_that_of_its_gates_is_believed_itself(tmp_path: Path) -> None:
+    """Where readings.csv was corrected by hand, the gates in events.jsonl are of something else."""
+    random = np.random.default_rng(2)
+    begin = 1.3 * np.arange(10)
+    names = ("time_s", "drive_frequency_hz", "precession_frequency_hz", "precession_frequency_u_hz")
+    channels = [{"name": name, "unit": "s" if name == "time_s" else "Hz", "source": "made up"} for name in names]
+    for change in (0.0, 0.01):
+        started = {"experiment": "precession", "status": "running", "started_utc": utc_now()}
+        record = RunRecord(**started, channels=channels, configuration={"precession": {}})
+        with RunWriter.create(tmp_path / f"{change}", record) as writer:
+            for k, drive in enumerate((44.0, 40.0, 36.0)):
+                length = random.uniform(0.75, 1.25, 10)
+                spin, laser = (Gates(begin, begin + length, drive + 0.02 * random.standard_normal(10)) for _ in "ab")
+                writer.event(20.0 * k + 19, COUNTED, "counted", drive_frequency_hz=drive, **gates_event(spin, laser))
+                counted = rates_at_point(spin, laser)[1].value + change
+                writer.reading(dict(zip(names, (20.0 * (k + 1), drive, counted, 0.5), strict=True)))
+            writer.finish("finished")
+        (run,) = analyze_precessions([writer.folder], PrecessionOptions()).runs
+        assert (run.fit.points[0].u == 0.5) == bool(change)
+        assert (run.fit.points[0].spin is None) == bool(change)
+    assert analyze_precessions([writer.folder], PrecessionOptions()).all_warnings[0].endswith("the gates are not used")
