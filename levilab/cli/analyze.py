@@ -152,8 +152,8 @@ OPTIONS = {
             Tilt,
             typer.Option(
                 "--tilt",
-                help="Whether counts hold the tilt of the top's moment.  auto: where they demand it, and u has what noise "
-                "may hide of it.  none: a top that only spins.",
+                help="Whether counts hold the tilt of the top's moment.  auto: where they demand it, and u has what "
+                "noise may hide of it.  none: a top that only spins.",
             ),
         ],
         Tilt.AUTO,
