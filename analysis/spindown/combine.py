@@ -25,7 +25,7 @@ from analysis.spindown.fit import (
 from analysis.spindown.lawfit import ROUNDING, LawFit
 from analysis.spindown.selection import NO_FIT, Statistics, statistics, weigh
 from analysis.spindown.verdict import Verdict, verdict
-from analysis.uncertainty import Estimate
+from analysis.uncertainty import Estimate, curvature
 
 Array = NDArray[np.float64]
 
@@ -114,7 +114,19 @@ def combine(runs: Sequence[SpinDown]) -> Combined:
     fits = tuple(_combined(name, [run.fit(name) for run in runs], weighed[name]) for name in names)
     exponent = next((fit.constants["exponent"] for fit in fits if fit.name == "power"), None)
     fall = max(float(1 - run.frequency[-1] / run.frequency[0]) for run in runs)
-    decision = verdict(weighed, criterion, fall=fall, exponent=exponent, correlation=correlation, tilt=tilt)
+    decision = (
+        runs[0].verdict
+        if len(runs) == 1
+        else verdict(
+            weighed,
+            criterion,
+            fall=fall,
+            exponent=exponent,
+            correlation=correlation,
+            tilt=tilt,
+            broken=_broken(runs),
+        )
+    )
     mixed = 0 < sum(run.u is None for run in runs) < len(runs)
     n = sum(len(run.time) for run in runs)
     said = [
@@ -129,6 +141,15 @@ def tilt_demanded(runs: Sequence[SpinDown]) -> bool:
     """Whether runs that do not demand the count's tilt each by itself do so together."""
     gains = [run.tilt_gain for run in runs if run.tilt_gain is not None]
     return len(gains) > 1 and sum(gains) > TILT_DEMANDED
+
+
+def _broken(runs: Sequence[SpinDown]) -> str:
+    """Which of several runs no law describes."""
+    numbers = [k for k, run in enumerate(runs, 1) if not run.verdict.describes]
+    if not numbers:
+        return ""
+    which = ", ".join(map(str, numbers))
+    return f"none describes run {which} of {len(runs)}" if len(numbers) == 1 else f"none describes the runs {which}"
 
 
 def _correlation(runs: Sequence[SpinDown]) -> Correlation | None:
@@ -194,7 +215,7 @@ def _statistics(runs: Sequence[SpinDown], name: str) -> Statistics:
         fit.residuals / run.u if all_known and run.u is not None else fit.residuals
         for run, fit in zip(runs, fits, strict=True)
     ]
-    spared, chi_square_more, rss_more = _common_exponent(fits)
+    spared, chi_square_more, rss_more = _common_exponent(runs, fits)
     return statistics(
         n=sum(fit.statistics.n for fit in fits),
         n_parameters=sum(fit.statistics.n_parameters for fit in fits) - spared,
@@ -206,7 +227,7 @@ def _statistics(runs: Sequence[SpinDown], name: str) -> Statistics:
     )
 
 
-def _common_exponent(fits: Sequence[LawFit]) -> tuple[int, float, float]:
+def _common_exponent(runs: Sequence[SpinDown], fits: Sequence[LawFit]) -> tuple[int, float, float]:
     """The law is common to the runs, so a free exponent is one parameter, not one a run: what that spares and costs.
 
     Near their minima χ² and RSS are parabolas in the exponent. With one exponent for all, their mean weighted by 1/u²,
@@ -219,7 +240,7 @@ def _common_exponent(fits: Sequence[LawFit]) -> tuple[int, float, float]:
     ):
         return 0, 0.0, 0.0
     values = np.array([e.value for e in exponents if e])
-    u = np.array([e.u for e in exponents if e])
+    u = np.array([_own_u(run, fit) for run, fit in zip(runs, fits, strict=True)])
     stated = np.array([fit.statistics.inflation for fit in fits])  # u was enlarged by its root
     noise = np.array([fit.statistics.rss / fit.statistics.degrees_of_freedom for fit in fits])
     # RSS of a run grows by its noise for each (u by the scatter)²; where u was stated that is not its own scatter's
@@ -232,6 +253,22 @@ def _common_exponent(fits: Sequence[LawFit]) -> tuple[int, float, float]:
     weights = stated / u**2
     away = (values - weights @ values / weights.sum()) ** 2 / u**2
     return len(fits) - 1, float(stated @ away), float((noise * own) @ away)
+
+
+def _own_u(run: SpinDown, fit: LawFit) -> float:
+    """U of the exponent by the readings' independent noise alone: neither correlation nor a tilt is part of χ²."""
+    stated = fit.parameters["exponent"].u
+    assert stated
+    if fit.has_tilt:
+        return stated
+    reference, duration = fit.reference
+    slopes = fit.law.gradient((run.time - fit.start_time) / duration, fit.solution)
+    found = curvature(slopes if run.u is None else slopes * reference / run.u).covariance
+    if found is None:
+        return stated
+    of = fit.statistics
+    variance = of.inflation if run.u is not None else of.rss / of.degrees_of_freedom / reference**2
+    return float(np.sqrt(found[2, 2] * variance)) or stated
 
 
 def _combined(name: str, fits: Sequence[LawFit], stats: Statistics) -> CombinedLaw:

@@ -210,6 +210,7 @@ def fit_law(
     *,
     rho: float = 0.0,
     plain: Solution | None = None,
+    spread: Array | None = None,
 ) -> LawFit:
     """The solution in textbook constants, with uncertainties and statistics.
 
@@ -220,6 +221,7 @@ def fit_law(
         seed: of a bootstrap.
         rho: correlation of neighbouring readings' noise.
         plain: the same law without the count's tilt, where `found` has it.
+        spread: what is to be added to the covariance of the dimensionless parameters, shape (p, p).
     """
     law, readings = found.law, found.readings
     values, slopes = law.natural(found.q, readings.reference_hz, readings.duration)
@@ -228,6 +230,10 @@ def fit_law(
     intervals = _INTERVALS[uncertainty](found, values, independent, samples, seed)
     if plain is not None:
         covariance, u = _with_unknown_part(covariance, u, values, _natural(plain))
+    if spread is not None:
+        more, u_more = propagate(spread, slopes)
+        covariance = None if covariance is None or more is None else covariance + more
+        u = np.hypot(u, u_more)
     intervals = [
         _stretched(interval, float(value), float(wide / own) if own > 0 else 1.0)
         for interval, value, wide, own in zip(intervals, values, u, independent, strict=True)
@@ -308,6 +314,12 @@ def _with_unknown_part(covariance: Array | None, u: Array, values: Array, plain:
         return covariance, u
     wider = np.hypot(u, change)
     return (None if covariance is None else covariance + np.outer(change, change)), wider
+
+
+def noise(found: Solution, rho: float) -> float:
+    """Standard deviation of a reading in units of its u; correlated noise as if it were so much larger."""
+    variance = _variance(found, float(found.degrees_of_freedom), correlated=False)
+    return float("nan") if variance is None else float(np.sqrt(variance * (1 + rho) / (1 - rho)))
 
 
 def _stretched(interval: tuple[float, float] | None, value: float, by: float) -> tuple[float, float] | None:

@@ -16,7 +16,7 @@ from analysis.uncertainty import Estimate
 EXCLUDED, TIED = 10.0, 4.0  # differences of AICc, Burnham & Anderson (2002) §2.6
 # Residuals that noise with a correlation of `analysis.residuals.NOISE` makes less often than this have a shape; where
 # the scatter exceeds the stated uncertainties, this much is enough against independent readings.
-SHAPE, SHAPE_BEYOND_U = 0.003, 0.01
+SHAPE, SHAPE_BEYOND_U = 0.005, 0.01
 SPECIAL_CASES = {"mixed": ("stokes", "newton"), "power": ("stokes", "newton", "disc")}
 _SIMPLE = ("stokes", "newton", "disc")
 
@@ -54,6 +54,7 @@ def verdict(
     exponent: Estimate | None,
     correlation: Correlation | None = None,
     tilt: Estimate | None = None,
+    broken: str = "",
 ) -> Verdict:
     """What the readings say about the laws.
 
@@ -64,6 +65,7 @@ def verdict(
         exponent: of the power law, where it was fitted.
         correlation: of what the best law leaves over.
         tilt: of the moment against the axis [rad], where the count shows it.
+        broken: what no drag and no noise does with the readings, as a clause; empty: nothing of the kind.
     """
     best = next(iter(fits))
     telling = criterion == "aicc" or (criterion == "bic" and fits[best].sigma_known)
@@ -71,10 +73,10 @@ def verdict(
     listed = {kind: tuple(name for name in fits if kinds[name] == kind) for kind in ("tied", "needless", "weak")}
     excluded = tuple((name, _reason(name, best, fits)) for name in fits if kinds[name] == "excluded")
     open_ = [name for name in (*listed["tied"], *listed["weak"]) if name in _SIMPLE]
-    described = _describes(fits[best], correlation)
+    described = not broken and _describes(fits[best], correlation)
     decided = telling and len(open_) <= 1 and described
     if not described:
-        first = _no_law(best, fits[best], correlation)
+        first = _no_law(best, fits[best], correlation, broken)
     else:
         first = _about_best(listed["tied"], exponent) if decided else _undecided(fits[best].n, fall, open_)
     sentences = [
@@ -99,13 +101,14 @@ def _describes(best: Statistics, correlation: Correlation | None) -> bool:
     return correlation.p_shape >= SHAPE and not (best.inflation > 1 and correlation.p < SHAPE_BEYOND_U)
 
 
-def _no_law(best: str, fit: Statistics, correlation: Correlation | None) -> str:
+def _no_law(best: str, fit: Statistics, correlation: Correlation | None, broken: str) -> str:
     alike = f", neighbours correlated by {correlation.value:.2f}" if correlation else ""
     beyond = f", {digits(fit.inflation**0.5)} times the stated uncertainties" if fit.inflation > 1 else ""
+    left = f"what the best one, {best}, leaves over ({digits(fit.rms_residual)} Hz rms{beyond})"
+    why = f"{broken}; {left} is no noise" if broken else f"{left} has a shape{alike}"
     return (
-        f"No law describes these readings: what the best one, {best}, leaves over ({digits(fit.rms_residual)} Hz "
-        f"rms{beyond}) has a shape{alike}. Its constants and their uncertainties are those of a curve through the "
-        "readings, not of a drag."
+        f"No law describes these readings: {why}. Its constants and their uncertainties are those of a curve through "
+        "the readings, not of a drag."
     )
 
 

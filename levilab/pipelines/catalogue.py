@@ -21,7 +21,7 @@ from levilab.pipelines.precession.columns import precession_columns
 from levilab.pipelines.precession.document import DOCUMENT as PRECESSION
 from levilab.pipelines.precession.report import precession_part
 from levilab.pipelines.precession.table import precession_tables
-from levilab.pipelines.result import Place, read_inputs, results_in
+from levilab.pipelines.result import Place, is_of_another, read_inputs, results_in
 from levilab.pipelines.result import save as save_files
 from levilab.pipelines.sources import data_files
 from levilab.pipelines.spin.columns import spin_columns
@@ -235,15 +235,15 @@ def save(analysis: Analysis[A], found: A, folder: Path | None = None) -> list[Pa
 
     The name result.json belongs to the first row that is for the run's experiment, or where none is to the first one
     that takes the run; with data files and with several inputs, which may be of any kind, to the first row of all.
-    Every other analysis has its name in its result's.
+    Every other analysis has its name in its result's, and into a given folder also one that would replace another's.
     """
     run = found.sources[0].run if len(found.sources) == 1 else None
     rows = [row for row in ANALYSES.values() if run is None or row.needs.take(run)]
     if run is not None:
         rows = [row for row in rows if _is_for_run(row, run)] or rows
     place = replace(found.place, folder=folder or found.home)
-    result = analysis.result.of(found, place)
-    return save_files(result, place, analysis.png(found), first=rows[0].name == analysis.name)
+    first = rows[0].name == analysis.name and not (folder and is_of_another(place.result(), analysis.name))
+    return save_files(analysis.result.of(found, place), place, analysis.png(found), first=first)
 
 
 def print_analysis(

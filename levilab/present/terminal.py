@@ -68,15 +68,20 @@ class _Table(RichTable):
 def _share_width(table: RichTable, console: Console, options: ConsoleOptions) -> bool:
     """Share the width among the columns, none of them narrower than its longest word, which rich itself would cut.
 
+    Columns that want little get all of it, and what is left goes in equal parts to those that want more.
+
     Returns whether there is width enough.
     """
     unlimited = options.update(width=_UNLIMITED)
     whole = Measurement.get(console, unlimited, table)
     free, wanted = options.max_width - whole.minimum, whole.maximum - whole.minimum
     if 0 <= free < wanted:
-        for column in table.columns:
-            needed = measure_renderables(console, unlimited, [column.header, *column.cells])
-            column.width = needed.minimum + needed.span * free // wanted
+        needs = [measure_renderables(console, unlimited, [c.header, *c.cells]) for c in table.columns]
+        left = free
+        for done, k in enumerate(sorted(range(len(needs)), key=lambda k: needs[k].span)):
+            more = min(needs[k].span, left // (len(needs) - done))
+            table.columns[k].width = needs[k].minimum + more
+            left -= more
     return free >= 0
 
 

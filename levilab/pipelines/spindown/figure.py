@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont, get_font
 
 from levilab.pipelines.spindown.laws import SHOWN_LAWS
+from levilab.pipelines.spindown.table import tilt_part
 from levilab.present.numbers import short_name
 from levilab.present.style import STYLE, row
 
@@ -146,7 +147,7 @@ def _draw_residuals(figure: Figure, panels: list[Axes], analysis: SpinDownAnalys
     u = _usual_u(analysis)
     band = "" if u is None else f"; grey: ±u of one reading, {u:.2g} Hz"
     means = "; black: means" if _many(analysis) else ""
-    _head(figure, 0.605, f"Residuals, reading − law, each law on its own scale{band}{means}")
+    _head(figure, 0.605, f"Residuals, reading − law, each law on its own scale{band}{means}{_tilt_in_words(analysis)}")
     for axes, name in zip(panels, SHOWN_LAWS, strict=True):
         residuals = [run.fit(name).residuals for run in analysis.runs]
         most = max(float(np.abs(r).max()) for r in residuals)
@@ -155,6 +156,7 @@ def _draw_residuals(figure: Figure, panels: list[Axes], analysis: SpinDownAnalys
             axes.axhspan(-u, u, color="black", alpha=0.12, linewidth=0)
         axes.axhline(0, color="black", linewidth=0.8)
         for k, values in enumerate(residuals):
+            _draw_tilt(axes, analysis, k, name, limit)
             _draw_readings(axes, analysis, k, values, 2 * limit, colour=SHOWN_LAWS[name].colour)
             _draw_means(axes, analysis, values)
         axes.set(ylim=(-limit, limit), xlabel="time  [s]")
@@ -162,6 +164,24 @@ def _draw_residuals(figure: Figure, panels: list[Axes], analysis: SpinDownAnalys
         axes.set_title(name, loc="left", color=SHOWN_LAWS[name].colour, fontweight="bold", pad=9)
         axes.set_title(f"to ±{most:.2g} Hz", loc="right", color="dimgrey", fontsize=8, pad=9)
     panels[0].set_ylabel("residual  [Hz]")
+
+
+def _draw_tilt(axes: Axes, analysis: SpinDownAnalysis, k: int, name: str, limit: float) -> None:
+    """What tilt and wobble add to the count of run k, by one law, brought to the panel's scale of ±limit."""
+    run = analysis.runs[k]
+    fit = run.fit(name)
+    if fit.has_tilt:
+        t = np.linspace(run.time[0], run.time[-1], 100)
+        added = tilt_part(fit, t)
+        y = 0.9 * limit * added / float(np.abs(added).max())
+        axes.plot(t, y, color="dimgrey", linestyle="dotted", linewidth=1.2, zorder=2)
+
+
+def _tilt_in_words(analysis: SpinDownAnalysis) -> str:
+    """What the dotted curves are; empty where no run shows a tilt."""
+    fits = [run.fit(analysis.combined.best) for run in analysis.runs]
+    most = [float(np.abs(tilt_part(fit, run.time)).max()) for fit, run in zip(fits, analysis.runs, strict=True)]
+    return f"; dotted: what the tilt adds to the count, up to {max(most):.2g} Hz, not to scale" if max(most) else ""
 
 
 def _usual_u(analysis: SpinDownAnalysis) -> float | None:

@@ -10,7 +10,14 @@ from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.pipelines.part import InputPart, ReportPart
 from levilab.pipelines.spindown.laws import SYMBOLS
-from levilab.pipelines.spindown.table import QUALITY_IN_WORDS, is_best, law_constants, quality_table, straight_quantity
+from levilab.pipelines.spindown.table import (
+    QUALITY_IN_WORDS,
+    count_table,
+    is_best,
+    law_constants,
+    quality_table,
+    straight_quantity,
+)
 from levilab.present.clock import with_clock
 from levilab.present.numbers import column, ends, in_words, short_name, with_uncertainty
 from levilab.present.tables import Row, Table, table
@@ -52,6 +59,7 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
             ],
             "laws": _laws_table(analysis),
             "quality": quality_table(analysis, QUALITY_IN_WORDS),
+            "count": count_table(analysis),
             "by_run": _by_run_table(analysis),
             "intervals": " and ".join(sorted(asked)),
             "durbin_watson": (max(2 - 4 / math.sqrt(n), 0), min(2 + 4 / math.sqrt(n), 4)),

@@ -4,16 +4,23 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from analysis.spindown.tilt import counted
 from levilab.pipelines.spindown.laws import SHOWN_LAWS, SYMBOLS
-from levilab.present.numbers import column, ends, in_words, plain, share, short_name, with_uncertainty
+from levilab.present.numbers import column, ends, in_words, plain, share, short_name, with_uncertainty, without_unit
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from analysis.spindown.lawfit import LawFit
     from analysis.spindown.selection import Statistics
     from analysis.uncertainty import Estimate
     from levilab.pipelines.spindown.analysis import SpinDownAnalysis
+
+    Array = NDArray[np.float64]
 
 #: How well a law fits: heads for 80 columns, and in words.
 QUALITY = ("constants", "rms [Hz]", "χ²/dof", "ΔAICc", "weight", "order p", "DW")
@@ -23,7 +30,8 @@ QUALITY_IN_WORDS = (*QUALITY[:5], "order test p", "Durbin–Watson")
 def spindown_tables(analysis: SpinDownAnalysis) -> tuple[Table, ...]:
     """The runs, the laws, how well they fit, the straight lines.  Each fits a terminal of 80 columns."""
     quality = quality_table(analysis, QUALITY)
-    return _runs_table(analysis), _laws_table(analysis), quality, _lines_table(analysis)
+    count = count_table(analysis)
+    return _runs_table(analysis), _laws_table(analysis), quality, *([count] if count else []), _lines_table(analysis)
 
 
 def _runs_table(analysis: SpinDownAnalysis) -> Table:
@@ -89,6 +97,41 @@ def _quality(statistics: Statistics, runs: int) -> list[str]:
         plain(statistics.runs_test_p, 2),
         plain(statistics.durbin_watson),
     ]
+
+
+def count_table(analysis: SpinDownAnalysis) -> Table | None:
+    """What the count holds beside the spin, and as how many readings correlated ones count; None: neither is seen."""
+    if not any(run.has_tilt or run.is_correlated for run in analysis.runs):
+        return None
+    heads = ("run", "δ [rad]", "ν_r [Hz]", "adds at the end [Hz]", "correlation", "count as")
+    rows = []
+    for source, run in zip(analysis.sources, analysis.runs, strict=True):
+        fit = run.fit(run.best)
+        tilt, resonance = (fit.parameters.get(name) for name in ("moment_tilt", "resonance"))
+        added = tilt_part(fit, run.time)
+        effective, seen = fit.statistics.n_effective, run.correlation
+        rows.append(
+            Row(
+                (
+                    short_name(source.name),
+                    without_unit(tilt) if tilt else "not seen",
+                    without_unit(resonance) if resonance else "—",
+                    plain(float(added[-1]), 2) if tilt else "—",
+                    f"{seen.value:.2f} ± {seen.u:.2f}" if seen and run.is_correlated else "none",
+                    f"{len(run.time)}" if effective is None else f"{effective:.2g} of {len(run.time)}",
+                )
+            )
+        )
+    title = "What the counter sees of the wobble, by the best law"
+    return table(title, heads, rows)
+
+
+def tilt_part(fit: LawFit, time: Array) -> Array:
+    """What tilt and wobble add to the count at some times [Hz], shape (n,); zeros for a fit without them."""
+    p = len(fit.law.parameters)
+    tau = (time - fit.start_time) / fit.reference[1]
+    spin: Array = fit.reference[0] * counted(fit.law, tau, fit.solution[:p])
+    return fit.spin_frequency(time) - spin
 
 
 def _lines_table(analysis: SpinDownAnalysis) -> Table:

@@ -25,7 +25,7 @@ class Bench:
     def top(self, *before: tuple[float, float]) -> FreeTop[Any]:
         session: Any = SimpleNamespace(
             bench=SimpleNamespace(counter=self),
-            settings=SimpleNamespace(reading_u_hz=None),
+            settings=SimpleNamespace(reading_u_hz=None, gate_s=5.0),
             now=lambda: self.time,
             check_settings=lambda _: None,
             event=lambda kind, text, **_: self.events.append((kind, text)),

@@ -83,6 +83,18 @@ def test_two_analyses_of_one_input_have_a_result_each(tmp_path: Path, runs: Path
     assert analyzed(file) == {f"my.csv.{name}": analysis for name, analysis in both.items()}
 
 
+def test_a_result_in_a_given_folder_replaces_no_other_analysis(
+    tmp_path: Path, sample_data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Analysis, "png", lambda *_: b"")
+    for _ in range(2):
+        for name, run in (("field", "field-scan"), ("limit", "lower-limits"), ("spindown", "spin-down-1")):
+            analysis = ANALYSES[name]
+            save_found(analysis, analysis.analyze([sample_data / run], analysis.options_from({})), tmp_path)
+    held = {file.name: json.loads(file.read_text(encoding="utf-8"))["analysis"] for file in tmp_path.glob("*.json")}
+    assert held == {"result.json": "field", "result.limit.json": "limit", "result.spindown.json": "spindown"}
+
+
 @pytest.mark.usefixtures("two")
 @pytest.mark.parametrize("name", ["runs", "runs/run-1", "my.csv"])
 def test_each_analysis_finds_its_own_result_again(tmp_path: Path, runs: Path, name: str) -> None:

@@ -171,7 +171,8 @@ def test_a_stated_reading_uncertainty_takes_the_place_of_the_scatter(tmp_path: P
     assert without.statistics.reduced_chi_square is None
     assert with_u.statistics.reduced_chi_square == pytest.approx(1, abs=1)
     ratio = without.parameters["c32"].u / with_u.parameters["c32"].u  # type: ignore[operator]
-    assert ratio**2 == pytest.approx(with_u.statistics.reduced_chi_square)
+    # 0.1: what a hidden tilt adds to u is not proportional to the readings' own
+    assert ratio**2 == pytest.approx(with_u.statistics.reduced_chi_square, rel=0.1)
 
 
 @pytest.mark.parametrize("how", ["profile", "bootstrap"])

@@ -17,6 +17,7 @@ from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.result import save
 from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis, SpinDownOptions, analyze_spindowns
 from levilab.pipelines.spindown.document import DOCUMENT
+from levilab.pipelines.spindown.table import count_table, tilt_part
 from support.spin_downs import spin_down_csv
 
 if TYPE_CHECKING:
@@ -289,3 +290,22 @@ def test_a_tilt_that_runs_show_together_is_in_a_recall_without_result(tmp_path: 
     assert recalled.combined.tilt == analysis.combined.tilt
     assert recalled.combined.fit("disc").constants == analysis.combined.fit("disc").constants
     assert any("show a tilt of the top together" in origin.text for origin in recalled.origins)
+
+
+def test_a_run_with_a_tilt_of_its_own_is_recalled_with_its_curves(tmp_path: Path) -> None:
+    """Counts good to 5 mHz show the tilt; its curves, tables and words come back from result.json."""
+    t, law = np.arange(0, 160, 10.0), LAWS["disc"]
+    q = law.dimensionless(np.array([40.0, 2.34e-4]), 29.0, 160.0)
+    counts = 29.0 * count(law, t / 160.0, q, 0.03**2, 21.6 / 29.0) + np.random.default_rng(6).normal(0, 0.005, t.size)
+    rows = [f"{time:g},{spin:.4f}" for time, spin in zip(t, counts, strict=True)]
+    (tmp_path / "run.csv").write_text("\n".join(["time_s,spin_frequency_hz", *rows, ""]), encoding="utf-8")
+    analysis = analyzed(tmp_path / "run.csv")
+    recalled = recall_spindowns([tmp_path / "run.csv"], SpinDownOptions())
+    (before,), (after,) = analysis.runs, recalled.runs
+    assert before.has_tilt
+    assert after.fit("disc").parameters == before.fit("disc").parameters
+    assert after.fit("disc").residuals == pytest.approx(before.fit("disc").residuals, abs=1e-9)
+    found = count_table(recalled)
+    assert found is not None
+    assert found == count_table(analysis)
+    assert tilt_part(after.fit("disc"), after.time)[-1] == pytest.approx(0.2, abs=0.1)
