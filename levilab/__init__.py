@@ -121,6 +121,7 @@ def analyze(
     bootstrap_samples: int = 1000,
     seed: int = 0,
     keep_outliers: bool = False,
+    tilt: Literal["auto", "none", "fitted"] = "auto",
     method: Literal["auto", "edges", "matched", "likelihood"] = "auto",
     orthogonal: bool = False,
     device: str | PathLike[str] | None = None,
@@ -144,6 +145,8 @@ def analyze(
         bootstrap_samples: how often the bootstrap draws (spindown).
         seed: of the bootstrap (spindown).
         keep_outliers: fit readings that look like miscounts, too (spindown, precession).
+        tilt: whether counts hold the tilt of the top's moment: "auto" where they demand it, and u has what noise may
+            hide of it; "none" for a top that only spins (spindown).
         method: how pulses are found: edges is the fastest, likelihood for weak ones (spin).
         orthogonal: let the uncertainty of the drive's frequency count, too (precession).
         device: file that describes base and top, as sample_data/device.toml (field).
@@ -172,6 +175,7 @@ def analyze(
             "bootstrap_samples": bootstrap_samples,
             "seed": seed,
             "keep_outliers": keep_outliers,
+            "tilt": tilt,
             "method": method,
             "orthogonal": orthogonal,
             "device": device,

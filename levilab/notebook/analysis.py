@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import tempfile
 import weakref
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import fields, replace
 from functools import partial
 from os import PathLike
@@ -16,11 +16,11 @@ from analysis.errors import AnalysisError
 from levilab.errors import DataError, DoesNotSuit, LevilabError, UsageError
 from levilab.formats.device import read_device
 from levilab.formats.table import parse_columns
-from levilab.notebook.frame import has_numbers_for_titles, in_rows, write_frame
+from levilab.notebook.frame import has_numbers_for_titles, in_rows, is_frame, write_frame
 from levilab.notebook.result import AnalysisResult
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.sources import data_files
-from levilab.runs.run import RECORD, Run, find_run, find_runs
+from levilab.runs.run import READINGS, RECORD, Run, find_run, find_runs
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 _CHOICES = {
     "uncertainty": ("covariance", "profile", "bootstrap"),
+    "tilt": ("auto", "none", "fitted"),
     "method": ("auto", "edges", "matched", "likelihood"),
 }
 #: Options that are above 0 where they are given, in words.
@@ -66,9 +67,14 @@ def analyze_data(data: One | Sequence[One], kind: str | None, given: Mapping[str
         raise UsageError("data", "a run, a path or a DataFrame is expected", value="nothing")
     if kind is not None and kind not in ANALYSES:
         raise UsageError("kind", f"{', '.join(ANALYSES)} or None is expected", value=kind)
+    frames = [item for item in items if is_frame(item)]
+    if not frames:
+        return _analyzed([_path(item) for item in items], kind, options, _in_keywords)
     folder = Path(tempfile.mkdtemp(prefix="levilab-"))
+    in_words = partial(_in_rows, folder=folder, titles=0 if any(map(has_numbers_for_titles, frames)) else 1)
     try:
-        result = _analyzed(items, kind, options, folder)
+        paths = [_path(item, folder, str(k) * (len(items) > 1)) for k, item in enumerate(items, 1)]
+        result = _analyzed(paths, kind, options, in_words, folder)
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
@@ -76,12 +82,15 @@ def analyze_data(data: One | Sequence[One], kind: str | None, given: Mapping[str
     return result
 
 
-def _analyzed(items: Sequence[One], kind: str | None, options: Mapping[str, Any], folder: Path) -> AnalysisResult:
-    """folder: in which DataFrames are written."""
-    numbers = [""] if len(items) == 1 else [f"-{k}" for k in range(1, len(items) + 1)]
-    paths = [_path(item, folder / f"{_FRAME}{number}.csv") for item, number in zip(items, numbers, strict=True)]
-    in_words = partial(_in_words, folder=folder, titles=0 if any(map(has_numbers_for_titles, items)) else 1)
-    with _in_keywords(in_words):
+def _analyzed(
+    paths: Sequence[Path],
+    kind: str | None,
+    options: Mapping[str, Any],
+    in_words: Callable[[str], str],
+    folder: Path | None = None,
+) -> AnalysisResult:
+    """in_words: a message as the caller reads it; folder: in which DataFrames were written."""
+    with _errors(in_words):
         analysis = ANALYSES[kind] if kind else _made_for(paths, options)
         _refuse_foreign(analysis, options)
         found = analysis.analyze(paths, analysis.options_from(options))
@@ -90,18 +99,19 @@ def _analyzed(items: Sequence[One], kind: str | None, options: Mapping[str, Any]
 
 
 def _is_one(data: object) -> bool:
-    return isinstance(data, str | PathLike | Run) or not hasattr(data, "__iter__") or hasattr(data, "to_csv")
+    return isinstance(data, str | PathLike | Run) or not hasattr(data, "__iter__") or is_frame(data)
 
 
-def _path(item: Any, for_frame: Path) -> Path:
-    """Where the data lie; a DataFrame is written to a file of its own."""
+def _path(item: Any, folder: Path = Path(), number: str = "") -> Path:
+    """Where the data lie; a DataFrame is written into the folder."""
     if isinstance(item, Run):
         return item.folder
     if isinstance(item, str | PathLike):
         return find_run(Path(item))
-    if hasattr(item, "to_csv") and hasattr(item, "columns"):
-        write_frame(item, for_frame)
-        return for_frame
+    if is_frame(item):
+        file = folder / f"{_FRAME}{number}.csv"
+        write_frame(item, file)
+        return file
     raise UsageError("data", "a run, a path, a DataFrame or several of them are expected", value=type(item).__name__)
 
 
@@ -168,6 +178,9 @@ def _made_for(paths: Sequence[Path], options: Mapping[str, Any]) -> Analysis[Any
 
 def _suiting(path: Path, options: Mapping[str, Any]) -> list[str]:
     """Names of the analyses that are made for what lies at a path.  Raises DataError where there is none."""
+    if path.name == READINGS and (path.parent / RECORD).exists():
+        with suppress(DataError):  # where its record is damaged, the readings can still be analyzed
+            return _for_run(Run.load(path.parent))
     if path.is_dir():
         runs = [Run.load(path)] if (path / RECORD).exists() else list(_usable_runs(path))
         suiting = {name for run in runs for name in _for_run(run)}
@@ -212,8 +225,8 @@ def _readers(file: Path, options: Mapping[str, Any]) -> tuple[list[str], Levilab
             foreign = foreign or error
         except DataError as error:
             damage = damage or error
-        except AnalysisError:
-            continue
+        except AnalysisError as error:
+            damage = damage or DataError(f"{file}: {error}")
     particular = [name for name in names if name in _PARTICULAR]
     return particular or names, damage or foreign
 
@@ -221,11 +234,16 @@ def _readers(file: Path, options: Mapping[str, Any]) -> tuple[list[str], Levilab
 # --- messages ------------------------------------------------------------------------------------------
 
 
-def _in_words(text: str, folder: Path, titles: int) -> str:
-    """A message with the names of keywords, and of a DataFrame with rows in the place of a file's lines."""
+def _in_keywords(text: str) -> str:
+    """A message with the names of keywords."""
     for quantity, keyword in _KEYWORDS.items():
         text = text.replace(f"`{quantity}`", f"`{keyword}`")
-    return in_rows(text, folder, titles=titles) if _FRAME in text else text
+    return text
+
+
+def _in_rows(text: str, folder: Path, titles: int) -> str:
+    """A message with the names of keywords, and about a DataFrame with rows in the place of a file's lines."""
+    return in_rows(_in_keywords(text), folder, titles=titles) if _FRAME in text else _in_keywords(text)
 
 
 def _with_words(found: Any, in_words: Callable[[str], str]) -> Any:
@@ -235,8 +253,8 @@ def _with_words(found: Any, in_words: Callable[[str], str]) -> Any:
 
 
 @contextmanager
-def _in_keywords(in_words: Callable[[str], str]) -> Iterator[None]:
-    """Errors in the words of Python: the same error with another text."""
+def _errors(in_words: Callable[[str], str]) -> Iterator[None]:
+    """Errors as the caller reads them: the same error with another text."""
     try:
         yield
     except LevilabError as error:

@@ -35,9 +35,14 @@ def write_frame(frame: pd.DataFrame, path: Path) -> None:
     frame.to_csv(path, index=False, header=False if numbered else titles, encoding="utf-8", lineterminator="\n")
 
 
-def has_numbers_for_titles(data: Any) -> bool:
-    """Whether data are a DataFrame whose columns are numbered."""
-    return hasattr(data, "columns") and all(isinstance(title, int) for title in data.columns)
+def is_frame(data: Any) -> bool:
+    """Whether data are a DataFrame: pandas need not be loaded to know."""
+    return hasattr(data, "to_csv") and hasattr(data, "columns")
+
+
+def has_numbers_for_titles(frame: pd.DataFrame) -> bool:
+    """Whether the columns are numbered."""
+    return all(isinstance(title, int) for title in frame.columns)
 
 
 def in_rows(text: str, folder: Path, *, titles: int) -> str:
@@ -56,7 +61,6 @@ def in_rows(text: str, folder: Path, *, titles: int) -> str:
     """
     for separator in ("/", "\\"):
         text = text.replace(f"{folder}{separator}", "")
-
     if titles:
         text = re.sub(r", line 1\b", "", text)
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 TableName = Literal["values", "models", "readings"]
 #: Values that the short form of a result shows.
 MOST_VALUES = 4
+_ELSEWHERE = ": choose another `folder`"
 
 
 @dataclass(frozen=True, repr=False)
@@ -199,25 +200,33 @@ class AnalysisResult:
 
         Returns the files.  Raises CannotWrite.
         """
-        place = Path(folder)
-        copies = {path: place / path.name for path in self.copies}
-        written = [_copy(path, to) for path, to in copies.items()]
-        sources = [
-            replace(source, path=copies[source.path], data=copies[source.path]) if source.path in copies else source
-            for source in self.found.sources
-        ]
-        return [*written, *save_result(self.analysis, replace(self.found, sources=tuple(sources)), place)]
+        place, found = Path(folder), self.found
+        written = []
+        for path in self.copies:
+            copy = _copy(path, place)
+            written.append(copy)
+            sources = [replace(one, path=copy, data=copy) if one.path == path else one for one in found.sources]
+            name = copy.name if len(sources) == 1 else found.place.name
+            found = replace(found, sources=tuple(sources), place=replace(found.place, name=name))
+        try:
+            return [*written, *save_result(self.analysis, found, place)]
+        except CannotWrite as error:
+            raise CannotWrite(f"{str(error).partition(': choose')[0]}{_ELSEWHERE}") from error
 
 
 def _print(result: AnalysisResult, console: Any) -> None:
     print_analysis(result.analysis, result.found, console=console)
 
 
-def _copy(path: Path, to: Path) -> Path:
-    """Raises CannotWrite."""
+def _copy(path: Path, folder: Path) -> Path:
+    """A copy of a file in a folder, by a name that replaces no other content.  Raises CannotWrite."""
+    content, number, to = path.read_bytes(), 1, folder / path.name
     try:
-        to.parent.mkdir(parents=True, exist_ok=True)
-        replace_atomically(to, path.read_bytes())
+        while to.exists() and to.read_bytes() != content:
+            number += 1
+            to = folder / f"{path.stem}-{number}{path.suffix}"
+        folder.mkdir(parents=True, exist_ok=True)
+        replace_atomically(to, content)
     except OSError as error:
-        raise CannotWrite(f"{to}: could not be written ({error.strerror or error}): choose another folder") from error
+        raise CannotWrite(f"{to}: could not be written ({error.strerror or error}){_ELSEWHERE}") from error
     return to

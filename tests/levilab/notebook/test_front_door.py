@@ -188,7 +188,15 @@ def test_a_saved_result_of_a_dataframe_has_its_readings_beside(tmp_path: Path) -
     written = json.loads((tmp_path / "DataFrame.csv.result.limit.json").read_text(encoding="utf-8"))
     sha256 = hashlib.sha256(file.read_bytes()).hexdigest()
     assert written["inputs"] == [{"path": "DataFrame.csv", "sha256": sha256}]
-    assert command("report", tmp_path, "-o", tmp_path / "report.html", cwd=tmp_path).status == 0
+    reported = command("report", tmp_path, "-o", tmp_path / "report.html", cwd=tmp_path)
+    assert reported.status == 0
+    assert "no result lies beside" not in reported.err
+    other = levilab.analyze(pd.DataFrame({"spin_frequency_hz": [21.1, 22.2, 23.4]}), "limit")
+    assert next(path.name for path in other.save(tmp_path)) == "DataFrame-2.csv"
+    assert pd.read_csv(file)["spin_frequency_hz"].tolist() == [21.1, 22.2, 23.3]
+    (tmp_path / "a file").write_text("", encoding="utf-8")
+    with pytest.raises(levilab.LevilabError, match=r"choose another `folder`$"):
+        other.save(tmp_path / "a file")
 
 
 def test_what_a_dataframe_was_written_to_goes_with_the_result() -> None:
@@ -219,6 +227,14 @@ def test_messages_about_a_dataframe_name_its_rows() -> None:
     result = levilab.analyze(frame, reading_u=0.03)
     assert any(text.startswith("DataFrame.csv: 1 of 8 rows is left out") for text in result.warnings)
     assert any(text.endswith("row 5") for text in result.document["warnings"])
+
+
+def test_several_dataframes_are_told_apart_by_their_place() -> None:
+    frames = [spin_down(), spin_down() * 1.01]
+    assert levilab.analyze(frames, reading_u=0.03).inputs == ("DataFrame1.csv", "DataFrame2.csv")
+    frames[1].loc[2, "spin_frequency_hz"] = -1.0
+    with pytest.raises(DataError, match=r"^DataFrame2.csv, row 2: the frequency is -1"):
+        levilab.analyze(frames)
 
 
 def test_numbered_columns_lose_no_row(tmp_path: Path) -> None:
