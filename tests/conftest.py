@@ -21,7 +21,7 @@ SLOW = """
     instruments/wire_faults
     levilab/acquisition/test_limit.py  levilab/acquisition/test_loop.py  levilab/acquisition/test_losses.py
     levilab/acquisition/test_precession.py
-    levilab/benchmark  levilab/cli/test_main.py  levilab/crosscheck  levilab/motion
+    levilab/benchmark  levilab/cli/test_main.py  levilab/crosscheck  levilab/motion  levilab/notebook
     levilab/pipelines/spindown  levilab/pipelines/test_result.py
     levilab/report/test_page.py
     levilab/runs/test_hostile.py  levilab/runs/test_kill.py
