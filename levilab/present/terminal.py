@@ -94,7 +94,8 @@ def terminal() -> Console:
 def as_text(show: Callable[[Console], object]) -> str:
     """What a function prints, as text of at most `TEXT_WIDTH` columns without colours."""
     written = io.StringIO()
-    show(_Terminal(file=written, width=TEXT_WIDTH, highlight=False, color_system=None))
+    # in a notebook rich would show it at once instead
+    show(_Terminal(file=written, width=TEXT_WIDTH, highlight=False, color_system=None, force_jupyter=False))
     return "\n".join(line.rstrip() for line in written.getvalue().strip("\n").splitlines())
 
 

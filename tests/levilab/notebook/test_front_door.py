@@ -153,8 +153,11 @@ def test_the_short_form_of_a_result_is_a_few_lines(four: Any, limits: Any) -> No
     assert len(repr(four).splitlines()) <= 7
 
 
-def test_the_summary_is_what_the_command_line_prints(limits: Any, tmp_path: Path) -> None:
+def test_the_summary_is_what_the_command_line_prints_also_in_a_notebook(
+    limits: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     printed = command("analyze", "limit", SAMPLE_DATA / "lower-limits", "--no-save", cwd=tmp_path)
+    monkeypatch.setattr("rich.console._is_jupyter", lambda: True)
     assert limits.summary().split() == printed.out.split()
 
 
