@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 UNITS = {
     "1": "",
     "1/s": "s⁻¹",
+    "Hz/s^2": "Hz/s²",
     "1/rad": "rad⁻¹",
     "(rad/s)^-1/2/s": "(rad/s)^−½/s",
     "(rad/s)^(1-exponent)/s": "(rad/s)^(1−n)/s",
@@ -112,6 +113,16 @@ def _number(value: float, u: float | None, *, ordinary: bool | None = None) -> s
         ordinary = 1e-2 <= abs(value) < 1e5 or abs(value) < u < 1e5
     text = f"{ufloat(value, u):SP}" if ordinary else f"{ufloat(value, u):eSP}"
     return re.sub(r"^-(?=0(\.0*)?\()", "", text)
+
+
+def signed(value: float, decimals: int) -> str:
+    """A number with its sign, and none where it rounds to zero.
+
+    >>> signed(0.471, 2), signed(-0.002, 2), signed(-1.614, 2)
+    ('+0.47', '0.00', '-1.61')
+    """
+    text = f"{value:+.{decimals}f}"
+    return text if float(text) else text[1:]
 
 
 def short_name(name: str) -> str:
