@@ -63,6 +63,14 @@ class Uncertainty(StrEnum):
     BOOTSTRAP = "bootstrap"
 
 
+class Tilt(StrEnum):
+    """Whether the count of a spin-down holds the tilt of the top's moment."""
+
+    AUTO = "auto"
+    NONE = "none"
+    FITTED = "fitted"
+
+
 class Method(StrEnum):
     """How the pulses of a trace are found."""
 
@@ -139,6 +147,18 @@ OPTIONS = {
         str,
     ),
     "keep_outliers": Option(KeepOutliers, False),
+    "tilt": Option(
+        Annotated[
+            Tilt,
+            typer.Option(
+                "--tilt",
+                help="Whether counts hold the tilt of the top's moment.  auto: where they demand it, and u has what "
+                "noise may hide of it.  none: a top that only spins.",
+            ),
+        ],
+        Tilt.AUTO,
+        str,
+    ),
     "method": Option(
         Annotated[
             Method,
@@ -205,7 +225,7 @@ _EACH = "each"
 COMMANDS = {
     "spindown": Command(
         "Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude.",
-        ("columns", "channel", "rate", "reading_u", "uncertainty", "keep_outliers"),
+        ("columns", "channel", "rate", "reading_u", "uncertainty", "keep_outliers", "tilt"),
     ),
     "spin": Command(
         "Spin frequency and chirp from traces of a detector (WAV, scopes' CSV, .npy), lists of pulse times, runs with "
@@ -226,7 +246,7 @@ COMMANDS = {
     ),
     _EACH: Command(
         "Each analysis that suits the runs or data files; --json prints a list where several suit.",
-        ("columns", "channel", "rate", "reading_u", "uncertainty", "keep_outliers", "method"),
+        ("columns", "channel", "rate", "reading_u", "uncertainty", "keep_outliers", "tilt", "method"),
     ),
 }
 

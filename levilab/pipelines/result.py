@@ -203,6 +203,14 @@ def read_result(path: Path, model: type[R]) -> R | None:
         raise DataError(f"{path}: {in_one_line(error)}; {_ANEW_OR_AWAY}") from error
 
 
+def is_of_another(path: Path, analysis: str) -> bool:
+    """Whether a file holds the result of another analysis than this."""
+    try:
+        return path.is_file() and _read(path).get("analysis") != analysis
+    except DataError:
+        return False
+
+
 def _read(path: Path) -> dict[str, Any]:
     """A result as it stands in the file.  Raises NoResult for another program's file, else DataError."""
     try:

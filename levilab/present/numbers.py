@@ -39,6 +39,23 @@ def with_uncertainty(estimate: Estimate) -> str:
     return text if estimate.u is not None or estimate.value is None else f"{text}, u not determined"
 
 
+def in_one_line(estimate: Estimate) -> str:
+    """Value, standard uncertainty in its last digits and unit, in characters that every program prints.
+
+    >>> from analysis.uncertainty import Estimate
+    >>> in_one_line(Estimate(0.003262, 2.3e-5, "1/s")), in_one_line(Estimate(1.7151e-5, 1.7e-7, "1/rad"))
+    ('0.003262(23) 1/s', '1.715(17)e-05 1/rad')
+    >>> in_one_line(Estimate(0.25, None, "1")), in_one_line(Estimate(None, None, "Hz"))
+    ('0.25', 'not determined')
+    """
+    from uncertainties import ufloat
+
+    if estimate.value is None:
+        return "not determined"
+    number = f"{ufloat(estimate.value, estimate.u):S}" if estimate.u else f"{estimate.value:.6g}"
+    return number if estimate.unit == "1" else f"{number} {estimate.unit}"
+
+
 def without_unit(estimate: Estimate) -> str:
     """Value and standard uncertainty alone, for a column whose head has the unit; a dash where there is none."""
     return "—" if estimate.value is None else _number(estimate.value, estimate.u)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 import sys
 from typing import TYPE_CHECKING
@@ -16,7 +17,7 @@ from rich.table import Table as RichTable
 from levilab.present.characters import for_encoding
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from typing import Any
 
     from rich.console import ConsoleOptions, RenderableType
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 _ASCII_HEAD = box.Box("    \n    \n -- \n    \n    \n -- \n    \n    \n", ascii=True)
 #: Columns below which no text can be read, and more than any table has.
 _NARROWEST, _UNLIMITED = 20, 10_000
+#: Columns of a text that is no terminal's: all tables fit into 80, and lines of words are still read with ease.
+TEXT_WIDTH = 110
 
 
 class _Terminal(Console):
@@ -65,15 +68,20 @@ class _Table(RichTable):
 def _share_width(table: RichTable, console: Console, options: ConsoleOptions) -> bool:
     """Share the width among the columns, none of them narrower than its longest word, which rich itself would cut.
 
+    Columns that want little get all of it, and what is left goes in equal parts to those that want more.
+
     Returns whether there is width enough.
     """
     unlimited = options.update(width=_UNLIMITED)
     whole = Measurement.get(console, unlimited, table)
     free, wanted = options.max_width - whole.minimum, whole.maximum - whole.minimum
     if 0 <= free < wanted:
-        for column in table.columns:
-            needed = measure_renderables(console, unlimited, [column.header, *column.cells])
-            column.width = needed.minimum + needed.span * free // wanted
+        needs = [measure_renderables(console, unlimited, [c.header, *c.cells]) for c in table.columns]
+        left = free
+        for done, k in enumerate(sorted(range(len(needs)), key=lambda k: needs[k].span)):
+            more = min(needs[k].span, left // (len(needs) - done))
+            table.columns[k].width = needs[k].minimum + more
+            left -= more
     return free >= 0
 
 
@@ -81,6 +89,13 @@ def terminal() -> Console:
     """As wide as the terminal; into a pipe or file as wide as the tables need."""
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 160
     return _Terminal(width=max(width, _NARROWEST), highlight=False)
+
+
+def as_text(show: Callable[[Console], object]) -> str:
+    """What a function prints, as text of at most `TEXT_WIDTH` columns without colours."""
+    written = io.StringIO()
+    show(_Terminal(file=written, width=TEXT_WIDTH, highlight=False, color_system=None))
+    return "\n".join(line.rstrip() for line in written.getvalue().strip("\n").splitlines())
 
 
 def new_table(title: str | None, *columns: str, numbers: Sequence[str] = ()) -> RichTable:

@@ -49,7 +49,7 @@ def trial(seed: int, folder: Path) -> list[Pull]:
         seed=seed,
     )
     run = acquired("spin", seed, folder, lambda request: _in_world(request, scene))
-    found = spindown_of(run.folder)
+    found = spindown_of(run.folder, tilt="none")  # a count of this world is the spin
     models = found.models
     pulls = [
         pull_of(f"{law} {name}", models[law]["parameters"][name], truth)
@@ -78,10 +78,10 @@ class Fitted:
     start_time: float
 
 
-def spindown_of(folder: Path) -> Fitted:
+def spindown_of(folder: Path, **options: Any) -> Fitted:
     """The analysis of a run."""
     analysis = ANALYSES["spindown"]
-    (run,) = analysis.document(analysis.analyze([folder], analysis.options_from({})), folder)["runs"]
+    (run,) = analysis.document(analysis.analyze([folder], analysis.options_from(options)), folder)["runs"]
     return Fitted({model["name"]: model for model in run["models"]}, run["values"]["start_time"]["value"])
 
 

@@ -129,7 +129,9 @@ def _point_cells(fit: SweepFit, point: Point, departure: str) -> tuple[str, ...]
 
 def coherence_table(run: PrecessionRun, name: str = "") -> Table:
     """How firmly the laser's pulses follow the drive, record by record."""
-    drifts = column(Estimate(one.coherence.drift_hz, one.coherence.u_drift_hz, "Hz") for one in run.coherences)
+    drifts = column(
+        Estimate(1e3 * one.coherence.drift_hz, 1e3 * one.coherence.u_drift_hz, "mHz") for one in run.coherences
+    )
     rows = [
         (
             f"{run.fit.points[one.point].drive:.6g}",
@@ -142,5 +144,5 @@ def coherence_table(run: PrecessionRun, name: str = "") -> Table:
         )
         for one, drift in zip(run.coherences, drifts, strict=True)
     ]
-    heads = ("ν_d [Hz]", "pulses", "mean vector", "phase [°]", "drift [Hz]", "turns", "locked")
+    heads = ("ν_d [Hz]", "pulses", "mean vector", "phase [°]", "drift [mHz]", "turns", "locked")
     return table(f"Phase of the laser's pulses on the drive{name}", heads, rows, numbers=heads[:6])

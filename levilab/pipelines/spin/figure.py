@@ -63,7 +63,8 @@ def spin_figure(analysis: SpinAnalysis) -> Figure:
             _draw(panels, source, run)
         more = len(analysis.runs) - len(shown)
         if more > 0:
-            figure.text(0.985, 1 - 0.02 / len(shown), f"{more} more inputs are not drawn", ha="right", fontsize=8)
+            y = 1 - 0.035 / len(shown)
+            figure.text(0.985, y, f"{more} more inputs are not drawn", ha="right", va="center", fontsize=8)
     return figure
 
 
@@ -247,7 +248,7 @@ def _draw_residuals(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:
     """What the pulses' times leave over: noise about zero, without a shape."""
     axes.axhline(0, color=VERMILION, linewidth=1)
     limit = 6 * 1e6 * max(spin.scatter, float(np.median(np.abs(excerpt.residuals))) if len(excerpt.residuals) else 0.0)
-    scale, unit = (1e-3, "ms") if limit >= 1e4 else (1.0, "µs")  # five digits would not find room beside the axis
+    scale, unit = (1e-3, "ms") if limit >= 5e3 else (1.0, "µs")  # five digits would not find room beside the axis
     limit *= scale
     values = 1e6 * scale * excerpt.residuals
     inside = np.abs(values) <= limit

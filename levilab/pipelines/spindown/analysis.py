@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from analysis.errors import AnalysisError
 from analysis.spindown.combine import Combined, combine, tilt_demanded
@@ -31,17 +31,24 @@ NEEDS = Needs(
 )
 
 
+#: Whether the count holds the tilt of the top's moment.
+Tilt = Literal["auto", "none", "fitted"]
+_TILTED: dict[Tilt, bool | None] = {"auto": None, "none": False, "fitted": True}
+
+
 @dataclass(frozen=True)
 class SpinDownOptions(InputOptions):
     """How spin-downs are analyzed.
 
     reading_u: of every reading [Hz], in the place of what the data say; bootstrap_samples, seed: of the bootstrap,
-    where it is asked for.
+    where it is asked for; tilt: whether the count holds the tilt of the top's moment, auto: where readings demand it,
+    and what they may hide of it is in u.
     """
 
     reading_u: float | None = None
     uncertainty: Uncertainty = "covariance"
     keep_outliers: bool = False
+    tilt: Tilt = "auto"
     bootstrap_samples: int = 1000
     seed: int = 0
 
@@ -70,7 +77,7 @@ class SpinDownAnalysis(Analyzed[Readings, SpinDown, Combined, SpinDownOptions]):
 def fit_source(source: Source[Readings], options: SpinDownOptions, *, tilt: bool | None = None) -> SpinDown:
     """All laws fitted to one input.  Raises DataError, which names the file.
 
-    tilt: whether the count has the top's tilt; None: if the readings demand it.
+    tilt: whether the count has the top's tilt; None: as the options say.
     """
     readings = source.readings
     try:
@@ -82,7 +89,7 @@ def fit_source(source: Source[Readings], options: SpinDownOptions, *, tilt: bool
             bootstrap_samples=options.bootstrap_samples,
             seed=options.seed,
             keep_outliers=options.keep_outliers,
-            tilt=tilt,
+            tilt=_TILTED[options.tilt] if tilt is None else tilt,
         )
     except AnalysisError as error:
         raise DataError(f"{source.data}: {error}") from error
@@ -94,7 +101,11 @@ def fit_with_tilt(
     """Number → fit with the tilt, of those that lack it where the runs together demand it."""
     if not tilt_demanded(runs):
         return {}
-    return {k: fit_source(sources[k], options[k], tilt=True) for k, run in enumerate(runs) if not run.has_tilt}
+    return {
+        k: fit_source(sources[k], options[k], tilt=True)
+        for k, run in enumerate(runs)
+        if not run.has_tilt and options[k].tilt == "auto"
+    }
 
 
 METHOD = Method(

@@ -200,6 +200,7 @@ class SettingsPart(Settings):
     reading_u: float | None = Field(gt=0, alias="reading_u_hz")
     uncertainty: Literal["covariance", "profile", "bootstrap"]
     keep_outliers: bool
+    tilt: Literal["auto", "none", "fitted"] = "auto"
     bootstrap: BootstrapPart | None
 
     @classmethod

@@ -46,7 +46,7 @@ class Content(Analysis[Any]):
 
 def content_row(*experiments: str) -> Analysis[Any]:
     row = second_row(*experiments)
-    return Content(row.result, row.tables, row.part)
+    return Content(row.result, row.tables, row.part, row.columns)
 
 
 def use(monkeypatch: pytest.MonkeyPatch, *rows: Analysis[Any]) -> None:
@@ -81,6 +81,18 @@ def test_two_analyses_of_one_input_have_a_result_each(tmp_path: Path, runs: Path
     assert analyzed(runs) == both
     file = spin_down_csv(tmp_path / "my.csv")
     assert analyzed(file) == {f"my.csv.{name}": analysis for name, analysis in both.items()}
+
+
+def test_a_result_in_a_given_folder_replaces_no_other_analysis(
+    tmp_path: Path, sample_data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Analysis, "png", lambda *_: b"")
+    for _ in range(2):
+        for name, run in (("field", "field-scan"), ("limit", "lower-limits"), ("spindown", "spin-down-1")):
+            analysis = ANALYSES[name]
+            save_found(analysis, analysis.analyze([sample_data / run], analysis.options_from({})), tmp_path)
+    held = {file.name: json.loads(file.read_text(encoding="utf-8"))["analysis"] for file in tmp_path.glob("*.json")}
+    assert held == {"result.json": "field", "result.limit.json": "limit", "result.spindown.json": "spindown"}
 
 
 @pytest.mark.usefixtures("two")

@@ -162,7 +162,7 @@ def test_a_file_that_does_not_go_is_named_with_what_is_wrong(tmp_path, content, 
 
 
 def test_a_folder_is_no_scene(tmp_path):
-    with pytest.raises(SceneError, match="cannot be read"):
+    with pytest.raises(SceneError, match="is a folder; a TOML file is expected"):
         read_scene(tmp_path)
 
 
