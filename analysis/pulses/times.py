@@ -20,7 +20,7 @@ FEWEST = 4
 GROSS = 4.5
 ROUNDS = 12
 #: A variance that is smaller by chance is seldom smaller than this part.
-TOLD = 0.6
+NOTED = 0.6
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ def correlated(fit: Fit, what: str) -> tuple[Finding, ...]:
     """What is to be said where neighbouring turns or pulses are not independent."""
     if fit.inflation > 1:
         text = f"neighbouring {what} resemble each other: variance x {digits(fit.inflation)}"
-    elif fit.inflation < TOLD:
+    elif fit.inflation < NOTED:
         text = f"neighbouring {what} differ from each other, which averages out: variance x {digits(fit.inflation)}"
     else:
         return ()

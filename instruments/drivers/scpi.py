@@ -31,8 +31,9 @@ _LONGEST_ERROR_QUEUE = 64
 _QUEUE_ENTRY = re.compile(r"([+-]?\d{1,5}), ?(\"[ -~]*\")", re.ASCII)
 #: How instruments print a switch (SCPI-1999, vol. 1, 7.3).
 _SWITCH = {"0": False, "1": True}
-#: Instruments round what they are set to by this fraction of it at most.
-_ROUNDING = 0.01
+#: Instruments round what they are set to by this fraction of it at most; where their resolution is known, an answer has
+#: four digits at least.
+_ROUNDING, _PRINTED = 0.01, 1e-4
 
 
 class ScpiInstrument:
@@ -349,7 +350,8 @@ class Setting(Generic[T]):
         rounding: a further one, in the setting's unit.
         """
         if self.kind is float:
-            aside = _ROUNDING * abs(float(asked)) + self.resolution + rounding
+            share = _PRINTED if self.resolution else _ROUNDING
+            aside = share * abs(float(asked)) + self.resolution + rounding
             return not abs(float(answered) - float(asked)) <= aside
         return self._canonical(asked) != self._canonical(answered)
 

@@ -32,8 +32,8 @@ _FASTEST = 2e9
 _CODES_ON_SCREEN = 199
 #: Bits of the operation status register.
 _RUN, _WAIT_TRIGGER, _OVERLOAD = 8, 32, 2048
-#: The code in the middle of the screen, and how many points a record for the screen has.
-_MIDDLE, _FOR_SCREEN = 128, 62_500
+#: Points of a record for the screen.
+_FOR_SCREEN = 62_500
 
 _MEASUREMENTS = {
     "FREQuency": "FREQUENCY",
@@ -336,11 +336,11 @@ class VirtualDSOX1000(VirtualOscilloscope):
     def scaling(self, channel: int) -> tuple[float, int]:
         """199 codes for eight divisions.  The offset, in the middle, is set to whole codes."""
         volts_per_code = 8 * self.division(channel) / _CODES_ON_SCREEN
-        return volts_per_code, _MIDDLE - round(self.value(f"chan{channel}_offset") / volts_per_code)
+        return volts_per_code, self.middle - round(self.value(f"chan{channel}_offset") / volts_per_code)
 
     def window(self, channel: int) -> tuple[float, float]:
         """Eight divisions around the middle."""
-        return float(_MIDDLE), float(_CODES_ON_SCREEN)
+        return float(self.middle), float(_CODES_ON_SCREEN)
 
     def fit(self, channel: int, middle: float, division: float) -> None:
         """The offset is the voltage in the middle."""
@@ -377,10 +377,10 @@ class VirtualDSOX1000(VirtualOscilloscope):
         kind = {"BYTE": 0, "WORD": 1, "ASC": 4}[form]
         mode = {"NORM": 0, "PEAK": 1, "AVER": 2, "HRES": 3}[str(self.settings["acquisition"])]
         averages = round(self.value("averages")) if mode == 2 else 1
-        per_code, reference = (1, _MIDDLE) if form == "BYTE" else (256, 256 * _MIDDLE)
+        per_code, reference = (1, self.middle) if form == "BYTE" else (256, 256 * self.middle)
         shown = record.inputs.get(self._channel_or_none())
         volts = shown.volts_per_code / per_code if shown else 1.0
-        offset = (_MIDDLE - shown.zero) * shown.volts_per_code if shown else 0.0
+        offset = (self.middle - shown.zero) * shown.volts_per_code if shown else 0.0
         signed = not self.settings["wav_unsigned"] and form != "ASC"
         return [
             *(f"{value:+d}" for value in (kind, mode, points, averages)),
@@ -408,7 +408,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
         form = str(self.settings["wav_format"])
         if form == "ASC":
             return self.block(self._as_text(record, channel, codes.astype(float)))
-        signed = 0 if self.settings["wav_unsigned"] else _MIDDLE
+        signed = 0 if self.settings["wav_unsigned"] else self.middle
         shifted = codes.astype(np.int32) - signed
         if form == "WORD":
             order = "<" if self.settings["wav_order"] == "LSBF" else ">"

@@ -23,10 +23,8 @@ if TYPE_CHECKING:
 #: Points of the record for one channel shown; half of it for two, a quarter for more.
 _DEPTHS = (12_000, 120_000, 1_200_000, 12_000_000, 24_000_000)
 _FASTEST = 1e9
-_CODES_PER_DIVISION = 25
-
-#: The code in the middle of the screen, and how many points a trace on the screen has.
-_MIDDLE, _ON_SCREEN = 127, 1200
+#: Points of a trace on the screen.
+_ON_SCREEN = 1200
 #: Points that one block may have, by format.
 _LONGEST = {"BYTE": 250_000, "WORD": 125_000, "ASC": 15_625}
 
@@ -198,6 +196,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
     identity = "RIGOL TECHNOLOGIES,DS1054Z,DS1ZVIRTUAL,00.04.04.SP4"
     no_error = '0,"No error"'
     columns, lowest, digits, keeps_old = 12, 0, 9, True
+    middle = 127
     CHANNEL_ROWS: ClassVar = _CHANNEL
     ROWS: ClassVar = (*_CONTROL, *_TIME, *_TRIGGER, *_WAVEFORM, *_REST)
 
@@ -313,19 +312,6 @@ class VirtualDS1000Z(VirtualOscilloscope):
         scale = self.value("time_scale")
         return self.value("time_offset") - 6 * scale, 12 * scale
 
-    def scaling(self, channel: int) -> tuple[float, int]:
-        """25 codes per division; the offset lifts the trace by whole codes."""
-        volts_per_code = self.division(channel) / _CODES_PER_DIVISION
-        return volts_per_code, _MIDDLE + round(self.value(f"chan{channel}_offset") / volts_per_code)
-
-    def window(self, channel: int) -> tuple[float, float]:
-        """Eight divisions around the middle."""
-        return float(_MIDDLE), 8.0 * _CODES_PER_DIVISION
-
-    def fit(self, channel: int, middle: float, division: float) -> None:
-        """The offset is what is added to the trace."""
-        self.settings |= {f"chan{channel}_scale": division, f"chan{channel}_offset": -middle}
-
     # --- reading the record ---
 
     def sequence(self) -> tuple[Record, float, float, int]:
@@ -353,7 +339,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
         mode = {"NORM": 0, "MAX": 1, "RAW": 2}[str(self.settings["wav_mode"])]
         averages = round(self.value("averages")) if self.settings["acquisition"] == "AVER" else 1
         times = (self.spell(step), self.spell(start), "0")
-        volts = (self.spell(scale.volts_per_code), str(scale.zero - _MIDDLE), str(_MIDDLE))
+        volts = (self.spell(scale.volts_per_code), str(scale.zero - self.middle), str(self.middle))
         return [str(kind), str(mode), str(points), str(averages), *times, *volts]
 
     def data(self) -> str:

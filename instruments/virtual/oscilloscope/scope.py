@@ -58,6 +58,9 @@ class VirtualOscilloscope(VirtualInstrument):
     #: What a code cannot go beyond.
     lowest: ClassVar[int]
     highest: ClassVar[int] = 255
+    #: Codes of a division, and the one in the middle of the screen.
+    codes_per_division: ClassVar[float] = 25.0
+    middle: ClassVar[int] = 128
     #: Whether the old record can be read until a single one is complete.
     keeps_old: ClassVar[bool] = False
     #: Bytes per second of a long answer (assumed), and digits of the length in a block's head.
@@ -93,16 +96,20 @@ class VirtualOscilloscope(VirtualInstrument):
         raise NotImplementedError
 
     def scaling(self, channel: int) -> tuple[float, int]:
-        """Volts per code and the code of 0 V, which may lie beyond the converter."""
-        raise NotImplementedError
+        """Volts per code and the code of 0 V, which may lie beyond the converter.
+
+        The offset is what is added to the trace: it lifts it by whole codes.
+        """
+        volts_per_code = self.division(channel) / self.codes_per_division
+        return volts_per_code, self.middle + round(self.value(f"chan{channel}_offset") / volts_per_code)
 
     def window(self, channel: int) -> tuple[float, float]:
-        """The code in the middle of the screen, and how many codes it is high."""
-        raise NotImplementedError
+        """The code in the middle of the screen, and how many codes it is high: eight divisions."""
+        return float(self.middle), 8.0 * self.codes_per_division
 
     def fit(self, channel: int, middle: float, division: float) -> None:
         """Show this voltage in the middle of the screen, with so many volts per division."""
-        raise NotImplementedError
+        self.settings |= {f"chan{channel}_scale": division, f"chan{channel}_offset": -middle}
 
     # --- settings ---
 

@@ -25,13 +25,11 @@ if TYPE_CHECKING:
     from instruments.clock import Clock
     from instruments.virtual.oscilloscope.record import Record, Signal
 
-_CODES_PER_DIVISION, _COLUMNS = 25, 14
+_COLUMNS = 14
 #: The fastest rate [1/s] and the points of the memory, where one channel of a pair is on; half of both with two.
 _FASTEST = 1e9
 _DEPTHS = {"14K": 14_000, "140K": 140_000, "1.4M": 1_400_000, "14M": 14_000_000}
 _HALVES = {"7K": 7_000, "70K": 70_000, "700K": 700_000, "7M": 7_000_000}
-#: Code 0 is the middle of the screen; on the wire it is a signed byte, here an unsigned one.
-_MIDDLE = 128
 #: Bytes of the descriptor.
 _DESCRIPTOR = 346
 #: Bits of INR?: a new record; the trigger is ready.
@@ -266,19 +264,6 @@ class VirtualSDS1000XE(VirtualOscilloscope):
         length = _COLUMNS * self.value("time_scale")
         return -self.value("time_offset") - length / 2, length
 
-    def scaling(self, channel: int) -> tuple[float, int]:
-        """25 codes per division; the offset lifts the trace by whole codes."""
-        volts_per_code = self.division(channel) / _CODES_PER_DIVISION
-        return volts_per_code, _MIDDLE + round(self.value(f"chan{channel}_offset") / volts_per_code)
-
-    def window(self, channel: int) -> tuple[float, float]:
-        """Eight divisions around the middle."""
-        return float(_MIDDLE), 8.0 * _CODES_PER_DIVISION
-
-    def fit(self, channel: int, middle: float, division: float) -> None:
-        """The offset is what is added to the trace."""
-        self.settings |= {f"chan{channel}_scale": division, f"chan{channel}_offset": -middle}
-
     # --- reading the record ---
 
     def set_waveform(self, parameters: list[str]) -> None:
@@ -319,7 +304,8 @@ class VirtualSDS1000XE(VirtualOscilloscope):
         codes = record.codes(
             n, places.start, places[-1] - places.start + 1, of=record.points, start=record.origin, step=1 / record.rate
         )
-        return bytes((codes[:: places.step] ^ 0x80).tobytes())  # a signed byte: the middle is 0
+        # code 0 is the middle of the screen on the wire, where it is a signed byte
+        return bytes((codes[:: places.step] ^ 0x80).tobytes())
 
     def _descriptor(self, record: Record, n: int) -> bytes:
         """WAVEDESC, as far as its places are known."""
@@ -336,7 +322,8 @@ class VirtualSDS1000XE(VirtualOscilloscope):
         put("i", 116, len(self._places(record)))
         put("iiii", 124, record.points - 1, self._setup["FP"], self._setup["SP"], 1)
         # volts per division, and the offset that is taken from code·gain/25
-        put("ff", 156, scale.volts_per_code * _CODES_PER_DIVISION, (scale.zero - _MIDDLE) * scale.volts_per_code)
+        offset = (scale.zero - self.middle) * scale.volts_per_code
+        put("ff", 156, scale.volts_per_code * self.codes_per_division, offset)
         put("fd", 176, 1 / record.rate, -(record.origin + record.points / record.rate / 2))
         return bytes(descriptor)
 

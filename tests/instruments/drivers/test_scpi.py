@@ -225,6 +225,7 @@ def test_what_stands_for_no_reading_is_none(answer, reading):
         (Keysight33500B, "amplitude", 2e-3, 6e-3),
         (Keysight33500B, "amplitude", 10.0, 9.89),
         (Keysight33500B, "frequency", 1e-3, 5e-3),
+        (Keysight33500B, "frequency", 30.0, 30.1),
         (Keysight33500B, "offset", 0.0, -1.1e-3),
         (Keysight33500B, "load", 9.9e37, 50.0),
         (Keysight33500B, "waveform", "SIN", "SQU"),
