@@ -259,7 +259,8 @@ def _result(pulses: Found, start: float) -> SpinFrequency:
     if isinstance(found, Match) and found.flat:
         more.append(Finding("clipped", "the tops of the pulses are flat: the detector or the converter is saturated"))
     if found.missing:
-        more.append(Finding("missing", f"{found.missing} turn{'s have' if found.missing > 1 else ' has'} no pulse"))
+        have = "s have" if found.missing > 1 else " has"
+        more.append(Finding("missing", f"{found.missing} turn{have} no pulse at the right place"))
     if found.wrong:
         more.append(Finding("wrong", f"{found.wrong} pulses are not at their place and were left out"))
     if fit.coefficients.size > 3:
