@@ -160,10 +160,10 @@ def _excerpt(records: Records, spin: SpinFrequency) -> _Excerpt:
 
     bend = _bend(spin, arrivals)
     unit = waveform.signals[waveform.signal(channel)].unit
-    at, late = arrivals(bend)
-    off = _middle(late, spin.scatter)  # where a pulse has its middle is a matter of its shape: the fit's mark differs
+    at, residuals = arrivals(bend)
+    off = _middle(residuals, spin.scatter)  # the fit may put the middle of a pulse at another place of its shape
     turns = turns_of(spin, time, bend) - off * (spin.frequency.value or 1.0)
-    return _Excerpt(time, signal, turns, unit, at + off, late - off, bend)
+    return _Excerpt(time, signal, turns, unit, at + off, residuals - off, bend)
 
 
 def _middle(late: Array, scatter: float) -> float:
