@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable
 
+from analysis.numbers import digits
+
 
 class AnalysisError(Exception):
     """The readings do not allow this analysis. The text is one sentence fit for a person."""
@@ -22,7 +24,7 @@ class TooFewPulses(AnalysisError):
         self.seen, self.needed, self.duration = seen, needed, duration
         wanted = f", at least {needed} are needed" if seen < needed else " that do not return regularly"
         super().__init__(
-            f"{seen} pulses in {duration:.3g} s{wanted}: record longer, or look at the trace: "
+            f"{seen} pulses in {digits(duration, 3)} s{wanted}: record longer, or look at the trace: "
             "does light reach the detector, is the trigger level inside the pulse?"
         )
 
@@ -32,7 +34,7 @@ class OnlyHum(TooFewPulses):
 
     def __init__(self, *, seen: int, needed: int, duration: float) -> None:
         super().__init__(seen=seen, needed=needed, duration=duration)
-        text = f"the trace holds hum of the mains, and in {duration:.3g} s no pulses that return regularly: "
+        text = f"the trace holds hum of the mains, and in {digits(duration, 3)} s no pulses that return regularly: "
         self.args = (text + "shield the detector from lamps, and look at the trace",)
 
 
@@ -151,7 +153,7 @@ class FieldTurnsOver(AnalysisError):
         self.low, self.high, self.reversal = low, high, reversal
         super().__init__(
             f"the flux density changes its sign between {1e3 * low:.4g} and {1e3 * high:.4g} mm, this base's does so "
-            f"at about {1e3 * reversal:.3g} mm: was the probe turned over in between, or not on the axis?"
+            f"at about {digits(1e3 * reversal, 3)} mm: was the probe turned over in between, or not on the axis?"
         )
 
 
@@ -161,8 +163,8 @@ class NoField(AnalysisError):
     def __init__(self, *, largest: float, background_u: float) -> None:
         self.largest, self.background_u = largest, background_u
         super().__init__(
-            f"the flux density is nowhere above {1e3 * largest:.3g} mT, which zero and background alone may make "
-            f"(u = {1e3 * background_u:.2g} mT): is the base there, and was the probe zeroed in its chamber?"
+            f"the flux density is nowhere above {digits(1e3 * largest, 3)} mT, which zero and background alone may "
+            f"make (u = {digits(1e3 * background_u)} mT): is the base there, and was the probe zeroed in its chamber?"
         )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.errors import TooFewPulses
+from analysis.numbers import digits
 from analysis.pulses.regression import Fit, median
 from analysis.pulses.result import Finding
 from analysis.pulses.search import WIDE, find_events, noise_of, shorten
@@ -73,7 +74,9 @@ def clean(samples: Array, rate: float, bins: Array, bad: Mask | None, *, own: Li
         notes.append(Finding("not-finite", f"{np.count_nonzero(bad)} samples are no finite numbers and do not count"))
     dead = _dead(bins, bin_rate, whole)
     if dead.any():
-        notes.append(Finding("gap", f"the signal is constant for {np.count_nonzero(dead) / bin_rate:.3g} s in all"))
+        notes.append(
+            Finding("gap", f"the signal is constant for {digits(np.count_nonzero(dead) / bin_rate, 3)} s in all")
+        )
         counted = counted & ~dead
         long = np.zeros(samples.size, dtype=bool)
         long[: bins.size * factor] = np.repeat(dead, factor)
@@ -87,13 +90,13 @@ def clean(samples: Array, rate: float, bins: Array, bad: Mask | None, *, own: Li
     own = _own_at_sight(lines, bins, bin_rate)
     lines = tuple(line for line in lines if line not in own)
     if lines:
-        names = " and ".join(f"{amplitude:.2g} at {frequency:.5g} Hz" for frequency, amplitude in lines)
+        names = " and ".join(f"{digits(amplitude)} at {frequency:.5g} Hz" for frequency, amplitude in lines)
         notes.append(Finding("hum", f"hum of amplitude {names} was taken off"))
         samples, bins = _without_hum(samples, rate, bins, counted, [frequency for frequency, _ in lines])
     steps = _baseline(bins, bin_rate, counted)
     if steps is not None:
         times, values = steps
-        notes.append(Finding("wander", f"the baseline wanders by {np.ptp(values):.2g} and was taken off"))
+        notes.append(Finding("wander", f"the baseline wanders by {digits(float(np.ptp(values)))} and was taken off"))
         samples = samples - np.interp(np.arange(samples.size) / rate, times, values)
         bins = bins - np.interp((np.arange(bins.size) + 0.5) / bin_rate, times, values)
     if not counted.all():

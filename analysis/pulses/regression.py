@@ -72,6 +72,14 @@ class Fit:
         frequency, chirp, away = _independent(self.coefficients, self.covariance, self.half)
         return frequency, chirp, self.centre + away
 
+    @property
+    def bend(self) -> Estimate | None:
+        """How the slope of the frequency itself changes, its third derivative of phase; None below degree three."""
+        if self.coefficients.size < 4:
+            return None
+        unit = 6 / self.half**3
+        return Estimate(unit * float(self.coefficients[3]), unit * float(np.sqrt(self.covariance[3, 3])), "Hz/s^2")
+
     def times(self, factor: float) -> Fit:
         """The phase multiplied: half or twice the frequency."""
         return replace(self, coefficients=self.coefficients * factor)

@@ -47,6 +47,7 @@ class SpinFrequency:
         scatter: standard deviation of one pulse's time [s].
         snr_db: 20 log₁₀ of the pulse's height over the noise of a sample; None for lists of times.
         notes: findings.
+        bend: how the slope itself changes [Hz/s²], the same at all times; None where no third degree was fitted.
     """
 
     frequency: Estimate
@@ -61,6 +62,7 @@ class SpinFrequency:
     scatter: float
     snr_db: float | None
     notes: tuple[Finding, ...] = ()
+    bend: Estimate | None = None
 
     def at(self, time: float) -> Estimate:
         """The frequency at another time [s], along the slope."""
@@ -80,7 +82,7 @@ class SpinFrequency:
         that gets slower, and is taken off; where a third degree was fitted nothing is left to be done.
         """
         frequency, chirp = self.frequency, self.chirp
-        if any(note.name == "curved" for note in self.notes) or not frequency.value or not chirp.value:
+        if self.bend or not frequency.value or not chirp.value:
             return self
         span = (self.pulses + self.missing - 1) / frequency.value
         most = chirp.value**2 / frequency.value * span**2 / 40

@@ -71,6 +71,7 @@ def spin_of_times(pulse_times: ArrayLike, *, degree: int | None = None) -> SpinF
         float(np.sqrt(train.fit.variance)) / frequency.value,
         None,
         findings_of(train),
+        train.fit.bend,
     )
 
 

@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
+import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from analysis.locked import Slip, slip_of
@@ -33,6 +34,10 @@ RAMP_STEP_S = 1.0
 _LONGEST_RAMP_S = 6 * 3600.0
 #: A held top swings about the drive's frequency by what the drive can hold at most, 0.5 Hz at 0.4 mT [Hz].
 HELD_WITHIN_HZ = 1.0
+#: The halves of a hold differ by no more than this where the top is held [Hz], the beginning and the end of a swing of
+#: a third of a turn in 10 s each, nor by so many standard uncertainties; a lost top loses 1 Hz meanwhile.  Of so many
+#: counts in a half.
+_DRIFTS_HZ, _DRIFTS_BY_U, _FEWEST_IN_HALF = 0.1, 3.0, 3
 #: Whether the drive takes hold depends on how the top happens to point when it comes on, and one time in four it does
 #: not.  So the top is looked at so often on the way [s] (one that is not held loses 0.1 Hz/s to the air), and tried
 #: again with the drive so many turns later: a reading ends with a pulse, so without that it would point as before.
@@ -236,7 +241,23 @@ def _hold(session: Session[D], drive: float) -> None:
         counts.append(held_spin(session, drive))
         session.progress(f"held at {drive:.2f} Hz", (k + 1) / n)
     if n > 1:
-        compare_with_drive(session, slip_of(counts, drive))
+        slip = slip_of(counts, drive)
+        if has_drifted(counts):  # a top that is lost is taken for held until it is HELD_WITHIN_HZ behind
+            raise NotHeld(counts[-1], drive)
+        compare_with_drive(session, slip)
+
+
+def has_drifted(counts: Sequence[float]) -> bool:
+    """Whether the second half of the counts lies off the first half, as those of a top that was lost meanwhile do.
+
+    A tape that slips is as far behind at first as it is at last.  counts: at least two, in order [Hz].
+    """
+    half = len(counts) // 2
+    first, last = np.array(counts[:half]), np.array(counts[-half:])
+    if half < _FEWEST_IN_HALF:
+        return False
+    u = math.hypot(float(first.std(ddof=1)), float(last.std(ddof=1))) / math.sqrt(half)
+    return abs(float(last.mean() - first.mean())) > max(_DRIFTS_BY_U * u, _DRIFTS_HZ)
 
 
 def compare_with_drive(session: Session[D], slip: Slip) -> None:

@@ -21,7 +21,7 @@ _SHOULD_BE = r"Input should be (a valid )?(.*?)(, unable to .*|, got .*)?"
 
 
 class Commands(typer.core.TyperGroup):
-    """All commands.  The wrong value of an option is refused in plain words."""
+    """All commands.  The wrong value of an option is refused in plain words; Ctrl-C ends them in one line."""
 
     def invoke(self, ctx: Any) -> Any:
         """Carry out what was called."""
@@ -30,6 +30,9 @@ class Commands(typer.core.TyperGroup):
         except typer.BadParameter as error:
             error.message = in_plain_words(error.message)
             raise
+        except KeyboardInterrupt:  # while a command is imported; what can be lost later is said by the command itself
+            message("levilab: interrupted")
+            raise typer.Exit(exit_codes.INTERRUPTED) from None
 
 
 def in_plain_words(text: str) -> str:

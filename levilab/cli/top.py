@@ -24,5 +24,6 @@ def top(
         return
     from levilab.present.terminal import draw, terminal  # with rich
 
-    terminal().print(draw(top_table(found)))
-    typer.echo(top_text(found))
+    console = terminal()
+    console.print(draw(top_table(found)))
+    console.print(top_text(found), markup=False)

@@ -61,5 +61,5 @@ def _panel(axis: Axes, name: str, spread: Spread) -> None:
     width = edges[1] - edges[0]
     axis.plot(x, spread.n * width * np.exp(-(x**2) / 2) / math.sqrt(2 * math.pi), color="black", lw=1)
     axis.axvline(0, color="black", lw=0.6)
-    told = f"mean {spread.mean:+.2f}, s.d. {spread.deviation:.2f}, {100 * spread.coverage:.0f} % in ±u"
-    axis.set_title(f"{name}: {spread.quantity}\n{told}", loc="left", fontsize=7.5)
+    numbers = f"mean {spread.mean:+.2f}, s.d. {spread.deviation:.2f}, {100 * spread.coverage:.0f} % in ±u"
+    axis.set_title(f"{name}: {spread.quantity}\n{numbers}", loc="left", fontsize=7.5)

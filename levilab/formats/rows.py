@@ -7,6 +7,7 @@ marks, blanks as separators, a damaged line) is read again line by line, so that
 
 import contextlib
 import csv
+import re
 import warnings
 from array import array
 from collections.abc import Sequence
@@ -34,12 +35,14 @@ class Rows:
     """Numbers as they stand in the file.
 
     `values` has one array, shape (rows,), for each column that is used, NaN where a reading is missed; `lines`,
-    shape (rows,), holds their 1-based lines; `torn` tells of a last line that was cut off and is left out.
+    shape (rows,), holds their 1-based lines; `torn` is about a last line that was cut off and is left out, `doubt`
+    about times that may be meant otherwise.
     """
 
     values: "tuple[NDArray[np.float64], ...]"
     lines: "NDArray[np.int64]"
     torn: str | None = None
+    doubt: str | None = None
 
 
 def read_rows(path: Path, layout: Layout, chosen: Sequence[Column], *, drop_unended: bool = False) -> Rows:
@@ -147,7 +150,7 @@ def _with_last(
 def _read_lines(path: Path, layout: Layout, chosen: Sequence[Column], *, drop_unended: bool) -> Rows:
     """All rows line by line; some 2 µs a number."""
     lines, values, torn = array("q"), [array("d") for _ in chosen], None
-    first = ""
+    time = ""
     with path.open(encoding=layout.encoding, errors="replace", newline=None) as stream:
         for number, line in enumerate(stream, 1):
             if number < layout.first_line or _skips(layout, line):
@@ -160,19 +163,38 @@ def _read_lines(path: Path, layout: Layout, chosen: Sequence[Column], *, drop_un
             if row is None:
                 torn = _torn(number, line)
                 break
-            first = first or line
+            time = time or _time_in(layout, chosen, line)
             lines.append(number)
             for column, value in zip(values, row, strict=True):
                 column.append(value)
-    numbers = tuple(_from_first_date(layout, *pair, first) for pair in zip(chosen, values, strict=True))
-    return Rows(numbers, np.array(lines, np.int64), torn)
+    numbers = tuple(
+        _from_first_date(np.array(found, np.float64))
+        if column.name == "time_s" and DATED.fullmatch(time)
+        else np.array(found, np.float64)
+        for column, found in zip(chosen, values, strict=True)
+    )
+    return Rows(numbers, np.array(lines, np.int64), torn, _doubt_about(time))
 
 
-def _from_first_date(layout: Layout, column: Column, values: "array[float]", first: str) -> "NDArray[np.float64]":
-    """Numbers of a column; dates, which count from 1970, count from the first one."""
-    numbers = np.array(values, np.float64)
-    dated = column.name == "time_s" and first and DATED.fullmatch(layout.dialect.split(first)[column.index])
-    return numbers - numbers[0] if dated else numbers
+def _time_in(layout: Layout, chosen: Sequence[Column], line: str) -> str:
+    """What stands in a row for the time, empty where it is missed."""
+    fields = layout.dialect.split(line)
+    found = next((fields[column.index] for column in chosen if column.name == "time_s"), "")
+    return "" if found.casefold() in MISSING else found
+
+
+def _from_first_date(times: "NDArray[np.float64]") -> "NDArray[np.float64]":
+    """Dates, which count from 1970, from the first one on.  times: shape (n,), NaN where one is missed [s]."""
+    first: float = times[np.isfinite(times)][0]
+    return np.asarray(times - first)
+
+
+def _doubt_about(time: str) -> str | None:
+    """What to say of the first time: a stopwatch begins at 0:00 or so, hours and minutes of a clock do not."""
+    minutes = re.fullmatch(r"(\d{1,2}):\d\d", time)
+    if minutes is None or int(minutes[1]) == 0:
+        return None
+    return f"the times, as {time}, are taken for minutes and seconds; of a clock write the seconds, too: {time}:00"
 
 
 def _row(path: Path, layout: Layout, chosen: Sequence[Column], line: int, text: str) -> list[float]:

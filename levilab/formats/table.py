@@ -246,6 +246,7 @@ def _table(
 
     name = shown(str(path), 200)
     told = [*warnings, *([f"{name}, {rows.torn} and is left out"] if rows.torn else [])]
+    told += [f"{name}: {rows.doubt}"] if rows.doubt else []
     numbers = dict(zip(chosen, rows.values, strict=False))
     # The comparison is false for NaN, too.
     present = {column: np.abs(values) < NO_READING for column, values in numbers.items()}

@@ -71,10 +71,15 @@ class SimulationOrder:
 
 @dataclass(frozen=True)
 class Simulation:
-    """What came of it, and the run folder if there is one."""
+    """What came of it.
+
+    summary: of the motion, with all its samples; folder: the run folder, if there is one; samples_per_state: every so
+    manieth sample is a state that was asked for.
+    """
 
     summary: Summary
     folder: Path | None
+    samples_per_state: int = 1
 
 
 def carry_out(
@@ -87,7 +92,7 @@ def carry_out(
     """
     factor = _samples_per_state(order)
     if order.out is None:
-        return Simulation(_simulated(order, factor, message, progress), None)
+        return Simulation(_simulated(order, factor, message, progress), None, factor)
     with interruption_postponed() as admit_interruption, RunWriter.create(order.out, _record(order), STATES) as writer:
         try:
             admit_interruption()  # from here on the folder is taken away again
@@ -96,7 +101,7 @@ def carry_out(
         except BaseException:
             writer.discard()
             raise
-    return Simulation(summary, writer.folder)
+    return Simulation(summary, writer.folder, factor)
 
 
 def _samples_per_state(order: SimulationOrder) -> int:

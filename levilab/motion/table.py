@@ -14,16 +14,20 @@ from levilab.present.terminal import new_table, terminal
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from rich.console import Console
     from rich.table import Table
 
     from levilab.motion.effects import Effect
     from levilab.motion.summary import Summary
 
 
-def print_motion(summary: Summary) -> None:
-    """How it ended, the motion in numbers, the lines of the axis, how good it is, and what to mind."""
-    out = terminal()
-    out.print(f"[bold]{escape(_headline(summary))}[/bold]")
+def print_motion(summary: Summary, console: Console | None = None) -> None:
+    """How it ended, the motion in numbers, the lines of the axis, how good it is, and what to mind.
+
+    console: where it is printed, by default the terminal.
+    """
+    out = console or terminal()
+    out.print(f"[bold]{escape(headline(summary))}[/bold]")
     facts = new_table(None, "", "")
     facts.show_header = False
     for what, text in (*_motion_facts(summary), *_quality_facts(summary)):
@@ -35,7 +39,8 @@ def print_motion(summary: Summary) -> None:
         out.print(f"[yellow]note:[/yellow] {escape(note)}")
 
 
-def _headline(summary: Summary) -> str:
+def headline(summary: Summary) -> str:
+    """How it ended, in a line."""
     name = summary.motion.scene.name or "the scene"
     if summary.motion.scene.observed == "spin":
         return f"{name}: the spin alone, for {summary.duration:g} s"

@@ -9,21 +9,26 @@ from typing import TYPE_CHECKING, Any, Generic
 
 from levilab.errors import DoesNotSuit, NoneUsable, unquoted
 from levilab.pipelines.analyzed import A
+from levilab.pipelines.field.columns import field_columns
 from levilab.pipelines.field.document import DOCUMENT as FIELD
 from levilab.pipelines.field.report import field_part
 from levilab.pipelines.field.table import field_tables
+from levilab.pipelines.limit.columns import limit_columns
 from levilab.pipelines.limit.document import DOCUMENT as LIMIT
 from levilab.pipelines.limit.report import limit_part
 from levilab.pipelines.limit.table import limit_tables
+from levilab.pipelines.precession.columns import precession_columns
 from levilab.pipelines.precession.document import DOCUMENT as PRECESSION
 from levilab.pipelines.precession.report import precession_part
 from levilab.pipelines.precession.table import precession_tables
 from levilab.pipelines.result import Place, is_of_another, read_inputs, results_in
 from levilab.pipelines.result import save as save_files
 from levilab.pipelines.sources import data_files
+from levilab.pipelines.spin.columns import spin_columns
 from levilab.pipelines.spin.document import DOCUMENT as SPIN
 from levilab.pipelines.spin.report import spin_part
 from levilab.pipelines.spin.table import spin_tables
+from levilab.pipelines.spindown.columns import spindown_columns
 from levilab.pipelines.spindown.document import DOCUMENT as SPINDOWN
 from levilab.pipelines.spindown.report import spindown_part
 from levilab.pipelines.spindown.table import spindown_tables
@@ -32,13 +37,17 @@ from levilab.present.numbers import short_name
 from levilab.runs.run import RECORD, find_runs
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
+
+    import numpy as np
+    from rich.console import Console
 
     from levilab.pipelines.document import Document, Looked
     from levilab.pipelines.part import ReportPart
     from levilab.pipelines.result import Written
     from levilab.pipelines.sources import InputOptions, Needs, Source
+    from levilab.present.style import Figure
     from levilab.present.tables import Table
     from levilab.runs.run import Run
 
@@ -50,13 +59,14 @@ MOST_STARTS = 6
 class Analysis(Generic[A]):
     """One analysis.
 
-    result: how it is carried out, and its result.json; tables: for the terminal; part: of a report.  Its figure is in
-    `levilab.pipelines.figures`.
+    result: how it is carried out, and its result.json; tables: for the terminal; part: of a report; columns: the
+    readings of each input as columns of a table, with residuals.  Its figure is in `levilab.pipelines.figures`.
     """
 
     result: Document[Any, Any, Any, A, Any]
     tables: Callable[[A], tuple[Table, ...]]
     part: Callable[[A], ReportPart]
+    columns: Callable[[A], Iterable[Mapping[str, np.ndarray]]]
 
     @property
     def needs(self) -> Needs[Any]:
@@ -87,27 +97,32 @@ class Analysis(Generic[A]):
         content: dict[str, Any] = self.result.of(found, Place(folder)).as_dict()
         return content
 
-    def png(self, found: A) -> bytes:
+    def figure(self, found: A) -> Figure:
         """The figure."""
         from levilab.pipelines.figures import FIGURES  # with matplotlib
-        from levilab.present.style import as_png
 
-        return as_png(FIGURES[self.name](found))
+        figure: Figure = FIGURES[self.name](found)
+        return figure
+
+    def png(self, found: A) -> bytes:
+        """The figure."""
+        from levilab.present.style import as_png  # with matplotlib
+
+        return as_png(self.figure(found))
 
     def svg(self, found: A) -> str:
         """The figure."""
-        from levilab.pipelines.figures import FIGURES  # with matplotlib
-        from levilab.present.style import as_svg
+        from levilab.present.style import as_svg  # with matplotlib
 
-        return as_svg(FIGURES[self.name](found))
+        return as_svg(self.figure(found))
 
 
 _TABLE: tuple[Analysis[Any], ...] = (
-    Analysis(SPINDOWN, spindown_tables, spindown_part),
-    Analysis(SPIN, spin_tables, spin_part),
-    Analysis(FIELD, field_tables, field_part),
-    Analysis(LIMIT, limit_tables, limit_part),
-    Analysis(PRECESSION, precession_tables, precession_part),
+    Analysis(SPINDOWN, spindown_tables, spindown_part, spindown_columns),
+    Analysis(SPIN, spin_tables, spin_part, spin_columns),
+    Analysis(FIELD, field_tables, field_part, field_columns),
+    Analysis(LIMIT, limit_tables, limit_part, limit_columns),
+    Analysis(PRECESSION, precession_tables, precession_part, precession_columns),
 )
 ANALYSES = MappingProxyType({analysis.name: analysis for analysis in _TABLE})
 
@@ -231,13 +246,18 @@ def save(analysis: Analysis[A], found: A, folder: Path | None = None) -> list[Pa
     return save_files(analysis.result.of(found, place), place, analysis.png(found), first=first)
 
 
-def print_analysis(analysis: Analysis[A], found: A, in_words: Callable[[str], str] = unquoted) -> None:
-    """The tables, what the data say, and the warnings, on the terminal.  in_words: a message as the person reads it."""
+def print_analysis(
+    analysis: Analysis[A], found: A, in_words: Callable[[str], str] = unquoted, console: Console | None = None
+) -> None:
+    """The tables, what the data say, and the warnings.
+
+    in_words: a message as the person reads it; console: where it is printed, by default the terminal.
+    """
     from rich.markup import escape
 
     from levilab.present.terminal import draw, terminal  # with rich
 
-    console = terminal()
+    console = console or terminal()
     for table in analysis.tables(found):
         console.print(draw(table))
     starts = [f"{short_name(one.name)} {moment(one.start)}" for one in found.sources if one.start]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from analysis.errors import AnalysisError
+from analysis.numbers import digits
 from analysis.top import Cylinder, Top, top_of
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
@@ -81,8 +82,8 @@ def top_text(found: Calculated) -> str:
         "top.inertia_transverse_kg_m2": top.transverse.value,
         "top.inertia_axial_kg_m2": top.axial.value,
     }
-    settings = " ".join(f"--set {key}={value:.6g}" for key, value in keys.items())
-    return f"I₃/I₁ = {ratio:.3g}: the top is {kind}.\nFor a scene: {settings}"
+    settings = "\n".join(f"--set {key}={value:.6g}" for key, value in keys.items())
+    return f"I₃/I₁ = {digits(ratio, 3)}: the top is {kind}.\nFor a scene:\n{settings}"
 
 
 def top_document(found: Calculated) -> dict[str, Any]:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 UNITS = {
     "1": "",
     "1/s": "s⁻¹",
+    "Hz/s^2": "Hz/s²",
     "1/rad": "rad⁻¹",
     "(rad/s)^-1/2/s": "(rad/s)^−½/s",
     "(rad/s)^(1-exponent)/s": "(rad/s)^(1−n)/s",
@@ -36,6 +37,23 @@ def with_uncertainty(estimate: Estimate) -> str:
     """
     text = f"{without_unit(estimate)} {in_words(estimate.unit)}".strip()
     return text if estimate.u is not None or estimate.value is None else f"{text}, u not determined"
+
+
+def in_one_line(estimate: Estimate) -> str:
+    """Value, standard uncertainty in its last digits and unit, in characters that every program prints.
+
+    >>> from analysis.uncertainty import Estimate
+    >>> in_one_line(Estimate(0.003262, 2.3e-5, "1/s")), in_one_line(Estimate(1.7151e-5, 1.7e-7, "1/rad"))
+    ('0.003262(23) 1/s', '1.715(17)e-05 1/rad')
+    >>> in_one_line(Estimate(0.25, None, "1")), in_one_line(Estimate(None, None, "Hz"))
+    ('0.25', 'not determined')
+    """
+    from uncertainties import ufloat
+
+    if estimate.value is None:
+        return "not determined"
+    number = f"{ufloat(estimate.value, estimate.u):S}" if estimate.u else f"{estimate.value:.6g}"
+    return number if estimate.unit == "1" else f"{number} {estimate.unit}"
 
 
 def without_unit(estimate: Estimate) -> str:
@@ -95,6 +113,16 @@ def _number(value: float, u: float | None, *, ordinary: bool | None = None) -> s
         ordinary = 1e-2 <= abs(value) < 1e5 or abs(value) < u < 1e5
     text = f"{ufloat(value, u):SP}" if ordinary else f"{ufloat(value, u):eSP}"
     return re.sub(r"^-(?=0(\.0*)?\()", "", text)
+
+
+def signed(value: float, decimals: int) -> str:
+    """A number with its sign, and none where it rounds to zero.
+
+    >>> signed(0.471, 2), signed(-0.002, 2), signed(-1.614, 2)
+    ('+0.47', '0.00', '-1.61')
+    """
+    text = f"{value:+.{decimals}f}"
+    return text if float(text) else text[1:]
 
 
 def short_name(name: str) -> str:

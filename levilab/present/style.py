@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Figure  # noqa: PLC0414 - for others, who may not name matplotlib
 
 
 STYLE: Any = {
@@ -48,6 +49,12 @@ def as_svg(figure: Figure) -> str:
     with mpl.rc_context(STYLE):
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     return buffer.getvalue()
+
+
+def for_notebooks(figure: Figure) -> Figure:
+    """The figure, which a notebook now shows as a picture, whether pyplot was imported there or not."""
+    vars(figure)["_repr_png_"] = partial(as_png, figure)
+    return figure
 
 
 def row(figure: Figure, bottom: float, height: float, n: int = 1, gap: float = 0.0) -> list[Axes]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 import sys
 from typing import TYPE_CHECKING
@@ -16,7 +17,7 @@ from rich.table import Table as RichTable
 from levilab.present.characters import for_encoding
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from typing import Any
 
     from rich.console import ConsoleOptions, RenderableType
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 _ASCII_HEAD = box.Box("    \n    \n -- \n    \n    \n -- \n    \n    \n", ascii=True)
 #: Columns below which no text can be read, and more than any table has.
 _NARROWEST, _UNLIMITED = 20, 10_000
+#: Columns of a text that is no terminal's: all tables fit into 80, and lines of words are still read with ease.
+TEXT_WIDTH = 110
 
 
 class _Terminal(Console):
@@ -86,6 +89,13 @@ def terminal() -> Console:
     """As wide as the terminal; into a pipe or file as wide as the tables need."""
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 160
     return _Terminal(width=max(width, _NARROWEST), highlight=False)
+
+
+def as_text(show: Callable[[Console], object]) -> str:
+    """What a function prints, as text of at most `TEXT_WIDTH` columns without colours."""
+    written = io.StringIO()
+    show(_Terminal(file=written, width=TEXT_WIDTH, highlight=False, color_system=None))
+    return "\n".join(line.rstrip() for line in written.getvalue().strip("\n").splitlines())
 
 
 def new_table(title: str | None, *columns: str, numbers: Sequence[str] = ()) -> RichTable:

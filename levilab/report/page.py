@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
     from pathlib import Path
 
-    from levilab.pipelines.analyzed import Analyzed
+    from jinja2 import Template
+
+    from levilab.pipelines.analyzed import A, Analyzed
     from levilab.pipelines.catalogue import Analysis
     from levilab.pipelines.part import ReportPart
     from levilab.pipelines.sources import Source
@@ -100,8 +102,37 @@ class Section:
     warnings: tuple[str, ...]
 
 
+def render_part(analysis: Analysis[A], found: A) -> str:
+    """What one analysis found, as a part of a page that is not ours: result, figure, warnings, run by run."""
+    section = _section(analysis, found, alone=True)
+    made_up = [
+        (source.name, source.run.record.synthetic_how or "not said how")
+        for source in found.sources
+        if source.run and source.run.record.synthetic
+    ]
+    return _template("report/notebook.html.j2").render(section=section, made_up=made_up)
+
+
 def render(results: Results) -> str:
     """The page's text."""
+    sections = [_section(analysis, found, alone=len(results) == 1) for analysis, found in results]
+    abouts: dict[Path, list[About]] = {}
+    for (_, found), section in zip(results, sections, strict=True):
+        several = len(found.sources) > 1
+        for source, part in zip(found.sources, section.part.inputs, strict=True):
+            abouts.setdefault(source.path.resolve(), []).append(About(source, section.part, part, several))
+    return _template("report/page.html.j2").render(
+        sections=sections,
+        banner=sections[0].banner if len(sections) == 1 else _banner([one[0].source for one in abouts.values()]),
+        inputs=[describe(of_input) for of_input in abouts.values()],
+        counted=counted([one[0].source for one in abouts.values()]),
+        software=software_versions(),
+        written=utc_now()[:19].replace("T", " ") + " UTC",
+    )
+
+
+def _template(name: str) -> Template:
+    """What is typed into it is escaped, and what it lacks is an error."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -111,20 +142,7 @@ def render(results: Results) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    sections = [_section(analysis, found, alone=len(results) == 1) for analysis, found in results]
-    abouts: dict[Path, list[About]] = {}
-    for (_, found), section in zip(results, sections, strict=True):
-        several = len(found.sources) > 1
-        for source, part in zip(found.sources, section.part.inputs, strict=True):
-            abouts.setdefault(source.path.resolve(), []).append(About(source, section.part, part, several))
-    return environment.get_template("report/page.html.j2").render(
-        sections=sections,
-        banner=sections[0].banner if len(sections) == 1 else _banner([one[0].source for one in abouts.values()]),
-        inputs=[describe(of_input) for of_input in abouts.values()],
-        counted=counted([one[0].source for one in abouts.values()]),
-        software=software_versions(),
-        written=utc_now()[:19].replace("T", " ") + " UTC",
-    )
+    return environment.get_template(name)
 
 
 def _section(analysis: Analysis[Any], found: Analyzed[Any, Any, Any, Any], *, alone: bool) -> Section:

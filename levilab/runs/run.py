@@ -19,11 +19,15 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from levilab.errors import DataError
 from levilab.files import parse_json
 from levilab.formats.table import read_run_readings
+from levilab.present.html import facts_as_html
 from levilab.runs.traces import load_traces
 from levilab.settings import in_one_line
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from levilab.formats.table import Table
+    from levilab.present.style import Figure
     from levilab.runs.traces import StoredTrace
 
 SCHEMA: Literal["levilab-run/1"] = "levilab-run/1"
@@ -39,6 +43,8 @@ READINGS, STATES, EVENTS, RECORD, LOCK, WIRE, PACKAGE = (
 
 #: The kind of an event that says what to know before the readings are used.
 WARNING = "warning"
+#: Rows of readings that a notebook shows.
+SHOWN_ROWS = 5
 _NUMBERS = re.compile(r"[\d.]+(\(\d+\))?")
 
 Status = Literal["running", "finished", "interrupted", "failed"]
@@ -104,6 +110,50 @@ class Run:
         record = read_record(folder)
         alive = record.status != "running" or _is_alive(folder)
         return cls(folder, record, record.status if alive else "interrupted")
+
+    def __repr__(self) -> str:
+        started = (self.record.started_utc or "").partition(".")[0].replace("T", " ")
+        when = f" of {started.removesuffix('Z')} UTC" if started else ""
+        made_up = ", SYNTHETIC" if self.record.synthetic else ""
+        return f"<Run: {self.record.experiment}{when}, {self.status}{made_up}, in {self.folder}>"
+
+    def _repr_html_(self) -> str:
+        """As a notebook shows it."""
+        frame, problem = self._frame_or_problem()
+        count = "" if frame is None else f"{len(frame)}, the first {min(len(frame), SHOWN_ROWS)} below"
+        facts = [
+            ("status", self.status),
+            ("started", (self.record.started_utc or "").partition(".")[0]),
+            ("synthetic", self.record.synthetic_how or "yes" if self.record.synthetic else ""),
+            ("note", self.record.note),
+            ("folder", str(self.folder)),
+            ("readings", problem or count),
+        ]
+        facts += [("warning", text) for text in ([] if problem else self.warnings())]
+        below = "" if frame is None else str(frame.head(SHOWN_ROWS).to_html(border=0))
+        return facts_as_html(f"{self.record.experiment} run", facts, below)
+
+    def _frame_or_problem(self) -> tuple[pd.DataFrame | None, str]:
+        try:
+            return self.to_dataframe(), ""
+        except DataError as error:
+            return None, str(error)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """The readings, or a simulated motion's states: columns in SI, with the unit in the name.  Raises DataError."""
+        if (self.folder / READINGS).exists() or not (self.folder / STATES).exists():
+            return self.readings().frame.copy()
+        declared = [channel["name"] for channel in self.record.channels if "name" in channel]
+        return read_run_readings(self.folder / STATES, declared).frame
+
+    def plot(self) -> Figure:
+        """The readings as they are, a panel for each channel.  Raises DataError."""
+        from levilab.present.style import for_notebooks  # with matplotlib
+        from levilab.runs.figure import readings_figure
+
+        made_up = ", SYNTHETIC" if self.record.synthetic else ""
+        title = f"{self.record.experiment} run {self.folder.name}{made_up}"
+        return for_notebooks(readings_figure(self.to_dataframe(), title))
 
     @property
     def continued_in(self) -> Path | None:

@@ -65,6 +65,11 @@ class Trajectory:
     fell: Event | None = None
     events: tuple[Event, ...] = ()
 
+    def __repr__(self) -> str:
+        name, end = self.scene.name or "a scene", float(self.time[-1])
+        how = "up to the end" if self.fell is None else f"lost at the limit of its {self.fell.name}"
+        return f"<{type(self).__name__} of {name}: {len(self.time)} states in {end:.4g} s, {how}>"
+
     @property
     def time(self) -> Array:
         """Shape (n,) [s]; the last one is the end, or the moment of the fall."""

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from instruments.drivers.generator import Limits as DriveLimits
     from levilab.acquisition.session import Row, Session
     from levilab.bench.config import Limits
 
@@ -172,13 +173,14 @@ def _point(session: Session[PrecessionSettings], drive: float) -> None:
     settings = session.settings
     _wait_for_lock(session, drive)
     row, counts = _measure(session, drive)
-    if settings.record_s:
-        _record(session, drive)
     text = f"spin and laser were counted at {drive:g} Hz"
     session.writer.event(session.now(), COUNTED, text, drive_frequency_hz=drive, **counts)
-    session.keep(
-        row | {"time_s": session.now()}, _time_left(settings, _points_done([*session.rows, row], settings.sweep))
-    )
+    try:
+        if settings.record_s:
+            _record(session, drive)
+    finally:  # what was counted is kept if the record is broken off; by their order a record belongs to its point
+        left = _time_left(settings, _points_done([*session.rows, row], settings.sweep))
+        session.keep(row | {"time_s": session.now()}, left)
 
 
 def _wait_for_lock(session: Session[PrecessionSettings], drive: float) -> None:
@@ -232,14 +234,31 @@ def _calm(session: Session[PrecessionSettings], drive: float, swing: Swing | Non
     """
     if swing is None or swing.size < _CALM or not swing.frequency * _STEP_S < _SHORT:
         return
-    half = 0.5 / swing.frequency
-    number = math.ceil((session.now() + _STEP_S - swing.crest) / half)
-    ahead = swing.size if number % 2 == 0 else -swing.size
-    session.wait(swing.crest + number * half - _STEP_S / 2 - session.now())
-    session.bench.generator.frequency = drive + ahead / _STEP_S
+    step = calming_step(swing, drive, session.now(), session.bench.generator.limits)
+    if step is None:
+        return
+    moment, frequency = step
+    session.wait(moment - session.now())
+    session.bench.generator.frequency = frequency
     session.wait(_STEP_S)
     session.bench.generator.frequency = drive
     session.event("calmed", f"the top swung {swing.size:.2f} turns about the drive: the drive was moved by as much")
+
+
+def calming_step(swing: Swing, drive: float, now: float, limits: DriveLimits) -> tuple[float, float] | None:
+    """When the drive's frequency is to differ for _STEP_S [s], and what it is then [Hz].
+
+    Forward where the top is farthest ahead, else back where it is farthest behind, whichever comes first and is within
+    the limits of the drive; None where neither is.
+    """
+    half = 0.5 / swing.frequency
+    first = math.ceil((now + _STEP_S - swing.crest) / half)
+    for number in (first, first + 1):
+        ahead = swing.size if number % 2 == 0 else -swing.size
+        frequency = drive + ahead / _STEP_S
+        if limits.drive_lowest_hz <= frequency <= limits.drive_frequency_hz:
+            return swing.crest + number * half - _STEP_S / 2, frequency
+    return None
 
 
 def _count_the_tape_again(session: Session[PrecessionSettings]) -> None:

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 USUAL = 2.34e-4
 #: A top of another mass, tilt of its moment and drag falls within so long [s].
 LONGEST_S = 400.0
-#: A top that nutates as much as one did after a drive at worst, and falls all the same (keys of a scene).
+#: A top that nutates (keys of a scene).  The tilt was chosen between two that were tried, and is measured on no top: it
+#: is an assumption about what a drive may leave.
 STIRRED = {"start.tilt_rad": 0.075, "start.precession": "none"}
 
 

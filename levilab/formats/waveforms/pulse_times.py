@@ -15,6 +15,7 @@ from levilab.formats.waveforms.waveform import PulseTimes, Signal, Waveform, che
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -53,6 +54,7 @@ def read_column(head: Head, dialect: Dialect, rate: float | None, *, guess: bool
         return _samples(head, rate, blocks)
     if not guess and not any(read_title(text).column == "time_s" or "pulse" in text.casefold() for text in titles):
         raise NoWaveform(path, "holds one column of numbers, which nothing calls times")
+    _refuse_another_quantity(path, titles)
     factor = _factor(titles)
     found = list(blocks())
     times = np.concatenate([block.numbers[:, 0] for block in found]) * factor
@@ -68,6 +70,18 @@ def read_column(head: Head, dialect: Dialect, rate: float | None, *, guess: bool
         raise NoWaveform(path, f"holds {len(times)} numbers, at least {FEWEST_PULSES} pulse times are needed")
     told = [f"{path.name}, {block.torn}" for block in found if block.torn]
     return PulseTimes(path, "list of pulse times", times, tuple(told))
+
+
+def _refuse_another_quantity(path: Path, titles: list[str]) -> None:
+    """Raise NoWaveform where the title of the column, or its unit, is that of another quantity than a time."""
+    for text in reversed(titles):
+        title = read_title(text)
+        unit = plain_unit(text) if is_unit(text) else title.unit or ""
+        other_unit = bool(unit) and is_unit(unit) and unit_factor(unit, "time") is None
+        if other_unit or title.column not in {None, "time_s"}:
+            raise NoWaveform(
+                path, f"holds one column, '{shown(text)}', which is no time: times of pulses are expected, as t [s]"
+            )
 
 
 def _factor(titles: list[str]) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 
 from analysis.errors import TooFewHeights
 from analysis.field.fit import FEWEST_HEIGHTS, SAME_HEIGHT_M
+from analysis.numbers import digits
 from levilab.formats.columns import TableError
 from levilab.formats.table import read_table
 
@@ -80,11 +81,10 @@ def field_readings(table: Table) -> FieldReadings:
             seen, line = float(values[wrong[0]]), int(table.lines[wrong[0]])
             raise TableError(table.path, f"{what} is {seen:g}, more than 0 is expected: correct it", line=line)
     strongest = float(np.abs(flux_density).max())
-    doubts = (
-        [f"{table.path.name}: {strongest:.3g} T is more than a permanent magnet makes; say the unit, as b=NAME [mT]"]
-        if strongest > _STRONGEST_MAGNET_T
-        else []
-    )
+    doubts = []
+    if strongest > _STRONGEST_MAGNET_T:
+        doubt = f"{digits(strongest, 3)} T is more than a permanent magnet makes; say the unit, as b=NAME [mT]"
+        doubts.append(f"{table.path.name}: {doubt}")
     return FieldReadings(height, flux_density, height_u, u, own, (*table.warnings, *doubts))
 
 

@@ -321,7 +321,7 @@ def warnings_of(statistics: Statistics) -> list[str]:
     if statistics.mean.u and statistics.step**2 > 0.5 * statistics.mean.u**2 and statistics.scatter:
         texts.append(
             "the tops scatter by less than the drive's steps, which leave "
-            f"{statistics.step:.2g} Hz to the mean however often it is repeated: creep slower, or look more often "
+            f"{digits(statistics.step)} Hz to the mean however often it is repeated: creep slower, or look more often "
             "(limit.creep_hz_per_s, limit.interval_s)"
         )
     return texts

@@ -61,9 +61,10 @@ def theory_table(analysis: LimitAnalysis) -> Table:
         for group in analysis.groups
         for one in group.comparisons
     ]
-    devices = " and ".join(dict.fromkeys(group.device.name for group in analysis.groups))
+    devices = list(dict.fromkeys(group.device.name for group in analysis.groups))
+    top = devices[0] if len(devices) == 1 else f"{len(devices)} tops"
     heads = ("theory", "[Hz]", "mean − theory [Hz]", "p", "agrees")
-    return table(f"Beside theory, for {devices}", heads, rows)
+    return table(f"Beside theory, for {top}", heads, rows)
 
 
 def _group(analysis: LimitAnalysis, run: int) -> str:

@@ -244,7 +244,8 @@ def _about_lock(fit: SweepFit) -> str:
         return f"A locked top, slope 1 and intercept 0, agrees with the {fit.line.n} points (p = {plain(p, 2)})."
     return (
         f"A locked top, slope 1 and intercept 0, is excluded (p = {plain(p, 1)}): the precession that was counted lies "
-        f"{_offset(fit):+.2g} Hz from the drive at {fit.line.centre:.4g} Hz."
+        f"{digits(abs(_offset(fit)))} Hz {'above' if _offset(fit) > 0 else 'below'} the drive at "
+        f"{fit.line.centre:.4g} Hz."
     )
 
 

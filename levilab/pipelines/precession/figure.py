@@ -8,6 +8,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from analysis.numbers import digits
 from levilab.pipelines.precession.analysis import intercept_of, slope_of
 from levilab.present.numbers import plain, short_name, without_unit
 from levilab.present.style import STYLE, row
@@ -116,7 +117,7 @@ def _draw_bands(axes: Axes, x: Array, y: Array, fit: SweepFit, *, labels: bool =
         return
     usual = fit.line.scale * _usual_u(fit)
     for half, alpha, what in (
-        (fit.line.prediction_band(x, _usual_u(fit)), 0.10, f"95 % of further points of u = {usual:.2g} Hz"),
+        (fit.line.prediction_band(x, _usual_u(fit)), 0.10, f"95 % of further points of u = {digits(usual)} Hz"),
         (fit.line.confidence_band(x), 0.28, "95 % confidence of the line"),
     ):
         axes.fill_between(x, y - half, y + half, color=LINE, alpha=alpha, linewidth=0, label=what if labels else None)
@@ -191,7 +192,7 @@ def _draw_leverage(axes: Axes, analysis: PrecessionAnalysis) -> None:
     n = min(run.fit.line.n for run in analysis.runs)
     axes.axhline(2 / n, color="dimgrey", linestyle="dotted", linewidth=1)
     axes.set(xlabel="ν$_d$  [Hz]", ylabel="leverage", ylim=(0, None))
-    axes.set_title(f"Leverage; dotted: the mean, {2 / n:.2g}", loc="left")
+    axes.set_title(f"Leverage; dotted: the mean, {digits(2 / n)}", loc="left")
 
 
 def _draw_changes(axes: Axes, analysis: PrecessionAnalysis) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.numbers import digits
 from analysis.precession.gates import pulses_too_many, rates_at_point, shared_scatter
 from levilab.formats.columns import TableError
 from levilab.formats.table import FEWEST, read_table
@@ -191,6 +192,7 @@ def _check_u(table: Table, values: Array, of: str, size: Array) -> None:
         i = int(wrong[0])
         raise TableError(
             table.path,
-            f"the uncertainty of the {of} frequency is {values[i]:.3g} Hz: correct it or remove the column",
+            f"the uncertainty of the {of} frequency is {digits(float(values[i]), 3)} Hz: correct it or remove the "
+            "column",
             line=int(table.lines[i]),
         )

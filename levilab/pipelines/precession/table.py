@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from analysis.uncertainty import Estimate
 from levilab.pipelines.precession.analysis import at_most, intercept_of, slope_of
-from levilab.present.numbers import column, plain, without_unit
+from levilab.present.numbers import column, plain, signed, without_unit
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ def _point_cells(fit: SweepFit, point: Point, departure: str) -> tuple[str, ...]
         "—" if point.spin is None else without_unit(Estimate(point.spin, point.u_spin, "Hz")),
         departure,
         plain(point.leverage, 2) if point.used else "left out",
-        "—" if change is None else f"{change:+.2f}",
+        "—" if change is None else signed(change, 2),
     )
 
 

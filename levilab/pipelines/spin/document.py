@@ -55,7 +55,8 @@ class SeriesPart(Part):
 
 #: Values that a run has, and their units.
 _UNITS = {
-    "frequency": "Hz", "chirp": "Hz/s", "phase": "1", "reference_time": "s", "bound": "Hz", "scatter": "s", "snr": "dB",
+    "frequency": "Hz", "chirp": "Hz/s", "bend": "Hz/s^2", "phase": "1", "reference_time": "s", "bound": "Hz",
+    "scatter": "s", "snr": "dB",
 }  # fmt: skip
 
 
@@ -106,6 +107,7 @@ def _entries(analysis: SpinAnalysis) -> dict[str, Any]:
 
 def _values(spin: SpinFrequency) -> dict[str, Any]:
     estimates = {"frequency": spin.frequency, "chirp": spin.chirp, "phase": spin.phase}
+    estimates |= {"bend": spin.bend} if spin.bend else {}
     plain = {"reference_time": spin.reference_time, "bound": spin.bound, "scatter": spin.scatter, "snr": spin.snr_db}
     values = {name: number(one.value, _UNITS[name], one.u) for name, one in estimates.items()}
     return values | {name: number(value, _UNITS[name]) for name, value in plain.items()}
@@ -148,6 +150,7 @@ def _run(part: SpinPart, *_: object) -> SpinRun:
         scatter=_number(values["scatter"]),
         snr_db=values["snr"].value if "snr" in values else None,
         notes=notes,
+        bend=values["bend"].estimate if "bend" in values else None,
     )
     series = part.series
     columns = (series.time_s, series.frequency_hz, series.frequency_u_hz)

@@ -9,12 +9,11 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from analysis.numbers import digits
 from levilab.present.numbers import short_name, with_uncertainty
 from levilab.present.style import STYLE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
@@ -37,10 +36,7 @@ BINS = 240
 
 @dataclass(frozen=True, eq=False)
 class _Excerpt:
-    """Samples about the reference time: time [s], signal [unit], turns; arrivals and residuals of the pulses [s].
-
-    bend: how the slope changes [Hz/s²].
-    """
+    """Samples about the reference time: time [s], signal [unit], turns; arrivals and residuals of the pulses [s]."""
 
     time: Array
     signal: Array
@@ -48,7 +44,6 @@ class _Excerpt:
     unit: str
     arrivals: Array
     residuals: Array
-    bend: float
 
 
 def spin_figure(analysis: SpinAnalysis) -> Figure:
@@ -101,37 +96,18 @@ def _draw(panels: list[Axes], source: Source[Records], run: SpinRun) -> None:
 # --- what is drawn -------------------------------------------------------------------------------------
 
 
-def turns_of(spin: SpinFrequency, time: Array, bend: float = 0.0) -> Array:
-    """Turns at given times [s] since the pulse before the reference time.  bend: how the slope changes [Hz/s²]."""
+def turns_of(spin: SpinFrequency, time: Array) -> Array:
+    """Turns at given times [s] since the pulse before the reference time."""
     away = time - spin.reference_time
     values = spin.phase.value, spin.frequency.value, spin.chirp.value
     phase, frequency, chirp = (value or 0.0 for value in values)
-    turns: Array = phase + frequency * away + chirp * away**2 / 2 + bend * away**3 / 6
+    turns: Array = phase + frequency * away + chirp * away**2 / 2 + _bend(spin) * away**3 / 6
     return turns
 
 
-def _bend(spin: SpinFrequency, pulses: Callable[[float], tuple[Array, Array]]) -> float:
-    """How the slope itself changes [Hz/s²]; 0 where no third degree was fitted.
-
-    A fit of the third degree gives phase, frequency and slope at the reference time, and those are kept.  The one
-    number that is not is found again from the pulses: from those near the reference time first, where none is mistaken
-    for the next, then from all.
-
-    pulses: a bend [Hz/s²] → times of the pulses and how late they are by a fit with it [s], shape (n,) each.
-    """
-    bend = 0.0
-    for share in (0.3, 0.6, 1.0, 1.0) if _is_curved(spin) else ():
-        times, late = pulses(bend)
-        away = times - spin.reference_time
-        near = np.abs(away) <= share * np.abs(away).max(initial=0.0)
-        cubes = away[near] ** 3 / 6
-        if cubes.any():
-            bend -= float(cubes @ late[near]) * (spin.frequency.value or 1.0) / float(cubes @ cubes)
-    return bend
-
-
-def _is_curved(spin: SpinFrequency) -> bool:
-    return any(note.name == "curved" for note in spin.notes)
+def _bend(spin: SpinFrequency) -> float:
+    """How the slope itself changes [Hz/s²]; 0 where no third degree was fitted."""
+    return (spin.bend.value if spin.bend else None) or 0.0
 
 
 def _excerpt(records: Records, spin: SpinFrequency) -> _Excerpt:
@@ -139,13 +115,9 @@ def _excerpt(records: Records, spin: SpinFrequency) -> _Excerpt:
     if records.pulses:
         times = records.pulses.times
         times = times[_near(times, spin)]
-
-        def late(bend: float) -> tuple[Array, Array]:
-            turns = turns_of(spin, times, bend)
-            return times, (turns - np.rint(turns)) / (spin.frequency.value or 1.0)
-
-        bend = _bend(spin, late)
-        return _Excerpt(times, np.zeros(len(times)), turns_of(spin, times, bend), "", *late(bend), bend)
+        turns = turns_of(spin, times)
+        late = (turns - np.rint(turns)) / (spin.frequency.value or 1.0)
+        return _Excerpt(times, np.zeros(len(times)), turns, "", times, late)
     waveform = min(records.waveforms, key=lambda w: abs(w.start + w.duration / 2 - spin.reference_time))
     first = 0
     if waveform.duration > LONGEST_FOLDED_S:
@@ -154,16 +126,12 @@ def _excerpt(records: Records, spin: SpinFrequency) -> _Excerpt:
     channel = records.channel if len(records.waveforms) == 1 else None
     signal = _part(waveform, channel, first, count)
     time = waveform.start + (first + np.arange(len(signal), dtype=np.float64)) * waveform.step
-
-    def arrivals(bend: float) -> tuple[Array, Array]:
-        return _arrivals(time, signal, turns_of(spin, time, bend), spin)
-
-    bend = _bend(spin, arrivals)
+    turns = turns_of(spin, time)
     unit = waveform.signals[waveform.signal(channel)].unit
-    at, residuals = arrivals(bend)
+    at, residuals = _arrivals(time, signal, turns, spin)
     off = _middle(residuals, spin.scatter)  # the fit may put the middle of a pulse at another place of its shape
-    turns = turns_of(spin, time, bend) - off * (spin.frequency.value or 1.0)
-    return _Excerpt(time, signal, turns, unit, at + off, residuals - off, bend)
+    turns -= off * (spin.frequency.value or 1.0)
+    return _Excerpt(time, signal, turns, unit, at + off, residuals - off)
 
 
 def _middle(late: Array, scatter: float) -> float:
@@ -285,7 +253,7 @@ def _draw_phases_of_pulses(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -
     axes.hist(1e6 * excerpt.residuals, bins=30, color=BLUE, alpha=0.6)
     axes.axvline(0, color=VERMILION, linewidth=1)
     axes.set(xlabel="time of a pulse − fit  [µs]", ylabel="pulses")
-    axes.set_title(f"Scatter of a pulse's time: {1e6 * spin.scatter:.3g} µs", loc="left")
+    axes.set_title(f"Scatter of a pulse's time: {digits(1e6 * spin.scatter, 3)} µs", loc="left")
 
 
 def _draw_residuals(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:
@@ -305,7 +273,7 @@ def _draw_residuals(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:
     if limit > 0:
         axes.set_ylim(-1.1 * limit, 1.1 * limit)
     axes.set(xlabel="time  [s]", ylabel=f"time of a pulse − fit  [{unit}]")
-    degree = " from a fit of the third degree" if _is_curved(spin) else ""
+    degree = " from a fit of the third degree" if spin.bend else ""
     axes.set_title(f"Residuals of the pulses' times{degree}", loc="left")
 
 
@@ -316,13 +284,13 @@ def _draw_series(axes: Axes, run: SpinRun, excerpt: _Excerpt) -> None:
         t = np.linspace(float(excerpt.time[0]), float(excerpt.time[-1]), 50)
         along = [spin.at(float(x)) for x in t]
         nu = np.array([one.value for one in along], dtype=np.float64)
-        nu += excerpt.bend * (t - spin.reference_time) ** 2 / 2
+        nu += _bend(spin) * (t - spin.reference_time) ** 2 / 2
         u = np.array([one.u if one.u is not None else np.nan for one in along])
-        if not excerpt.bend:
+        if not spin.bend:
             axes.fill_between(t, nu - u, nu + u, color=BLUE, alpha=0.25, linewidth=0)
         axes.plot(t, nu, color=BLUE)
         axes.plot(spin.reference_time, spin.frequency.value or 0.0, "o", color="black", markersize=5)
-        curve = "with its change" if excerpt.bend else "± u"
+        curve = "with its change" if spin.bend else "± u"
         axes.set_title(f"Frequency along the slope, {curve}", loc="left")
     else:
         axes.errorbar(series.time, series.frequency, series.u, color=BLUE, fmt=".", markersize=3, elinewidth=0.8)

@@ -10,6 +10,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont, get_font
 
+from analysis.numbers import digits
 from levilab.pipelines.spindown.laws import SHOWN_LAWS
 from levilab.pipelines.spindown.table import tilt_part
 from levilab.present.numbers import short_name
@@ -145,7 +146,7 @@ def _synthetic(analysis: SpinDownAnalysis) -> str:
 def _draw_residuals(figure: Figure, panels: list[Axes], analysis: SpinDownAnalysis) -> None:
     """What each law leaves over, each on its own scale: it should be noise about zero, without a shape."""
     u = _usual_u(analysis)
-    band = "" if u is None else f"; grey: ±u of one reading, {u:.2g} Hz"
+    band = "" if u is None else f"; grey: ±u of one reading, {digits(u)} Hz"
     means = "; black: means" if _many(analysis) else ""
     _head(figure, 0.605, f"Residuals, reading − law, each law on its own scale{band}{means}{_tilt_in_words(analysis)}")
     for axes, name in zip(panels, SHOWN_LAWS, strict=True):
@@ -162,7 +163,7 @@ def _draw_residuals(figure: Figure, panels: list[Axes], analysis: SpinDownAnalys
         axes.set(ylim=(-limit, limit), xlabel="time  [s]")
         axes.tick_params(labelsize=7)
         axes.set_title(name, loc="left", color=SHOWN_LAWS[name].colour, fontweight="bold", pad=9)
-        axes.set_title(f"to ±{most:.2g} Hz", loc="right", color="dimgrey", fontsize=8, pad=9)
+        axes.set_title(f"to ±{digits(most)} Hz", loc="right", color="dimgrey", fontsize=8, pad=9)
     panels[0].set_ylabel("residual  [Hz]")
 
 
@@ -181,7 +182,7 @@ def _tilt_in_words(analysis: SpinDownAnalysis) -> str:
     """What the dotted curves are; empty where no run shows a tilt."""
     fits = [run.fit(analysis.combined.best) for run in analysis.runs]
     most = [float(np.abs(tilt_part(fit, run.time)).max()) for fit, run in zip(fits, analysis.runs, strict=True)]
-    return f"; dotted: what the tilt adds to the count, up to {max(most):.2g} Hz, not to scale" if max(most) else ""
+    return f"; dotted: what the tilt adds to the count, up to {digits(max(most))} Hz, not to scale" if max(most) else ""
 
 
 def _usual_u(analysis: SpinDownAnalysis) -> float | None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.errors import AnalysisError
+from analysis.numbers import digits
 from analysis.pulses import phases, track_of_blocks, track_of_times
 from analysis.spindown.readings import must_fall
 from levilab.errors import DataError, DoesNotSuit
@@ -99,7 +100,7 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
     duration = record.duration if not isinstance(record, PulseTimes) else float(record.times[-1] - record.times[0])
     if duration < FEWEST * WINDOW_S:
         expected = f"a spin-down needs {FEWEST} windows of {WINDOW_S:g} s at least: `levilab analyze spin` reads it"
-        raise DoesNotSuit(f"{path}: lasts {duration:.3g} s, {expected}")
+        raise DoesNotSuit(f"{path}: lasts {digits(duration, 3)} s, {expected}")
     try:
         if isinstance(record, PulseTimes):
             track = track_of_times(record.times, window=WINDOW_S)
@@ -115,7 +116,7 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
         expected = "a falling spin is expected: is the drive still on? `levilab analyze spin` reads it"
         raise DoesNotSuit(f"{path}: {seen}, {expected}")
     notes = [f"{path.name}: {note.text}" for note in track.notes]
-    what = f"{path.name}: a {'list of pulse times' if times is not None else 'record'} of {duration:.3g} s: "
+    what = f"{path.name}: a {'list of pulse times' if times is not None else 'record'} of {digits(duration, 3)} s: "
     told = [f"{what}each reading is the frequency in a window of {WINDOW_S:g} s"]
     if last - first < len(track.time):
         span = f"{track.time[first]:.1f} s to {track.time[last - 1]:.1f} s"
@@ -216,6 +217,7 @@ def _must_be_possible(table: Table, u: "NDArray[np.float64]", frequency: "NDArra
         i = int(wrong[0])
         raise TableError(
             table.path,
-            f"an uncertainty of {u[i]:.3g} Hz for {frequency[i]:.9g} Hz cannot be meant: correct it or drop the column",
+            f"an uncertainty of {digits(float(u[i]), 3)} Hz for {frequency[i]:.9g} Hz cannot be meant: correct it or "
+            "drop the column",
             line=int(table.lines[i]),
         )

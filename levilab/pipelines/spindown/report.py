@@ -222,5 +222,4 @@ def _fall(source: Source[Readings], fit: SpinDown) -> str:
     text = next((str(event["text"]) for event in reversed(events) if event["kind"] == FELL), None)
     if text is None:
         return ""
-    text = text[:1].upper() + text[1:]
     return f"{text}; last reading that was fitted {fit.frequency[-1]:.2f} Hz at {fit.time[-1]:.1f} s"

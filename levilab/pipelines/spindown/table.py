@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from analysis.numbers import digits
 from analysis.spindown.tilt import counted
 from levilab.pipelines.spindown.laws import SHOWN_LAWS, SYMBOLS
 from levilab.present.numbers import column, ends, in_words, plain, share, short_name, with_uncertainty, without_unit
@@ -118,7 +119,7 @@ def count_table(analysis: SpinDownAnalysis) -> Table | None:
                     without_unit(resonance) if resonance else "—",
                     plain(float(added[-1]), 2) if tilt else "—",
                     f"{seen.value:.2f} ± {seen.u:.2f}" if seen and run.is_correlated else "none",
-                    f"{len(run.time)}" if effective is None else f"{effective:.2g} of {len(run.time)}",
+                    f"{len(run.time)}" if effective is None else f"{digits(effective)} of {len(run.time)}",
                 )
             )
         )

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -10,7 +12,7 @@ import pytest
 from instruments.clock import VirtualClock
 from instruments.errors import NoAnswer
 from levilab.acquisition.counting import prepare_counter
-from levilab.acquisition.driving import DriveSettings, FailedPoint, NotHeld, held_spin, sweep_drive
+from levilab.acquisition.driving import DriveSettings, FailedPoint, NotHeld, _hold, has_drifted, held_spin, sweep_drive
 from levilab.acquisition.experiment import Experiment
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.table import EXPERIMENTS, Configuration, with_settings
@@ -132,3 +134,33 @@ def test_a_generator_that_fails_on_the_way_costs_no_point(tmp_path: Path, monkey
     assert (measured(run), failed) == ([31.0, 31.5], ())
     assert len(events(run, "found again")) == 1
     assert events(run, "lock lost") == []
+
+
+@pytest.mark.parametrize(
+    ("counts", "drifts"),
+    [
+        ([30.0 + 0.03 * (-1) ** k for k in range(20)], False),
+        ([29.83 + 0.03 * (-1) ** k for k in range(20)], False),  # a tape that slips does so from the first count on
+        ([30.0 + 0.3 * math.sin(2 * math.pi * 0.21 * k) for k in range(20)], False),  # swings about the drive
+        ([30.0 - 0.1 * max(k - 11, 0) for k in range(20)], True),  # lost after 11 s: the air takes 0.1 Hz/s
+        ([30.0, 29.0], False),
+    ],
+)
+def test_counts_of_a_top_that_was_lost_drift_off(counts: list[float], drifts: bool) -> None:
+    assert has_drifted(counts) is drifts
+
+
+def test_a_top_lost_while_it_is_held_is_not_compared_with_its_drive(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is within 1 Hz of the drive to the end of the hold, as a tape that slips is."""
+    said: list[str] = []
+    counts = iter([30.0 - 0.1 * max(k - 11, 0) for k in range(20)])
+    monkeypatch.setattr("levilab.acquisition.driving.held_spin", lambda *_: next(counts))
+    session: Any = SimpleNamespace(
+        settings=DriveSettings(hold_s=20.0, gate_s=1.0),
+        progress=lambda *_: None,
+        event=lambda *texts, **_: said.append(texts[1]),
+        warn=said.append,
+    )
+    with pytest.raises(NotHeld, match=r"a spin of 29.20 Hz under a drive of 30.00 Hz"):
+        _hold(session, 30.0)
+    assert said == []

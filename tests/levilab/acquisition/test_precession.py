@@ -9,14 +9,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from analysis.precession.gates import Swing
 from instruments.clock import VirtualClock
+from instruments.drivers.generator import Limits
 from instruments.errors import NoAnswer
 from levilab.acquisition.counting import prepare_counter
-from levilab.acquisition.experiments.precession import PrecessionSettings
+from levilab.acquisition.experiments.precession import PrecessionSettings, calming_step
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import Configuration, with_settings
+from levilab.interruption import Interrupted
 from levilab.pipelines.precession.analysis import PrecessionOptions, analyze_precessions
 from levilab.runs.run import Run
 from levilab.world.bench import virtual_wiring
@@ -103,6 +106,24 @@ def test_an_interrupted_sweep_goes_on_at_the_next_point(tmp_path: Path) -> None:
     np.testing.assert_array_equal(readings.column("drive_frequency_hz"), [30.5, 31.0, 32.0])
     assert (np.diff(readings.column("time_s")) > 0).all()
     np.testing.assert_allclose(readings.column("precession_frequency_hz"), [30.5, 31.0, 32.0], atol=0.2)
+
+
+def test_a_point_whose_record_is_broken_off_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(*_: Any) -> None:
+        raise Interrupted("SIGINT")
+
+    monkeypatch.setattr("levilab.acquisition.experiments.precession._record", interrupt)
+    run = acquire(request(tmp_path, Wobbling(SpinScene(), VirtualClock()), record_s=6.0), Silent())
+    assert (run.status, run.count()) == ("interrupted", 1)
+
+
+def test_a_swing_is_taken_off_within_the_limits_of_the_drive() -> None:
+    """Its crest is at 3 s, half a swing lasts 2 s: it goes forward at 11 s or, at its upper limit, back at 13 s."""
+    swing = Swing(frequency=0.25, size=0.3, crest=3.0)
+    at_11, at_13 = (10.85, 41.0), (12.85, 39.0)
+    assert calming_step(swing, 40.0, 10.0, Limits(drive_frequency_hz=100.0)) == pytest.approx(at_11)
+    assert calming_step(swing, 40.0, 10.0, Limits(drive_frequency_hz=40.5)) == pytest.approx(at_13)
+    assert calming_step(swing, 40.0, 10.0, Limits(drive_frequency_hz=40.5, drive_lowest_hz=39.5)) is None
 
 
 def test_a_sweep_that_is_resumed_on_another_day_goes_on(tmp_path: Path) -> None:

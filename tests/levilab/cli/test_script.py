@@ -4,11 +4,40 @@ from __future__ import annotations
 
 import tomllib
 from importlib.metadata import EntryPoint
+from typing import TYPE_CHECKING, Any
 
-from levilab.cli.main import main
+import pytest
+
+from levilab.cli.exit_codes import INTERRUPTED
+from levilab.cli.later import Later
+from levilab.cli.start import main
+from support.commands import command
 from support.paths import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def interrupt(*_: Any) -> None:
+    raise KeyboardInterrupt
 
 
 def test_the_console_script_starts_the_application() -> None:
     scripts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["scripts"]
     assert EntryPoint("levilab", scripts["levilab"], "console_scripts").load() is main
+
+
+def test_ctrl_c_at_the_start_ends_in_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("levilab.cli.main.main", interrupt)
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == INTERRUPTED
+    assert capsys.readouterr().err == "levilab: interrupted\n"
+
+
+def test_ctrl_c_while_a_command_is_imported_ends_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Later, "command", property(interrupt))
+    ended = command("report", "x", cwd=tmp_path)
+    assert (ended.status, ended.err) == (INTERRUPTED, "levilab: interrupted\n")

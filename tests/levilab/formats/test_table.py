@@ -96,6 +96,19 @@ def test_a_table_reads_the_same_whoever_wrote_it(name, table_file):
     assert (table.frame.dtypes == np.float64).all()
 
 
+def test_times_of_hours_and_minutes_are_doubted(table_file):
+    """A stopwatch begins at 0 minutes, as in the tables above; 14:05 and 14:06 may be a minute apart."""
+    table = read_table(table_file("time,f\n14:05,61.5\n14:06,61.25\n14:07,61\n"))
+    np.testing.assert_allclose(table.column(T), [845, 846, 847])
+    (warning,) = table.warnings
+    assert "the times, as 14:05, are taken for minutes and seconds" in warning
+
+
+def test_dates_count_from_the_first_that_is_written(table_file):
+    text = "t,f,u\n,61.5,\n2026-11-20T14:05:12Z,61.5,\n2026-11-20T14:05:13Z,61.25,\n2026-11-20T14:05:14Z,61,\n"
+    assert read_table(table_file(text)).column(T).tolist() == [0, 1, 2]
+
+
 @pytest.mark.parametrize(
     "missed", ["", "-", "--", "n/a", "nan", "NaN", "inf", "-Infinity", "9.91E37", "9.9e+37", "1e999"]
 )

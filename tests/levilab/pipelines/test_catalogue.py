@@ -46,7 +46,7 @@ class Content(Analysis[Any]):
 
 def content_row(*experiments: str) -> Analysis[Any]:
     row = second_row(*experiments)
-    return Content(row.result, row.tables, row.part)
+    return Content(row.result, row.tables, row.part, row.columns)
 
 
 def use(monkeypatch: pytest.MonkeyPatch, *rows: Analysis[Any]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import re
 import sys
 import tracemalloc
 import types
@@ -240,6 +241,14 @@ def test_a_column_of_times_is_a_list_of_pulses(text: str, write: Write) -> None:
     record = read_record(write(text, "pulses.txt"))
     assert isinstance(record, PulseTimes)
     np.testing.assert_allclose(record.times[:4], [0.1, 0.2, 0.35, 0.4], rtol=1e-12)
+
+
+@pytest.mark.parametrize("title", ["f [Hz]", "rpm", "signal [V]", "height"])
+def test_a_column_of_another_quantity_is_no_list_of_pulses(title: str, write: Write) -> None:
+    """The numbers increase, as times do."""
+    seen = re.escape(title.replace(" ", ""))
+    with pytest.raises(NoWaveform, match=f"one column, '{seen}', which is no time"):
+        read_record(write(f"{title}\n" + "".join(f"{20 + k / 25}\n" for k in range(40))))
 
 
 def test_arrays_need_a_rate_unless_they_hold_pulse_times(tmp_path: Path) -> None:

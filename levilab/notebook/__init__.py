@@ -1,0 +1,1 @@
+"""What the front door gives to scripts and notebooks: results and motions that can be printed, tabled and drawn."""

@@ -1,0 +1,84 @@
+"""Experiments from scripts and notebooks, and the runs of earlier ones."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from levilab.acquisition.loop import acquire
+from levilab.acquisition.request import AcquisitionOptions, request_for
+from levilab.acquisition.session import ExperimentFailed
+from levilab.acquisition.table import EXPERIMENTS
+from levilab.errors import DataError, UsageError
+from levilab.present.progress import Mute
+from levilab.runs.run import RECORD, Run, find_run
+from levilab.simulator.keys import plain
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from os import PathLike
+
+    from levilab.bench.person import Task
+
+
+def acquire_run(
+    experiment: str,
+    *,
+    mock: bool,
+    bench: str | PathLike[str] | None,
+    out: str | PathLike[str],
+    seed: int | None,
+    scene: str | PathLike[str] | None,
+    note: str,
+    realtime: bool,
+    resume: str | PathLike[str] | Run | None,
+    settings: Mapping[str, Any],
+    wire_log: bool,
+    person: Callable[[Task], str] | None,
+) -> Run:
+    """Run an experiment without a word on the terminal; see `levilab.acquire`."""
+    if experiment not in EXPERIMENTS:
+        raise UsageError("experiment", f"{', '.join(EXPERIMENTS)} are known", value=experiment)
+    if isinstance(resume, Run):
+        resume = resume.folder
+    options = AcquisitionOptions(
+        mock=mock,
+        bench=None if bench is None else Path(bench),
+        out=Path(out),
+        seed=seed,
+        scene=None if scene is None else str(scene),
+        note=note,
+        realtime=realtime,
+        resume=None if resume is None else Path(resume),
+        wire_log=wire_log,
+        person=person or ask_with_input,
+        settings=tuple(f"{key}={_typed(value)}" for key, value in settings.items()),
+    )
+    return acquire(request_for(experiment, options), Mute())
+
+
+def _typed(value: Any) -> str:
+    """A value as one would type it behind KEY=."""
+    value = plain(value)
+    return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False, default=str)
+
+
+def ask_with_input(task: Task) -> str:
+    """Ask the person at the bench where Python asks.  Raises ExperimentFailed where that cannot be answered."""
+    try:
+        return input(f"{task.text}  [Enter] ")
+    except EOFError:
+        raise ExperimentFailed(
+            f"{task.text!r} cannot be answered: standard input is closed; give `person`, a function that answers"
+        ) from None
+
+
+def load_run(path: str | PathLike[str]) -> Run:
+    """The run in a run folder, or of a name in runs/.  Raises DataError."""
+    folder = find_run(Path(path))
+    if folder.is_file():
+        raise DataError(f"{folder}: is a file; a run folder is expected, a data file goes to levilab.analyze as it is")
+    if folder.is_dir() and not (folder / RECORD).exists():
+        raise DataError(f"{folder}: holds no {RECORD}, so it is no run folder: name one of the runs in it")
+    return Run.load(folder)

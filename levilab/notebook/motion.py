@@ -1,0 +1,103 @@
+"""A simulated motion, as scripts and notebooks use it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from levilab.motion.simulation import COLUMNS, SimulationOrder, carry_out, kept_rows
+from levilab.motion.summary import as_document
+from levilab.motion.table import headline, print_motion
+from levilab.present.html import facts_as_html
+from levilab.simulator.scene import Scene, read_scene
+from levilab.simulator.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from os import PathLike
+
+    import pandas as pd
+
+    from levilab.motion.summary import Summary
+    from levilab.present.style import Figure
+
+
+@dataclass(frozen=True, repr=False)
+class SimulatedMotion(Trajectory):
+    """A trajectory with what `levilab simulate` says of it.
+
+    found: the motion in numbers, with all samples that its spectrum needed; folder: of the run, None if none was
+    written.
+    """
+
+    found: Summary | None = None
+    folder: Path | None = None
+
+    @property
+    def _found(self) -> Summary:
+        assert self.found
+        return self.found
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What to know before using the numbers."""
+        return self._found.notes
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """The motion in numbers by names that have the unit, with the estimated errors of its end."""
+        return as_document(self._found)
+
+    def _repr_html_(self) -> str:
+        """As a notebook shows it."""
+        found = self._found
+        error = f"{self.accuracy.position:.1g} m, {self.accuracy.axis:.1g} rad of the axis (estimated)"
+        facts = [
+            ("spin", found.spin),
+            ("height", found.heights),
+            ("error at the end", error),
+            ("states", f"{len(self.time)}"),
+            *(("note", note) for note in found.notes),
+        ]
+        return facts_as_html(headline(found), facts)
+
+    def summary(self) -> str:
+        """What `levilab simulate` prints: how it ended, heights, spin, the lines of the axis, the errors."""
+        from levilab.present.terminal import as_text  # with rich
+
+        return as_text(partial(print_motion, self._found))
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """The states, a row each, with the columns of states.csv: time_s, x_m, …, energy_j."""
+        import pandas as pd
+
+        return pd.DataFrame({name: values(self) for name, _, _, values in COLUMNS})
+
+    def plot(self) -> Figure:
+        """Path, height, spin, tilt and energy in time, and the spectrum of the axis; it needs no display."""
+        from levilab.motion.figure import motion_figure  # with matplotlib
+        from levilab.present.style import for_notebooks
+
+        return for_notebooks(motion_figure(self._found))
+
+
+def simulate_motion(
+    scene: Scene | str | PathLike[str],
+    duration: float,
+    *,
+    settings: Mapping[str, Any],
+    tolerance: float,
+    rate: float,
+    out: str | PathLike[str] | None,
+) -> SimulatedMotion:
+    """Simulate a scene with changes at dotted keys.  Raises SceneError, UsageError, SimulationError, CannotWrite."""
+    chosen = (scene if isinstance(scene, Scene) else read_scene(Path(scene))).changed(settings)
+    order = SimulationOrder(chosen, duration, tolerance, rate, None if out is None else Path(out))
+    done = carry_out(order, lambda _: None)
+    motion = done.summary.motion
+    rows = kept_rows(motion, done.samples_per_state)
+    own = {one.name: getattr(motion, one.name) for one in fields(motion)}
+    own |= {"states": motion.states[rows], "energies": motion.energies[rows]}
+    return SimulatedMotion(**own, found=done.summary, folder=done.folder)

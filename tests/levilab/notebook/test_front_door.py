@@ -1,0 +1,383 @@
+"""levilab.acquire, load, analyze and simulate, as scripts and notebooks call them."""
+
+from __future__ import annotations
+
+import gc
+import hashlib
+import inspect
+import json
+import shutil
+import subprocess
+import sys
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import levilab
+from levilab.acquisition.request import AcquisitionOptions
+from levilab.acquisition.session import ExperimentFailed
+from levilab.bench.person import Task
+from levilab.errors import DataError, DoesNotSuit, UsageError
+from levilab.motion.simulation import SimulationOrder
+from levilab.notebook.acquisition import ask_with_input
+from levilab.notebook.analysis import write_frame
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.runs.run import Run
+from levilab.simulator.scene import SceneError
+from support.commands import command
+from support.paths import SAMPLE_DATA
+from support.waiting import HANG_GUARD_S
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+DEVICE = SAMPLE_DATA / "device.toml"
+RECORD = SAMPLE_DATA / "scope-files" / "rigol-ds1000z.csv"
+
+#: Analysis → a run, options for its bare readings, a value, and the truth: what made the readings, or was published.
+CASES = {
+    "spindown": ("spin-down-1", {}, "c32", 2.3711e-4),
+    "field": ("field-scan", {"device": DEVICE}, "strength", 1.409299e-3),
+    "limit": ("lower-limits", {}, "mean", 21.86),
+    "precession": ("precession-sweep", {}, "slope", 1.0),
+}
+
+
+def test_importing_levilab_loads_nothing_heavy() -> None:
+    heavy = {
+        "numpy",
+        "pandas",
+        "scipy",
+        "matplotlib",
+        "pydantic",
+        "typer",
+        "rich",
+        "lmfit",
+        "numba",
+        "pyvisa",
+        "jinja2",
+    }
+    program = f"import levilab, sys; print(sorted({heavy!r} & set(sys.modules)))"
+    words = [sys.executable, "-c", program]
+    done = subprocess.run(words, capture_output=True, text=True, encoding="utf-8", check=True, timeout=HANG_GUARD_S)
+    assert done.stdout.strip() == "[]"
+
+
+# --- analyze ---
+
+
+@pytest.mark.parametrize("kind", CASES)
+def test_run_file_and_dataframe_of_the_same_readings_agree(kind: str, tmp_path: Path) -> None:
+    folder, options, name, truth = CASES[kind]
+    run = levilab.load(SAMPLE_DATA / folder)
+    of_run = levilab.analyze(run)
+    bare = tmp_path / "readings.csv"
+    shutil.copy(run.folder / "readings.csv", bare)
+    of_file = levilab.analyze(bare, **options)
+    of_frame = levilab.analyze(run.to_dataframe(), **options)
+    assert of_run.kind == of_file.kind == of_frame.kind == kind
+    assert of_file.values == of_frame.values  # to the last bit
+    quantity = of_run.values[name]
+    assert quantity.u
+    assert of_frame.values[name].value == pytest.approx(quantity.value, abs=quantity.u)  # a run knows more of itself
+    assert quantity.value == pytest.approx(truth, abs=4 * quantity.u)
+
+
+def test_records_of_light_are_analyzed_from_run_file_and_dataframe() -> None:
+    of_run, of_file = levilab.analyze(SAMPLE_DATA / "trace-tape"), levilab.analyze(RECORD)
+    assert of_run.kind == of_file.kind == "spin"
+    assert 28 < float(of_run.values["frequency"]) < 30  # the tops of two drives that coast
+    time = np.arange(6000) / 3000.0
+    light = 1.0 * (np.abs((25.0 * time) % 1 - 0.5) < 0.03) + np.random.default_rng(1).normal(0, 0.01, time.size)
+    of_frame = levilab.analyze(pd.DataFrame({"time_s": time, "light_v": light}))
+    frequency = of_frame.values["frequency"]
+    assert of_frame.kind == "spin"
+    assert frequency.value == pytest.approx(25.0, abs=0.01)  # edges lie where a sample lies: 0.33 ms of 2 s
+
+
+@pytest.fixture(scope="module")
+def four() -> Any:
+    return levilab.analyze([SAMPLE_DATA / f"spin-down-{k}" for k in (1, 2, 3, 4)])
+
+
+@pytest.fixture(scope="module")
+def limits() -> Any:
+    return levilab.analyze(SAMPLE_DATA / "lower-limits")
+
+
+def test_values_have_a_row_for_each_input_and_all_together(four: Any) -> None:
+    table = four.to_dataframe().set_index(["input", "name"])
+    constants = table.loc[[f"spin-down-{k}" for k in (1, 2, 3, 4)]].xs("c32", level="name")
+    assert constants["value"].mean() == pytest.approx(table.loc[("together", "c32"), "value"])
+    assert set(constants["unit"]) == {"(rad/s)^-1/2/s"}
+    assert four.by_input["spin-down-2"]["c32"].u == constants.loc["spin-down-2", "u"]
+
+
+def test_readings_stand_with_their_residuals(four: Any) -> None:
+    readings = four.to_dataframe("readings")
+    assert len(readings) == 78
+    models = four.to_dataframe("models").set_index(["model", "name"])
+    assert models.loc[("disc", "c32"), "value"] == float(four.values["c32"])
+    assert readings["residual_hz"].std() == pytest.approx(0.03, rel=0.25)  # their noise; 3/√(2·78)
+    limit = levilab.analyze(pd.DataFrame({"spin_frequency_hz": [21.0, 22.0, 23.0]}), "limit")
+    assert limit.to_dataframe("readings")["residual_hz"].tolist() == [-1.0, 0.0, 1.0]
+
+
+@pytest.mark.parametrize("kind", ANALYSES)
+def test_every_analysis_has_readings_as_columns(kind: str) -> None:
+    folder = {"spin": "trace-laser"} | {name: case[0] for name, case in CASES.items()}
+    table = levilab.analyze(SAMPLE_DATA / folder[kind]).to_dataframe("readings")
+    assert len(table) > 2
+    assert np.isfinite(table.filter(regex="^(spin_frequency_hz|residual|flux)").to_numpy()).all()
+
+
+def test_outliers_keep_their_row_and_have_no_residual() -> None:
+    frame = levilab.load(SAMPLE_DATA / "spin-down-1").to_dataframe()
+    frame.loc[7, "spin_frequency_hz"] *= 2
+    readings = levilab.analyze(frame).to_dataframe("readings")
+    assert readings.index[~readings["used"]].tolist() == [7]
+    assert readings.index[readings["residual_hz"].isna()].tolist() == [7]
+
+
+def test_the_short_form_of_a_result_is_a_few_lines(four: Any, limits: Any) -> None:
+    assert repr(limits).splitlines()[:2] == ["<limit of lower-limits", "  mean = 21.86(8) Hz"]
+    assert len(repr(four).splitlines()) <= 7
+
+
+def test_the_summary_is_what_the_command_line_prints(limits: Any, tmp_path: Path) -> None:
+    printed = command("analyze", "limit", SAMPLE_DATA / "lower-limits", "--no-save", cwd=tmp_path)
+    assert limits.summary().split() == printed.out.split()
+
+
+def test_a_notebook_shows_a_result_escaped_and_with_its_figure(tmp_path: Path) -> None:
+    folder = tmp_path / "lower-limits"
+    shutil.copytree(SAMPLE_DATA / "lower-limits", folder)
+    record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    record |= {"synthetic": True, "synthetic_how": "<script>alert(1)</script>", "note": "<script>"}
+    (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
+    result = levilab.analyze(folder)
+    html = result._repr_html_()
+    assert "&lt;script&gt;alert(1)" in html
+    assert 'src="data:image/svg+xml;base64,' in html
+    assert not any(text in html for text in ("<script", "http://", "https://", "@import", "<link"))
+    assert "&lt;script&gt;" in levilab.load(folder)._repr_html_()
+    assert "<script" not in levilab.load(folder)._repr_html_()
+    picture = result.plot()._repr_png_()
+    assert picture.startswith(b"\x89PNG")
+
+
+def test_analyze_writes_nothing_and_save_does(tmp_path: Path) -> None:
+    folder = tmp_path / "lower-limits"
+    shutil.copytree(SAMPLE_DATA / "lower-limits", folder)
+    before = sorted(tmp_path.rglob("*"))
+    result = levilab.analyze(folder)
+    assert sorted(tmp_path.rglob("*")) == before
+    result.save(tmp_path / "out")
+    written = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
+    assert written["values"]["mean"]["value"] == result.values["mean"].value
+    assert written["inputs"][0]["path"] == "../lower-limits/readings.csv"
+
+
+def test_a_saved_result_of_a_dataframe_has_its_readings_beside(tmp_path: Path) -> None:
+    result = levilab.analyze(pd.DataFrame({"spin_frequency_hz": [21.1, 22.2, 23.3]}), "limit")
+    file, *_ = result.save(tmp_path)
+    assert pd.read_csv(file)["spin_frequency_hz"].tolist() == [21.1, 22.2, 23.3]
+    written = json.loads((tmp_path / "DataFrame.csv.result.limit.json").read_text(encoding="utf-8"))
+    sha256 = hashlib.sha256(file.read_bytes()).hexdigest()
+    assert written["inputs"] == [{"path": "DataFrame.csv", "sha256": sha256}]
+    reported = command("report", tmp_path, "-o", tmp_path / "report.html", cwd=tmp_path)
+    assert reported.status == 0
+    assert "no result lies beside" not in reported.err
+    other = levilab.analyze(pd.DataFrame({"spin_frequency_hz": [21.1, 22.2, 23.4]}), "limit")
+    assert next(path.name for path in other.save(tmp_path)) == "DataFrame-2.csv"
+    assert pd.read_csv(file)["spin_frequency_hz"].tolist() == [21.1, 22.2, 23.3]
+    (tmp_path / "a file").write_text("", encoding="utf-8")
+    with pytest.raises(levilab.LevilabError, match=r"choose another `folder`$"):
+        other.save(tmp_path / "a file")
+
+
+def test_what_a_dataframe_was_written_to_goes_with_the_result() -> None:
+    frame = pd.DataFrame({"spin_frequency_hz": [21.0, 22.0, 23.0]})
+    result = levilab.analyze(frame, "limit")
+    folder = result.found.sources[0].path.parent
+    assert folder.exists()
+    del result
+    gc.collect()
+    assert not folder.exists()
+
+
+# --- DataFrames ---
+
+
+def spin_down() -> pd.DataFrame:
+    time = 10.0 * np.arange(8)
+    return pd.DataFrame({"time_s": time, "spin_frequency_hz": 40.0 * np.exp(-3.2e-3 * time)})
+
+
+def test_messages_about_a_dataframe_name_its_rows() -> None:
+    frame = spin_down()
+    frame.loc[3, "time_s"] = 20.0
+    with pytest.raises(DataError, match=r"^DataFrame.csv, row 3: the time 20 s is repeated after 20 s in row 2"):
+        levilab.analyze(frame)
+    frame.loc[3, "time_s"] = 30.0
+    frame.loc[5, "spin_frequency_hz"] = np.nan
+    result = levilab.analyze(frame, reading_u=0.03)
+    assert any(text.startswith("DataFrame.csv: 1 of 8 rows is left out") for text in result.warnings)
+    assert any(text.endswith("row 5") for text in result.document["warnings"])
+
+
+def test_several_dataframes_are_told_apart_by_their_place() -> None:
+    frames = [spin_down(), spin_down() * 1.01]
+    assert levilab.analyze(frames, reading_u=0.03).inputs == ("DataFrame1.csv", "DataFrame2.csv")
+    frames[1].loc[2, "spin_frequency_hz"] = -1.0
+    with pytest.raises(DataError, match=r"^DataFrame2.csv, row 2: the frequency is -1"):
+        levilab.analyze(frames)
+
+
+def test_numbered_columns_lose_no_row(tmp_path: Path) -> None:
+    write_frame(pd.DataFrame(spin_down().to_numpy()), tmp_path / "a.csv")
+    assert len((tmp_path / "a.csv").read_text(encoding="utf-8").splitlines()) == 8
+
+
+def test_an_index_with_a_name_and_odd_titles_become_columns(tmp_path: Path) -> None:
+    write_frame(spin_down().set_index("time_s").rename(columns=lambda _: 'ν,\n"x"'), tmp_path / "a.csv")
+    back = pd.read_csv(tmp_path / "a.csv")
+    assert list(back.columns) == ["time_s", 'ν, "x"']
+    assert back["time_s"].tolist() == spin_down()["time_s"].tolist()
+
+
+# --- wrong calls ---
+
+
+def frame_of(*names: str) -> pd.DataFrame:
+    return pd.DataFrame({name: [40.0, 41.0, 42.0, 43.5] for name in names})
+
+
+WRONG = {
+    "several suit": (lambda: levilab.analyze(SAMPLE_DATA), UsageError, "say which, as kind='spindown', or name"),
+    "no such kind": (lambda: levilab.analyze(spin_down(), "spin-down"), UsageError, "kind = spin-down: spindown, spin"),
+    "no such data": (lambda: levilab.analyze(5), UsageError, "data = int: a run, a path, a DataFrame"),
+    "nothing": (lambda: levilab.analyze([]), UsageError, "data = nothing"),
+    "no columns": (lambda: levilab.analyze(pd.DataFrame()), UsageError, "data = a DataFrame with none"),
+    "unknown titles": (lambda: levilab.analyze(frame_of("a", "b")), DoesNotSuit, "^DataFrame.csv: no title is known"),
+    "two kinds": (
+        lambda: levilab.analyze([SAMPLE_DATA / "spin-down-1", SAMPLE_DATA / "field-scan"]),
+        DoesNotSuit,
+        r"spin-down-1 suits spindown; field-scan suits field\): analyze them one after the other",
+    ),
+    "no file": (lambda: levilab.analyze("nowhere.csv"), DataError, "nowhere.csv: no such file"),
+    "foreign option": (lambda: levilab.analyze(spin_down(), method="edges"), UsageError, "method: is no option of"),
+    "no such word": (lambda: levilab.analyze(spin_down(), uncertainty="x"), UsageError, "uncertainty = x: covariance,"),
+    "no positive u": (lambda: levilab.analyze(spin_down(), reading_u=-1.0), UsageError, "reading_u = -1: a standard"),
+    "u alone": (lambda: levilab.analyze(spin_down(), height_u_m=1e-3), UsageError, "goes with `height_m` alone"),
+    "height alone": (
+        lambda: levilab.analyze(SAMPLE_DATA / "field-scan", height_m=0.07),
+        DataError,
+        "`height_m` tells the moment of a top only if its mass is known",
+    ),
+    "no table": (lambda: levilab.analyze(spin_down()).to_dataframe("fits"), UsageError, "table = fits: values, models"),
+    "no run": (lambda: levilab.load("nowhere"), DataError, "is nowhere a run folder"),
+    "a file": (lambda: levilab.load(RECORD), DataError, "a data file goes to levilab.analyze"),
+    "many runs": (lambda: levilab.load(SAMPLE_DATA), DataError, "name one of the runs in it"),
+    "no experiment": (lambda: levilab.acquire("spinn", mock=True), UsageError, "experiment = spinn: spin, trace"),
+    "no setting": (
+        lambda: levilab.acquire("limit", mock=True, settings={"limit.which": "uper"}),
+        UsageError,
+        "settings = limit.which=uper: lower or upper is expected",
+    ),
+    "a seed of a real bench": (lambda: levilab.acquire("spin", seed=1), UsageError, "seed: goes with `mock`"),
+    "no scene": (lambda: levilab.simulate("undrivn"), SceneError, "did you mean undriven"),
+    "no key": (lambda: levilab.simulate("undriven", settings={"top.mas_kg": 1}), SceneError, "did you mean top.mass"),
+    "no duration": (lambda: levilab.simulate("undriven", -1), UsageError, "duration = -1: a number above 0"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_a_wrong_call_says_what_was_expected(case: str) -> None:
+    call, kind, words = WRONG[case]
+    with pytest.raises(kind, match=words) as raised:
+        call()
+    assert isinstance(raised.value, levilab.LevilabError)
+    assert "--" not in str(raised.value).replace("--settings", "")
+
+
+def test_every_option_is_a_keyword_with_its_default() -> None:
+    given = inspect.signature(levilab.analyze).parameters
+    options = {one.name: one.default for row in ANALYSES.values() for one in fields(row.result.method.options)}
+    options.pop("guess")  # whether titles are guessed is for those who name a single file
+    assert {name: one.default for name, one in given.items() if name not in {"data", "kind"}} == options
+    assert all(f"'{name}'" in str(given["kind"].annotation).replace('"', "'") for name in ANALYSES)
+    of_acquire = set(inspect.signature(levilab.acquire).parameters) - {"experiment"}
+    assert of_acquire == {one.name for one in fields(AcquisitionOptions)} - {"tell"}
+    of_simulate = inspect.signature(levilab.simulate).parameters
+    order = {one.name: one.default for one in fields(SimulationOrder) if one.name != "scene"}
+    assert {name: one.default for name, one in of_simulate.items() if name not in {"scene", "settings"}} == order
+
+
+# --- acquire and load ---
+
+
+def test_an_experiment_gives_its_run_without_a_word(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    settings = {"spin.hold_s": np.float64(0.0)}
+    run = levilab.acquire("spin", mock=True, seed=1, out=tmp_path, note="first try", settings=settings)
+    assert capsys.readouterr() == ("", "")
+    assert isinstance(run, Run)
+    assert (run.status, run.record.note, run.record.seed) == ("finished", "first try", 1)
+    assert run.record.configuration["spin"]["hold_s"] == 0
+    assert len(run.to_dataframe()) == run.count() > 10
+    assert repr(levilab.load(run.folder)) == repr(run)
+    assert "spin of 20" in repr(run)
+    assert "finished, SYNTHETIC, in" in repr(run)
+    with pytest.raises(levilab.LevilabError, match="is finished, only an interrupted or failed run"):
+        levilab.acquire("spin", resume=run)
+
+
+def test_a_person_who_cannot_be_asked_ends_the_experiment(monkeypatch: pytest.MonkeyPatch) -> None:
+    def closed(_: str) -> str:
+        raise EOFError
+
+    monkeypatch.setattr("builtins.input", closed)
+    with pytest.raises(ExperimentFailed, match=r"'float the top' cannot be answered: .* give `person`"):
+        ask_with_input(Task("float the top"))
+
+
+def test_readings_of_a_run_are_drawn_channel_by_channel() -> None:
+    figure = levilab.load(SAMPLE_DATA / "field-scan").plot()
+    assert [panel.get_ylabel() for panel in figure.axes] == ["flux_density_t"]
+    assert figure.axes[-1].get_xlabel() == "height_m"
+    assert len(levilab.load(SAMPLE_DATA / "upper-limits").plot().axes) == 4
+
+
+def test_a_run_whose_readings_are_damaged_is_still_shown(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(SAMPLE_DATA / "lower-limits", folder)
+    (folder / "readings.csv").write_text("spin_frequency_hz\nabc\n", encoding="utf-8")
+    assert "readings.csv, line 2" in levilab.load(folder)._repr_html_()
+
+
+# --- simulate ---
+
+
+def test_a_simulated_motion_has_the_states_that_were_asked_for(tmp_path: Path) -> None:
+    motion = levilab.simulate("undriven", 2, rate=50, settings={"start.spin_hz": 31.0}, out=tmp_path)
+    states = motion.to_dataframe()
+    assert states["time_s"].tolist() == pytest.approx(np.arange(101) / 50)
+    assert np.allclose(np.hypot.reduce(states[["axis_x", "axis_y", "axis_z"]].to_numpy(), axis=1), 1, atol=1e-12)
+    assert states["spin_frequency_hz"].iloc[0] == pytest.approx(31.0)
+    assert np.array_equal(motion.position[:, 2], states["z_m"])
+    assert repr(motion) == "<SimulatedMotion of undriven: 101 states in 2 s, up to the end>"
+    assert "undriven: the top stayed up for all of 2 s" in motion.summary()
+    assert "constant, 31.000 Hz" in motion._repr_html_()
+    assert motion.folder
+    written = levilab.load(motion.folder).to_dataframe()
+    assert np.array_equal(written.to_numpy(), states.to_numpy())
+
+
+def test_a_top_too_heavy_to_float_falls() -> None:
+    motion = levilab.simulate("undriven", 3, settings={"top.mass_kg": 0.04})
+    assert not motion.survived
+    assert "lost at the limit of its height" in repr(motion)
+    assert motion.warnings
