@@ -22,7 +22,7 @@ class Finding:
     """Something that a user has to know: a short name that stays, and a sentence.
 
     Names: fell-back, missing, doubled, wrong, half, double, mains, hum, clipped, gap, not-finite, spikes, wander,
-    curved, correlated, few-pulses, unsteady; no-pulses of a run with several records.
+    curved, correlated, scattered, few-pulses, unsteady; no-pulses of a run with several records.
     """
 
     name: str

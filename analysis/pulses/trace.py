@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -39,6 +40,13 @@ WIDE = 0.2
 MOST_MISSING, MOST_WRONG = 0.5, 0.15
 #: Nor where so many times as many pulses lie beside the turns as at them: a reflection is one of them for each turn.
 MOST_DOUBLED = 1.5
+#: Pulses that scatter by more than this part of their width are placed one by one, and so are those that scatter by so
+#: many times what the match leaves: a mean pulse that is learnt from few of them fits each where it happens to be.
+SCATTERED, UNDERSTATED = 0.25, 3.0
+#: But only where noise would move each by no more than a quarter of that (0.8 widths over the contrast, by simulation),
+#: where they scatter by more than this part of a bin, which the bins themselves do not, and where no more than this
+#: part of the turns is without its own pulse.
+BY_NOISE, BY_BINS, MOST_ODD = 3.2, 0.25, 0.1
 
 
 def spin_of_trace(
@@ -95,6 +103,11 @@ class Trace:
         self.notes = cleaned.notes
         self.rate, self.bin_rate = rate, rate / (self.samples.size // self.bins.size)
 
+    @cached_property
+    def events(self) -> Events:
+        """What stands out."""
+        return find_events(self.bins, self.bin_rate)
+
     @property
     def duration(self) -> float:
         """[s]."""
@@ -137,16 +150,52 @@ def _found(trace: Trace, method: Choice, degree: int | None) -> Found:
         edges, doubled = _by_edges(trace)
         return Found(edges, doubled, "edges", 0.0, trace.notes)
     found, doubled, used, why = _by_pulse(trace, method, degree)
+    if method == "auto" and (train := _scattered(trace, found, degree)):
+        text = f"the pulses scatter by {digits(_scatter(train), 2)} turns: each was placed by itself"
+        one_by_one = Edges(train.fit, train.used.size, math.nan, math.nan, math.nan, train.missing, 0)
+        return Found(one_by_one, train.doubled, "edges", 0.0, (Finding("scattered", text), *trace.notes))
     found, trap = _without_trap(trace, found, degree)
     return Found(found, doubled, used, found.origin, (*why, *trap, *trace.notes))
 
 
-def _events(trace: Trace) -> tuple[Events, Train]:
+def _events(trace: Trace, degree: int | None = None) -> tuple[Events, Train]:
     """What stands out, numbered.  Raises TooFewPulses."""
-    events = find_events(trace.bins, trace.bin_rate)
+    events = trace.events
     if events.times.size < FEWEST:
         raise trace.too_few(events.times.size)
-    return events, fit_train(events.times - 0.5 / trace.rate)  # a bin's centre is that of its samples
+    return events, fit_train(events.times - 0.5 / trace.rate, degree=degree)  # a bin's centre is that of its samples
+
+
+def _scattered(trace: Trace, found: Match, degree: int | None) -> Train | None:
+    """The pulses numbered, if they stand out but not at their places: no mean pulse tells how far they are off.
+
+    None where the match is to be trusted: at noise, at gaps, and where every second pulse is off by the same, which is
+    a trap of its own.
+    """
+    try:
+        events, train = _events(trace, degree)
+    except TooFewPulses:
+        return None
+    frequency = float(train.fit.coefficients[1]) / train.fit.half
+    width, bin_width = events.width * frequency, frequency / trace.bin_rate  # [turns]
+    odd = train.missing + train.doubled
+    scatter = _scatter(train)
+    left = 1.4826 * median(np.abs(found.shifts[found.used]))
+    if odd > MOST_ODD * train.used.size or scatter < max(BY_NOISE / events.contrast * width, BY_BINS * bin_width):
+        return None
+    if scatter < SCATTERED * width and scatter < UNDERSTATED * left:
+        return None
+    sides = [train.fit.residuals[train.turns % 2 == k] for k in (0, 1)]
+    if min(map(len, sides)) < 2:
+        return None
+    apart = abs(float(sides[0].mean() - sides[1].mean()))
+    by_chance = math.hypot(*(float(side.std(ddof=1)) / math.sqrt(len(side)) for side in sides))
+    return train if apart < 4 * by_chance else None
+
+
+def _scatter(train: Train) -> float:
+    """Of the pulses about their fit [turns]."""
+    return float(np.sqrt(train.fit.variance))
 
 
 def _by_edges(trace: Trace) -> tuple[Edges, int]:
@@ -259,7 +308,8 @@ def _result(pulses: Found, start: float) -> SpinFrequency:
     if isinstance(found, Match) and found.flat:
         more.append(Finding("clipped", "the tops of the pulses are flat: the detector or the converter is saturated"))
     if found.missing:
-        more.append(Finding("missing", f"{found.missing} turn{'s have' if found.missing > 1 else ' has'} no pulse"))
+        have = "s have" if found.missing > 1 else " has"
+        more.append(Finding("missing", f"{found.missing} turn{have} no pulse"))
     if found.wrong:
         more.append(Finding("wrong", f"{found.wrong} pulses are not at their place and were left out"))
     if fit.coefficients.size > 3:

@@ -91,12 +91,12 @@ def _without_result(results: Results) -> Iterator[str]:
 class Section:
     """What the page says of one analysis.
 
-    part: in its own words; count: of its inputs; banner: which of them are synthetic, where that matters here; figure:
-    as an address of data.
+    part: in its own words; count: of its inputs, in words; banner: which of them are synthetic, where that matters
+    here; figure: as an address of data.
     """
 
     part: ReportPart
-    count: int
+    count: str
     banner: tuple[str, str] | None
     figure: str
     warnings: tuple[str, ...]
@@ -118,12 +118,14 @@ def render(results: Results) -> str:
     sections = [_section(analysis, found, alone=len(results) == 1) for analysis, found in results]
     abouts: dict[Path, list[About]] = {}
     for (_, found), section in zip(results, sections, strict=True):
+        several = len(found.sources) > 1
         for source, part in zip(found.sources, section.part.inputs, strict=True):
-            abouts.setdefault(source.path.resolve(), []).append(About(source, section.part, part, section.count > 1))
+            abouts.setdefault(source.path.resolve(), []).append(About(source, section.part, part, several))
     return _template("report/page.html.j2").render(
         sections=sections,
         banner=sections[0].banner if len(sections) == 1 else _banner([one[0].source for one in abouts.values()]),
         inputs=[describe(of_input) for of_input in abouts.values()],
+        counted=counted([one[0].source for one in abouts.values()]),
         software=software_versions(),
         written=utc_now()[:19].replace("T", " ") + " UTC",
     )
@@ -148,7 +150,7 @@ def _section(analysis: Analysis[Any], found: Analyzed[Any, Any, Any, Any], *, al
     mixes = any(0 < sum(one.synthetic for one in together) < len(together) for together in found.averaged)
     return Section(
         part=analysis.part(found),
-        count=len(found.sources),
+        count=counted(found.sources),
         banner=_banner(found.sources, mixed=mixes) if alone or mixes else None,
         figure=_as_image(analysis.svg(found)),
         warnings=tuple(unquoted(text) for text in found.all_warnings),
@@ -158,6 +160,7 @@ def _section(analysis: Analysis[Any], found: Analyzed[Any, Any, Any, Any], *, al
 def _banner(sources: Sequence[Source[Any]], *, mixed: bool = False) -> tuple[str, str] | None:
     """Which inputs are synthetic, and what that does to numbers that are of both together."""
     total, made_up = len(sources), [source.name for source in sources if source.synthetic]
+    files = sum(source.run is None for source in sources)
     if not made_up:
         return None
     below = "How it was made stands below, under its name."
@@ -167,10 +170,20 @@ def _banner(sources: Sequence[Source[Any]], *, mixed: bool = False) -> tuple[str
     if len(made_up) == total:
         return "SYNTHETIC.", f"None of these {total} runs came from a real bench. {below}"
     said = f"{len(made_up)} of {total} runs did not come from a real bench ({', '.join(made_up)})."
+    if not mixed and files:
+        said = f"Of {counted(sources)} {len(made_up)} did not come from a real bench ({', '.join(made_up)})."
+        return "SYNTHETIC IN PART.", f"{said} A data file does not say where it is from. {below}"
     if not mixed:
         return "REAL AND SYNTHETIC RUNS.", f"{said} {below}"
     consequence = "Means, comparisons and figure are of both together and so no measurement: report the real runs "
     return "REAL AND SYNTHETIC RUNS MIXED.", f"{said} {consequence}by themselves. {below}"
+
+
+def counted(sources: Sequence[Source[Any]]) -> str:
+    """How many inputs of which kind: "4 runs and 1 data file"."""
+    files = sum(source.run is None for source in sources)
+    kinds = ((len(sources) - files, "run"), (files, "data file"))
+    return " and ".join(f"{n} {kind}{'s' * (n > 1)}" for n, kind in kinds if n)
 
 
 def _as_image(svg: str) -> str:

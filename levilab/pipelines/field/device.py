@@ -135,13 +135,13 @@ def known_top(options: FieldOptions, height_u: float | None) -> tuple[KnownTop, 
     if missing:
         warnings.append(
             f"of the top the {' and the '.join(missing)} are not known, those of the thesis's top are taken: what "
-            "follows is of that top; describe yours in a file and give it with `device`"
+            "follows is of that top; describe yours in a file, for the option `device`"
         )
     magnet = Disc(table.magnet_radius_m, table.magnet_height_m or 0.0) if table.magnet_radius_m else None
     if magnet is None:
         warnings.append(
             "the top's magnet is taken for a point: one of 14 mm radius feels about 4 % more force at 73 mm, and its "
-            "lowest height lies 3 mm lower; give magnet_radius_m and magnet_height_m with `device`"
+            "lowest height lies 3 mm lower; give magnet_radius_m and magnet_height_m in the file of the option `device`"
         )
     covariance = made.covariance if made else None
     return KnownTop(transverse, axial, moment, mass, height, device.gravity_m_s2, covariance, magnet), warnings

@@ -30,6 +30,9 @@ FLOATS, SET = "#009E73", "#E69F00"
 _BEYOND = 0.06
 #: Points of a curve, and of the windows of spin, which take longer.
 _POINTS, _MASSES = 300, 11
+#: The lightest and the heaviest top float at the very edge of the window, or, by rounding, beyond it: the part of the
+#: window that is left out at both ends.
+_INSIDE = 1e-6
 
 
 def field_figure(analysis: FieldAnalysis) -> Figure:
@@ -104,7 +107,7 @@ def _mark_window(axes: Axes, analysis: FieldAnalysis) -> None:
     low, high, middle = (
         1e3 * (values[name].value or 0.0) for name in ("lowest_height", "highest_height", "height_at_mass")
     )
-    axes.axvspan(low, high, color=FLOATS, alpha=0.15, linewidth=0, label=f"tops float: {low:.1f} to {high:.1f} mm")
+    axes.axvspan(low, high, color=FLOATS, alpha=0.15, linewidth=0, label=f"tops float: {low:.2f} to {high:.2f} mm")
     mass = with_uncertainty(SHOWN["mass_to_set"].of(values["mass_to_set"]))
     axes.axvline(middle, color=SET, linewidth=1.5, linestyle="dashed", label=f"a top of {mass}")
 
@@ -167,7 +170,7 @@ def _draw_spins(axes: Axes, run: FieldRun) -> None:
     floating = run.floating
     assert floating is not None
     light, heavy = floating["lightest_mass"], floating["heaviest_mass"]
-    masses = light + (heavy - light) * np.linspace(0.0, 1.0, _MASSES)
+    masses = light + (heavy - light) * np.linspace(_INSIDE, 1 - _INSIDE, _MASSES)
     heights = floating["lowest_height"], floating["highest_height"]
     found = [floating_spins(run.scan.ring, run.top, float(mass), heights) for mass in masses]
     spins: Array = np.array([window or (math.nan, math.nan) for window in found])

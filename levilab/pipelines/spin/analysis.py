@@ -19,7 +19,7 @@ from levilab.runs.traces import INDEX
 from levilab.runs.waveforms import has_traces
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -178,25 +178,44 @@ def _with_rate(spin: SpinFrequency, waveform: Waveform) -> SpinFrequency:
 def _of_several(records: Records, options: SpinOptions) -> SpinRun:
     """A spin for each record of a run; what has no pulses is left out with a note, unless none has."""
     spins: list[SpinFrequency] = []
+    numbers: list[int] = []  # of the records that gave them
     missed: AnalysisError | None = None
-    for waveform in records.waveforms:
+    for number, waveform in enumerate(records.waveforms, 1):
         try:
             samples = waveform.samples()
             spin = spin_of_trace(samples, waveform.rate, start=waveform.start, method=options.method)
             spins.append(spin.under_drag())
+            numbers.append(number)
         except AnalysisError as error:
             missed = error
     if not spins:
         assert missed
         raise missed
     series = Series(*_columns(spins), of="record")
-    names = dict.fromkeys(note.name for spin in spins for note in spin.notes)
-    notes = tuple(next(note for spin in spins for note in spin.notes if note.name == name) for name in names)
+    all_of_them = len(records.waveforms)
+    notes = _by_record(dict(zip(numbers, spins, strict=True)), all_of_them)
     if missed:
-        left_out, all_of_them = len(records.waveforms) - len(spins), len(records.waveforms)
+        left_out = all_of_them - len(spins)
         text = f"{left_out} of {all_of_them} records are left out, the last of them for this: {missed}"
         notes = (*notes, Finding("no-pulses", text))
     return SpinRun(spins[len(spins) // 2], series, notes)
+
+
+def _by_record(spins: Mapping[int, SpinFrequency], all_of_them: int) -> tuple[Finding, ...]:
+    """Each finding once, with the records that it is of: the table shows the record in the middle, which may lack it.
+
+    spins: the number of a record, from 1 → its spin.
+    """
+    found: dict[str, dict[int, str]] = {}
+    for number, spin in spins.items():
+        for note in spin.notes:
+            found.setdefault(note.name, {}).setdefault(number, note.text)
+    notes = []
+    for name, texts in found.items():
+        first, text = next(iter(texts.items()))
+        where = f"{len(texts)} of {all_of_them} records, number {first} first" if len(texts) > 1 else f"record {first}"
+        notes.append(Finding(name, text if all_of_them == 1 else f"{where}: {text}"))
+    return tuple(notes)
 
 
 def _of_one(spin: SpinFrequency) -> SpinRun:

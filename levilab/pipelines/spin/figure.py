@@ -128,7 +128,19 @@ def _excerpt(records: Records, spin: SpinFrequency) -> _Excerpt:
     time = waveform.start + (first + np.arange(len(signal), dtype=np.float64)) * waveform.step
     turns = turns_of(spin, time)
     unit = waveform.signals[waveform.signal(channel)].unit
-    return _Excerpt(time, signal, turns, unit, *_arrivals(time, signal, turns, spin))
+    at, residuals = _arrivals(time, signal, turns, spin)
+    off = _middle(residuals, spin.scatter)  # the fit may put the middle of a pulse at another place of its shape
+    turns -= off * (spin.frequency.value or 1.0)
+    return _Excerpt(time, signal, turns, unit, at + off, residuals - off)
+
+
+def _middle(late: Array, scatter: float) -> float:
+    """The mean of what the pulses' times leave over [s], without those that stand alone."""
+    if not len(late):
+        return 0.0
+    median = float(np.median(late))
+    near = np.abs(late - median) <= 6 * max(scatter, float(np.median(np.abs(late - median))))
+    return float(late[near].mean())
 
 
 def _near(times: Array, spin: SpinFrequency) -> NDArray[np.bool_]:
@@ -225,7 +237,7 @@ def _draw_folded(axes: Axes, excerpt: _Excerpt) -> None:
     good = np.isfinite(mean)
     axes.plot(phase[good], mean[good], color="black", linewidth=1)
     axes.axvline(0, color=VERMILION, linewidth=1, alpha=0.7, zorder=1)
-    turns = int(np.ptp(np.rint(excerpt.turns))) + 1
+    turns = round(float(np.ptp(excerpt.turns)))
     axes.set(xlabel="part of a turn", ylabel=f"signal  [{excerpt.unit}]", xlim=(-0.5, 0.5))
     axes.set_title(f"{turns} turns laid over each other, and their mean", loc="left")
 

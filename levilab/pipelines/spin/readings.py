@@ -64,7 +64,9 @@ def read_spin_file(path: Path, options: InputOptions) -> Records:
     warnings = list(record.warnings)
     if options.channel is None and len(record.signals) > 1:
         names = ", ".join(signal.name for signal in record.signals)
-        warnings.append(f"{path.name}: has the channels {names}; {chosen} is analyzed, `channel` chooses another")
+        warnings.append(
+            f"{path.name}: has the channels {names}; {chosen} is analyzed, the option `channel` chooses another"
+        )
     return Records(path, (record,), chosen, None, tuple(warnings))
 
 
@@ -91,6 +93,7 @@ def read_spin_run(run: Run, options: InputOptions) -> Records:
     ]
     if options.channel is None and len(names) > 1:
         warnings.append(
-            f"{run.folder.name}: has records of {', '.join(names)}; {chosen} is analyzed, `channel` chooses another"
+            f"{run.folder.name}: has records of {', '.join(names)}; {chosen} is analyzed, "
+            "the option `channel` chooses another"
         )
     return Records(run.folder, of_channel, chosen, None, tuple(warnings))

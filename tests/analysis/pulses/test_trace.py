@@ -210,3 +210,20 @@ def test_traces_without_pulses_are_refused():
 def test_a_constant_trace_has_no_pulses_however_its_sums_are_rounded(level, method):
     with pytest.raises(TooFewPulses, match=r"0 pulses in 0\.4 s"):
         spin_of_trace(np.full(1600, level), 4000, method=method)
+
+
+@pytest.mark.parametrize("scatter", [0.01, 0.0212])
+def test_pulses_that_scatter_as_a_wobbling_top_makes_them_are_in_the_uncertainty(scatter):
+    """Records of 0.6 s: the mean pulse of 15 to 18 turns fits each of them where it happens to be."""
+    rate, pulls = 10_000.0, []
+    time = np.arange(6000) / rate - 0.3
+    for seed in range(60, 160):
+        random = np.random.default_rng(seed)
+        spin, phase = random.uniform(23, 30), random.uniform(0, 1)
+        turns = phase + spin * time - 0.08 * time**2 / 2
+        late = random.normal(0, scatter, 40)[np.floor(turns).astype(int) + 20]
+        found = spin_of_trace(light(turns - late) + random.normal(0, 0.01, time.size), rate)
+        truth = spin - 0.08 * (found.reference_time - 0.3)
+        pulls.append((found.frequency.value - truth) / found.frequency.u)
+    assert np.std(pulls) < 1.3  # 1, its standard error 0.1; 1.8 and more by the mean pulse
+    assert np.max(np.abs(pulls)) < 6

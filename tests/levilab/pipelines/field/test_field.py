@@ -132,6 +132,16 @@ def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(
     assert len(field_part(found).inputs) == 2
 
 
+def test_the_windows_of_spin_are_drawn_from_the_lightest_top_to_the_heaviest(sample_data: Path) -> None:
+    found = analyze_scans([sample_data / "field-scan"], FieldOptions())
+    slow, fast = field_figure(found).axes[3].get_lines()[:2]
+    ends = [1e3 * (found.values[name].value or 0.0) for name in ("lightest_mass", "heaviest_mass")]
+    for line in (slow, fast):
+        masses, spins = (np.asarray(values, dtype=float) for values in (line.get_xdata(), line.get_ydata()))
+        drawn = masses[np.isfinite(spins)]
+        assert [drawn[0], drawn[-1]] == pytest.approx(ends, abs=1e-3)
+
+
 # --- users' files ---
 
 

@@ -53,7 +53,7 @@ def test_options_reach_the_file_and_the_method(sample_data: Path) -> None:
     other = analyze_spins([two], SpinOptions(channel="2")).runs[0].spin
     assert other.frequency.value == pytest.approx(50, abs=0.01)  # 40 samples high, 40 low, at 4000 a second
     assert any(
-        "CH1 is analyzed, `channel` chooses another" in text
+        "CH1 is analyzed, the option `channel` chooses another" in text
         for text in analyze_spins([two], SpinOptions()).all_warnings
     )
 
@@ -137,6 +137,22 @@ def test_records_of_a_run_that_are_left_out_are_counted_in_a_note(traced: Path) 
     assert len(analysis.runs[0].series) == 2
     (note,) = [text for text in analysis.all_warnings if text.endswith("(no-pulses)")]
     assert "1 of 3 records are left out, the last of them for this: 0 pulses" in note
+
+
+def test_a_finding_in_some_records_of_a_run_names_them(traced: Path) -> None:
+    """The table shows the record in the middle alone."""
+    channels = [{"name": "time_s", "unit": "s", "source": "a test"}]
+    record = RunRecord(experiment="trace", status="running", started_utc=utc_now(), channels=channels)
+    with RunWriter.create(traced.parent, record, tell=lambda _: None) as writer:
+        for k, stored in enumerate(Run.load(traced).traces()):
+            codes = stored.trace.codes.copy()
+            if k == 2:  # at 28 Hz, from -0.2 s on: its sixth turn
+                codes[int((0 - 0.5 / 28 + 0.2) * 4000) : int((0.5 / 28 + 0.2) * 4000)] = 10
+            writer.trace(10.0 * k, replace(stored.trace, codes=codes), "light")
+        writer.finish("finished")
+    analysis = analyze_spins([writer.folder], SpinOptions())
+    assert analysis.runs[0].spin.missing == 0
+    assert [text for text in analysis.all_warnings if text.endswith("record 3: 1 turn has no pulse (missing)")]
 
 
 def test_the_result_says_what_the_interface_promises(sample_data: Path, tmp_path: Path) -> None:
@@ -233,6 +249,7 @@ def test_the_figure_shows_the_trace_the_turns_the_residuals_and_the_frequency(
     residuals = np.concatenate([np.asarray(line.get_ydata(), float) for line in panels[2].get_lines()[1:]])
     assert len(residuals) > 10
     assert np.abs(residuals).max() < 200  # µs: a fifth of a pulse's width
+    assert abs(residuals.mean()) < 1  # µs: no more than those that stand alone are worth
 
 
 @pytest.mark.parametrize("what", ["trace", "times"])
