@@ -366,4 +366,5 @@ def _compared(one: Comparison) -> str:
     if one.p is None:
         return f"That is {where}."
     verdict = "which chance explains" if one.agrees else "more than chance makes"
-    return f"The mean lies {where}, {verdict} (p = {digits(one.p)})."
+    chance = f"p = {digits(one.p)}" if one.p >= 1e-6 else "p < 10⁻⁶"
+    return f"The mean lies {where}, {verdict} ({chance})."

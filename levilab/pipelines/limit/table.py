@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from levilab.present.numbers import plain, short_name, without_unit
+from levilab.present.numbers import share, short_name, without_unit
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def theory_table(analysis: LimitAnalysis) -> Table:
                 one.name if analysis.number(group) is None else f"{analysis.number(group)}: {one.name}",
                 f"{one.expected:.2f}",
                 without_unit(one.difference),
-                plain(one.p, 2),
+                share(one.p),
                 "—" if one.agrees is None else "yes" if one.agrees else "no",
             )
         )
