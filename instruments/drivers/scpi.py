@@ -44,8 +44,8 @@ class ScpiInstrument:
 
     It is a context manager: it is closed at the end.  One program, one thread: there is no lock within a driver.
 
-    >>> ScpiInstrument.connect("TCPIP0::192.168.1.20::5025::SOCKET")  # doctest: +SKIP
-    <ScpiInstrument 53230A MY58120113 at TCPIP0::192.168.1.20::5025::SOCKET>
+    ``Keysight53230A.connect("TCPIP0::192.168.1.20::5025::SOCKET")`` shows itself as
+    ``<Keysight53230A 53230A MY58120113 at TCPIP0::192.168.1.20::5025::SOCKET>``.
     """
 
     MODELS: ClassVar[str] = ".*"

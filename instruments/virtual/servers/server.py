@@ -107,9 +107,10 @@ class BenchServer:
 
     offers: where the instruments are, once it runs.  Raises OSError when a port is taken.
 
-    >>> with BenchServer(bus) as server:  # doctest: +SKIP
-    ...     print(server.offers[0].resources["hislip"])
-    TCPIP0::127.0.0.1::hislip0,40213::INSTR
+    So the first instrument's address over HiSLIP, such as TCPIP0::127.0.0.1::hislip0,40213::INSTR, is printed by::
+
+        with BenchServer(bus) as server:
+            print(server.offers[0].resources["hislip"])
     """
 
     bus: Bus
