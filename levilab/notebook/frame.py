@@ -54,9 +54,9 @@ def in_rows(text: str, folder: Path, *, titles: int) -> str:
         titles: lines of titles in it, 0 or 1.
 
     >>> from pathlib import Path
-    >>> in_rows("/tmp/x/DataFrame.csv, line 5: the time 3 s is repeated", Path("/tmp/x"), titles=1)
+    >>> in_rows("folder/DataFrame.csv, line 5: the time 3 s is repeated", Path("folder"), titles=1)
     'DataFrame.csv, row 3: the time 3 s is repeated'
-    >>> in_rows("/tmp/x/DataFrame.csv, line 1: no title is known", Path("/tmp/x"), titles=1)
+    >>> in_rows("folder/DataFrame.csv, line 1: no title is known", Path("folder"), titles=1)
     'DataFrame.csv: no title is known'
     """
     for separator in ("/", "\\"):
