@@ -74,22 +74,25 @@ def acquire(
         LevilabError: known failures; `UsageError` for a wrong argument.
         instruments.errors.InstrumentError: an instrument did not answer, or wrongly.
     """
-    from levilab.notebook.acquisition import acquire_run
+    from pathlib import Path
 
-    return acquire_run(
-        experiment,
+    from levilab.acquisition.request import AcquisitionOptions
+    from levilab.notebook.acquisition import acquire_run, as_path, ask_with_input, assignments
+
+    options = AcquisitionOptions(
         mock=mock,
-        bench=bench,
-        out=out,
+        bench=as_path(bench),
+        out=Path(out),
         seed=seed,
-        scene=scene,
+        scene=None if scene is None else str(scene),
         note=note,
         realtime=realtime,
-        resume=resume,
-        settings=settings or {},
+        resume=as_path(resume),
         wire_log=wire_log,
-        person=person,
+        person=person or ask_with_input,
+        settings=assignments(settings or {}),
     )
+    return acquire_run(experiment, options)
 
 
 def load(path: str | PathLike[str]) -> Run:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from levilab.acquisition.loop import acquire
-from levilab.acquisition.request import AcquisitionOptions, request_for
+from levilab.acquisition.request import request_for
 from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import EXPERIMENTS
 from levilab.errors import DataError, UsageError
@@ -16,46 +16,30 @@ from levilab.runs.run import RECORD, Run, find_run
 from levilab.simulator.keys import plain
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
     from os import PathLike
 
+    from levilab.acquisition.request import AcquisitionOptions
     from levilab.bench.person import Task
 
 
-def acquire_run(
-    experiment: str,
-    *,
-    mock: bool,
-    bench: str | PathLike[str] | None,
-    out: str | PathLike[str],
-    seed: int | None,
-    scene: str | PathLike[str] | None,
-    note: str,
-    realtime: bool,
-    resume: str | PathLike[str] | Run | None,
-    settings: Mapping[str, Any],
-    wire_log: bool,
-    person: Callable[[Task], str] | None,
-) -> Run:
+def acquire_run(experiment: str, options: AcquisitionOptions) -> Run:
     """Run an experiment without a word on the terminal; see `levilab.acquire`."""
     if experiment not in EXPERIMENTS:
         raise UsageError("experiment", f"{', '.join(EXPERIMENTS)} are known", value=experiment)
-    if isinstance(resume, Run):
-        resume = resume.folder
-    options = AcquisitionOptions(
-        mock=mock,
-        bench=None if bench is None else Path(bench),
-        out=Path(out),
-        seed=seed,
-        scene=None if scene is None else str(scene),
-        note=note,
-        realtime=realtime,
-        resume=None if resume is None else Path(resume),
-        wire_log=wire_log,
-        person=person or ask_with_input,
-        settings=tuple(f"{key}={_typed(value)}" for key, value in settings.items()),
-    )
     return acquire(request_for(experiment, options), Mute())
+
+
+def as_path(place: str | PathLike[str] | Run | None) -> Path | None:
+    """A file or a run folder as a path."""
+    if place is None:
+        return None
+    return place.folder if isinstance(place, Run) else Path(place)
+
+
+def assignments(settings: Mapping[str, Any]) -> tuple[str, ...]:
+    """Settings as one would type them, KEY=VALUE."""
+    return tuple(f"{key}={_typed(value)}" for key, value in settings.items())
 
 
 def _typed(value: Any) -> str:

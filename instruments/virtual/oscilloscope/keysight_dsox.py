@@ -17,7 +17,7 @@ import numpy as np
 from instruments.virtual.core.parameters import choice, none, number, one
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Row, Switch, Text, Word, whole
-from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope
+from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope, at_input
 from instruments.virtual.oscilloscope.screenshot import bmp8, bmp24, draw, grey, png
 
 if TYPE_CHECKING:
@@ -72,18 +72,6 @@ _INTERVALS = ("CYCLe", "DISPlay", "AC", "DC")
 _EMPTY_SOURCES = ("FUNCtion", "MATH", "FFT", "WMEMory1", "WMEMory2", "EXTernal", "ABUS")
 
 
-def _probe(scope: VirtualDSOX1000, n: int) -> float:
-    return scope.value(f"chan{n}_probe")
-
-
-def _scales(scope: VirtualDSOX1000, n: int) -> tuple[float, float]:
-    return 5e-4 * _probe(scope, n), 10 * _probe(scope, n)
-
-
-def _ranges(scope: VirtualDSOX1000, n: int) -> tuple[float, float]:
-    return 4e-3 * _probe(scope, n), 80 * _probe(scope, n)
-
-
 def _levels(scope: VirtualDSOX1000) -> tuple[float, float]:
     """Three quarters of the full scale from the middle of the screen."""
     channel = scope.source_channel() or 1
@@ -97,8 +85,8 @@ def _names(scope: VirtualDSOX1000) -> str:
 
 _CHANNEL: tuple[Row, ...] = (
     Number("CHANnel{n}:PROBe[:ATTenuation]", "chan{n}_probe", 10.0, (0.1, 1e4)),
-    Number("CHANnel{n}:SCALe", "chan{n}_scale", 5.0, _scales, "V"),
-    Number("CHANnel{n}:RANGe", "chan{n}_scale", 5.0, _ranges, "V", factor=8, alias=True),
+    Number("CHANnel{n}:SCALe", "chan{n}_scale", 5.0, at_input(5e-4, 10), "V"),
+    Number("CHANnel{n}:RANGe", "chan{n}_scale", 5.0, at_input(4e-3, 80), "V", factor=8, alias=True),
     Number("CHANnel{n}:OFFSet", "chan{n}_offset", 0.0, (-1e5, 1e5), "V"),
     Number("CHANnel{n}:PROBe:SKEW", "chan{n}_skew", 0.0, (-1e-7, 1e-7), "S"),
     Word("CHANnel{n}:PROBe:STYPe", "chan{n}_probe_kind", "DIFFerential *SINGle"),
@@ -236,7 +224,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
         """An offset beyond what the range allows is set to the nearest that it does."""
         if name.startswith("chan") and name.endswith("_offset"):
             n = int(name[4])
-            reach = (2.0 if self.value(f"chan{n}_scale") / _probe(self, n) < 0.2 else 50.0) * _probe(self, n)
+            reach = (2.0 if self.value(f"chan{n}_scale") / self.probe(n) < 0.2 else 50.0) * self.probe(n)
             self.settings[name] = min(max(self.value(name), -reach), reach)
         super().adjusted(name, before)
 

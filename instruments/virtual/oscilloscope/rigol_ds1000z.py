@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, ClassVar
 from instruments.virtual.core.parameters import at_most_one, boolean, choice, limit, number, one
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Row, Switch, Word, whole
-from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope, one_two_five
+from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope, at_input, one_two_five
 from instruments.virtual.oscilloscope.screenshot import bmp8, bmp24, draw, grey, png
 
 if TYPE_CHECKING:
@@ -69,20 +69,8 @@ _WORDS = tuple(_ITEMS)
 _STATISTICS = ("MAXimum", "MINimum", "CURRent", "AVERages", "DEViation")
 
 
-def _probe(scope: VirtualDS1000Z, n: int) -> float:
-    return scope.value(f"chan{n}_probe")
-
-
-def _scales(scope: VirtualDS1000Z, n: int) -> tuple[float, float]:
-    return 1e-3 * _probe(scope, n), 10 * _probe(scope, n)
-
-
-def _ranges(scope: VirtualDS1000Z, n: int) -> tuple[float, float]:
-    return 8e-3 * _probe(scope, n), 80 * _probe(scope, n)
-
-
 def _offsets(scope: VirtualDS1000Z, n: int) -> tuple[float, float]:
-    reach = (100.0 if scope.value(f"chan{n}_scale") / _probe(scope, n) >= 0.5 else 2.0) * _probe(scope, n)
+    reach = (100.0 if scope.value(f"chan{n}_scale") / scope.probe(n) >= 0.5 else 2.0) * scope.probe(n)
     return -reach, reach
 
 
@@ -102,9 +90,9 @@ def _names(scope: VirtualDS1000Z) -> str:
 
 _CHANNEL: tuple[Row, ...] = (
     Number("CHANnel{n}:PROBe", "chan{n}_probe", 10.0, (0.01, 1000.0), rounded=one_two_five),
-    Number("CHANnel{n}:SCALe", "chan{n}_scale", 1.0, _scales, "V"),
+    Number("CHANnel{n}:SCALe", "chan{n}_scale", 1.0, at_input(1e-3, 10), "V"),
     Number("CHANnel{n}:OFFSet", "chan{n}_offset", 0.0, _offsets, "V"),
-    Number("CHANnel{n}:RANGe", "chan{n}_scale", 1.0, _ranges, "V", factor=8, alias=True),
+    Number("CHANnel{n}:RANGe", "chan{n}_scale", 1.0, at_input(8e-3, 80), "V", factor=8, alias=True),
     Number("CHANnel{n}:TCAL", "chan{n}_delay", 0.0, (-1e-7, 1e-7), "S"),
     Word("CHANnel{n}:COUPling", "chan{n}_coupling", "AC *DC GND"),
     Word("CHANnel{n}:BWLimit", "chan{n}_bandwidth", "20M *OFF"),

@@ -22,7 +22,7 @@ from instruments.virtual.oscilloscope.measure import Measured, measure
 from instruments.virtual.oscilloscope.record import COARSEST, Edge, Input, Record, open_input
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
@@ -138,6 +138,10 @@ class VirtualOscilloscope(VirtualInstrument):
         """Volts per division."""
         return self.value(f"chan{channel}_scale")
 
+    def probe(self, channel: int) -> float:
+        """How many times less than the probe's tip the input sees."""
+        return self.value(f"chan{channel}_probe")
+
     def shown(self) -> list[int]:
         """The channels that are on."""
         return [n for n in self.channels if self.settings[f"chan{n}_display"]]
@@ -251,7 +255,7 @@ class VirtualOscilloscope(VirtualInstrument):
         if str(coupling).startswith("A"):
             begin = max(0.0, start - 0.5)
             mean = float(np.mean(signal(begin, COARSEST, round(1 / COARSEST))))
-        factor = self.value(f"chan{channel}_probe") * (-1.0 if self.settings[f"chan{channel}_invert"] else 1.0)
+        factor = self.probe(channel) * (-1.0 if self.settings[f"chan{channel}_invert"] else 1.0)
         volts_per_code, zero = self.scaling(channel)
         return Input(signal, factor, mean, volts_per_code, zero, self.lowest, self.highest)
 
@@ -370,7 +374,7 @@ class VirtualOscilloscope(VirtualInstrument):
     def autoscale(self) -> None:
         """Scale, offset, time base and level to fit what stands at the inputs."""
         for n in self.channels:
-            signal, factor = self._signals.get(n, open_input), self.value(f"chan{n}_probe")
+            signal, factor = self._signals.get(n, open_input), self.probe(n)
             volts = factor * signal(max(0.0, self.now - 0.5), COARSEST, round(0.5 / COARSEST))
             low, high = float(volts.min()), float(volts.max())
             if high - low < 0.02 * factor:
@@ -399,6 +403,11 @@ SETUP = Both(
     lambda s, _p: s.block(s.setup()),
 )
 PRESETS = (Both("*SAV", lambda s, p: s.keep(p)), Both("*RCL", lambda s, p: s.recall(p)))
+
+
+def at_input(lowest: float, highest: float) -> Callable[[VirtualOscilloscope, int], tuple[float, float]]:
+    """Limits that hold at a channel's input [V]: at the tip of its probe they are its factor larger."""
+    return lambda scope, n: (lowest * scope.probe(n), highest * scope.probe(n))
 
 
 def one_two_five(value: float, *, up: bool = False) -> float:

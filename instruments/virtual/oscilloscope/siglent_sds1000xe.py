@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from instruments.virtual.core.parameters import choice, one
 from instruments.virtual.core.parser import Command, ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Row, Switch, Word, short_header
-from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope, one_two_five
+from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope, at_input, one_two_five
 from instruments.virtual.oscilloscope.screenshot import bmp24, draw
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ _MEASUREMENTS = {
 
 
 def _reach(scope: VirtualSDS1000XE, n: int) -> tuple[float, float]:
-    probe = scope.value(f"chan{n}_probe")
+    probe = scope.probe(n)
     reach = (100.0 if scope.value(f"chan{n}_scale") / probe >= 0.102 else 2.0) * probe
     return -reach, reach
 
@@ -65,14 +65,10 @@ def _levels(scope: VirtualSDS1000XE, n: int) -> tuple[float, float]:
     return middle - reach, middle + reach
 
 
-def _scales(scope: VirtualSDS1000XE, n: int) -> tuple[float, float]:
-    return 5e-4 * scope.value(f"chan{n}_probe"), 10 * scope.value(f"chan{n}_probe")
-
-
 #: In CHDR SHORT, as it leaves the factory, an answer has its header and its unit: C1:VDIV 5.00E-01V.
 _CHANNEL: tuple[Row, ...] = (
     Number("C{n}:(ATTN|ATTENUATION)", "chan{n}_probe", 10.0, (0.1, 1e4), spell=lambda v: f"{v:g}"),
-    Number("C{n}:(VDIV|VOLT_DIV)", "chan{n}_scale", 1.0, _scales, "V", clips=True),
+    Number("C{n}:(VDIV|VOLT_DIV)", "chan{n}_scale", 1.0, at_input(5e-4, 10), "V", clips=True),
     Number("C{n}:(OFST|OFFSET)", "chan{n}_offset", 0.0, _reach, "V", clips=True),
     Number("C{n}:(TRLV|TRIG_LEVEL)", "chan{n}_level", 0.0, _levels, "V", clips=True),
     Word("C{n}:(TRSL|TRIG_SLOPE)", "chan{n}_slope", "NEG *POS WINDOW"),
