@@ -129,7 +129,7 @@ def find_miscounts(
         y: shape (n,) [Hz].
         u: standard uncertainty of y, shape (n,) [Hz], if it is known.
         robust: the median line.
-        gate_s: of the counter [s]; without it, and without gates, whole counts cannot be told.
+        gate_s: of the counter [s]; without it, and without gates, whole counts are not recognised.
         gates: behind each point, where they are known: then each of them has to be off by the same counts.
     """
     line = float(robust.intercept.value or 0.0) + float(robust.slope.value or 0.0) * x

@@ -245,8 +245,8 @@ def _table(
     import pandas as pd
 
     name = shown(str(path), 200)
-    told = [*warnings, *([f"{name}, {rows.torn} and is left out"] if rows.torn else [])]
-    told += [f"{name}: {rows.doubt}"] if rows.doubt else []
+    notes = [*warnings, *([f"{name}, {rows.torn} and is left out"] if rows.torn else [])]
+    notes += [f"{name}: {rows.doubt}"] if rows.doubt else []
     numbers = dict(zip(chosen, rows.values, strict=False))
     # The comparison is false for NaN, too.
     present = {column: np.abs(values) < NO_READING for column, values in numbers.items()}
@@ -256,17 +256,17 @@ def _table(
     for column, missing in [(c, read & ~p) for c, p in present.items() if c.name in companions]:
         if missing.any():  # better no uncertainties than readings lost for want of them
             del present[column]
-            told.append(
+            notes.append(
                 f"{name}: column '{shown(column.label)}' is empty in {missing.sum()} of {read.sum()} rows and "
                 "is not used"
             )
     good = np.logical_and.reduce(list(present.values())) if present else np.ones(rows.lines.size, bool)
     lines, kept = rows.lines, {column: numbers[column] for column in present}
     if not good.all():
-        told.append(_missed(name, lines[~good], good.size))
+        notes.append(_missed(name, lines[~good], good.size))
         lines, kept = lines[good], {column: values[good] for column, values in kept.items()}
     frame = {c.name: values if c.factor == 1 else values * c.factor for c, values in kept.items()}
-    return Table(path, pd.DataFrame(frame, dtype=np.float64), tuple(told), header, lines)
+    return Table(path, pd.DataFrame(frame, dtype=np.float64), tuple(notes), header, lines)
 
 
 def _missed(name: str, lines: "NDArray[np.int64]", rows: int) -> str:

@@ -113,7 +113,7 @@ class VirtualSDG1000X(VirtualInstrument):
         return f"{value:.12g}"
 
     def changed(self, name: str) -> None:
-        """What stands at the terminals of channel 1 is told to the listener."""
+        """Pass the voltage at the terminals of channel 1 to the listener."""
         if self._listener and ":" not in name:
             self._listener(self.clock.now(), self.signal())
 

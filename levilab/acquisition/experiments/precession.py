@@ -36,11 +36,11 @@ _MOST_POINTS = 1000
 #: A locked top swings about the drive, by some tenths of a hertz: so many looks in a row have a mean this near to it
 #: [Hz]; after so many looks it is not locked.
 _LOOKS, _LOCKED_WITHIN_HZ, _MOST_LOOKS = 3, 0.25, 12
-#: Gates have so many lengths, in parts of `gate_s`, and so long a pause before them, in periods of the drive.
+#: Shortest and longest gate, in parts of `gate_s`, and longest pause before one, in periods of the drive.
 _GATES, _PAUSES = (0.75, 1.25), 4.0
 #: No count is better than that: the resolution of the counters over a second [Hz].
 _LEAST_U_HZ = 1e-7
-#: A swing of more than this [turns] is taken off by a step of the drive's phase that lasts so long [s], if that is at
+#: A swing of more than this [turns] is taken off by a step of the drive's phase of this duration [s], if that is at
 #: most such a part of its period.  From half a turn on a top is lost.
 _CALM, _STEP_S, _SHORT = 0.12, 0.3, 0.25
 #: Of an oscilloscope's record of laser and drive: samples a second, and volts of a division; the drive has ±5 V.
