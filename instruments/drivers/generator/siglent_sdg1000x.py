@@ -54,6 +54,7 @@ class SiglentSDG1000X(DriveGenerator):
       them behind the header: ``C1:BSWV WVTP,SINE,FRQ,30.5HZ,…``.
     - A number beyond its limits becomes the limit without a word, and the guide has no error queue: each setting is
       asked for after it was sent.
+    - It prints six digits of a number, ten of a frequency, and none that are zero at the end (measured on an SDG2042X).
     - A triangle is a ramp of 50 % symmetry; so `waveform` answers RAMP for it.
     """
 
@@ -70,17 +71,13 @@ class SiglentSDG1000X(DriveGenerator):
         key="WVTP",
     )
     frequency = LimitedSetting(
-        "C1:BSWV", float, unit="Hz", low=1e-6, high=60e6, resolution=1e-6, quantity="frequency_hz", key="FRQ"
+        *("C1:BSWV", float, "Hz", 1e-6, 60e6), key="FRQ", resolution=1e-6, digits=10, quantity="frequency_hz"
     )
     amplitude = LimitedSetting(
-        "C1:BSWV", float, unit="Vpp", low=2e-3, high=20.0, quantity="amplitude_vpp", partner="offset_v", key="AMP"
+        *("C1:BSWV", float, "Vpp", 2e-3, 20.0), key="AMP", digits=6, quantity="amplitude_vpp", partner="offset_v"
     )
     offset = LimitedSetting(
-        *("C1:BSWV", float, "V", -OPEN_V, OPEN_V),
-        resolution=1e-3,
-        quantity="offset_v",
-        partner="amplitude_vpp",
-        key="OFST",
+        *("C1:BSWV", float, "V", -OPEN_V, OPEN_V), key="OFST", digits=6, quantity="offset_v", partner="amplitude_vpp"
     )
     load = _Load("C1:OUTP", float, unit="ohm", low=50.0, high=INFINITY, key="LOAD")
     output = OutputSwitch("C1:OUTP", bool)
