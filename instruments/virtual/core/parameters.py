@@ -16,7 +16,7 @@ _CHANNEL_LIST = re.compile(r"\(@[\d,: !]*\)")
 MOST_DIGITS = 255
 
 
-def at_most_one(parameters: list[str]) -> str:
+def optional_parameter(parameters: list[str]) -> str:
     """The only parameter or "", a channel list aside.  Raises ScpiError if there are more."""
     plain = [parameter for parameter in parameters if not _CHANNEL_LIST.fullmatch(parameter)]
     if len(plain) > 1:
@@ -24,17 +24,17 @@ def at_most_one(parameters: list[str]) -> str:
     return plain[0] if plain else ""
 
 
-def one(parameters: list[str]) -> str:
+def parameter(parameters: list[str]) -> str:
     """The only parameter, a channel list aside.  Raises ScpiError if there is none or another."""
-    only = at_most_one(parameters)
+    only = optional_parameter(parameters)
     if not only:
         raise ScpiError(-109)
     return only
 
 
-def none(parameters: list[str]) -> None:
+def no_parameters(parameters: list[str]) -> None:
     """Nothing but a channel list.  Raises ScpiError."""
-    if at_most_one(parameters):
+    if optional_parameter(parameters):
         raise ScpiError(-108)
 
 
@@ -153,3 +153,7 @@ def nr3(value: float) -> str:
     ('+2.345678900000000E+01', '+9.900000000000000E+37')
     """
     return f"{value:+.14E}".replace("E", "0E")
+
+
+#: The old names.
+at_most_one, one, none = optional_parameter, parameter, no_parameters

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 from instruments.ieee488 import INFINITY, NOT_A_NUMBER
 from instruments.virtual.core.device import answers, does
 from instruments.virtual.core.parameters import at_most_one, block_text, choice, limit, none, number, one
-from instruments.virtual.core.parser import Command, ScpiError
+from instruments.virtual.core.parser import Command, Row, ScpiError
 from instruments.virtual.core.rows import Number
 from instruments.virtual.counter.counter import DARK, Function, VirtualCounter, darkness
 from instruments.virtual.counter.edges import Input
@@ -50,12 +50,10 @@ def number_text(value: float) -> str:
     return f"{value:+.13E}"
 
 
-def _input_values(head: str, name: str) -> tuple[Number, ...]:
-    """The rows of an input that has some values and no other."""
-    return (
-        Number(head + "IMPedance", "impedance" + name, 1e6, (50, 1e6), "OHM", spell=number_text, values=(50, 1e6)),
-        Number(head + "ATTenuation", "attenuation" + name, 1.0, (1, 10), spell="{:+.0f}".format, values=(1, 10)),
-    )
+_CHANNEL: tuple[Row, ...] = (
+    Number("INPut[n]:IMPedance", "impedance{n}", 1e6, (50, 1e6), "OHM", spell=number_text, values=(50, 1e6)),
+    Number("INPut[n]:ATTenuation", "attenuation{n}", 1.0, (1, 10), spell="{:+.0f}".format, values=(1, 10)),
+)
 
 
 @dataclass
@@ -87,6 +85,8 @@ class VirtualCNT91(VirtualCounter):
 
     identity = "PENDULUM, CNT-91, VIRTUAL, V1.28 levilab"
     no_error = '0,"No error"'
+    numbered = (1, 2)
+    CHANNEL_ROWS: ClassVar = _CHANNEL
     functions: ClassVar = {
         "FREQ": Function("FREQuency"),
         "FREQ:BTB": Function("FREQuency:BTBack", kind="FREQ"),
@@ -251,7 +251,6 @@ class VirtualCNT91(VirtualCounter):
         head, name = f"INPut{suffix}:", str(channel)
         return (
             self.word(head + "COUPling", "coupling" + name, ("AC", "DC"), "AC"),
-            *(row.bind(self) for row in _input_values(head, name)),
             self.toggle(head + "FILTer[:LPASs][:STATe]", "filter" + name),
             self.toggle(head + "FILTer:DIGital", "digital_filter" + name),
             self._number(head + "FILTer:DIGital:FREQuency", "cutoff" + name, low=1, high=5e7, default=1e5, unit="HZ"),

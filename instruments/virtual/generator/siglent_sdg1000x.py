@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.parameters import choice, number
-from instruments.virtual.core.parser import ScpiError
-from instruments.virtual.core.rows import Both, Do, Row
+from instruments.virtual.core.parser import Row, ScpiError
+from instruments.virtual.core.rows import Both, Do
 from instruments.virtual.generator.channel import INFINITE, OPEN_V, SOURCE_OHM, Output
 
 if TYPE_CHECKING:

@@ -19,6 +19,7 @@ import numpy as np
 from instruments.virtual.core.device import VirtualInstrument, answers, does
 from instruments.virtual.core.parameters import number
 from instruments.virtual.core.parser import Command, ScpiError
+from instruments.virtual.core.rows import Ask, Do
 from instruments.virtual.magnetometer.hall_probe import HallProbe, Reading
 
 if TYPE_CHECKING:
@@ -96,6 +97,7 @@ class VirtualGaussmeter(VirtualInstrument):
     """
 
     takes_blocks = False
+    COMMON: ClassVar = (Ask("*IDN", lambda d: d.identity), Do("*RST", lambda d: d.reset()))
     line_end = "\r\n"
     #: Ranges by probe, lowest first [T].
     RANGES_T: ClassVar[dict[str, tuple[float, ...]]]
@@ -133,9 +135,6 @@ class VirtualGaussmeter(VirtualInstrument):
         elif "?" in message:
             self._last_question = message
         return super().steps(message)
-
-    def _common(self) -> tuple[Command, ...]:
-        return (Command("*IDN", get=answers(lambda: self.identity)), Command("*RST", set=does(self.reset)))
 
     def table(self) -> tuple[Command, ...]:
         """The commands of the family."""

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from instruments.virtual.core.parameters import choice, none, number, one
-from instruments.virtual.core.parser import ScpiError
-from instruments.virtual.core.rows import Ask, Both, Do, Number, Row, Switch, Text, Word, whole
+from instruments.virtual.core.parser import Row, ScpiError
+from instruments.virtual.core.rows import Ask, Both, Do, Number, Switch, Text, Word, whole
 from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope, at_input
 from instruments.virtual.oscilloscope.screenshot import bmp8, bmp24, draw, grey, png
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from instruments.clock import Clock
-    from instruments.virtual.core.device import Value
     from instruments.virtual.oscilloscope.record import Record, Signal
 
 #: The fastest rate [1/s].
@@ -141,7 +140,7 @@ _TIME: tuple[Row, ...] = (
 )
 _TRIGGER: tuple[Row, ...] = (
     Word("TRIGger:MODE", "trigger_mode", "EDGE GLITch PATTern TV SHOLd TRANsition SBUS1"),
-    Word("TRIGger[:EDGE]:SOURce", "trigger_source", lambda s: _names(s) + " EXTernal LINE WGEN"),
+    Word("TRIGger[:EDGE]:SOURce", "trigger_source", lambda s: _names(s) + " EXTernal LINE WGEN", "CHAN1"),
     Word("TRIGger[:EDGE]:SLOPe", "trigger_slope", "NEGative *POSitive EITHer ALTernate"),
     Number("TRIGger[:EDGE]:LEVel", "trigger_level", 0.0, _levels, "V"),
     Do("TRIGger:LEVel:ASETup", lambda s: s.half_level()),
@@ -157,7 +156,7 @@ _TRIGGER: tuple[Row, ...] = (
 _PARTS = {"TYPE": 1, "COUNt": 3, "XINCrement": 4, "XORigin": 5, "XREFerence": 6}
 _PARTS |= {"YINCrement": 7, "YORigin": 8, "YREFerence": 9}
 _WAVEFORM: tuple[Row, ...] = (
-    Word("WAVeform:SOURce", "wav_source", lambda s: " ".join((_names(s), *_EMPTY_SOURCES))),
+    Word("WAVeform:SOURce", "wav_source", lambda s: " ".join((_names(s), *_EMPTY_SOURCES)), "CHAN1"),
     Word("WAVeform:FORMat", "wav_format", "WORD *BYTE ASCii"),
     Word("WAVeform:BYTeorder", "wav_order", "LSBFirst *MSBFirst"),
     Switch("WAVeform:UNSigned", "wav_unsigned", default=True),
@@ -196,6 +195,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
     columns, lowest, digits = 10, 1, 8
     transfer = 5e6
     CHANNEL_ROWS: ClassVar = _CHANNEL
+    DEFAULTS: ClassVar = {"wav_points": float(_FOR_SCREEN), "measure_source": "CHAN1"}
     ROWS: ClassVar = (*_CONTROL, *_TIME, *_TRIGGER, *_WAVEFORM, *_REST)
 
     def __init__(
@@ -210,9 +210,6 @@ class VirtualDSOX1000(VirtualOscilloscope):
         self._memory = memory
         self._results: list[tuple[str, int]] = []
         super().__init__(clock, signals=signals, channels=channels, identity=identity)
-        own: dict[str, Value] = {"wav_points": float(_FOR_SCREEN), "measure_source": "CHAN1"}
-        self._defaults |= own
-        self.settings |= own
 
     def spell(self, value: float) -> str:
         """Seven digits, as in the preamble of a real one."""

@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 from instruments.virtual.core.parameters import at_most_one, boolean, choice, limit, number, one
-from instruments.virtual.core.parser import ScpiError
-from instruments.virtual.core.rows import Ask, Both, Do, Number, Row, Switch, Word, whole
+from instruments.virtual.core.parser import Row, ScpiError
+from instruments.virtual.core.rows import Ask, Both, Do, Number, Switch, Word, whole
 from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope, at_input, one_two_five
 from instruments.virtual.oscilloscope.screenshot import bmp8, bmp24, draw, grey, png
 
@@ -129,7 +129,7 @@ _TIME: tuple[Row, ...] = (
 )
 _TRIGGER: tuple[Row, ...] = (
     Word("TRIGger:MODE", "trigger_mode", "EDGE PULSe SLOPe VIDeo TIMeout"),
-    Word("TRIGger:EDGe:SOURce", "trigger_source", lambda s: _names(s) + " EXT EXT5 ACLine"),
+    Word("TRIGger:EDGe:SOURce", "trigger_source", lambda s: _names(s) + " EXT EXT5 ACLine", "CHAN1"),
     Word("TRIGger:EDGe:SLOPe", "trigger_slope", "POSitive NEGative RFALl"),
     Number("TRIGger[:EDGe]:LEVel", "trigger_level", 0.0, _levels, "V"),
     Word("TRIGger:SWEep", "trigger_sweep", "AUTO NORMal SINGle"),
@@ -141,7 +141,7 @@ _TRIGGER: tuple[Row, ...] = (
 )
 _PARTS = ("XINCrement", "XORigin", "XREFerence", "YINCrement", "YORigin", "YREFerence")
 _WAVEFORM: tuple[Row, ...] = (
-    Word("WAVeform:SOURce", "wav_source", _names),
+    Word("WAVeform:SOURce", "wav_source", _names, "CHAN1"),
     Word("WAVeform:MODE", "wav_mode", "NORMal MAXimum RAW"),
     Word("WAVeform:FORMat", "wav_format", "WORD *BYTE ASCii"),
     whole("WAVeform:STARt", "wav_start", 1.0, (1, 24e6)),
@@ -154,7 +154,7 @@ _WAVEFORM: tuple[Row, ...] = (
 #: What only changes the picture.
 _IGNORED = ("CLEar", "RECover", "ADISplay", "AMSource", "STATistic:DISPlay", "STATistic:RESet")
 _REST: tuple[Row, ...] = (
-    Word("MEASure:SOURce", "measure_source", _names),
+    Word("MEASure:SOURce", "measure_source", _names, "CHAN1"),
     Both("MEASure:ITEM", lambda s, p: s.install(p), lambda s, p: s.item(p)),
     Both("MEASure:STATistic:ITEM", lambda s, p: s.install(p), lambda s, p: s.statistic(p)),
     *(

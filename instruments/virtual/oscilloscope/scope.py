@@ -50,9 +50,10 @@ class VirtualOscilloscope(VirtualInstrument):
 
     signals: the voltage at each input, by channel; an input without one is open, 0 V.
 
-    Each row of a setting that is part of the setup is remembered with its header, to keep and restore it.
+    Each setting that has a row is part of the setup, which can be kept and restored.
     """
 
+    lenient = True
     #: Divisions of the screen from left to right.
     columns: ClassVar[int]
     #: What a code cannot go beyond.
@@ -72,14 +73,13 @@ class VirtualOscilloscope(VirtualInstrument):
     def __init__(
         self, clock: Clock, *, signals: Mapping[int, Signal], channels: int = 4, identity: str | None = None
     ) -> None:
-        self.channels = self.numbered = range(1, channels + 1)
+        self.channels = range(1, channels + 1)
         self._signals = signals
         self.acquisition = Acquisition(self._plan, keeps_old=self.keeps_old)
-        self._headers: dict[str, str] = {}
         self._restoring = False
         self._kept: dict[int, str] = {}
-        super().__init__(clock, identity=identity)
-        self.run()
+        super().__init__(clock, identity=identity, numbered=self.channels)
+        self.acquisition.arm(self.now, once=False)
 
     # --- what a subclass says of its numbers and its scaling ---
 
@@ -112,11 +112,6 @@ class VirtualOscilloscope(VirtualInstrument):
         self.settings |= {f"chan{channel}_scale": division, f"chan{channel}_offset": -middle}
 
     # --- settings ---
-
-    def declare(self, name: str, header: str, default: Value) -> None:
-        """There is this setting; it is part of the setup."""
-        super().declare(name, header, default)
-        self._headers[name] = ":" + short_header(header)
 
     def value(self, name: str) -> float:
         """A setting that is a number."""
@@ -188,7 +183,12 @@ class VirtualOscilloscope(VirtualInstrument):
 
     def setup(self) -> bytes:
         """All settings, as messages that restore them."""
-        return "\n".join(f"{header} {self._spelled(name)}" for name, header in self._headers.items()).encode("latin-1")
+        headers = self._headers().items()
+        return "\n".join(f"{header} {self._spelled(name)}" for name, header in headers).encode("latin-1")
+
+    def _headers(self) -> dict[str, str]:
+        """Each setting that is part of the setup, and the shortest header of its row."""
+        return {name: ":" + short_header(row.header) for row in self.commands.rows for name in row.defaults()}
 
     def _spelled(self, name: str) -> str:
         value: Value = self.settings[name]
@@ -202,7 +202,7 @@ class VirtualOscilloscope(VirtualInstrument):
         """Settings from messages; a setup that is none leaves what it had already set.  Raises ScpiError."""
         if self._restoring:
             raise ScpiError(-224)
-        known = set(self._headers.values())
+        known = set(self._headers().values())
         self._restoring = True
         try:
             for line in setup.split("\n"):

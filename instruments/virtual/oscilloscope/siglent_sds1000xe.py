@@ -14,8 +14,8 @@ import struct
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from instruments.virtual.core.parameters import choice, one
-from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.core.rows import Ask, Both, Do, Number, Row, Switch, Word, short_header
+from instruments.virtual.core.parser import Row, ScpiError
+from instruments.virtual.core.rows import Ask, Both, Do, Number, Switch, Word, short_header
 from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope, at_input, one_two_five
 from instruments.virtual.oscilloscope.screenshot import bmp24, draw
 
@@ -111,17 +111,13 @@ class VirtualSDS1000XE(VirtualOscilloscope):
     path_memory = False
     ROWS: ClassVar = (*_REST, *PRESETS)
     CHANNEL_ROWS: ClassVar = _CHANNEL
+    DEFAULTS: ClassVar = {"trigger_source": "C1"}
 
     def __init__(
         self, clock: Clock, *, signals: Mapping[int, Signal], channels: int = 4, identity: str | None = None
     ) -> None:
         self._setup = {"SP": 0, "NP": 0, "FP": 0}
         super().__init__(clock, signals=signals, channels=channels, identity=identity)
-
-    def table(self) -> tuple[Command, ...]:
-        """Its commands, and the source of its trigger."""
-        self._defaults["trigger_source"] = "C1"
-        return super().table()
 
     def reset(self) -> None:
         """The state after ``*RST``; how answers look stays."""

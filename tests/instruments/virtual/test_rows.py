@@ -35,10 +35,12 @@ def reported(device):
 @pytest.mark.parametrize("name", FAMILIES)
 def test_every_row_is_asked_set_and_reset(name):
     device = prepared(name)
-    settable = [row for row in device.parser.commands if row.set and row.get and not row.pattern.startswith(NO_SETTING)]
+    settable = [row for row in device.commands.rows if row.settable and row.askable]
     kept = {}
     for row in settable:
-        header = hostile.spellings(row.pattern)[0]
+        if row.header.startswith(NO_SETTING):
+            continue
+        header = hostile.spellings(row.header)[0]
         answer = said(device, header + "?")
         if reported(device) or answer is None or "#" in answer:
             continue  # it needs parameters, or there is nothing to tell
