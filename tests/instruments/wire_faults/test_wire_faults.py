@@ -28,7 +28,7 @@ tally = collections.Counter()
 _REST = str.maketrans("012345678+-", "999999999±±")
 _EXPONENT = re.compile(r"[Ee][+-]\d+")
 #: "1000HZ", "-1.5V", "1e-06HZ": as few digits as the number needs.
-_SIGLENT = r"-?\d{1,12}(\.\d{1,15})?(e[+-]\d{2,3})?(?P<unit>HZ|S|V|Vrms)?"
+_SIGLENT = r"-?(0|[1-9]\d{0,11})(\.\d{0,14}[1-9])?(e[+-]\d{2})?(?P<unit>HZ|V)?"
 #: Numbers whose length is not known, by model: as many digits as the resolution gives (CNT-91, handbook 8-36), NR3 and
 #: NR1 of any length (InfiniiVision), codes with and without a leading zero (Lake Shore), numbers of Siglent.
 _OF_ANY_LENGTH = {
@@ -37,7 +37,7 @@ _OF_ANY_LENGTH = {
     "425": r"\d{1,2}",
     "475": r"\d{1,2}",
     "SDG1000X": _SIGLENT,
-    "SDS1000X-E": r"\d{1,5}",
+    "SDS1000X-E": r"0|[1-9]\d{0,4}",
 }
 #: Those that print a sign where the number is negative, and no other.
 _MINUS_ALONE = {"DS1000Z"}
@@ -64,6 +64,8 @@ def form(name, text):
 def has_the_form(name, question, honest, taken):
     """Whether an instrument could have answered this to the question, as far as its form goes."""
     question, honest, taken = (part.decode("latin-1").strip() for part in (question, honest, taken))
+    if taken == honest:
+        return True
     if not taken:  # of a CNT-91 this is "no reading"
         return name == "CNT-91" and question == "READ?"
     if question == "*IDN?":

@@ -494,7 +494,7 @@ class GeneratorPairing(Pairing):
     def it_is_switched_off(self):
         with contextlib.suppress(InstrumentError):
             self.driver.off()
-            assert self.pair.liar.settings["output"] is False
+            assert self.pair.liar.settings["1:output"] is False
 
     @rule()
     def it_is_switched_on(self):

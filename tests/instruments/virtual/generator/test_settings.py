@@ -72,7 +72,7 @@ def test_the_state_after_reset_is_that_of_the_family(generator):
         assert ask(generator, header + "?") == value
         send(generator, entry.encode() + b"\n")
     assert errors(generator) == []
-    assert dict(generator.settings) == Virtual33500B(VirtualClock()).settings | {"list": "100.0,1000.0,550.0"}
+    assert dict(generator.settings) == Virtual33500B(VirtualClock()).settings | {"1:list": "100.0,1000.0,550.0"}
 
 
 def test_a_text_is_displayed_until_it_is_cleared(either):
