@@ -15,8 +15,8 @@ from instruments.virtual.core.parameters import boolean, limit, number, optional
 from instruments.virtual.core.parser import ScpiError, header_pattern
 from instruments.virtual.core.rows import Number
 from instruments.virtual.core.status import OPERATION_COMPLETE
-from instruments.virtual.core.steps import at_once
-from instruments.virtual.counter.measurements import Looks, Measurement, Span, measurement
+from instruments.virtual.core.steps import run_to_end
+from instruments.virtual.counter.measurements import GateTime, Inputs, Measurement, measurement
 from instruments.virtual.counter.memory import Memory, statistics
 from instruments.virtual.counter.parameters import without_channels
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from instruments.clock import Clock
     from instruments.virtual.core.device import Answer
     from instruments.virtual.core.steps import Steps
-    from instruments.virtual.counter.edges import Array, Input, Signal
+    from instruments.virtual.counter.edges import Array, Signal, TriggerInput
     from instruments.virtual.counter.run import Run
 
 #: An answer that never comes is ready then [s].
@@ -102,7 +102,7 @@ class VirtualCounter(VirtualInstrument):
 
     # --- what goes on while nobody asks ---
 
-    def cut_off_by(self, message: str) -> bool:
+    def is_abort(self, message: str) -> bool:
         """See the base: ABORt does."""
         return bool(_ABORT.fullmatch(message))
 
@@ -113,7 +113,7 @@ class VirtualCounter(VirtualInstrument):
 
     def status_byte(self, *, message_available: bool = False) -> int:
         """The status byte; see the base."""
-        at_once(self.catch_up())
+        run_to_end(self.catch_up())
         return super().status_byte(message_available=message_available)
 
     def abandon(self) -> None:
@@ -143,19 +143,19 @@ class VirtualCounter(VirtualInstrument):
 
     def _stop(self) -> None:
         if self._run:
-            self._memory.cut(self.clock.now())
+            self._memory.truncate(self.clock.now())
         self._run = None
         self._completion_awaited = False
 
     def idle(self, now: float) -> bool:
         """Whether nothing is being measured at this time [s]."""
-        return self._run is None or (self._run.complete and self._memory.there(now) == self._memory.held)
+        return self._run is None or (self._run.complete and self._memory.available(now) == self._memory.size)
 
-    def there(self) -> int:
+    def available(self) -> int:
         """Readings in the memory by now."""
         if self._run and self._ready < NEVER:
-            at_once(self._run.advance(self._ready))
-        return self._memory.there(self._ready)
+            run_to_end(self._run.advance(self._ready))
+        return self._memory.available(self._ready)
 
     def wait_for(self, count: float = math.inf) -> Steps[bool]:
         """The answer to the message under way is ready when so many readings have been taken since INITiate.
@@ -178,24 +178,28 @@ class VirtualCounter(VirtualInstrument):
             raise ScpiError(-213)
         self._run, self._memory, self._counted_from = run, run.memory, 0
 
-    def looks(self) -> Looks:
+    def inputs(self) -> Inputs:
         """The inputs as they are set now."""
-        return Looks(
+        return Inputs(
             {
-                channel: (signal, self.entry(channel, falling=falling), self.entry(channel, falling=not falling))
+                channel: (
+                    signal,
+                    self.trigger_input(channel, falling=falling),
+                    self.trigger_input(channel, falling=not falling),
+                )
                 for channel, signal in self._signals.items()
                 for falling in (self.settings[f"slope{channel}"] == "NEG",)
             }
         )
 
-    def entry(self, channel: int, *, falling: bool) -> Input:
+    def trigger_input(self, channel: int, *, falling: bool) -> TriggerInput:
         """How an input looks at its signal with these settings."""
         raise NotImplementedError
 
-    def measure(self, looks: Looks, span: Span) -> Measurement:
+    def measure(self, inputs: Inputs, gate: GateTime) -> Measurement:
         """One measurement of the function that is set."""
         falling = self.settings[f"slope{self._channels[0]}"] == "NEG"
-        return measurement(self.kind, looks, self._channels, span, falling=falling)
+        return measurement(self.kind, inputs, self._channels, gate, falling=falling)
 
     @property
     def kind(self) -> str:
@@ -228,7 +232,7 @@ class VirtualCounter(VirtualInstrument):
     def found_level(self, channel: int) -> float:
         """Where the trigger fires now, if it is found automatically [V]."""
         falling = self.settings[f"slope{channel}"] == "NEG"
-        entry = self.entry(channel, falling=falling)
+        entry = self.trigger_input(channel, falling=falling)
         self.busy_until(self._ready + entry.window)
         return entry.thresholds(self._signals[channel], min(self._ready, self.clock.now() + 1.0)).fire
 
@@ -293,5 +297,5 @@ class VirtualCounter(VirtualInstrument):
 
     def statistics(self) -> dict[str, float]:
         """Of the readings since INITiate, or since they were cleared; "not a number" while that is off."""
-        values, _ = self._memory.part(self._counted_from, self.there())
+        values, _ = self._memory.slice(self._counted_from, self.available())
         return statistics(values if self.settings["averaging"] else np.empty(0))

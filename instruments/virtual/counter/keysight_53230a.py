@@ -13,8 +13,8 @@ from instruments.virtual.core.parameters import block_text, choice, limit, numbe
 from instruments.virtual.core.parser import Row, ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Switch, Word
 from instruments.virtual.counter.counter import AUTOMATIC, DARK, LEVEL, Count, Function, VirtualCounter
-from instruments.virtual.counter.edges import Input
-from instruments.virtual.counter.measurements import Looks, Measurement, Span
+from instruments.virtual.counter.edges import TriggerInput
+from instruments.virtual.counter.measurements import GateTime, Inputs, Measurement
 from instruments.virtual.counter.parameters import channels_of, without_channels
 from instruments.virtual.counter.run import Run
 
@@ -209,14 +209,14 @@ class Virtual53230A(VirtualCounter):
         gapless = self._function in {"FREQ", "PER"} and self.settings["mode"] in {"CONT", "RCON"}
         triggers = 1.0 if gapless else self.value("triggers")
 
-        def measure(looks: Looks, begin: float, _: int) -> Measurement:
+        def measure(inputs: Inputs, begin: float, _: int) -> Measurement:
             deadline = begin + timeout if timeout < INFINITY else math.inf
-            return self.measure(looks, Span(begin, gate, deadline))
+            return self.measure(inputs, GateTime(begin, gate, deadline))
 
         self.begin(
             Run(
                 begin=self._ready,
-                looks=self.looks(),
+                inputs=self.inputs(),
                 measure=measure,
                 samples=self.value("samples"),
                 triggers=triggers,
@@ -273,12 +273,12 @@ class Virtual53230A(VirtualCounter):
         """See the base."""
         return 5.125 * self._wide(channel) * self.value(f"probe_factor{channel}")
 
-    def entry(self, channel: int, *, falling: bool) -> Input:
+    def trigger_input(self, channel: int, *, falling: bool) -> TriggerInput:
         """See the base.  A probe's factor is in the levels, not in the voltage at the input."""
         setting = {name: self.settings[f"{name}{channel}"] for name in ("automatic", "level", "probe_factor")}
         relative = self.value(f"relative{channel}") / 100
         noisy = 2.0 if self.settings[f"noise_rejection{channel}"] else 1.0
-        return Input(
+        return TriggerInput(
             level=None if setting["automatic"] else float(setting["level"]) / float(setting["probe_factor"]),
             hysteresis=_HYSTERESIS * self._wide(channel) * noisy,
             window=1 / self.value("slowest"),
@@ -290,7 +290,7 @@ class Virtual53230A(VirtualCounter):
 
     def extremes(self, channel: int) -> tuple[float, float]:
         """The least and the greatest voltage at an input now [V]."""
-        entry = self.entry(channel, falling=False)
+        entry = self.trigger_input(channel, falling=False)
         low, high = entry.extremes(self._signals[channel], min(self._ready, self.clock.now() + 1.0))
         self.busy_until(self._ready + entry.window)
         return low, high
@@ -299,18 +299,18 @@ class Virtual53230A(VirtualCounter):
 
     def fetch(self) -> Steps[str]:
         """FETCh?: all readings, when there are all; they stay in the memory."""
-        if self._run is None and not self._memory.held:
+        if self._run is None and not self._memory.size:
             raise ScpiError(-230)
         if not (yield from self.wait_for()):
             return ""
-        values, _ = self._memory.part(self._memory.fetched, self._memory.held)
+        values, _ = self._memory.slice(self._memory.fetched, self._memory.size)
         return self._spell(values, head="#0")
 
     def remove_what_is_there(self, parameters: list[str]) -> str:
         """R? [n]: at most n of the readings that are there, as a block, taken out of the memory."""
         text = optional_parameter(parameters)
         most = number(text, low=1, high=1e6, default=1e6) if text else math.inf
-        there = self.there()
+        there = self.available()
         if there == self._memory.fetched and self.idle(self._ready):
             raise ScpiError(-230)
         return self._take(int(min(most, there - self._memory.fetched)), as_block=True)
@@ -323,9 +323,9 @@ class Virtual53230A(VirtualCounter):
         if len(words) > 2 or (len(words) == 2 and words[1].upper() != "WAIT"):
             raise ScpiError(-224)
         count = int(number(words[0], low=1, high=1e6, default=1))
-        there = self.there()
+        there = self.available()
         if there - self._memory.fetched < count:
-            gone = self._run.taken - self._memory.held if self._run else 0
+            gone = self._run.taken - self._memory.size if self._run else 0
             wanted = gone + self._memory.fetched + count
             if len(words) == 1 or self._run is None or wanted > self._run.wanted:
                 raise ScpiError(-230)
@@ -336,19 +336,19 @@ class Virtual53230A(VirtualCounter):
     def _take(self, count: int, *, as_block: bool) -> str:
         start = self._memory.fetched
         self._memory.fetched += count
-        values, _ = self._memory.part(start, start + count)
+        values, _ = self._memory.slice(start, start + count)
         if as_block and self.settings["format"] == "ASC":
             return block_text(",".join(map(self.spell, values)).encode())
         return self._spell(values)
 
     def points(self) -> int:
         """DATA:POINts?: readings that are there and have not been removed."""
-        return self.there() - self._memory.fetched
+        return self.available() - self._memory.fetched
 
     def last(self) -> str:
         """DATA:LAST?: the latest reading."""
-        there = self.there()
-        return self.spell(float(self._memory.part(there - 1, there)[0][0]) if there else NOT_A_NUMBER)
+        there = self.available()
+        return self.spell(float(self._memory.slice(there - 1, there)[0][0]) if there else NOT_A_NUMBER)
 
     # --- formats and statistics ---
 
@@ -381,8 +381,8 @@ class Virtual53230A(VirtualCounter):
 
     def counted(self) -> int:
         """How many readings the statistics are of."""
-        return self.there() - self._counted_from
+        return self.available() - self._counted_from
 
     def clear_statistics(self) -> None:
         """CALCulate:AVERage:CLEar: those that come next are counted."""
-        self._counted_from = self.there()
+        self._counted_from = self.available()

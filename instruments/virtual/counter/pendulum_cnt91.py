@@ -12,8 +12,8 @@ from instruments.virtual.core.parameters import block_text, choice, number, para
 from instruments.virtual.core.parser import Row, ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Switch, Word
 from instruments.virtual.counter.counter import AUTOMATIC, DARK, LEVEL, Count, Function, VirtualCounter
-from instruments.virtual.counter.edges import Input
-from instruments.virtual.counter.measurements import Looks, Measurement, Span, Wish, first_edge
+from instruments.virtual.counter.edges import TriggerInput
+from instruments.virtual.counter.measurements import GateTime, Inputs, Measurement, Wanted, first_edge
 from instruments.virtual.counter.parameters import channels_of, without_channels
 from instruments.virtual.counter.run import Run
 
@@ -123,7 +123,7 @@ _CALCULATION: tuple[Row, ...] = (
     Switch("CALCulate:STATe", "mathematics"),
     Switch("CALCulate:AVERage[:STATe]", "averaging"),
     Count("CALCulate:AVERage:COUNt", "averaged", 100.0, (2, 2e9)),
-    Ask("CALCulate:AVERage:COUNt:CURRent", lambda d: str(d.there())),
+    Ask("CALCulate:AVERage:COUNt:CURRent", lambda d: str(d.available())),
     Word("CALCulate:AVERage:TYPE", "average_type", "MEAN SDEViation MINimum MAXimum ADEViation MINMax"),
     Ask("CALCulate:AVERage:ALL", lambda d: d.all_statistics()),
 )
@@ -244,22 +244,22 @@ class VirtualCNT91(VirtualCounter):
         timeout = self.value("timeout") if self.settings["timeout_on"] else math.inf
         pacing = _Pacing(aperture)
 
-        def measure(looks: Looks, begin: float, number: int) -> Measurement:
+        def measure(inputs: Inputs, begin: float, number: int) -> Measurement:
             deadline = begin + timeout
             if number == 0 and arming in {"EXT1", "EXT2"}:
-                begin = yield from self._armed(looks, int(arming[-1]), begin)
+                begin = yield from self._armed(inputs, int(arming[-1]), begin)
                 deadline = begin + timeout
             gate = aperture
             if gapless:
-                opened = yield from first_edge(looks.finder(self._channels[0], begin), begin, deadline)
+                opened = yield from first_edge(inputs.finder(self._channels[0], begin), begin, deadline)
                 gate = pacing.gate(opened.time, number == 0) if opened else aperture
-            return (yield from self.measure(looks, Span(begin, gate, deadline)))
+            return (yield from self.measure(inputs, GateTime(begin, gate, deadline)))
 
         dead = 0.0 if gapless else _DEAD + _CALIBRATION * bool(self.settings["calibrating"])
         self.begin(
             Run(
                 begin=self._ready,
-                looks=self.looks(),
+                inputs=self.inputs(),
                 measure=measure,
                 samples=math.inf if endless else self._wanted(),
                 dead=dead,
@@ -271,9 +271,9 @@ class VirtualCNT91(VirtualCounter):
         )
 
     @staticmethod
-    def _armed(looks: Looks, channel: int, begin: float) -> Generator[Wish, None, float]:
+    def _armed(inputs: Inputs, channel: int, begin: float) -> Generator[Wanted, None, float]:
         """When the arming input has its edge."""
-        edge = yield from first_edge(looks.finder(channel, begin), begin, math.inf)
+        edge = yield from first_edge(inputs.finder(channel, begin), begin, math.inf)
         return edge.time if edge else begin
 
     def operation(self) -> str:
@@ -301,10 +301,10 @@ class VirtualCNT91(VirtualCounter):
         """See the base."""
         return 5.0 * self.value(f"attenuation{channel}")
 
-    def entry(self, channel: int, *, falling: bool) -> Input:
+    def trigger_input(self, channel: int, *, falling: bool) -> TriggerInput:
         """See the base.  Back to back, and for times, an automatic level is one level with a narrow hysteresis."""
         wide = self._function in {"FREQ", "PER"}
-        return Input(
+        return TriggerInput(
             level=None if self.settings[f"automatic{channel}"] else self.value(f"level{channel}"),
             hysteresis=_HYSTERESIS * self.value(f"attenuation{channel}"),
             window=1 / _SLOWEST,
@@ -356,7 +356,7 @@ class VirtualCNT91(VirtualCounter):
             raise ScpiError(-222)
         if math.isfinite(count):
             return (yield from self.fetch(int(count)))
-        there = self.there()
+        there = self.available()
         fresh = there - self._memory.fetched
         if not fresh and not self.idle(self._ready):
             raise ScpiError(-230)
@@ -366,28 +366,28 @@ class VirtualCNT91(VirtualCounter):
 
     def fetch(self, count: int, *, size_known: bool = True) -> Steps[str]:
         """So many results, from where the last fetch ended; a negative number: the last ones, the place is kept."""
-        if self._run is None and not self._memory.held:
+        if self._run is None and not self._memory.size:
             raise ScpiError(-230)
         if self.settings["averaging"]:
             return (yield from self._fetch_statistic())
         if count < 0:
-            there = self.there()
+            there = self.available()
             if there < -count and not (yield from self._wait_until(-count)):
                 return ""
-            there = self.there()
-            return self._spell(*self._memory.part(there + count, there))
-        if self._memory.fetched >= self._memory.held and self.idle(self._ready):
+            there = self.available()
+            return self._spell(*self._memory.slice(there + count, there))
+        if self._memory.fetched >= self._memory.size and self.idle(self._ready):
             self._memory.fetched = 0
         start = self._memory.fetched
         if not (yield from self._wait_until(start + count)):
             return ""
         self._memory.fetched = start + count
-        return self._spell(*self._memory.part(start, start + count), size_known=size_known)
+        return self._spell(*self._memory.slice(start, start + count), size_known=size_known)
 
     def _wait_until(self, held: int) -> Steps[bool]:
         """Wait until the memory holds so many.  Raises ScpiError if it never will."""
-        gone = self._run.taken - self._memory.held if self._run else 0
-        if held > self._memory.held and (self._run is None or gone + held > self._run.wanted):
+        gone = self._run.taken - self._memory.size if self._run else 0
+        if held > self._memory.size and (self._run is None or gone + held > self._run.wanted):
             raise ScpiError(-230)
         return (yield from self.wait_for(gone + held))
 
