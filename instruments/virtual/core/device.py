@@ -21,7 +21,7 @@ from instruments.virtual.core.parameters import (
 from instruments.virtual.core.parser import Bound, Command, Parser, Row, Table
 from instruments.virtual.core.rows import Ask, Do, Own
 from instruments.virtual.core.status import OPERATION_COMPLETE, Status
-from instruments.virtual.core.steps import at_once
+from instruments.virtual.core.steps import run_to_end
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -136,14 +136,14 @@ class VirtualInstrument:
 
     def execute(self, message: str) -> Answer | None:
         """Run one message, a line without its end; the answers of its queries, if it has any."""
-        return at_once(self.steps(message))
+        return run_to_end(self.steps(message))
 
     def steps(self, message: str) -> Steps[Answer | None]:
         """Do what execute() does, in steps."""
         self._begin_message()
         return self._answer((yield from self.parser.steps(message)))
 
-    def cut_off_by(self, message: str) -> bool:
+    def is_abort(self, message: str) -> bool:
         """Whether this message ends the work on the one before it."""
         return False
 
@@ -162,7 +162,7 @@ class VirtualInstrument:
     def abandon(self) -> None:
         """What is under way is given up, and what has not been read yet is lost."""
         if self.work:
-            self.work.give_up()
+            self.work.cancel()
         self.epoch += 1
         self._ready = self.clock.now()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 from instruments.ieee488 import BrokenBlock, block, block_of
@@ -131,19 +132,22 @@ def choice(text: str, words: tuple[str, ...]) -> str:
     raise ScpiError(-224, text[:20])
 
 
-def boolean(text: str) -> bool:
+def boolean(text: str, *, rounded: bool = False) -> bool:
     """ON, OFF, 1 or 0, however the number is written.  Raises ScpiError.
 
-    >>> boolean("on"), boolean("1.0"), boolean("0")
-    (True, True, False)
+    rounded: any number, OFF if it rounds to nought.
+
+    >>> boolean("on"), boolean("1.0"), boolean("0"), boolean("2", rounded=True)
+    (True, True, False, True)
     """
     words = {"ON": True, "OFF": False}
     if text.upper() in words:
         return words[text.upper()]
-    number = _NUMBER.fullmatch(text)
-    if not number or number[3] or (value := _value(number)) not in {0.0, 1.0}:
+    match = _NUMBER.fullmatch(text)
+    value = math.inf if not match or match[3] else _value(match)
+    if not math.isfinite(value) or (value not in {0.0, 1.0} and not rounded):
         raise ScpiError(-224, text[:20])
-    return value == 1.0
+    return round(value) != 0
 
 
 def nr3(value: float) -> str:

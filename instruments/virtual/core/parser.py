@@ -16,7 +16,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, Self
 
 from instruments.virtual.core.message import read_units
-from instruments.virtual.core.steps import at_once
+from instruments.virtual.core.steps import run_to_end
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -184,7 +184,7 @@ class Parser:
 
     def run(self, message: str) -> str | None:
         """Execute one message (a line without its end); the answers of its queries joined with ``;``, or None."""
-        return at_once(self.steps(message))
+        return run_to_end(self.steps(message))
 
     def steps(self, message: str) -> Steps[str | None]:
         """Do what run() does, in steps: a message may be interrupted after each of its units."""

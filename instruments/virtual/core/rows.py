@@ -120,7 +120,11 @@ class Number(Row):
             value = limit(asked, low=low, high=high, default=self.factor * self.default)
         else:
             value = self.factor * float(device.settings[self.name])
-        return device.reply(self.header, (self.spell or device.spell)(value), self.unit)
+        return device.reply(self.header, self.printed(device, value), self.unit)
+
+    def printed(self, device: Device, value: float) -> str:
+        """The number as it is answered, without header and unit."""
+        return (self.spell or device.spell)(value)
 
 
 def whole(header: str, name: str, default: float, limits: tuple[float, float], *, sign: str = "") -> Number:

@@ -16,7 +16,7 @@ T = TypeVar("T")
 Steps = Generator[None, None, T]
 
 
-def at_once(steps: Steps[T]) -> T:
+def run_to_end(steps: Steps[T]) -> T:
     """The result, without interruption."""
     while True:
         try:
@@ -49,7 +49,7 @@ class Work(Generic[T]):
                 self.error, self.done = error, True
         return not self.done
 
-    def give_up(self) -> None:
+    def cancel(self) -> None:
         """No more of it; what gives itself up (ABORt) goes on to its own end."""
         if inspect.getgeneratorstate(self._steps) != inspect.GEN_RUNNING:
             self._steps.close()

@@ -43,7 +43,7 @@ class Thresholds:
 
 
 @dataclass(frozen=True)
-class Input:
+class TriggerInput:
     """How an input looks at its signal.
 
     level: fixed [V], or None to find it; upper, lower: where the trigger fires and is armed, in parts of peak to
@@ -96,7 +96,7 @@ class Edge:
 class EdgeFinder:
     """The edges of one input from some time on.  They are asked for in order; those passed are forgotten."""
 
-    def __init__(self, signal: Signal, entry: Input, start: float) -> None:
+    def __init__(self, signal: Signal, entry: TriggerInput, start: float) -> None:
         self._signal, self._entry, self._start = signal, entry, start
         self._samples = 0
         self._ask: Callable[[float, float, Thresholds], Array | None] | None = getattr(signal, "crossings", None)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from instruments.virtual.core.steps import Steps
-    from instruments.virtual.counter.measurements import Looks, Measurement, Reading
+    from instruments.virtual.counter.measurements import Inputs, Measurement, Reading
 
 #: A message may make a model look so far ahead [s]; an answer that is further away does not come.  Three hours are
 #: ten readings with the longest gate there is.
@@ -39,8 +39,8 @@ class Run:
     """
 
     begin: float
-    looks: Looks
-    measure: Callable[[Looks, float, int], Measurement]
+    inputs: Inputs
+    measure: Callable[[Inputs, float, int], Measurement]
     samples: float
     triggers: float = 1
     dead: float = 0.0
@@ -86,13 +86,15 @@ class Run:
         """
         if until > self._seen + _CATCH_UP and not self.waiting:
             self._under_way, self._next = None, until - _CATCH_UP
-            self.looks.forget()
+            self.inputs.forget()
         self._seen = max(self._seen, until)
         while self.taken < min(count, self.wanted):
             if self._under_way is None:
                 if self._next > until:
                     return
-                self._under_way = self.measure(self.looks, self._next, self.taken % max(1, int(min(self.samples, 1e9))))
+                self._under_way = self.measure(
+                    self.inputs, self._next, self.taken % max(1, int(min(self.samples, 1e9)))
+                )
             try:
                 finder, wanted = next(self._under_way)
             except StopIteration as result:

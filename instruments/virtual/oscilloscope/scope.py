@@ -75,11 +75,10 @@ class VirtualOscilloscope(VirtualInstrument):
     ) -> None:
         self.channels = range(1, channels + 1)
         self._signals = signals
-        self.acquisition = Acquisition(self._plan, keeps_old=self.keeps_old)
+        self.acquisition = Acquisition(self._plan, keeps_old=self.keeps_old, switched_on=clock.now())
         self._restoring = False
         self._kept: dict[int, str] = {}
         super().__init__(clock, identity=identity, numbered=self.channels)
-        self.acquisition.arm(self.now, once=False)
 
     # --- what a subclass says of its numbers and its scaling ---
 

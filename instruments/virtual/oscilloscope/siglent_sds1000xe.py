@@ -192,8 +192,8 @@ class VirtualSDS1000XE(VirtualOscilloscope):
 
     def stop_key(self) -> None:
         """STOP: the mode says so."""
-        self.settings["trigger_sweep"] = "STOP"
         self.stop()
+        self.settings["trigger_sweep"] = "STOP"
 
     def running(self) -> bool:
         """See the base; a single record ends the mode SINGLE."""

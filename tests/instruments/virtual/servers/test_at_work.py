@@ -344,4 +344,4 @@ def test_a_counter_that_was_not_asked_for_long_catches_up_in_slices(monkeypatch)
     assert session.go_on(work)
     while session.go_on(work):
         pass
-    assert counter._memory.held > 5000
+    assert counter._memory.size > 5000
