@@ -11,7 +11,7 @@ from instruments.virtual.core.parser import ScpiError
 _MULTIPLIERS = {"": 1.0, "N": 1e-9, "U": 1e-6, "M": 1e-3, "K": 1e3, "MA": 1e6, "G": 1e9}
 #: A mantissa and an exponent, then a unit.  No digit can be matched in two ways (\d+\.?\d* could): a long line of them
 #: that is no number in the end takes a time proportional to its length, not to its square.
-_NUMBER = re.compile(r"([+-]?(?:\d+(?:\.\d*)?|\.\d+))([eE][+-]?\d{1,3})?\s*([a-zA-Z]*)")
+_NUMBER = re.compile(r"([+-]?(?:\d+(?:\.\d*)?|\.\d+))([eE][+-]?\d{1,3})?\s*([a-zA-Z/]*)")
 _CHANNEL_LIST = re.compile(r"\(@[\d,: !]*\)")
 #: Digits of a mantissa, leading zeros not counted (IEEE 488.2, 7.7.2.4.1).
 MOST_DIGITS = 255
