@@ -92,7 +92,8 @@ class Number(Row):
         row, find = super().of_channel(n), self.limits
         return replace(row, limits=lambda device: find(device, n)) if callable(find) else row
 
-    def _limits(self, device: Device) -> tuple[float, float]:
+    def range(self, device: Device) -> tuple[float, float]:
+        """The lowest and the highest number that can be sent now."""
         return self.limits(device) if callable(self.limits) else self.limits
 
     def set(self, device: Device, parameters: list[str]) -> None:
@@ -105,7 +106,7 @@ class Number(Row):
 
     def read(self, device: Device, text: str) -> float:
         """The number as it is sent, within its limits.  Raises ScpiError."""
-        low, high = self._limits(device)
+        low, high = self.range(device)
         default = self.factor * self.default
         if self.clips and text.upper() not in _BOUNDS:
             sent = number(text, low=-9e99, high=9e99, default=default, unit=self.unit)
@@ -116,7 +117,7 @@ class Number(Row):
         """See the base."""
         asked = optional_parameter(parameters[:1] if device.lenient else parameters)
         if asked.upper() in _BOUNDS or (asked and not device.lenient):
-            low, high = self._limits(device)
+            low, high = self.range(device)
             value = limit(asked, low=low, high=high, default=self.factor * self.default)
         else:
             value = self.factor * float(device.settings[self.name])
