@@ -127,11 +127,16 @@ class Channel:
         self._report(ScpiError(-221, text))
 
     def clip(self, value: float, low: float, high: float) -> float:
-        """The number or the limit that it is beyond, which goes into the error queue."""
+        """The number or the limit that it is beyond, which goes into the error queue.
+
+        A limit as it is printed, with its last digit rounded, is no more than itself.
+        """
         if low <= value <= high:
             return value
-        self._report(ScpiError(-222, f"value clipped to {'upper' if value > high else 'lower'} limit"))
-        return high if value > high else low
+        bound = high if value > high else low
+        if not math.isclose(value, bound, rel_tol=1e-12):
+            self._report(ScpiError(-222, f"value clipped to {'upper' if value > high else 'lower'} limit"))
+        return bound
 
     def read(self, text: str, low: float, high: float, default: float, unit: str = "") -> float:
         """A numeric parameter, at most at its limits.  Raises ScpiError."""
@@ -283,12 +288,12 @@ class Channel:
     def high_limits(self) -> tuple[float, float]:
         """Of the high level [V]."""
         low, high = self.voltage_limits()
-        return low + 1e-3, high
+        return low + self._step(), high
 
     def low_limits(self) -> tuple[float, float]:
         """Of the low level [V]."""
         low, high = self.voltage_limits()
-        return low, high - 1e-3
+        return low, high - self._step()
 
     def set_high(self, high: float) -> None:
         """Set the high level [V]; the low one stays, or gives way by the smallest step."""

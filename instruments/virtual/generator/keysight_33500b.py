@@ -141,6 +141,7 @@ _CHANNEL: tuple[Row, ...] = (
     Word("[SOURce[n]:]SUM:INTernal:FUNCtion", "{n}:sum_function", INNER),
     Quantity("[SOURce[n]:]SUM:INTernal:FREQuency", "{n}:sum_frequency", 100.0, (1e-6, 30e6), "HZ"),
     Switch("[SOURce[n]:]AM:DSSC", "{n}:am_dssc"),
+    Do("[SOURce[n]:]PHASe:SYNChronize", lambda _s, _n: None),
     Do("INITiate[n][:IMMediate][:ALL]", lambda _s, _n: None),
     Switch("INITiate[n]:CONTinuous", "{n}:continuous", default=True),
     Word("OUTPut[n]:MODE", "{n}:output_mode", "NORMal GATed"),
@@ -148,7 +149,6 @@ _CHANNEL: tuple[Row, ...] = (
     Word("OUTPut[n]:SYNC:POLarity", "{n}:sync_polarity", "NORMal INVerted"),
 )
 _SHARED: tuple[Row, ...] = (
-    Do("[SOURce[1|2]:]PHASe:SYNChronize"),
     Word("OUTPut[1|2]:SYNC:SOURce", "sync_source", "CH1 CH2"),
     Word("OUTPut:TRIGger:SOURce", "trigger_out_source", "CH1 CH2"),
     Word("ROSCillator:SOURce", "clock_source", "INTernal EXTernal"),

@@ -48,7 +48,8 @@ class Quantity(Row):
         """See the base."""
         return {} if self.alias else {self.name: self.default}
 
-    def _limits(self, channel: Channel) -> tuple[float, float]:
+    def range(self, channel: Channel) -> tuple[float, float]:
+        """The lowest and the highest number that can be sent now."""
         return self.limits(channel) if callable(self.limits) else self.limits
 
     def _is_infinite(self, text: str) -> bool:
@@ -62,7 +63,7 @@ class Quantity(Row):
         """The number as it is sent, within its limits.  Raises ScpiError."""
         if self._is_infinite(text):
             return INFINITE
-        return channel.read(text, *self._limits(channel), self.default, self.unit)
+        return channel.read(text, *self.range(channel), self.default, self.unit)
 
     def set(self, device: VirtualGenerator, parameters: list[str]) -> None:
         """See the base."""
@@ -81,7 +82,7 @@ class Quantity(Row):
     def asked(self, channel: Channel, parameters: list[str]) -> float:
         """The number, or the limit that is asked for.  Raises ScpiError."""
         if text := optional_parameter(parameters):
-            low, high = self._limits(channel)
+            low, high = self.range(channel)
             return limit(text, low=low, high=high, default=self.default)
         return self.get(channel) if self.get else channel.number(self.name.rpartition(":")[2])
 
@@ -96,7 +97,7 @@ class Angle(Quantity):
             return super().read(channel, text)
         value, unit = quantity_of(text, ("", "DEG", "RAD"))
         degrees = {"": channel.degrees_per_unit(), "DEG": 1.0, "RAD": math.degrees(1)}
-        return channel.clip(value * degrees[unit], *self._limits(channel))
+        return channel.clip(value * degrees[unit], *self.range(channel))
 
     def ask(self, device: VirtualGenerator, parameters: list[str]) -> str:
         """See the base."""

@@ -2,9 +2,10 @@
 
 Sources: SDG Programming Guide PG02-E04A as public drivers quote it; an emulator that its authors compared with an
 SDG1032X (state after ``*RST``, forms of the answers, amplitudes that are clipped, the load that halves what is shown);
-what a public driver's authors measured on an SDG2042X (the answer to ``C1:BSWV?`` after a reset; six digits of a number,
-ten of a frequency; volts r.m.s. of a sine are 0.3535 of its peak to peak; a load's fraction is cut off).  Inferred: which field gives way where amplitude
-and offset together go beyond 10 V (the one that is set), that a message has no path memory, limits of the ramp.
+what the authors of a public driver measured on an SDG2042X (the answer to ``C1:BSWV?`` after a reset; six digits of a
+number, ten of a frequency; volts r.m.s. of a sine are 0.3535 of its peak to peak, of a ramp 1/3.464; the fraction of a
+load is cut off).  Inferred: which field gives way where amplitude and offset together go beyond 10 V (the one that is
+set), that a message has no path memory, limits of the ramp.
 Modulation, sweep, burst and arbitrary waveforms are missing.
 """
 

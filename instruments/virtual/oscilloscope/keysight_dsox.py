@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from instruments.virtual.core.parameters import choice, none, number, one
+from instruments.virtual.core.parameters import choice, no_parameters, number, parameter
 from instruments.virtual.core.parser import Row, ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Switch, Text, Word, whole
 from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope, at_input
@@ -335,7 +335,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
 
     def set_points(self, parameters: list[str]) -> None:
         """A number, rounded to the next the scope can give when it is asked for; MAXimum takes all."""
-        self.settings["wav_points"] = number(one(parameters), low=1, high=8e6, default=_FOR_SCREEN)
+        self.settings["wav_points"] = number(parameter(parameters), low=1, high=8e6, default=_FOR_SCREEN)
 
     def sequence(self) -> tuple[Record, float, int]:
         """The record, the distance of the points that can be read [s], how many.  Raises ScpiError."""
@@ -409,7 +409,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
 
     def points(self, parameters: list[str]) -> str:
         """WAVeform:POINts?: how many there are."""
-        none(parameters)
+        no_parameters(parameters)
         return f"{self.sequence()[2]:+d}"
 
     # --- measurements and pictures ---
@@ -430,7 +430,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
 
     def source(self, parameters: list[str]) -> str:
         """MEASure:SOURce?."""
-        none(parameters)
+        no_parameters(parameters)
         return str(self.settings["measure_source"])
 
     def install(self, name: str, parameters: list[str]) -> None:

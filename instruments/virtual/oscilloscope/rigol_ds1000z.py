@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
-from instruments.virtual.core.parameters import at_most_one, boolean, choice, limit, number, one
+from instruments.virtual.core.parameters import boolean, choice, limit, number, optional_parameter, parameter
 from instruments.virtual.core.parser import Row, ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Switch, Word, whole
 from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope, at_input, one_two_five
@@ -174,7 +174,7 @@ _REST: tuple[Row, ...] = (
     Ask("SYSTem:ERRor:COUNt", lambda s: str(len(s.parser.errors))),
     Ask("SYSTem:GAM", lambda _s: "12"),
     Ask("SYSTem:RAM", lambda s: str(len(s.channels))),
-    Both("MATH:DISPlay", lambda _s, p: _never(boolean(one(p))), lambda _s, _p: "0"),
+    Both("MATH:DISPlay", lambda _s, p: _never(boolean(parameter(p))), lambda _s, _p: "0"),
 )
 
 
@@ -255,7 +255,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
 
     def set_depth(self, parameters: list[str]) -> None:
         """ACQuire:MDEPth: AUTO, or one of the depths.  Raises ScpiError."""
-        text = one(parameters).upper()
+        text = parameter(parameters).upper()
         if text != "AUTO":
             depths = self._depths()
             points = int(number(text, low=depths[0], high=depths[-1], default=depths[0]))
@@ -267,7 +267,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
 
     def depth(self, parameters: list[str]) -> str:
         """ACQuire:MDEPth?: what is set, or its limits.  Raises ScpiError."""
-        asked, depths = at_most_one(parameters), self._depths()
+        asked, depths = optional_parameter(parameters), self._depths()
         return (
             str(int(limit(asked, low=depths[0], high=depths[-1], default=depths[0])))
             if asked

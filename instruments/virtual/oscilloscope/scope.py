@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from instruments.virtual.core.device import Value, VirtualInstrument
-from instruments.virtual.core.parameters import block_content, block_text, choice, number, one
+from instruments.virtual.core.parameters import block_content, block_text, choice, number, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Both, short_header
 from instruments.virtual.core.trigger import crossings
@@ -392,13 +392,13 @@ class VirtualOscilloscope(VirtualInstrument):
 
 
 def _place(parameters: list[str]) -> int:
-    return int(number(one(parameters), low=0, high=9, default=0))
+    return int(number(parameter(parameters), low=0, high=9, default=0))
 
 
 #: The setup as a block, and setups in ten places.
 SETUP = Both(
     "SYSTem:SETup",
-    lambda s, p: s.restore(block_content(one(p)).decode("latin-1")),
+    lambda s, p: s.restore(block_content(parameter(p)).decode("latin-1")),
     lambda s, _p: s.block(s.setup()),
 )
 PRESETS = (Both("*SAV", lambda s, p: s.keep(p)), Both("*RCL", lambda s, p: s.recall(p)))

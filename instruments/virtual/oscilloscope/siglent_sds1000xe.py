@@ -13,7 +13,7 @@ import math
 import struct
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from instruments.virtual.core.parameters import choice, one
+from instruments.virtual.core.parameters import choice, parameter
 from instruments.virtual.core.parser import Row, ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Switch, Word, short_header
 from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope, at_input, one_two_five
@@ -234,7 +234,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
     def set_depth(self, parameters: list[str]) -> None:
         """MSIZ 14K: obeyed when stopped.  Raises ScpiError."""
         words = [*_DEPTHS, *_HALVES]
-        word = choice(one(parameters).upper(), tuple(words))
+        word = choice(parameter(parameters).upper(), tuple(words))
         if self.running():
             raise ScpiError(-221)
         self.settings["depth"] = list(_DEPTHS)[words.index(word) % len(_DEPTHS)]
@@ -281,7 +281,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
 
     def waveform(self, n: int, parameters: list[str]) -> str:
         """WF? DESC, DAT2 or ALL.  Raises ScpiError."""
-        part = choice(one(parameters), ("DESC", "DAT2", "ALL"))
+        part = choice(parameter(parameters), ("DESC", "DAT2", "ALL"))
         record = self.record()
         data = b"" if part == "DAT2" else self._descriptor(record, n)
         if part != "DESC":
@@ -321,14 +321,14 @@ class VirtualSDS1000XE(VirtualOscilloscope):
 
     def sample_number(self, parameters: list[str]) -> str:
         """SANU? C1: points of the record, as 14Mpts."""
-        choice(one(parameters), tuple(f"C{n}" for n in self.channels))
+        choice(parameter(parameters), tuple(f"C{n}" for n in self.channels))
         points = self.full_scale()[1]
         scale, prefix = (1e6, "M") if points >= 1e6 else (1e3, "k") if points >= 1e3 else (1, "")
         return self.reply("SANU", f"{points / scale:g}{prefix}", "pts")
 
     def parameter_value(self, n: int, parameters: list[str]) -> str:
         """PAVA? PKPK: name and value, stars where the trace does not show it."""
-        word = choice(one(parameters), tuple(_MEASUREMENTS))
+        word = choice(parameter(parameters), tuple(_MEASUREMENTS))
         name, unit = _MEASUREMENTS[word]
         value = self.measured(name, n)
         shown = "****" if value >= self.no_measurement or math.isnan(value) else self.spell(value)

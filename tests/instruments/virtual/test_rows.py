@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 
 from instruments.virtual.core.rows import Number, Switch, Text, Word
+from instruments.virtual.generator.generator import VirtualGenerator
+from instruments.virtual.generator.rows import Quantity
 from instruments.virtual.magnetometer.lakeshore import Fields
 from support import hostile
 from support.models import FAMILIES, KIND_OF
@@ -23,11 +25,14 @@ NO_SETTING = ("*OPC", "CONFigure", "MEASure", "DISPlay:DATA", "C1:(BSWV", "C2:(B
 KEPT = {"53230A": {"timeout"}, "SDS1000X-E": {"header"}}
 MASKS = ("*ESE", "*SRE")
 #: Numbers that the instrument moves to the nearest that it can do.
-ADJUSTED = {"DSOX1000": ("CHANnel1:OFFSet", "CHANnel2:OFFSet")}
+ADJUSTED = {
+    "DSOX1000": ("CHANnel1:OFFSet", "CHANnel2:OFFSet"),
+    # a sweep begins above 0 Hz
+    "33500B": ("[SOURce[1]:]FREQuency:SPAN", "SOURce2:FREQuency:SPAN"),
+    "33220A": ("[SOURce[1]:]FREQuency:SPAN",),
+}
 #: Two long forms have this short form.
 ONE_SHORT_FORM = {"OPER:COND"}
-#: Whose rows are not yet data.
-PENDING = {"33500B", "33220A"}
 #: Levels that follow the light, where they are automatic.
 FOLLOWS = ("INPut[1]:LEVel", "INPut2:LEVel")
 
@@ -58,14 +63,17 @@ def said(device, header):
 
 
 def reported(device):
-    """The error queue, where there is one."""
-    return errors(device) if device.takes_blocks else []
+    """The error queue, where there is one, but for what gives way at a generator: another setting (-221)."""
+    gives_way = {-221} if isinstance(device, VirtualGenerator) else set()
+    return [number for number in errors(device) if number not in gives_way] if device.takes_blocks else []
 
 
 def values(row, device):
     """What can be sent to set a row, as far as its kind says it; else None."""
     if isinstance(row, Number):
         return [f"{value:.17g}" for value in row.values or row.range(device)]
+    if isinstance(row, Quantity):
+        return [f"{value:.17g}" for value in row.range(device.channel(row.channel))]
     if isinstance(row, Word):
         return [word.removeprefix("*") for word in (row.words(device) if callable(row.words) else row.words).split()]
     if isinstance(row, Switch):
@@ -86,6 +94,8 @@ def is_same(row, sent, answer):
     if isinstance(row, Number):
         # an instrument rounds to its digits, at least three, or to its steps: then it may be the next one
         return float(answer.rstrip("SV")) == pytest.approx(float(sent), rel=5e-3 if row.rounded is float else 0.5)
+    if isinstance(row, Quantity):
+        return float(answer) == pytest.approx(float(sent), rel=1e-9)
     if isinstance(row, Word):
         return answer == re.sub("[a-z]", "", sent)
     if isinstance(row, Switch):
@@ -120,7 +130,7 @@ def test_a_model_understands_its_list_of_headers(name):
     assert sorted(header + marks[ways] for header, ways in found.items()) == sorted(listed)
 
 
-@pytest.mark.parametrize("name", sorted({*FAMILIES} - PENDING))
+@pytest.mark.parametrize("name", FAMILIES)
 def test_every_header_finds_its_own_row(name):
     commands = hostile.instrument(name).commands
     for row in commands.rows:
