@@ -14,7 +14,7 @@ from instruments.virtual.generator.generator import VirtualGenerator
 from instruments.virtual.generator.rows import Quantity
 from instruments.virtual.magnetometer.lakeshore import Fields
 from support import hostile
-from support.models import FAMILIES, KIND_OF
+from support.models import FAMILIES, KIND_OF, SERIAL
 from support.wire import ask, errors, send
 
 HEADERS = Path(__file__).parent / "headers"
@@ -70,10 +70,8 @@ def reported(device):
 
 def values(row, device):
     """What can be sent to set a row, as far as its kind says it; else None."""
-    if isinstance(row, Number):
-        return [f"{value:.17g}" for value in row.values or row.range(device)]
-    if isinstance(row, Quantity):
-        return [f"{value:.17g}" for value in row.range(device.channel(row.channel))]
+    if isinstance(row, Number | Quantity):
+        return [f"{value:.17g}" for value in numbers(row, device)]
     if isinstance(row, Word):
         return [word.removeprefix("*") for word in (row.words(device) if callable(row.words) else row.words).split()]
     if isinstance(row, Switch):
@@ -83,6 +81,16 @@ def values(row, device):
     if isinstance(row, Fields):
         return [",".join(f"{limit:g}" for limit in limits) for limits in _limits(row)]
     return None
+
+
+def row_limits(row, device):
+    """The lowest and the highest number that can be sent now."""
+    return row.range(device.channel(row.channel) if isinstance(row, Quantity) else device)
+
+
+def numbers(row, device):
+    """The lowest and the highest number, or all of few."""
+    return getattr(row, "values", ()) or row_limits(row, device)
 
 
 def _limits(row):
@@ -158,3 +166,14 @@ def test_every_row_is_set_asked_and_reset(name):
             continue
         assert {setting: device.settings[setting] for setting in row.defaults()} == row.defaults(), header
         assert said(device, header) == default or row.header.startswith(FOLLOWS), header
+
+
+@pytest.mark.parametrize("name", sorted(set(FAMILIES) - set(SERIAL)))
+def test_every_number_says_its_limits_where_it_is_asked(name):
+    device = reset(hostile.instrument(name))
+    for row in device.commands.rows:
+        if isinstance(row, Number | Quantity):
+            header = hostile.spellings(row.header)[0]
+            for word, limit in zip(("MIN", "MAX"), row_limits(row, device), strict=True):
+                answer = ask(device, f"{header}? {word}").rpartition(" ")[2]
+                assert float(answer.rstrip("SV")) == pytest.approx(limit, rel=5e-3), (header, word)
