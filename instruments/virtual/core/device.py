@@ -179,6 +179,10 @@ class VirtualInstrument:
         """Commands in their old form, beyond the common ones."""
         return ()
 
+    def value(self, name: str) -> float:
+        """A setting that is a number."""
+        return float(self.settings[name])
+
     def read_boolean(self, text: str) -> bool:
         """A switch as it is sent.  Raises ScpiError."""
         return boolean(text)

@@ -14,6 +14,7 @@ from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.parameters import boolean, limit, number, optional_parameter, parameter
 from instruments.virtual.core.parser import ScpiError, header_pattern
 from instruments.virtual.core.rows import Number
+from instruments.virtual.core.signal import no_signal
 from instruments.virtual.core.status import OPERATION_COMPLETE
 from instruments.virtual.core.steps import run_to_end
 from instruments.virtual.counter.measurements import GateTime, Inputs, Measurement, measurement
@@ -25,8 +26,9 @@ if TYPE_CHECKING:
 
     from instruments.clock import Clock
     from instruments.virtual.core.device import Answer
+    from instruments.virtual.core.signal import Signal
     from instruments.virtual.core.steps import Steps
-    from instruments.virtual.counter.edges import Array, Signal, TriggerInput
+    from instruments.virtual.counter.edges import TriggerInput
     from instruments.virtual.counter.run import Run
 
 #: An answer that never comes is ready then [s].
@@ -38,11 +40,6 @@ DARK = 60.0
 AUTOMATIC, LEVEL = ("automatic{n}", True), ("level{n}", 0.0)
 
 _ABORT = re.compile(r"[\x00-\x20]*:?ABORT?[\x00-\x20]*", re.IGNORECASE)
-
-
-def no_signal(_start: float, _step: float, n: int) -> Array:
-    """Nothing is plugged in."""
-    return np.zeros(n)
 
 
 @dataclass(frozen=True)
@@ -220,10 +217,6 @@ class VirtualCounter(VirtualInstrument):
             raise ScpiError(-224, words[0][:20] if words else "")
         self.choose(found, tuple(map(int, words[1:])) or self._channels[:1])
         self.changed("function")
-
-    def value(self, name: str) -> float:
-        """A setting that is a number."""
-        return float(self.settings[name])
 
     def greatest_level(self, channel: int) -> float:
         """The greatest absolute trigger level [V]."""

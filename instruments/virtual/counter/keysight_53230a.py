@@ -19,8 +19,8 @@ from instruments.virtual.counter.parameters import channels_of, without_channels
 from instruments.virtual.counter.run import Run
 
 if TYPE_CHECKING:
+    from instruments.virtual.core.signal import Array
     from instruments.virtual.core.steps import Steps
-    from instruments.virtual.counter.edges import Array
 
 #: From the end of a measurement to the beginning of the next, but for gap-free ones [s] (estimated).
 _DEAD = 1e-3

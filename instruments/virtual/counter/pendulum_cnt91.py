@@ -20,8 +20,8 @@ from instruments.virtual.counter.run import Run
 if TYPE_CHECKING:
     from collections.abc import Generator
 
+    from instruments.virtual.core.signal import Array
     from instruments.virtual.core.steps import Steps
-    from instruments.virtual.counter.edges import Array
 
 #: From the end of a measurement to the beginning of the next, but for back-to-back ones [s] (handbook, 8-72: 4 µs
 #: and more; the calibration of the interpolators is 400 µs, estimated).

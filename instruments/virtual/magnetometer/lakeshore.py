@@ -198,10 +198,6 @@ class VirtualGaussmeter(VirtualInstrument):
             self._last_question = message
         return super().steps(message)
 
-    def value(self, name: str) -> float:
-        """A setting; all of them are numbers."""
-        return float(self.settings[name])
-
     def _unit(self) -> float:
         return _UNITS_T[int(self.value("unit")) - 1]
 
