@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 #: An answer that never comes is ready then [s].
 NEVER = INFINITY
-#: Without a time-out a model looks ahead so long, and ten gates, for an edge [s]: then there will be none.
+#: Without a time-out a model looks ahead for this time and ten gates to find an edge [s].
 DARK = 60.0
 
 #: The settings behind the rows of a trigger level.
@@ -97,7 +97,7 @@ class VirtualCounter(VirtualInstrument):
         self._completion_awaited = False
         super().__init__(clock, identity=identity)
 
-    # --- what goes on while nobody asks ---
+    # --- what goes on between messages ---
 
     def is_abort(self, message: str) -> bool:
         """See the base: ABORt does."""
@@ -125,8 +125,14 @@ class VirtualCounter(VirtualInstrument):
         super().reset()
 
     def trigger(self) -> None:
-        """*TRG: the next readings of a run that waits for it."""
-        if self._run:
+        """*TRG: the next readings of a run that waits for it.  Raises ScpiError if none does."""
+        if self._run is None or not self._run.waiting:
+            raise ScpiError(-211)
+        self.arm()
+
+    def arm(self) -> None:
+        """As *TRG, where a run waits for it."""
+        if self._run and self._run.waiting:
             self._run.trigger(self._ready)
 
     def catch_up(self) -> Steps[None]:
@@ -165,7 +171,7 @@ class VirtualCounter(VirtualInstrument):
         self.busy_until(min(instant, NEVER))
         if instant < NEVER:
             return True
-        # only ABORt or a device clear end this, and the run with it: nobody will see more of it
+        # only ABORt or a device clear end this, and the run with it
         self._run = None
         return False
 

@@ -2,7 +2,7 @@
 
 A signal may be looked at for hours: only a piece of it is in memory at a time.  One may have a method `crossings`
 beside, which gives the times at which a trigger fires: (start [s], stop [s], thresholds) → shape (m,) [s], or None if
-only the voltage can tell.
+only the voltage shows them.
 """
 
 from __future__ import annotations

@@ -354,7 +354,7 @@ class Virtual53230A(VirtualCounter):
     # --- formats and statistics ---
 
     def _spell(self, values: Array, head: str = "") -> str:
-        """Readings in the format that is set.  head: of a block, if it does not tell its length."""
+        """Readings in the format that is set.  head: of a block, if it does not give its length."""
         if self.settings["format"] == "ASC":
             return ",".join(map(self.spell, values))
         data = values.astype("<f8" if self.settings["byte_order"] == "SWAP" else ">f8").tobytes()
