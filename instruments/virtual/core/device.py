@@ -90,7 +90,7 @@ class VirtualInstrument:
     """
 
     identity = "levilab,virtual,0,0"
-    #: What ``SYST:ERR?`` answers when there is nothing to tell, how many entries it keeps, and what ends an answer.
+    #: What ``SYST:ERR?`` answers when the queue is empty, how many entries it keeps, and what ends an answer.
     no_error, queue_size, line_end = '+0,"No error"', 20, "\n"
     #: Whether it knows blocks (IEEE 488.2, 7.7.6), and path memory (SCPI-1999, volume 1, 6.2.4).
     takes_blocks = path_memory = True
@@ -178,6 +178,10 @@ class VirtualInstrument:
     def table(self) -> tuple[Command, ...]:
         """Commands in their old form, beyond the common ones."""
         return ()
+
+    def value(self, name: str) -> float:
+        """A setting that is a number."""
+        return float(self.settings[name])
 
     def read_boolean(self, text: str) -> bool:
         """A switch as it is sent.  Raises ScpiError."""

@@ -34,6 +34,7 @@ ERRORS = {
     -222: "Data out of range",
     -224: "Illegal parameter value",
     -230: "Data corrupt or stale",
+    -211: "Trigger ignored",
     -213: "Init ignored",
     -221: "Settings conflict",
     -350: "Error queue overflow",

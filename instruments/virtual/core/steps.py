@@ -27,9 +27,9 @@ def run_to_end(steps: Steps[T]) -> T:
 
 
 class Work(Generic[T]):
-    """Steps that anybody may drive on, until they are done or given up.
+    """Steps that are driven on one by one, until they are done or cancelled.
 
-    result: None until then, and if it was given up; error: that ended it, for the one whose work it is.
+    result: None until then, and if it was cancelled; error: that ended it.
     """
 
     def __init__(self, steps: Steps[T]) -> None:

@@ -14,6 +14,7 @@ from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.parameters import boolean, limit, number, optional_parameter, parameter
 from instruments.virtual.core.parser import ScpiError, header_pattern
 from instruments.virtual.core.rows import Number
+from instruments.virtual.core.signal import no_signal
 from instruments.virtual.core.status import OPERATION_COMPLETE
 from instruments.virtual.core.steps import run_to_end
 from instruments.virtual.counter.measurements import GateTime, Inputs, Measurement, measurement
@@ -25,24 +26,20 @@ if TYPE_CHECKING:
 
     from instruments.clock import Clock
     from instruments.virtual.core.device import Answer
+    from instruments.virtual.core.signal import Signal
     from instruments.virtual.core.steps import Steps
-    from instruments.virtual.counter.edges import Array, Signal, TriggerInput
+    from instruments.virtual.counter.edges import TriggerInput
     from instruments.virtual.counter.run import Run
 
 #: An answer that never comes is ready then [s].
 NEVER = INFINITY
-#: Without a time-out a model looks ahead so long, and ten gates, for an edge [s]: then there will be none.
+#: Without a time-out a model looks ahead for this time and ten gates to find an edge [s].
 DARK = 60.0
 
 #: The settings behind the rows of a trigger level.
 AUTOMATIC, LEVEL = ("automatic{n}", True), ("level{n}", 0.0)
 
 _ABORT = re.compile(r"[\x00-\x20]*:?ABORT?[\x00-\x20]*", re.IGNORECASE)
-
-
-def no_signal(_start: float, _step: float, n: int) -> Array:
-    """Nothing is plugged in."""
-    return np.zeros(n)
 
 
 @dataclass(frozen=True)
@@ -100,7 +97,7 @@ class VirtualCounter(VirtualInstrument):
         self._completion_awaited = False
         super().__init__(clock, identity=identity)
 
-    # --- what goes on while nobody asks ---
+    # --- what goes on between messages ---
 
     def is_abort(self, message: str) -> bool:
         """See the base: ABORt does."""
@@ -128,8 +125,14 @@ class VirtualCounter(VirtualInstrument):
         super().reset()
 
     def trigger(self) -> None:
-        """*TRG: the next readings of a run that waits for it."""
-        if self._run:
+        """*TRG: the next readings of a run that waits for it.  Raises ScpiError if none does."""
+        if self._run is None or not self._run.waiting:
+            raise ScpiError(-211)
+        self.arm()
+
+    def arm(self) -> None:
+        """As *TRG, where a run waits for it."""
+        if self._run and self._run.waiting:
             self._run.trigger(self._ready)
 
     def catch_up(self) -> Steps[None]:
@@ -168,7 +171,7 @@ class VirtualCounter(VirtualInstrument):
         self.busy_until(min(instant, NEVER))
         if instant < NEVER:
             return True
-        # only ABORt or a device clear end this, and the run with it: nobody will see more of it
+        # only ABORt or a device clear end this, and the run with it
         self._run = None
         return False
 
@@ -220,10 +223,6 @@ class VirtualCounter(VirtualInstrument):
             raise ScpiError(-224, words[0][:20] if words else "")
         self.choose(found, tuple(map(int, words[1:])) or self._channels[:1])
         self.changed("function")
-
-    def value(self, name: str) -> float:
-        """A setting that is a number."""
-        return float(self.settings[name])
 
     def greatest_level(self, channel: int) -> float:
         """The greatest absolute trigger level [V]."""

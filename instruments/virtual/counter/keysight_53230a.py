@@ -19,8 +19,8 @@ from instruments.virtual.counter.parameters import channels_of, without_channels
 from instruments.virtual.counter.run import Run
 
 if TYPE_CHECKING:
+    from instruments.virtual.core.signal import Array
     from instruments.virtual.core.steps import Steps
-    from instruments.virtual.counter.edges import Array
 
 #: From the end of a measurement to the beginning of the next, but for gap-free ones [s] (estimated).
 _DEAD = 1e-3
@@ -354,7 +354,7 @@ class Virtual53230A(VirtualCounter):
     # --- formats and statistics ---
 
     def _spell(self, values: Array, head: str = "") -> str:
-        """Readings in the format that is set.  head: of a block, if it does not tell its length."""
+        """Readings in the format that is set.  head: of a block, if it does not give its length."""
         if self.settings["format"] == "ASC":
             return ",".join(map(self.spell, values))
         data = values.astype("<f8" if self.settings["byte_order"] == "SWAP" else ">f8").tobytes()

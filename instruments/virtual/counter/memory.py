@@ -11,7 +11,7 @@ import numpy as np
 from instruments.ieee488 import NOT_A_NUMBER
 
 if TYPE_CHECKING:
-    from instruments.virtual.counter.edges import Array
+    from instruments.virtual.core.signal import Array
     from instruments.virtual.counter.measurements import Reading
 
 #: Readings that are kept; then the oldest is lost (53220A/53230A User's Guide: 1 000 000).

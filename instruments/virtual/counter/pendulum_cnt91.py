@@ -20,8 +20,8 @@ from instruments.virtual.counter.run import Run
 if TYPE_CHECKING:
     from collections.abc import Generator
 
+    from instruments.virtual.core.signal import Array
     from instruments.virtual.core.steps import Steps
-    from instruments.virtual.counter.edges import Array
 
 #: From the end of a measurement to the beginning of the next, but for back-to-back ones [s] (handbook, 8-72: 4 µs
 #: and more; the calibration of the interpolators is 400 µs, estimated).
@@ -107,7 +107,7 @@ _ARMING: tuple[Row, ...] = (
     Word("ARM[:SEQuence[1]][:STARt][:LAYer[1]]:SLOPe", "arming_slope", "POSitive NEGative"),
     Number("ARM[:SEQuence[1]][:STARt][:LAYer[1]]:DELay", "arming_delay", 0.0, (0, 2), "S"),
     Word("ARM[:SEQuence[1]][:STARt]:LAYer2:SOURce", "bus_arming", "IMMediate BUS"),
-    Do("ARM[:SEQuence[1]][:STARt]:LAYer2[:IMMediate]", lambda d: d.trigger()),
+    Do("ARM[:SEQuence[1]][:STARt]:LAYer2[:IMMediate]", lambda d: d.arm()),
     Word("ARM:STOP:SOURce", "stop_arming", "IMMediate BUS EXT1 EXT2 EXT4 TIMer"),
     Count("TRIGger[:STARt]:COUNt", "triggers", 1.0, (1, 2**31 - 1), endless=True),
     Word("TRIGger[:STARt]:SOURce", "trigger_source", "IMMediate TIMer"),
@@ -411,7 +411,7 @@ class VirtualCNT91(VirtualCounter):
         """Results in the format that is set (handbook, 8-36 and 8-39).
 
         REAL is a block of eight bytes for each number, PACKed one block for all, time stamps in it as whole
-        picoseconds; and if the size was not told, its length has six digits.
+        picoseconds; and if the size was not asked for, its length has six digits.
         """
         kind, order = self.settings["format"], "<" if self.settings["byte_order"] == "SWAP" else ">"
         pairs = [(float(value), float(stamp)) for value, stamp in zip(values, stamps, strict=True)]

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 FARTHEST = 12_000.0
 #: Nor does one that has to wait for more readings than this.
 _MOST_AHEAD = 100_000
-#: Light that nobody has asked about for longer than this [s] is passed over.
+#: Light that was not asked about for longer than this [s] is passed over.
 _CATCH_UP = 2500.0
 #: A model looks ahead in steps, to stop where the result is known [s].
 _STEP = 60.0
@@ -74,9 +74,8 @@ class Run:
         return math.isinf(self._next) and self._under_way is None and not self.complete
 
     def trigger(self, now: float) -> None:
-        """It has come [s]."""
-        if self.waiting:
-            self._next = now + self.delay
+        """The trigger that is waited for has come [s]."""
+        self._next = now + self.delay
 
     def advance(self, until: float, count: float = math.inf) -> Steps[None]:
         """Everything that happens up to this time [s], or until so many readings have been taken in all.

@@ -126,8 +126,8 @@ FAMILY: tuple[Row, ...] = (
     Fields("UNIT", (Field("unit", 1, 4, 1),)),
     Own("AUTO", lambda d, p: d.set_auto(p), lambda d: f"{d.value('auto'):.0f}", ("auto", 1.0)),
     Own("RANGE", lambda d, p: d.set_range(p), lambda d: f"{d.range_index() + 1}", ("range", 1.0)),
-    Ask("RDGFIELD", lambda d: d.tell(d.shown)),
-    Ask("RDGREL", lambda d: d.tell(lambda: d.shown() - d.relative_to)),
+    Ask("RDGFIELD", lambda d: d.answer(d.shown)),
+    Ask("RDGREL", lambda d: d.answer(lambda: d.shown() - d.relative_to)),
     Ask("RDGMNMX", lambda d: d.extremes()),
     Ask("OPST", lambda d: f"{d.operational_status():03d}"),
     Ask("TYPE", lambda d: f"{_PROBE_TYPES.get(d.probe or '', 0):02d}"),
@@ -181,7 +181,7 @@ class VirtualGaussmeter(VirtualInstrument):
         self._zeroed_at: float | None = None
         self._zero_done = False
         self._last: Reading | None = None
-        self._told: float | None = None  # the instant of the reading that was told last
+        self._answered: float | None = None  # the instant of the latest reading that was answered
         self.relative_to = 0.0  # of RDGREL [T]
         self._lowest, self._highest = math.inf, -math.inf
         self._last_question = ""
@@ -197,10 +197,6 @@ class VirtualGaussmeter(VirtualInstrument):
         elif "?" in message:
             self._last_question = message
         return super().steps(message)
-
-    def value(self, name: str) -> float:
-        """A setting; all of them are numbers."""
-        return float(self.settings[name])
 
     def _unit(self) -> float:
         return _UNITS_T[int(self.value("unit")) - 1]
@@ -289,14 +285,14 @@ class VirtualGaussmeter(VirtualInstrument):
         resolution = self._ranges()[self.range_index()] / self._counts()
         reading = self.reading()
         shown = round((self.measured() + _NOISE * reading.noise * resolution) / resolution) * resolution
-        self._told = reading.instant
+        self._answered = reading.instant
         self._lowest, self._highest = min(self._lowest, shown), max(self._highest, shown)
         return shown
 
     def _overloaded(self) -> bool:
         return self.probe is not None and abs(self.measured()) > self._ranges()[self.range_index()]
 
-    def tell(self, value: Callable[[], float]) -> str:
+    def answer(self, value: Callable[[], float]) -> str:
         """A field [T] in the present unit, or why there is none."""
         if self.probe is None:
             return "NO PROBE"
@@ -304,7 +300,7 @@ class VirtualGaussmeter(VirtualInstrument):
 
     def extremes(self) -> str:
         """RDGMNMX?: both, or on the 425 zero and the greatest."""
-        self.tell(self.shown)
+        self.answer(self.shown)
         seen = [value if math.isfinite(value) else 0.0 for value in (self._lowest, self._highest)]
         return ",".join(map(self.in_unit, seen))
 
@@ -337,7 +333,7 @@ class VirtualGaussmeter(VirtualInstrument):
         """OPST?: what the probe and the last reading are like."""
         if self.probe is None:
             return _NO_PROBE
-        new = self.reading().instant != self._told
+        new = self.reading().instant != self._answered
         return (
             _OVERLOAD * self._overloaded()
             + _NEW_READING * new

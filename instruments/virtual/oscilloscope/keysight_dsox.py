@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from instruments.clock import Clock
-    from instruments.virtual.oscilloscope.record import Record, Signal
+    from instruments.virtual.core.signal import Signal
+    from instruments.virtual.oscilloscope.record import Record
 
 #: The fastest rate [1/s].
 _FASTEST = 2e9

@@ -16,10 +16,11 @@ from instruments.virtual.core.device import Value, VirtualInstrument
 from instruments.virtual.core.parameters import block_content, block_text, choice, number, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Both, short_header
+from instruments.virtual.core.signal import Signal, no_signal
 from instruments.virtual.core.trigger import crossings
 from instruments.virtual.oscilloscope.acquisition import LOOK_AHEAD, Acquisition, Plan
 from instruments.virtual.oscilloscope.measure import Measured, measure
-from instruments.virtual.oscilloscope.record import COARSEST, Edge, Input, Record, open_input
+from instruments.virtual.oscilloscope.record import COARSEST, Edge, Input, Record
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from instruments.clock import Clock
-    from instruments.virtual.oscilloscope.record import Signal
 
 #: Below the level by this part of a division the trigger is armed again.
 _HYSTERESIS = 0.3
@@ -111,10 +111,6 @@ class VirtualOscilloscope(VirtualInstrument):
         self.settings |= {f"chan{channel}_scale": division, f"chan{channel}_offset": -middle}
 
     # --- settings ---
-
-    def value(self, name: str) -> float:
-        """A setting that is a number."""
-        return float(self.settings[name])
 
     def level_name(self, channel: int) -> str:
         """The setting that holds the trigger level of a channel."""
@@ -246,10 +242,10 @@ class VirtualOscilloscope(VirtualInstrument):
         return Plan(record, partial(self._search, record), automatic=self.settings["trigger_sweep"] == "AUTO")
 
     def _input(self, channel: int, start: float) -> Input:
-        signal = self._signals.get(channel, open_input)
+        signal = self._signals.get(channel, no_signal)
         coupling = self.settings[f"chan{channel}_coupling"]
         if coupling == "GND":
-            signal = open_input
+            signal = no_signal
         mean = 0.0
         if str(coupling).startswith("A"):
             begin = max(0.0, start - 0.5)
@@ -373,7 +369,7 @@ class VirtualOscilloscope(VirtualInstrument):
     def autoscale(self) -> None:
         """Scale, offset, time base and level to fit what stands at the inputs."""
         for n in self.channels:
-            signal, factor = self._signals.get(n, open_input), self.probe(n)
+            signal, factor = self._signals.get(n, no_signal), self.probe(n)
             volts = factor * signal(max(0.0, self.now - 0.5), COARSEST, round(0.5 / COARSEST))
             low, high = float(volts.min()), float(volts.max())
             if high - low < 0.02 * factor:

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from instruments.clock import Clock
-    from instruments.virtual.oscilloscope.record import Record, Signal
+    from instruments.virtual.core.signal import Signal
+    from instruments.virtual.oscilloscope.record import Record
 
 _COLUMNS = 14
 #: The fastest rate [1/s] and the points of the memory, where one channel of a pair is on; half of both with two.
