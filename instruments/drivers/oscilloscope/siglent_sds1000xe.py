@@ -101,7 +101,7 @@ class SiglentSDS1000XE(Scope):
     MAIN: ClassVar[Mapping[str, Value]] = {}
     EDGE: ClassVar[Mapping[str, Value]] = {}
     OFFSET_SIGN = -1.0
-    READY = "TRMD STOP"
+    WHILE_SETTING_UP = "TRMD STOP"
     #: That WINDOW triggers on both slopes is inferred from the front panel's three choices.
     SLOPES: ClassVar[Mapping[str, str]] = SLOPES | {"either": "WINDOW"}
     #: It acquires in acquire() alone.
@@ -162,8 +162,8 @@ class SiglentSDS1000XE(Scope):
     def _scaling(self, setup: Setup) -> dict[str, Value]:
         return super()._scaling(setup) | {"coupling": self.COUPLINGS[setup.coupling]}
 
-    def _give(self, part: ScpiInstrument, wanted: Mapping[str, Value]) -> None:
-        super()._give(part, wanted)
+    def _apply(self, part: ScpiInstrument, wanted: Mapping[str, Value]) -> None:
+        super()._apply(part, wanted)
         if part is self and self._setup:
             shown = set(self._setup.shown)
             depths = _HALVES if {1, 2} <= shown or {3, 4} <= shown else _DEPTHS

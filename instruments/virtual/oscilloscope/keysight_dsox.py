@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from instruments.virtual.core.parameters import choice, no_parameters, number, parameter
+from instruments.virtual.core.parameters import choice, number, parameter
 from instruments.virtual.core.parser import Row, ScpiError
-from instruments.virtual.core.rows import Ask, Both, Do, Number, Switch, Text, Word, whole
+from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Switch, Text, Word, whole
 from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope, at_input
 from instruments.virtual.oscilloscope.screenshot import bmp8, bmp24, draw, grey, png
 
@@ -163,13 +163,13 @@ _WAVEFORM: tuple[Row, ...] = (
     Switch("WAVeform:UNSigned", "wav_unsigned", default=True),
     Word("WAVeform:VIEW", "wav_view", "MAIN"),
     Word("WAVeform:POINts:MODE", "wav_mode", "NORMal MAXimum RAW"),
-    Both("WAVeform:POINts", lambda s, p: s.set_points(p), lambda s, p: s.points(p)),
+    Own("WAVeform:POINts", lambda s, p: s.set_points(p), lambda s: f"{s.sequence()[2]:+d}"),
     Ask("WAVeform:PREamble", lambda s: ",".join(s.preamble())),
     *(Ask(f"WAVeform:{word}", lambda s, k=k: s.preamble()[k]) for word, k in _PARTS.items()),
     Ask("WAVeform:DATA", lambda s: s.data()),
 )
 _REST: tuple[Row, ...] = (
-    Both("MEASure:SOURce", lambda s, p: s.set_source(p), lambda s, p: s.source(p)),
+    Own("MEASure:SOURce", lambda s, p: s.set_source(p), lambda s: str(s.settings["measure_source"])),
     Word("MEASure:SHOW", "measure_shown", "1 ON"),
     Do("MEASure:CLEar", lambda s: s.clear_results()),
     Ask("MEASure:RESults", lambda s: s.all_results()),
@@ -324,7 +324,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
         volts_per_code = 8 * self.division(channel) / _CODES_ON_SCREEN
         return volts_per_code, self.middle - round(self.value(f"chan{channel}_offset") / volts_per_code)
 
-    def window(self, channel: int) -> tuple[float, float]:
+    def codes_on_screen(self, channel: int) -> tuple[float, float]:
         """Eight divisions around the middle."""
         return float(self.middle), float(_CODES_ON_SCREEN)
 
@@ -348,13 +348,6 @@ class VirtualDSOX1000(VirtualOscilloscope):
         wanted = self.value("wav_points")
         every = math.ceil(record.points / min(max(wanted, 1), most))
         return record, every / record.rate, max(1, record.points // every)
-
-    def _source(self) -> int:
-        """Raises ScpiError for a source with nothing in it."""
-        source = str(self.settings["wav_source"])
-        if not source.startswith("CHAN"):
-            raise ScpiError(-230)
-        return int(source[4:])
 
     def preamble(self) -> list[str]:
         """WAVeform:PREamble?: its ten fields.  Raises ScpiError."""
@@ -408,11 +401,6 @@ class VirtualDSOX1000(VirtualOscilloscope):
         scale = record.inputs[channel]
         return ",".join(f"{v:+.5E}" for v in (codes - scale.zero) * scale.volts_per_code).encode()
 
-    def points(self, parameters: list[str]) -> str:
-        """WAVeform:POINts?: how many there are."""
-        no_parameters(parameters)
-        return f"{self.sequence()[2]:+d}"
-
     # --- measurements and pictures ---
 
     def set_source(self, parameters: list[str]) -> None:
@@ -428,11 +416,6 @@ class VirtualDSOX1000(VirtualOscilloscope):
         if not parameters or parameters[-1].upper() in {"CYCL", "CYCLE", "DISP", "DISPLAY", "AC", "DC"}:
             return self.channel_of(str(self.settings["measure_source"]))
         return self.channel_of(parameters[-1])
-
-    def source(self, parameters: list[str]) -> str:
-        """MEASure:SOURce?."""
-        no_parameters(parameters)
-        return str(self.settings["measure_source"])
 
     def install(self, name: str, parameters: list[str]) -> None:
         """MEASure:FREQuency and its like: a measurement more on the screen.  Raises ScpiError."""
@@ -461,7 +444,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
         form, palette = (*parameters, *("BMP", "COLor")[len(parameters) :])
         writers = {"BMP": bmp24, "BMP8": bmp8, "PNG": png}
         write = writers[choice(form, ("BMP", "BMP8bit", "PNG"))]
-        picture = draw(self.heights(), columns=self.columns)
+        picture = draw(self.traces_on_screen(), columns=self.columns)
         grey_wanted = choice(palette, ("COLor", "GRAYscale", "MONochrome")) != "COL"
         picture = grey(picture) if grey_wanted else picture
         return self.block(write(255 - picture if self.settings["ink_saver"] else picture))

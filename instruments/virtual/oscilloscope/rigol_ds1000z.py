@@ -174,7 +174,7 @@ _REST: tuple[Row, ...] = (
     Ask("SYSTem:ERRor:COUNt", lambda s: str(len(s.parser.errors))),
     Ask("SYSTem:GAM", lambda _s: "12"),
     Ask("SYSTem:RAM", lambda s: str(len(s.channels))),
-    Both("MATH:DISPlay", lambda _s, p: _never(boolean(parameter(p))), lambda _s, _p: "0"),
+    Both("MATH:DISPlay", lambda _s, p: _refuse_mathematics(boolean(parameter(p))), lambda _s, _p: "0"),
 )
 
 
@@ -386,13 +386,13 @@ class VirtualDS1000Z(VirtualOscilloscope):
         colour, invert, form = (*parameters, *("ON", "OFF", "BMP24")[len(parameters) :])
         writers = {"BMP24": lambda p: bmp24(p) + b"\0\0", "BMP8": bmp8, "PNG": png}
         name = choice(form, tuple(writers))
-        picture = draw(self.heights(), columns=self.columns)
+        picture = draw(self.traces_on_screen(), columns=self.columns)
         picture = picture if boolean(colour) else grey(picture)
         picture = 255 - picture if invert.upper() in {"ON", "1", "INVERT", "INV"} else picture
         return self.block(writers[name](picture))
 
 
-def _never(on: bool) -> None:  # noqa: FBT001
+def _refuse_mathematics(on: bool) -> None:  # noqa: FBT001
     """There is no mathematics in this model.  Raises ScpiError when it is switched on."""
     if on:
         raise ScpiError(-221)

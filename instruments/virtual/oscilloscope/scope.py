@@ -102,7 +102,7 @@ class VirtualOscilloscope(VirtualInstrument):
         volts_per_code = self.division(channel) / self.codes_per_division
         return volts_per_code, self.middle + round(self.value(f"chan{channel}_offset") / volts_per_code)
 
-    def window(self, channel: int) -> tuple[float, float]:
+    def codes_on_screen(self, channel: int) -> tuple[float, float]:
         """The code in the middle of the screen, and how many codes it is high: eight divisions."""
         return float(self.middle), 8.0 * self.codes_per_division
 
@@ -345,14 +345,14 @@ class VirtualOscilloscope(VirtualInstrument):
         value = measure(name, self.on_screen(channel))
         return self.no_measurement if value is None else value
 
-    def heights(self) -> dict[int, NDArray[np.float64]]:
+    def traces_on_screen(self) -> dict[int, NDArray[np.float64]]:
         """For the picture: each shown trace, 800 columns from the lower edge of the screen, 0, to the upper, 1."""
         record = self.record()
         heights: dict[int, NDArray[np.float64]] = {}
         start, length = record.screen
         for n in self.shown():
             codes = record.codes(n, 0, 800, of=800, start=start, step=length / 800)
-            middle, span = self.window(n)
+            middle, span = self.codes_on_screen(n)
             heights[n] = 0.5 + (codes.astype(np.float64) - middle) / span
         return heights
 

@@ -337,4 +337,4 @@ class VirtualSDS1000XE(VirtualOscilloscope):
 
     def picture(self) -> str:
         """SCDP: a bitmap, in no block."""
-        return bmp24(draw(self.heights(), columns=self.columns)).decode("latin-1")
+        return bmp24(draw(self.traces_on_screen(), columns=self.columns)).decode("latin-1")
