@@ -9,27 +9,21 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from instruments.virtual.core.parameters import (
     boolean,
-    choice,
-    limit,
-    no_parameters,
     nr3,
     number,
-    one_of,
-    optional_parameter,
     parameter,
 )
-from instruments.virtual.core.parser import Bound, Command, Parser, Row, Table
+from instruments.virtual.core.parser import Parser, Table
 from instruments.virtual.core.rows import Ask, Do, Own
 from instruments.virtual.core.status import OPERATION_COMPLETE, Status
 from instruments.virtual.core.steps import run_to_end
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from instruments.clock import Clock
+    from instruments.virtual.core.parser import Row, Value
     from instruments.virtual.core.steps import Steps, Work
-
-Value = float | str | bool
 
 
 class Answer(NamedTuple):
@@ -76,7 +70,7 @@ def _table(model: type[VirtualInstrument], numbered: tuple[int, ...]) -> Table:
     table = _TABLES.get((model, numbered))
     if table is None:
         of_channels = (row.of_channel(n) for n in numbered for row in model.CHANNEL_ROWS)
-        table = _TABLES[model, numbered] = Table((*model.COMMON, *of_channels, *model.ROWS))
+        table = _TABLES[model, numbered] = Table((*model.COMMON, *of_channels, *model.ROWS), model.DEFAULTS)
     return table
 
 
@@ -114,8 +108,7 @@ class VirtualInstrument:
             self.numbered = numbered
         #: Its rows; one table for all devices of a class with as many channels.
         self.commands = _table(type(self), tuple(self.numbered))
-        self.settings: dict[str, Value] = {}
-        self._defaults: dict[str, Value] = {**self.DEFAULTS, **self.commands.defaults}
+        self.settings: dict[str, Value] = dict(self.commands.defaults)
         self.status = Status()
         self.epoch = 0
         self._ready = 0.0
@@ -129,10 +122,6 @@ class VirtualInstrument:
             on_error=self.status.note_error,
             path_memory=self.path_memory,
         )
-        if old := (*self._common(), *self.table()):
-            rows = (Bound(command.pattern, command) for command in old)
-            self.commands = self.parser.commands = Table((*rows, *self.commands.rows))
-        self.settings |= self._defaults
 
     def execute(self, message: str) -> Answer | None:
         """Run one message, a line without its end; the answers of its queries, if it has any."""
@@ -175,10 +164,6 @@ class VirtualInstrument:
 
     # --- what the rows need ---
 
-    def table(self) -> tuple[Command, ...]:
-        """Commands in their old form, beyond the common ones."""
-        return ()
-
     def value(self, name: str) -> float:
         """A setting that is a number."""
         return float(self.settings[name])
@@ -204,13 +189,9 @@ class VirtualInstrument:
 
     def reset(self) -> None:
         """The state after ``*RST``."""
-        self.settings |= self._defaults
-        for name in self._defaults:
+        self.settings |= self.commands.defaults
+        for name in self.commands.defaults:
             self.changed(name)
-
-    def _common(self) -> tuple[Command, ...]:
-        """Common commands in their old form."""
-        return ()
 
     # --- status ---
 
@@ -237,72 +218,3 @@ class VirtualInstrument:
     def set_mask(self, name: str, parameters: list[str]) -> None:
         """A mask of the status.  Raises ScpiError."""
         setattr(self.status, name, int(number(parameter(parameters), low=0, high=255, default=0)))
-
-    # --- the old form of rows ---
-
-    def _note_completion(self) -> None:
-        self.note_completion()
-
-    def numeric(
-        self,
-        pattern: str,
-        name: str,
-        *,
-        low: float,
-        high: float,
-        default: float,
-        unit: str = "",
-        values: tuple[float, ...] = (),
-    ) -> Command:
-        """A row for a number that can be set and asked for, ``MIN``, ``MAX`` and ``DEF`` included.
-
-        values: the only ones that there are.
-        """
-        self._defaults[name] = default
-
-        def read(text: str) -> float:
-            return one_of(number(text, low=low, high=high, default=default, unit=unit), values)
-
-        def ask(parameters: list[str]) -> str:
-            asked = optional_parameter(parameters)
-            return nr3(limit(asked, low=low, high=high, default=default) if asked else float(self.settings[name]))
-
-        return Command(pattern, self._setter(name, read), ask)
-
-    def word(self, pattern: str, name: str, words: tuple[str, ...], default: str) -> Command:
-        """A row for one word of several; the answer is the short form."""
-        self._defaults[name] = default
-        set_ = self._setter(name, lambda text: choice(text, words))
-        return Command(pattern, set_, answers(lambda: str(self.settings[name])))
-
-    def switch(self, pattern: str, name: str, *, default: bool = False) -> Command:
-        """A row for ON or OFF; the answer is 1 or 0."""
-        self._defaults[name] = default
-        return Command(pattern, self._setter(name, boolean), answers(lambda: str(int(self.settings[name]))))
-
-    def _setter(self, name: str, read: Callable[[str], Value]) -> Callable[[list[str]], None]:
-        def set_(parameters: list[str]) -> None:
-            self.settings[name] = read(parameter(parameters))
-            self.changed(name)
-
-        return set_
-
-
-def does(act: Callable[[], Steps[None] | None]) -> Callable[[list[str]], Steps[None] | None]:
-    """What a command without parameters does, for a row of a table."""
-
-    def set_(parameters: list[str]) -> Steps[None] | None:
-        no_parameters(parameters)
-        return act()
-
-    return set_
-
-
-def answers(tell: Callable[[], Steps[str] | str]) -> Callable[[list[str]], Steps[str] | str]:
-    """What a query without parameters is answered with, for a row of a table."""
-
-    def get(parameters: list[str]) -> Steps[str] | str:
-        no_parameters(parameters)
-        return tell()
-
-    return get

@@ -157,7 +157,3 @@ def nr3(value: float) -> str:
     ('+2.345678900000000E+01', '+9.900000000000000E+37')
     """
     return f"{value:+.14E}".replace("E", "0E")
-
-
-#: The old names.
-at_most_one, one, none = optional_parameter, parameter, no_parameters

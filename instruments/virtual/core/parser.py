@@ -19,7 +19,7 @@ from instruments.virtual.core.message import read_units
 from instruments.virtual.core.steps import run_to_end
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from instruments.virtual.core.steps import Steps
 
@@ -117,11 +117,14 @@ def _of_channel(text: str, n: int) -> str:
 
 
 class Table:
-    """The rows of a model, in an order in which the first that fits a header has it, and the settings behind them."""
+    """The rows of a model, and its settings.  Of rows that fit a header the first one has it.
 
-    def __init__(self, rows: Iterable[Row]) -> None:
+    others: settings that no row has.  defaults: all settings, with their values after ``*RST``.
+    """
+
+    def __init__(self, rows: Iterable[Row], others: Mapping[str, Value]) -> None:
         self.rows = tuple(rows)
-        self.defaults = {name: value for row in self.rows for name, value in row.defaults().items()}
+        self.defaults = {**others, **{name: value for row in self.rows for name, value in row.defaults().items()}}
         self._actions: dict[str, Action] = {}
 
     def find(self, header: str) -> Action:
@@ -223,44 +226,3 @@ class Parser:
     def next_error(self) -> str:
         """The oldest entry, removed, or that there is none."""
         return self.errors.popleft() if self.errors else self.no_error
-
-
-@dataclass(frozen=True)
-class Command:
-    """The old form of a row, bound to its device; see `Bound`."""
-
-    pattern: str
-    set: Callable[[list[str]], Steps[None] | None] | None = None
-    get: Callable[[list[str]], Steps[str] | str] | None = None
-
-    @property
-    def header(self) -> re.Pattern[str]:
-        """The pattern as a regular expression for a header without its question mark."""
-        return header_pattern(self.pattern)
-
-
-@dataclass(frozen=True)
-class Bound(Row):
-    """A command in its old form."""
-
-    command: Command
-
-    @property
-    def settable(self) -> bool:
-        """Whether there is the command."""
-        return self.command.set is not None
-
-    @property
-    def askable(self) -> bool:
-        """Whether there is the query."""
-        return self.command.get is not None
-
-    def set(self, device: Any, parameters: list[str]) -> Steps[None] | None:
-        """Do what the command does."""
-        assert self.command.set
-        return self.command.set(parameters)
-
-    def ask(self, device: Any, parameters: list[str]) -> Steps[str] | str:
-        """Answer the query."""
-        assert self.command.get
-        return self.command.get(parameters)

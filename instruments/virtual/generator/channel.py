@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from instruments.virtual.core.device import Value
+    from instruments.virtual.core.parser import Value
     from instruments.virtual.generator.family import Family, Waveform
 
 #: The generator's own resistance [Ω], its greatest voltage without a load [V], and SCPI's infinity.

@@ -74,7 +74,7 @@ class VirtualGenerator(VirtualInstrument):
         """The state after ``*RST``: all outputs off."""
         for channel in self.channels:
             channel.stop()
-        self.settings |= self._defaults
+        self.settings |= self.commands.defaults
         for channel in self.channels:
             self.changed(channel.prefix + "output")
 
@@ -82,7 +82,7 @@ class VirtualGenerator(VirtualInstrument):
         """``*TRG``: starts what waits for it."""
         waiting = [channel for channel in self.channels if channel.waits and channel["trigger_source"] == "BUS"]
         if not waiting:
-            raise DeviceError(-211, "Trigger ignored")
+            raise ScpiError(-211)
         for channel in waiting:
             channel.trigger()
         self._notify()

@@ -123,7 +123,7 @@ class VirtualSDG1000X(VirtualInstrument):
 
     def reset(self) -> None:
         """The state after ``*RST``: all outputs off."""
-        self.settings |= self._defaults
+        self.settings |= self.commands.defaults
         self.changed("1:output")
 
     def _number(self, n: int, name: str) -> float:

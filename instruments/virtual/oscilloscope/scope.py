@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from instruments.virtual.core.device import Value, VirtualInstrument
+from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.parameters import block_content, block_text, choice, number, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Both, short_header
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from instruments.clock import Clock
+    from instruments.virtual.core.parser import Value
 
 #: Below the level by this part of a division the trigger is armed again.
 _HYSTERESIS = 0.3
