@@ -50,7 +50,7 @@ NO_FREQUENCIES = {
     "another channel's": "C2:BSWV WVTP,SINE,FRQ,1000HZ",
     "none": "C1:BSWV WVTP,SINE,PERI,0.001S",
     "no header": "1000HZ",
-    "twice": "C1:BSWV WVTP,SINE,FRQ,1000HZ,FRQ,2V",
+    "twice": "C1:BSWV WVTP,SINE,FRQ,1000HZ,FRQ,1900HZ",
     "volts": "C1:BSWV WVTP,SINE,FRQ,1000V",
     "no unit": "C1:BSWV WVTP,SINE,FRQ,1000",
     "a zero that is not printed": "C1:BSWV WVTP,SINE,FRQ,0100HZ",
@@ -79,6 +79,29 @@ def test_a_generator_prints_six_digits_and_ten_of_a_frequency():
     send(device, b"C1:OUTP LOAD,1234.5\nC1:BSWV FRQ,1e-6\n")
     assert ask(device, "C1:OUTP?") == "C1:OUTP OFF,LOAD,1234,PLRT,NOR"
     assert "FRQ,1e-06HZ,PERI,1e+06S" in ask(device, "C1:BSWV?")
+
+
+FIELDS = [  # the waveform that has it, the field, two values, what is there after a reset
+    ("SINE", "FRQ", ("25HZ", "1e-06HZ"), "1000HZ"),
+    ("SINE", "PERI", ("0.04S", "1000S"), "0.001S"),
+    ("SINE", "AMP", ("3V", "0.002V"), "4V"),
+    ("SINE", "OFST", ("-1.5V", "8V"), "0V"),
+    ("SINE", "PHSE", ("90", "360"), "0"),
+    ("SQUARE", "DUTY", ("20", "99"), "50"),
+    ("RAMP", "SYM", ("0", "100"), "50"),
+]
+
+
+@pytest.mark.parametrize(("waveform", "name", "values", "default"), FIELDS)
+def test_a_field_of_each_channel_is_set_asked_and_reset(waveform, name, values, default):
+    device = VirtualSDG1000X(VirtualClock())
+    for n, other in ((1, 2), (2, 1)):
+        for value in values:
+            send(device, f"C{n}:BSWV WVTP,{waveform},{name},{value}\n".encode())
+            assert f",{name},{value}" in ask(device, f"C{n}:BSWV?")
+        assert f",{name},{value}" not in ask(device, f"C{other}:BSWV WVTP,{waveform};C{other}:BSWV?")
+        send(device, b"*RST\n")
+        assert f",{name},{default}" in ask(device, f"C{n}:BSWV WVTP,{waveform};C{n}:BSWV?")
 
 
 def test_a_switch_that_did_not_move_is_refused():

@@ -148,6 +148,12 @@ def test_every_header_finds_its_own_row(name):
 
 
 @pytest.mark.parametrize("name", FAMILIES)
+def test_one_row_gives_the_default_of_a_setting(name):
+    given = [setting for row in hostile.instrument(name).commands.rows for setting in row.defaults()]
+    assert sorted(given) == sorted({*given})
+
+
+@pytest.mark.parametrize("name", FAMILIES)
 def test_every_row_is_set_asked_and_reset(name):
     device, fresh = prepared(name), reset(hostile.instrument(name))
     assert len(settings_of(name)) >= 4
