@@ -134,8 +134,9 @@ def test_a_model_understands_its_list_of_headers(name):
         command, query = found.get(header, (False, False))
         found[header] = command or row.settable, query or row.askable
     marks = {(True, False): "", (False, True): "?", (True, True): "[?]"}
-    listed = (HEADERS / f"{name}.txt").read_text(encoding="utf-8").splitlines()
-    assert sorted(header + marks[ways] for header, ways in found.items()) == sorted(listed)
+    path = HEADERS / f"{name}.txt"
+    listed = path.read_text(encoding="utf-8") if path.exists() else ""
+    assert "".join(sorted(f"{header}{marks[ways]}\n" for header, ways in found.items())) == listed, path
 
 
 @pytest.mark.parametrize("name", FAMILIES)
