@@ -37,7 +37,7 @@ from support.proxy import LOOPBACK, Proxy
 from support.wire_faults import FaultyBus, Tapped, Wire
 
 #: A time-out that a fault may make a program wait for, and one that only a failure reaches [s].
-SHORT, AT_MOST = 0.03, 10.0
+SHORT, AT_MOST = 0.03, 600.0
 
 NETWORK, SOCKET, SERIAL = "TCPIP0::box::inst0::INSTR", "TCPIP0::box::5025::SOCKET", "ASRLbox::INSTR"
 
