@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 import shutil
@@ -10,7 +11,7 @@ import sys
 from datetime import datetime, timedelta
 from html.parser import HTMLParser
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -24,6 +25,9 @@ from levilab.runs.run import RunRecord
 from support.paths import SAMPLE_DATA
 from support.spin_downs import spin_down_csv
 from support.waiting import HANG_GUARD_S
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 
 def render(found: SpinDownAnalysis) -> str:
@@ -75,8 +79,17 @@ def changed(run: Path, **entries: object) -> Path:
     return run
 
 
+@contextlib.contextmanager
+def without_figures() -> Iterator[None]:
+    """Where the text alone is looked at: drawing is most of what a page costs."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Analysis, "svg", lambda *_: "<svg/>")
+        yield
+
+
 def text_of(*paths: Path, options: SpinDownOptions | None = None) -> str:
-    return " ".join(Page(render(analyze_spindowns(paths, options or SpinDownOptions()))).text.split())
+    with without_figures():
+        return " ".join(Page(render(analyze_spindowns(paths, options or SpinDownOptions()))).text.split())
 
 
 @pytest.fixture
@@ -208,7 +221,8 @@ def test_a_law_is_marked_best_only_where_the_readings_decide(tmp_path: Path, rea
 
 
 def reported(*paths: Path, output: Path, tell: Any = None, **options: Any) -> str:
-    page = write_report(paths, output, options, tell).read_text(encoding="utf-8")
+    with without_figures():
+        page = write_report(paths, output, options, tell).read_text(encoding="utf-8")
     return " ".join(Page(page).text.split())
 
 
