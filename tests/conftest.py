@@ -18,9 +18,10 @@ SLOW = """
     analysis/spindown/test_fit.py  analysis/spindown/test_tilt.py
     instruments/virtual/bench/test_fuzz.py  instruments/virtual/core/test_long_lines.py
     instruments/virtual/servers/test_at_work.py
-    instruments/wire_faults
-    levilab/acquisition/test_limit.py  levilab/acquisition/test_loop.py  levilab/acquisition/test_losses.py
-    levilab/acquisition/test_precession.py  levilab/acquisition/test_trace.py
+    instruments/links/test_wire_faults.py  instruments/links/test_wire_proxy.py
+    levilab/acquisition/experiments/test_limit.py  levilab/acquisition/experiments/test_precession.py
+    levilab/acquisition/experiments/test_trace.py  levilab/acquisition/test_loop.py
+    levilab/acquisition/test_losses.py
     levilab/benchmark  levilab/cli/test_main.py  levilab/crosscheck
     levilab/formats/waveforms/test_memory.py  levilab/motion  levilab/notebook
     levilab/pipelines/spindown  levilab/pipelines/test_result.py
