@@ -74,6 +74,7 @@ def test_acquire_analyze_report_and_list_from_an_empty_folder(
     assert "one" in listed
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_json_is_one_document_and_nothing_else(levilab: Command) -> None:
     acquired = json.loads(levilab("acquire", "spin", "--mock", "--seed", "3", "--json").stdout)
     assert acquired["status"] == "finished"
@@ -83,6 +84,7 @@ def test_json_is_one_document_and_nothing_else(levilab: Command) -> None:
     assert listed["readings"] == acquired["readings"]
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_no_save_writes_nothing_and_out_writes_there(levilab: Command, tmp_path: Path) -> None:
     path = spin_down_csv(tmp_path / "my.csv")
     levilab("analyze", "spindown", path, "--no-save")
@@ -91,6 +93,7 @@ def test_no_save_writes_nothing_and_out_writes_there(levilab: Command, tmp_path:
     assert sorted(p.name for p in (tmp_path / "there").iterdir()) == ["my.csv.result.json", "my.csv.spindown.png"]
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_an_analysis_need_not_be_named(levilab: Command, sample_data: Path) -> None:
     run = sample_data / "spin-down-1"
     named = levilab("analyze", "spindown", run, "--no-save")
@@ -107,6 +110,7 @@ def test_an_analysis_need_not_be_named(levilab: Command, sample_data: Path) -> N
     assert "Did you mean 'spindown'" in levilab("analyze", "spindwon", check=2).stderr
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_options_may_stand_before_the_name_of_an_analysis(levilab: Command, sample_data: Path) -> None:
     named = levilab("analyze", "spindown", sample_data, "--no-save").stdout
     for first in (["--out", "spindown"], ["--out=there"], ["--no-save"], ["--uncertainty", "covariance"]):
@@ -130,6 +134,7 @@ def test_the_spin_of_a_record_is_printed_and_written_beside_it(
     assert "30.0009(4)" in page
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_notes_name_options_on_the_terminal_and_quantities_where_stored(
     levilab: Command, tmp_path: Path, sample_data: Path
 ) -> None:
@@ -147,6 +152,7 @@ def test_notes_name_options_on_the_terminal_and_quantities_where_stored(
         assert text.count("passed over") == 1
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_two_files_in_a_folder_have_a_result_each_that_the_report_reads(levilab: Command, tmp_path: Path) -> None:
     for k, name in enumerate(("a.csv", "b.csv")):
         levilab("analyze", "spindown", spin_down_csv(tmp_path / name, seed=k), "--uncertainty", "profile")
@@ -161,6 +167,7 @@ def test_two_files_in_a_folder_have_a_result_each_that_the_report_reads(levilab:
     assert "other options than those of b.csv.result.json" in page
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_what_does_not_belong_to_the_analysis_is_a_message_and_no_warning(levilab: Command, sample_data: Path) -> None:
     done = levilab("analyze", "spindown", sample_data, "--no-save")
     assert "passed over" not in done.stdout
@@ -175,6 +182,7 @@ def test_a_result_that_is_damaged_ends_the_report_with_one_line(levilab: Command
     assert line.startswith(f"levilab: {tmp_path / 'my.csv.result.json'}: is cut off")
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_columns_of_another_name_are_mapped(levilab: Command, tmp_path: Path) -> None:
     path = spin_down_csv(tmp_path / "my.csv", u=False)
     path.write_text(path.read_text().replace("time_s,spin_frequency_hz", "Uhr,Kanal 2").replace(",", ";"), "utf-8")
@@ -266,6 +274,7 @@ def test_an_instrument_that_does_not_answer_is_status_3(levilab: Command, tmp_pa
     assert list((tmp_path / "runs").iterdir()) == []  # there is nothing to keep
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_a_run_is_meant_by_its_short_name(levilab: Command) -> None:
     run = json.loads(levilab("acquire", "spin", "--mock", "--json").stdout)["run"]
     short = run.split("Z-")[1]
@@ -315,6 +324,7 @@ def test_a_finished_run_is_not_resumed(levilab: Command) -> None:
     assert "is finished" in levilab("acquire", "spin", "--resume", run, check=1).stderr
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_a_result_that_cannot_be_written_is_shown_all_the_same(levilab: Command, tmp_path: Path) -> None:
     path = spin_down_csv(tmp_path / "my.csv")
     done = levilab("analyze", "spindown", path, "--out", path / "below", check=1)

@@ -209,6 +209,7 @@ def test_a_folder_without_runs_says_what_it_found(sample_data: Path, tmp_path: P
         analyze_spindowns([tmp_path], SpinDownOptions())
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_a_folder_that_cannot_be_written_is_told_in_one_line(sample_data: Path, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     analysis = analyze_spindowns([sample_data], SpinDownOptions())
