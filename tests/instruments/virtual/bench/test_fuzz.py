@@ -524,7 +524,7 @@ PAIRINGS = {
 }
 
 
-#: One way for each driver, so that each way has its turn: links/test_wire_faults.py tries all drivers on all ways.
+#: One way for each driver, so that each way has its turn; links/test_wire_faults.py strikes on all ways.
 PAIRED = [(name, ways[k % 2]) for k, (name, ways) in enumerate((name, BOTH[name in SERIAL]) for name in FAMILIES)]
 
 
