@@ -34,10 +34,11 @@ from instruments.virtual.servers.serial_port import HAS_PSEUDO_TERMINALS
 from instruments.virtual.servers.server import BenchServer
 from support import hostile
 from support.proxy import LOOPBACK, Proxy
+from support.waiting import HANG_GUARD_S
 from support.wire_faults import FaultyBus, Tapped, Wire
 
 #: A time-out that a fault may make a program wait for, and one that only a failure reaches [s].
-SHORT, AT_MOST = 0.03, 600.0
+SHORT, AT_MOST = 0.03, HANG_GUARD_S
 
 NETWORK, SOCKET, SERIAL = "TCPIP0::box::inst0::INSTR", "TCPIP0::box::5025::SOCKET", "ASRLbox::INSTR"
 

@@ -9,9 +9,8 @@ import pytest
 
 from instruments.errors import NoAnswer, NotConnected
 from instruments.links.visa import VisaTransport
+from support.waiting import HANG_GUARD_S as AT_MOST
 
-#: How long a test waits for its own server before it fails [s]; reached by a failure only, however busy the machine.
-AT_MOST = 600.0
 #: A time-out that is meant to be reached [s].
 SHORT = 0.05
 

@@ -20,9 +20,7 @@ from levilab.cli.bench import bench_app
 from levilab.errors import UsageError
 from levilab.world.bench import own_world, virtual_bus
 from levilab.world.serve import Service, chosen_models, serve
-
-#: How long something is waited for [s]; reached by a failure only, however busy the machine is.
-AT_MOST = 600.0
+from support.waiting import HANG_GUARD_S as AT_MOST
 
 
 @contextlib.contextmanager
