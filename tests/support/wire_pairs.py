@@ -14,6 +14,7 @@ import pyvisa_py.protocols.rpc
 import pyvisa_py.tcpip
 import serial.urlhandler.protocol_socket
 
+import instruments.virtual.servers.hislip
 from instruments.drivers.counter.keysight_53230a import Keysight53230A
 from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
 from instruments.drivers.generator.agilent_33220a import Agilent33220A
@@ -340,7 +341,10 @@ class _Bound:
 
 @contextlib.contextmanager
 def hasty_clients():
-    """The clients without waits of their own: at a device clear, at the end of a connection, and for its last words."""
+    """The clients without waits of their own: at a device clear, at the end of a connection, and for its last words.
+
+    The servers send away none that a busy machine delays.
+    """
     receive = pyvisa_py.protocols.rpc._recvrecord
 
     def receive_soon(sock, timeout, **more):
@@ -352,6 +356,7 @@ def hasty_clients():
         mock.patch.object(pyvisa_py.tcpip.Vxi11CoreClient, "destroy_link", return_value=0),
         mock.patch.object(serial.urlhandler.protocol_socket, "time", SimpleNamespace(sleep=lambda _: None)),
         mock.patch.object(serial, "protocol_handler_packages", ["serial.urlhandler", "instruments.virtual.bench"]),
+        mock.patch.multiple(instruments.virtual.servers.hislip, FIRST_WORDS=AT_MOST, SECOND_CHANNEL=AT_MOST),
     ):
         yield
 

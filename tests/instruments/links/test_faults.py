@@ -270,6 +270,8 @@ def served_box(way):
 @pytest.mark.parametrize("what", FAULTS)
 @pytest.mark.parametrize("way", ["socket", "hislip", "vxi11"])
 def test_over_a_server_a_fault_is_told_as_what_it_is_and_the_next_question_gets_its_own_answer(way, what, monkeypatch):
+    monkeypatch.setattr("instruments.virtual.servers.hislip.FIRST_WORDS", AT_MOST)  # a busy machine delays the client
+    monkeypatch.setattr("instruments.virtual.servers.hislip.SECOND_CHANNEL", AT_MOST)
     if what in LOST:  # pyvisa-py looks until its time-out for more on a connection that has ended, and at its farewell
         monkeypatch.setattr("pyvisa_py.protocols.rpc._recvrecord", received_before_the_end)
         monkeypatch.setattr("pyvisa_py.tcpip.Vxi11CoreClient.destroy_link", lambda *_: 0)
