@@ -112,6 +112,10 @@ class NotHeld(Exception):
         super().__init__(f"{seen} under a drive of {drive:.2f} Hz")
 
 
+class PointFailed(Exception):
+    """Nothing can be measured at a point of a sweep, though the top is held: the sweep goes on to the next one."""
+
+
 # --- up ---
 
 
@@ -332,7 +336,7 @@ def sweep_drive(
         session: the acquisition.
         points: frequencies of the drive, in order [Hz].
         measure: measures at a frequency at which the drive now is, and keeps the reading itself.  Raises NotHeld where
-            the top is lost, or not locked.
+            the top is lost, or not locked; PointFailed where another try at this point would not help.
         within_s: how long a person has to float a top [s].
         most_failed: so many points that fail one after the other end the sweep.
 
@@ -394,6 +398,9 @@ class _Sweep:
             except InstrumentError as error:
                 self.at = None
                 reach_generator_again(session, error)
+            except PointFailed as failed:
+                self.at = self.held = drive
+                return str(failed)
             else:
                 self.at = self.held = drive
                 return ""

@@ -206,9 +206,34 @@ class Session(Generic[S]):
             self.show.message("  ".join(f"{_head(one):>{_width(one)}}" for one in self._shown))
         self.show.reading(self._in_words(row), row["time_s"], time_left_s)
 
-    def keep_trace(self, trace: Trace, channel: str) -> int:
-        """Write an oscilloscope's record down, raw.  channel: what it shows.  Returns its number in the run."""
-        return self.writer.trace(self.now(), trace, channel)
+    def keep_trace(self, input_: int, channel: str, time_s: float) -> Trace:
+        """Fetch a record from the oscilloscope and write it down, raw, while it comes.
+
+        What has come when the link breaks is kept as a record that is shorter than announced.
+
+        Args:
+            input_: of the oscilloscope.
+            channel: what it shows.
+            time_s: when the record was taken.
+
+        Raises:
+            InstrumentError: as the driver's `trace`.
+        """
+
+        def arrived(part: Trace, points: int) -> None:
+            self.writer.arriving(time_s, part, channel, points)
+
+        try:
+            trace = self.bench.oscilloscope.trace(input_, arrived)
+        except SettingsLost:
+            self.writer.forget_what_arrived()
+            raise
+        except InstrumentError:
+            if cut_short := self.writer.keep_what_arrived():
+                self.event("cut short", cut_short)
+            raise
+        self.writer.trace(time_s, trace, channel)
+        return trace
 
     def _in_words(self, row: Row) -> str:
         """The values of a reading as they stand in a line, below their heads."""

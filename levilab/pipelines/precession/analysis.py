@@ -196,9 +196,9 @@ def _coherences(source: Source[Readings]) -> tuple[tuple[PointCoherence, ...], t
     for laser, drive in pairwise(traces):
         if (laser.channel, drive.channel) != ("laser", "drive"):
             continue
-        # a record is kept before its point's reading is
-        point = int(np.searchsorted(source.readings.time, laser.time_s - _AT_ONCE_S))
-        if point >= len(source.readings):
+        # a record is taken once its point's reading is kept
+        point = int(np.searchsorted(source.readings.time, laser.time_s + _AT_ONCE_S, side="right")) - 1
+        if point < 0:
             continue
         try:
             found.append(PointCoherence(point, _coherence(laser, drive, float(source.readings.drive[point]))))

@@ -91,6 +91,7 @@ def read_spin_run(run: Run, options: InputOptions) -> Records:
         f"{run.folder.name}: {path} has no line in {INDEX}, as a process that was killed leaves it: it is left out"
         for path in undescribed_codes(run.folder)
     ]
+    warnings += [f"{run.folder.name}: record {one.number} {one.how_short}" for one in run.traces() if one.announced]
     if options.channel is None and len(names) > 1:
         warnings.append(
             f"{run.folder.name}: has records of {', '.join(names)}; {chosen} is analyzed, "
