@@ -11,6 +11,8 @@ from levilab.formats.titles import (
     COMPANIONS,
     UNITS,
     Title,
+    as_a_period,
+    companion,
     dimension,
     foreign_unit,
     implied_unit,
@@ -47,12 +49,21 @@ class NoSuchColumn(TableError, DoesNotSuit):
 
 @dataclass(frozen=True)
 class Column:
-    """A column that is used: canonical `name`, 0-based `index` and `label` in the file, `factor` to SI."""
+    """A column that is used.
+
+    Attributes:
+        name: canonical.
+        index: in the file, from 0 on.
+        label: in the file.
+        factor: to SI.
+        inverse: the file has the inverse of the quantity, a period [s] after the factor, or that one's uncertainty.
+    """
 
     name: str
     index: int
     label: str
     factor: float
+    inverse: bool = False
 
 
 def shown(text: str, most: int = 40) -> str:
@@ -82,13 +93,15 @@ def choose_columns(
         units: the row of units beneath, or nothing.
         wanted: {canonical name, or t, f, u: title or 1-based number}; goes before what the titles say.  A unit may
             follow in brackets where the file gives none: ``Drehzahl [rpm]``.
-
         quantities: canonical names looked for.
+
+    Returns:
+        The columns, in the order of the canonical names, and the warnings.
 
     Raises:
         TableError: a wanted column does not exist, a quantity has two columns, or units contradict each other.
     """
-    titles = [read_title(text) for text in header]
+    titles = _with_periods(header)
     chosen, stated = _wanted_columns(path, header, wanted)
     offered: dict[str, list[int]] = {}
     warnings = []
@@ -97,7 +110,8 @@ def choose_columns(
             continue
         if title.column in chosen or index in chosen.values():
             continue
-        if title.unit is not None and unit_factor(title.unit, dimension(title.column)) is None:
+        known = title.inverse or title.unit is None or unit_factor(title.unit, dimension(title.column)) is not None
+        if not known and not _is_of_a_period(title, titles):
             warnings.append(_unknown_unit(path, header[index], title))
         else:
             offered.setdefault(title.column, []).append(index)
@@ -105,6 +119,12 @@ def choose_columns(
     written = {name: _written_unit(path, name, index, header, units) for name, index in chosen.items()} | stated
     columns = []
     for name, index in chosen.items():
+        period = titles[chosen.get(COMPANIONS.get(name, name), index)]
+        if period.inverse and name not in stated and not written[name]:
+            # an uncertainty without a unit has that of its period
+            unit = (titles[index] if _is_of_a_period(titles[index], titles) else period).unit
+            columns.append(Column(name, index, header[index], unit_factor(unit or "s", "time") or 1, inverse=True))
+            continue
         # An uncertainty without a unit has that of its quantity: "rpm,u" gives both in 1/min.
         unit = written[name] or written.get(COMPANIONS.get(name, ""))
         other = None if unit else foreign_unit(header[index], dimension(name))
@@ -119,10 +139,28 @@ def choose_columns(
     return tuple(sorted(columns, key=lambda c: CANONICAL.index(c.name))), tuple(warnings)
 
 
+def _with_periods(header: Sequence[str]) -> list[Title]:
+    """What the titles say, with T for a period beside a time; periods do not count beside a frequency."""
+    titles = [read_title(text) for text in header]
+    if sum(title.column == "time_s" for title in titles) > 1:
+        titles = [as_a_period(text) or title for text, title in zip(header, titles, strict=True)]
+    if any(title.column == "spin_frequency_hz" and not title.inverse for title in titles):
+        titles = [Title(None, title.unit) if title.inverse else title for title in titles]
+    return titles
+
+
+def _is_of_a_period(title: Title, titles: Sequence[Title]) -> bool:
+    """Whether a title is that of the uncertainty of a period, in a unit of time."""
+    times = title.unit is not None and unit_factor(title.unit, "time") is not None
+    return times and title.column == companion("spin_frequency_hz") and any(one.inverse for one in titles)
+
+
 def how_else(title: str) -> str:
     """What to do with a column that is not what is wanted."""
-    work_out = nearly_a_frequency(title)
-    return f"write {work_out} into the column, in Hz" if work_out else "say which unit it is, as NAME [Hz]"
+    unit = read_title(title).unit
+    if unit and unit_factor(unit, "time"):
+        return f"correct it, or if these are the times of a turn call the column period [{shown(unit)}]"
+    return nearly_a_frequency(title) or "say which unit it is, as NAME [Hz]"
 
 
 def _wanted_columns(
@@ -177,9 +215,10 @@ def _only_one(path: Path, header: Sequence[str], name: str, indices: list[int]) 
         return (exact or indices)[0]
     key = next((short for short, long in SHORTHANDS.items() if long == name), name)
     numbers = " or ".join(f"{key}={index + 1}" for index in indices)
+    period = "; if T is the time of a turn say its unit, as T [ms]" if any(header[i] == "T" for i in indices) else ""
     raise TableError(
         path,
-        f"columns {listed(header[i] for i in indices)} could each be {name}; say which: `columns` = {numbers}",
+        f"columns {listed(header[i] for i in indices)} could each be {name}; say which: `columns` = {numbers}{period}",
     )
 
 

@@ -26,7 +26,16 @@ from levilab.formats.columns import (
 from levilab.formats.dialect import Dialect
 from levilab.formats.layout import Layout, sniff
 from levilab.formats.rows import Rows, read_rows
-from levilab.formats.titles import CANONICAL, COMPANIONS, EXAMPLES, companion, nearly_a_frequency
+from levilab.formats.titles import (
+    CANONICAL,
+    COMPANIONS,
+    EXAMPLES,
+    QUANTITIES,
+    companion,
+    dimension,
+    nearly_a_frequency,
+    read_title,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -185,7 +194,11 @@ def _key(name: str) -> str:
 def _no_column(path: Path, name: str, header: Sequence[str]) -> NoSuchColumn:
     text = f"no column is known to be {name}; it has {listed(header)}: say `columns` = {_key(name)}=NAME"
     nearly = next((title for title in header if nearly_a_frequency(title)), None) if "frequency" in name else None
-    if nearly:
+    foreign = next((title for title in header if read_title(title).column == name), None)
+    if foreign:
+        unit = shown(read_title(foreign).unit or "")
+        text = f"column '{shown(foreign)}' is in {unit}, which is no unit of {dimension(name)}: {how_else(foreign)}"
+    elif nearly:
         text = f"no column is known to be {name}; '{shown(nearly)}' could become one: {how_else(nearly)}"
     return NoSuchColumn(path, text)
 
@@ -250,6 +263,7 @@ def _table(
     numbers = dict(zip(chosen, rows.values, strict=False))
     # The comparison is false for NaN, too.
     present = {column: np.abs(values) < NO_READING for column, values in numbers.items()}
+    present = {column: there & (numbers[column] != 0) if column.inverse else there for column, there in present.items()}
     companions = {companion(column.name) for column in chosen} | COMPANIONS.keys()
     quantity = [p for c, p in present.items() if c.name not in companions]
     read = np.logical_and.reduce(quantity) if quantity else np.ones(rows.lines.size, bool)
@@ -266,6 +280,10 @@ def _table(
         notes.append(_missed(name, lines[~good], good.size))
         lines, kept = lines[good], {column: values[good] for column, values in kept.items()}
     frame = {c.name: values if c.factor == 1 else values * c.factor for c, values in kept.items()}
+    for name in [c.name for c in kept if c.inverse and c.name in QUANTITIES]:
+        frame[name] = 1 / frame[name]
+        if any(c.inverse and c.name == companion(name) for c in kept):
+            frame[companion(name)] = frame[companion(name)] * frame[name] ** 2  # u(1/T) = u(T)/T²
     return Table(path, pd.DataFrame(frame, dtype=np.float64), tuple(notes), header, lines)
 
 
