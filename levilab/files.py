@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from levilab.errors import LevilabError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
 
@@ -109,6 +110,20 @@ def _refuse_surrogates(text: str) -> None:
         text.encode()
     except UnicodeEncodeError:
         raise ValueError("a text in it holds half a surrogate pair") from None
+
+
+@contextlib.contextmanager
+def writing(what: str, advice: str = "choose another place with `out`") -> Iterator[None]:
+    """Raise CannotWrite, in a sentence, for what the operating system refuses.
+
+    Args:
+        what: the beginning of the sentence: what could not be written, and where.
+        advice: what to do.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise CannotWrite(f"{what} ({error.strerror or error}): {advice}") from error
 
 
 def replace_atomically(path: Path, content: str | bytes) -> None:

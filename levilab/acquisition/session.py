@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from levilab.bench.bench import Bench
     from levilab.bench.person import Person, Task
     from levilab.interruption import Stop
-    from levilab.present.progress import Show
+    from levilab.present.progress import Display
     from levilab.runs.channel import Channel
     from levilab.runs.run import Run
     from levilab.runs.writer import RunWriter
@@ -75,7 +75,7 @@ class Session(Generic[S]):
     settings: S
     channels: tuple[Channel, ...]
     writer: RunWriter
-    show: Show
+    show: Display
     stop: Stop
     person: Person = ask_no_person
     earlier: Earlier | None = None

@@ -6,7 +6,7 @@ import json
 import sys
 from typing import TYPE_CHECKING, Any
 
-from levilab.files import CannotWrite, replace_atomically
+from levilab.files import replace_atomically, writing
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -37,12 +37,8 @@ def give(
     else:
         print_tables()
     if out is not None:
-        try:
+        with writing(f"{out}: the result cannot be written"):
             out.mkdir(parents=True, exist_ok=True)
             replace_atomically(out / f"{name}.json", text + "\n")
             save_figure(out / f"{name}.png")
-        except OSError as error:
-            raise CannotWrite(
-                f"{out}: the result cannot be written ({error.strerror or error}): choose another place with `out`"
-            ) from None
         print(f"wrote {out / name}.json and {out / name}.png", file=sys.stderr)  # noqa: T201

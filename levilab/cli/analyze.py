@@ -385,7 +385,7 @@ def _write_and_print(
             failures += [failure] if failure else []
             messages += [f"wrote {path}" for path in written]
     if as_json:
-        documents = [analysis.document(found, out or found.home) for analysis, found in results]
+        documents = [analysis.document(found, out or found.output_folder) for analysis, found in results]
         print_json(documents[0] if len(documents) == 1 else documents, sort_keys=True)
     else:
         for analysis, found in results:

@@ -60,7 +60,7 @@ class Analyzed(Generic[S, R, T, Opt]):
     origins: tuple[Origin[Opt], ...]
 
     @property
-    def home(self) -> Path:
+    def output_folder(self) -> Path:
         """The folder that the result belongs to."""
         return self.place.folder
 

@@ -241,7 +241,7 @@ def save(analysis: Analysis[A], found: A, folder: Path | None = None) -> list[Pa
     rows = [row for row in ANALYSES.values() if run is None or row.needs.take(run)]
     if run is not None:
         rows = [row for row in rows if _is_for_run(row, run)] or rows
-    place = replace(found.place, folder=folder or found.home)
+    place = replace(found.place, folder=folder or found.output_folder)
     first = rows[0].name == analysis.name and not (folder and is_of_another(place.result(), analysis.name))
     return save_files(analysis.result.of(found, place), place, analysis.png(found), first=first)
 

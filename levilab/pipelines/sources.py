@@ -147,7 +147,7 @@ def collect(paths: Sequence[Path], needs: Needs[R], options: Callable[[Path], In
             remarks += here.remarks
         else:
             found.append(_one(path, needs, options(path)))
-    return Found(_named(_without_copies(found, warnings)), tuple(warnings), tuple(remarks))
+    return Found(_with_short_names(_without_copies(found, warnings)), tuple(warnings), tuple(remarks))
 
 
 def _without_copies(found: Sequence[Source[R]], warnings: list[str]) -> list[Source[R]]:
@@ -163,7 +163,7 @@ def _without_copies(found: Sequence[Source[R]], warnings: list[str]) -> list[Sou
     return [source for source in found if any(source is one for one in kept[len(source.readings)])]
 
 
-def _named(sources: Sequence[Source[R]]) -> tuple[Source[R], ...]:
+def _with_short_names(sources: Sequence[Source[R]]) -> tuple[Source[R], ...]:
     """Names that differ: the last part of the path, or as many more as it takes."""
     for parts in range(1, 10):
         names = ["/".join(source.path.resolve().parts[-parts:]) for source in sources]

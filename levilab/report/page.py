@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import UsageError, unquoted
-from levilab.files import CannotWrite, replace_atomically
+from levilab.files import replace_atomically, writing
 from levilab.pipelines.catalogue import recall_suiting, remarks
 from levilab.pipelines.document import NO_RESULT
 from levilab.report.inputs import About, describe
@@ -56,13 +56,9 @@ def write_report(
         raise UnknownFormat("output", expected, value=output)
     results = recall_suiting(paths, given or {}, tell)
     page = render(results)
-    try:
+    with writing(f"{output}: could not be written", "choose another place with `output`"):
         output.parent.mkdir(parents=True, exist_ok=True)
         replace_atomically(output, page)
-    except OSError as error:
-        raise CannotWrite(
-            f"{output}: could not be written ({error.strerror or error}): choose another place with `output`"
-        ) from error
     if tell:
         for remark in remarks([found.remarks for _, found in results]):
             tell(remark)

@@ -23,7 +23,7 @@ from levilab.simulator.keys import SceneError
 from levilab.simulator.model import model_of
 from levilab.simulator.problem import NOWHERE, Problem, end_at, scheme_for, travelled
 from levilab.simulator.schemes import SCHEMES
-from levilab.simulator.single import ROOM, check, simulate
+from levilab.simulator.single import MIN_STEPS_FOR_DOUBLING, check, simulate
 from levilab.simulator.start import start_of
 from levilab.simulator.stops import stops_between
 
@@ -261,7 +261,7 @@ def _estimates(some: list[_Top], states: Array, steps: Array) -> tuple[Array, Ar
     """Estimated errors of places [m] and axes [rad] at the ends, shape (n,) each."""
     problem, lasted = some[0].problem, states[:, TIME]
     # where a fall or a kink of the drive leaves no room for longer steps, half of them tell as much
-    room = (lasted > ROOM * steps) & ~np.array([one.kinked for one in some])
+    room = (lasted > MIN_STEPS_FOR_DOUBLING * steps) & ~np.array([one.kinked for one in some])
     lengths = [np.where(room, times * steps, np.minimum(steps, lasted) / 2) for times in (2, 4)]
     twice = _coarse(some, lasted, lengths[0])
     four = _coarse(some, lasted, lengths[1]) if np.any(room) else twice

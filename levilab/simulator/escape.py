@@ -60,7 +60,7 @@ def at_the_crossing(
         up, sideways = _margins(states, escape)
         margin = np.where(height, up, sideways)
         low, high = np.where(margin > 0, time, low), np.where(margin > 0, high, time)
-        newton = time + margin / (_signed(states, height))
+        newton = time + margin / (_margin_rates(states, height))
         better = np.where((newton > low) & (newton < high), newton, (low + high) / 2)
         if np.all(np.abs(better - time) <= 1e-15 * lengths):
             break
@@ -70,7 +70,7 @@ def at_the_crossing(
     return states
 
 
-def _signed(states: Array, height: NDArray[np.bool_]) -> Array:
+def _margin_rates(states: Array, height: NDArray[np.bool_]) -> Array:
     """How fast the margin shrinks [m/s]; 1e-300 where it does not, which sends Newton out of the bracket."""
     x, y, _ = states[:, R].T
     vx, vy, vz = states[:, V].T

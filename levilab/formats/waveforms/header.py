@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from levilab.formats.columns import NoSuchColumn, TableError, listed, shown
-from levilab.formats.dialect import Dialect, filled, find_dialect
+from levilab.formats.dialect import Dialect, filled_count, find_dialect
 from levilab.formats.layout import SAMPLE, Layout, lay_out
 from levilab.formats.titles import QUANTITIES, is_unit, plain_unit, read_title, unit_factor
 
@@ -232,7 +232,7 @@ def _titled(_: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header 
     first = _first_row(rows, 1, 0, dialect)
     if factor is None or first is None:
         return None
-    columns = [SampleColumn(_signal(rows[0][k]), *_from_unit(rows[1], k)) for k in range(1, filled(rows[0]))]
+    columns = [SampleColumn(_signal(rows[0][k]), *_from_unit(rows[1], k)) for k in range(1, filled_count(rows[0]))]
     return Header(
         "Keysight CSV" if rows[0][0].casefold() == "x-axis" else "Rigol CSV with times",
         dialect,
@@ -247,7 +247,7 @@ def _beside(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Head
     """Tektronix TDS: the header stands beside the first rows, time and samples in the last columns."""
     if len(rows) < 2 or rows[0][0].casefold() != "record length" or len(rows[0]) < 5:
         return None
-    time = filled(rows[0]) - 2
+    time = filled_count(rows[0]) - 2
     if time < 2 or not all(_is_number(text, dialect) for text in rows[0][time : time + 2]):
         return None
     keys = _keys(rows)
@@ -282,7 +282,7 @@ def _keyed(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Heade
     names = [cell for cell in keys.get("source", ()) if cell]
     units = [cell.partition(":") for cell in keys.get("vertical units", ()) if cell]
     columns = []
-    for k in range(1, filled(rows[titles])):
+    for k in range(1, filled_count(rows[titles])):
         title, given = rows[titles][k], units[k - 1] if k <= len(units) else ("", "", "")
         worded = title.casefold() in _VOLTS or is_unit(title)
         name = names[k - 1] if k <= len(names) else (given[0] if given[1] else "")

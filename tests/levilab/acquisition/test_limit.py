@@ -80,10 +80,10 @@ def test_the_upper_limit_is_where_drag_takes_all_that_the_drive_can_give(tmp_pat
 class Slipping(SpinWorld):
     """The drive loses the top when it is set above 36 Hz."""
 
-    def _go_on(self, now: Any) -> None:
+    def _plan_future(self, now: Any) -> None:
         if self._drive_spin > 2 * math.pi * 36:
             self._hold = 0.0
-        super()._go_on(now)
+        super()._plan_future(now)
 
 
 #: An upper limit, soon: from 34 Hz at 0.1 Hz/s.
