@@ -34,10 +34,15 @@ def _zero(function: Callable[[float], float], low: float, high: float, *, xtol: 
 
 @dataclass(frozen=True)
 class SymmetricTop:
-    """A symmetric top.  mass [kg]; transverse, axial: I₁, I₃ [kg m²]; moment [A m²], signed; gravity [m/s²].
+    """A symmetric top.
 
-    stiffnesses: of an upright magnet that is no point, heights, shape (n,) → ∂²E/∂θ², ∂²E/∂x², ∂²E/∂x∂θ of its energy,
-    shape (3, n) [J, J/m², J/m]; None: those of a point, μB, μB″/2, μB′/2.
+    Attributes:
+        mass: [kg].
+        transverse, axial: I₁, I₃ [kg m²].
+        moment: signed [A m²].
+        gravity: [m/s²].
+        stiffnesses: of an upright magnet that is no point, heights, shape (n,) → ∂²E/∂θ², ∂²E/∂x², ∂²E/∂x∂θ of its
+            energy, shape (3, n) [J, J/m², J/m]; None: those of a point, μB, μB″/2, μB′/2.
     """
 
     mass: float
@@ -59,7 +64,9 @@ class SymmetricTop:
 class Window:
     """Heights at which a top whose moment follows the field is stable; masses that float there.
 
-    low, high [m]; light, heavy [kg]: of a top of the given moment, which stands against the field.
+    Attributes:
+        low, high: [m].
+        light, heavy: of a top of the given moment, which stands against the field [kg].
     """
 
     low: float
@@ -72,8 +79,10 @@ class Window:
 class Equilibrium:
     """A height at which field and weight balance for an upright top.
 
-    height [m]; axial, radial: stiffness over mass [1/s²] of a moment that follows the field, positive if stable;
-    spins: the windows of spin [Hz] in which small motions stay small, from the quartic.
+    Attributes:
+        height: [m].
+        axial, radial: stiffness over mass of a moment that follows the field, positive if stable [1/s²].
+        spins: the windows of spin in which small motions stay small, from the quartic [Hz].
     """
 
     height: float

@@ -6,6 +6,7 @@ import contextlib
 import json
 import math
 import os
+import re
 import time
 import tomllib
 from typing import TYPE_CHECKING, Any
@@ -50,14 +51,25 @@ def parse_toml(text: str) -> dict[str, Any]:
     """
     try:
         table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError:
-        raise
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"{error}{_hint(text, str(error))}") from error
     except RecursionError:
         raise ValueError(_TOO_DEEP) from None
     except ValueError:  # Python reads no more than 4300 digits
         raise ValueError(_TOO_LARGE) from None
     _refuse_oddities(table, finite=False)
     return table
+
+
+def _hint(text: str, said: str) -> str:
+    """What is wrong with a number at which TOML was left, as the rest of a sentence; empty for anything else."""
+    place = re.search(r"line (\d+)", said)
+    line = text.splitlines()[int(place[1]) - 1] if place and int(place[1]) <= len(text.splitlines()) else ""
+    if re.search(r"=\s*[+-]?\d+,\d", line):
+        return "; write a decimal point, not a comma"
+    if re.search(r"=\s*[+-]?\d[\d.]*\s*[A-Za-zµ°%]", line):
+        return "; write the number without its unit, which is in the key's name"
+    return ""
 
 
 _TOO_DEEP = f"it is nested more than {DEEPEST} levels deep"

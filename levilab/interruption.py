@@ -16,7 +16,10 @@ _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "S
 
 
 class Interrupted(BaseException):
-    """The run was asked to end.  by: the signal's name.
+    """The run was asked to end.
+
+    Attributes:
+        by: the signal's name.
 
     No Exception, so that no library on the way takes it for a failure of its own.
     """

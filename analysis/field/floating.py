@@ -50,9 +50,13 @@ _OF_TOP = ("mass", "transverse", "axial", "moment", "height")
 class KnownTop:
     """What is known of the top.
 
-    transverse, axial: I₁, I₃ [kg m²]; moment: its size [A m²]; mass [kg]; height: where it floats, on the scale of the
-    scan's heights [m]; with mass and height the moment follows from them.  covariance: of mass, I₁ and I₃, where they
-    come from the same parts, shape (3, 3).
+    Attributes:
+        transverse, axial: I₁, I₃ [kg m²].
+        moment: its size [A m²].
+        mass: [kg].
+        height: where it floats, on the scale of the scan's heights [m]; with mass and height the moment follows from
+            them.
+        covariance: of mass, I₁ and I₃, where they come from the same parts, shape (3, 3).
     """
 
     transverse: Estimate
@@ -74,9 +78,11 @@ class KnownTop:
 class Floating:
     """What follows.
 
-    values: name → estimate, of RESULTS; the heights and masses of the window far above the base, the spins of a top of
-    mass_to_set, floating at height_at_mass; height_per_mass: how it moves with the mass; moment and mass_to_add only
-    where the top's mass is known, and for the moment its height.  warnings: what to know.
+    Attributes:
+        values: name → estimate, of RESULTS: the heights and masses of the window far above the base; the spins of a top
+            of mass_to_set, floating at height_at_mass; height_per_mass, how it moves with the mass; moment and
+            mass_to_add only where the top's mass is known, and for the moment its height.
+        warnings: what to know.
     """
 
     values: Mapping[str, Estimate]

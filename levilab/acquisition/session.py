@@ -44,7 +44,11 @@ class ExperimentFailed(LevilabError):
 
 @dataclass(frozen=True)
 class Earlier:
-    """The run that is resumed.  replay: its world is virtual, and is brought to where the run left it."""
+    """The run that is resumed.
+
+    Attributes:
+        replay: its world is virtual, and is brought to where the run left it.
+    """
 
     run: Run
     rows: list[Row]
@@ -116,7 +120,10 @@ class Session(Generic[S]):
 
         A resumed run is taken up where it was left, without starting again: a real top has gone on meanwhile; the one
         of a virtual bench is started once more, which is no event of the run, and left alone up to the last reading.
-        resumed: how it goes on, for the event of a resumed run.
+
+        Args:
+            start: brings the top there.
+            resumed: how it goes on, for the event of a resumed run.
         """
         if self.earlier is None:
             start()
@@ -174,7 +181,12 @@ class Session(Generic[S]):
         self.event(WARNING, text)
 
     def progress(self, text: str, share: float) -> None:
-        """Show how far the bench is on the way to the first reading.  share: from 0 to 1."""
+        """Show how far the bench is on the way to the first reading.
+
+        Args:
+            text: what it is doing.
+            share: of the way, from 0 to 1.
+        """
         if not self._replaying:
             self.show.preparing(text, share)
 
@@ -194,7 +206,12 @@ class Session(Generic[S]):
     def keep(self, row: Row, time_left_s: float) -> None:
         """Write a reading down, then show it: what was shown is on the disk.
 
-        time_left_s: expected until the end.  Raises ExperimentFailed if its time does not come after the last one's.
+        Args:
+            row: the reading.
+            time_left_s: expected until the end.
+
+        Raises:
+            ExperimentFailed: its time does not come after the last one's.
         """
         if self.rows and not row["time_s"] > self.rows[-1]["time_s"]:
             raise ExperimentFailed(f"the clock went back: {row['time_s']} s after {self.rows[-1]['time_s']} s")

@@ -83,8 +83,11 @@ class Method(StrEnum):
 class Option(NamedTuple):
     """An option of some analyses.
 
-    kind: its type, as typer reads it; default: where it is not given; read: from what was given, unless that is None,
-    to what the analysis takes (raises UsageError); to: how the analysis calls it, if otherwise.
+    Attributes:
+        kind: its type, as typer reads it.
+        default: where it is not given.
+        read: from what was given, unless that is None, to what the analysis takes (raises UsageError).
+        to: how the analysis calls it, if otherwise.
     """
 
     kind: Any

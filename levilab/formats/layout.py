@@ -91,7 +91,14 @@ def _encoding(head: bytes) -> str:
 
 
 def lay_out(lines: list[str], encoding: str, dialect: Dialect, head: bytes) -> Layout:
-    """Where a table stands in lines that were read.  head: their bytes, for the offset of the first row."""
+    """Where a table stands in lines that were read.
+
+    Args:
+        lines: the first ones of the file.
+        encoding: of the file.
+        dialect: of the table.
+        head: the lines' bytes, for the offset of the first row.
+    """
     sample = content_lines(lines[-SAMPLE:], dialect, 1 + max(0, len(lines) - SAMPLE))
     rows = [line for line in sample if line.is_row]
     width = most_common(row.filled_count for row in rows)

@@ -106,7 +106,8 @@ COMPANION_FORMS = (
 class Title:
     """What one header field says: a canonical column (None: unknown to us) and a unit (None: none given).
 
-    inverse: the field holds the time of a turn, of which the column is the inverse.
+    Attributes:
+        inverse: the field holds the time of a turn, of which the column is the inverse.
     """
 
     column: str | None

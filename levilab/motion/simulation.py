@@ -59,7 +59,8 @@ COLUMNS: tuple[tuple[str, str, str, Callable[[Trajectory], Any]], ...] = (
 class SimulationRequest:
     """What is to be simulated: scene, duration [s], tolerance [m and rad], rate [states per second].
 
-    out: where a run folder is made, None for none.
+    Attributes:
+        out: where a run folder is made, None for none.
     """
 
     scene: Scene
@@ -73,8 +74,10 @@ class SimulationRequest:
 class Simulation:
     """What came of it.
 
-    summary: of the motion, with all its samples; folder: the run folder, if there is one; samples_per_state: every so
-    manieth sample is a state that was asked for.
+    Attributes:
+        summary: of the motion, with all its samples.
+        folder: the run folder, if there is one.
+        samples_per_state: every so manieth sample is a state that was asked for.
     """
 
     summary: Summary
@@ -87,8 +90,14 @@ def run_simulation(
 ) -> Simulation:
     """Simulate, look at the motion, and write it down; what does not come to its end leaves nothing behind.
 
-    message: called with what takes a moment; progress: the share that is done.  Raises UsageError, SimulationError,
-    CannotWrite.
+    Args:
+        order: what is simulated, and how.
+        message: called with what takes a moment.
+        progress: called with the share that is done.
+
+    Raises:
+        UsageError, SimulationError: for what cannot be simulated.
+        CannotWrite: the run folder cannot be written.
     """
     factor = _samples_per_state(order)
     if order.out is None:

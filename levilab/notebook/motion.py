@@ -28,8 +28,9 @@ if TYPE_CHECKING:
 class SimulatedMotion(Trajectory):
     """A trajectory with what `levilab simulate` says of it.
 
-    found: the motion in numbers, with all samples that its spectrum needed; folder: of the run, None if none was
-    written.
+    Attributes:
+        found: the motion in numbers, with all samples that its spectrum needed.
+        folder: of the run, None if none was written.
     """
 
     found: Summary | None = None

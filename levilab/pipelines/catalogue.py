@@ -59,8 +59,13 @@ MOST_STARTS = 6
 class Analysis(Generic[A]):
     """One analysis.
 
-    result: how it is carried out, and its result.json; tables: for the terminal; part: of a report; columns: the
-    readings of each input as columns of a table, with residuals.  Its figure is in `levilab.pipelines.figures`.
+    Attributes:
+        result: how it is carried out, and its result.json.
+        tables: for the terminal.
+        part: of a report.
+        columns: the readings of each input as columns of a table, with residuals.
+
+    Its figure is in `levilab.pipelines.figures`.
     """
 
     result: Document[Any, Any, Any, A, Any]
@@ -251,7 +256,11 @@ def print_analysis(
 ) -> None:
     """The tables, what the data say, and the warnings.
 
-    in_words: a message as the person reads it; console: where it is printed, by default the terminal.
+    Args:
+        analysis: the row of the catalogue.
+        found: what it found.
+        in_words: a message as the person reads it.
+        console: where it is printed, by default the terminal.
     """
     from rich.markup import escape
 

@@ -225,7 +225,11 @@ def _read(path: Path) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Written:
-    """A result that was named by its own path.  inputs: the run folders and data files that it says it is of."""
+    """A result that was named by its own path.
+
+    Attributes:
+        inputs: the run folders and data files that it says it is of.
+    """
 
     file: Path
     analysis: str
@@ -272,7 +276,12 @@ def results_in(folder: Path) -> list[Written]:
 
 @dataclass(frozen=True)
 class Earlier(Generic[R]):
-    """An input as it was found in a result written before.  file: the result; number: of the input in it."""
+    """An input as it was found in a result written before.
+
+    Attributes:
+        file: the result.
+        number: of the input in it.
+    """
 
     file: Path
     result: R

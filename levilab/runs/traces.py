@@ -37,7 +37,8 @@ ARRIVING, ARRIVING_CODES = f"{FOLDER}/arriving.json", f"{FOLDER}/arriving.codes"
 class Head(Settings):
     """When and of what a record is, and how to read its codes in the names of `Trace`.
 
-    announced: points that it was to have, where it has fewer.
+    Attributes:
+        announced: points that it was to have, where it has fewer.
     """
 
     number: int
@@ -94,7 +95,15 @@ class StoredTrace:
 
 
 def head_of(trace: Trace, number: int, time_s: float, channel: str, announced: int | None = None) -> Head:
-    """The head of a record.  channel: what it shows; announced: points that it is to have, where it has fewer."""
+    """The head of a record.
+
+    Args:
+        trace: the record.
+        number: in the run, from 1 on.
+        time_s: when it was taken, on the clock of the readings.
+        channel: what it shows.
+        announced: points that it is to have, where it has fewer.
+    """
     return Head(
         number=number,
         time_s=time_s,

@@ -78,7 +78,17 @@ class RunWriter:
     def create(
         cls, out: Path, record: RunRecord, table: str = READINGS, *, tell: Callable[[str], None] = lambda _: None
     ) -> Self:
-        """A new folder ``<UTC>-<experiment>-<four hex digits>`` below `out`; table: its rows.  Raises CannotWrite."""
+        """A new folder ``<UTC>-<experiment>-<four hex digits>``.
+
+        Args:
+            out: the folder below which it is made.
+            record: what run.json is to say.
+            table: the file of its rows.
+            tell: called with a sentence for the person at the bench.
+
+        Raises:
+            CannotWrite: it cannot be made.
+        """
         with _told("create the run folder", out, safe=""):
             _make_folder(out)
             writer = cls(_new_folder(out, record.experiment), record, tell)

@@ -47,10 +47,16 @@ SLOW_RAD_S = 2 * math.pi * 5.0
 class Ensemble:
     """The ends of many motions.  All arrays have the shape of the values that were varied, states one axis more.
 
-    scene: what they have in common; values: what differs, by dotted keys; survived: still up after `duration` [s];
-    time [s]: of the end, or of the escape; states: at the end, shape (…, 18); position_error [m], axis_error [rad]:
-    estimated, NaN where they were not asked for.  Where an error is larger than the tolerance, the motion was
-    chaotic, and whether it survived is chance.
+    Attributes:
+        scene: what they have in common.
+        values: what differs, by dotted keys.
+        survived: still up after `duration` [s].
+        time: of the end, or of the escape [s].
+        states: at the end, shape (…, 18).
+        position_error: estimated [m], NaN where it was not asked for.
+        axis_error: likewise [rad].
+
+    Where an error is larger than the tolerance, the motion was chaotic, and whether it survived is chance.
     """
 
     scene: Scene
@@ -94,12 +100,20 @@ def simulate_many(
 ) -> Ensemble:
     """Simulate a scene for many values at once.
 
-    over: dotted keys of the scene with their values, broadcast against each other; duration [s]; tolerance: wanted
-    error of place [m] and axis [rad] at the end, from which one step is chosen on a few of the tops; step [s]:
-    fixes it for all instead; cores: threads, as many as there are where None; errors: estimate every top's error by a
-    second, coarser run, which takes half as long again; progress: is told the share of the work done.
+    Args:
+        scene: what the tops have in common.
+        over: dotted keys of the scene with their values, broadcast against each other.
+        duration: of each motion [s].
+        tolerance: wanted error of place [m] and axis [rad] at the end, from which one step is chosen on a few of the
+            tops.
+        step: fixes it for all instead [s].
+        cores: threads, as many as there are where None.
+        errors: estimate every top's error by a second, coarser run, which takes half as long again.
+        progress: called with the share of the work that is done.
 
-    Raises SceneError for keys and values that a scene does not allow, SimulationError for senseless numbers.
+    Raises:
+        SceneError: a scene does not allow these keys or values.
+        SimulationError: a number makes no sense.
 
     >>> import numpy as np
     >>> from levilab.simulator import preset, simulate_many

@@ -33,10 +33,14 @@ HEAVIEST_KG = 1.0
 class Stability:
     """What the theory says of a scene.
 
-    top, field: the scene's, as `analysis.stability` takes them; windows: heights and masses, adiabatic; equilibria: of
-    the scene's own mass; floating: the one in which it floats, None if there is none; modes [Hz]: sideways, at the
-    scene's spin, complex where unstable; vertical, sleeping [Hz]: the up-and-down mode and the sleeping top's limit
-    there; nearest: the mass [kg] nearest to the scene's that floats, None where no mass does.
+    Attributes:
+        top, field: the scene's, as `analysis.stability` takes them.
+        windows: heights and masses, adiabatic.
+        equilibria: of the scene's own mass.
+        floating: the one in which it floats, None if there is none.
+        modes: sideways, at the scene's spin, complex where unstable [Hz].
+        vertical, sleeping: the up-and-down mode and the sleeping top's limit there [Hz].
+        nearest: the mass [kg] nearest to the scene's that floats, None where no mass does.
     """
 
     scene: Scene

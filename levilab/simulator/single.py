@@ -78,13 +78,19 @@ def simulate(
 ) -> Trajectory:
     """Simulate a scene, with an error at the end within the tolerance.
 
-    duration [s], negative to go back in time; tolerance: wanted error of the place [m] and the axis [rad] at the
-    end; rate: samples per second (the last sample is the end), None for the start and the end alone; events:
-    functions of a Trajectory, shape (n,), whose zeros are located; scheme: a name of SCHEMES, chosen where none is
-    given; step: fixes the step [s] instead of choosing it; start: a state to start from instead of the scene's,
-    shape (18,), whose time is kept; progress: is told the share of the work that is done.
+    Args:
+        scene: what is simulated.
+        duration: [s], negative to go back in time.
+        tolerance: wanted error of the place [m] and the axis [rad] at the end.
+        rate: samples per second (the last sample is the end), None for the start and the end alone.
+        events: functions of a Trajectory, shape (n,), whose zeros are located.
+        scheme: a name of SCHEMES, chosen where none is given.
+        step: fixes the step instead of choosing it [s].
+        start: a state to start from instead of the scene's, shape (18,), whose time is kept.
+        progress: called with the share of the work that is done.
 
-    Raises SimulationError for numbers that make no sense, and where the motion leaves the numbers' range.
+    Raises:
+        SimulationError: a number makes no sense, or the motion leaves the numbers' range.
 
     >>> from levilab.simulator import preset, simulate
     >>> motion = simulate(preset("undriven"), 5, tolerance=1e-10)

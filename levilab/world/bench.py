@@ -103,8 +103,12 @@ VIRTUAL_MODELS: dict[str, dict[str, Maker]] = {
 def virtual_bus(world: World | None = None, models: Mapping[str, str] | None = None) -> Bus:
     """A virtual bench.
 
-    world: by default a top of its own, on a virtual clock; models: kind → model, for those that are to be others than
-    in VIRTUAL.  Raises ConfigError for one that there is not.
+    Args:
+        world: by default a top of its own, on a virtual clock.
+        models: kind → model, for those that are to be others than in VIRTUAL.
+
+    Raises:
+        ConfigError: there is no such kind or model.
     """
     world = world or practice_world()
     chosen = {kind: settings.model for kind, settings in VIRTUAL.items()} | dict(models or {})
@@ -113,7 +117,12 @@ def virtual_bus(world: World | None = None, models: Mapping[str, str] | None = N
 
 
 def virtual_wiring(world: World, limits: Limits | None = None) -> Wiring:
-    """The wiring of a virtual bench that measures this world.  limits: by default those of a bench file without any."""
+    """The wiring of a virtual bench.
+
+    Args:
+        world: that it measures.
+        limits: by default those of a bench file without any.
+    """
     return Wiring(VIRTUAL, limits or Limits(), library_for(virtual_bus(world)), world.clock, VirtualPerson(world))
 
 
@@ -121,7 +130,10 @@ def plug_in_serial(bus: Bus | None = None) -> Bus:
     """Let pyserial find a virtual bench; which one.
 
     From then on ``serial.serial_for_url("levilab://magnetometer")`` is its magnetometer, and for pyvisa-py
-    ``ASRLlevilab://magnetometer::INSTR``.  bus: by default a fresh bench with a top of its own.
+    ``ASRLlevilab://magnetometer::INSTR``.
+
+    Args:
+        bus: by default a fresh bench with a top of its own.
     """
     bus = bus or virtual_bus()
     plug_in(lambda: bus)
@@ -133,7 +145,11 @@ PUT_BACK_AFTER_S = 15.0
 
 
 def practice_world(clock: Clock | None = None) -> World:
-    """A top to practise with, put back whenever it falls.  clock: by default one that jumps."""
+    """A top to practise with, put back whenever it falls.
+
+    Args:
+        clock: by default one that jumps.
+    """
     return SpinWorld(SpinScene(put_back_after_s=PUT_BACK_AFTER_S), clock or VirtualClock())
 
 

@@ -164,7 +164,10 @@ class Flight:
     def passages(self, place: Callable[[float], float], start: float, stop: float) -> Array:
         """When the tape's turn has a place in [0, 1) between two times [s], increasing, shape (n,) [s].
 
-        place: given the rate of turns [Hz].
+        Args:
+            place: given the rate of turns [Hz].
+            start: the first time [s].
+            stop: the second one [s].
         """
         self.look(stop)
         found = [np.empty(0)]

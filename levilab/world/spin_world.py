@@ -38,7 +38,11 @@ _LOOK_S, _AROUND_S = 0.01, 0.02
 
 
 class World(Protocol):
-    """What the virtual instruments see and do.  clock: the bench's."""
+    """What the virtual instruments see and do.
+
+    Attributes:
+        clock: the bench's.
+    """
 
     clock: Clock
 
@@ -58,7 +62,11 @@ class World(Protocol):
         """From this time on the coil's field is this: a generator's output, amplitude and offset in T."""
 
     def float_top(self, number: int) -> None:
-        """Spin the top by hand and let it float, if it is down.  number: how many tops came before."""
+        """Spin the top by hand and let it float, if it is down.
+
+        Args:
+            number: how many tops came before.
+        """
 
     def coil_field(self, start: float, step: float, n: int) -> Array:
         """The coil's field at start + step·k, shape (n,) [T]."""
@@ -107,7 +115,11 @@ class SpinScene:
     seed: int = 0
 
     def fall_of(self, number: int) -> float:
-        """The spin at which a top falls [Hz].  number: how many tops came before."""
+        """The spin at which a top falls [Hz].
+
+        Args:
+            number: how many tops came before.
+        """
         later = self.later_falls_hz
         return later[(number - 1) % len(later)] if number and later else self.fall_hz
 

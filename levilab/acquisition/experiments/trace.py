@@ -48,7 +48,8 @@ def _distinct(channels: tuple[int, ...]) -> tuple[int, ...]:
 class TraceSettings(ExperimentSettings):
     """Records of one or several channels, all with one scaling, at an interval.
 
-    drive_frequency_hz: without it the generator is not needed and not touched.
+    Attributes:
+        drive_frequency_hz: without it the generator is not needed and not touched.
     """
 
     channels: Annotated[tuple[PositiveInt, ...], Field(min_length=1), AfterValidator(_distinct)] = Field(

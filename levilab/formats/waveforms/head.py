@@ -25,7 +25,13 @@ _CONTROL = re.compile("[\x01-\x08\x0e-\x19]")
 
 @dataclass(frozen=True)
 class Head:
-    """The first lines of a text file.  encoding: of all of it; lines: the whole ones; whole: whether these are all."""
+    """The first lines of a text file.
+
+    Attributes:
+        encoding: of all of it.
+        lines: the whole ones.
+        whole: whether these are all.
+    """
 
     path: Path
     encoding: str

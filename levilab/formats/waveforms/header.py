@@ -49,7 +49,11 @@ class NoRate(NoWaveform):
 
 @dataclass(frozen=True)
 class Printed:
-    """A number as it stands in a text.  resolution: one unit of its last digit."""
+    """A number as it stands in a text.
+
+    Attributes:
+        resolution: one unit of its last digit.
+    """
 
     value: float
     resolution: float
@@ -57,7 +61,12 @@ class Printed:
 
 @dataclass(frozen=True)
 class SampleColumn:
-    """A channel.  index: of its column; factor: to its unit."""
+    """A channel.
+
+    Attributes:
+        index: of its column.
+        factor: to its unit.
+    """
 
     name: str
     unit: str

@@ -44,8 +44,10 @@ NEEDS = Needs(
 class PrecessionOptions(InputOptions):
     """How sweeps are analyzed.
 
-    reading_u: of every count of the precession [Hz], in the place of what the data say; keep_outliers: points that
-    miscounted are kept; orthogonal: the uncertainty of the drive's frequency counts, too.
+    Attributes:
+        reading_u: of every count of the precession [Hz], in the place of what the data say.
+        keep_outliers: points that miscounted are kept.
+        orthogonal: the uncertainty of the drive's frequency counts, too.
     """
 
     reading_u: float | None = None
@@ -61,7 +63,11 @@ DIFFERENT_P = 0.01
 
 @dataclass(frozen=True)
 class PointCoherence:
-    """How firmly the laser's pulses follow the drive at a point.  point: its number, from 0 on."""
+    """How firmly the laser's pulses follow the drive at a point.
+
+    Attributes:
+        point: its number, from 0 on.
+    """
 
     point: int
     coherence: Coherence
@@ -69,7 +75,12 @@ class PointCoherence:
 
 @dataclass(frozen=True)
 class PrecessionRun:
-    """One sweep.  coherences: of the records that were kept; warnings: about these."""
+    """One sweep.
+
+    Attributes:
+        coherences: of the records that were kept.
+        warnings: about these.
+    """
 
     fit: SweepFit
     coherences: tuple[PointCoherence, ...] = ()

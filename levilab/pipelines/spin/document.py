@@ -93,7 +93,12 @@ class SettingsPart(Settings):
 
 
 class SpinResult(Result):
-    """result.json of spin frequencies.  method: of the only input; models: none compete."""
+    """result.json of spin frequencies.
+
+    Attributes:
+        method: of the only input.
+        models: none compete.
+    """
 
     analysis: Literal["spin"] = "spin"
     settings: SettingsPart

@@ -27,8 +27,11 @@ NO_SPIN = {"laser": "how often the stem cuts the laser: its precession", "drive"
 class Records:
     """One input.
 
-    waveforms: one for a file, one a record for a run, none for a list of times; channel: its name; pulses: the list;
-    origin: the file or folder.
+    Attributes:
+        waveforms: one for a file, one a record for a run, none for a list of times.
+        channel: its name.
+        pulses: the list.
+        origin: the file or folder.
     """
 
     origin: Path

@@ -425,7 +425,8 @@ def test_an_empty_description_is_a_bench_without_instruments(tmp_path):
         ("counter = 3", "counter = '3'"),
         ("[spin]\ngate = 1\nlevel = 2", "(and 1 more)"),
         ("[spin\n", "not readable as TOML"),
-        ("[spin]\ngate_s = 1,0", "not readable as TOML"),
+        ("[spin]\ngate_s = 1,0", "; write a decimal point, not a comma"),
+        ("[spin]\ngate_s = 1 s", "; write the number without its unit"),
     ],
 )
 def test_what_is_wrong_with_a_description_is_told_in_one_line_with_its_path(tmp_path, text, says):
