@@ -30,7 +30,7 @@ class Interrupted(BaseException):
 
 
 class Stop:
-    """Whether somebody asked for the end.
+    """Whether the end was asked for.
 
     The first signal is only noted, so that no exchange with an instrument is torn; `check()` raises it
     where the program can end well.  The second one breaks through, in case an exchange hangs; from then on
@@ -43,7 +43,7 @@ class Stop:
         self._at_once = False
 
     def check(self) -> None:
-        """Raise Interrupted if somebody asked."""
+        """Raise Interrupted if the end was asked for."""
         if self.by:
             raise Interrupted(self.by)
 

@@ -70,7 +70,7 @@ class Session(Generic[S]):
         earlier: the run that is resumed, if one is.
         rows: the readings so far, those of the resumed run included.
         zero: bench time of time_s = 0 [s], None before it is reached.
-        asked: when the last reading was asked for [s].
+        last_request_time: when the last reading was asked for [s].
         called: what one reading of this experiment is called.
         began: when this session began to measure: at time zero, or when it resumed the run, maybe days later [s].
     """
@@ -85,7 +85,7 @@ class Session(Generic[S]):
     earlier: Earlier | None = None
     rows: list[Row] = field(default_factory=list)
     zero: float | None = None
-    asked: float = 0.0
+    last_request_time: float = 0.0
     began: float = 0.0
     called: str = "reading"
     _replaying: bool = False
@@ -157,8 +157,8 @@ class Session(Generic[S]):
         k = int(self.now() // interval_s) + 1 if self.rows else 0
         while True:
             self.wait(k * interval_s - self.now())
-            self.asked, self._lost = self.now(), False
-            yield self.asked
+            self.last_request_time, self._lost = self.now(), False
+            yield self.last_request_time
             k = max(k + 1, math.ceil(self.now() / interval_s)) if self._lost else k + 1
             if self.now() > longest_s:
                 name = self.writer.record.experiment

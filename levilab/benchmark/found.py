@@ -29,7 +29,16 @@ def give(
 ) -> None:
     """Print the tables, or the document as JSON; write name.json and name.png into a folder, if one is given.
 
-    save_figure: draws and writes it; imports matplotlib, which takes long.  Raises CannotWrite.
+    Args:
+        name: of the files.
+        document: for JSON.
+        print_tables: for people.
+        save_figure: draws and writes it; imports matplotlib, which takes long.
+        out: the folder.
+        as_json: whether the document is printed.
+
+    Raises:
+        CannotWrite: of the folder.
     """
     text = json.dumps(document, indent=2, allow_nan=False)
     if as_json:

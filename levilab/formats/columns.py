@@ -35,7 +35,7 @@ class TableError(DataError):
 
     def __init__(self, path: Path, message: str, *, line: int | None = None) -> None:
         self.path, self.line = path, line
-        place = f"{shown(str(path), 200)}, line {line}" if line is not None else shown(str(path), 200)
+        place = f"{shorten(str(path), 200)}, line {line}" if line is not None else shorten(str(path), 200)
         super().__init__(f"{place}: {message}")
 
 
@@ -66,16 +66,16 @@ class Column:
     inverse: bool = False
 
 
-def shown(text: str, most: int = 40) -> str:
+def shorten(text: str, most: int = 40) -> str:
     """`text` for a message of one line: no control characters, at most `most` characters."""
     plain = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
     return plain if len(plain) <= most else plain[: most - 1] + "…"
 
 
-def listed(names: Iterable[str]) -> str:
+def quoted(names: Iterable[str]) -> str:
     """Names in quotation marks, with commas, the first dozen of them."""
     names = list(names)
-    return ", ".join(f"'{shown(n)}'" for n in names[:12]) + (", …" if len(names) > 12 else "")
+    return ", ".join(f"'{shorten(n)}'" for n in names[:12]) + (", …" if len(names) > 12 else "")
 
 
 def choose_columns(
@@ -131,7 +131,7 @@ def choose_columns(
         if other:
             raise TableError(
                 path,
-                f"column '{shown(header[index])}' is to be {name} and has the unit {other}, which is none of "
+                f"column '{shorten(header[index])}' is to be {name} and has the unit {other}, which is none of "
                 f"{dimension(name)}: {how_else(header[index])}",
             )
         factor = unit_factor(unit, dimension(name)) if unit else 1
@@ -159,7 +159,7 @@ def how_else(title: str) -> str:
     """What to do with a column that is not what is wanted."""
     unit = read_title(title).unit
     if unit and unit_factor(unit, "time"):
-        return f"correct it, or if these are the times of a turn call the column period [{shown(unit)}]"
+        return f"correct it, or if these are the times of a turn call the column period [{shorten(unit)}]"
     return nearly_a_frequency(title) or "say which unit it is, as NAME [Hz]"
 
 
@@ -173,7 +173,8 @@ def _wanted_columns(
         name = SHORTHANDS.get(key, key)
         if name not in CANONICAL:
             raise TableError(
-                path, f"`columns` cannot set '{shown(key)}'; it sets {', '.join(SHORTHANDS)} or {', '.join(CANONICAL)}"
+                path,
+                f"`columns` cannot set '{shorten(key)}'; it sets {', '.join(SHORTHANDS)} or {', '.join(CANONICAL)}",
             )
         index = _find(header, title.strip())
         if index is None and (with_unit := re.fullmatch(r"(.+?)\s*\[([^\[\]]+)\]\s*", title)):
@@ -182,10 +183,10 @@ def _wanted_columns(
         if index is None:
             raise TableError(
                 path,
-                f"has no column '{shown(title)}'; it has {listed(header)}: correct `columns` = {key}=NAME or NUMBER",
+                f"has no column '{shorten(title)}'; it has {quoted(header)}: correct `columns` = {key}=NAME or NUMBER",
             )
         if index in chosen.values():
-            raise TableError(path, f"`columns` names column '{shown(title)}' twice; each column holds one quantity")
+            raise TableError(path, f"`columns` names column '{shorten(title)}' twice; each column holds one quantity")
         chosen[name] = index
     return chosen, stated
 
@@ -193,7 +194,7 @@ def _wanted_columns(
 def _stated_unit(path: Path, name: str, unit: str) -> str:
     kind = dimension(name)
     if unit_factor(unit, kind) is None:
-        raise TableError(path, f"`columns`: '{shown(unit)}' is no unit of {kind}; known are {', '.join(UNITS[kind])}")
+        raise TableError(path, f"`columns`: '{shorten(unit)}' is no unit of {kind}; known are {', '.join(UNITS[kind])}")
     return unit
 
 
@@ -218,7 +219,7 @@ def _only_one(path: Path, header: Sequence[str], name: str, indices: list[int]) 
     period = "; if T is the time of a turn say its unit, as T [ms]" if any(header[i] == "T" for i in indices) else ""
     raise TableError(
         path,
-        f"columns {listed(header[i] for i in indices)} could each be {name}; say which: `columns` = {numbers}{period}",
+        f"columns {quoted(header[i] for i in indices)} could each be {name}; say which: `columns` = {numbers}{period}",
     )
 
 
@@ -232,7 +233,8 @@ def _written_unit(path: Path, name: str, index: int, header: Sequence[str], unit
     if in_title and beneath and not implied and unit_factor(in_title, kind) != unit_factor(beneath, kind):
         raise TableError(
             path,
-            f"column '{shown(header[index])}' has the unit '{shown(beneath)}' in the row beneath; correct one of them",
+            f"column '{shorten(header[index])}' has the unit '{shorten(beneath)}' in the row beneath; "
+            "correct one of them",
         )
     return beneath or in_title
 
@@ -240,6 +242,6 @@ def _written_unit(path: Path, name: str, index: int, header: Sequence[str], unit
 def _unknown_unit(path: Path, label: str, title: Title) -> str:
     kind = dimension(title.column or "")
     return (
-        f"{shown(str(path), 200)}: column '{shown(label)}' is not used: '{shown(title.unit or '')}' is no unit of "
-        f"{kind} known here ({', '.join(list(UNITS[kind])[:8])} …)"
+        f"{shorten(str(path), 200)}: column '{shorten(label)}' is not used: '{shorten(title.unit or '')}' is no unit "
+        f"of {kind} known here ({', '.join(list(UNITS[kind])[:8])} …)"
     )

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from levilab.formats.columns import NoTable, shown
+from levilab.formats.columns import NoTable, shorten
 from levilab.formats.dialect import Dialect, Line, content_lines, filled_count, find_dialect, most_common
 from levilab.formats.titles import is_unit, known_titles
 
@@ -74,7 +74,7 @@ def sniff(path: Path) -> Layout:
     if dialect is None:
         at, line = next((n, line) for n, line in enumerate(lines, 1) if line.strip())
         alone = "; number the rows in a column of their own if there is but one"
-        seen = f"'{shown(line.strip())}' begins no table of at least two columns"
+        seen = f"'{shorten(line.strip())}' begins no table of at least two columns"
         raise NoTable(path, f"{seen}; {EXPORT}{alone}", line=at)
     return lay_out(lines, encoding, dialect, head)
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: A chaotic motion has no step that is small enough: below this part of the longest step it is told instead.
+#: A chaotic motion has no step that is small enough: below this part of the longest step the error is given instead.
 SMALLEST_STEP_SHARE = 1 / 256
 
 #: Shorter steps in succession that did not halve the error: once is chance in the estimates, twice is chaos.

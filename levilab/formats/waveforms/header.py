@@ -17,7 +17,7 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from levilab.formats.columns import NoSuchColumn, TableError, listed, shown
+from levilab.formats.columns import NoSuchColumn, TableError, quoted, shorten
 from levilab.formats.dialect import Dialect, filled_count, find_dialect
 from levilab.formats.layout import SAMPLE, Layout, lay_out
 from levilab.formats.titles import QUANTITIES, is_unit, plain_unit, read_title, unit_factor
@@ -162,7 +162,7 @@ def dialect_of(head: Head) -> Dialect:
         return found
     if sum(bool(re.fullmatch(r"[+-]?\d*[.,]?\d+([eE][+-]?\d+)?[,;]?", text)) for text in texts) < 0.5 * len(texts):
         at, line = next((n, line) for n, line in enumerate(head.lines, 1) if line.strip())
-        raise NoWaveform(head.path, f"'{shown(line.strip())}' begins no table of samples; {WANTED}", line=at)
+        raise NoWaveform(head.path, f"'{shorten(line.strip())}' begins no table of samples; {WANTED}", line=at)
     return Dialect(None, "," if any(match for match in one_comma) else ".")
 
 
@@ -172,11 +172,11 @@ def _unit(text: str) -> tuple[str, float]:
     if not plain or plain.casefold() in _VOLTS:
         return "V", 1.0
     factor = unit_factor(plain, "voltage")
-    return ("V", factor) if factor is not None else (shown(plain, 12), 1.0)
+    return ("V", factor) if factor is not None else (shorten(plain, 12), 1.0)
 
 
 def _signal(title: str) -> str:
-    return f"CH{title}" if title.isdecimal() else shown(title)
+    return f"CH{title}" if title.isdecimal() else shorten(title)
 
 
 def _is_number(text: str, dialect: Dialect) -> bool:
@@ -265,7 +265,7 @@ def _beside(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Head
         "Tektronix TDS CSV",
         dialect,
         1,
-        (SampleColumn(shown(_value(keys, "source") or "CH1"), unit, time + 1, factor),),
+        (SampleColumn(shorten(_value(keys, "source") or "CH1"), unit, time + 1, factor),),
         time=time,
         time_factor=unit_factor(_value(keys, "horizontal units"), "time") or 1.0,
         step=_interval(head, keys, dialect),
@@ -360,7 +360,7 @@ def _plain(head: Head, dialect: Dialect, wanted: Mapping[str, str]) -> Header:
     rows = [dialect.split(line) for line in head.lines[layout.first_line - 1 :][:MOST_LINES] if not dialect.skips(line)]
     kept = _with_samples(columns, rows, 0, dialect) if rows else ()
     if not kept:
-        raise NoWaveform(head.path, f"has no samples beside its times, its columns are {listed(names)}")
+        raise NoWaveform(head.path, f"has no samples beside its times, its columns are {quoted(names)}")
     return Header(
         "CSV",
         dialect,
@@ -378,7 +378,7 @@ _NO_READINGS = ("time_s", "drive_amplitude_v")
 
 def _bare(title: str) -> str:
     """A title without its unit."""
-    return shown(re.sub(r"\s*/?\s*[\[(][^\[\]()]*[\])]$|\s*/\s*\S+$", "", title).strip() or title)
+    return shorten(re.sub(r"\s*/?\s*[\[(][^\[\]()]*[\])]$|\s*/\s*\S+$", "", title).strip() or title)
 
 
 def _time_column(head: Head, layout: Layout, wanted: Mapping[str, str]) -> int:
@@ -390,13 +390,15 @@ def _time_column(head: Head, layout: Layout, wanted: Mapping[str, str]) -> int:
             return folded.index(name.casefold())
         if name.isdecimal() and 1 <= int(name) <= layout.width:
             return int(name) - 1
-        raise TableError(head.path, f"has no column '{shown(name)}'; it has {listed(layout.header)}: correct `columns`")
+        raise TableError(
+            head.path, f"has no column '{shorten(name)}'; it has {quoted(layout.header)}: correct `columns`"
+        )
     if not layout.header:
         return 0
     known = [k for k, text in enumerate(layout.header) if read_title(text).column == "time_s" or folded[k] in _TIMES]
     if len(known) != 1:
         raise NoWaveform(
-            head.path, f"no title is known to be a time among {listed(layout.header)}: say `columns` = t=NAME"
+            head.path, f"no title is known to be a time among {quoted(layout.header)}: say `columns` = t=NAME"
         )
     return known[0]
 
@@ -408,6 +410,8 @@ def _time_factor(head: Head, layout: Layout, time: int) -> float:
     factor = unit_factor(unit, "time") if unit else 1.0
     if factor is None:
         raise TableError(
-            head.path, f"'{shown(unit or '')}' is no unit of time: correct the title", line=layout.header_line or None
+            head.path,
+            f"'{shorten(unit or '')}' is no unit of time: correct the title",
+            line=layout.header_line or None,
         )
     return factor

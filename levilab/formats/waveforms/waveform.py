@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from levilab.errors import UsageError
-from levilab.formats.columns import TableError, listed, shown
+from levilab.formats.columns import TableError, quoted, shorten
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -92,9 +92,9 @@ class Waveform:
             return names.index(wanted.strip().casefold())
         if wanted.strip().isdecimal() and 1 <= int(wanted) <= len(names):
             return int(wanted) - 1
-        has = listed(signal.name for signal in self.signals)
+        has = quoted(signal.name for signal in self.signals)
         raise NoSuchSignal(
-            "channel", f"{shown(str(self.path), 200)} has {has}: name one of them", value=f"'{shown(wanted)}'"
+            "channel", f"{shorten(str(self.path), 200)} has {has}: name one of them", value=f"'{shorten(wanted)}'"
         )
 
     def blocks(self, wanted: str | None = None) -> Iterator[Array]:
