@@ -52,7 +52,8 @@ def parse_toml(text: str) -> dict[str, Any]:
     try:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{error}{_hint(text, str(error))}") from error
+        error.args = (f"{error}{_hint(text, str(error))}",)
+        raise
     except RecursionError:
         raise ValueError(_TOO_DEEP) from None
     except ValueError:  # Python reads no more than 4300 digits
