@@ -28,7 +28,7 @@ from levilab.files import CannotWrite
 from levilab.runs.run import Run
 from levilab.runs.writer import RunWriter
 from levilab.world.bench import VIRTUAL, virtual_bus
-from levilab.world.spin_world import SpinScene, SpinWorld, drawn
+from levilab.world.spin_world import Phase, SpinScene, SpinWorld, drawn
 from support.acquisitions import BEFORE, Impatient, Silent, in_world, mock, of_scene
 
 if TYPE_CHECKING:
@@ -281,7 +281,7 @@ def test_the_time_of_a_reading_is_the_middle_of_its_gate(tmp_path: Path) -> None
     for seed in range(15):
         world = SpinWorld(drawn(seed), VirtualClock())
         frame = acquire(in_world(mock(tmp_path, seed), world), Silent()).readings().frame
-        released = [stretch for stretch in world._stretches if stretch.rule == "coasts"][-1].start
+        released = [stretch for stretch in world._stretches if stretch.phase is Phase.COASTING][-1].start
         spin, _ = world.motion(released + frame["time_s"].to_numpy()[:8])
         off += list(frame["spin_frequency_hz"].to_numpy()[:8] - spin / (2 * np.pi))
     # 120 readings of 0.03 Hz: 0.0027 Hz; 5 ms between the drive's end and time zero: 0.0005 Hz; the reciprocal

@@ -102,7 +102,7 @@ def test_an_analysis_need_not_be_named(levilab: Command, sample_data: Path) -> N
     each = json.loads(levilab("analyze", sample_data, "--no-save", "--json").stdout)
     assert [(one["analysis"], len(one["runs"])) for one in each] == [
         ("spindown", 4),
-        ("spin", 14),
+        ("spin", 13),
         ("field", 1),
         ("limit", 3),
         ("precession", 1),

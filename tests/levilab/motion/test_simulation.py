@@ -15,10 +15,10 @@ import pytest
 
 from levilab.motion.figure import motion_figure
 from levilab.motion.lines import lines_of, rate_for
-from levilab.motion.simulation import COLUMNS, SimulationOrder, carry_out, kept_rows
+from levilab.motion.simulation import COLUMNS, SimulationRequest, kept_rows, run_simulation
 from levilab.motion.summary import as_document, summarise
 from levilab.motion.table import print_motion
-from levilab.present.progress import Share
+from levilab.present.progress import ShareBar
 from levilab.runs.run import Run
 from levilab.runs.writer import RunWriter
 from levilab.simulator.scene import preset
@@ -47,7 +47,7 @@ def summary(scene: Scene, duration: float, rate: float = 100.0) -> Summary:
 
 def test_a_run_folder_holds_the_states_in_full_precision_the_scene_and_a_figure(tmp_path: Path) -> None:
     scene = preset("undriven").changed({"start.spin_hz": 31.0})
-    done = carry_out(SimulationOrder(scene, 2.0, out=tmp_path), lambda _: None)
+    done = run_simulation(SimulationRequest(scene, 2.0, out=tmp_path), lambda _: None)
     assert done.folder is not None
     header, *lines = (done.folder / "states.csv").read_text(encoding="utf-8").splitlines()
     assert header == HEADER == ",".join(column[0] for column in COLUMNS)
@@ -75,7 +75,7 @@ def test_a_simulation_that_fails_leaves_no_folder(tmp_path: Path) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        carry_out(SimulationOrder(preset("undriven"), 5.0, out=tmp_path), lambda _: None, broken)
+        run_simulation(SimulationRequest(preset("undriven"), 5.0, out=tmp_path), lambda _: None, broken)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -375,12 +375,12 @@ def test_interrupted_while_its_folder_is_made_it_leaves_nothing(
 
     monkeypatch.setattr(RunWriter, "create", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        carry_out(SimulationOrder(preset("driven"), out=tmp_path), print)
+        run_simulation(SimulationRequest(preset("driven"), out=tmp_path), print)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_no_bar_is_shown_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    share = Share("simulating")
+    share = ShareBar("simulating")
     for part in (0.1, 0.9, 0.1):
         share(part)
     share.close()

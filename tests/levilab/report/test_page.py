@@ -265,6 +265,13 @@ def test_one_p_value_is_the_same_number_on_the_page_and_the_terminal(page: Page)
     assert "2.3×10⁻¹⁴" in page.text
 
 
+def test_a_figure_keeps_its_text_on_a_telephone_and_is_moved_sideways(page: Page) -> None:
+    """A figure is 10 in wide and its text 9 pt high: as wide as a telephone of 390 px, that would be 4.5 px."""
+    assert ("div", {"class": "scroll", "tabindex": "0"}) in page.tags
+    (width,) = re.findall(r"\.scroll > img \{ width: (\d+)rem; \}", page.text)
+    assert 9 / 72 / 10 * int(width) * 16 > 10
+
+
 def test_nothing_is_folded_away_so_that_all_is_printed(page: Page) -> None:
     assert "details" not in {tag for tag, _ in page.tags}
 

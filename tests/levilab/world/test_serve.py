@@ -18,7 +18,7 @@ from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.servers.server import LOOPBACK, BenchServer
 from levilab.cli.bench import bench_app
 from levilab.errors import UsageError
-from levilab.world.bench import own_world, virtual_bus
+from levilab.world.bench import practice_world, virtual_bus
 from levilab.world.serve import Service, chosen_models, serve
 from support.waiting import HANG_GUARD_S as AT_MOST
 
@@ -71,7 +71,7 @@ def test_the_line_names_every_instrument_each_answers_and_sigterm_ends_it():
 
 
 def test_a_served_top_begins_to_spin_down_with_the_first_message():
-    world = own_world(WallClock(waits=True))
+    world = practice_world(WallClock(waits=True))
     bus = virtual_bus(world)
     bus.heard = world.clock.begin
     with BenchServer(bus) as server:

@@ -98,7 +98,7 @@ def test_the_result_is_written_as_the_interface_says(sample_data: Path, tmp_path
 
 def test_one_run_has_its_start_and_covariance_at_the_top(sample_data: Path) -> None:
     analysis = analyze_spindowns([sample_data / "spin-down-1"], SpinDownOptions())
-    result = ANALYSES["spindown"].document(analysis, analysis.home)
+    result = ANALYSES["spindown"].document(analysis, analysis.output_folder)
     disc = next(model for model in result["models"] if model["name"] == "disc")
     assert set(disc["parameters"]) == {"start_frequency", "c32"}
     assert np.array(disc["covariance"]).shape == (2, 2)
@@ -108,8 +108,8 @@ def test_one_run_has_its_start_and_covariance_at_the_top(sample_data: Path) -> N
 
 def test_a_plain_csv_is_analyzed_and_knows_nothing_of_synthetic(tmp_path: Path) -> None:
     analysis = analyze_spindowns([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions())
-    result = ANALYSES["spindown"].document(analysis, analysis.home)
-    assert analysis.home == tmp_path
+    result = ANALYSES["spindown"].document(analysis, analysis.output_folder)
+    assert analysis.output_folder == tmp_path
     assert (result["synthetic"], result["best_model"]) == (False, "disc")
     assert result["values"]["c32"]["value"] == pytest.approx(2.34e-4, abs=4 * result["values"]["c32"]["u"])
 
@@ -136,7 +136,7 @@ def test_real_and_synthetic_inputs_together_are_warned_of(sample_data: Path, tmp
     path = spin_down_csv(tmp_path / "my.csv")
     analysis = analyze_spindowns([path, sample_data / "spin-down-1"], SpinDownOptions())
     assert "1 of 2 inputs are SYNTHETIC" in analysis.warnings[0]
-    assert analysis.home == Path()
+    assert analysis.output_folder == Path()
 
 
 def test_inputs_of_the_same_name_are_told_apart(tmp_path: Path) -> None:
