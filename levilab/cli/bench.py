@@ -134,6 +134,14 @@ def bench_serve(
         int | None,
         typer.Option(metavar="N", min=1, max=65535, help="The first port, the others follow.", show_default="any free"),
     ] = None,
+    portmapper: Annotated[
+        bool,
+        typer.Option(
+            "--portmapper",
+            help="For programs that know a host alone: each instrument at an address of its own, 127.0.0.2 and on, "
+            "with a port mapper at port 111.",
+        ),
+    ] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one line of JSON when all can be reached, and nothing else.")
     ] = False,
@@ -142,6 +150,7 @@ def bench_serve(
 
     Ctrl-C or SIGTERM ends it.  Nobody is asked for a password: at another host than 127.0.0.1 all can use it.
     """
+    from instruments.virtual.servers.port_mapper import PORT
     from levilab.world.serve import Service, chosen_models, serve
 
     moving = None
@@ -149,7 +158,8 @@ def bench_serve(
         from levilab.simulator.scene import read_scene
 
         moving = read_scene(scene)
-    service = Service(host, port_base, speed, chosen_models(models or []), moving)
+    mapper = PORT if portmapper else None
+    service = Service(host, port_base, speed, chosen_models(models or []), moving, mapper)
     told = serve(service, _tell_as_json if as_json else _tell, message)
     if told == "SIGINT":
         raise typer.Exit(exit_codes.INTERRUPTED)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
 import signal
+import sys
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -36,6 +38,19 @@ _KEEP_UP_S = 0.2
 _LAST_PORT = 0xFFFF
 
 
+#: How a program that is not privileged may listen at any port, by the system.
+_PORTS_FOR_ALL = {
+    "linux": (
+        "`sudo sysctl net.ipv4.ip_unprivileged_port_start={port}` lets all use it until the next start, "
+        "`sudo setcap cap_net_bind_service=+ep PYTHON` this Python"
+    ),
+    "darwin": "start it with sudo",
+}
+
+#: How a loopback address is added where there is one alone.
+_ADD_ADDRESS = "`sudo ifconfig lo0 alias 127.0.0.2 up`, and so on for 127.0.0.3 and 127.0.0.4"
+
+
 class CannotServe(LevilabError):
     """The bench cannot be offered there."""
 
@@ -46,7 +61,7 @@ class Service:
 
     host: an address of this machine; port_base: the first port, None: free ones; speed: seconds of the bench per
     second; models: by kind of instrument, where it is not the first one; scene: of the top's full motion, None: it
-    only spins.
+    only spins; port_mapper: the port of each instrument's port mapper, None: there is none.
     """
 
     host: str = LOOPBACK
@@ -54,6 +69,7 @@ class Service:
     speed: float = 1.0
     models: dict[str, str] = field(default_factory=dict)
     scene: Scene | None = None
+    port_mapper: int | None = None
 
 
 @dataclass(frozen=True)
@@ -105,10 +121,27 @@ async def _serve(service: Service, world: World, ready: Callable[[tuple[Served, 
         try:
             offers = await opened.enter_async_context(offered(bus, place))
         except OSError as error:
-            why = f"the bench cannot be offered at {service.host} ({error})"
-            raise CannotServe(f"{why}: try another `host` or `port_base`") from error
+            raise _not_served(service, error) from error
         ready(tuple(_served(service, offer) for offer in offers))
         await first_of(end.comes(), _kept_up(bus, world))
+
+
+def _not_served(service: Service, error: OSError) -> CannotServe:
+    """What to do where an address or a port cannot be had."""
+    if service.port_mapper is None:
+        why = f"the bench cannot be offered at {service.host} ({error})"
+        return CannotServe(f"{why}: try another `host` or `port_base`")
+    port = service.port_mapper
+    if isinstance(error, PermissionError):
+        system = _PORTS_FOR_ALL.get(sys.platform, "run it with the rights of the system's administrator")
+        what = f"this system gives port {port} to privileged programs alone: {system.format(port=port)}"
+    elif error.errno == errno.EADDRINUSE:
+        what = "another port mapper (rpcbind) is there, or another program has `port_base`: end it, or change that"
+    elif error.errno == errno.EADDRNOTAVAIL:
+        what = "each instrument needs a loopback address of its own: add them, on macOS with " + _ADD_ADDRESS
+    else:
+        what = "try without `portmapper`"
+    return CannotServe(f"the port mapper cannot be offered ({error}): {what}")
 
 
 async def _kept_up(bus: Bus, world: World) -> None:
@@ -138,10 +171,13 @@ def _clock(service: Service) -> WallClock:
 def _place(service: Service, instruments: int) -> Place:
     if ":" in service.host:  # a resource name is cut at its colons
         raise UsageError("host", "IPv6 has no place in VISA resource names, give an IPv4 address", value=service.host)
+    if service.port_mapper is not None and service.host != LOOPBACK:
+        why = "does not go with `portmapper`, which gives each instrument a loopback address of its own"
+        raise UsageError("host", why, value=service.host)
     last = (service.port_base or 0) + PORTS_PER_INSTRUMENT * instruments - 1
     if last > _LAST_PORT:
         raise UsageError("port_base", f"the ports end at {_LAST_PORT}, {last} would be needed", value=service.port_base)
-    return Place(service.host, service.port_base)
+    return Place(service.host, service.port_base, service.port_mapper)
 
 
 def _served(service: Service, offer: Offer) -> Served:
