@@ -174,6 +174,10 @@ def _place(service: Service, instruments: int) -> Place:
     if service.port_mapper is not None and service.host != LOOPBACK:
         why = "does not go with `portmapper`, which gives each instrument a loopback address of its own"
         raise UsageError("host", why, value=service.host)
+    try:
+        service.host.encode("idna")
+    except UnicodeError:
+        raise UsageError("host", "no host can have this name", value=service.host) from None
     last = (service.port_base or 0) + PORTS_PER_INSTRUMENT * instruments - 1
     if last > _LAST_PORT:
         raise UsageError("port_base", f"the ports end at {_LAST_PORT}, {last} would be needed", value=service.port_base)

@@ -262,6 +262,11 @@ def test_a_port_mapper_that_cannot_be_had_says_what_to_do(monkeypatch, error, pl
     assert "\n" not in str(told.value)
 
 
+def test_a_host_that_cannot_be_one_is_wrong_usage():
+    with pytest.raises(UsageError, match="no host can have this name"):
+        serve(Service(host="é" * 80), lambda _: None)
+
+
 def test_a_port_mapper_goes_with_loopback_addresses_alone():
     with pytest.raises(UsageError, match="does not go with `portmapper`"):
         serve(Service(host="192.168.1.5", port_mapper=111), lambda _: None)
