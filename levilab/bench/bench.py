@@ -59,14 +59,13 @@ class Bench:
         Raises SettingsLost where some settings are not as the driver set them: the instrument was reset meanwhile.
         """
         now = self.instruments[kind].settings()
-        if lost := self.instruments[kind].unlike(now):
+        if lost := self.instruments[kind].changed_settings(now):
             raise SettingsLost(self.address(kind), lost)
         self._prepared[kind] = now
 
     def changed_settings(self, kind: str) -> dict[str, tuple[object, object]]:
         """Settings that are no longer as they were set up, by name: (as set up, now)."""
-        now = self.instruments[kind].settings()
-        return {name: (then, now[name]) for name, then in self._prepared.get(kind, {}).items() if now[name] != then}
+        return self.instruments[kind].changed_settings(since=self._prepared.get(kind, {}))
 
     def address(self, kind: str) -> str:
         """Where an instrument is."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import errno
-import signal
 import sys
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -14,19 +13,17 @@ from instruments.clock import WallClock
 from instruments.virtual.servers.server import LOOPBACK, PORTS_PER_INSTRUMENT, Place, offered
 from instruments.virtual.servers.station import first_of
 from levilab.errors import LevilabError, UsageError
+from levilab.interruption import watching_for_end
 from levilab.world.bench import AGAIN_S, MODELS, VIRTUAL, own_world, scene_world, virtual_bus
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from types import FrameType
+    from collections.abc import Callable
 
     from instruments.virtual.bench.bus import Bus
     from instruments.virtual.servers.server import Offer
+    from levilab.interruption import End
     from levilab.simulator.scene import Scene
     from levilab.world.spin_world import World
-
-#: What asks a server to end: Ctrl-C, kill, a closed terminal, and on Windows Ctrl-Break.
-_SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
 
 #: A top in full motion is simulated some 700 times faster than it moves; half of the time and more is for the clients.
 FASTEST_MOTION = 200.0
@@ -103,7 +100,7 @@ def serve(
     ready: called once, when all can be reached; tell: is told what takes long before.  Raises CannotServe,
     UsageError, SceneError.
     """
-    with _asked_to_end() as end:
+    with watching_for_end() as end:
         world = _world(service, tell)
         if not end.by:
             asyncio.run(_serve(service, world, ready, end))
@@ -111,7 +108,7 @@ def serve(
     return end.by
 
 
-async def _serve(service: Service, world: World, ready: Callable[[tuple[Served, ...]], None], end: _End) -> None:
+async def _serve(service: Service, world: World, ready: Callable[[tuple[Served, ...]], None], end: End) -> None:
     bus = virtual_bus(world, service.models)
     # the top spins down from the first message on, not while no program is there
     assert isinstance(world.clock, WallClock)
@@ -123,7 +120,7 @@ async def _serve(service: Service, world: World, ready: Callable[[tuple[Served, 
         except OSError as error:
             raise _not_served(service, error) from error
         ready(tuple(_served(service, offer) for offer in offers))
-        await first_of(end.comes(), _kept_up(bus, world))
+        await first_of(_comes(end), _kept_up(bus, world))
 
 
 def _not_served(service: Service, error: OSError) -> CannotServe:
@@ -189,35 +186,10 @@ def _served(service: Service, offer: Offer) -> Served:
     return Served(kind, service.models.get(kind, VIRTUAL[kind].model), offer.resources)
 
 
-class _End:
-    """Whether a signal asked for the end, and which; a signal handler that wakes an event loop."""
-
-    def __init__(self) -> None:
-        self.by: str | None = None
-        self._woken: tuple[asyncio.AbstractEventLoop, asyncio.Event] | None = None
-
-    def __call__(self, number: int, frame: FrameType | None) -> None:
-        self.by = self.by or signal.Signals(number).name
-        if self._woken:
-            loop, event = self._woken
-            loop.call_soon_threadsafe(event.set)
-
-    async def comes(self) -> None:
-        """Wait for a signal."""
-        event = asyncio.Event()
-        self._woken = asyncio.get_running_loop(), event
-        if self.by is None:
-            await event.wait()
-        self._woken = None
-
-
-@contextlib.contextmanager
-def _asked_to_end() -> Iterator[_End]:
-    """Signals go to the one given here (main thread only); one that was ignored from the start still is."""
-    end = _End()
-    before = {number: signal.signal(number, end) for number in _SIGNALS if signal.getsignal(number) != signal.SIG_IGN}
-    try:
-        yield end
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+async def _comes(end: End) -> None:
+    """Wait for a signal."""
+    event, loop = asyncio.Event(), asyncio.get_running_loop()
+    end.wake = lambda: loop.call_soon_threadsafe(event.set)
+    if end.by is None:
+        await event.wait()
+    end.wake = None
