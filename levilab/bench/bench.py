@@ -6,7 +6,6 @@ import contextlib
 from typing import TYPE_CHECKING, TypeVar
 
 from instruments.drivers import Instrument
-from instruments.drivers.generator import Limits
 from instruments.errors import InstrumentError, SettingsLost
 from levilab.bench.kinds import COUNTER, GENERATOR, MAGNETOMETER, OSCILLOSCOPE, transport_to
 
@@ -127,7 +126,7 @@ def open_bench(
             if GENERATOR.name in kinds:  # first: a program that was killed may have left its output on
                 # never locked: if its link is lost, its output must be switched off over another one
                 bench.generator = connect(GENERATOR, alone=False)
-                bench.generator.limits = Limits(**wiring.limits.model_dump())
+                bench.generator.limits = wiring.limits.of_the_drive()
                 bench.outputs_off()
             if COUNTER.name in kinds:
                 bench.counter = connect(COUNTER)
