@@ -1,5 +1,6 @@
 """The run folder: nothing that was written is lost, and what is broken says so."""
 
+import errno
 import hashlib
 import json
 import re
@@ -280,3 +281,29 @@ def test_a_list_of_many_runs_looks_like_one_of_a_few(capsys: pytest.CaptureFixtu
     assert len(many) == len(few) + 298
     assert "[red]limit" in few[4]
     assert "\x1b" not in "".join(many)
+
+
+# --- the disk ---
+
+
+def test_every_new_folder_above_a_run_is_on_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    synchronised: list[Path] = []
+    monkeypatch.setattr("levilab.runs.writer.sync_folder", synchronised.append)
+    with RunWriter.create(tmp_path / "a" / "b" / "c", record()):
+        pass
+    assert {tmp_path, tmp_path / "a", tmp_path / "a" / "b", tmp_path / "a" / "b" / "c"} <= set(synchronised)
+
+
+@pytest.mark.parametrize(
+    ("number", "advice"), [(errno.ENOSPC, "free space"), (errno.EIO, "look at the folder and its disk")]
+)
+def test_a_disk_that_fails_is_no_full_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, advice: str
+) -> None:
+    def fail(_: int) -> None:
+        raise OSError(number, "no")
+
+    with RunWriter.create(tmp_path, record()) as writer:
+        monkeypatch.setattr("os.fsync", fail)
+        with pytest.raises(CannotWrite, match=advice):
+            writer.reading(row(0))
