@@ -245,7 +245,7 @@ ENDS = st.sampled_from(["\n", "\n", "\n", "\r\n", "\n\n", "\n# note\n", ""])
 
 
 @given(st.lists(st.tuples(st.lists(FIELDS, min_size=2, max_size=4), ENDS), max_size=5), st.booleans())
-@settings(max_examples=150)
+@settings(max_examples=60)
 def test_a_glance_at_readings_says_what_reading_them_does(lines: list[tuple[list[str], str]], three: bool) -> None:
     channels = CHANNELS if three else [*CHANNELS[:2], {"name": "record"}]
     header = ",".join(channel["name"] for channel in channels)
