@@ -122,9 +122,11 @@ class SerialPort:
     # --- bytes ---
 
     def send(self, data: bytes, within: float) -> None:
-        """See :class:`instruments.links.transport.Port`."""
-        if self.device.write_timeout != within:  # setting it configures the port anew
-            self.device.write_timeout = within
+        """See :class:`instruments.links.transport.Port`.
+
+        Within the time-out with which the port was opened: pyserial raises where a shorter one is over although all was
+        written, as on a busy machine.
+        """
         self.device.write(data)
 
     def line(self, within: float) -> bytes:
