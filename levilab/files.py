@@ -35,12 +35,22 @@ def parse_json(text: str) -> Any:
         ValueError: it is not JSON, or it holds what no program of ours writes and much of Python stumbles over:
             nesting beyond DEEPEST, a whole number beyond LARGEST, NaN, infinity, half a surrogate pair.
     """
+    _refuse_surrogates(text)
+    if "\\u" not in text and text.count("{") + text.count("[") <= DEEPEST:  # nothing to look for afterwards
+        return json.loads(text, parse_int=_whole_number, parse_float=_finite_number, parse_constant=_finite_number)
     try:
         value = json.loads(text, parse_int=_whole_number)
     except RecursionError:
         raise ValueError(_TOO_DEEP) from None
     _refuse_oddities(value, finite=True)
     return value
+
+
+def _finite_number(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(_NOT_FINITE)
+    return number
 
 
 def parse_toml(text: str) -> dict[str, Any]:
@@ -74,6 +84,7 @@ def _hint(text: str, said: str) -> str:
 
 
 _TOO_DEEP = f"it is nested more than {DEEPEST} levels deep"
+_NOT_FINITE = "a number in it is not finite"
 _TOO_LARGE = "a whole number in it has more than 300 digits"
 
 
@@ -91,9 +102,9 @@ def finite(value: Any) -> Any:
 
 
 def _whole_number(digits: str) -> int:
-    if len(digits) > 301:
+    if len(digits) > 302 or abs(number := int(digits)) > LARGEST:
         raise ValueError(_TOO_LARGE)
-    return int(digits)
+    return number
 
 
 def _refuse_oddities(value: Any, *, finite: bool) -> None:
@@ -107,7 +118,7 @@ def _refuse_oddities(value: Any, *, finite: bool) -> None:
             elif isinstance(item, int) and abs(item) > LARGEST:
                 raise ValueError(_TOO_LARGE)
             elif isinstance(item, float) and finite and not math.isfinite(item):
-                raise ValueError("a number in it is not finite")
+                raise ValueError(_NOT_FINITE)
         level = [inner for item in level for inner in _parts(item)]
         depth += 1
 

@@ -82,19 +82,14 @@ def check_drive(table: str, limits: Limits, amplitude_vpp: float, frequencies: I
         amplitude_vpp: that is asked for [V].
         frequencies: names of its settings, with what they ask for [Hz].
     """
-    asked = [("drive_amplitude_vpp", amplitude_vpp, "drive_amplitude_vpp")]
-    asked += [(name, frequency, "drive_frequency_hz") for name, frequency in frequencies]
-    for name, wanted, limit in asked:
-        if wanted > getattr(limits, limit):
+    drive = limits.of_the_drive()
+    asked = [("drive_amplitude_vpp", amplitude_vpp, drive.beyond(amplitude_vpp=amplitude_vpp))]
+    asked += [(name, frequency, drive.beyond(frequency_hz=frequency)) for name, frequency in frequencies]
+    for name, wanted, found in asked:
+        if found:
             raise ConfigError(
-                f"{table}.{name} = {wanted:g} is more than this bench allows, limits.{limit} = "
-                f"{getattr(limits, limit):g}"
-            )
-    for name, wanted, _ in asked[1:]:
-        if wanted < limits.drive_lowest_hz:
-            raise ConfigError(
-                f"{table}.{name} = {wanted:g} is less than this bench allows, limits.drive_lowest_hz = "
-                f"{limits.drive_lowest_hz:g}"
+                f"{table}.{name} = {wanted:g} is {'more' if found.is_highest else 'less'} than this bench allows, "
+                f"limits.{found.name} = {found.limit:g}"
             )
 
 

@@ -206,8 +206,7 @@ def _exit_with(error: Exception) -> NoReturn:
 
 
 def _in_one_line(text: str) -> str:
-    """Without line ends, and without what would steer the terminal: a file's name may hold it."""
-    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in " ".join(text.split()))
+    return " ".join(text.split())
 
 
 def _silence_output() -> None:

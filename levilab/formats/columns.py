@@ -19,6 +19,7 @@ from levilab.formats.titles import (
     nearly_a_frequency,
     read_title,
     unit_factor,
+    without_runs_of_blanks,
 )
 
 SHORTHANDS = {
@@ -201,7 +202,7 @@ def _stated_unit(path: Path, name: str, unit: str) -> str:
 def _find(header: Sequence[str], title: str) -> int | None:
     """Index of a title: as it stands, in any case, or without its unit; else a 1-based number."""
     folded = [text.casefold() for text in header]
-    bare = [re.sub(r"\s*/?\s*[\[(][^\[\]()]*[\])]$", "", text) for text in folded]
+    bare = [re.sub(r" ?/? ?[\[(][^\[\]()]*[\])]$", "", without_runs_of_blanks(text)) for text in folded]
     for titles, wanted in ((list(header), title), (folded, title.casefold()), (bare, title.casefold())):
         if titles.count(wanted) == 1:
             return titles.index(wanted)

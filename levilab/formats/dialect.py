@@ -177,5 +177,5 @@ def _split_at_blanks(line: str) -> list[str]:
     if '"' in line:
         return [field.strip('"') for field in re.findall(r'"[^"]*"|\S+', line)]
     if any(mark in line for mark in "[(/"):  # "f [Hz]" and "f / Hz" are one title each
-        line = re.sub(r"\s+(?=[\[(/])|(?<=/)\s+", "", line)
+        line = re.sub(r"(?<!\s)\s+(?=[\[(/])|(?<=/)\s+", "", line)
     return line.split()

@@ -199,6 +199,15 @@ _UNIT_FORMS = tuple(
 )
 
 
+#: A title that is longer names nothing that is known here: the forms above look at each pair of its places.
+LONGEST_TITLE = 200
+
+
+def without_runs_of_blanks(text: str) -> str:
+    """A title with a blank where there are many: a program that lays out columns writes thousands."""
+    return " ".join(text.split())
+
+
 def read_title(text: str) -> Title:
     """Read one header field.
 
@@ -209,7 +218,9 @@ def read_title(text: str) -> Title:
     >>> read_title("turns in 10 s").unit, read_title("period [ms]").inverse
     ('/10 s', True)
     """
-    text = text.strip()
+    text = without_runs_of_blanks(text)
+    if len(text) > LONGEST_TITLE:
+        return Title(None, None)
     name = _plain_name(text)
     if name in NAMES and name not in NEED_UNITS:
         return Title(NAMES[name], IMPLIED_UNITS.get(name))
@@ -262,7 +273,10 @@ def foreign_unit(text: str, kind: str) -> str | None:
     >>> foreign_unit("period_ms", "frequency")
     'ms'
     """
-    form = re.fullmatch(r".*?[\[(]([^\[\]()]*)[\])]", text.strip())
+    text = without_runs_of_blanks(text)
+    if len(text) > LONGEST_TITLE:
+        return None
+    form = re.fullmatch(r".*?[\[(]([^\[\]()]*)[\])]", text)
     unit = form[1] if form else text.rpartition("_")[2] if "_" in text else ""
     return unit if unit and is_unit(unit) and unit_factor(unit, kind) is None else None
 

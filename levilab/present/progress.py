@@ -6,6 +6,8 @@ import sys
 import time
 from typing import TYPE_CHECKING, Protocol
 
+from levilab.present.characters import printable
+
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
@@ -64,7 +66,7 @@ class LineDisplay:
         if self._gone:
             return
         try:
-            print(text, file=sys.stderr, flush=True)  # noqa: T201 - this is where it is shown
+            print(printable(text), file=sys.stderr, flush=True)  # noqa: T201 - this is where it is shown
         except OSError:
             self._gone = True
 
@@ -101,7 +103,7 @@ class BarDisplay:
 
     def message(self, text: str) -> None:
         """A line above the bar."""
-        self._progress.console.print(text, markup=False, highlight=False)
+        self._progress.console.print(printable(text), markup=False, highlight=False)
 
     def close(self) -> None:
         """Take the bar away; the lines stay."""

@@ -66,7 +66,7 @@ def test_settings_survive_a_round_trip(name):
         for row in rows:
             setattr(driver, row, before[row])
     assert {row: getattr(driver, row) for row in rows} == before
-    assert driver.unlike(driver.settings()) == {}
+    assert driver.changed_settings(driver.settings()) == {}
 
 
 @pytest.mark.parametrize("kind", CATALOGUE)

@@ -219,7 +219,7 @@ class Scope(ScpiInstrument):
         differing: dict[str, tuple[object, object]] = {}
         for part in self._prepared:
             head = f"channel{part.number}_" if isinstance(part, Channel) else ""
-            found = part.unlike()
+            found = part.changed_settings()
             differing |= {
                 head + name: both for name, both in found.items() if both[1] != self.CHANGED_BY_ACQUIRE.get(name)
             }

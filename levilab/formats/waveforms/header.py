@@ -20,7 +20,15 @@ from typing import TYPE_CHECKING
 from levilab.formats.columns import NoSuchColumn, TableError, quoted, shorten
 from levilab.formats.dialect import Dialect, filled_count, find_dialect
 from levilab.formats.layout import SAMPLE, Layout, lay_out
-from levilab.formats.titles import QUANTITIES, is_unit, plain_unit, read_title, unit_factor
+from levilab.formats.titles import (
+    LONGEST_TITLE,
+    QUANTITIES,
+    is_unit,
+    plain_unit,
+    read_title,
+    unit_factor,
+    without_runs_of_blanks,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -378,7 +386,8 @@ _NO_READINGS = ("time_s", "drive_amplitude_v")
 
 def _bare(title: str) -> str:
     """A title without its unit."""
-    return shorten(re.sub(r"\s*/?\s*[\[(][^\[\]()]*[\])]$|\s*/\s*\S+$", "", title).strip() or title)
+    bare = re.sub(r" ?/? ?[\[(][^\[\]()]*[\])]$| ?/ ?\S+$", "", without_runs_of_blanks(title)[:LONGEST_TITLE])
+    return shorten(bare.strip() or title)
 
 
 def _time_column(head: Head, layout: Layout, wanted: Mapping[str, str]) -> int:

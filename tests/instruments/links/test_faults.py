@@ -62,7 +62,7 @@ READING = {
     "late answer": (NoAnswer, "no answer to 'READ\\?' within 2 s"),
     "single bytes": 25.0,
     "two answers at once": 25.0,
-    "garbage before": (BadAnswer, "expected a number"),
+    "garbage before": (BadAnswer, "expected plain text"),
     "bytes that are no text before": (BadAnswer, "expected plain text"),
     "garbage after": 25.0,
     "block longer than it says": 25.0,

@@ -72,7 +72,7 @@ def test_question_and_answer_over_a_bare_socket():
 def test_a_bare_socket_sends_at_once():
     """VISA's default; without it a message behind another without an answer waits 0.04 s for its acknowledgement."""
     with serving() as server, contextlib.closing(VisaTransport(server.address, timeout=AT_MOST)) as transport:
-        link = transport._resource.visalib.sessions[transport._resource.session].interface
+        link = transport.port.resource.visalib.sessions[transport.port.resource.session].interface
         assert link.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
 
 

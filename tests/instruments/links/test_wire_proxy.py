@@ -124,7 +124,7 @@ def test_a_command_that_is_lost_without_a_trace_is_found_by_its_setting(pair_ove
     pair = pair_over(way, "53230A")
     pair.driver.gate = 0.5
     struck(pair, Fault("message lost"), lambda driver: setattr(driver, "gate", 0.25))
-    assert pair.driver.unlike(pair.driver.settings()) == {"gate_s": (0.25, 0.5)}
+    assert pair.driver.changed_settings(pair.driver.settings()) == {"gate_s": (0.25, 0.5)}
 
 
 @pytest.mark.parametrize("way", FRAMED)

@@ -520,3 +520,23 @@ def test_a_unit_can_be_stated_with_the_column(table_file):
 def test_what_is_another_kind_of_text_is_named(table_file, text, says):
     with pytest.raises(TableError, match=says):
         read_table(table_file(text))
+
+
+@pytest.mark.parametrize(
+    "title",
+    [
+        "f" + " " * 30_000 + "x",
+        " " * 30_000 + "/" + " " * 30_000 + "q",
+        "f" + "\u00a0" * 20_000 + "[H",
+        "f" + "[(" * 10_000,
+    ],
+    ids=["blanks", "blanks about a stroke", "no-break blanks", "brackets"],
+)
+def test_a_title_of_many_blanks_or_brackets_is_read_at_once(tmp_path: Path, title: str) -> None:
+    """Forms that look at each pair of places of a title took minutes; the hang guard ends a test that does so again."""
+    file = tmp_path / "odd.csv"
+    file.write_text(f"time_s,{title}\n" + "".join(f"{k},{30 - k}\n" for k in range(5)), encoding="utf-8")
+    with pytest.raises(DataError):
+        read_table(file, needed=["spin_frequency_hz"])
+    table = read_table(file, columns={"t": "1", "f": "2"})
+    assert len(table.frame) == 5

@@ -352,11 +352,11 @@ def test_interrupted_it_says_so_in_one_line_and_leaves_nothing(
 ) -> None:
     under_way: list[Path] = []
 
-    def interrupt(share: Share, part: float) -> None:
+    def interrupt(share: ShareBar, part: float) -> None:
         under_way.extend(tmp_path.glob("runs/*/run.json"))
         signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(Share, "__call__", interrupt)
+    monkeypatch.setattr(ShareBar, "__call__", interrupt)
     ended = levilab("simulate", "driven", "--duration", "60", "--out", "runs", check=130)
     assert len(under_way) == 1
     assert ended.stderr.splitlines()[-1] == "levilab: interrupted, nothing was written"

@@ -126,6 +126,34 @@ def test_markup_and_escapes_in_a_record_are_printed_as_text(tmp_path: Path) -> N
     assert "\u202e" not in ended.out
 
 
+#: A title of the window, a colour, the same as one byte, and what turns the direction of writing.
+STEERING = "\x1b]0;title\x07\x1b[31mred\x9b32m\u202e"
+posix_names = pytest.mark.skipif(os.name != "posix", reason="Windows has no such names")
+
+
+@posix_names
+def test_names_and_notes_do_not_steer_the_terminal_of_an_analysis(tmp_path: Path) -> None:
+    folder = tmp_path / f"run{STEERING}"
+    shutil.copytree(SAMPLE_DATA / "loose-washers", folder)
+    with (folder / "events.jsonl").open("a", encoding="utf-8") as events:
+        events.write(json.dumps({"time_s": 1.0, "kind": "warning", "text": f"odd {STEERING}"}) + "\n")
+    ended = command("analyze", folder, "--no-save", cwd=tmp_path)
+    assert ended.status == 0
+    assert not set(ended.out + ended.err) & set("\x1b\x07\x9b\u202e")
+    assert "]0;title" in ended.out
+
+
+@pytest.mark.parametrize("key", ["address", "model"])
+def test_an_address_and_a_model_do_not_steer_the_terminal(tmp_path: Path, key: str) -> None:
+    entries = {"model": "53230A", "address": "no resource name"} | {key: f"x::{STEERING}"}
+    lines = ["[counter]", *(f"{name} = {json.dumps(text)}" for name, text in entries.items())]
+    (tmp_path / "bench.toml").write_text("\n".join(lines), encoding="utf-8")
+    ended = command("bench", "check", cwd=tmp_path)
+    assert ended.status in {1, 3}
+    assert not set(ended.out + ended.err) & set("\x1b\x07\x9b\u202e")
+    assert "]0;title" in ended.out + ended.err
+
+
 # --- resuming ---
 
 
