@@ -206,9 +206,12 @@ class Session(Generic[S]):
             self.show.message("  ".join(f"{_head(one):>{_width(one)}}" for one in self._shown))
         self.show.reading(self._in_words(row), row["time_s"], time_left_s)
 
-    def keep_trace(self, trace: Trace, channel: str) -> int:
-        """Write an oscilloscope's record down, raw.  channel: what it shows.  Returns its number in the run."""
-        return self.writer.trace(self.now(), trace, channel)
+    def keep_trace(self, trace: Trace, channel: str, time_s: float | None = None) -> int:
+        """Write an oscilloscope's record down, raw.
+
+        channel: what it shows; time_s: when it was complete, None: now.  Returns its number in the run.
+        """
+        return self.writer.trace(self.now() if time_s is None else time_s, trace, channel)
 
     def _in_words(self, row: Row) -> str:
         """The values of a reading as they stand in a line, below their heads."""

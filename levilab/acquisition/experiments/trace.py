@@ -136,8 +136,9 @@ def run(session: Session[TraceSettings]) -> None:
         return
     watch = _Watch(session)
     for _ in session.readings_every(settings.interval_s, math.inf):
-        if traces := _take(session):
-            _keep(session, traces)
+        complete_s, traces = _take(session)
+        if traces:
+            _keep(session, traces, complete_s)
             watch.look(traces)
         if len(session.rows) >= settings.records:
             return
@@ -248,22 +249,25 @@ def spin_of_record(trace: Trace, level_v: float) -> float | None:
 # --- records ---
 
 
-def _take(session: Session[TraceSettings]) -> list[Trace]:
-    """The traces of one record, one a channel; none where the oscilloscope was lost and is set up anew.
+def _take(session: Session[TraceSettings]) -> tuple[float, list[Trace]]:
+    """When a record was complete [s], and its traces, one a channel.
+
+    None of them where the oscilloscope was lost and is set up anew.
 
     Raises ExperimentFailed where no trigger comes.
     """
     settings, scope = session.settings, session.bench.oscilloscope
     try:
         scope.acquire(timeout_s=settings.trigger_patience_s)
-        return [scope.trace(channel) for channel in settings.channels]
+        complete_s = session.now()  # its way to this computer takes longer
+        return complete_s, [scope.trace(channel) for channel in settings.channels]
     except NeverTriggered as never:
         raise ExperimentFailed(_why_no_trigger(session)) from never
     except OutOfRange:
         raise
     except InstrumentError as error:
         session.reconnect("oscilloscope", error, lambda: _prepare_scope(session))
-        return []
+        return session.now(), []
 
 
 def _why_no_trigger(session: Session[TraceSettings]) -> str:
@@ -297,17 +301,16 @@ def _range(trace: Trace) -> tuple[float, float]:
     return (float(volts.min()), float(volts.max())) if volts.size else (math.nan, math.nan)
 
 
-def _keep(session: Session[TraceSettings], traces: list[Trace]) -> None:
+def _keep(session: Session[TraceSettings], traces: list[Trace], complete_s: float) -> None:
     """The traces, then the row that says that they are there."""
     settings, number = session.settings, len(session.rows) + 1
-    now = session.now()
     for trace in traces:
-        session.keep_trace(trace, settings.label(trace.channel))
+        session.keep_trace(trace, settings.label(trace.channel), complete_s)
         if problem := _problem(trace, settings):
             session.event("look at the scale", f"record {number}: {problem}", record=number, channel=trace.channel)
     shown = next(trace for trace in traces if trace.channel == _shown(settings))
     low, high = _range(shown)
-    row: Row = {"time_s": now, "record": number}
+    row: Row = {"time_s": complete_s, "record": number}
     if not math.isnan(low):
         row |= {"lowest_v": low, "highest_v": high}
     session.keep(row, (settings.records - number) * settings.interval_s)

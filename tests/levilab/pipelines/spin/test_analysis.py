@@ -114,12 +114,13 @@ def traced(tmp_path: Path) -> Path:
 
 def test_the_traces_of_a_run_are_read_in_volts_on_its_clock(traced: Path) -> None:
     waveform = run_waveforms(Run.load(traced))[1]
-    assert (waveform.start, waveform.step, waveform.count) == (pytest.approx(9.8), 2.5e-4, 1600)
+    assert (waveform.start, waveform.step, waveform.count) == (pytest.approx(9.6), 2.5e-4, 1600)
     assert waveform.samples().max() == pytest.approx(1.1, abs=0.1)
     analysis = analyze_spins([traced], SpinOptions())
     series = analysis.runs[0].series
     assert series.frequency == pytest.approx([30, 29, 28], abs=0.01)
-    assert series.time == pytest.approx([0, 10, 20], abs=0.05)
+    assert series.time == pytest.approx([-0.2, 9.8, 19.8], abs=0.05)  # the middles of 0.4 s before they were complete
+    assert series.u[1] == pytest.approx(0.1 * 0.02 / np.sqrt(3), rel=0.05)  # the slope, by when that was asked
     document = ANALYSES["spin"].document(analysis, traced)
     assert document["inputs"][0]["path"] == "traces.jsonl"
     assert save_found(ANALYSES["spin"], analysis)[0] == traced / "result.json"
