@@ -105,7 +105,10 @@ def clean(samples: Array, rate: float, bins: Array, bad: Mask | None, *, own: Li
 
 
 def _own_at_sight(lines: Lines, bins: Array, rate: float) -> Lines:
-    """Those lines that are harmonics of pulses which are seen before anything is taken off."""
+    """Those lines that are harmonics of pulses which are seen before anything is taken off.
+
+    Where more turns lack a pulse than have one, hum itself may be what was numbered, and is no measure of hum.
+    """
     if not lines:
         return ()
     events = find_events(bins, rate)
@@ -114,6 +117,8 @@ def _own_at_sight(lines: Lines, bins: Array, rate: float) -> Lines:
     try:
         train = fit_train(events.times)
     except TooFewPulses:
+        return ()
+    if train.missing > train.used.size:
         return ()
     return own_lines(lines, bins, rate, train.fit)
 

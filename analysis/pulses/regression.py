@@ -11,7 +11,8 @@ from analysis.uncertainty import Estimate
 
 Array = NDArray[np.float64]
 
-#: The slope's own change is fitted where it differs from 0 by so many standard uncertainties.
+#: The slope's own change is fitted where it differs from 0 by so many standard uncertainties, or, by few residuals, by
+#: as many as chance seldom makes of it as these.
 CURVED = 4.0
 #: The noise of the samples counts as so many degrees of freedom, where there are fewer of the residuals.
 FEW = 30.0
@@ -56,7 +57,7 @@ class Fit:
     @property
     def covariance(self) -> Array:
         """Of the coefficients, such that one standard uncertainty covers 68.27 %."""
-        return np.asarray(self.unit_covariance * self.variance * self.inflation * _student(self.freedom) ** 2)
+        return np.asarray(self.unit_covariance * self.variance * self.inflation * student(self.freedom) ** 2)
 
     def phase(self, times: Array) -> Array:
         """Phase at times [turns]."""
@@ -71,6 +72,10 @@ class Fit:
         """Frequency and slope where they are independent, and that time."""
         frequency, chirp, away = _independent(self.coefficients, self.covariance, self.half)
         return frequency, chirp, self.centre + away
+
+    def frequency_and_chirp_at(self, time: float) -> tuple[Estimate, Estimate]:
+        """Frequency and slope at any time [s], where they may depend on each other."""
+        return _at(self.coefficients, self.covariance, self.half, (time - self.centre) / self.half)
 
     @property
     def bend(self) -> Estimate | None:
@@ -137,8 +142,8 @@ class Fit:
         least = float(np.mean((rounded @ carried) ** 2))
         if least <= max(seen, COHERENT**2 * rounding**2 / 12 * float(carried @ carried)):
             return self
-        student = _student(self.freedom) ** 2
-        return replace(self, variance=least / (float(self.unit_covariance[1, 1]) * self.inflation * student))
+        wider = self.inflation * student(self.freedom) ** 2
+        return replace(self, variance=least / (float(self.unit_covariance[1, 1]) * wider))
 
     def phase_at(self, time: float, origin: float = 0.0) -> Estimate:
         """Phase at a time, from 0 to 1 [turns], of what passes at a phase of origin."""
@@ -170,10 +175,14 @@ def _independent(coefficients: Array, covariance: Array, half: float) -> tuple[E
         u = min(max(u - step, -1.0), 1.0)
         if abs(step) < 1e-12 or size < 4:
             break
-    d1, d2 = _derivatives(u, size)
+    return *_at(coefficients, covariance, half, u), u * half
+
+
+def _at(coefficients: Array, covariance: Array, half: float, u: float) -> tuple[Estimate, Estimate]:
+    d1, d2 = _derivatives(u, coefficients.size)
     frequency = Estimate(float(d1 @ coefficients) / half, float(np.sqrt(d1 @ covariance @ d1)) / half, "Hz")
     chirp = Estimate(float(d2 @ coefficients) / half**2, float(np.sqrt(d2 @ covariance @ d2)) / half**2, "Hz/s")
-    return frequency, chirp, u * half
+    return frequency, chirp
 
 
 def _derivatives(u: float, size: int) -> tuple[Array, Array]:
@@ -182,13 +191,13 @@ def _derivatives(u: float, size: int) -> tuple[Array, Array]:
     return d1, d2
 
 
-def _student(freedom: float) -> float:
-    """What a standard deviation from so few degrees of freedom is multiplied by so that it covers 68.27 %."""
+def student(freedom: float, deviations: float = 1.0) -> float:
+    """What a standard deviation from few degrees of freedom is multiplied by, to cover as so many that are known."""
     if freedom > 200:
-        return 1.0
-    from scipy.special import stdtrit
+        return deviations
+    from scipy.special import ndtr, stdtrit
 
-    return float(stdtrit(max(freedom, 1.0), 0.8413447460685429))
+    return float(stdtrit(max(freedom, 1.0), float(ndtr(deviations))))
 
 
 def fit_turns(times: Array, turns: Array, weight: Array | None = None, *, degree: int | None = None) -> Fit:
@@ -200,8 +209,8 @@ def fit_turns(times: Array, turns: Array, weight: Array | None = None, *, degree
     fit, third = _fit(times, turns, weight, degree or 2)
     if degree is None and times.size >= 12 and third > CURVED:
         cubic, _ = _fit(times, turns, weight, 3)
-        u = float(np.sqrt(cubic.covariance[3, 3] * max(1.0, 1 / cubic.inflation)))
-        if abs(cubic.coefficients[3]) > CURVED * u:
+        u = float(np.sqrt(cubic.unit_covariance[3, 3] * cubic.variance * max(1.0, cubic.inflation)))
+        if abs(cubic.coefficients[3]) > student(cubic.freedom, CURVED) * u:
             return cubic
     return fit
 

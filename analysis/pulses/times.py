@@ -9,14 +9,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.errors import NotFinite, ShapesDiffer, TimesNotIncreasing, TooFewPulses
 from analysis.numbers import digits
-from analysis.pulses.regression import Fit, fit_turns, median
+from analysis.pulses.regression import Fit, fit_turns, median, student
 from analysis.pulses.result import Finding, SpinFrequency
 from analysis.pulses.turns import Numbering, number_turns
 
 Array = NDArray[np.float64]
 
 FEWEST = 4
-#: A pulse farther from its place than this many standard deviations of the others is no pulse of the top.
+#: A pulse farther from its place than this many standard deviations of the others is no pulse of the top; than more of
+#: them by few pulses, which say little of their standard deviation.
 GROSS = 4.5
 ROUNDS = 12
 #: A variance that is smaller by chance is seldom smaller than this part.
@@ -106,7 +107,8 @@ def fit_train(times: Array, *, degree: int | None = None) -> Train:
         whole = np.rint(phase).astype(np.int64)
         away = phase - whole
         spread = 1.4826 * median(np.abs(fit.residuals)) + 1e-12
-        near = np.abs(away) < np.clip(GROSS * spread, 1e-9, numbering.tolerance)
+        far = student(used.size - fit.coefficients.size, GROSS) * spread
+        near = np.abs(away) < np.clip(far, 1e-9, numbering.tolerance)
         new = _one_a_turn(Numbering(whole, near), np.abs(away))
         if new.size < FEWEST:
             break

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
@@ -13,17 +13,18 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.errors import NotPositive, OnlyHum, ShapesDiffer, TooFewPulses
 from analysis.numbers import digits
 from analysis.pulses import traps
-from analysis.pulses.clean import Clean, clean, own_lines
+from analysis.pulses.clean import STRAYS, Clean, clean, own_lines
 from analysis.pulses.edges import Edges, place_edges
 from analysis.pulses.likelihood import search
 from analysis.pulses.matched import Match, match, window_of
-from analysis.pulses.regression import median
+from analysis.pulses.regression import median, student
 from analysis.pulses.result import Finding, Method, SpinFrequency
 from analysis.pulses.search import Events, find_events, shorten
 from analysis.pulses.times import FEWEST, Train, correlated, fit_train
 
 if TYPE_CHECKING:
     from analysis.pulses.regression import Fit
+    from analysis.uncertainty import Estimate
 
 Array = NDArray[np.float64]
 Choice = Literal["auto", "edges", "matched", "likelihood"]
@@ -47,6 +48,10 @@ SCATTERED, UNDERSTATED = 0.25, 3.0
 #: where they scatter by more than this part of a bin, which the bins themselves do not, and where no more than this
 #: part of the turns is without its own pulse.
 BY_NOISE, BY_BINS, MOST_ODD = 3.2, 0.25, 0.1
+#: Two frequencies that differ by no more than this part count the same turns.
+SAME = 0.1
+#: And not where every second pulse lies so many standard deviations from the others.
+APART = 4.0
 
 
 def spin_of_trace(
@@ -91,7 +96,7 @@ def spin_of_trace(
     if cleaned.lines:
         own = own_lines(cleaned.lines, cleaned.before, rate / (x.size // bins.size), found.match.fit)
         if own:
-            found = _found(Trace(clean(x, rate, bins, bad, own=own), rate), method, degree)
+            found = _found(Trace(clean(x, rate, bins, bad, own=own), rate), method, degree, near=found.match.fit)
     return _result(found, start)
 
 
@@ -100,7 +105,7 @@ class Trace:
 
     def __init__(self, cleaned: Clean, rate: float) -> None:
         self.samples, self.bins, self.bad = cleaned.samples, cleaned.bins, cleaned.bad
-        self.notes = cleaned.notes
+        self.notes, self.lines = cleaned.notes, cleaned.lines
         self.rate, self.bin_rate = rate, rate / (self.samples.size // self.bins.size)
 
     @cached_property
@@ -134,7 +139,8 @@ class Trace:
 class Found:
     """Pulses of a trace, which method found them, the phase of the fit at which a pulse's middle passes, and findings.
 
-    doubled: pulses beside the turns' own.
+    doubled: pulses beside the turns' own; one_by_one: the phase by pulses that were placed by themselves, of the same
+    degree, where they scatter more than the method's residuals show.
     """
 
     match: Match | Edges
@@ -142,20 +148,37 @@ class Found:
     method: Method
     origin: float
     notes: tuple[Finding, ...]
+    one_by_one: Fit | None = None
 
 
-def _found(trace: Trace, method: Choice, degree: int | None) -> Found:
-    """The pulses by a method.  Raises TooFewPulses."""
+def _found(trace: Trace, method: Choice, degree: int | None, *, near: Fit | None = None) -> Found:
+    """The pulses by a method; near: a phase that fitted the trace before it was cleaned anew.  Raises TooFewPulses."""
     if method == "edges":
+        if train := _scattered(trace, math.inf, degree):
+            return _one_by_one(trace, train)
         edges, doubled = _by_edges(trace)
         return Found(edges, doubled, "edges", 0.0, trace.notes)
-    found, doubled, used, why = _by_pulse(trace, method, degree)
-    if method == "auto" and (train := _scattered(trace, found, degree)):
-        text = f"the pulses scatter by {digits(_scatter(train), 2)} turns: each was placed by itself"
-        one_by_one = Edges(train.fit, train.used.size, math.nan, math.nan, math.nan, train.missing, 0)
-        return Found(one_by_one, train.doubled, "edges", 0.0, (Finding("scattered", text), *trace.notes))
+    found, doubled, used, why = _by_pulse(trace, method, degree, near)
+    train = _scattered(trace, 1.4826 * median(np.abs(found.shifts[found.used])), degree)
+    if train and method == "auto":
+        return _one_by_one(trace, train)
     found, trap = _without_trap(trace, found, degree)
-    return Found(found, doubled, used, found.origin, (*why, *trap, *trace.notes))
+    notes = (*why, *trap, *trace.notes)
+    if train is None or not _same(found.fit, train.fit):
+        return Found(found, doubled, used, found.origin, notes)
+    _, train = _events(trace, found.fit.coefficients.size - 1)
+    notes = (_scatters(train, "a mean pulse does not show it, so their own places are in the uncertainty"), *notes)
+    return Found(found, doubled, used, found.origin, notes, train.fit)
+
+
+def _one_by_one(trace: Trace, train: Train) -> Found:
+    """What the pulses say that were placed each by itself."""
+    edges = Edges(train.fit, train.used.size, math.nan, math.nan, math.nan, train.missing, 0)
+    return Found(edges, train.doubled, "edges", 0.0, (_scatters(train, "each was placed by itself"), *trace.notes))
+
+
+def _scatters(train: Train, text: str) -> Finding:
+    return Finding("scattered", f"the pulses scatter by {digits(_scatter(train), 2)} turns: {text}")
 
 
 def _events(trace: Trace, degree: int | None = None) -> tuple[Events, Train]:
@@ -166,9 +189,10 @@ def _events(trace: Trace, degree: int | None = None) -> tuple[Events, Train]:
     return events, fit_train(events.times - 0.5 / trace.rate, degree=degree)  # a bin's centre is that of its samples
 
 
-def _scattered(trace: Trace, found: Match, degree: int | None) -> Train | None:
+def _scattered(trace: Trace, left: float, degree: int | None) -> Train | None:
     """The pulses numbered, if they stand out but not at their places: no mean pulse tells how far they are off.
 
+    left: how far a match leaves them from their places, as a standard deviation [turns].
     None where the match is to be trusted: at noise, at gaps, and where every second pulse is off by the same, which is
     a trap of its own.
     """
@@ -176,11 +200,9 @@ def _scattered(trace: Trace, found: Match, degree: int | None) -> Train | None:
         events, train = _events(trace, degree)
     except TooFewPulses:
         return None
-    frequency = float(train.fit.coefficients[1]) / train.fit.half
-    width, bin_width = events.width * frequency, frequency / trace.bin_rate  # [turns]
+    width, bin_width = events.width * _frequency(train.fit), _frequency(train.fit) / trace.bin_rate  # [turns]
     odd = train.missing + train.doubled
     scatter = _scatter(train)
-    left = 1.4826 * median(np.abs(found.shifts[found.used]))
     if odd > MOST_ODD * train.used.size or scatter < max(BY_NOISE / events.contrast * width, BY_BINS * bin_width):
         return None
     if scatter < SCATTERED * width and scatter < UNDERSTATED * left:
@@ -190,7 +212,7 @@ def _scattered(trace: Trace, found: Match, degree: int | None) -> Train | None:
         return None
     apart = abs(float(sides[0].mean() - sides[1].mean()))
     by_chance = math.hypot(*(float(side.std(ddof=1)) / math.sqrt(len(side)) for side in sides))
-    return train if apart < 4 * by_chance else None
+    return train if apart < student(train.used.size - 2, APART) * by_chance else None
 
 
 def _scatter(train: Train) -> float:
@@ -198,10 +220,20 @@ def _scatter(train: Train) -> float:
     return float(np.sqrt(train.fit.variance))
 
 
+def _frequency(fit: Fit) -> float:
+    """In the middle [Hz]."""
+    return float(fit.coefficients[1]) / fit.half
+
+
+def _same(one: Fit, other: Fit) -> bool:
+    """Whether two fits count the same turns."""
+    return abs(_frequency(one) - _frequency(other)) < SAME * _frequency(other)
+
+
 def _by_edges(trace: Trace) -> tuple[Edges, int]:
     """The edges, and the number of pulses beside the turns' own.  Raises TooFewPulses."""
     events, train = _events(trace)
-    if events.width * train.fit.coefficients[1] / train.fit.half > WIDE:
+    if events.width * _frequency(train.fit) > WIDE:
         fit = train.fit.with_grid(events.times[train.used], None, step=1 / trace.rate, steep=1.0)
         return Edges(fit, train.used.size, math.nan, math.nan, math.nan, train.missing, 0), train.doubled
     edges = place_edges(trace.samples, trace.rate, train.fit, width=events.width, sign=events.sign)
@@ -210,7 +242,9 @@ def _by_edges(trace: Trace) -> tuple[Edges, int]:
     return edges, train.doubled
 
 
-def _by_pulse(trace: Trace, method: Choice, degree: int | None) -> tuple[Match, int, Method, tuple[Finding, ...]]:
+def _by_pulse(
+    trace: Trace, method: Choice, degree: int | None, near: Fit | None
+) -> tuple[Match, int, Method, tuple[Finding, ...]]:
     """The match, the number of pulses beside the turns' own, which method found it, and why not the other.
 
     Raises TooFewPulses.
@@ -223,6 +257,8 @@ def _by_pulse(trace: Trace, method: Choice, degree: int | None) -> tuple[Match, 
         found = trace.match(train.fit, degree)
     except TooFewPulses as error:
         seen = error.seen
+    if found is not None and near is not None and _same(found.fit, near):
+        found = _likelier(found, trace.match(near, degree))
     if method == "matched":
         if found is None:
             raise trace.too_few(seen)
@@ -231,16 +267,33 @@ def _by_pulse(trace: Trace, method: Choice, degree: int | None) -> tuple[Match, 
         why = "more pulses lie beside the turns than at them" if astray else _doubt(found)
         if not why:
             return found, doubled, "matched", ()
-    fit = search(trace.bins, trace.bin_rate)
-    other = None if fit is None else trace.match(fit, degree)
-    if other is None or (found is not None and found.evidence > other.evidence):
-        other = found
+    other = _of_greatest_likelihood(trace, found, degree)
     if other is None or _doubt(other).startswith("the frequency"):
         raise trace.too_few(seen)
     notes = (
         () if method == "likelihood" else (Finding("fell-back", f"{why}: the greatest likelihood was searched for"),)
     )
     return other, doubled, "likelihood", notes
+
+
+def _of_greatest_likelihood(trace: Trace, found: Match | None, degree: int | None) -> Match | None:
+    """The match at the frequency of greatest likelihood, or the one that was found, if that is likelier."""
+    fit = search(trace.bins, trace.bin_rate)
+    other = None if fit is None else trace.match(fit, degree)
+    if other and found and _of_hum(trace, found) and not _of_hum(trace, other):
+        return other
+    return _likelier(other, found)
+
+
+def _of_hum(trace: Trace, found: Match) -> bool:
+    """Whether the frequency passes one at which hum was taken off: what is left of it recurs as often as it."""
+    ends = np.sort(found.fit.frequency(np.array([0.0, trace.duration])))
+    return any(ends[0] - STRAYS < frequency < ends[1] + STRAYS for frequency, _ in trace.lines)
+
+
+def _likelier(one: Match | None, other: Match | None) -> Match | None:
+    """The one of greater evidence; the first of two alike."""
+    return max((each for each in (one, other) if each), key=lambda each: each.evidence, default=None)
 
 
 def _doubt(found: Match) -> str:
@@ -303,6 +356,12 @@ def _result(pulses: Found, start: float) -> SpinFrequency:
     found = pulses.match
     fit = found.fit
     frequency, chirp, reference = fit.frequency_and_chirp()
+    phase, bend, scatter = fit.phase_at(reference, pulses.origin), fit.bend, 1.4826 * median(np.abs(fit.residuals))
+    if (own := pulses.one_by_one) is not None:
+        at, slope = own.frequency_and_chirp_at(reference)
+        frequency, chirp, phase = _wider(frequency, at), _wider(chirp, slope), _wider(phase, own.phase_at(reference))
+        bend = bend and own.bend and _wider(bend, own.bend)
+        scatter = float(np.sqrt(own.variance))
     assert frequency.value is not None
     more = [*pulses.notes, *traps.mains(frequency, chirp)]
     if isinstance(found, Match) and found.flat:
@@ -318,16 +377,28 @@ def _result(pulses: Found, start: float) -> SpinFrequency:
     return SpinFrequency(
         frequency=frequency,
         chirp=chirp,
-        phase=fit.phase_at(reference, pulses.origin),
+        phase=phase,
         reference_time=start + reference,
         method=pulses.method,
         bound=None if math.isnan(found.bound) else found.bound,
         pulses=found.turns,
         missing=found.missing,
         doubled=pulses.doubled,
-        scatter=1.4826 * median(np.abs(fit.residuals)) / frequency.value,
+        scatter=scatter / frequency.value,
         snr_db=20 * math.log10(found.height / found.noise) if found.noise > 0 and found.height > 0 else None,
         notes=tuple(more),
-        bend=fit.bend,
-        correlations=fit.correlations(reference),
+        bend=bend,
+        correlations=(own or fit).correlations(reference),
     )
+
+
+def _wider(found: Estimate, own: Estimate) -> Estimate:
+    """What a method found, with an uncertainty that holds the pulses' own places, and how far it is from those."""
+    assert found.value is not None
+    assert found.u is not None
+    assert own.value is not None
+    assert own.u is not None
+    apart = found.value - own.value
+    if found.unit == "turns":
+        apart -= round(apart)
+    return replace(found, u=max(found.u, math.hypot(own.u, apart)))

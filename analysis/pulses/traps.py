@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from analysis.pulses.clean import MAINS
 from analysis.pulses.matched import COARSE
+from analysis.pulses.regression import student
 from analysis.pulses.result import Finding
 
 if TYPE_CHECKING:
@@ -17,7 +18,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Every second pulse differs where the means of both halves are so many standard errors apart ...
+#: Every second pulse differs where the means of both halves are so many standard errors apart, or, by few pulses, as
+#: many as chance as seldom makes of it ...
 CERTAIN = 6.0
 #: ... and by so much, in parts of the height, or in turns.
 HIGHER, ASIDE = 0.1, 2e-3
@@ -25,6 +27,8 @@ HIGHER, ASIDE = 0.1, 2e-3
 EQUAL = 0.7
 #: Every second pulse lies elsewhere where the profiles of even and odd turns are less alike than this,
 ALIKE = 0.5
+#: smoothed over so many of their places, for pulses that scatter about theirs,
+BLUR = 7
 #: and one of them stands out so many times its noise.
 STANDS_OUT = 8.0
 #: The frequency is that of the mains where it is so near to a multiple and changes so little, as parts of it [1, 1/s].
@@ -51,7 +55,7 @@ def alternates(found: Match) -> str:
             return ""
         apart = abs(float(a.mean() - b.mean()))
         error = float(np.sqrt(a.var() / a.size + b.var() / b.size))
-        if apart > max(CERTAIN * error, least):
+        if apart > max(student(a.size + b.size - 2, CERTAIN) * error, least):
             return what
     return ""
 
@@ -68,7 +72,8 @@ def elsewhere(bins: Array, phase: Array) -> str:
     away = np.abs(both)
     if phase[-1] - phase[0] < 16 or away.max() < STANDS_OUT * 1.4826 * float(np.median(away)):
         return ""
-    even, odd = both
+    around = np.pad(both.ravel(), BLUR // 2, mode="wrap")
+    even, odd = np.lib.stride_tricks.sliding_window_view(around, BLUR).sum(axis=1).reshape(2, COARSE)
     alike = float(even @ odd) / float(np.sqrt((even @ even) * (odd @ odd)) + 1e-300)
     return "is not half-way between its neighbours" if alike < ALIKE else ""
 

@@ -187,6 +187,10 @@ def benchmark_estimators(
     trials: Annotated[
         int, typer.Option(metavar="N", min=10, help="Traces of each kind; 400 take about ten minutes.")
     ] = 400,
+    case: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Only this hard case, as '50 Hz'; repeatable.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Other traces of the same kinds.")] = 2026,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write estimators.json and estimators.png there.")
     ] = None,
@@ -199,4 +203,4 @@ def benchmark_estimators(
     from levilab.benchmark.estimators.command import run_and_tell
 
     with interruptible("nothing was written"):
-        run_and_tell(trials=trials, out=out, as_json=as_json)
+        run_and_tell(trials=trials, cases=case or (), seed=seed, out=out, as_json=as_json)

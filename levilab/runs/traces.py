@@ -74,7 +74,7 @@ class StoredTrace:
 
     Attributes:
         number: from 1 on.
-        time_s: when it was kept, on the clock of the readings.
+        time_s: when it was complete, on the clock of the readings.
         channel: what it shows.
         trace: the record itself.
         announced: points that it was to have, None where it has them all.

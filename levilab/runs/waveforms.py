@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+#: The drivers ask an oscilloscope so often whether its record is complete [s].
+SEEN_LATE_S = 0.02
+
 
 def has_traces(run: Run) -> bool:
     """Whether a run keeps records of an oscilloscope, or what had come of one when it was killed."""
@@ -28,8 +32,8 @@ def has_traces(run: Run) -> bool:
 def run_waveforms(run: Run) -> list[Waveform]:
     """Each record of a run, in the order in which they were kept.
 
-    A record starts at the time when it was kept, on the clock of the readings, plus its own: the trigger came a little
-    earlier, by the time that the record took on its way.  Raises DataError for one that is damaged.
+    A record ended when the oscilloscope said that it was complete, or up to SEEN_LATE_S before, and began so much
+    earlier as it lasts.  Raises DataError for one that is damaged.
     """
     return [_waveform(run, stored) for stored in load_traces(run.folder)]
 
@@ -40,8 +44,14 @@ def _waveform(run: Run, stored: StoredTrace) -> Waveform:
     def read(_: int) -> Iterator[Array]:
         yield np.asarray(trace.volts, dtype=np.float64)
 
-    start = stored.time_s + trace.t0_s
-    name = run.folder / INDEX
+    count = len(trace.codes)
     return Waveform(
-        name, f"record {stored.number}", start, trace.dt_s, len(trace.codes), (Signal(stored.channel),), read
+        path=run.folder / INDEX,
+        format=f"record {stored.number}",
+        start=stored.time_s - count * trace.dt_s,
+        step=trace.dt_s,
+        count=count,
+        signals=(Signal(stored.channel),),
+        read=read,
+        start_u=SEEN_LATE_S / math.sqrt(3),  # the root mean square of what lies evenly between 0 and that
     )

@@ -257,7 +257,7 @@ def _take(session: Session[TraceSettings]) -> list[Trace]:
     traces: list[Trace] = []
     try:
         session.bench.oscilloscope.acquire(timeout_s=settings.trigger_patience_s)
-        now = session.now()
+        now = session.now()  # the record's way to this computer takes longer
         for channel in settings.channels:
             trace = session.keep_trace(channel, settings.label(channel), now)
             traces.append(trace)

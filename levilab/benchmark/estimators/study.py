@@ -18,14 +18,17 @@ from analysis.pulses import spin_of_times, spin_of_trace
 from levilab.benchmark.estimators.peers import PEERS
 from levilab.benchmark.estimators.traces import DURATION, DUTY, HARD, RATE, Case, Trace, make
 from levilab.benchmark.machine import processor, version_of
+from levilab.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from analysis.pulses.trace import Choice
 
 Array = NDArray[np.float64]
 
+#: Seed of the traces, unless given.
+SEED = 2026
 #: Signal to noise of the study [dB].
 SNR = (0.0, 5.0, 10.0, 20.0, 30.0, 40.0)
 OURS: dict[str, Choice] = {"default": "auto", "fast": "edges", "maximum likelihood": "likelihood"}
@@ -73,6 +76,8 @@ class Score:
         rmse_hz, rmse_over_bound: of those that did not fail; the bound is the closed form, or of hard cases the median
             of what the estimates state for their own pulse and noise.
         coverage: share of one-sigma intervals that hold the truth.
+        pull_mean, pull_sd, pull_kurtosis: of the errors in units of the stated uncertainties, without the failures; the
+            kurtosis of a normal distribution is 0.
         best_ms, median_ms: CPU time of a trace [ms].
         samples_per_s: by the best time.
         notes: how often each finding was named.
@@ -85,6 +90,9 @@ class Score:
     rmse_hz: float
     rmse_over_bound: float
     coverage: float | None
+    pull_mean: float | None
+    pull_sd: float | None
+    pull_kurtosis: float | None
     best_ms: float
     median_ms: float
     samples_per_s: float | None
@@ -111,28 +119,37 @@ class Study:
     hard: tuple[Score, ...]
 
 
-def study(*, trials: int, tell: Callable[[str], None] = lambda _: None) -> Study:
-    """Carry it all out, with seeds that stay.
+def study(
+    *, trials: int, cases: Sequence[str] = (), seed: int = SEED, tell: Callable[[str], None] = lambda _: None
+) -> Study:
+    """Carry it all out.
 
     Args:
         trials: of each score.
+        cases: only these hard cases; empty: all, and each method at each SNR.
+        seed: the same gives the same traces.
         tell: called with what is under way.
+
+    Raises:
+        UsageError: for a case that is none.
     """
+    if unknown := [name for name in cases if name not in HARD]:
+        raise UsageError("case", f"one of these is expected: {'; '.join(HARD)}", value=unknown[0])
     scores: list[Score] = []
-    for snr in SNR:
+    for snr in () if cases else SNR:
         tell(f"{snr:g} dB, {trials} traces")
-        scores += _at(snr, trials)
+        scores += _at(snr, trials, seed)
     hard = []
-    for name, case in HARD.items():
+    for name in cases or HARD:
         tell(f"{name}, {trials} traces")
-        hard.append(hard_case(name, case, trials))
+        hard.append(hard_case(name, HARD[name], trials, seed))
     return Study(trials, tuple(scores), tuple(hard))
 
 
-def _at(snr: float, trials: int) -> list[Score]:
+def _at(snr: float, trials: int, seed: int = SEED) -> list[Score]:
     """All methods on the same traces, one after the other on each."""
     found = {name: Trials() for name in (*OURS, *PEERS)}
-    random = np.random.default_rng([2026, round(snr)])
+    random = np.random.default_rng([seed, round(snr)])
     for number in range(-1, trials):  # the first is not counted: caches, imports
         trace = make(Case(snr=snr), random)
         for name, method in OURS.items():
@@ -146,10 +163,10 @@ def _at(snr: float, trials: int) -> list[Score]:
     return [_score(name, snr, each, bound(snr)) for name, each in found.items()]
 
 
-def hard_case(name: str, case: Case, trials: int) -> Score:
+def hard_case(name: str, case: Case, trials: int, seed: int = SEED) -> Score:
     """The default on one kind of hard trace."""
     found = Trials()
-    random = np.random.default_rng([2026, list(HARD).index(name) + 100])
+    random = np.random.default_rng([seed, list(HARD).index(name) + 100])
     for number in range(-1, trials):
         _try(found, make(case, random), number, "auto", times=case.bounces)
     return _score(name, case.snr, found, None)
@@ -186,6 +203,7 @@ def _score(name: str, snr: float, found: Trials, limit: float | None) -> Score:
     right = errors[~wrong] if found.u and not wrong.all() else errors
     rmse = float(np.sqrt(np.mean(right**2)))
     seconds = np.array(found.seconds)
+    mean, sd, kurtosis = _shape(errors[~wrong] / np.array(found.u)[~wrong]) if found.u else (None, None, None)
     traced = not math.isnan(limit)
     return Score(
         name=name,
@@ -195,11 +213,22 @@ def _score(name: str, snr: float, found: Trials, limit: float | None) -> Score:
         rmse_hz=rmse,
         rmse_over_bound=rmse / limit,
         coverage=float(np.mean(np.abs(errors) < np.array(found.u))) if found.u else None,
+        pull_mean=mean,
+        pull_sd=sd,
+        pull_kurtosis=kurtosis,
         best_ms=1e3 * float(seconds.min()),
         median_ms=1e3 * float(np.median(seconds)),
         samples_per_s=RATE * DURATION / float(seconds.min()) if traced and name != "5 pulses only" else None,
         notes=dict(sorted(found.notes.items())),
     )
+
+
+def _shape(pulls: Array) -> tuple[float | None, float | None, float | None]:
+    """Mean, standard deviation, and kurtosis less that of a normal distribution; None of none."""
+    if pulls.size < 2 or not (sd := float(pulls.std())) > 0:
+        return None, None, None
+    mean = float(pulls.mean())
+    return mean, sd, float(np.mean(((pulls - mean) / sd) ** 4)) - 3
 
 
 def as_document(found: Study) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from levilab.acquisition.table import settings_of, with_settings
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquired, pull_of
 from levilab.crosscheck.subjects.spindown import LAWS
 from levilab.pipelines.catalogue import ANALYSES
+from levilab.runs.waveforms import run_waveforms
 from levilab.world.bench import virtual_wiring
 from levilab.world.light import Tape
 from levilab.world.spin_world import Array, SpinScene, SpinWorld
@@ -56,8 +57,8 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     world = _Watched(scene)
     duration = float(random.uniform(1.0, 4.0))
     run = acquired("trace", seed, folder, lambda request: _in_world(request, world, duration))
-    (stored,) = run.traces()
-    start = world.looks.get(stored.trace.codes.size)
+    (record,) = run_waveforms(run)
+    start = world.looks.get(record.count)
     if start is None:
         raise TrialFailed("the oscilloscope took its record in several pieces: its time is not known")
     found = ANALYSES["spin"]
@@ -65,7 +66,7 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     (one,) = found.document(found.analyze([run.folder], options), folder)["runs"]
     values = one["values"]
     # the run's time counts from its own zero; the record has the same first sample in both
-    moment = values["reference_time"]["value"] - (stored.time_s + stored.trace.t0_s) + start
+    moment = values["reference_time"]["value"] - record.start + start
     before, here, after = world.motion(moment + np.array([-_APART_S, 0.0, _APART_S]))[0] / (2 * math.pi)
     return [
         pull_of("frequency", values["frequency"], float(here)),

@@ -57,6 +57,7 @@ class Waveform:
         signals: the channels.
         read: from the index of a channel to its samples in order, in blocks, each of shape (m,), in the channel's unit.
         warnings: what to know before using it.
+        start_u: standard uncertainty of the start [s], where it comes from the clock of a run.
     """
 
     path: Path
@@ -68,6 +69,7 @@ class Waveform:
     read: Callable[[int], Iterator[Array]]
     warnings: tuple[str, ...] = ()
     step_u: float = 0.0
+    start_u: float = 0.0
 
     @property
     def rate(self) -> float:

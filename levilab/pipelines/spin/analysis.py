@@ -197,7 +197,7 @@ def _of_several(records: Records, options: SpinOptions) -> SpinRun:
     if not spins:
         assert missed
         raise missed
-    series = Series(*_columns(spins), of="record")
+    series = _with_start(Series(*_columns(spins), of="record"), records.waveforms[0].start_u)
     all_of_them = len(records.waveforms)
     notes = _by_record(dict(zip(numbers, spins, strict=True)), all_of_them)
     if missed:
@@ -205,6 +205,13 @@ def _of_several(records: Records, options: SpinOptions) -> SpinRun:
         text = f"{left_out} of {all_of_them} records are left out, the last of them for this: {missed}"
         notes = (*notes, Finding("no-pulses", text))
     return SpinRun(spins[len(spins) // 2], series, notes)
+
+
+def _with_start(series: Series, u_s: float) -> Series:
+    """The same with the uncertainty of the times [s] in that of the frequencies at them, by their slope."""
+    if u_s == 0 or len(series) < 2:
+        return series
+    return replace(series, u=np.hypot(series.u, u_s * np.gradient(series.frequency, series.time)))
 
 
 def _by_record(spins: Mapping[int, SpinFrequency], all_of_them: int) -> tuple[Finding, ...]:

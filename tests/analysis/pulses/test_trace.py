@@ -227,3 +227,42 @@ def test_pulses_that_scatter_as_a_wobbling_top_makes_them_are_in_the_uncertainty
         pulls.append((found.frequency.value - truth) / found.frequency.u)
     assert np.std(pulls) < 1.3  # 1, its standard error 0.1; 1.8 and more by the mean pulse
     assert np.max(np.abs(pulls)) < 6
+
+
+@pytest.mark.parametrize("method", ["edges", "matched", "likelihood"])
+def test_a_method_asked_for_by_name_states_the_scatter_of_pulses_too(method):
+    """As above; the learnt pulse is broad, and its fit leaves less of the scatter than there is."""
+    rate, pulls = 10_000.0, []
+    time = np.arange(6000) / rate - 0.3
+    for seed in range(40):
+        random = np.random.default_rng(seed)
+        spin, phase = random.uniform(23, 30), random.uniform(0, 1)
+        turns = phase + spin * time - 0.08 * time**2 / 2
+        late = random.normal(0, 0.0212, 40)[np.floor(turns).astype(int) + 20]
+        found = spin_of_trace(light(turns - late) + random.normal(0, 0.01, time.size), rate, method=method)
+        pulls.append((found.frequency.value - spin + 0.08 * (found.reference_time - 0.3)) / found.frequency.u)
+        assert found.method == method
+        assert "scattered" in names(found)
+    assert np.std(pulls) == pytest.approx(1, abs=0.35)  # 3 standard errors from 40
+    assert np.max(np.abs(pulls)) < 4
+
+
+def test_few_pulses_that_scatter_are_no_two_marks_by_chance():
+    """Seventeen turns: every second one's mean profile differs from the others' as their places do."""
+    time = np.arange(6000) / 10_000
+    for seed in range(120, 130):  # 124 took every second pulse for a mark of its own
+        random = np.random.default_rng(seed)
+        late = random.normal(0, 0.01, 20)[np.floor(29.6 * time + 0.3).astype(int)]
+        found = spin_of_trace(light(29.6 * time + 0.3 - late) + random.normal(0, 0.01, time.size), 10_000)
+        assert found.frequency.value == pytest.approx(29.6, abs=0.2)
+
+
+@pytest.mark.parametrize(("seed", "number"), [((2026, 123), 10), ((21, 23), 40)])
+def test_hum_that_was_cut_off_with_the_pulses_is_not_the_top(seed, number):
+    """Trials of "all together": clipped hum was numbered as pulses, and pulses with their reflection."""
+    random = np.random.default_rng(seed)
+    for _ in range(number + 1):
+        trace = make(HARD["all together"], random)
+    found = spin_of_trace(trace.samples, RATE)
+    assert abs(found.frequency.value - trace.truth(found.reference_time)) < 5 * found.frequency.u
+    assert found.frequency.u < 5e-5

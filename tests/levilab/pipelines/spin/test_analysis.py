@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+import levilab
 from instruments.drivers.oscilloscope import Trace
 from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
@@ -122,12 +123,14 @@ def traced(tmp_path: Path) -> Path:
 
 def test_the_traces_of_a_run_are_read_in_volts_on_its_clock(traced: Path) -> None:
     waveform = run_waveforms(Run.load(traced))[1]
-    assert (waveform.start, waveform.step, waveform.count) == (pytest.approx(9.8), 2.5e-4, 1600)
+    assert (waveform.start, waveform.step, waveform.count) == (pytest.approx(9.6), 2.5e-4, 1600)
     assert waveform.samples().max() == pytest.approx(1.1, abs=0.1)
     analysis = analyze_spins([traced], SpinOptions())
     series = analysis.runs[0].series
     assert series.frequency == pytest.approx([30, 29, 28], abs=0.01)
-    assert series.time == pytest.approx([0, 10, 20], abs=0.05)
+    assert series.time == pytest.approx([-0.2, 9.8, 19.8], abs=0.05)  # the middles of 0.4 s before they were complete
+    by_start = 0.1 * 0.02 / np.sqrt(3)  # the slope, and how often a driver asks whether a record is complete
+    assert series.u[1] == pytest.approx(np.hypot(analysis.runs[0].spin.frequency.u, by_start), rel=0.01)
     document = ANALYSES["spin"].document(analysis, traced)
     assert document["inputs"][0]["path"] == "traces.jsonl"
     assert save_found(ANALYSES["spin"], analysis)[0] == traced / "result.json"
@@ -285,3 +288,20 @@ def test_residuals_from_a_third_degree_have_no_bend_left(what: str, tmp_path: Pa
     assert np.ptp(third(at)) < 40  # µs: twice the noise of one pulse, and 8 of its standard errors at an end
     assert residuals.std() < 30
     assert panel.get_title(loc="left").endswith("from a fit of the third degree")
+
+
+def test_the_frequencies_of_a_mock_run_scatter_about_the_disc_law_as_u_says(tmp_path: Path) -> None:
+    """ν^(-1/2) falls on a straight line in time: dν/dt = -c ν^(3/2).
+
+    u of a record comes from some 13 degrees of freedom of its own. So χ² is 1.16 times its degrees of freedom in the
+    mean, and scatters by 14: of 40 seeds, by fits to the exact times of the pulses.
+    """
+    settings = {"trace.records": 50, "trace.interval_s": 2.0}
+    run = levilab.acquire("trace", mock=True, seed=2, out=tmp_path, settings=settings)
+    found = analyze_spins([run.folder], SpinOptions()).runs[0]
+    straight, weight = found.series.frequency**-0.5, 2 * found.series.frequency**1.5 / found.series.u
+    line = np.polynomial.Polynomial.fit(found.series.time, straight, 1, w=weight)
+    squares = float((((straight - line(found.series.time)) * weight) ** 2).sum())
+    assert squares == pytest.approx(48 * 1.16, abs=2 * 14)
+    (note,) = [note.text for note in found.notes if note.name == "scattered"]
+    assert note.startswith("50 of 50 records")  # a mean pulse was fitted to two, of which one was 6 u off
