@@ -57,7 +57,7 @@ class Wobble:
 # How a top came to its spin is not known: set by a calm hand it has hardly any.
 UNKNOWN_ORIGIN = Wobble(0.0008, 0.0013)
 # A drive makes the top nutate while it raises it: 58 virtual tops had 0.0013 in the median, nine in ten of them 0.0003
-# to 0.0037, measured in their motion (the counts know it to 0.001 at best).
+# to 0.004, measured in their motion (the counts know it to 0.001).
 AFTER_DRIVE = Wobble(0.0015, 0.0010)
 
 PARAMETERS = ("moment_tilt", "resonance", "wobble")
