@@ -1,4 +1,4 @@
-# `make` lists what there is. Everything needs python3 (3.11 or newer), venv and make, and nothing else.
+# `make` lists the targets. Everything needs python3 (3.11 or newer), venv and make, and nothing else.
 PYTHON ?= python3
 BIN    := .venv/bin
 DEMO   := demo
@@ -24,14 +24,17 @@ demo: setup  ## the main job on the virtual bench: acquire, analyze, report (int
 	$(BIN)/levilab analyze spindown $(DEMO)
 	$(BIN)/levilab report $(DEMO) --output $(DEMO)/report.html
 
-test: setup lint  ## everything that must pass: style, types, imports, tests
-	$(BIN)/python -m pytest
+# mypy works beside the tests: alone it would leave a core idle
+test: setup  ## everything that must pass: style, types, imports, tests
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports --no-cache
+	@$(BIN)/mypy & types=$$!; $(BIN)/python -m pytest && tests=0 || tests=$$?; wait $$types && exit $$tests
 
 quick: setup  ## within a minute: style and types, and the tests that are not slow
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
-	@$(BIN)/mypy
-	$(BIN)/python -m pytest -m 'not slow'
+	@$(BIN)/mypy & types=$$!; $(BIN)/python -m pytest -m 'not slow' && tests=0 || tests=$$?; wait $$types && exit $$tests
 
 explore: setup  ## the property tests with new random examples
 	HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest tests/levilab/formats tests/analysis tests/instruments
@@ -46,7 +49,7 @@ lint: setup  ## style, types and import rules
 	$(BIN)/lint-imports --no-cache
 
 all-pythons: setup  ## the tests on every Python from 3.11 on that is installed
-	@# pyenv shows only the versions that it is told to
+	@# pyenv shows only the versions that PYENV_VERSION names
 	@if command -v pyenv >/dev/null; then \
 	  PYENV_VERSION="$$(pyenv version-name):$$(pyenv versions --bare | tr '\n' ':')"; export PYENV_VERSION; fi; \
 	$(BIN)/nox --session tests
