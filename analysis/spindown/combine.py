@@ -6,7 +6,7 @@ good to 0.1 %; PHYSICS.md §5). So a mean over runs has its uncertainty from the
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import sqrt
+from math import hypot, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -174,8 +174,11 @@ def _together(probabilities: Sequence[float]) -> float:
 
 
 def _tilt(runs: Sequence[SpinDown], best: str) -> Mean | None:
-    seen = [run.fit(best).parameters["moment_tilt"] for run in runs if run.fit(best).has_tilt]
-    return mean(seen) if seen else None
+    seen = [run.fit(best) for run in runs if run.fit(best).has_tilt]
+    if not seen:
+        return None
+    shared = [fit.shared_u.get("moment_tilt", 0.0) for fit in seen]
+    return mean([fit.parameters["moment_tilt"] for fit in seen], shared)
 
 
 def _about_number(runs: Sequence[SpinDown]) -> list[str]:
@@ -272,7 +275,10 @@ def _own_u(run: SpinDown, fit: LawFit) -> float:
 
 
 def _combined(name: str, fits: Sequence[LawFit], stats: Statistics) -> CombinedLaw:
-    constants = _means([fit.parameters for fit in fits], LAWS[name].constants)
+    constants = {
+        constant: mean([fit.parameters[constant] for fit in fits], [fit.shared_u.get(constant, 0.0) for fit in fits])
+        for constant in LAWS[name].constants
+    }
     lines = [fit.linearised for fit in fits if fit.linearised is not None]
     said = [
         warning
@@ -286,17 +292,24 @@ def _means(runs: Sequence[Mapping[str, Estimate]], names: Sequence[str]) -> dict
     return {name: mean([run[name] for run in runs]) for name in names}
 
 
-def mean(estimates: Sequence[Estimate]) -> Mean:
+def mean(estimates: Sequence[Estimate], shared_u: Sequence[float] = ()) -> Mean:
     """The mean of one constant over the runs that have it, with u = s/√N from their scatter s (GUM 4.2).
 
     Few runs may agree by chance: u is no smaller than the runs' own uncertainties leave to their mean, √Σu²/N.
-    Of one run: its own value and u.
+    Of one run: its own value and u.  The part of u that is the same in all runs, as that of a tilt, does not show in
+    their scatter, and no number of runs makes it smaller: it is added.
+
+    Args:
+        estimates: one a run.
+        shared_u: that part of each one's u.
 
     >>> mean([Estimate(value, 0.01, "Hz") for value in (1.0, 2.0, 3.0)])
     Mean(value=2.0, u=0.577..., unit='Hz', interval=None, scatter=1.0, degrees_of_freedom=2)
     """
     unit = estimates[0].unit
-    values = np.array([estimate.value for estimate in estimates if estimate.value is not None])
+    shared = shared_u or [0.0] * len(estimates)
+    kept = [(each, part) for each, part in zip(estimates, shared, strict=True) if each.value is not None]
+    values = np.array([estimate.value for estimate, _ in kept])
     if not len(values):
         return Mean(None, None, unit)
     if len(values) == 1:
@@ -306,9 +319,9 @@ def mean(estimates: Sequence[Estimate]) -> Mean:
         average, scatter = float(values.mean()), float(values.std(ddof=1))
     if not np.isfinite([average, scatter]).all():
         return Mean(None, None, unit)
-    own = [estimate.u for estimate in estimates if estimate.value is not None and estimate.u is not None]
+    own = [np.sqrt(max(estimate.u**2 - part**2, 0.0)) for estimate, part in kept if estimate.u is not None]
     least = float(np.sqrt(np.sum(np.square(own)))) / len(values) if len(own) == len(values) else 0.0
-    u = max(scatter / float(np.sqrt(len(values))), least)
+    u = hypot(max(scatter / float(np.sqrt(len(values))), least), float(np.mean([part for _, part in kept])))
     return Mean(average, u, unit, scatter=scatter, degrees_of_freedom=len(values) - 1)
 
 

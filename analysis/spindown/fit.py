@@ -14,6 +14,7 @@ from analysis.spindown.hidden import bend, hidden_tilt
 from analysis.spindown.lawfit import (
     ROUNDING,
     UNCERTAINTIES,
+    HiddenTilt,
     LawFit,
     Solution,
     Uncertainty,
@@ -25,7 +26,7 @@ from analysis.spindown.lawfit import (
 )
 from analysis.spindown.readings import Readings, checked
 from analysis.spindown.selection import NO_FIT, Statistics, weigh
-from analysis.spindown.tilt import LAST_GAP, LAST_GAP_U, CountedLaw
+from analysis.spindown.tilt import AFTER_DRIVE, LAST_GAP, LAST_GAP_U, UNKNOWN_ORIGIN, CountedLaw, Wobble
 from analysis.spindown.verdict import EXCLUDED, Verdict, verdict
 from analysis.uncertainty import Estimate
 
@@ -100,6 +101,7 @@ def fit_spin_down(
     seed: int = 0,
     keep_outliers: bool = False,
     tilt: bool | None = None,
+    driven: bool = False,
 ) -> SpinDown:
     """Fits drag laws to one spin-down by weighted least squares of the spin frequency itself.
 
@@ -115,6 +117,7 @@ def fit_spin_down(
         keep_outliers: fit gross outliers too, instead of leaving them out. Both ways a warning names them.
         tilt: whether the count has the top's tilt (see `analysis.spindown.tilt`); None: if the readings demand it, and
             else the uncertainties hold what a hidden one would do (see `analysis.spindown.hidden`); False: it has none.
+        driven: whether a drive brought the top to its spin; it nutates more then.
 
     Raises:
         AnalysisError: readings or names that cannot be used, see `readings.checked` and `UnknownName`.
@@ -137,7 +140,8 @@ def fit_spin_down(
     readings = given.without(left_out) if len(left_out) else given
     solved = {"power": search.power} if search.power and len(search.power.readings) == len(readings) else {}
     plain = {name: solved.get(name) or solution(LAWS[name], readings) for name in chosen}
-    gain, tilted = _tilted(plain | solved, wanted=tilt)
+    wobble = AFTER_DRIVE if driven else UNKNOWN_ORIGIN
+    gain, tilted = _tilted(plain | solved, wobble, wanted=tilt)
     best = plain | {name: tilted[name] for name in chosen if name in tilted}
     stats, criterion, correlated = _judged(best)
     rho = correlated.cautious() if correlated and is_correlated(correlated) else 0.0
@@ -149,7 +153,7 @@ def fit_spin_down(
             seed,
             rho=rho,
             plain=plain[name] if name in tilted else None,
-            spread=None if tilt is False or name in tilted else _hidden(found, rho),
+            hidden=None if tilt is False or name in tilted else _hidden(found, rho, wobble),
         )
         for name, found in best.items()
     }
@@ -190,12 +194,11 @@ def _about_jump(jump: Jump | None, readings: Readings) -> str:
     return f"they jump {way} by {digits(abs(jump.size))} Hz between {before:.4g} s and {after:.4g} s"
 
 
-def _hidden(found: Solution, rho: float) -> Array | None:
-    """What a tilt that the readings do not demand adds to the covariance of a law."""
+def _hidden(found: Solution, rho: float, wobble: Wobble) -> HiddenTilt | None:
+    """A tilt that the readings do not demand."""
     if len(found.readings) < FEWEST_FOR_TILT or isinstance(found.law, CountedLaw):
         return None
-    hidden = hidden_tilt(found, noise(found, rho))
-    return None if hidden is None else hidden.spread
+    return hidden_tilt(found, noise(found, rho), wobble)
 
 
 def is_correlated(found: Correlation | None) -> bool:
@@ -263,23 +266,30 @@ def _correlation(found: Mapping[str, Solution], weighed: Mapping[str, Statistics
     return correlation((one.residuals, one.slopes))
 
 
-def _tilted(plain: Mapping[str, Solution], *, wanted: bool | None) -> tuple[float | None, dict[str, Solution]]:
+def _tilted(
+    plain: Mapping[str, Solution], wobble: Wobble, *, wanted: bool | None
+) -> tuple[float | None, dict[str, Solution]]:
     """ΔAICc in favour of the count's tilt, and the solutions with it, where it is demanded or wanted."""
     readings = next(iter(plain.values())).readings
     if len(readings) < FEWEST_FOR_TILT:
         return None, {}
     least = min(_aicc(found) for found in plain.values())
-    last = (float(readings.x[-1]), LAST_GAP, LAST_GAP_U)
-    steps = {name: _one_step(found, last) for name, found in plain.items()}
+    laws = {name: _counted(found, wobble) for name, found in plain.items()}
+    steps = {name: _one_step(found, laws[name]) for name, found in plain.items()}
     gain = least - min(steps.values())
     if wanted is False or (wanted is None and gain < TILT_WORTH_A_FIT):
         return (gain if np.isfinite(gain) else None), {}
     promising = {name: plain[name] for name, step in steps.items() if np.isfinite(step)}
-    tilted = {name: each for name, found in promising.items() if (each := with_tilt(found, last)) is not None}
+    tilted = {name: each for name, found in promising.items() if (each := with_tilt(found, laws[name])) is not None}
     if not tilted:
         return 0.0, {}
     gain = min(map(_misfit, plain.values())) - min(map(_misfit, tilted.values()))
     return gain, (tilted if wanted or gain > TILT_DEMANDED else {})
+
+
+def _counted(plain: Solution, wobble: Wobble = UNKNOWN_ORIGIN) -> CountedLaw:
+    """The law of a solution with the count's tilt."""
+    return CountedLaw(LAWS[plain.law.name], float(plain.readings.x[-1]), LAST_GAP, LAST_GAP_U, wobble)
 
 
 def _misfit(found: Solution) -> float:
@@ -301,13 +311,12 @@ def _aicc(found: Solution) -> float:
     return float("inf") if fit.aicc is None else fit.aicc
 
 
-def _one_step(plain: Solution, last: tuple[float, float, float]) -> float:
+def _one_step(plain: Solution, law: CountedLaw) -> float:
     """AICc with the tilt, as one step of a search from the solution without finds it; at no cost to speak of."""
     readings, stats = plain.readings, plain.statistics
     n, k = stats.n, stats.n_parameters + 1 + (not stats.sigma_known)
     if plain.curvature.covariance is None or n - k < 2:
         return float("inf")
-    law = CountedLaw(LAWS[plain.law.name], *last)
     more = bend(plain, law, amplitude=0.004, gap=law.gap)
     if not np.isfinite(more).all():
         return float("inf")
@@ -356,7 +365,7 @@ def _search_outliers(readings: Readings) -> _Search:
     kept = readings.without(left_out) if len(left_out) else readings
     plain = solution(LAWS["power"], kept)
     with np.errstate(all="ignore"):
-        tilted = with_tilt(plain, (float(kept.x[-1]), LAST_GAP, LAST_GAP_U))
+        tilted = with_tilt(plain, _counted(plain))
     if tilted is None or _misfit(plain) - _misfit(tilted) < TILT_DEMANDED:
         return found
     other = _far_from(readings, left_out, deviations, tilted)

@@ -1,7 +1,7 @@
 """One drag law fitted to the readings of one run."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
@@ -14,7 +14,7 @@ from analysis.residuals import DENSE, ar1, durbin_watson, runs_test_p
 from analysis.spindown.drag import LAWS, DragLaw
 from analysis.spindown.readings import Readings
 from analysis.spindown.selection import Statistics, statistics
-from analysis.spindown.tilt import MORE, UNKNOWN_PART, UNKNOWN_TILT, WOBBLE, CountedLaw, Law, counted
+from analysis.spindown.tilt import MORE, UNKNOWN_PART, UNKNOWN_TILT, CountedLaw, Law, counted
 from analysis.uncertainty import Curvature, Estimate, bootstrap, curvature, propagate
 
 Array = NDArray[np.float64]
@@ -24,6 +24,21 @@ Intervals = Sequence[tuple[float, float] | None]
 MOST_WITH_TILT = 60  # a law that the readings suit needs 5 to 15
 FACTOR_TOLD = 3.0  # u(ln c) above which "known to a factor" says nothing
 ROUNDING = 64 * float(np.finfo(float).eps)  # relative: residuals below it are the computer's, not the top's
+
+
+@dataclass(frozen=True, eq=False)
+class HiddenTilt:
+    """A tilt that may be there, though readings do not show it; `analysis.spindown.hidden` works it out.
+
+    Attributes:
+        probability: after the readings.
+        spread: what it adds to the covariance of the dimensionless parameters, shape (p, p).
+        shared: the part of that which is the same in all runs of one top, shape (p, p).
+    """
+
+    probability: float
+    spread: Array
+    shared: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +57,7 @@ class LawFit:
         start_time: time of the first reading [s].
         solution: the same parameters, dimensionless (see `analysis.spindown.drag`, and `tilt.counted`).
         reference: their units, spin frequency [Hz] and time [s].
+        shared_u: by parameter, the part of its u that is the same for all runs of one top, with one sign.
     """
 
     name: str
@@ -54,6 +70,7 @@ class LawFit:
     start_time: float
     solution: Array
     reference: tuple[float, float]
+    shared_u: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def law(self) -> DragLaw:
@@ -177,16 +194,15 @@ def solution(law: Law, readings: Readings, start: Array | None = None, scale: fl
     )
 
 
-def with_tilt(plain: Solution, last: tuple[float, float, float]) -> Solution | None:
+def with_tilt(plain: Solution, law: CountedLaw) -> Solution | None:
     """The same law as a counter sees it; None where the readings ask for no tilt, or a negative one.
 
     Args:
         plain: the solution without.
-        last: x of the last reading, then a and its u (see `CountedLaw`).
+        law: the same law, with the tilt.
     """
-    assert isinstance(plain.law, DragLaw)
-    law, readings = CountedLaw(plain.law, *last), plain.readings
-    start = np.array([*plain.q, 0.003, law.gap, WOBBLE])
+    readings = plain.readings
+    start = np.array([*plain.q, 0.003, law.gap, law.wobble.value])
     found, scale = None, 1.0 if readings.sigma_known else scatter(plain)
     for _ in range(1 if readings.sigma_known else 2):
         found = solution(law, readings, start, scale)
@@ -210,7 +226,7 @@ def fit_law(
     *,
     rho: float = 0.0,
     plain: Solution | None = None,
-    spread: Array | None = None,
+    hidden: HiddenTilt | None = None,
 ) -> LawFit:
     """The solution in textbook constants, with uncertainties and statistics.
 
@@ -221,19 +237,21 @@ def fit_law(
         seed: of a bootstrap.
         rho: correlation of neighbouring readings' noise.
         plain: the same law without the count's tilt, where `found` has it.
-        spread: what is to be added to the covariance of the dimensionless parameters, shape (p, p).
+        hidden: a tilt that the readings may hide, which is to be in the uncertainties.
     """
     law, readings = found.law, found.readings
     values, slopes = law.natural(found.q, readings.reference_hz, readings.duration)
     stats = found.statistics
     covariance, u, independent = _uncertainties(found, slopes, rho)
     intervals = _INTERVALS[uncertainty](found, values, independent, samples, seed)
+    shared = np.zeros(len(values))
     if plain is not None:
-        covariance, u = _with_unknown_part(covariance, u, values, _natural(plain))
-    if spread is not None:
-        more, u_more = propagate(spread, slopes)
+        shared = _unknown_part(values, _natural(plain))
+        covariance, u = None if covariance is None else covariance + np.outer(shared, shared), np.hypot(u, shared)
+    if hidden is not None:
+        more, u_more = propagate(hidden.spread, slopes)
         covariance = None if covariance is None or more is None else covariance + more
-        u = np.hypot(u, u_more)
+        u, shared = np.hypot(u, u_more), propagate(hidden.shared, slopes)[1]
     intervals = [
         _stretched(interval, float(value), float(wide / own) if own > 0 else 1.0)
         for interval, value, wide, own in zip(intervals, values, u, independent, strict=True)
@@ -260,6 +278,9 @@ def fit_law(
         start_time=readings.start_time,
         solution=law.solution(found.q) if isinstance(law, CountedLaw) else found.q,
         reference=(readings.reference_hz, readings.duration),
+        shared_u={
+            name: abs(float(part)) for name, part in zip(law.parameters, shared, strict=True) if np.isfinite(part)
+        },
     )
 
 
@@ -304,16 +325,13 @@ def _uncertainties(found: Solution, slopes: Array, rho: float) -> tuple[Array | 
     return wide, grown, independent
 
 
-def _with_unknown_part(covariance: Array | None, u: Array, values: Array, plain: Array) -> tuple[Array | None, Array]:
-    """A part of what the tilt changes in the constants is unknown."""
+def _unknown_part(values: Array, plain: Array) -> Array:
+    """What of the tilt's change in the constants is not known, shape (p,): it is the same in all runs of one top."""
     change = np.zeros(len(values))
     with np.errstate(invalid="ignore", over="ignore"):
         change[: len(plain)] = UNKNOWN_PART * (values[: len(plain)] - plain)
         change[len(plain)] = UNKNOWN_TILT * values[len(plain)]
-    if not np.isfinite(change).all():
-        return covariance, u
-    wider = np.hypot(u, change)
-    return (None if covariance is None else covariance + np.outer(change, change)), wider
+    return change if np.isfinite(change).all() else np.zeros(len(values))
 
 
 def noise(found: Solution, rho: float) -> float:

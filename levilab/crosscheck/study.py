@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
 import tempfile
-from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,6 +25,7 @@ SCHEMA = "levilab-crosscheck/1"
 MEAN_WITHIN, DEVIATION_WITHIN, COVERAGE = 0.1, 0.1, math.erf(1 / math.sqrt(2))
 #: What chance alone may add to that, in standard errors.
 CHANCE = 3.0
+_NUMBER = re.compile(r"(\d+(?:\.\d+)?)")
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,8 @@ class Spread:
 class Checked:
     """A subject with its trials.
 
-    trials: how many were made; spreads: a quantity each; failures: why trials came to no estimate, and how often.
+    trials: how many were made; spreads: a quantity each; failures: why trials came to no estimate, and how often; for
+    one reason with other numbers in it there is one entry.
     """
 
     subject: Subject
@@ -92,15 +94,37 @@ class Checked:
 def crosscheck(subject: Subject, trials: int, seed: int, progress: Callable[[float], None]) -> Checked:
     """Make the trials of a subject, each with a seed of its own.  progress: called with the share that is done."""
     pulls: list[Pull] = []
-    failures: Counter[str] = Counter()
+    failures: list[str] = []
     for k in range(trials):
         with tempfile.TemporaryDirectory(prefix="levilab-crosscheck-") as folder:
             try:
                 pulls += subject.trial(seed + k, Path(folder))
             except (LevilabError, InstrumentError) as error:
-                failures[str(error).replace(folder, "")] += 1
+                failures.append(str(error).replace(folder, ""))
         progress((k + 1) / trials)
-    return Checked(subject, trials, seed, tuple(_spreads(pulls)), dict(failures))
+    return Checked(subject, trials, seed, tuple(_spreads(pulls)), by_reason(failures))
+
+
+def by_reason(texts: Sequence[str]) -> dict[str, int]:
+    """How often each text comes, texts that differ in their numbers alone as one, with the range of these.
+
+    >>> by_reason(["lost at 31.3 Hz of 40 Hz", "dark", "lost at 29.9 Hz of 40 Hz"])
+    {'lost at 29.9 to 31.3 Hz of 40 Hz': 2, 'dark': 1}
+    """
+    alike: dict[tuple[str, ...], list[list[str]]] = {}
+    for text in texts:
+        parts = _NUMBER.split(text)
+        alike.setdefault(tuple(parts[::2]), []).append(parts[1::2])
+    found = {}
+    for words, numbers in alike.items():
+        ranges = [_range(column) for column in zip(*numbers, strict=True)]
+        found["".join(a + b for a, b in zip(words, [*ranges, ""], strict=True))] = len(numbers)
+    return found
+
+
+def _range(numbers: Sequence[str]) -> str:
+    least, most = min(numbers, key=float), max(numbers, key=float)
+    return least if least == most else f"{least} to {most}"
 
 
 def _spreads(pulls: Sequence[Pull]) -> Iterable[Spread]:

@@ -51,6 +51,11 @@ def steady_precession(scene: Scene, spin: float, place: Array) -> float:
     Goldstein, Classical Mechanics, § 5.7, with the torque of the field in place of the weight's.  A top too slow for a
     steady precession, (I₃ω₃)² < 4 I₁ cosθ P, starts at the rate I₃ω₃/(2 I₁ cosθ), at which least torque is missing.
     """
+    return steady_rates(scene, spin, place)[0]
+
+
+def steady_rates(scene: Scene, spin: float, place: Array) -> tuple[float, float]:
+    """Both roots of that equation [rad/s]: of the precession, and of a steady nutation."""
     top = scene.top
     bz = float(flux_density(base_field(scene), place[None, :])[0, 2])
     restoring = -top.moment_a_m2 * top.moment_tilt[1] * bz
@@ -58,6 +63,16 @@ def steady_precession(scene: Scene, spin: float, place: Array) -> float:
     b = top.inertia_axial_kg_m2 * spin
     square = b * b - 4 * a * restoring
     if square < 0:
-        return b / (2 * a)
+        return b / (2 * a), b / (2 * a)
     root = math.copysign(math.sqrt(square), b)
-    return 2 * restoring / (b + root) if b + root else 0.0
+    return (2 * restoring / (b + root) if b + root else 0.0), (b + root) / (2 * a)
+
+
+def nutating_start(scene: Scene) -> Array:
+    """The state at time 0, shape (18,), of a top whose axis goes round at the fast rate, a nutation of the tilt."""
+    state = start_of(scene)
+    spin, tilt, n = 2 * math.pi * scene.start.spin_hz, scene.start.tilt_rad, state[N]
+    transverse = np.array([0.0, 0.0, 1.0]) - n * math.cos(tilt)
+    rate = steady_rates(scene, spin, state[R])[1]
+    state[L] = scene.top.inertia_axial_kg_m2 * spin * n + scene.top.inertia_transverse_kg_m2 * rate * transverse
+    return state

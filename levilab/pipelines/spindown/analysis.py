@@ -98,6 +98,7 @@ def fit_source(source: Source[Readings], options: SpinDownOptions, *, tilt: bool
             seed=options.seed,
             keep_outliers=options.keep_outliers,
             tilt=_TILTED[options.tilt] if tilt is None else tilt,
+            driven=readings.driven,
         )
     except AnalysisError as error:
         raise DataError(f"{source.data}: {error}") from error

@@ -72,7 +72,10 @@ class FitPart(Part):
 
 
 class ModelPart(Part):
-    """One drag law, fitted to one run or, without a start, over several."""
+    """One drag law, fitted to one run or, without a start, over several.
+
+    shared_u: by parameter, the part of its u that all runs of one top share.
+    """
 
     name: str
     parameters: dict[str, Value]
@@ -82,6 +85,7 @@ class ModelPart(Part):
     warnings: tuple[str, ...]
     linearised: dict[str, Value] | None = None
     scatter: dict[str, float | None] | None = None
+    shared_u: dict[str, float] | None = None
 
     @model_validator(mode="after")
     def _is_a_law(self) -> Self:
@@ -296,6 +300,7 @@ def _model(fit: LawFit) -> dict[str, Any]:
         "covariance": None if fit.covariance is None else fit.covariance.tolist(),
         "statistics": _some(fit.statistics, StatisticsPart),
         "fit": _some(fit.statistics, FitPart) | {"solution": fit.solution.tolist()},
+        "shared_u": dict(fit.shared_u),
         "warnings": list(fit.warnings),
     } | ({"linearised": values_of(fit.linearised)} if fit.linearised else {})
 
@@ -405,13 +410,10 @@ def _law_fit(
 ) -> LawFit:
     solution = np.array(model.fit.solution)
     tau, x = (time - start_time) / reference.time_s, frequency / reference.frequency_hz
+    names = [name for name in (*LAWS[model.name].parameters, *PARAMETERS) if name in model.parameters]
     return LawFit(
         name=model.name,
-        parameters={
-            name: model.parameters[name].estimate
-            for name in (*LAWS[model.name].parameters, *PARAMETERS)
-            if name in model.parameters
-        },
+        parameters={name: model.parameters[name].estimate for name in names},
         covariance=None if model.covariance is None else np.array(model.covariance, dtype=float),
         statistics=_statistics(model),
         residuals=reference.frequency_hz * (x - counted(LAWS[model.name], tau, solution)),
@@ -420,6 +422,7 @@ def _law_fit(
         start_time=start_time,
         solution=solution,
         reference=(reference.frequency_hz, reference.time_s),
+        shared_u={name: model.shared_u[name] for name in names if name in model.shared_u} if model.shared_u else {},
     )
 
 

@@ -1,6 +1,6 @@
 """What a table of readings must fulfil before an analysis may trust it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,12 +36,16 @@ LEAST_FALL = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """Spin readings, each array of shape (n,): increasing `time` [s], positive `frequency` and its `u` [Hz]."""
+    """Spin readings, each array of shape (n,): increasing `time` [s], positive `frequency` and its `u` [Hz].
+
+    driven: whether a drive is known to have brought the top to its spin.
+    """
 
     time: "NDArray[np.float64]"
     frequency: "NDArray[np.float64]"
     u: "NDArray[np.float64] | None"
     warnings: tuple[str, ...]
+    driven: bool = False
 
     def __len__(self) -> int:
         return len(self.time)
@@ -59,8 +63,8 @@ SAME = 1e-9
 
 
 def read_run_readings(run: "Run", _: "InputOptions") -> Readings:
-    """The readings of a run."""
-    return spin_readings(run.readings())
+    """The readings of a run of the experiment `spin`, which drives the top up."""
+    return replace(spin_readings(run.readings()), driven=True)
 
 
 def read_spin_file(path: "Path", options: "InputOptions") -> Readings:

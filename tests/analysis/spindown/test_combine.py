@@ -35,11 +35,23 @@ def test_each_constant_is_the_mean_of_the_runs():
         for constant, average in together.fit(name).constants.items():
             values = [run.fit(name).parameters[constant].value for run in fitted]
             assert average.value == pytest.approx(np.mean(values))
-            own = np.array([run.fit(name).parameters[constant].u for run in fitted])
+            shared = np.array([run.fit(name).shared_u[constant] for run in fitted])
+            own2 = np.square([run.fit(name).parameters[constant].u for run in fitted]) - shared**2
             assert average.scatter == pytest.approx(np.std(values, ddof=1))
-            assert average.u == pytest.approx(max(average.scatter / 2, np.sqrt(own @ own) / 4))
+            assert average.u == pytest.approx(
+                np.hypot(max(average.scatter / 2, np.sqrt(own2.sum()) / 4), shared.mean())
+            )
     lines = [run.fit("disc").linearised["c32"].value for run in fitted]
     assert together.fit("disc").linearised["c32"].value == pytest.approx(np.mean(lines))
+
+
+def test_what_runs_of_one_top_share_grows_no_smaller_with_their_number():
+    found = [Estimate(c, 5e-6, "1/s") for c in (1.0e-3, 1.002e-3, 0.998e-3, 1.0e-3)]
+    shared = mean(found, [3e-6] * 4)
+    assert shared.value == mean(found).value
+    # by hand: each one's own part is √(5² − 3²) = 4, so 2 of the mean, with 3 of all
+    assert mean([*found[:1]] * 4, [3e-6] * 4).u == pytest.approx(np.hypot(2e-6, 3e-6))
+    assert mean([*found[:1]] * 400, [3e-6] * 400).u > 3e-6
 
 
 def test_the_common_law_is_found_and_the_others_excluded():
