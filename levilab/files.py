@@ -6,6 +6,7 @@ import contextlib
 import json
 import math
 import os
+import re
 import time
 import tomllib
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from levilab.errors import LevilabError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
 
@@ -49,7 +51,8 @@ def parse_toml(text: str) -> dict[str, Any]:
     """
     try:
         table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError:
+    except tomllib.TOMLDecodeError as error:
+        error.args = (f"{error}{_hint(text, str(error))}",)
         raise
     except RecursionError:
         raise ValueError(_TOO_DEEP) from None
@@ -57,6 +60,17 @@ def parse_toml(text: str) -> dict[str, Any]:
         raise ValueError(_TOO_LARGE) from None
     _refuse_oddities(table, finite=False)
     return table
+
+
+def _hint(text: str, said: str) -> str:
+    """What is wrong with a number at which TOML was left, as the rest of a sentence; empty for anything else."""
+    place = re.search(r"line (\d+)", said)
+    line = text.splitlines()[int(place[1]) - 1] if place and int(place[1]) <= len(text.splitlines()) else ""
+    if re.search(r"=\s*[+-]?\d+,\d", line):
+        return "; write a decimal point, not a comma"
+    if re.search(r"=\s*[+-]?\d[\d.]*\s*[A-Za-zµ°%]", line):
+        return "; write the number without its unit, which is in the key's name"
+    return ""
 
 
 _TOO_DEEP = f"it is nested more than {DEEPEST} levels deep"
@@ -109,6 +123,20 @@ def _refuse_surrogates(text: str) -> None:
         text.encode()
     except UnicodeEncodeError:
         raise ValueError("a text in it holds half a surrogate pair") from None
+
+
+@contextlib.contextmanager
+def writing(what: str, advice: str = "choose another place with `out`") -> Iterator[None]:
+    """Raise CannotWrite, in a sentence, for what the operating system refuses.
+
+    Args:
+        what: the beginning of the sentence: what could not be written, and where.
+        advice: what to do.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise CannotWrite(f"{what} ({error.strerror or error}): {advice}") from error
 
 
 def replace_atomically(path: Path, content: str | bytes) -> None:

@@ -16,7 +16,10 @@ _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "S
 
 
 class Interrupted(BaseException):
-    """The run was asked to end.  by: the signal's name.
+    """The run was asked to end.
+
+    Attributes:
+        by: the signal's name.
 
     No Exception, so that no library on the way takes it for a failure of its own.
     """
@@ -27,7 +30,7 @@ class Interrupted(BaseException):
 
 
 class Stop:
-    """Whether somebody asked for the end.
+    """Whether the end was asked for.
 
     The first signal is only noted, so that no exchange with an instrument is torn; `check()` raises it
     where the program can end well.  The second one breaks through, in case an exchange hangs; from then on
@@ -40,7 +43,7 @@ class Stop:
         self._at_once = False
 
     def check(self) -> None:
-        """Raise Interrupted if somebody asked."""
+        """Raise Interrupted if the end was asked for."""
         if self.by:
             raise Interrupted(self.by)
 

@@ -85,12 +85,12 @@ def bench_check(
     from levilab.bench.check import Light, check
     from levilab.bench.config import read_bench
     from levilab.bench.wiring import described_wiring
-    from levilab.world.bench import own_world, virtual_wiring
+    from levilab.world.bench import practice_world, virtual_wiring
 
     if mock and bench:
         raise UsageError("bench", "does not go with `mock`, the virtual bench, which no file describes")
     config = Configuration() if mock else read_bench(bench or Path("bench.toml"), Configuration)
-    wiring = virtual_wiring(own_world()) if mock else described_wiring(config)
+    wiring = virtual_wiring(practice_world()) if mock else described_wiring(config)
     counting = counter_settings(config)
     checked = []
     for one in check(wiring, Light(counting.gate_s, counting.trigger_level_v)):

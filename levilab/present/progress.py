@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
 
-class Show(Protocol):
+class Display(Protocol):
     """What the acquisition tells."""
 
     def preparing(self, text: str, fraction: float) -> None:
@@ -42,7 +42,7 @@ class Mute:
         """Nothing is open."""
 
 
-class Lines:
+class LineDisplay:
     """One line a reading, for logs, pipes and tests."""
 
     def __init__(self) -> None:
@@ -72,7 +72,7 @@ class Lines:
         """Nothing is open."""
 
 
-class Bar:
+class BarDisplay:
     """A progress bar with the time left and the last reading."""
 
     def __init__(self) -> None:
@@ -108,12 +108,12 @@ class Bar:
         self._progress.stop()
 
 
-def to_stderr() -> Show:
+def to_stderr() -> Display:
     """A bar on a terminal, lines elsewhere."""
-    return Bar() if sys.stderr.isatty() else Lines()
+    return BarDisplay() if sys.stderr.isatty() else LineDisplay()
 
 
-class Share:
+class ShareBar:
     """A bar for work whose share is known, on a terminal, once it takes longer than a second.
 
     A share that goes back is a new attempt: a simulation tries shorter steps until its error is small enough.

@@ -100,7 +100,13 @@ def as_text(show: Callable[[Console], object]) -> str:
 
 
 def new_table(title: str | None, *columns: str, numbers: Sequence[str] = ()) -> RichTable:
-    """An empty table; numbers: the columns that are aligned to the right."""
+    """An empty table.
+
+    Args:
+        title: above it.
+        *columns: heads of its columns.
+        numbers: those that are aligned to the right.
+    """
     table = _Table(
         box=box.SIMPLE_HEAD if _is_unicode(sys.stdout.encoding) else _ASCII_HEAD,
         padding=(0, 1, 0, 0),

@@ -17,13 +17,27 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    import pandas as pd
+
 
 @dataclass(frozen=True)
 class Listed:
-    """One run in the list.  length_s: from the first to the last reading or state; problem: why it cannot be read.
+    """One run in the list.
 
-    states, scene: of a simulation, 0 and empty for what was measured; records: of the oscilloscope, where each has a
-    reading.
+    Attributes:
+        path: its folder.
+        started_utc: as in run.json.
+        experiment: its name, ``?`` where run.json cannot be read.
+        status: as of the run, or ``unreadable``.
+        readings: how many there are.
+        length_s: from time zero, or the first reading where that is not known, to the last reading or state; None
+            where they have no times.
+        synthetic: whether any of it was simulated or made up.
+        note: as in run.json.
+        problem: why it cannot be read.
+        states: of a simulation, 0 for what was measured.
+        scene: of a simulation, empty for what was measured.
+        records: of the oscilloscope, where each has a reading.
     """
 
     path: str
@@ -31,7 +45,7 @@ class Listed:
     experiment: str
     status: str
     readings: int
-    length_s: float
+    length_s: float | None
     synthetic: bool
     note: str
     problem: str = ""
@@ -61,7 +75,7 @@ def _listed(folder: Path) -> Listed:
         run = Run.load(folder)
         frame = run.readings().frame if (folder / READINGS).exists() else None
     except DataError as error:
-        return Listed(str(folder), None, "?", "unreadable", 0, 0.0, synthetic=False, note="", problem=str(error))
+        return Listed(str(folder), None, "?", "unreadable", 0, None, synthetic=False, note="", problem=str(error))
     times = frame["time_s"] if frame is not None and len(frame) and "time_s" in frame else None
     simulation = _table(run.record.model_extra, "simulation")
     return Listed(
@@ -70,13 +84,18 @@ def _listed(folder: Path) -> Listed:
         experiment=run.record.experiment,
         status=run.status,
         readings=0 if frame is None else len(frame),
-        length_s=_number(simulation, "end_s") if times is None else float(times.iloc[-1] - times.iloc[0]),
+        length_s=(_number(simulation, "end_s") or None) if times is None else _length(run, times),
         synthetic=run.record.synthetic,
         note=run.record.note,
         states=int(_number(simulation, "states")),
         scene=str(_table(run.record.configuration, "scene").get("name", "")),
         records=len(frame) if frame is not None and "record" in frame else 0,
     )
+
+
+def _length(run: Run, times: pd.Series[float]) -> float:
+    """From time zero to the last reading [s]; limits and sweeps have their first one long after it."""
+    return float(times.iloc[-1] - (0.0 if run.record.time_zero_utc else times.iloc[0]))
 
 
 def _table(of: dict[str, Any] | None, key: str) -> dict[str, Any]:
@@ -107,13 +126,17 @@ def print_runs(runs: Sequence[Listed], root: Path) -> None:
         when = (run.started_utc or "—")[:16].replace("T", " ")
         scene = f" {run.scene}" if run.scene not in {"", run.experiment} else ""
         what = run.experiment + scene + (", synthetic" if run.synthetic else "")
-        cells = [when, _below(run.path, root), what, run.status, run.size, f"{run.length_s:.0f} s"]
+        cells = [when, _below(run.path, root), what, run.status, run.size, _seconds(run.length_s)]
         notes = [run.note] if with_notes else []
         table.add_row(*(_harmless(text) for text in (*cells, *notes)))
     console.print(table)
     for run in runs:
         if run.problem:
             console.print(f"[yellow]note:[/yellow] {_harmless(run.problem)}")
+
+
+def _seconds(length: float | None) -> str:
+    return "—" if length is None else f"{length:.0f} s"
 
 
 def _harmless(text: str) -> str:

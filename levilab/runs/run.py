@@ -97,7 +97,8 @@ def lock_of(folder: Path) -> Any:
 class Run:
     """A run folder as it lies on the disk.
 
-    status: as in run.json, but a run that says "running" and whose process is gone is "interrupted".
+    Attributes:
+        status: as in run.json, but a run that says "running" and whose process is gone is "interrupted".
     """
 
     folder: Path

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from levilab.formats.waveforms.waveform import Signal, Waveform
-from levilab.runs.traces import INDEX, load_traces
+from levilab.runs.traces import INDEX, is_arriving, load_traces
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -25,8 +25,8 @@ SEEN_LATE_S = 0.02
 
 
 def has_traces(run: Run) -> bool:
-    """Whether a run keeps records of an oscilloscope."""
-    return (run.folder / INDEX).is_file()
+    """Whether a run keeps records of an oscilloscope, or what had come of one when it was killed."""
+    return (run.folder / INDEX).is_file() or is_arriving(run.folder)
 
 
 def run_waveforms(run: Run) -> list[Waveform]:
@@ -48,7 +48,8 @@ def _waveform(run: Run, stored: StoredTrace) -> Waveform:
     return Waveform(
         path=run.folder / INDEX,
         format=f"record {stored.number}",
-        start=stored.time_s - count * trace.dt_s,
+        start=stored.time_s
+        - (stored.announced or count) * trace.dt_s,  # one that was cut short on its way lacks its end
         step=trace.dt_s,
         count=count,
         signals=(Signal(stored.channel),),

@@ -12,7 +12,7 @@ from instruments.clock import WallClock
 from instruments.virtual.servers.server import LOOPBACK, PORTS_PER_INSTRUMENT, Place, offered
 from instruments.virtual.servers.station import first_of
 from levilab.errors import LevilabError, UsageError
-from levilab.world.bench import AGAIN_S, MODELS, VIRTUAL, own_world, scene_world, virtual_bus
+from levilab.world.bench import PUT_BACK_AFTER_S, VIRTUAL, VIRTUAL_MODELS, practice_world, scene_world, virtual_bus
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -70,9 +70,11 @@ def chosen_models(words: list[str]) -> dict[str, str]:
     chosen = {}
     for word in words:
         kind, _, model = word.partition("=")
-        if kind not in MODELS:
-            raise UsageError("models", f"{kind!r} is no kind of instrument, known are {', '.join(MODELS)}", value=word)
-        known = {name.upper(): name for name in MODELS[kind]}
+        if kind not in VIRTUAL_MODELS:
+            raise UsageError(
+                "models", f"{kind!r} is no kind of instrument, known are {', '.join(VIRTUAL_MODELS)}", value=word
+            )
+        known = {name.upper(): name for name in VIRTUAL_MODELS[kind]}
         if model.upper() not in known:
             raise UsageError("models", f"no such {kind}, known are {', '.join(known.values())}", value=word)
         chosen[kind] = known[model.upper()]
@@ -116,16 +118,16 @@ async def _kept_up(bus: Bus, world: World) -> None:
     while True:
         await asyncio.sleep(_KEEP_UP_S)
         with bus.lock:
-            world.keep_up()
+            world.catch_up()
 
 
 def _world(service: Service, tell: Callable[[str], None]) -> World:
     clock = _clock(service)
     if service.scene is None:
-        return own_world(clock)
+        return practice_world(clock)
     if service.speed > FASTEST_MOTION:
         raise UsageError("speed", f"with `scene` up to {FASTEST_MOTION:g} is possible", value=service.speed)
-    return scene_world(service.scene, lambda: _clock(service), tell, again_s=AGAIN_S)
+    return scene_world(service.scene, lambda: _clock(service), tell, put_back_after_s=PUT_BACK_AFTER_S)
 
 
 def _clock(service: Service) -> WallClock:

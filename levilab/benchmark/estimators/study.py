@@ -106,7 +106,13 @@ class Score:
 
 @dataclass(frozen=True)
 class Study:
-    """All scores: by method and SNR, and of the default on the hard cases."""
+    """All scores.
+
+    Attributes:
+        trials: of each score.
+        scores: by method and SNR.
+        hard: of the default on the hard cases.
+    """
 
     trials: int
     scores: tuple[Score, ...]

@@ -26,14 +26,13 @@ from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.line import LineSettings, carried
 from instruments.virtual.core.rows import Ask
 from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
+from support.waiting import HANG_GUARD_S as AT_MOST
 
 METER = "levilab://magnetometer"
 SLOW = "levilab://slow"
 IDENTITY = "levilab,slow,0,0"
 #: The 425's line; the pause between two exchanges is the wall's, and would make the tests wait.
 LINE = dict(LakeShore425.SERIAL) | {"pause": 0.0}
-#: How long a test waits for its own server before it fails [s]; reached by a failure only.
-AT_MOST = 5.0
 
 ANY_BYTES = bytes(range(256)) * 4
 

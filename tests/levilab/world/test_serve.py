@@ -18,11 +18,9 @@ from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.servers.server import LOOPBACK, BenchServer
 from levilab.cli.bench import bench_app
 from levilab.errors import UsageError
-from levilab.world.bench import own_world, virtual_bus
+from levilab.world.bench import practice_world, virtual_bus
 from levilab.world.serve import Service, chosen_models, serve
-
-#: How long something is waited for [s]; reached by a failure only, however busy the machine is.
-AT_MOST = 600.0
+from support.waiting import HANG_GUARD_S as AT_MOST
 
 
 @contextlib.contextmanager
@@ -73,7 +71,7 @@ def test_the_line_names_every_instrument_each_answers_and_sigterm_ends_it():
 
 
 def test_a_served_top_begins_to_spin_down_with_the_first_message():
-    world = own_world(WallClock(waits=True))
+    world = practice_world(WallClock(waits=True))
     bus = virtual_bus(world)
     bus.heard = world.clock.begin
     with BenchServer(bus) as server:
@@ -117,12 +115,12 @@ def interrupt_when(said, name="SIGTERM"):
 
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
 def test_a_signal_ends_it_and_threads_and_handlers_are_as_before(name):
-    before, threads = signal.getsignal(signal.SIGINT), threading.active_count()
+    before, threads = signal.getsignal(signal.SIGINT), set(threading.enumerate())
     said = []
     assert serve(Service(), interrupt_when(said, name)) == name
     assert {served.kind for served in said} >= {"counter", "generator"}
     assert signal.getsignal(signal.SIGINT) is before
-    assert threading.active_count() <= threads  # one of another test may have ended meanwhile
+    assert set(threading.enumerate()) <= threads
 
 
 def test_models_are_chosen_by_kind_in_any_case():
