@@ -106,6 +106,7 @@ class Trace:
     def __init__(self, cleaned: Clean, rate: float) -> None:
         self.samples, self.bins, self.bad = cleaned.samples, cleaned.bins, cleaned.bad
         self.notes, self.lines = cleaned.notes, cleaned.lines
+        self.trains: dict[int | None, Train] = {}
         self.rate, self.bin_rate = rate, rate / (self.samples.size // self.bins.size)
 
     @cached_property
@@ -186,7 +187,9 @@ def _events(trace: Trace, degree: int | None = None) -> tuple[Events, Train]:
     events = trace.events
     if events.times.size < FEWEST:
         raise trace.too_few(events.times.size)
-    return events, fit_train(events.times - 0.5 / trace.rate, degree=degree)  # a bin's centre is that of its samples
+    if degree not in trace.trains:  # a bin's centre is that of its samples
+        trace.trains[degree] = fit_train(events.times - 0.5 / trace.rate, degree=degree)
+    return events, trace.trains[degree]
 
 
 def _scattered(trace: Trace, left: float, degree: int | None) -> Train | None:

@@ -48,7 +48,8 @@ def _waveform(run: Run, stored: StoredTrace) -> Waveform:
     return Waveform(
         path=run.folder / INDEX,
         format=f"record {stored.number}",
-        start=stored.time_s - count * trace.dt_s,
+        start=stored.time_s
+        - (stored.announced or count) * trace.dt_s,  # one that was cut short on its way lacks its end
         step=trace.dt_s,
         count=count,
         signals=(Signal(stored.channel),),
