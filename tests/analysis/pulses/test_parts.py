@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.pulses.edges import place_edges
+from analysis.pulses.likelihood import search
 from analysis.pulses.matched import COARSE, window_of
 from analysis.pulses.regression import fit_turns, median
 
@@ -30,3 +31,14 @@ def test_a_turn_without_a_pulse_is_seen_whatever_the_offset(offset):
     assert edges is not None
     assert edges.missing == 1
     assert edges.height == pytest.approx(39 / 40, abs=1e-3)
+
+
+@pytest.mark.parametrize("slope", [-0.3, 0.2])
+def test_the_greatest_likelihood_is_that_of_the_true_frequency_and_slope(slope):
+    rate, duration, frequency = 1000.0, 10.0, 31.4
+    time = (np.arange(int(rate * duration)) + 0.5) / rate - duration / 2
+    turns = frequency * time + 0.5 * slope * time**2
+    found = search(np.exp(-0.5 * ((turns - np.rint(turns)) / 0.03) ** 2), rate)
+    # the last grid has 8 harmonics: steps of 0.25/T/8 and 1/T²/8
+    assert float(found.frequency(np.array([duration / 2]))[0]) == pytest.approx(frequency, abs=0.25 / duration / 8)
+    assert 2 * found.coefficients[2] / found.half**2 == pytest.approx(slope, abs=1 / duration**2 / 8)

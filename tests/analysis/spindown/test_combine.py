@@ -152,3 +152,10 @@ def test_more_runs_make_no_law_more_excluded_for_its_constants():
 def test_few_runs_say_how_little_they_tell():
     assert "Student's t" in combine(runs()[:2]).warnings[-1]
     assert "1.8 u" in combine(runs()[:2]).warnings[-1]  # t of one degree of freedom at 84.1 %: 1.84
+
+
+def test_runs_without_stated_uncertainties_say_so_all_and_some():
+    with_u, without = runs(constants=THESIS[:2]), runs(None, constants=THESIS[:2])
+    said = [" ".join(combine(each).warnings) for each in (without, [with_u[0], without[1]], with_u)]
+    assert ["no uncertainties of the readings were given" in text for text in said] == [True, False, False]
+    assert ["1 of 2 runs give no uncertainties" in text for text in said] == [False, True, False]
