@@ -28,7 +28,7 @@ OUTCOMES = trial.WORK / "outcomes.json"
 
 #: Tests run in two rounds of so many seconds of a processor at most: first those of the files whose names are nearest
 #: to that of the mutation's file, then the fastest of the others.  A mutation that they all pass has survived.
-NEAREST, FIRST_S, REST_S = 3, 6.0, 12.0
+NEAREST, FIRST_S, REST_S = 3, 5.0, 8.0
 #: Collecting a file of tests costs about so much [s].
 _FILE_S = 0.25
 
