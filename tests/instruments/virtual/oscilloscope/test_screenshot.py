@@ -1,8 +1,13 @@
 """What the picture of a screen shows."""
 
-import numpy as np
+import io
+import struct
 
-from instruments.virtual.oscilloscope.screenshot import HEIGHT, WIDTH, draw
+import numpy as np
+import pytest
+from PIL import Image
+
+from instruments.virtual.oscilloscope.screenshot import HEIGHT, WIDTH, bmp8, bmp24, draw
 
 
 def test_a_jump_is_a_line_from_the_height_before_to_the_one_after():
@@ -12,3 +17,12 @@ def test_a_jump_is_a_line_from_the_height_before_to_the_one_after():
     jump = round((HEIGHT - 1) / 2)  # from a quarter to three quarters, with both ends
     assert lit[300] in {jump, jump + 1, jump + 2}
     assert (np.delete(lit, 300) == 1).all()
+
+
+@pytest.mark.parametrize("form", [bmp24, bmp8])
+def test_a_bitmap_is_what_another_library_reads(form):
+    picture = draw({1: np.linspace(0, 1, WIDTH)}, columns=10)
+    data = form(picture)
+    assert struct.unpack_from("<H", data, 26) == (1,)  # planes: always one (Windows GDI, BITMAPINFOHEADER)
+    read = np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
+    assert np.abs(read.astype(int) - picture).max() <= (0 if form is bmp24 else 25)  # half a step of 51
