@@ -8,7 +8,9 @@ import hashlib
 import json
 import time
 from collections import defaultdict
-from pathlib import PurePosixPath
+from functools import cache
+from pathlib import Path, PurePosixPath
+from typing import Any
 
 import trial
 
@@ -29,23 +31,21 @@ def groups() -> dict[str, list[str]]:
 
 
 def measure(only: list[str]) -> None:
-    """Measure the groups that are not known yet, or whose tests have changed."""
+    """Measure the files of tests that are not known yet, or have changed, group by group."""
     KEPT.mkdir(parents=True, exist_ok=True)
     for group, files in groups().items():
         if only and not any(word in group for word in only):
             continue
-        kept = KEPT / f"{group.replace('/', '.')}.json"
-        digest = _digest(files)
-        if kept.exists() and json.loads(kept.read_text(encoding="utf-8"))["digest"] == digest:
+        stale = [name for name in files if _known(name).get("digest") != _digest(name)]
+        if not stale:
             continue
         start = time.monotonic()
-        result = trial.run({"files": files, "tests": None, "reach": True}, 1200)
+        result = trial.run({"files": stale, "tests": None, "reach": True}, 1200)
         if not result:
             print(f"  {group}: no answer", flush=True)
             continue
-        result["digest"] = digest
-        result["functions"] = {name: _functions(name) for name in result["lines"]}
-        kept.write_text(json.dumps(result), encoding="utf-8")
+        for name in stale:
+            _kept(name).write_text(json.dumps(_part(result, name) | {"digest": _digest(name)}), encoding="utf-8")
         print(
             f"  {group}: {len(result['tests'])} tests, {result['cpu_s']:.0f} s of a processor,"
             f" {time.monotonic() - start:.0f} s by the clock, {len(result['failed'])} fail here",
@@ -53,14 +53,37 @@ def measure(only: list[str]) -> None:
         )
 
 
-def _digest(files: list[str]) -> str:
-    digest = hashlib.sha256()
-    for name in files:
-        path = trial.TREE / name
-        digest.update(path.read_bytes() if path.is_file() else b"doctests")
-    return digest.hexdigest()[:16]
+def _kept(name: str) -> Path:
+    return KEPT / f"{name.replace('/', '.')}.json"
 
 
+def _known(name: str) -> dict[str, Any]:
+    return json.loads(_kept(name).read_text(encoding="utf-8")) if _kept(name).exists() else {}
+
+
+def _part(result: dict[str, Any], name: str) -> dict[str, Any]:
+    """What is of one file of tests, or of a package's doctests."""
+    tests = {test: seconds for test, seconds in result["tests"].items() if test.startswith(name)}
+    failed = [test for test in result["failed"] if test.startswith(name)]
+    reached = {
+        file: {line: part for line, by in lines.items() if (part := [test for test in by if test in tests])}
+        for file, lines in result["lines"].items()
+    }
+    reached = {file: lines for file, lines in reached.items() if lines}
+    return {
+        "tests": tests,
+        "failed": failed,
+        "lines": reached,
+        "functions": {file: _functions(file) for file in reached},
+    }
+
+
+def _digest(name: str) -> str:
+    path = trial.TREE / name
+    return hashlib.sha256(path.read_bytes() if path.is_file() else b"doctests").hexdigest()[:16]
+
+
+@cache
 def _functions(name: str) -> dict[str, list[object]]:
     """First and last line of each function, and a digest of its text."""
     source = (trial.TREE / name).read_text(encoding="utf-8")
