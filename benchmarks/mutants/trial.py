@@ -174,6 +174,7 @@ def _obey(order: dict[str, Any]) -> None:
                 line: sorted(filter(None, tests)) for line, tests in data.contexts_by_lineno(name).items() if any(tests)
             }
             for name in data.measured_files()
+            if name.endswith(".py")  # templates are compiled to code, too
         }
     with open(order["answer"], "w", encoding="utf-8") as out:  # noqa: PTH123
         json.dump(result, out)
