@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import dataclasses
 import hashlib
 import json
 import os
@@ -40,6 +41,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=11, help="of the choice")
     parser.add_argument("--only", nargs="*", default=[], help="files, names, changes, folders of tests with it")
     parser.add_argument("--again", nargs="*", default=[], help="states to try anew, as survived")
+    parser.add_argument("--tests", nargs="*", help="by these tests, new ones perhaps, not by those of the map")
     parser.add_argument("--known", action="store_true", help="do with the map as far as it is known")
     parser.add_argument("--map", action="store_true", help="learn which tests reach which lines, and end")
     asked = parser.parse_args()
@@ -83,7 +85,10 @@ def _outcome(
     if fresh or not wanted:
         return before
     start = time.monotonic()
-    found = attempt(mutation, reached) | {"digest": digest}
+    tried = dataclasses.replace(mutation, tests=tuple(asked.tests)) if asked.tests else mutation
+    found = attempt(tried, reached) | {"digest": digest}
+    if before and asked.tests and found["state"] == "survived":
+        return before  # they are not all that reach it
     known[mutation.key] = found
     OUTCOMES.write_text(json.dumps(known, indent=0), encoding="utf-8")
     what = name or f"{mutation.file} {mutation.function}: {mutation.text}"
