@@ -1,4 +1,4 @@
-# `make` lists what there is. Everything needs python3 (3.11 or newer), venv and make, and nothing else.
+# `make` lists the targets. Everything needs python3 (3.11 or newer), venv and make, and nothing else.
 PYTHON ?= python3
 BIN    := .venv/bin
 DEMO   := demo
@@ -49,7 +49,7 @@ lint: setup  ## style, types and import rules
 	$(BIN)/lint-imports --no-cache
 
 all-pythons: setup  ## the tests on every Python from 3.11 on that is installed
-	@# pyenv shows only the versions that it is told to
+	@# pyenv shows only the versions that PYENV_VERSION names
 	@if command -v pyenv >/dev/null; then \
 	  PYENV_VERSION="$$(pyenv version-name):$$(pyenv versions --bare | tr '\n' ':')"; export PYENV_VERSION; fi; \
 	$(BIN)/nox --session tests

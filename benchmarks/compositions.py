@@ -160,14 +160,14 @@ def main() -> None:
         compare()
         return
     tops, unseen, draw = cases(14, 1), cases(16, 2), np.random.default_rng(options.seed)
-    told(SCHEMES["blanes-moan-6"], unseen)
+    report(SCHEMES["blanes-moan-6"], unseen)
     end, best = time.perf_counter() + 60 * options.minutes, np.inf
     while time.perf_counter() < end:
         value, free = best_of(options.stages, 20 * options.minutes, tops, draw)
         if value < best:
             best = value
             scheme = composition(free, options.stages)
-            told(scheme, unseen)
+            report(scheme, unseen)
             print("   drifts", [f"{a:.17g}" for a in scheme.drifts[: halves(options.stages)[0]]])
             print("   kicks ", [f"{b:.17g}" for b in scheme.kicks[: halves(options.stages)[1]]], flush=True)
 
@@ -194,7 +194,7 @@ def compare() -> None:
         print(f"{kind:58}", *(f"{old / new:6.2g}" for old, new in zip(*both, strict=True)))
 
 
-def told(scheme: Scheme, unseen: list[Case]) -> None:
+def report(scheme: Scheme, unseen: list[Case]) -> None:
     rates = {error: needed(scheme, unseen, error) for error in (1e-8, 1e-11)}
     size = sum(map(abs, scheme.drifts + scheme.kicks))
     print(

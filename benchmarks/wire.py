@@ -148,7 +148,7 @@ def in_process(rounds: int, duration: float) -> dict[str, Any]:
 
 @contextmanager
 def in_another_process(serve: Callable[..., None], *given: object) -> Iterator[Connection]:
-    """Let it serve in a process of its own; what it has to tell comes first, and it ends when it is told anything."""
+    """Let it serve in a process of its own; its addresses come first, and it ends when any message reaches it."""
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
     process = context.Process(target=serve, args=(there, *given))
@@ -162,21 +162,21 @@ def in_another_process(serve: Callable[..., None], *given: object) -> Iterator[C
         process.join()
 
 
-def serve_bench(told: Connection) -> None:
+def serve_bench(parent: Connection) -> None:
     """The virtual generator by every protocol."""
     with BenchServer(Bus({ADDRESS: generator()})) as server:
-        told.send(server.offers[0].resources)
-        told.recv()
+        parent.send(server.offers[0].resources)
+        parent.recv()
 
 
-def serve_plainly(told: Connection) -> None:
+def serve_plainly(parent: Connection) -> None:
     """The same number in answer to every line, with nothing but sockets: a thread for each of two connections."""
     with socket.create_server(("127.0.0.1", 0)) as server:
-        told.send(server.getsockname()[1])
+        parent.send(server.getsockname()[1])
         threads = [threading.Thread(target=_repeat, args=server.accept()[:1]) for _ in range(2)]
         for thread in threads:
             thread.start()
-        told.recv()
+        parent.recv()
         for thread in threads:
             thread.join()
 
@@ -252,29 +252,29 @@ def scope_bench() -> tuple[Bus, Stopwatch]:
     return Bus({ADDRESS: VirtualDS1000Z(clock, signals={1: light})}), light
 
 
-def serve_scope(told: Connection) -> None:
-    """The virtual oscilloscope; how long its light takes is told whenever it is asked for."""
+def serve_scope(parent: Connection) -> None:
+    """The virtual oscilloscope; it answers each message with the time that its light has taken."""
     bus, light = scope_bench()
     with BenchServer(bus) as server:
-        told.send(server.offers[0].resources["socket"])
-        while told.recv() != "end":
-            told.send(light.seconds)
+        parent.send(server.offers[0].resources["socket"])
+        while parent.recv() != "end":
+            parent.send(light.seconds)
 
 
-def serve_blocks(told: Connection) -> None:
+def serve_blocks(parent: Connection) -> None:
     """Blocks as long as the scope's in answer to every line, with nothing but a socket."""
     block = b"#9000250000" + bytes(250_000) + b"\n"
     with socket.create_server(("127.0.0.1", 0)) as server:
-        told.send(server.getsockname()[1])
+        parent.send(server.getsockname()[1])
         link, _ = server.accept()
         with link:
             while link.recv(4096):
                 link.sendall(block)
-        told.recv()
+        parent.recv()
 
 
-def fetch(told: Connection, way: str, traced: bool) -> None:  # noqa: FBT001 - a process is started with it
-    """Fetch a trace; time, the light's share and memory are told."""
+def fetch(parent: Connection, way: str, traced: bool) -> None:  # noqa: FBT001 - a process is started with it
+    """Fetch a trace; send back time, the light's share and memory."""
     with ExitStack() as opened_:
         if way == "in process":
             bus, light = scope_bench()
@@ -299,7 +299,7 @@ def fetch(told: Connection, way: str, traced: bool) -> None:  # noqa: FBT001 - a
         points = sum(piece.size for piece in scope.blocks(1))
         seconds = time.perf_counter() - began
         assert points == POINTS
-        told.send(
+        parent.send(
             {
                 "seconds": seconds,
                 "light": physics() - before,
@@ -309,10 +309,10 @@ def fetch(told: Connection, way: str, traced: bool) -> None:  # noqa: FBT001 - a
             }
         )
         scope.close()
-    told.recv()
+    parent.recv()
 
 
-def fetch_plainly(told: Connection, way: str, traced: bool) -> None:  # noqa: ARG001, FBT001 - as fetch
+def fetch_plainly(parent: Connection, way: str, traced: bool) -> None:  # noqa: ARG001, FBT001 - as fetch
     """As many bytes in blocks as long, by a bare socket."""
     with in_another_process(serve_blocks) as server, socket.create_connection(("127.0.0.1", server.recv())) as link:
         room, began, rss = bytearray(1 << 18), time.perf_counter(), _peak_rss()
@@ -323,8 +323,10 @@ def fetch_plainly(told: Connection, way: str, traced: bool) -> None:  # noqa: AR
                 left -= link.recv_into(room, left)
         seconds = time.perf_counter() - began
         link.close()
-        told.send({"seconds": seconds, "light": 0.0, "rss": _peak_rss(), "rss_growth": _peak_rss() - rss, "traced": 0})
-    told.recv()
+        parent.send(
+            {"seconds": seconds, "light": 0.0, "rss": _peak_rss(), "rss_growth": _peak_rss() - rss, "traced": 0}
+        )
+    parent.recv()
 
 
 def _peak_rss() -> int:
@@ -343,22 +345,22 @@ def long_trace(rounds: int) -> dict[str, Any]:
     ways = {"in process": fetch, "TCP socket": fetch, "plain sockets": fetch_plainly}
     found: dict[str, Any] = {}
     for way, how in ways.items():
-        all_ = [_told_by(how, way, traced=False) for _ in range(rounds)]
-        best = min(all_, key=lambda told: told["seconds"] - told["light"])
-        wire = [told["seconds"] - told["light"] for told in all_]
+        all_ = [_answer_of(how, way, traced=False) for _ in range(rounds)]
+        best = min(all_, key=lambda answer: answer["seconds"] - answer["light"])
+        wire = [answer["seconds"] - answer["light"] for answer in all_]
         found[way] = best | {
             "wire": min(wire),
             "spread": statistics.median(wire) / min(wire) - 1,
             "mb_per_second": POINTS / 1e6 / best["seconds"],
             "mb_per_second_of_wire": POINTS / 1e6 / min(wire),
-            "traced": _told_by(how, way, traced=True)["traced"],
+            "traced": _answer_of(how, way, traced=True)["traced"],
         }
     return found
 
 
-def _told_by(how: Callable[..., None], way: str, *, traced: bool) -> dict[str, float]:
-    with in_another_process(how, way, traced) as told:
-        answer: dict[str, float] = told.recv()
+def _answer_of(how: Callable[..., None], way: str, *, traced: bool) -> dict[str, float]:
+    with in_another_process(how, way, traced) as child:
+        answer: dict[str, float] = child.recv()
         return answer
 
 

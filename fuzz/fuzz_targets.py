@@ -1,6 +1,6 @@
 """What is fuzzed: functions of bytes that must end, and must not raise.
 
-Each takes any bytes, does with them what somebody at the other end of a wire could do, and asserts what must hold
+Each takes any bytes, does with them what a program at the other end of a wire could do, and asserts what must hold
 afterwards.  Nothing here knows the fuzzer: tests/instruments/virtual/bench/test_fuzz.py calls the same functions.
 """
 

@@ -71,8 +71,7 @@ COUNTERS: tuple[Model[Counter], ...] = (
     Model(
         "53220A",
         Keysight53230A,
-        # 11 digits a second instead of 12 (data sheet of both)
-        partial(Virtual53230A, identity="Keysight Technologies,53220A,VIRTUAL,3.09-levilab", resolution=1e-11),
+        partial(Virtual53230A, identity="Keysight Technologies,53220A,VIRTUAL,3.09-levilab"),
         "TCPIP0::192.168.1.20::5025::SOCKET",
     ),
     Model("CNT-91", PendulumCNT91, VirtualCNT91, "GPIB0::10::INSTR"),
@@ -113,7 +112,7 @@ OSCILLOSCOPES: tuple[Model[Oscilloscope], ...] = (
 )
 MAGNETOMETERS: tuple[Model[Magnetometer], ...] = (
     Model("425", LakeShore425, Virtual425, "COM3"),
-    Model("455", LakeShore475, partial(Virtual475, model="455"), "GPIB0::12::INSTR"),
+    Model("455", LakeShore475, partial(Virtual475, identity="LSCI,MODEL455,VIRTUAL,01012020"), "GPIB0::12::INSTR"),
     Model("475", LakeShore475, Virtual475, "GPIB0::12::INSTR"),
 )
 

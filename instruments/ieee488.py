@@ -131,7 +131,7 @@ class Form:
     narrower the form, the fewer of them pass.
 
     pattern: a regular expression that the whole answer matches, in ASCII; example: an answer in this form; suffix:
-    what may follow a number, a unit (regular expression).
+    what follows a number, its unit.
 
     >>> NR3.number("+2.5E+01"), NR1.matches("1_0"), NR1.matches("\u0661")
     (25.0, False, False)
@@ -148,7 +148,7 @@ class Form:
     def number(self, answer: str) -> float:
         """The number in an answer of this form.  Raises ValueError."""
         if self.suffix:
-            found = _compiled(f"({self.pattern})(?:{self.suffix})?").fullmatch(answer)
+            found = _compiled(f"({self.pattern}){self.suffix}").fullmatch(answer)
             answer = found[1] if found else ""
         if not self.matches(answer):
             raise ValueError(answer)

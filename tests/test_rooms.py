@@ -10,25 +10,17 @@ from typing import TYPE_CHECKING
 import pytest
 
 from support.paths import ROOT
+from support.sources import modules, sources
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
-
-PACKAGES = ("levilab", "instruments", "analysis", "pyvisa_levilab")
 
 #: What takes so long to load that it is imported where it is used: at least 10 ms, or not everywhere installed.
 HEAVY = {
     "RigolWFM", "filelock", "grp", "heyoka", "jinja2", "lmfit", "matplotlib", "numba", "pandas", "pyvisa", "rich",
     "scipy", "serial", "typst", "uncertainties",
 }  # fmt: skip
-
-
-def modules() -> Iterator[tuple[str, Path]]:
-    for package in PACKAGES:
-        for path in sorted((ROOT / package).rglob("*.py")):
-            parts = path.relative_to(ROOT).with_suffix("").parts
-            yield ".".join(parts[:-1] if parts[-1] == "__init__" else parts), path
 
 
 def imported(node: ast.AST) -> list[str]:
@@ -43,11 +35,6 @@ def imported(node: ast.AST) -> list[str]:
 def top_level(tree: ast.Module) -> list[str]:
     """What is loaded together with a module; ``if TYPE_CHECKING`` loads nothing."""
     return [name for statement in tree.body for name in imported(statement)]
-
-
-@cache
-def sources() -> dict[str, ast.Module]:
-    return {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in modules()}
 
 
 @cache

@@ -31,8 +31,8 @@ _LONGEST_ERROR_QUEUE = 64
 _QUEUE_ENTRY = re.compile(r"([+-]?\d{1,5}), ?(\"[ -~]*\")", re.ASCII)
 #: How instruments print a switch (SCPI-1999, vol. 1, 7.3).
 _SWITCH = {"0": False, "1": True}
-#: Instruments round what they are set to by this fraction of it at most; where their resolution is known, an answer has
-#: four digits at least.
+#: Instruments round what they are set to by this fraction of it at most; where their resolution is known and the digits
+#: of their answers are not, these have four at least.
 _ROUNDING, _PRINTED = 0.01, 1e-4
 
 
@@ -272,6 +272,7 @@ class Setting(Generic[T]):
     low, high: what the instrument takes; choices: the words it takes, long form with the short form in capitals
     (SINusoid); answers: words that it may answer beside the choices; form: the form of its answer, where that is not
     the instrument's NUMBER, or of a text without choices; resolution: the step in which the instrument sets it [unit];
+    digits: how many significant ones of a number it keeps and prints, where that is known;
     key: the name of the field where the header has several, ``C1:BSWV WVTP,SINE,FRQ,1000HZ,…``; suffix: the unit that
     is sent with a number; values: the only numbers that the instrument has; about: what it is, for `help`.
     """
@@ -285,6 +286,7 @@ class Setting(Generic[T]):
     answers: tuple[str, ...] = ()
     form: Form | None = None
     resolution: float = 0.0
+    digits: int = 0
     key: str = ""
     suffix: str = ""
     values: tuple[float, ...] = ()
@@ -350,10 +352,15 @@ class Setting(Generic[T]):
         rounding: a further one, in the setting's unit.
         """
         if self.kind is float:
-            share = _PRINTED if self.resolution else _ROUNDING
-            aside = share * abs(float(asked)) + self.resolution + rounding
+            aside = self._last_digit(abs(float(asked))) + self.resolution + rounding
             return not abs(float(answered) - float(asked)) <= aside
         return self._canonical(asked) != self._canonical(answered)
+
+    def _last_digit(self, value: float) -> float:
+        """What one unit in the last digit that the instrument keeps of a number is worth [unit]."""
+        if self.digits and value:
+            return 10.0 ** (math.floor(math.log10(value)) + 1 - self.digits)
+        return (_PRINTED if self.resolution else _ROUNDING) * value
 
     def _parse(self, answer: str, form: Form) -> bool | float | str:
         """The value of an answer.  Raises ValueError."""

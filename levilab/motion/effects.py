@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
     from levilab.simulator.trajectory import Trajectory
 
-#: Seconds that are compared: some twenty up-and-downs, lines told apart by 0.1 Hz.
+#: Seconds that are compared: some twenty up-and-downs, lines distinguished by 0.1 Hz.
 LONGEST = 20.0
 #: Below these a change is nothing that could be seen: a micrometre, a tenth of a millihertz.
 LEAST_M, LEAST_HZ = 1e-7, 1e-5

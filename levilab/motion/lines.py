@@ -25,8 +25,8 @@ NEAR_HZ, NEAR_SHARE = 0.1, 0.06
 SIDEBAND_HZ = 2.0
 #: A spin that is on the average this far from the drive's frequency is not locked to it.
 UNLOCKED_HZ = 0.5
-#: A motion shorter than this has no lines that could be told apart [s]; of one longer than this a part shows them all,
-#: and more of it only breaks lines up that are never quite steady.
+#: A motion shorter than this has no lines that could be distinguished [s]; of one longer than this a part shows them
+#: all, and more of it only breaks up lines that are never quite steady.
 SHORTEST_S, LONGEST_S = 1.0, 300.0
 #: Lines that are worth showing, and the weakest of them in parts of the strongest.
 MOST, WEAKEST = 16, 0.01

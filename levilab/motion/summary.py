@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
     from levilab.simulator.trajectory import Accuracy, Trajectory
 
-#: An error [m, rad] at the end that nobody sees.
+#: An error [m, rad] at the end that no figure shows.
 SMALL = 1e-5
 
 #: A spin that changes by less than this part of itself changes by rounding only.
@@ -32,7 +32,7 @@ ENDINGS = {"radius": "was lost", "height": "fell"}
 
 @dataclass(frozen=True)
 class Summary:
-    """What is told of a motion.
+    """What a summary says of a motion.
 
     rate: states kept per second [1/s]; computing: the time it took [s]; energy_change: greatest departure from the
     start in parts of the energy then; notes: sentences of what to mind.

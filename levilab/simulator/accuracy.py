@@ -41,7 +41,7 @@ def _slowing(drag: Any, start: Array) -> float:
     if drag is None:
         return 0.0
     spin = abs(float(start[CLOCK]))
-    if isinstance(drag, braking.LooseFlowing):
+    if isinstance(drag, braking.WasherDragFlow):
         friction = drag.coupling * (drag.inverse_washers + drag.inverse_core)
         return max(friction, _relative(drag.washers, spin), _relative(drag.core, spin))
     return _relative(drag.law, spin)
@@ -49,9 +49,9 @@ def _slowing(drag: Any, start: Array) -> float:
 
 def has_kink(drag: Any) -> bool:
     """Whether drag flows by a law with |ω| in it, which at ω = 0 is not smooth: a step across it loses its order."""
-    if isinstance(drag, braking.LooseFlowing):
+    if isinstance(drag, braking.WasherDragFlow):
         return any(_law_has_kink(law) for law in (drag.washers, drag.core))
-    return isinstance(drag, braking.Flowing) and _law_has_kink(drag.law)
+    return isinstance(drag, braking.DragFlow) and _law_has_kink(drag.law)
 
 
 def _law_has_kink(law: Any) -> bool:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from levilab.simulator.disc import distance_to, nodes_of, rule_for
 from levilab.simulator.field import field_of
 from levilab.simulator.kernels import braking
-from levilab.simulator.kernels.loads import Aligned, Disc, Kinked, Leaning, Sine, Tilted, Upright
+from levilab.simulator.kernels.loads import Aligned, Disc, Leaning, PiecewiseLinear, Sine, Tilted, Upright
 from levilab.simulator.kernels.motion import Body, Loose, Model, Rigid
 
 if TYPE_CHECKING:
@@ -102,16 +102,16 @@ def _drag(scene: Scene) -> Any:
     if scene.drag.law == "none" or not any(constants):
         return None
     law = _LAWS[scene.drag.law](*constants)
-    return braking.Flowing(law) if has_attitude(scene) else braking.Clocked(law)
+    return braking.DragFlow(law) if has_attitude(scene) else braking.PrescribedDrag(law)
 
 
-def _loose_drag(scene: Scene) -> braking.LooseFlowing:
+def _loose_drag(scene: Scene) -> braking.WasherDragFlow:
     """The torque of the air is shared: each part slows as by a law of its own, scaled by I₃ over its inertia."""
     axial, washers = scene.top.inertia_axial_kg_m2, scene.washers.inertia_kg_m2
     core, share = axial - washers, scene.washers.drag_share
     law = _LAWS.get(scene.drag.law, braking.Stokes)
     constants = scene.drag.constants if scene.drag.law != "none" else (0.0,)
-    return braking.LooseFlowing(
+    return braking.WasherDragFlow(
         washers=law(*(c * share * axial / washers for c in constants)),
         core=law(*(c * (1 - share) * axial / core for c in constants)),
         inverse_washers=1 / washers,
@@ -127,4 +127,4 @@ def _drive(scene: Scene) -> Any:
     x, y, z = (_moment(scene) * drive.amplitude_t * part for part in drive.unit_direction)
     if drive.waveform == "sine":
         return Sine((x, y, z), drive.frequency_hz, drive.phase_rad / (2 * math.pi))
-    return Kinked((x, y, z))
+    return PiecewiseLinear((x, y, z))

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from levilab.errors import LeftRange, SimulationError
 from levilab.simulator.escape import locate_escape
-from levilab.simulator.kernels.braking import Flowing, LooseFlowing
-from levilab.simulator.kernels.loads import Kinked
+from levilab.simulator.kernels.braking import DragFlow, WasherDragFlow
+from levilab.simulator.kernels.loads import PiecewiseLinear
 from levilab.simulator.kernels.motion import STATE_SIZE, TIME, R
 from levilab.simulator.kernels.splitting import advance
 from levilab.simulator.model import model_of
@@ -74,9 +74,9 @@ def scheme_for(name: str | None, model: Any) -> Scheme:
 
     Part of the error of `levitron-6` comes back at each stop, and a drive with corners has many (docs/speed.md).
     """
-    flows = isinstance(model.drag, Flowing | LooseFlowing)
+    flows = isinstance(model.drag, DragFlow | WasherDragFlow)
     if name is None:
-        smooth = "blanes-moan-6" if isinstance(model.drive, Kinked) else "levitron-6"
+        smooth = "blanes-moan-6" if isinstance(model.drive, PiecewiseLinear) else "levitron-6"
         return SCHEMES["kahan-li-8" if flows else smooth]
     if name not in SCHEMES:
         raise SimulationError(f"scheme {name!r}: expected one of {', '.join(SCHEMES)}")

@@ -99,7 +99,7 @@ def _without_brackets(pattern):
 
 def headers(device):
     """Every header of an instrument, in several spellings, as commands and as questions."""
-    found = [spelled for row in device.parser.commands for spelled in spellings(row.pattern)]
+    found = [spelled for row in device.commands.rows for spelled in spellings(row.header)]
     return [*found, *(header + "?" for header in found)]
 
 
@@ -161,7 +161,7 @@ class Bench:
         device, session = self.device, self.session
         assert len(device.parser.errors) <= device.queue_size
         assert all(map(ENTRY.fullmatch, device.parser.errors))
-        assert len(device.parser._known) <= 20_000
+        assert len(device.commands._actions) <= 20_000
         assert len(session._framer._buffer) <= LONGEST_LINE + (1 << 26)
         assert not math.isnan(device._ready)
         assert 0 <= device.status.events < 256

@@ -60,14 +60,15 @@ class Lines:
         return held + now, delivery.ended
 
     def _end(self):
-        head = re.match(rb"#([1-9])", self._far)
+        head = re.match(rb"([^#\n]{0,16})#([1-9])", self._far)
         if head:
-            data = 2 + int(head[1])
+            data = head.end() + int(head[2])
             if len(self._far) < data:
                 return None
-            end = data + int(self._far[2:data])
-            feed = self._far.find(b"\n", end) + 1
-            return feed or None
+            end = data + int(self._far[head.end() : data])
+            # behind a header, as Siglent has it, two line feeds end a block
+            feed = self._far.find(b"\n\n" if head[1] else b"\n", end) + 1
+            return feed + bool(head[1]) if feed else None
         return (self._far.find(b"\n") + 1) or None
 
 

@@ -17,8 +17,8 @@ from pyvisa_py.tcpip import Vxi11CoreClient
 
 from instruments.clock import WallClock
 from instruments.virtual.bench.bus import Bus
-from instruments.virtual.core.device import VirtualInstrument, answers
-from instruments.virtual.core.parser import Command
+from instruments.virtual.core.device import VirtualInstrument
+from instruments.virtual.core.rows import Ask, Number, Own
 from instruments.virtual.servers.hislip_messages import HEADER, Type
 from instruments.virtual.servers.serial_port import HAS_PSEUDO_TERMINALS
 from instruments.virtual.servers.server import BenchServer, Place
@@ -51,13 +51,12 @@ class Thing(VirtualInstrument):
         super().__init__(clock, pace=0.0)
         self.taken = b""
 
-    def table(self):
-        return (
-            Command("BLOCk", self._take, answers(self._give)),
-            Command("SLOW", get=answers(self._slow)),
-            Command("FAIL", get=answers(lambda: str(1 // 0))),
-            self.numeric("LEVel", "level", low=0, high=10, default=0),
-        )
+    ROWS = (
+        Own("BLOCk", lambda d, p: d._take(p), lambda d: d._give()),
+        Ask("SLOW", lambda d: d._slow()),
+        Ask("FAIL", lambda _d: str(1 // 0)),
+        Number("LEVel", "level", 0.0, (0, 10)),
+    )
 
     def _slow(self):
         self.busy_until(self._ready + SLOW)

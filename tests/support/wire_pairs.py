@@ -4,6 +4,7 @@ import contextlib
 import itertools
 import math
 import re
+import struct
 from dataclasses import dataclass
 from types import SimpleNamespace
 from unittest import mock
@@ -14,16 +15,12 @@ import pyvisa_py.protocols.rpc
 import pyvisa_py.tcpip
 import serial.urlhandler.protocol_socket
 
-from instruments.drivers.counter.keysight_53230a import Keysight53230A
-from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
-from instruments.drivers.generator.agilent_33220a import Agilent33220A
-from instruments.drivers.generator.keysight_33500b import Keysight33500B
-from instruments.drivers.magnetometer.lakeshore_425 import LakeShore425
-from instruments.drivers.magnetometer.lakeshore_475 import LakeShore475
 from instruments.drivers.oscilloscope.keysight_dsox import KeysightDSOX
 from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
+from instruments.drivers.oscilloscope.siglent_sds1000xe import SiglentSDS1000XE
+from instruments.drivers.scpi import ScpiInstrument
 from instruments.errors import CommandRefused, InstrumentError, NotConnected
-from instruments.ieee488 import PLAIN_BLOCK, block_of
+from instruments.ieee488 import PLAIN_BLOCK, BlockForm, block_of
 from instruments.links.serial_port import SerialTransport
 from instruments.links.visa import VisaTransport
 from instruments.virtual.bench.bus import Bus
@@ -33,6 +30,7 @@ from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.servers.serial_port import HAS_PSEUDO_TERMINALS
 from instruments.virtual.servers.server import BenchServer
 from support import hostile
+from support.models import FAMILIES, KIND_OF, ROWS
 from support.proxy import LOOPBACK, Proxy
 from support.wire_faults import FaultyBus, Tapped, Wire
 
@@ -149,29 +147,30 @@ ANY = {
     "identity": Operation(lambda driver: driver.identity(), lambda pair, value: value == pair.tap.device.identity),
     "settings": Operation(lambda driver: driver.settings(), _are_the_settings),
 }
-SCPI = ANY | {"an empty error queue": _errors(_report_none), "an error in the queue": _errors(_report_one)}
+QUEUE = {"an empty error queue": _errors(_report_none), "an error in the queue": _errors(_report_one)}
 
 
-def _with_settings(driver, operations):
+def _operations(driver, of_its_kind):
+    """Those of every driver, those of its kind, and asking for each of its settings."""
+    operations = ANY | (QUEUE if driver.raise_errors is ScpiInstrument.raise_errors else {}) | of_its_kind
     found = {f"setting {row.name}": _setting(row.name) for row in driver.declared()}
     for row in driver.CHANNEL.declared() if hasattr(driver, "CHANNEL") else ():
         found[f"setting channel1_{row.name}"] = _channel_setting(row.name)
     return operations | found
 
 
-def _counter(driver, question, block):
-    timed = {"timed readings": _readings(block, lambda driver: driver.timed_readings(3))}
-    return _with_settings(
-        driver,
-        SCPI
-        | {
-            "prepare": Operation(_prepare_counter, _same_settings, remakes=True),
-            "set gate": _set("gate", 0.25),
-            "reading": _reading(question),
-            "readings": _readings(block, lambda driver: driver.readings(3)),
-        }
-        | (timed if hasattr(driver, "timed_readings") else {}),
-    )
+#: The questions by which the counters of both makers give a series.
+_SERIES = r"(DATA:REM|FETC:ARR)\?.*"
+
+
+def _counter(driver):
+    timed = {"timed readings": _readings(_SERIES, lambda driver: driver.timed_readings(3))}
+    return {
+        "prepare": Operation(_prepare_counter, _same_settings, remakes=True),
+        "set gate": _set("gate", 0.25),
+        "reading": _reading(r"READ\?"),
+        "readings": _readings(_SERIES, lambda driver: driver.readings(3)),
+    } | (timed if hasattr(driver, "timed_readings") else {})
 
 
 def _prepare_counter(driver):
@@ -187,22 +186,15 @@ def _prepare_generator(driver):
     driver.prepare(waveform="TRI", frequency_hz=25.0, amplitude_vpp=2.0, offset_v=0.5)
 
 
-def _generator(driver):
-    return _with_settings(
-        driver,
-        SCPI
-        | {
-            "prepare": Operation(_prepare_generator, _same_settings, remakes=True),
-            "set frequency": _set("frequency", 31.5),
-            "on": _set("output", value=True),
-            "off": Operation(
-                lambda driver: driver.off(),
-                lambda pair, _: pair.side.output is False,
-                _switch_on,
-                remakes=True,
-            ),
-        },
-    )
+def _generator(_driver):
+    return {
+        "prepare": Operation(_prepare_generator, _same_settings, remakes=True),
+        "set frequency": _set("frequency", 31.5),
+        "on": _set("output", value=True),
+        "off": Operation(
+            lambda driver: driver.off(), lambda pair, _: pair.side.output is False, _switch_on, remakes=True
+        ),
+    }
 
 
 def _prepare_scope(driver):
@@ -214,38 +206,81 @@ def _acquire(driver):
 
 
 def _has_record(pair, _):
-    return pair.has_done("SING") and not pair.is_running()
+    return pair.has_new_record()
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How the scopes of a maker are read, after its manual.
+
+    block, scaling: the questions for the codes and for what they mean (regular expressions); form: of the block; zero:
+    code 0 of the wire; numbers: of an answer to the latter: time between samples, first time, volts a code, volts at
+    code 0.
+    """
+
+    numbers: object
+    block: str = r":WAV:DATA\?"
+    scaling: str = r":WAV:PRE\?"
+    form: BlockForm = PLAIN_BLOCK
+    zero: int = 0
+
+    def codes(self, answer):
+        """The codes in a block as it came."""
+        return np.frombuffer(block_of(answer, self.form), np.uint8) ^ np.uint8(self.zero)
+
+
+def _rigol_numbers(answer):
+    *_, step, first, _, per_code, origin, reference = _numbers(answer)
+    return step, first, per_code, -(origin + reference) * per_code
+
+
+def _keysight_numbers(answer):
+    *_, step, first, _, per_code, origin, reference = _numbers(answer)
+    return step, first, per_code, origin - reference * per_code
+
+
+_LECROY = BlockForm(longest_head=16, ends=2)
+
+
+def _siglent_numbers(answer):
+    """WAVEDESC: the count of points at 116, volts a division and offset at 156, the step at 176; seven digits."""
+    descriptor = block_of(answer, _LECROY)
+    (count,), (step,) = struct.unpack_from("<i", descriptor, 116), struct.unpack_from("<f", descriptor, 176)
+    step, division, offset = (float(f"{v:.7g}") for v in (step, *struct.unpack_from("<ff", descriptor, 156)))
+    return step, -count * step / 2, division / 25, -128 * (division / 25) - offset
+
+
+READINGS = {
+    RigolDS1000Z: Reading(_rigol_numbers),
+    KeysightDSOX: Reading(_keysight_numbers),
+    SiglentSDS1000XE: Reading(_siglent_numbers, r"C1:WF\? DAT2", r"C1:WF\? DESC", _LECROY, 128),
+}
 
 
 def _is_trace(pair, trace):
     """Every code of it, and its scaling, as they left the instrument in this attempt."""
-    return any(
-        np.array_equal(trace.codes, np.frombuffer(block_of(block), np.uint8)) for block in pair.answers(r":WAV:DATA\?")
-    ) and any(
-        (trace.dt_s, trace.t0_s, trace.volts_per_code, trace.offset_v)
-        == (n[4], n[5], n[7], pair.offset(per_code=n[7], origin=n[8], reference=n[9]))
-        for n in map(_numbers, pair.answers(r":WAV:PRE\?"))
+    reading = READINGS[pair.kind.driver]
+    return any(np.array_equal(trace.codes, reading.codes(block)) for block in pair.answers(reading.block)) and any(
+        (trace.dt_s, trace.t0_s, trace.volts_per_code, trace.offset_v) == reading.numbers(answer)
+        for answer in pair.answers(reading.scaling)
     )
 
 
 def _are_blocks(pair, codes):
-    return any(codes == block_of(block) for block in pair.answers(r":WAV:DATA\?"))
+    reading = READINGS[pair.kind.driver]
+    return any(codes == reading.codes(block).tobytes() for block in pair.answers(reading.block))
 
 
-def _scope(driver):
-    return _with_settings(
-        driver,
-        SCPI
-        | {
-            "prepare": Operation(_prepare_scope, _same_settings, remakes=True),
-            "set level": _set("trigger_level", 0.3),
-            "acquire": Operation(_acquire, _has_record, remakes=True),
-            "trace": Operation(lambda driver: driver.trace(1), _is_trace, remakes=True),
-            "blocks": Operation(
-                lambda driver: b"".join(piece.tobytes() for piece in driver.blocks(1)), _are_blocks, remakes=True
-            ),
-        },
-    )
+def _scope(_driver):
+    return {
+        "prepare": Operation(_prepare_scope, _same_settings, remakes=True),
+        "set level": _set("trigger_level", 0.3),
+        "acquire": Operation(_acquire, _has_record, remakes=True),
+        "trace": Operation(lambda driver: driver.trace(1), _is_trace, remakes=True),
+        "blocks": Operation(
+            lambda driver: b"".join(piece.tobytes() for piece in driver.blocks(1)), _are_blocks, remakes=True
+        ),
+    }
 
 
 def _prepare_magnetometer(driver):
@@ -261,17 +296,13 @@ def _is_field(pair, value):
     return any(value == float(field) * _UNITS_T[unit] for unit, field, *_ in answers)
 
 
-def _magnetometer(driver):
-    return _with_settings(
-        driver,
-        ANY
-        | {
-            "prepare": Operation(_prepare_magnetometer, _same_settings, remakes=True),
-            "set unit": _set("unit", "GAUSS"),
-            "reading": Operation(lambda driver: driver.flux_density(), _is_field),
-            "probe": Operation(lambda driver: driver.probe(), lambda pair, value: value == pair.side.probe()),
-        },
-    )
+def _magnetometer(_driver):
+    return {
+        "prepare": Operation(_prepare_magnetometer, _same_settings, remakes=True),
+        "set unit": _set("unit", "GAUSS"),
+        "reading": Operation(lambda driver: driver.flux_density(), _is_field),
+        "probe": Operation(lambda driver: driver.probe(), lambda pair, value: value == pair.side.probe()),
+    }
 
 
 @dataclass(frozen=True)
@@ -283,29 +314,36 @@ class Kind:
     operations: dict
 
 
-KINDS = {
-    "53230A": Kind(Keysight53230A, _prepare_counter, _counter(Keysight53230A, r"READ\?", r"DATA:REM\?.*")),
-    "CNT-91": Kind(PendulumCNT91, _prepare_counter, _counter(PendulumCNT91, r"READ\?", r"FETC:ARR\?.*")),
-    "33500B": Kind(Keysight33500B, _prepare_generator, _generator(Keysight33500B)),
-    "33220A": Kind(Agilent33220A, _prepare_generator, _generator(Agilent33220A)),
-    "DS1000Z": Kind(RigolDS1000Z, _prepare_scope, _scope(RigolDS1000Z)),
-    "DSOX1000": Kind(KeysightDSOX, _prepare_scope, _scope(KeysightDSOX)),
-    "425": Kind(LakeShore425, _prepare_magnetometer, _magnetometer(LakeShore425)),
-    "475": Kind(LakeShore475, _prepare_magnetometer, _magnetometer(LakeShore475)),
+_OF_KIND = {
+    "counter": (_prepare_counter, _counter),
+    "generator": (_prepare_generator, _generator),
+    "oscilloscope": (_prepare_scope, _scope),
+    "magnetometer": (_prepare_magnetometer, _magnetometer),
 }
-SCOPES, MAGNETOMETERS = ("DS1000Z", "DSOX1000"), ("425", "475")
+
+
+def _kind(name):
+    driver, (prepare, operations) = ROWS[name].driver, _OF_KIND[KIND_OF[name]]
+    return Kind(driver, prepare, _operations(driver, operations(driver)))
+
+
+#: Each model of the catalogue that has a twin of its own.
+KINDS = {name: _kind(name) for name in FAMILIES}
+SCOPES = tuple(name for name in KINDS if KIND_OF[name] == "oscilloscope")
+#: Those at a serial line.
+ON_A_LINE = tuple(name for name, kind in KINDS.items() if kind.driver.SERIAL)
 
 #: Way → the models that go it.  The first four lie within the process, on the bench's clock; the others are proxied.
 WAYS = {
     "messages": tuple(KINDS),
     "stream": tuple(KINDS),
-    "line": MAGNETOMETERS,
-    "levilab": MAGNETOMETERS,
+    "line": ON_A_LINE,
+    "levilab": ON_A_LINE,
     "socket": tuple(KINDS),
     "hislip": tuple(KINDS),
     "vxi11": tuple(KINDS),
-    "serial": MAGNETOMETERS,
-    **({"pty": MAGNETOMETERS} if HAS_PSEUDO_TERMINALS else {}),
+    "serial": ON_A_LINE,
+    **({"pty": ON_A_LINE} if HAS_PSEUDO_TERMINALS else {}),
 }
 WITHIN = ("messages", "stream", "line", "levilab")
 #: Those without frames: a line feed ends a message.
@@ -374,7 +412,7 @@ class Pair:
         self.driver = self.kind.driver(transport, **clock)
         self._opened.callback(self.side.close)
         self._opened.callback(self.driver.close)
-        self._mark = 0
+        self._mark, self._since = 0, 0.0
         self.prepare()
         self.reference = self._settings()
 
@@ -390,7 +428,7 @@ class Pair:
         address = {"messages": NETWORK, "stream": SOCKET}.get(self.way, SERIAL)
         self.tap = Tapped(device, self.wire.heard)
         bus = FaultyBus({address: self.tap}, self.wire)
-        line = {key: value for key, value in getattr(self.kind.driver, "SERIAL", {}).items() if key != "pause"}
+        line = {key: value for key, value in self.kind.driver.SERIAL.items() if key != "pause"}
         if self.way == "levilab":
             name = f"wire{next(_bench_numbers)}"
             benches[name] = lambda: bus
@@ -416,29 +454,17 @@ class Pair:
 
     # --- what the far end knows ---
 
-    def ask(self, question):
-        """The instrument's own answer, over the sound link."""
-        return self.side.transport.query(question)
-
     def answers(self, pattern):
         """What it has answered to questions of this form in this attempt."""
         heard = list(self.tap.heard)[self._mark :]
         return [answer for message, answer, _ in heard if answer and re.fullmatch(pattern, message)]
 
-    def has_done(self, command):
-        """Whether it has carried this command out in this attempt."""
-        heard = list(self.tap.heard)[self._mark :]
-        return any(command in message and not complained for message, _, complained in heard)
-
-    def is_running(self):
-        """Whether a scope still takes a record."""
-        if self.name == "DS1000Z":
-            return self.ask(":TRIG:STAT?") != "STOP"
-        return bool(int(self.ask(":OPER:COND?")) & 8)
-
-    def offset(self, *, per_code, origin, reference):
-        """The voltage of code 0, after each maker's manual."""
-        return -(origin + reference) * per_code if self.name == "DS1000Z" else origin - reference * per_code
+    def has_new_record(self):
+        """Whether a scope has stopped with a record that it took in this attempt."""
+        with self.bus.lock:
+            scope = self.tap.device
+            latest = None if scope.running() else scope.acquisition.latest
+        return latest is not None and latest.trigger >= self._since
 
     # --- a program's part ---
 
@@ -473,7 +499,7 @@ class Pair:
         """A new attempt."""
         if operation.ready:
             operation.ready(self)
-        self._mark = len(self.tap.heard)
+        self._mark, self._since = len(self.tap.heard), self.room.clock.now()
 
     def recover(self, *, anew, reset):
         """What a program does after an error: a new link if there is none, the error queue emptied, set up if need be.

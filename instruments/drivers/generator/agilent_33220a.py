@@ -30,9 +30,9 @@ class Agilent33220A(DriveGenerator):
 
     waveform = Setting("FUNC", str, choices=("SINusoid", "SQUare", "RAMP"), answers=("PULSe", "NOISe", "DC", "USER"))
     symmetry = Setting("FUNC:RAMP:SYMM", float, unit="percent", low=0.0, high=100.0)
-    frequency = frequency_setting(20e6)
+    frequency = frequency_setting(20e6, digits=14)
     amplitude = amplitude_setting(20e-3)
-    offset = offset_setting()
+    offset = offset_setting(digits=14)
     load = LoadSetting("OUTP:LOAD", float, unit="ohm", low=1.0, high=INFINITY)
     output = OutputSwitch("OUTP", bool)
 

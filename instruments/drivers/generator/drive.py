@@ -58,21 +58,27 @@ class OutputSwitch(Setting[bool]):
         super().__set__(instrument, value)
 
 
-def frequency_setting(high: float) -> LimitedSetting:
-    """The frequency of the output, in steps of 1 µHz, up to the highest of the family [Hz]."""
-    return LimitedSetting("FREQ", float, unit="Hz", low=1e-6, high=high, resolution=1e-6, quantity="frequency_hz")
+def frequency_setting(high: float, digits: int) -> LimitedSetting:
+    """The frequency of the output, in steps of 1 µHz, up to the highest of the family [Hz], which prints the digits."""
+    return LimitedSetting(
+        "FREQ", float, "Hz", low=1e-6, high=high, resolution=1e-6, digits=digits, quantity="frequency_hz"
+    )
 
 
 def amplitude_setting(low: float) -> LimitedSetting:
-    """The amplitude of the output, from the lowest of the family on [V, peak to peak]."""
-    return LimitedSetting("VOLT", float, unit="Vpp", low=low, high=20.0, quantity="amplitude_vpp", partner="offset_v")
+    """The amplitude of the output, four digits (data sheets), from the lowest of the family on [V, peak to peak]."""
+    return LimitedSetting("VOLT", float, "Vpp", low, 20.0, digits=4, quantity="amplitude_vpp", partner="offset_v")
 
 
-def offset_setting() -> LimitedSetting:
-    """The offset of the output, with four digits of 10 V [V]."""
-    low, high, resolution = -OPEN_V, OPEN_V, 1e-3
+def offset_setting(digits: int) -> LimitedSetting:
+    """The offset of the output, with four digits of 10 V, of the digits that the family prints [V]."""
+    low, high = -OPEN_V, OPEN_V
     return LimitedSetting(
-        "VOLT:OFFS", float, "V", low, high, resolution=resolution, quantity="offset_v", partner="amplitude_vpp"
+        *("VOLT:OFFS", float, "V", low, high),
+        resolution=1e-3,
+        digits=digits,
+        quantity="offset_v",
+        partner="amplitude_vpp",
     )
 
 

@@ -40,9 +40,9 @@ class Keysight33500B(DriveGenerator):
         choices=("SINusoid", "SQUare", "TRIangle", "RAMP"),
         answers=("PULSe", "PRBS", "NOISe", "ARBitrary", "DC"),
     )
-    frequency = frequency_setting(30e6)
+    frequency = frequency_setting(30e6, digits=16)
     amplitude = amplitude_setting(2e-3)
-    offset = offset_setting()
+    offset = offset_setting(digits=16)
     load = LoadSetting("OUTP1:LOAD", float, unit="ohm", low=1.0, high=INFINITY)
     output = OutputSwitch("OUTP1", bool)
 

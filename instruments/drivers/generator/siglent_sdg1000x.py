@@ -14,8 +14,9 @@ from instruments.ieee488 import INFINITY, Form
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-#: "1000HZ", "0.001S", "4V", "-2V": as few digits as the number needs (answers that were seen in public).
-_NUMBER = Form(r"-?\d{1,12}(\.\d{1,15})?([eE][+-]?\d{1,3})?", "1000HZ", suffix="HZ|S|V|Vrms|dBm|OHM")
+#: "1000HZ", "4V", "-1.999V", "1e-06HZ": as the C language's %g, no zero that need not be (measured on an SDG2042X).
+_DIGITS = r"-?(0|[1-9]\d{0,11})(\.\d{0,14}[1-9])?(e[+-]\d{2})?"
+_NUMBER, _HERTZ, _VOLTS = (Form(_DIGITS, f"1000{unit}", suffix=unit) for unit in ("", "HZ", "V"))
 #: The only word that is no number: the load of an open circuit.
 _OPEN = "HZ"
 #: A reset, and so the answer to *OPC?, may take this long [s] (assumed).
@@ -54,6 +55,7 @@ class SiglentSDG1000X(DriveGenerator):
       them behind the header: ``C1:BSWV WVTP,SINE,FRQ,30.5HZ,…``.
     - A number beyond its limits becomes the limit without a word, and the guide has no error queue: each setting is
       asked for after it was sent.
+    - It prints six digits of a number, ten of a frequency, and none that are zero at the end (measured on an SDG2042X).
     - A triangle is a ramp of 50 % symmetry; so `waveform` answers RAMP for it.
     """
 
@@ -70,19 +72,31 @@ class SiglentSDG1000X(DriveGenerator):
         key="WVTP",
     )
     frequency = LimitedSetting(
-        "C1:BSWV", float, unit="Hz", low=1e-6, high=60e6, resolution=1e-6, quantity="frequency_hz", key="FRQ"
+        *("C1:BSWV", float, "Hz", 1e-6, 60e6),
+        key="FRQ",
+        form=_HERTZ,
+        resolution=1e-6,
+        digits=10,
+        quantity="frequency_hz",
     )
     amplitude = LimitedSetting(
-        "C1:BSWV", float, unit="Vpp", low=2e-3, high=20.0, quantity="amplitude_vpp", partner="offset_v", key="AMP"
+        *("C1:BSWV", float, "Vpp", 2e-3, 20.0),
+        key="AMP",
+        form=_VOLTS,
+        digits=6,
+        quantity="amplitude_vpp",
+        partner="offset_v",
     )
     offset = LimitedSetting(
         *("C1:BSWV", float, "V", -OPEN_V, OPEN_V),
-        resolution=1e-3,
+        key="OFST",
+        form=_VOLTS,
+        digits=6,
         quantity="offset_v",
         partner="amplitude_vpp",
-        key="OFST",
     )
-    load = _Load("C1:OUTP", float, unit="ohm", low=50.0, high=INFINITY, key="LOAD")
+    #: Whole ohms; a fraction is cut off.
+    load = _Load("C1:OUTP", float, unit="ohm", low=50.0, high=INFINITY, key="LOAD", resolution=1.0, digits=6)
     output = OutputSwitch("C1:OUTP", bool)
 
     def field_of(self, answer: str, header: str, key: str) -> str:
@@ -95,6 +109,8 @@ class SiglentSDG1000X(DriveGenerator):
             return self._STATES.get(fields[0], answer)
         named = fields[fields[0] in self._STATES :]  # names and values follow each other, behind the state of an output
         pairs = dict(zip(named[::2], named[1::2], strict=True))
+        if 2 * len(pairs) != len(named):
+            raise ValueError(answer)  # a name that comes twice
         return pairs.get(key, answer)
 
     def confirm(self, setting: Setting[Any], value: bool | float | str) -> None:  # noqa: FBT001

@@ -55,7 +55,7 @@ class KeysightDSOX(Scope):
     #: Format, type, points, count; distance, first and reference of the times; the same of the voltages.
     PREAMBLE = (NR1, NR1, NR1, NR1, _NUMBER, _NUMBER, NR1, _NUMBER, _NUMBER, NR1)
     CHANNEL = _KeysightChannel
-    READY = ":STOP"
+    WHILE_SETTING_UP = ":STOP"
     CODES = (1, 255, 0)
     SLOPES: ClassVar[Mapping[str, str]] = SLOPES | {"either": "EITH"}
     SWEEPS: ClassVar[Mapping[str, str]] = {"normal": "NORM", "single": "NORM", "auto": "AUTO"}

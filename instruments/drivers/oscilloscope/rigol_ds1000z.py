@@ -77,11 +77,11 @@ class RigolDS1000Z(Scope):
     CHANNEL = _RigolChannel
     OFFSET_SIGN = -1.0
     #: Some firmware takes no memory depth when it has stopped.
-    READY = ":RUN"
+    WHILE_SETTING_UP = ":RUN"
     SLOPES: ClassVar[Mapping[str, str]] = SLOPES | {"either": "RFAL"}
     SWEEPS: ClassVar[Mapping[str, str]] = {"normal": "NORM", "single": "SING", "auto": "AUTO"}
     #: `:SINGle` does that.
-    PASSING: ClassVar[Mapping[str, str]] = {"sweep": "SING"}
+    CHANGED_BY_ACQUIRE: ClassVar[Mapping[str, str]] = {"sweep": "SING"}
 
     time_mode = Setting(":TIM:MODE", str, choices=("MAIN", "WINDow", "XY", "ROLL"))
     trigger_mode = Setting(":TRIG:MODE", str, choices=TRIGGER_MODES)

@@ -52,9 +52,9 @@ class Scope(ScpiInstrument):
 
     CHANNEL: the class of its inputs; SOURCE: how an input is called as the trigger's source; STOP: ends every
     acquisition; MAIN, EDGE: the settings that choose the time base, and the trigger on edges; OFFSET_SIGN: of the
-    voltage in the middle of the screen, in its offset; READY: how it acquires while it is set up; SLOPES, SWEEPS: its
-    words for them; CODES: of a clipped trace, and of no sample; PASSING: settings that acquire() leaves in another
-    state than they were prepared; PREAMBLE: the form of each of its ten fields.
+    voltage in the middle of the screen, in its offset; WHILE_SETTING_UP: how it acquires then; SLOPES, SWEEPS: its
+    words for them; CODES: of a clipped trace, and of no sample; CHANGED_BY_ACQUIRE: settings that acquire() leaves in
+    another state than they were prepared; PREAMBLE: the form of each of its ten fields.
     """
 
     CHANNEL: ClassVar[type[Channel]]
@@ -63,11 +63,11 @@ class Scope(ScpiInstrument):
     MAIN: ClassVar[Mapping[str, Value]] = {"time_mode": "MAIN"}
     EDGE: ClassVar[Mapping[str, Value]] = {"trigger_mode": "EDGE"}
     OFFSET_SIGN: ClassVar[float] = 1.0
-    READY: ClassVar[str]
+    WHILE_SETTING_UP: ClassVar[str]
     SLOPES: ClassVar[Mapping[str, str]]
     SWEEPS: ClassVar[Mapping[str, str]]
     CODES: ClassVar[tuple[int, int, int | None]] = (0, 255, None)
-    PASSING: ClassVar[Mapping[str, str]] = {}
+    CHANGED_BY_ACQUIRE: ClassVar[Mapping[str, str]] = {}
     PREAMBLE: ClassVar[tuple[Form, ...]]
 
     trigger_source: Setting[str]
@@ -157,13 +157,13 @@ class Scope(ScpiInstrument):
         for part in self._prepared:
             part.set_to.clear()
         self.forget_errors()
-        self.command(self.READY)
+        self.command(self.WHILE_SETTING_UP)
         for n in range(1, inputs + 1):  # first, for the trigger's level depends on their scales
             if n in setup.shown:
-                self._give(self.channel[n], self._scaling(setup))
+                self._apply(self.channel[n], self._scaling(setup))
             else:
                 self.channel[n].display = False
-        self._give(self, {**self.MAIN} | times | self._trigger(setup))
+        self._apply(self, {**self.MAIN} | times | self._trigger(setup))
         self._check_taken()
 
     def _check_setup(self, setup: Setup) -> int:
@@ -205,7 +205,7 @@ class Scope(ScpiInstrument):
             "sweep": self.SWEEPS[setup.sweep],
         }
 
-    def _give(self, part: ScpiInstrument, wanted: Mapping[str, Value]) -> None:
+    def _apply(self, part: ScpiInstrument, wanted: Mapping[str, Value]) -> None:
         for name, value in wanted.items():
             setattr(part, name, value)
 
@@ -220,7 +220,9 @@ class Scope(ScpiInstrument):
         for part in self._prepared:
             head = f"channel{part.number}_" if isinstance(part, Channel) else ""
             found = part.unlike()
-            differing |= {head + name: both for name, both in found.items() if both[1] != self.PASSING.get(name)}
+            differing |= {
+                head + name: both for name, both in found.items() if both[1] != self.CHANGED_BY_ACQUIRE.get(name)
+            }
         return differing
 
     def rounding(self, row: Setting[Any]) -> float:
@@ -248,7 +250,7 @@ class Scope(ScpiInstrument):
             raise SettingsLost(self.transport.address, differing)
 
     @contextlib.contextmanager
-    def _blaming_changes(self) -> Iterator[None]:
+    def _reporting_changed_settings(self) -> Iterator[None]:
         """Raise SettingsLost in the place of an error that came because the scope was changed."""
         try:
             yield
@@ -303,7 +305,7 @@ class Scope(ScpiInstrument):
     def trace(self, channel: int) -> Trace:
         """The record of one channel; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
         self._check_readable(channel)
-        with self._blaming_changes():
+        with self._reporting_changed_settings():
             preamble = self.preamble(channel)
             codes = np.empty(preamble.points, dtype=np.uint8)
             at = 0
@@ -318,7 +320,7 @@ class Scope(ScpiInstrument):
         """The codes of one channel, piece by piece; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
         self._check_readable(channel)
         self._check_kept()
-        with self._blaming_changes():
+        with self._reporting_changed_settings():
             yield from self._pieces(self.preamble(channel))
         self._check_kept()
 

@@ -22,8 +22,10 @@ if TYPE_CHECKING:
     from instruments.drivers import Value
 
 
-#: "1.00E+00V": as it was measured; other firmware may print more digits, or a factor of 1, 10, 100 short.
-_NUMBER = Form(r"[+-]?\d{1,3}(\.\d{1,6})?(E[+-]\d{2})?", "5.00E-01V", suffix="V|S")
+#: "1.00E+00V", "-6.00E-01V": as it was measured; other firmware may print more digits.
+_VOLTAGE, _TIME = (Form(r"-?\d\.\d{2,6}E[+-]\d{2}", f"5.00E-01{unit}", suffix=unit) for unit in "VS")
+#: The factor of a probe: "10", "0.1".
+_FACTOR = Form(r"(0|[1-9]\d{0,4})(\.\d{1,3})?", "10")
 #: Points of the memory where one channel of a pair (1 and 2, 3 and 4) is on; half where both are.
 _DEPTHS = {"14K": 14_000, "140K": 140_000, "1.4M": 1_400_000, "14M": 14_000_000}
 _HALVES = {"7K": 7_000, "70K": 70_000, "700K": 700_000, "7M": 7_000_000}
@@ -47,15 +49,14 @@ def _after_header(answer: str, header: str) -> str:
 class _SiglentChannel(Channel):
     """An input of an SDS1000X-E."""
 
-    NUMBER: ClassVar[Form] = _NUMBER
     HEAD: ClassVar[str] = "C{}:"
 
     display = Setting("TRA", bool)
     inverted = Setting("INVS", bool)
-    probe_factor = Setting("ATTN", float, low=0.1, high=1e4)
+    probe_factor = Setting("ATTN", float, low=0.1, high=1e4, form=_FACTOR)
     coupling = Setting("CPL", str, choices=("D1M", "A1M", "GND"))
-    scale = Setting("VDIV", float, unit="V", low=5e-4, high=1e5, suffix="V")
-    offset = Setting("OFST", float, unit="V", low=-1e5, high=1e5, suffix="V")
+    scale = Setting("VDIV", float, unit="V", form=_VOLTAGE, low=5e-4, high=1e5, suffix="V")
+    offset = Setting("OFST", float, unit="V", form=_VOLTAGE, low=-1e5, high=1e5, suffix="V")
 
     def field_of(self, answer: str, header: str, key: str) -> str:
         """What stands behind the header; a switch as 0 or 1."""
@@ -94,14 +95,13 @@ class SiglentSDS1000XE(Scope):
     """
 
     MODELS: ClassVar[str] = r"SDS1\d{3}X-[EU]"
-    NUMBER: ClassVar[Form] = _NUMBER
     CHANNEL = _SiglentChannel
     SOURCE = "C{}"
     STOP = "TRMD STOP"
     MAIN: ClassVar[Mapping[str, Value]] = {}
     EDGE: ClassVar[Mapping[str, Value]] = {}
     OFFSET_SIGN = -1.0
-    READY = "TRMD STOP"
+    WHILE_SETTING_UP = "TRMD STOP"
     #: That WINDOW triggers on both slopes is inferred from the front panel's three choices.
     SLOPES: ClassVar[Mapping[str, str]] = SLOPES | {"either": "WINDOW"}
     #: It acquires in acquire() alone.
@@ -109,13 +109,13 @@ class SiglentSDS1000XE(Scope):
     COUPLINGS: ClassVar[Mapping[str, str]] = {"DC": "D1M", "AC": "A1M"}
 
     sweep = Setting("TRMD", str, choices=("AUTO", "NORM", "SINGLE", "STOP"))
-    time_scale = Setting("TDIV", float, unit="s", low=1e-9, high=100.0, suffix="S")
-    time_offset = Setting("TRDL", float, unit="s", low=-1e4, high=1e4, suffix="S")
+    time_scale = Setting("TDIV", float, unit="s", form=_TIME, low=1e-9, high=100.0, suffix="S")
+    time_offset = Setting("TRDL", float, unit="s", form=_TIME, low=-1e4, high=1e4, suffix="S")
     memory_depth = Setting("MSIZ", str, choices=(*_DEPTHS, *_HALVES))
     acquisition_type = Setting("ACQW", str, choices=("SAMPLING", "PEAK_DETECT", "AVERAGE", "HIGH_RES"))
     trigger_source = Setting("TRSE", str, key="EDGE,SR", choices=("C1", "C2", "C3", "C4", "EX", "EX5", "LINE"))
     trigger_slope = Setting("TRSL", str, choices=("POS", "NEG", "WINDOW"))
-    trigger_level = Setting("TRLV", float, unit="V", low=-1e5, high=1e5, suffix="V")
+    trigger_level = Setting("TRLV", float, unit="V", form=_VOLTAGE, low=-1e5, high=1e5, suffix="V")
 
     #: With sweep auto the trigger is forced after this time [s].
     _PATIENCE = 0.1
@@ -162,8 +162,8 @@ class SiglentSDS1000XE(Scope):
     def _scaling(self, setup: Setup) -> dict[str, Value]:
         return super()._scaling(setup) | {"coupling": self.COUPLINGS[setup.coupling]}
 
-    def _give(self, part: ScpiInstrument, wanted: Mapping[str, Value]) -> None:
-        super()._give(part, wanted)
+    def _apply(self, part: ScpiInstrument, wanted: Mapping[str, Value]) -> None:
+        super()._apply(part, wanted)
         if part is self and self._setup:
             shown = set(self._setup.shown)
             depths = _HALVES if {1, 2} <= shown or {3, 4} <= shown else _DEPTHS

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Protocol
 from instruments.ieee488 import INFINITY
 from instruments.virtual.core.message import Framer, Overrun
 from instruments.virtual.core.parser import LONGEST_ANSWER, ScpiError
-from instruments.virtual.core.steps import Work, at_once
+from instruments.virtual.core.steps import Work, run_to_end
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -109,7 +109,7 @@ class Session:
         with self.lock:
             for message in self.messages(data, end=end):
                 if message:
-                    at_once(self._run(message, self.device.work))
+                    run_to_end(self._run(message, self.device.work))
 
     def messages(self, data: bytes, *, end: bool = True) -> Iterator[str]:
         """The messages that these bytes complete, for begin().
@@ -150,15 +150,15 @@ class Session:
             raise work.error
         return not work.done
 
-    def give_up(self, work: Work[None]) -> None:
+    def cancel(self, work: Work[None]) -> None:
         """No more of this work."""
         with self.lock:
-            work.give_up()
+            work.cancel()
 
     def _run(self, message: str, before: Work[None] | None) -> Steps[None]:
         if before and not before.done:
-            if self.cut_off_by(message):
-                before.give_up()
+            if self.is_abort(message):
+                before.cancel()
             while before.step():
                 yield
         self._drop_what_is_abandoned()
@@ -176,14 +176,14 @@ class Session:
             self._answers.append(answer)
             self._keep_within_bounds()
 
-    def cut_off_by(self, message: str) -> bool:
+    def is_abort(self, message: str) -> bool:
         """Whether this message ends what the instrument works on."""
-        return self.device.cut_off_by(message)
+        return self.device.is_abort(message)
 
-    def cut_off_by_bytes(self, data: bytes, *, end: bool = True) -> bool:
+    def bytes_are_abort(self, data: bytes, *, end: bool = True) -> bool:
         """Whether these bytes are such a message, whole and by itself."""
         whole = not self._framer.begun and ((end and not self.stream) or data.endswith(b"\n"))
-        return whole and self.cut_off_by(data.decode("latin-1"))
+        return whole and self.is_abort(data.decode("latin-1"))
 
     def _keep_within_bounds(self) -> None:
         """Who asks on and on and never reads gets nothing of it (IEEE 488.2, 6.3.1.7)."""

@@ -7,19 +7,23 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
-from instruments.virtual.core.parameters import at_most_one, boolean, choice, limit, none, nr3, number, one, one_of
-from instruments.virtual.core.parser import Command, Parser
+from instruments.virtual.core.parameters import (
+    boolean,
+    nr3,
+    number,
+    parameter,
+)
+from instruments.virtual.core.parser import Parser, Table
+from instruments.virtual.core.rows import Ask, Do, Own
 from instruments.virtual.core.status import OPERATION_COMPLETE, Status
-from instruments.virtual.core.steps import at_once
+from instruments.virtual.core.steps import run_to_end
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Mapping, Sequence
 
     from instruments.clock import Clock
-    from instruments.virtual.core.rows import Row
+    from instruments.virtual.core.parser import Row, Value
     from instruments.virtual.core.steps import Steps, Work
-
-Value = float | str | bool
 
 
 class Answer(NamedTuple):
@@ -34,55 +38,101 @@ class Answer(NamedTuple):
     complete: bool = True
 
 
+#: The commands that every instrument of SCPI has.
+COMMON: tuple[Row, ...] = (
+    Ask("*IDN", lambda d: d.identity),
+    Do("*RST", lambda d: d.reset()),
+    Do("*CLS", lambda d: d.clear_status()),
+    Do("*OPC", lambda d: d.note_completion()),
+    Ask("*OPC", lambda d: d.completion()),
+    Do("*WAI", lambda d: d.wait()),
+    Do("*TRG", lambda d: d.trigger()),
+    Ask("*TST", lambda _d: "+0"),
+    Ask("*ESR", lambda d: f"{d.status.take_events():+d}"),
+    Own("*ESE", lambda d, p: d.set_mask("event_enable", p), lambda d: f"{d.status.event_enable:+d}"),
+    Own("*SRE", lambda d, p: d.set_mask("request_enable", p), lambda d: f"{d.status.request_enable:+d}"),
+    Ask("*STB", lambda d: f"{d.status_byte():+d}"),
+    Ask("SYSTem:ERRor[:NEXT]", lambda d: d.parser.next_error()),
+    Ask("SYSTem:VERSion", lambda _d: "1999.0"),
+    Do("SYSTem:BEEPer[:IMMediate]"),
+    Do("SYSTem:LOCal"),
+    Do("SYSTem:REMote"),
+    Do("SYSTem:RWLock"),
+)
+
+
+#: By class and channels.
+_TABLES: dict[tuple[type[VirtualInstrument], tuple[int, ...]], Table] = {}
+
+
+def _table(model: type[VirtualInstrument], numbered: tuple[int, ...]) -> Table:
+    """The rows of a model with these channels, made once."""
+    table = _TABLES.get((model, numbered))
+    if table is None:
+        of_channels = (row.of_channel(n) for n in numbered for row in model.CHANNEL_ROWS)
+        table = _TABLES[model, numbered] = Table((*model.COMMON, *of_channels, *model.ROWS), model.DEFAULTS)
+    return table
+
+
 class VirtualInstrument:
     """A wire-level model: messages in, answers out, an error queue, and the time everything takes.
 
-    A subclass gives its identity and extends `table()` and, where it reacts to settings, `changed()`.
+    A subclass gives its identity and its rows and, where it reacts to settings, `changed()`.
 
     clock: of the bench; identity: the answer to ``*IDN?`` of another model of the family; pace: time for one
     message [s].
     """
 
     identity = "levilab,virtual,0,0"
-    #: What ``SYST:ERR?`` answers when there is nothing to tell, how many entries it keeps, and what ends an answer.
+    #: What ``SYST:ERR?`` answers when the queue is empty, how many entries it keeps, and what ends an answer.
     no_error, queue_size, line_end = '+0,"No error"', 20, "\n"
     #: Whether it knows blocks (IEEE 488.2, 7.7.6), and path memory (SCPI-1999, volume 1, 6.2.4).
     takes_blocks = path_memory = True
-    #: Its commands beyond the common ones, and those of each channel.
+    #: Whether a number may have a second parameter, as the source of a level, which changes nothing; and whether a
+    #: question about a number ignores a parameter that is none of MIN, MAX and DEF.
+    lenient: ClassVar[bool] = False
+    #: The common commands, its own, those of each channel, and the settings that no row has, with their defaults.
+    COMMON: ClassVar[tuple[Row, ...]] = COMMON
     ROWS: ClassVar[tuple[Row, ...]] = ()
     CHANNEL_ROWS: ClassVar[tuple[Row, ...]] = ()
+    DEFAULTS: ClassVar[Mapping[str, Value]] = {}
     #: The numbers of the channels that CHANNEL_ROWS are for.
     numbered: Sequence[int] = ()
 
-    def __init__(self, clock: Clock, *, identity: str | None = None, pace: float = 2e-3) -> None:
+    def __init__(
+        self, clock: Clock, *, identity: str | None = None, pace: float = 2e-3, numbered: Sequence[int] | None = None
+    ) -> None:
         self.clock, self.pace = clock, pace
         self.identity = identity or self.identity
-        self.settings: dict[str, Value] = {}
-        self._defaults: dict[str, Value] = {}
+        if numbered is not None:
+            self.numbered = numbered
+        #: Its rows; one table for all devices of a class with as many channels.
+        self.commands = _table(type(self), tuple(self.numbered))
+        self.settings: dict[str, Value] = dict(self.commands.defaults)
         self.status = Status()
         self.epoch = 0
         self._ready = 0.0
         #: On the message that came last, if it is worked on in slices: it may not be done yet.
         self.work: Work[None] | None = None
         self.parser = Parser(
+            self,
+            self.commands,
             queue_size=self.queue_size,
             no_error=self.no_error,
-            noted=self.status.note_error,
+            on_error=self.status.note_error,
             path_memory=self.path_memory,
         )
-        self.parser.commands = (*self._common(), *self.table())
-        self.settings |= self._defaults
 
     def execute(self, message: str) -> Answer | None:
         """Run one message, a line without its end; the answers of its queries, if it has any."""
-        return at_once(self.steps(message))
+        return run_to_end(self.steps(message))
 
     def steps(self, message: str) -> Steps[Answer | None]:
         """Do what execute() does, in steps."""
         self._begin_message()
         return self._answer((yield from self.parser.steps(message)))
 
-    def cut_off_by(self, message: str) -> bool:
+    def is_abort(self, message: str) -> bool:
         """Whether this message ends the work on the one before it."""
         return False
 
@@ -101,7 +151,7 @@ class VirtualInstrument:
     def abandon(self) -> None:
         """What is under way is given up, and what has not been read yet is lost."""
         if self.work:
-            self.work.give_up()
+            self.work.cancel()
         self.epoch += 1
         self._ready = self.clock.now()
 
@@ -112,16 +162,15 @@ class VirtualInstrument:
     def trigger(self) -> None:
         """``*TRG``, or the interface's own trigger message."""
 
-    # --- the tables ---
+    # --- what the rows need ---
 
-    def table(self) -> tuple[Command, ...]:
-        """The commands beyond the common ones."""
-        of_channels = (row.of_channel(n).bind(self) for n in self.numbered for row in self.CHANNEL_ROWS)
-        return (*of_channels, *(row.bind(self) for row in self.ROWS))
+    def value(self, name: str) -> float:
+        """A setting that is a number."""
+        return float(self.settings[name])
 
-    def declare(self, name: str, header: str, default: Value) -> None:
-        """There is this setting, with this value after ``*RST``."""
-        self._defaults[name] = default
+    def read_boolean(self, text: str) -> bool:
+        """A switch as it is sent.  Raises ScpiError."""
+        return boolean(text)
 
     def spell(self, value: float) -> str:
         """A number as this instrument prints it."""
@@ -140,28 +189,11 @@ class VirtualInstrument:
 
     def reset(self) -> None:
         """The state after ``*RST``."""
-        self.settings |= self._defaults
-        for name in self._defaults:
+        self.settings |= self.commands.defaults
+        for name in self.commands.defaults:
             self.changed(name)
 
-    def _common(self) -> tuple[Command, ...]:
-        status = self.status
-        return (
-            Command("*IDN", get=answers(lambda: self.identity)),
-            Command("*RST", set=does(self.reset)),
-            Command("*CLS", set=does(self.clear_status)),
-            Command("*OPC", set=does(self._note_completion), get=answers(lambda: "1")),
-            Command("*WAI", set=none),
-            Command("*TRG", set=does(self.trigger)),
-            Command("*TST", get=answers(lambda: "+0")),
-            Command("*ESR", get=answers(lambda: f"{status.take_events():+d}")),
-            self._mask("*ESE", "event_enable"),
-            self._mask("*SRE", "request_enable"),
-            Command("*STB", get=answers(lambda: f"{self.status_byte():+d}")),
-            Command("SYSTem:ERRor[:NEXT]", get=answers(self.parser.next_error)),
-            Command("SYSTem:VERSion", get=answers(lambda: "1999.0")),
-            *(Command(f"SYSTem:{word}", set=none) for word in ("BEEPer[:IMMediate]", "LOCal", "REMote", "RWLock")),
-        )
+    # --- status ---
 
     def status_byte(self, *, message_available: bool = False) -> int:
         """The status byte (IEEE 488.2, 11.2)."""
@@ -172,75 +204,17 @@ class VirtualInstrument:
         self.parser.errors.clear()
         self.status.events = 0
 
-    def _note_completion(self) -> None:
+    def note_completion(self) -> None:
+        """``*OPC``: bit 0 of the events when all is done that was begun; here it is."""
         self.status.events |= OPERATION_COMPLETE
 
-    def _mask(self, pattern: str, name: str) -> Command:
-        def set_(parameters: list[str]) -> None:
-            setattr(self.status, name, int(number(one(parameters), low=0, high=255, default=0)))
+    def completion(self) -> Steps[str] | str:
+        """``*OPC?``: answered when all is done that was begun."""
+        return "1"
 
-        return Command(pattern, set_, answers(lambda: f"{getattr(self.status, name):+d}"))
+    def wait(self) -> Steps[None] | None:
+        """``*WAI``: what comes next waits until all is done that was begun."""
 
-    def numeric(
-        self,
-        pattern: str,
-        name: str,
-        *,
-        low: float,
-        high: float,
-        default: float,
-        unit: str = "",
-        values: tuple[float, ...] = (),
-    ) -> Command:
-        """A row for a number that can be set and asked for, ``MIN``, ``MAX`` and ``DEF`` included.
-
-        values: the only ones that there are.
-        """
-        self._defaults[name] = default
-
-        def read(text: str) -> float:
-            return one_of(number(text, low=low, high=high, default=default, unit=unit), values)
-
-        def ask(parameters: list[str]) -> str:
-            asked = at_most_one(parameters)
-            return nr3(limit(asked, low=low, high=high, default=default) if asked else float(self.settings[name]))
-
-        return Command(pattern, self._setter(name, read), ask)
-
-    def word(self, pattern: str, name: str, words: tuple[str, ...], default: str) -> Command:
-        """A row for one word of several; the answer is the short form."""
-        self._defaults[name] = default
-        set_ = self._setter(name, lambda text: choice(text, words))
-        return Command(pattern, set_, answers(lambda: str(self.settings[name])))
-
-    def switch(self, pattern: str, name: str, *, default: bool = False) -> Command:
-        """A row for ON or OFF; the answer is 1 or 0."""
-        self._defaults[name] = default
-        return Command(pattern, self._setter(name, boolean), answers(lambda: str(int(self.settings[name]))))
-
-    def _setter(self, name: str, read: Callable[[str], Value]) -> Callable[[list[str]], None]:
-        def set_(parameters: list[str]) -> None:
-            self.settings[name] = read(one(parameters))
-            self.changed(name)
-
-        return set_
-
-
-def does(act: Callable[[], Steps[None] | None]) -> Callable[[list[str]], Steps[None] | None]:
-    """What a command without parameters does, for a row of a table."""
-
-    def set_(parameters: list[str]) -> Steps[None] | None:
-        none(parameters)
-        return act()
-
-    return set_
-
-
-def answers(tell: Callable[[], Steps[str] | str]) -> Callable[[list[str]], Steps[str] | str]:
-    """What a query without parameters is answered with, for a row of a table."""
-
-    def get(parameters: list[str]) -> Steps[str] | str:
-        none(parameters)
-        return tell()
-
-    return get
+    def set_mask(self, name: str, parameters: list[str]) -> None:
+        """A mask of the status.  Raises ScpiError."""
+        setattr(self.status, name, int(number(parameter(parameters), low=0, high=255, default=0)))

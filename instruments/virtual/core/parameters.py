@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 from instruments.ieee488 import BrokenBlock, block, block_of
@@ -10,13 +11,13 @@ from instruments.virtual.core.parser import ScpiError
 _MULTIPLIERS = {"": 1.0, "N": 1e-9, "U": 1e-6, "M": 1e-3, "K": 1e3, "MA": 1e6, "G": 1e9}
 #: A mantissa and an exponent, then a unit.  No digit can be matched in two ways (\d+\.?\d* could): a long line of them
 #: that is no number in the end takes a time proportional to its length, not to its square.
-_NUMBER = re.compile(r"([+-]?(?:\d+(?:\.\d*)?|\.\d+))([eE][+-]?\d{1,3})?\s*([a-zA-Z]*)")
+_NUMBER = re.compile(r"([+-]?(?:\d+(?:\.\d*)?|\.\d+))([eE][+-]?\d{1,3})?\s*([a-zA-Z/]*)")
 _CHANNEL_LIST = re.compile(r"\(@[\d,: !]*\)")
 #: Digits of a mantissa, leading zeros not counted (IEEE 488.2, 7.7.2.4.1).
 MOST_DIGITS = 255
 
 
-def at_most_one(parameters: list[str]) -> str:
+def optional_parameter(parameters: list[str]) -> str:
     """The only parameter or "", a channel list aside.  Raises ScpiError if there are more."""
     plain = [parameter for parameter in parameters if not _CHANNEL_LIST.fullmatch(parameter)]
     if len(plain) > 1:
@@ -24,17 +25,17 @@ def at_most_one(parameters: list[str]) -> str:
     return plain[0] if plain else ""
 
 
-def one(parameters: list[str]) -> str:
+def parameter(parameters: list[str]) -> str:
     """The only parameter, a channel list aside.  Raises ScpiError if there is none or another."""
-    only = at_most_one(parameters)
+    only = optional_parameter(parameters)
     if not only:
         raise ScpiError(-109)
     return only
 
 
-def none(parameters: list[str]) -> None:
+def no_parameters(parameters: list[str]) -> None:
     """Nothing but a channel list.  Raises ScpiError."""
-    if at_most_one(parameters):
+    if optional_parameter(parameters):
         raise ScpiError(-108)
 
 
@@ -131,19 +132,22 @@ def choice(text: str, words: tuple[str, ...]) -> str:
     raise ScpiError(-224, text[:20])
 
 
-def boolean(text: str) -> bool:
+def boolean(text: str, *, rounded: bool = False) -> bool:
     """ON, OFF, 1 or 0, however the number is written.  Raises ScpiError.
 
-    >>> boolean("on"), boolean("1.0"), boolean("0")
-    (True, True, False)
+    rounded: any number, OFF if it rounds to nought.
+
+    >>> boolean("on"), boolean("1.0"), boolean("0"), boolean("2", rounded=True)
+    (True, True, False, True)
     """
     words = {"ON": True, "OFF": False}
     if text.upper() in words:
         return words[text.upper()]
-    number = _NUMBER.fullmatch(text)
-    if not number or number[3] or (value := _value(number)) not in {0.0, 1.0}:
+    match = _NUMBER.fullmatch(text)
+    value = math.inf if not match or match[3] else _value(match)
+    if not math.isfinite(value) or (value not in {0.0, 1.0} and not rounded):
         raise ScpiError(-224, text[:20])
-    return value == 1.0
+    return round(value) != 0
 
 
 def nr3(value: float) -> str:

@@ -10,15 +10,16 @@ from __future__ import annotations
 
 import re
 from collections import deque
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Self
 
 from instruments.virtual.core.message import read_units
-from instruments.virtual.core.steps import at_once
+from instruments.virtual.core.steps import run_to_end
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Iterable, Mapping
 
     from instruments.virtual.core.steps import Steps
 
@@ -33,6 +34,7 @@ ERRORS = {
     -222: "Data out of range",
     -224: "Illegal parameter value",
     -230: "Data corrupt or stale",
+    -211: "Trigger ignored",
     -213: "Init ignored",
     -221: "Settings conflict",
     -350: "Error queue overflow",
@@ -58,27 +60,97 @@ class ScpiError(Exception):
         super().__init__(self.entry)
 
 
-@dataclass(frozen=True)
-class Command:
-    """One row of an instrument's table.
+#: A setting.
+Value = float | str | bool
+#: What a command or a query does, given the device and the parameters: at once or in steps.
+Action = Callable[[Any, list[str]], "Steps[str] | Steps[None] | str | None"]
 
-    pattern: the header as the manual prints it, ``[SOURce[1]:]FREQuency[:CW|:FIXed]``;
-    set, get: what a command or a query with this header does, given its parameters, at once or in steps; None where
-    there is none.
+
+@dataclass(frozen=True)
+class Row:
+    """One command of an instrument, as data; the kinds of rows are in `rows`.
+
+    header: as the manual prints it, ``[SOURce[1]:]FREQuency[:CW|:FIXed]``.
     """
 
-    pattern: str
-    set: Callable[[list[str]], Steps[None] | None] | None = None
-    get: Callable[[list[str]], Steps[str] | str] | None = None
+    header: str
 
     @property
-    def header(self) -> re.Pattern[str]:
-        """The pattern as a regular expression for a header without its question mark."""
-        return _header(self.pattern)
+    def settable(self) -> bool:
+        """Whether there is the command."""
+        return True
+
+    @property
+    def askable(self) -> bool:
+        """Whether there is the query."""
+        return True
+
+    def set(self, device: Any, parameters: list[str]) -> Steps[None] | None:
+        """Do what the command does.  Raises ScpiError."""
+        raise NotImplementedError
+
+    def ask(self, device: Any, parameters: list[str]) -> Steps[str] | str:
+        """Answer the query.  Raises ScpiError."""
+        raise NotImplementedError
+
+    def defaults(self) -> dict[str, Value]:
+        """The settings behind this row, with their values after ``*RST``."""
+        return {}
+
+    def of_channel(self, n: int) -> Self:
+        """The row of one channel: ``{n}`` in its texts is the channel's number.
+
+        ``[n]`` is the number, too, which may be left out for channel 1, with all that stands in the brackets around it.
+
+        >>> Row("[SOURce[n]:]SUM").of_channel(1).header, Row("[SOURce[n]:]SUM").of_channel(2).header
+        ('[SOURce[1]:]SUM', 'SOURce2:SUM')
+        """
+        texts = {field.name: getattr(self, field.name) for field in fields(self)}
+        return replace(self, **{name: _of_channel(text, n) for name, text in texts.items() if isinstance(text, str)})
+
+
+def _of_channel(text: str, n: int) -> str:
+    text = text.replace("{n}", str(n))
+    if n > 1:
+        text = re.sub(r"\[(\w+)\[n\](:?)\]", rf"\g<1>{n}\2", text)
+    return text.replace("[n]", "[1]" if n == 1 else str(n))
+
+
+class Table:
+    """The rows of a model, and its settings.  Of rows that fit a header the first one has it.
+
+    others: settings that no row has.  defaults: all settings, with their values after ``*RST``.
+    """
+
+    def __init__(self, rows: Iterable[Row], others: Mapping[str, Value]) -> None:
+        self.rows = tuple(rows)
+        self.defaults = {**others, **{name: value for row in self.rows for name, value in row.defaults().items()}}
+        self._actions: dict[str, Action] = {}
+
+    def find(self, header: str) -> Action:
+        """What stands behind a header, with a question mark behind the one of a query.  Raises ScpiError."""
+        name = header.upper()
+        action = self._actions.get(name)
+        if action is None:  # unknown headers are not remembered: they could be any number
+            action = self._actions[name] = self._search(header)
+        return action
+
+    def _search(self, header: str) -> Action:
+        plain = header.removesuffix("?").upper()
+        rows = [row for row in self.rows if header_pattern(row.header).fullmatch(plain)]
+        if not rows:
+            raise ScpiError(-113, plain[:40])
+        for row in rows:
+            if header.endswith("?") and row.askable:
+                return row.ask
+            if not header.endswith("?") and row.settable:
+                return row.set
+        raise ScpiError(-113, header)
 
 
 @cache
-def _header(pattern: str) -> re.Pattern[str]:
+def header_pattern(pattern: str) -> re.Pattern[str]:
+    """A printed header as a regular expression for a header without its question mark."""
     return re.compile(_expression(pattern), re.IGNORECASE)
 
 
@@ -102,21 +174,21 @@ def _expression(pattern: str) -> str:
 class Parser:
     """Takes messages apart and runs them on a table of commands.
 
-    commands: the table; queue_size: entries of the error queue before it overflows; no_error: what an empty one
-    answers; noted: called with the number of each error; path_memory: see `message`.
+    device, commands: whose table it is; queue_size: entries of the error queue before it overflows; no_error: what an
+    empty one answers; on_error: called with the number of each error; path_memory: see `message`.
     """
 
-    commands: tuple[Command, ...] = ()
+    device: Any
+    commands: Table
     queue_size: int = 20
     no_error: str = '+0,"No error"'
-    noted: Callable[[int], None] = lambda _: None
+    on_error: Callable[[int], None] = lambda _: None
     path_memory: bool = True
     errors: deque[str] = field(default_factory=deque)
-    _known: dict[str, Command] = field(default_factory=dict)
 
     def run(self, message: str) -> str | None:
         """Execute one message (a line without its end); the answers of its queries joined with ``;``, or None."""
-        return at_once(self.steps(message))
+        return run_to_end(self.steps(message))
 
     def steps(self, message: str) -> Steps[str | None]:
         """Do what run() does, in steps: a message may be interrupted after each of its units."""
@@ -128,7 +200,7 @@ class Parser:
                 continue
             header, parameters = unit
             try:
-                answer = self._act(header)(parameters)
+                answer = self.commands.find(header)(self.device, parameters)
                 if answer is not None and not isinstance(answer, str):
                     answer = yield from answer
             except ScpiError as error:
@@ -143,25 +215,9 @@ class Parser:
                 return None
         return ";".join(answers) if answers else None
 
-    def _act(self, header: str) -> Callable[[list[str]], Steps[str] | Steps[None] | str | None]:
-        command = self._find(header.removesuffix("?").upper())
-        act = command.get if header.endswith("?") else command.set
-        if act is None:
-            raise ScpiError(-113, header)
-        return act
-
-    def _find(self, name: str) -> Command:
-        known = self._known.get(name)
-        if known is None:
-            known = next((command for command in self.commands if command.header.fullmatch(name)), None)
-            if known is None:  # unknown headers are not remembered: they could be any number
-                raise ScpiError(-113, name[:40])
-            self._known[name] = known
-        return known
-
     def report(self, error: ScpiError) -> None:
         """Put an entry into the error queue; when it is full its last entry says so."""
-        self.noted(error.number)
+        self.on_error(error.number)
         if len(self.errors) < self.queue_size:
             self.errors.append(error.entry)
         else:

@@ -1,7 +1,8 @@
 """What a virtual instrument understands, one row a command: a table that says what, not how.
 
-A row is data, made once a module; `bind` makes a command of it for one device.  ``{n}`` in a header or a name is the
-number of a channel, and what depends on the channel is given its number, too.
+A row is data, made once a module, and knows no device: what it sets and asks is given to it.  ``{n}`` in a header or a
+name is the number of a channel (and ``[n]`` in a header one that may be left out for the first); what depends on the
+channel is given its number, too.
 
 >>> Number("CHANnel{n}:SCALe", "chan{n}_scale", 1.0, (1e-3, 10.0), "V").of_channel(2).header
 'CHANnel2:SCALe'
@@ -10,65 +11,48 @@ number of a channel, and what depends on the channel is given its number, too.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
-from instruments.virtual.core.parameters import at_most_one, boolean, choice, limit, none, number, one, one_of
-from instruments.virtual.core.parser import Command, ScpiError
+from instruments.virtual.core.parameters import (
+    choice,
+    limit,
+    no_parameters,
+    number,
+    one_of,
+    optional_parameter,
+    parameter,
+)
+from instruments.virtual.core.parser import Row, ScpiError, Value
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from instruments.virtual.core.steps import Steps
 
-Value = float | str | bool
 _BOUNDS = {"MIN", "MAX", "DEF", "MINIMUM", "MAXIMUM", "DEFAULT"}
 #: What would end a string or a message.
 _NOT_IN_TEXTS = dict.fromkeys(map(ord, "\"';\n"))
 
 
 class Device(Protocol):
-    """What a row needs of the device that it is bound to."""
+    """What a row needs of the device that is asked."""
 
     settings: dict[str, Value]
-
-    def declare(self, name: str, header: str, default: Value) -> None:
-        """There is this setting, with this value after ``*RST``."""
+    lenient: bool
 
     def adjusted(self, name: str, before: float) -> None:
         """Called after a setting has changed; before: what it was, 0 where that was no number."""
+
+    def read_boolean(self, text: str) -> bool:
+        """A switch as it is sent."""
 
     def spell(self, value: float) -> str:
         """A number as the device prints it."""
 
     def reply(self, header: str, text: str, unit: str = "") -> str:
         """What is answered: the text alone, or with its header and unit."""
-
-
-@dataclass(frozen=True)
-class Row:
-    """A header as the manual prints it."""
-
-    header: str
-
-    def of_channel(self, n: int) -> Self:
-        """The same of one channel."""
-        return replace(self, header=self.header.format(n=n))
-
-    def bind(self, device: Any) -> Command:
-        """The command of one device."""
-        raise NotImplementedError
-
-
-@dataclass(frozen=True)
-class Setting(Row):
-    """A row with a setting behind it."""
-
-    name: str
-
-    def of_channel(self, n: int) -> Self:
-        """The same of one channel."""
-        return replace(super().of_channel(n), name=self.name.format(n=n))
 
 
 def _put(device: Device, name: str, value: Value) -> None:
@@ -78,7 +62,7 @@ def _put(device: Device, name: str, value: Value) -> None:
 
 
 @dataclass(frozen=True)
-class Number(Setting):
+class Number(Row):
     """A number that can be set and asked for, MIN, MAX and DEF included.
 
     default: after ``*RST``; limits: lowest and highest, or how they follow from the device (and the channel);
@@ -88,55 +72,60 @@ class Number(Setting):
     its default.
     """
 
+    name: str
     default: float
     limits: tuple[float, float] | Callable[..., tuple[float, float]] = (0.0, 0.0)
     unit: str = ""
-    rounded: Callable[[float], float] = float
-    spell: Callable[[float], str] | None = None
+    rounded: Callable[[float], float] = field(default=float, repr=False)
+    spell: Callable[[float], str] | None = field(default=None, repr=False)
     factor: float = 1.0
     clips: bool = False
     values: tuple[float, ...] = ()
     alias: bool = False
 
+    def defaults(self) -> dict[str, Value]:
+        """See the base."""
+        return {} if self.alias else {self.name: self.default}
+
     def of_channel(self, n: int) -> Self:
-        """The same of one channel."""
+        """See the base."""
         row, find = super().of_channel(n), self.limits
         return replace(row, limits=lambda device: find(device, n)) if callable(find) else row
 
-    def bind(self, device: Device) -> Command:
+    def range(self, device: Device) -> tuple[float, float]:
+        """The lowest and the highest number that can be sent now."""
+        return self.limits(device) if callable(self.limits) else self.limits
+
+    def set(self, device: Device, parameters: list[str]) -> None:
         """See the base."""
-        default = self.default
-        if not self.alias:
-            device.declare(self.name, self.header, default)
-        spell = self.spell or device.spell
-
-        def limits() -> tuple[float, float]:
-            return self.limits(device) if callable(self.limits) else self.limits
-
-        def set_(parameters: list[str]) -> None:
-            if len(parameters) > 2:  # a second one, as the source of a level, changes nothing here
+        if device.lenient:
+            if len(parameters) > 2:
                 raise ScpiError(-108)
-            low, high = limits()
-            text = one(parameters[:1])
-            if self.clips and text.upper() not in _BOUNDS:
-                sent = number(text, low=-9e99, high=9e99, default=default, unit=self.unit)
-                value = min(max(sent, low), high)
-            else:
-                value = one_of(
-                    number(text, low=low, high=high, default=self.factor * default, unit=self.unit), self.values
-                )
-            _put(device, self.name, self.rounded(value / self.factor))
+            parameters = parameters[:1]
+        _put(device, self.name, self.rounded(self.read(device, parameter(parameters)) / self.factor))
 
-        def ask(parameters: list[str]) -> str:
-            asked = at_most_one(parameters[:1])
-            if asked.upper() in _BOUNDS:
-                low, high = limits()
-                value = limit(asked, low=low, high=high, default=self.factor * default)
-            else:
-                value = self.factor * float(device.settings[self.name])
-            return device.reply(self.header, spell(value), self.unit)
+    def read(self, device: Device, text: str) -> float:
+        """The number as it is sent, within its limits.  Raises ScpiError."""
+        low, high = self.range(device)
+        default = self.factor * self.default
+        if self.clips and text.upper() not in _BOUNDS:
+            sent = number(text, low=-9e99, high=9e99, default=default, unit=self.unit)
+            return min(max(sent, low), high)
+        return one_of(number(text, low=low, high=high, default=default, unit=self.unit), self.values)
 
-        return Command(self.header, set_, ask)
+    def ask(self, device: Device, parameters: list[str]) -> str:
+        """See the base."""
+        asked = optional_parameter(parameters[:1] if device.lenient else parameters)
+        if asked.upper() in _BOUNDS or (asked and not device.lenient):
+            low, high = self.range(device)
+            value = limit(asked, low=low, high=high, default=self.factor * self.default)
+        else:
+            value = self.factor * float(device.settings[self.name])
+        return device.reply(self.header, self.printed(device, value), self.unit)
+
+    def printed(self, device: Device, value: float) -> str:
+        """The number as it is answered, without header and unit."""
+        return (self.spell or device.spell)(value)
 
 
 def whole(header: str, name: str, default: float, limits: tuple[float, float], *, sign: str = "") -> Number:
@@ -145,105 +134,137 @@ def whole(header: str, name: str, default: float, limits: tuple[float, float], *
 
 
 @dataclass(frozen=True)
-class Word(Setting):
+class Word(Row):
     """One word of several, in its long form with the short form in capitals; the answer is the short form.
 
-    words: with blanks between them, or how they follow from the device; the first, or the one behind an asterisk, is
-    the default.
+    words: with blanks between them, or how they follow from the device; default: in its short form, if it is neither
+    the word behind an asterisk nor the first.
     """
 
-    words: str | Callable[[Any], str] = ""
+    name: str
+    words: str | Callable[[Any], str]
+    default: str = ""
 
-    def bind(self, device: Device) -> Command:
+    def defaults(self) -> dict[str, Value]:
         """See the base."""
-        words = (self.words(device) if callable(self.words) else self.words).split()
-        plain = tuple(word.removeprefix("*") for word in words)
-        default = next((word for word in words if word.startswith("*")), plain[0])
-        device.declare(self.name, self.header, choice(default.removeprefix("*"), plain))
-        return Command(
-            self.header,
-            lambda parameters: _put(device, self.name, choice(one(parameters), plain)),
-            _asked(lambda: device.reply(self.header, str(device.settings[self.name]))),
-        )
+        if self.default:
+            return {self.name: self.default}
+        assert isinstance(self.words, str), "words that follow from the device need a default"
+        first = next((word for word in self.words.split() if word.startswith("*")), self.words.split()[0])
+        return {self.name: choice(first.removeprefix("*"), _split(self.words))}
+
+    def set(self, device: Device, parameters: list[str]) -> None:
+        """See the base."""
+        words = self.words(device) if callable(self.words) else self.words
+        _put(device, self.name, choice(parameter(parameters), _split(words)))
+
+    def ask(self, device: Device, parameters: list[str]) -> str:
+        """See the base."""
+        no_parameters(parameters)
+        return device.reply(self.header, str(device.settings[self.name]))
+
+
+@cache
+def _split(words: str) -> tuple[str, ...]:
+    """The words without the asterisk of the default."""
+    return tuple(word.removeprefix("*") for word in words.split())
 
 
 @dataclass(frozen=True)
-class Switch(Setting):
+class Switch(Row):
     """ON or OFF.  default: or how it follows from the channel; words: what is answered for off and for on."""
 
+    name: str
     default: bool | Callable[[int], bool] = False
     words: tuple[str, str] = ("0", "1")
 
+    def defaults(self) -> dict[str, Value]:
+        """See the base."""
+        assert isinstance(self.default, bool), "of a channel"
+        return {self.name: self.default}
+
     def of_channel(self, n: int) -> Self:
-        """The same of one channel."""
+        """See the base."""
         row, find = super().of_channel(n), self.default
         return replace(row, default=find(n)) if callable(find) else row
 
-    def bind(self, device: Device) -> Command:
+    def set(self, device: Device, parameters: list[str]) -> None:
         """See the base."""
-        assert isinstance(self.default, bool), "of a channel"
-        device.declare(self.name, self.header, self.default)
-        return Command(
-            self.header,
-            lambda parameters: _put(device, self.name, boolean(one(parameters))),
-            _asked(lambda: device.reply(self.header, self.words[bool(device.settings[self.name])])),
-        )
+        _put(device, self.name, device.read_boolean(parameter(parameters)))
+
+    def ask(self, device: Device, parameters: list[str]) -> str:
+        """See the base."""
+        no_parameters(parameters)
+        return device.reply(self.header, self.words[bool(device.settings[self.name])])
 
 
 @dataclass(frozen=True)
-class Text(Setting):
+class Text(Row):
     """A string in quotes, cut to its greatest length, in capitals."""
 
+    name: str
     default: str = ""
     longest: int = 10
 
-    def of_channel(self, n: int) -> Self:
-        """The same of one channel."""
-        return replace(super().of_channel(n), default=self.default.format(n=n))
-
-    def bind(self, device: Device) -> Command:
+    def defaults(self) -> dict[str, Value]:
         """See the base."""
-        device.declare(self.name, self.header, self.default)
+        return {self.name: self.default}
 
-        def set_(parameters: list[str]) -> None:
-            given = one(parameters)
-            if len(given) < 2 or given[0] not in "\"'" or given[-1] != given[0]:
-                raise ScpiError(-104)
-            _put(device, self.name, given[1:-1].translate(_NOT_IN_TEXTS)[: self.longest].upper())
+    def set(self, device: Device, parameters: list[str]) -> None:
+        """See the base."""
+        given = parameter(parameters)
+        if len(given) < 2 or given[0] not in "\"'" or given[-1] != given[0]:
+            raise ScpiError(-104)
+        _put(device, self.name, given[1:-1].translate(_NOT_IN_TEXTS)[: self.longest].upper())
 
-        return Command(self.header, set_, _asked(lambda: f'"{device.settings[self.name]}"'))
+    def ask(self, device: Device, parameters: list[str]) -> str:
+        """See the base."""
+        no_parameters(parameters)
+        return f'"{device.settings[self.name]}"'
 
 
 @dataclass(frozen=True)
 class Do(Row):
     """A command without parameters.  act: what the device does, nothing by default."""
 
-    act: Callable[[Any], Steps[None] | None] = lambda _device: None
+    act: Callable[..., Steps[None] | None] = field(default=lambda _device: None, repr=False)
 
-    def bind(self, device: Any) -> Command:
+    @property
+    def askable(self) -> bool:
         """See the base."""
+        return False
 
-        def set_(parameters: list[str]) -> Steps[None] | None:
-            none(parameters)
-            return self.act(device)
+    def of_channel(self, n: int) -> Self:
+        """See the base: act is given the channel's number behind the device."""
+        act = self.act
+        return replace(super().of_channel(n), act=lambda device: act(device, n))
 
-        return Command(self.header, set_)
+    def set(self, device: Any, parameters: list[str]) -> Steps[None] | None:
+        """See the base."""
+        no_parameters(parameters)
+        return self.act(device)
 
 
 @dataclass(frozen=True)
 class Ask(Row):
     """A question without parameters."""
 
-    tell: Callable[..., Steps[str] | str] = lambda _device: "0"
+    tell: Callable[..., Steps[str] | str] = field(default=lambda _device: "0", repr=False)
+
+    @property
+    def settable(self) -> bool:
+        """See the base."""
+        return False
 
     def of_channel(self, n: int) -> Self:
-        """The same of one channel."""
+        """See the base: tell is given the channel's number behind the device."""
         tell = self.tell
         return replace(super().of_channel(n), tell=lambda device: tell(device, n))
 
-    def bind(self, device: Any) -> Command:
+    def ask(self, device: Any, parameters: list[str]) -> Steps[str] | str:
         """See the base."""
-        return Command(self.header, get=_asked(lambda: self.tell(device)))
+        no_parameters(parameters)
+        return self.tell(device)
 
 
 @dataclass(frozen=True)
@@ -253,38 +274,59 @@ class Both(Row):
     keeps: the setting behind it, where it has one, with its default.
     """
 
-    act: Callable[..., Steps[None] | None] | None = None
-    tell: Callable[..., Steps[str] | str] | None = None
+    act: Callable[..., Steps[None] | None] | None = field(default=None, repr=False)
+    tell: Callable[..., Steps[str] | str] | None = field(default=None, repr=False)
     keeps: tuple[str, Value] | None = None
 
+    @property
+    def settable(self) -> bool:
+        """See the base."""
+        return self.act is not None
+
+    @property
+    def askable(self) -> bool:
+        """See the base."""
+        return self.tell is not None
+
+    def defaults(self) -> dict[str, Value]:
+        """See the base."""
+        return dict((self.keeps,)) if self.keeps else {}
+
     def of_channel(self, n: int) -> Self:
-        """The same of one channel: act and tell are given its number behind the device."""
-        act, tell = self.act, self.tell
+        """See the base: act and tell are given the channel's number behind the device."""
+        act, tell, keeps = self.act, self.tell, self.keeps
         return replace(
             super().of_channel(n),
             act=act and (lambda device, parameters: act(device, n, parameters)),
             tell=tell and (lambda device, parameters: tell(device, n, parameters)),
+            keeps=keeps and (keeps[0].format(n=n), keeps[1]),
         )
 
-    def bind(self, device: Any) -> Command:
+    def set(self, device: Any, parameters: list[str]) -> Steps[None] | None:
         """See the base."""
-        act, tell = self.act, self.tell
-        if self.keeps:
-            name, default = self.keeps
-            device.declare(name, self.header, default)
-        return Command(
-            self.header,
-            set=act and (lambda parameters: act(device, parameters)),
-            get=tell and (lambda parameters: tell(device, parameters)),
-        )
+        assert self.act
+        return self.act(device, parameters)
+
+    def ask(self, device: Any, parameters: list[str]) -> Steps[str] | str:
+        """See the base."""
+        assert self.tell
+        return self.tell(device, parameters)
 
 
-def _asked(tell: Callable[[], Steps[str] | str]) -> Callable[[list[str]], Steps[str] | str]:
-    def get(parameters: list[str]) -> Steps[str] | str:
-        none(parameters)
-        return tell()
+@dataclass(frozen=True)
+class Own(Both):
+    """As Both, but the question takes no parameters: tell is given the device alone."""
 
-    return get
+    def of_channel(self, n: int) -> Self:
+        """See the base."""
+        row, tell = super().of_channel(n), self.tell
+        return replace(row, tell=tell and (lambda device: tell(device, n)))
+
+    def ask(self, device: Any, parameters: list[str]) -> Steps[str] | str:
+        """See the base."""
+        assert self.tell
+        no_parameters(parameters)
+        return self.tell(device)
 
 
 def short_header(pattern: str) -> str:

@@ -1,4 +1,4 @@
-"""The status registers of IEEE 488.2, chapter 11: what an instrument tells of itself in bits."""
+"""The status registers of IEEE 488.2, chapter 11: what an instrument says of itself in bits."""
 
 from __future__ import annotations
 

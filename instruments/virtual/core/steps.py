@@ -16,7 +16,7 @@ T = TypeVar("T")
 Steps = Generator[None, None, T]
 
 
-def at_once(steps: Steps[T]) -> T:
+def run_to_end(steps: Steps[T]) -> T:
     """The result, without interruption."""
     while True:
         try:
@@ -27,9 +27,9 @@ def at_once(steps: Steps[T]) -> T:
 
 
 class Work(Generic[T]):
-    """Steps that anybody may drive on, until they are done or given up.
+    """Steps that are driven on one by one, until they are done or cancelled.
 
-    result: None until then, and if it was given up; error: that ended it, for the one whose work it is.
+    result: None until then, and if it was cancelled; error: that ended it.
     """
 
     def __init__(self, steps: Steps[T]) -> None:
@@ -49,7 +49,7 @@ class Work(Generic[T]):
                 self.error, self.done = error, True
         return not self.done
 
-    def give_up(self) -> None:
+    def cancel(self) -> None:
         """No more of it; what gives itself up (ABORt) goes on to its own end."""
         if inspect.getgeneratorstate(self._steps) != inspect.GEN_RUNNING:
             self._steps.close()

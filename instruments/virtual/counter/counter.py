@@ -4,41 +4,42 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from instruments.ieee488 import INFINITY
-from instruments.virtual.core.device import VirtualInstrument, answers, does
-from instruments.virtual.core.parameters import at_most_one, limit, nr3, number, one
-from instruments.virtual.core.parser import Command, ScpiError
+from instruments.virtual.core.device import VirtualInstrument
+from instruments.virtual.core.parameters import boolean, limit, number, optional_parameter, parameter
+from instruments.virtual.core.parser import ScpiError, header_pattern
+from instruments.virtual.core.rows import Number
+from instruments.virtual.core.signal import no_signal
 from instruments.virtual.core.status import OPERATION_COMPLETE
-from instruments.virtual.core.steps import at_once
-from instruments.virtual.counter.measurements import Looks, Measurement, Span, measurement
+from instruments.virtual.core.steps import run_to_end
+from instruments.virtual.counter.measurements import GateTime, Inputs, Measurement, measurement
 from instruments.virtual.counter.memory import Memory, statistics
-from instruments.virtual.counter.parameters import truth, without_channels
+from instruments.virtual.counter.parameters import without_channels
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from instruments.clock import Clock
     from instruments.virtual.core.device import Answer
+    from instruments.virtual.core.signal import Signal
     from instruments.virtual.core.steps import Steps
-    from instruments.virtual.counter.edges import Array, Input, Signal
+    from instruments.virtual.counter.edges import TriggerInput
     from instruments.virtual.counter.run import Run
 
 #: An answer that never comes is ready then [s].
 NEVER = INFINITY
-#: Without a time-out a model looks ahead so long, and ten gates, for an edge [s]: then there will be none.
+#: Without a time-out a model looks ahead for this time and ten gates to find an edge [s].
 DARK = 60.0
 
+#: The settings behind the rows of a trigger level.
+AUTOMATIC, LEVEL = ("automatic{n}", True), ("level{n}", 0.0)
+
 _ABORT = re.compile(r"[\x00-\x20]*:?ABORT?[\x00-\x20]*", re.IGNORECASE)
-
-
-def darkness(_start: float, _step: float, n: int) -> Array:
-    """Nothing is plugged in."""
-    return np.zeros(n)
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,26 @@ class Function:
     kind: str = ""
 
 
+@dataclass(frozen=True)
+class Count(Number):
+    """A whole number, which may stand in brackets.  endless: it may be infinite."""
+
+    rounded: Callable[[float], float] = field(default=lambda value: float(round(value)), repr=False)
+    endless: bool = False
+
+    def set(self, device: Any, parameters: list[str]) -> None:
+        """See the base."""
+        super().set(device, without_channels(parameters))
+
+    def read(self, device: Any, text: str) -> float:
+        """See the base."""
+        return INFINITY if self.endless and text.upper() in {"INF", "INFINITY"} else super().read(device, text)
+
+    def printed(self, device: Any, value: float) -> str:
+        """See the base."""
+        return str(device.spell_whole(value))
+
+
 class VirtualCounter(VirtualInstrument):
     """What both counters are: two inputs, one run at a time, and a memory for its readings.
 
@@ -62,8 +83,11 @@ class VirtualCounter(VirtualInstrument):
 
     #: What CONFigure, MEASure and FUNCtion know, by the short name that they answer.
     functions: ClassVar[dict[str, Function]]
+    numbered = (1, 2)
 
-    def __init__(self, clock: Clock, *, signal: Signal, second: Signal = darkness, identity: str | None = None) -> None:
+    def __init__(
+        self, clock: Clock, *, signal: Signal, second: Signal = no_signal, identity: str | None = None
+    ) -> None:
         self._signals = {1: signal, 2: second}
         self._run: Run | None = None
         self._memory = Memory()
@@ -73,9 +97,9 @@ class VirtualCounter(VirtualInstrument):
         self._completion_awaited = False
         super().__init__(clock, identity=identity)
 
-    # --- what goes on while nobody asks ---
+    # --- what goes on between messages ---
 
-    def cut_off_by(self, message: str) -> bool:
+    def is_abort(self, message: str) -> bool:
         """See the base: ABORt does."""
         return bool(_ABORT.fullmatch(message))
 
@@ -86,7 +110,7 @@ class VirtualCounter(VirtualInstrument):
 
     def status_byte(self, *, message_available: bool = False) -> int:
         """The status byte; see the base."""
-        at_once(self.catch_up())
+        run_to_end(self.catch_up())
         return super().status_byte(message_available=message_available)
 
     def abandon(self) -> None:
@@ -101,8 +125,14 @@ class VirtualCounter(VirtualInstrument):
         super().reset()
 
     def trigger(self) -> None:
-        """*TRG: the next readings of a run that waits for it."""
-        if self._run:
+        """*TRG: the next readings of a run that waits for it.  Raises ScpiError if none does."""
+        if self._run is None or not self._run.waiting:
+            raise ScpiError(-211)
+        self.arm()
+
+    def arm(self) -> None:
+        """As *TRG, where a run waits for it."""
+        if self._run and self._run.waiting:
             self._run.trigger(self._ready)
 
     def catch_up(self) -> Steps[None]:
@@ -116,19 +146,19 @@ class VirtualCounter(VirtualInstrument):
 
     def _stop(self) -> None:
         if self._run:
-            self._memory.cut(self.clock.now())
+            self._memory.truncate(self.clock.now())
         self._run = None
         self._completion_awaited = False
 
     def idle(self, now: float) -> bool:
         """Whether nothing is being measured at this time [s]."""
-        return self._run is None or (self._run.complete and self._memory.there(now) == self._memory.held)
+        return self._run is None or (self._run.complete and self._memory.available(now) == self._memory.size)
 
-    def there(self) -> int:
+    def available(self) -> int:
         """Readings in the memory by now."""
         if self._run and self._ready < NEVER:
-            at_once(self._run.advance(self._ready))
-        return self._memory.there(self._ready)
+            run_to_end(self._run.advance(self._ready))
+        return self._memory.available(self._ready)
 
     def wait_for(self, count: float = math.inf) -> Steps[bool]:
         """The answer to the message under way is ready when so many readings have been taken since INITiate.
@@ -141,7 +171,7 @@ class VirtualCounter(VirtualInstrument):
         self.busy_until(min(instant, NEVER))
         if instant < NEVER:
             return True
-        # only ABORt or a device clear end this, and the run with it: nobody will see more of it
+        # only ABORt or a device clear end this, and the run with it
         self._run = None
         return False
 
@@ -151,24 +181,28 @@ class VirtualCounter(VirtualInstrument):
             raise ScpiError(-213)
         self._run, self._memory, self._counted_from = run, run.memory, 0
 
-    def looks(self) -> Looks:
+    def inputs(self) -> Inputs:
         """The inputs as they are set now."""
-        return Looks(
+        return Inputs(
             {
-                channel: (signal, self.entry(channel, falling=falling), self.entry(channel, falling=not falling))
+                channel: (
+                    signal,
+                    self.trigger_input(channel, falling=falling),
+                    self.trigger_input(channel, falling=not falling),
+                )
                 for channel, signal in self._signals.items()
                 for falling in (self.settings[f"slope{channel}"] == "NEG",)
             }
         )
 
-    def entry(self, channel: int, *, falling: bool) -> Input:
+    def trigger_input(self, channel: int, *, falling: bool) -> TriggerInput:
         """How an input looks at its signal with these settings."""
         raise NotImplementedError
 
-    def measure(self, looks: Looks, span: Span) -> Measurement:
+    def measure(self, inputs: Inputs, gate: GateTime) -> Measurement:
         """One measurement of the function that is set."""
         falling = self.settings[f"slope{self._channels[0]}"] == "NEG"
-        return measurement(self.kind, looks, self._channels, span, falling=falling)
+        return measurement(self.kind, inputs, self._channels, gate, falling=falling)
 
     @property
     def kind(self) -> str:
@@ -181,100 +215,86 @@ class VirtualCounter(VirtualInstrument):
         self._memory = Memory()
         self._function, self._channels = name, channels
 
-    def choose_as_told(self, words: list[str]) -> None:
+    def select_function(self, words: list[str]) -> None:
         """FUNCtion "FREQ 1": a function and its channels; settings stay.  words: of the string.  Raises ScpiError."""
-        rows = ((name, Command("[:][SENSe[1]:]" + function.header)) for name, function in self.functions.items())
-        found = next((name for name, row in rows if words and row.header.fullmatch(words[0])), None)
+        headers = ((name, "[:][SENSe[1]:]" + function.header) for name, function in self.functions.items())
+        found = next((name for name, header in headers if words and header_pattern(header).fullmatch(words[0])), None)
         if found is None or not all(word in {"1", "2"} for word in words[1:]):
             raise ScpiError(-224, words[0][:20] if words else "")
         self.choose(found, tuple(map(int, words[1:])) or self._channels[:1])
         self.changed("function")
 
+    def greatest_level(self, channel: int) -> float:
+        """The greatest absolute trigger level [V]."""
+        raise NotImplementedError
+
     def found_level(self, channel: int) -> float:
         """Where the trigger fires now, if it is found automatically [V]."""
         falling = self.settings[f"slope{channel}"] == "NEG"
-        entry = self.entry(channel, falling=falling)
+        entry = self.trigger_input(channel, falling=falling)
         self.busy_until(self._ready + entry.window)
         return entry.thresholds(self._signals[channel], min(self._ready, self.clock.now() + 1.0)).fire
 
-    # --- rows ---
+    # --- what the rows set and ask ---
 
-    def _common(self) -> tuple[Command, ...]:
-        own = (
-            Command("*OPC", set=does(self._note_when_complete), get=answers(self._completion)),
-            Command("*WAI", set=does(self._wait)),
-        )
-        return (*own, *super()._common())
+    def read_boolean(self, text: str) -> bool:
+        """Any number will do: OFF is what rounds to nought (SCPI-1999, volume 1, 7.3).  Raises ScpiError."""
+        return boolean(text, rounded=True)
 
-    def _wait(self) -> Steps[None]:
-        yield from self.wait_for()
+    def spell_whole(self, value: float) -> str:
+        """A whole number as this instrument prints it."""
+        return f"{round(value):+d}"
 
-    def _note_when_complete(self) -> None:
+    def note_completion(self) -> None:
+        """See the base."""
         self._completion_awaited = True
 
-    def _completion(self) -> Steps[str]:
+    def completion(self) -> Steps[str]:
+        """See the base."""
         if self._run and math.isfinite(self._run.wanted):  # a counter that runs freely has nothing pending
             yield from self.wait_for()
         return "1"
 
-    def toggle(self, pattern: str, name: str, *, default: bool = False) -> Command:
-        """A row for a switch that takes any number for ON or OFF."""
-        self._defaults[name] = default
-        return Command(pattern, self._setter(name, truth), answers(lambda: str(int(self.settings[name]))))
+    def wait(self) -> Steps[None]:
+        """See the base."""
+        yield from self.wait_for()
 
-    def integer(self, pattern: str, name: str, *, low: float, high: float, default: float) -> Command:
-        """A row for a whole number."""
-        self._defaults[name] = default
+    def set_level(self, channel: int, parameters: list[str]) -> None:
+        """An absolute trigger level; setting it fixes it.  Raises ScpiError."""
+        text, reach = parameter(parameters), self.greatest_level(channel)
+        self.settings[f"level{channel}"] = number(text, low=-reach, high=reach, default=0.0, unit="V")
+        self.settings[f"automatic{channel}"] = False
+        self.changed(f"level{channel}")
 
-        def ask(parameters: list[str]) -> str:
-            asked = at_most_one(parameters)
-            value = limit(asked, low=low, high=high, default=default) if asked else float(self.settings[name])
-            return self.spell_integer(value)
+    def level(self, channel: int, parameters: list[str]) -> str:
+        """The trigger level as it is set, or as it is found now.  Raises ScpiError."""
+        if asked := optional_parameter(parameters):
+            reach = self.greatest_level(channel)
+            return self.spell(limit(asked, low=-reach, high=reach, default=0.0))
+        automatic = self.settings[f"automatic{channel}"]
+        return self.spell(self.found_level(channel) if automatic else self.value(f"level{channel}"))
 
-        read = self._setter(name, lambda text: float(round(number(text, low=low, high=high, default=default))))
-        return Command(pattern, lambda parameters: read(without_channels(parameters)), ask)
+    def set_automatic(self, channel: int, parameters: list[str]) -> None:
+        """The automatic level: ON, OFF, or ONCE, which finds it and then leaves it.  Raises ScpiError."""
+        name, text = f"automatic{channel}", parameter(parameters)
+        if text.upper() == "ONCE":
+            self.settings[name] = True
+            self.settings[f"level{channel}"] = self.found_level(channel)
+            self.settings[name] = False
+        else:
+            self.settings[name] = self.read_boolean(text)
+        self.changed(name)
 
-    @staticmethod
-    def spell_integer(value: float) -> str:
-        """A whole number as this instrument prints it."""
-        return nr3(value) if value >= INFINITY else f"{round(value):+d}"
+    def automatic(self, channel: int) -> str:
+        """Whether the level is found automatically."""
+        return f"{self.settings[f'automatic{channel}']:d}"
 
-    def level(self, pattern: str, channel: int, reach: Callable[[], float], spell: Callable[[float], str]) -> Command:
-        """A row for an absolute trigger level; setting it fixes it.  reach: the greatest one [V]."""
-        name, automatic = f"level{channel}", f"automatic{channel}"
-        self._defaults[name] = 0.0
-
-        def set_(parameters: list[str]) -> None:
-            text = one(parameters)
-            self.settings[name] = number(text, low=-reach(), high=reach(), default=0.0, unit="V")
-            self.settings[automatic] = False
-            self.changed(name)
-
-        def ask(parameters: list[str]) -> str:
-            if asked := at_most_one(parameters):
-                return spell(limit(asked, low=-reach(), high=reach(), default=0.0))
-            return spell(self.found_level(channel) if self.settings[automatic] else float(self.settings[name]))
-
-        return Command(pattern, set_, ask)
-
-    def automatic(self, pattern: str, channel: int) -> Command:
-        """A row for the automatic level: ON, OFF, or ONCE, which finds it and then leaves it."""
-        name = f"automatic{channel}"
-        self._defaults[name] = True
-
-        def set_(parameters: list[str]) -> None:
-            text = one(parameters)
-            if text.upper() == "ONCE":
-                self.settings[name] = True
-                self.settings[f"level{channel}"] = self.found_level(channel)
-                self.settings[name] = False
-            else:
-                self.settings[name] = truth(text)
-            self.changed(name)
-
-        return Command(pattern, set_, answers(lambda: str(int(self.settings[name]))))
+    def configuration(self) -> str:
+        """CONFigure?: the function and its channels."""
+        where = ",".join(f"(@{channel})" for channel in self._channels)
+        return f'"{self._function} {where}"'
 
     def statistics(self) -> dict[str, float]:
         """Of the readings since INITiate, or since they were cleared; "not a number" while that is off."""
-        values, _ = self._memory.part(self._counted_from, self.there())
+        values, _ = self._memory.slice(self._counted_from, self.available())
         return statistics(values if self.settings["averaging"] else np.empty(0))

@@ -1,25 +1,24 @@
 """Edges of a sampled voltage: where a Schmitt trigger fires, looked for piece by piece.
 
-A signal may be looked at for hours: only a piece of it is in memory at a time.
+A signal may be looked at for hours: only a piece of it is in memory at a time.  One may have a method `crossings`
+beside, which gives the times at which a trigger fires: (start [s], stop [s], thresholds) → shape (m,) [s], or None if
+only the voltage shows them.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from instruments.virtual.core.trigger import fires
 
-Array = NDArray[np.float64]
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
-#: The voltage at an input: (start [s], step [s], n) → shape (n,) [V].  One may have a method `crossings` beside, which
-#: gives the times at which a trigger fires: (start [s], stop [s], thresholds) → shape (m,) [s], or None if only the
-#: voltage can tell.
-Signal = Callable[[float, float, int], Array]
+    from instruments.virtual.core.signal import Array, Signal
 
 #: Samples per second with which the models look at the light.  A pulse of 3 % of a turn at 60 Hz lasts
 #: 0.5 ms: ten samples; the crossing is interpolated between two of them.
@@ -43,7 +42,7 @@ class Thresholds:
 
 
 @dataclass(frozen=True)
-class Input:
+class TriggerInput:
     """How an input looks at its signal.
 
     level: fixed [V], or None to find it; upper, lower: where the trigger fires and is armed, in parts of peak to
@@ -96,7 +95,7 @@ class Edge:
 class EdgeFinder:
     """The edges of one input from some time on.  They are asked for in order; those passed are forgotten."""
 
-    def __init__(self, signal: Signal, entry: Input, start: float) -> None:
+    def __init__(self, signal: Signal, entry: TriggerInput, start: float) -> None:
         self._signal, self._entry, self._start = signal, entry, start
         self._samples = 0
         self._ask: Callable[[float, float, Thresholds], Array | None] | None = getattr(signal, "crossings", None)

@@ -8,9 +8,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from instruments.ieee488 import NOT_A_NUMBER
-from instruments.virtual.counter.edges import Edge, EdgeFinder, Input, Signal
+from instruments.virtual.counter.edges import Edge, EdgeFinder, TriggerInput
+
+if TYPE_CHECKING:
+    from instruments.virtual.core.signal import Signal
 
 
 @dataclass(frozen=True)
@@ -23,15 +27,15 @@ class Reading:
 
 
 #: A measurement asks: let me look at this input at least up to this time [s].
-Wish = tuple[EdgeFinder, float]
-Measurement = Generator[Wish, None, Reading]
+Wanted = tuple[EdgeFinder, float]
+Measurement = Generator[Wanted, None, Reading]
 
 
 @dataclass
-class Looks:
+class Inputs:
     """The edges of the inputs, for one run.  inputs: signal and setting by channel."""
 
-    inputs: dict[int, tuple[Signal, Input, Input]]
+    inputs: dict[int, tuple[Signal, TriggerInput, TriggerInput]]
     _finders: dict[tuple[int, bool], EdgeFinder] = field(default_factory=dict)
 
     def finder(self, channel: int, instant: float, *, other_slope: bool = False) -> EdgeFinder:
@@ -47,7 +51,7 @@ class Looks:
         self._finders.clear()
 
 
-def first_edge(finder: EdgeFinder, instant: float, before: float) -> Generator[Wish, None, Edge | None]:
+def first_edge(finder: EdgeFinder, instant: float, before: float) -> Generator[Wanted, None, Edge | None]:
     """The first edge at this time or later; None if there is none before the deadline."""
     while (edge := finder.find(instant)) is None:
         if finder.reached >= before:
@@ -57,11 +61,11 @@ def first_edge(finder: EdgeFinder, instant: float, before: float) -> Generator[W
 
 
 @dataclass(frozen=True)
-class Span:
+class GateTime:
     """One measurement's time: when it begins, how long its gate is, and when it is given up (all s)."""
 
     begin: float
-    gate: float
+    length: float
     deadline: float
 
     def given_up(self) -> Reading:
@@ -69,91 +73,93 @@ class Span:
         return Reading(NOT_A_NUMBER, self.begin, self.deadline)
 
 
-def frequency(looks: Looks, channel: int, span: Span) -> Measurement:
+def frequency(inputs: Inputs, channel: int, gate: GateTime) -> Measurement:
     """Whole periods between the first edge and the first one after the gate, over their time [Hz]."""
-    finder = looks.finder(channel, span.begin)
-    finder.refresh(span.begin)
-    opened = yield from first_edge(finder, span.begin, span.deadline)
+    finder = inputs.finder(channel, gate.begin)
+    finder.refresh(gate.begin)
+    opened = yield from first_edge(finder, gate.begin, gate.deadline)
     if opened is None:
-        return span.given_up()
-    due = max(opened.time + span.gate, math.nextafter(opened.time, math.inf))
-    closed = yield from first_edge(finder, due, span.deadline)
+        return gate.given_up()
+    due = max(opened.time + gate.length, math.nextafter(opened.time, math.inf))
+    closed = yield from first_edge(finder, due, gate.deadline)
     if closed is None:
-        return span.given_up()
+        return gate.given_up()
     return Reading((closed.count - opened.count) / (closed.time - opened.time), opened.time, closed.time)
 
 
-def period(looks: Looks, channel: int, span: Span) -> Measurement:
+def period(inputs: Inputs, channel: int, gate: GateTime) -> Measurement:
     """The mean period [s]."""
-    found = yield from frequency(looks, channel, span)
+    found = yield from frequency(inputs, channel, gate)
     return found if found.value == NOT_A_NUMBER else Reading(1 / found.value, found.stamp, found.done)
 
 
-def single_period(looks: Looks, channel: int, span: Span) -> Measurement:
+def single_period(inputs: Inputs, channel: int, gate: GateTime) -> Measurement:
     """One period [s]."""
-    return (yield from period(looks, channel, Span(span.begin, 0.0, span.deadline)))
+    return (yield from period(inputs, channel, GateTime(gate.begin, 0.0, gate.deadline)))
 
 
-def interval(looks: Looks, start: int, stop: int, span: Span, *, slopes: tuple[bool, bool]) -> Measurement:
+def interval(inputs: Inputs, start: int, stop: int, gate: GateTime, *, slopes: tuple[bool, bool]) -> Measurement:
     """From an edge of one input to the next of another, or of the same one [s].
 
     slopes: for each whether it is the slope that is not set.
     """
     finders = [
-        looks.finder(channel, span.begin, other_slope=other)
+        inputs.finder(channel, gate.begin, other_slope=other)
         for channel, other in zip((start, stop), slopes, strict=True)
     ]
     for finder in finders:
-        finder.refresh(span.begin)
-    opened = yield from first_edge(finders[0], span.begin, span.deadline)
+        finder.refresh(gate.begin)
+    opened = yield from first_edge(finders[0], gate.begin, gate.deadline)
     if opened is None:
-        return span.given_up()
-    closed = yield from first_edge(finders[1], math.nextafter(opened.time, math.inf), span.deadline)
+        return gate.given_up()
+    closed = yield from first_edge(finders[1], math.nextafter(opened.time, math.inf), gate.deadline)
     if closed is None:
-        return span.given_up()
+        return gate.given_up()
     return Reading(closed.time - opened.time, opened.time, closed.time)
 
 
-def duty(looks: Looks, channel: int, span: Span, *, slopes: tuple[bool, bool]) -> Measurement:
+def duty(inputs: Inputs, channel: int, gate: GateTime, *, slopes: tuple[bool, bool]) -> Measurement:
     """The part of a period that lies between an edge of one slope and the next of the other one."""
-    width = yield from interval(looks, channel, channel, span, slopes=slopes)
+    width = yield from interval(inputs, channel, channel, gate, slopes=slopes)
     if width.value == NOT_A_NUMBER:
         return width
-    again = yield from first_edge(looks.finder(channel, span.begin, other_slope=slopes[0]), width.done, span.deadline)
+    again = yield from first_edge(inputs.finder(channel, gate.begin, other_slope=slopes[0]), width.done, gate.deadline)
     if again is None:
-        return span.given_up()
+        return gate.given_up()
     return Reading(width.value / (again.time - width.stamp), width.stamp, again.time)
 
 
-def total(looks: Looks, channel: int, span: Span) -> Measurement:
+def total(inputs: Inputs, channel: int, gate: GateTime) -> Measurement:
     """Edges while the gate is open."""
-    finder = looks.finder(channel, span.begin)
-    finder.refresh(span.begin)
-    finder.find(span.begin)
-    before, end = finder.count_before(span.begin), span.begin + span.gate
+    finder = inputs.finder(channel, gate.begin)
+    finder.refresh(gate.begin)
+    finder.find(gate.begin)
+    before, end = finder.count_before(gate.begin), gate.begin + gate.length
     while finder.reached < end:
         yield finder, end
-    return Reading(float(finder.count_before(end) - before), span.begin, end)
+    return Reading(float(finder.count_before(end) - before), gate.begin, end)
 
 
-#: By function: looks, channels, span, and whether falling edges are the ones that are set.
-_FUNCTIONS: dict[str, Callable[[Looks, tuple[int, ...], Span, bool], Measurement]] = {
-    "FREQ": lambda looks, channels, span, _: frequency(looks, channels[0], span),
-    "PER": lambda looks, channels, span, _: period(looks, channels[0], span),
-    "SPER": lambda looks, channels, span, _: single_period(looks, channels[0], span),
-    "TINT": lambda looks, channels, span, _: interval(looks, channels[0], channels[-1], span, slopes=(False, False)),
-    "PWID": lambda looks, channels, span, falling: interval(
-        looks, channels[0], channels[0], span, slopes=(falling, not falling)
+#: By function: inputs, channels, gate, and whether falling edges are the ones that are set.
+_FUNCTIONS: dict[str, Callable[[Inputs, tuple[int, ...], GateTime, bool], Measurement]] = {
+    "FREQ": lambda inputs, channels, gate, _: frequency(inputs, channels[0], gate),
+    "PER": lambda inputs, channels, gate, _: period(inputs, channels[0], gate),
+    "SPER": lambda inputs, channels, gate, _: single_period(inputs, channels[0], gate),
+    "TINT": lambda inputs, channels, gate, _: interval(inputs, channels[0], channels[-1], gate, slopes=(False, False)),
+    "PWID": lambda inputs, channels, gate, falling: interval(
+        inputs, channels[0], channels[0], gate, slopes=(falling, not falling)
     ),
-    "NWID": lambda looks, channels, span, falling: interval(
-        looks, channels[0], channels[0], span, slopes=(not falling, falling)
+    "NWID": lambda inputs, channels, gate, falling: interval(
+        inputs, channels[0], channels[0], gate, slopes=(not falling, falling)
     ),
-    "PDUT": lambda looks, channels, span, falling: duty(looks, channels[0], span, slopes=(falling, not falling)),
-    "NDUT": lambda looks, channels, span, falling: duty(looks, channels[0], span, slopes=(not falling, falling)),
-    "TOT": lambda looks, channels, span, _: total(looks, channels[0], span),
+    "PDUT": lambda inputs, channels, gate, falling: duty(inputs, channels[0], gate, slopes=(falling, not falling)),
+    "NDUT": lambda inputs, channels, gate, falling: duty(inputs, channels[0], gate, slopes=(not falling, falling)),
+    "TOT": lambda inputs, channels, gate, _: total(inputs, channels[0], gate),
 }
 
 
-def measurement(function: str, looks: Looks, channels: tuple[int, ...], span: Span, *, falling: bool) -> Measurement:
+def measurement(
+    function: str, inputs: Inputs, channels: tuple[int, ...], gate: GateTime, *, falling: bool
+) -> Measurement:
     """One measurement of this function.  falling: whether the first channel is set to falling edges."""
-    return _FUNCTIONS[function](looks, channels, span, falling)
+    return _FUNCTIONS[function](inputs, channels, gate, falling)

@@ -11,7 +11,7 @@ import numpy as np
 from instruments.ieee488 import NOT_A_NUMBER
 
 if TYPE_CHECKING:
-    from instruments.virtual.counter.edges import Array
+    from instruments.virtual.core.signal import Array
     from instruments.virtual.counter.measurements import Reading
 
 #: Readings that are kept; then the oldest is lost (53220A/53230A User's Guide: 1 000 000).
@@ -31,31 +31,31 @@ class Memory:
         for column, number in zip(self._columns, (reading.value, reading.stamp, reading.done), strict=True):
             column.append(number)
         if len(self._done) >= CAPACITY + CAPACITY // 8:
-            self.drop(len(self._done) - CAPACITY)
+            self.drop_oldest(len(self._done) - CAPACITY)
             self.lost = True
 
     @property
     def _columns(self) -> tuple[array[float], array[float], array[float]]:
         return self._values, self._stamps, self._done
 
-    def drop(self, count: int) -> None:
+    def drop_oldest(self, count: int) -> None:
         """Take the oldest away."""
         for column in self._columns:
             del column[:count]
         self.fetched = max(0, self.fetched - count)
 
-    def there(self, now: float) -> int:
+    def available(self, now: float) -> int:
         """How many there are by this time [s]."""
         return int(np.searchsorted(np.frombuffer(self._done), now, "right")) if self._done else 0
 
-    def cut(self, now: float) -> None:
+    def truncate(self, now: float) -> None:
         """What would have come later does not come."""
-        keep = self.there(now)
+        keep = self.available(now)
         for column in self._columns:
             del column[keep:]
 
     @property
-    def held(self) -> int:
+    def size(self) -> int:
         """How many there are, those included that come later."""
         return len(self._done)
 
@@ -63,7 +63,7 @@ class Memory:
         """When the last reading was there, or the one so many before it [s]; long ago if it is lost."""
         return self._done[-1 - back] if back < len(self._done) else -math.inf
 
-    def part(self, start: int, stop: int) -> tuple[Array, Array]:
+    def slice(self, start: int, stop: int) -> tuple[Array, Array]:
         """Values and time stamps of some of them."""
         return np.array(self._values[start:stop]), np.array(self._stamps[start:stop])
 

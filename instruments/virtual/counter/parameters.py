@@ -32,18 +32,3 @@ def without_channels(parameters: list[str]) -> list[str]:
     """
     plain = [text for text in parameters if not _CHANNELS.fullmatch(text)]
     return [found[1].strip() if (found := _BRACKETED.fullmatch(text)) else text for text in plain]
-
-
-def truth(text: str) -> bool:
-    """ON, OFF, or a number: what rounds to nought is OFF (SCPI-1999, volume 1, 7.3).  Raises ScpiError.
-
-    >>> truth("1.0"), truth("off")
-    (True, False)
-    """
-    words = {"ON": True, "OFF": False}
-    if text.upper() in words:
-        return words[text.upper()]
-    try:
-        return round(float(text)) != 0
-    except (ValueError, OverflowError):
-        raise ScpiError(-224, text[:20]) from None

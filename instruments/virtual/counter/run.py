@@ -15,14 +15,14 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from instruments.virtual.core.steps import Steps
-    from instruments.virtual.counter.measurements import Looks, Measurement, Reading
+    from instruments.virtual.counter.measurements import Inputs, Measurement, Reading
 
 #: A message may make a model look so far ahead [s]; an answer that is further away does not come.  Three hours are
 #: ten readings with the longest gate there is.
 FARTHEST = 12_000.0
 #: Nor does one that has to wait for more readings than this.
 _MOST_AHEAD = 100_000
-#: Light that nobody has asked about for longer than this [s] is passed over.
+#: Light that was not asked about for longer than this [s] is passed over.
 _CATCH_UP = 2500.0
 #: A model looks ahead in steps, to stop where the result is known [s].
 _STEP = 60.0
@@ -39,8 +39,8 @@ class Run:
     """
 
     begin: float
-    looks: Looks
-    measure: Callable[[Looks, float, int], Measurement]
+    inputs: Inputs
+    measure: Callable[[Inputs, float, int], Measurement]
     samples: float
     triggers: float = 1
     dead: float = 0.0
@@ -74,9 +74,8 @@ class Run:
         return math.isinf(self._next) and self._under_way is None and not self.complete
 
     def trigger(self, now: float) -> None:
-        """It has come [s]."""
-        if self.waiting:
-            self._next = now + self.delay
+        """The trigger that is waited for has come [s]."""
+        self._next = now + self.delay
 
     def advance(self, until: float, count: float = math.inf) -> Steps[None]:
         """Everything that happens up to this time [s], or until so many readings have been taken in all.
@@ -86,13 +85,15 @@ class Run:
         """
         if until > self._seen + _CATCH_UP and not self.waiting:
             self._under_way, self._next = None, until - _CATCH_UP
-            self.looks.forget()
+            self.inputs.forget()
         self._seen = max(self._seen, until)
         while self.taken < min(count, self.wanted):
             if self._under_way is None:
                 if self._next > until:
                     return
-                self._under_way = self.measure(self.looks, self._next, self.taken % max(1, int(min(self.samples, 1e9))))
+                self._under_way = self.measure(
+                    self.inputs, self._next, self.taken % max(1, int(min(self.samples, 1e9)))
+                )
             try:
                 finder, wanted = next(self._under_way)
             except StopIteration as result:

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import math
-from functools import partial
-from typing import TYPE_CHECKING
+from typing import ClassVar
 
-from instruments.virtual.core.device import answers, does
-from instruments.virtual.core.parameters import at_most_one, one
-from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.generator.arbitrary import Refused, plain_name
+from instruments.virtual.core.parameters import optional_parameter, parameter
+from instruments.virtual.core.parser import Row, ScpiError
+from instruments.virtual.core.rows import Ask, Both, Do, Own, Switch, Word
+from instruments.virtual.generator.arbitrary import DeviceError, plain_name
+from instruments.virtual.generator.channel import Channel
 from instruments.virtual.generator.family import Family, Waveform
 from instruments.virtual.generator.generator import VirtualGenerator
-
-if TYPE_CHECKING:
-    from instruments.virtual.generator.channel import Channel
+from instruments.virtual.generator.rows import CHANNEL, SHARED, Quantity
 
 #: The waveforms that it is made with; 64 K points in each of the others.
 _BUILT_IN = ("EXP_RISE", "EXP_FALL", "NEG_RAMP", "SINC", "CARDIAC")
 _KEPT = 4
+#: Limits of the edges of pulses [s].
+_EDGES = (5e-9, 100e-9)
 
 
 def _square(frequency: float) -> tuple[float, float]:
@@ -26,116 +26,129 @@ def _square(frequency: float) -> tuple[float, float]:
     return (20.0, 80.0) if frequency <= 10e6 else (40.0, 60.0)
 
 
+_FAMILY = Family(
+    waveforms=(
+        Waveform("SINusoid", 20e6, crest=2 * math.sqrt(2)),
+        Waveform("SQUare", 20e6),
+        Waveform("RAMP", 200e3, crest=2 * math.sqrt(3)),
+        Waveform("PULSe", 5e6, bottom=500e-6, sweeps=False),
+        Waveform("NOISe", 20e6, crest=6.6, sweeps=False),  # crest factor 3.3 is the model's, not the manual's
+        Waveform("DC", 20e6, bursts=False, sweeps=False),
+        Waveform("USER", 6e6),
+    ),
+    square=_square,
+    arb="USER",
+    library=_BUILT_IN,
+    least_vpp=10e-3,
+    shortest_pulse=20e-9,
+    shortest_edge=_EDGES[0],
+    longest_burst=500.0,
+    burst_rest=200e-9,
+    points=(1, 65_536),
+    room=65_536,
+)
+
+_DATA, _EDGE = "[SOURce[n]:]DATA", "[SOURce[n]:][FUNCtion:]PULSe:TRANsition"
+_CHANNEL: tuple[Row, ...] = (
+    Word("[SOURce[n]:]FUNCtion[:SHAPe]", "{n}:waveform", " ".join(waveform.word for waveform in _FAMILY.waveforms)),
+    Quantity(
+        *("[SOURce[n]:][FUNCtion:]PULSe:PERiod", "{n}:frequency", 1e-3, (1 / 5e6, 2000), "S"),
+        get=Channel.period,
+        put=Channel.set_period,
+        alias=True,
+    ),
+    Quantity(f"{_EDGE}:LEADing", "{n}:pulse_leading", 5e-9, _EDGES, "S"),
+    Quantity(f"{_EDGE}:TRAiling", "{n}:pulse_trailing", 5e-9, _EDGES, "S"),
+    Quantity(f"{_EDGE}[:BOTH]", "{n}:pulse_leading", 5e-9, _EDGES, "S", put=Channel.set_edges, alias=True),
+    Quantity(
+        *("[SOURce[n]:]BURSt:NCYCles", "{n}:burst_cycles", 1.0, (1, 50e3)), put=Channel.set_burst_cycles, endless=True
+    ),
+    Quantity("[SOURce[n]:]SWEep:TIME", "{n}:sweep_time", 1.0, (1e-3, 500), "S"),
+    Word("TRIGger[n]:SOURce", "{n}:trigger_source", "IMMediate EXTernal BUS"),
+    Quantity("TRIGger[n]:DELay", "{n}:trigger_delay", 0.0, (0, 85), "S"),
+    *(
+        Both(f"[SOURce[n]:]APPLy:{w.word}", lambda s, n, p, short=w.short: s.apply(n, short, p))
+        for w in _FAMILY.waveforms
+    ),
+    # arbitrary waveforms
+    Own(
+        "[SOURce[n]:]FUNCtion:USER",
+        lambda s, n, p: s.select(n, p),
+        lambda s, n: s.channel(n)["arb"],
+        keeps=("{n}:arb", "EXP_RISE"),
+    ),
+    Both(_DATA, lambda s, n, p: s.keep(n, p)),
+    Both(f"{_DATA}:DAC", lambda s, n, p: s.keep(n, p, full_scale=8191.0)),
+    Both(f"{_DATA}:COPY", lambda s, n, p: s.copy(n, p)),
+    Both(f"{_DATA}:DELete[:NAME]", lambda s, n, p: s.delete(n, p)),
+    Do(f"{_DATA}:DELete:ALL", lambda s, n: s.delete_all(n)),
+    Ask(f"{_DATA}:CATalog", lambda s, n: s.catalogue(n)),
+    Ask(f"{_DATA}:NVOLatile:CATalog", lambda s, n: ",".join(f'"{name}"' for name in s.copies(n)) or '""'),
+    Ask(f"{_DATA}:NVOLatile:FREE", lambda s, n: f"{_KEPT - len(s.copies(n)):+d}"),
+    Switch("[SOURce[n]:]MARKer[:STATe]", "marker"),
+    Own("[SOURce[n]:]PHASe:UNLock:ERRor:STATe", lambda _s, _n, _p: None, lambda _s, _n: "0"),
+)
+
+
 class Virtual33220A(VirtualGenerator):
     """The 33220A.  Source: Agilent 33220A User's Guide, chapter 4."""
 
     identity = "Agilent Technologies,33220A,VIRTUAL,2.02-2.02-22-2"
-    family = Family(
-        waveforms=(
-            Waveform("SINusoid", 20e6, crest=2 * math.sqrt(2)),
-            Waveform("SQUare", 20e6),
-            Waveform("RAMP", 200e3, crest=2 * math.sqrt(3)),
-            Waveform("PULSe", 5e6, bottom=500e-6, sweeps=False),
-            Waveform("NOISe", 20e6, crest=6.6, sweeps=False),  # crest factor 3.3 is the model's, not the manual's
-            Waveform("DC", 20e6, bursts=False, sweeps=False),
-            Waveform("USER", 6e6),
-        ),
-        square=_square,
-        arb="USER",
-        least_vpp=10e-3,
-        shortest_pulse=20e-9,
-        shortest_edge=5e-9,
-        longest_edge=100e-9,
-        first_edge=5e-9,
-        longest_period=2000.0,
-        most_cycles=50_000,
-        longest_burst=500.0,
-        burst_rest=200e-9,
-        longest_delay=85.0,
-        longest_sweep=500.0,
-        points=(1, 65_536),
-        room=65_536,
-    )
+    family = _FAMILY
+    BUILT_IN = _BUILT_IN
+    CHANNEL_ROWS: ClassVar = (*CHANNEL, *_CHANNEL)
+    ROWS: ClassVar = SHARED
 
-    @staticmethod
-    def printed(value: float) -> str:
-        """A number as this family prints it: fourteen digits.
-
-        >>> Virtual33220A.printed(1000.0)
-        '+1.0000000000000E+03'
-        """
+    def spell(self, value: float) -> str:
+        """Fourteen digits: +1.0000000000000E+03."""
         return f"{value:+.13E}"
 
-    def arbitrary_rows(self, channel: Channel) -> tuple[Command, ...]:
-        """The waveform in the volatile memory, four that are kept, and the built-in ones."""
-        self._defaults["arb"] = "EXP_RISE"
-        channel.library = {name: channel.library[name] for name in _BUILT_IN}
-        data = "[SOURce[1]:]DATA"
+    # --- arbitrary waveforms: one in the volatile memory, four that are kept, and the built-in ones ---
 
-        def keep(parameters: list[str], *, dac: bool) -> None:
-            if len(parameters) < 2:
-                raise ScpiError(-109)
-            if plain_name(parameters[0]) != "VOLATILE":
-                raise ScpiError(-224, parameters[0][:20])
-            channel.memory.held.pop("VOLATILE", None)
-            self.store(channel, "VOLATILE", parameters[1:], dac=dac, full_scale=8191.0 if dac else 1.0)
-            self.changed("arb")
+    def keep(self, n: int, parameters: list[str], *, full_scale: float = 1.0) -> None:
+        """DATA: into the volatile memory.  Raises ScpiError."""
+        if len(parameters) < 2:
+            raise ScpiError(-109)
+        if plain_name(parameters[0]) != "VOLATILE":
+            raise ScpiError(-224, parameters[0][:20])
+        self.store(n, "VOLATILE", parameters[1:], full_scale=full_scale)
+        self.changed(f"{n}:arb")
 
-        def catalogue() -> str:
-            return ",".join(f'"{name}"' for name in (*sorted(channel.memory.held, reverse=True), *_BUILT_IN))
+    def catalogue(self, n: int) -> str:
+        """DATA:CATalog?: what is held, then what is built in."""
+        return ",".join(f'"{name}"' for name in (*sorted(self.channel(n).memory.held, reverse=True), *_BUILT_IN))
 
-        def kept() -> list[str]:
-            return [name for name in channel.memory.held if name != "VOLATILE"]
+    def copies(self, n: int) -> list[str]:
+        """The names in the four places."""
+        return [name for name in self.channel(n).memory.held if name != "VOLATILE"]
 
-        return (
-            Command("[SOURce[1]:]FUNCtion:USER", partial(self._select, channel), answers(lambda: str(channel["arb"]))),
-            Command(data, partial(keep, dac=False)),
-            Command(data + ":DAC", partial(keep, dac=True)),
-            Command(data + ":COPY", partial(self._copy, channel)),
-            Command(data + ":DELete[:NAME]", partial(self._delete, channel)),
-            Command(data + ":DELete:ALL", set=does(lambda: self._forget(channel, [*channel.memory.held]))),
-            Command(data + ":CATalog", get=answers(catalogue)),
-            Command(data + ":NVOLatile:CATalog", get=answers(lambda: ",".join(f'"{k}"' for k in kept()) or '""')),
-            Command(data + ":NVOLatile:FREE", get=answers(lambda: f"{_KEPT - len(kept()):+d}")),
-            *self.attributes(channel, data),
-            self.switch("[SOURce[1]:]MARKer[:STATe]", "marker"),
-            Command("[SOURce[1]:]PHASe:UNLock:ERRor:STATe", set=lambda _: None, get=answers(lambda: "0")),
-        )
-
-    def _select(self, channel: Channel, parameters: list[str]) -> None:
-        name = plain_name(one(parameters))
-        if name not in channel.memory.held and name not in _BUILT_IN:
-            raise Refused(785, "Specified arb waveform does not exist")
-        channel["arb"] = name
-        self.changed("arb")
-
-    def _copy(self, channel: Channel, parameters: list[str]) -> None:
-        """DATA:COPY: from the volatile memory into one of four places."""
+    def copy(self, n: int, parameters: list[str]) -> None:
+        """DATA:COPY: from the volatile memory into one of four places.  Raises ScpiError."""
         if not parameters:
             raise ScpiError(-109)
-        name, held = plain_name(parameters[0]), channel.memory.held
-        if at_most_one(parameters[1:]).upper() not in {"", "VOLATILE"}:
-            raise Refused(784, "Name of source arb waveform for copy must be VOLATILE")
+        name, held = plain_name(parameters[0]), self.channel(n).memory.held
+        if optional_parameter(parameters[1:]).upper() not in {"", "VOLATILE"}:
+            raise DeviceError(784, "Name of source arb waveform for copy must be VOLATILE")
         if "VOLATILE" not in held:
-            raise Refused(785, "Specified arb waveform does not exist")
+            raise DeviceError(785, "Specified arb waveform does not exist")
         if name in _BUILT_IN:
-            raise Refused(782, "Cannot overwrite a built-in waveform")
+            raise DeviceError(782, "Cannot overwrite a built-in waveform")
         if name not in held and len(held) > _KEPT:
-            raise Refused(781, "Not enough memory to store new arb waveform; use DATA:DELETE")
+            raise DeviceError(781, "Not enough memory to store new arb waveform; use DATA:DELETE")
         held[name] = held["VOLATILE"]
 
-    def _delete(self, channel: Channel, parameters: list[str]) -> None:
-        name = plain_name(one(parameters))
+    def delete(self, n: int, parameters: list[str]) -> None:
+        """DATA:DELete: a waveform that is not selected.  Raises ScpiError."""
+        channel, name = self.channel(n), plain_name(parameter(parameters))
         if name in _BUILT_IN:
-            raise Refused(786, "Cannot delete a built-in arb waveform")
+            raise DeviceError(786, "Cannot delete a built-in arb waveform")
         if name == channel["arb"]:
-            raise Refused(787, "Cannot delete the currently selected active arb waveform")
+            raise DeviceError(787, "Cannot delete the currently selected active arb waveform")
         if name not in channel.memory.held:
-            raise Refused(785, "Specified arb waveform does not exist")
-        self._forget(channel, [name])
+            raise DeviceError(785, "Specified arb waveform does not exist")
+        del channel.memory.held[name]
 
-    @staticmethod
-    def _forget(channel: Channel, names: list[str]) -> None:
-        for name in names:
-            if name != channel["arb"]:
-                del channel.memory.held[name]
+    def delete_all(self, n: int) -> None:
+        """DATA:DELete:ALL: all but the one that is selected."""
+        channel = self.channel(n)
+        channel.memory.held = {name: held for name, held in channel.memory.held.items() if name == channel["arb"]}

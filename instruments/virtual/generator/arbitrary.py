@@ -26,7 +26,7 @@ _BUILT_IN_POINTS = 250
 _NAME = re.compile(r"[A-Z0-9_.\-:\\/]{1,255}")
 
 
-class Refused(ScpiError):
+class DeviceError(ScpiError):
     """An error that only this kind of instrument knows: its number and its text."""
 
     def __init__(self, number: int, text: str) -> None:
@@ -89,14 +89,14 @@ def samples(data: Sequence[str], *, full_scale: float, block: str, least: int, m
     if values.size < least or not np.all(np.abs(values) <= 1 + 1e-6):
         raise ScpiError(-222)
     if values.size > most:
-        raise Refused(781, "Not enough memory to store new arb waveform; use DATA:DELETE")
+        raise DeviceError(781, "Not enough memory to store new arb waveform; use DATA:DELETE")
     return values
 
 
 def _from_block(text: str, kind: str) -> Samples:
     data = block_content(text, -102)
     if len(data) % np.dtype(kind).itemsize:
-        raise Refused(800, "Block length must be even")
+        raise DeviceError(800, "Block length must be even")
     return np.frombuffer(data, dtype=kind).astype(np.float64)
 
 

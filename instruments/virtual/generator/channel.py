@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from instruments.virtual.core.device import Value
+    from instruments.virtual.core.parser import Value
     from instruments.virtual.generator.family import Family, Waveform
 
 #: The generator's own resistance [Ω], its greatest voltage without a load [V], and SCPI's infinity.
@@ -101,9 +101,9 @@ class Channel:
     ) -> None:
         self.family, self.index = family, index
         self._settings, self._report = settings, report
-        self.prefix = "" if index == 1 else f"{index}:"
+        self.prefix = f"{index}:"
         self.memory = Memory(family.room)
-        self.library = built_in()
+        self.library = {name: values for name, values in built_in().items() if name in family.library}
         self._now = now
         #: From when to when a triggered burst or sweep lasts [s].
         self.under_way = (-math.inf, -math.inf)
@@ -127,20 +127,28 @@ class Channel:
         self._report(ScpiError(-221, text))
 
     def clip(self, value: float, low: float, high: float) -> float:
-        """The number or the limit that it is beyond, which goes into the error queue."""
+        """The number or the limit that it is beyond, which goes into the error queue.
+
+        A limit as it is printed, with its last digit rounded, is no more than itself.
+        """
         if low <= value <= high:
             return value
-        self._report(ScpiError(-222, f"value clipped to {'upper' if value > high else 'lower'} limit"))
-        return high if value > high else low
+        bound = high if value > high else low
+        if not math.isclose(value, bound, rel_tol=1e-12):
+            self._report(ScpiError(-222, f"value clipped to {'upper' if value > high else 'lower'} limit"))
+        return bound
 
-    def read(self, text: str, low: float, high: float, default: float, units: tuple[str, ...] = ("",)) -> float:
+    def read(self, text: str, low: float, high: float, default: float, unit: str = "") -> float:
         """A numeric parameter, at most at its limits.  Raises ScpiError."""
         if text[:1].isalpha():
             if text.upper() in {"INF", "INFINITY"} or text.upper() not in _WORDS:
                 raise ScpiError(-104, text[:20])
             return limit(text, low=low, high=high, default=default)
-        value, _ = quantity_of(text, units)
-        return self.clip(value, low, high)
+        return self.clip(quantity_of(text, (unit,))[0], low, high)
+
+    def degrees_per_unit(self) -> float:
+        """What the unit of UNIT:ANGLe is worth [°]."""
+        return math.degrees(1) if self._settings["angle_unit"] == "RAD" else 1.0
 
     # --- frequency ---
 
@@ -171,52 +179,93 @@ class Channel:
         """Of the waveform that is selected [Hz]."""
         return self.number("arb_rate") / self.points if self.sampled else self.number("frequency")
 
-    @frequency.setter
-    def frequency(self, value: float) -> None:
+    def set_frequency(self, value: float) -> None:
+        """Of the waveform that is selected [Hz]."""
         if self.sampled:
             self["arb_rate"] = value * self.points
         else:
             self["frequency"] = value
+
+    def set_rate(self, value: float) -> None:
+        """Samples per second of an arbitrary waveform."""
+        self["arb_rate"] = value
 
     def frequency_limits(self) -> tuple[float, float]:
         """Of the waveform that is selected [Hz]."""
         top = self.waveform.top
         return self.waveform.bottom, top / self.points if self.sampled else top
 
+    def period(self) -> float:
+        """Of all waveforms but samples [s]."""
+        return 1 / self.number("frequency")
+
+    def set_period(self, value: float) -> None:
+        """Of all waveforms but samples [s]."""
+        self["frequency"] = 1 / value
+
+    def square_periods(self) -> tuple[float, float]:
+        """The limits of the period of a square wave [s]."""
+        return 1 / self.family.waveform("SQU").top, 1e6
+
+    def square_duties(self) -> tuple[float, float]:
+        """The limits of the duty cycle of a square wave [%]."""
+        return self.family.square(self.number("frequency"))
+
+    # --- sweeps: centre and span are start and stop in other words ---
+
+    def sweep_centre(self) -> float:
+        """The mean of start and stop [Hz]."""
+        return (self.number("sweep_start") + self.number("sweep_stop")) / 2
+
+    def set_sweep_centre(self, value: float) -> None:
+        """Move start and stop; the span stays, as far as there is room for it [Hz]."""
+        half = min(self.sweep_span() / 2, value - 1e-6)
+        self["sweep_start"], self["sweep_stop"] = value - half, value + half
+
+    def sweep_span(self) -> float:
+        """From start to stop [Hz]."""
+        return self.number("sweep_stop") - self.number("sweep_start")
+
+    def set_sweep_span(self, value: float) -> None:
+        """Move start and stop; the centre stays [Hz]."""
+        centre = self.sweep_centre()
+        self["sweep_start"], self["sweep_stop"] = max(centre - value / 2, 1e-6), centre + value / 2
+
     # --- voltages, as they are displayed: at the load that OUTPut:LOAD names ---
 
     @property
-    def share(self) -> float:
+    def load_factor(self) -> float:
         """Of the open-circuit voltage at the load."""
         load = self.number("load")
         return 1.0 if load >= INFINITE else load / (load + SOURCE_OHM)
 
-    def levels(self) -> tuple[float, float]:
+    def voltage_limits(self) -> tuple[float, float]:
         """The lowest and the highest voltage that there can be [V]."""
-        top = OPEN_V * self.share
+        top = OPEN_V * self.load_factor
         if self["limits_on"]:
             return max(-top, self.number("limit_low")), min(top, self.number("limit_high"))
         return -top, top
 
     def amplitude_limits(self) -> tuple[float, float]:
-        """Of the peak-to-peak voltage [V]."""
-        low, high = self.levels()
-        return 2 * self.family.least_vpp * self.share, high - low
+        """Of the peak-to-peak voltage [V]; there is always some, even where the limits leave no room for it."""
+        low, high = self.voltage_limits()
+        least = 2 * self.family.least_vpp * self.load_factor
+        return least, max(least, high - low)
 
     def offset_limits(self) -> tuple[float, float]:
         """Of the offset at the amplitude there is [V]; a DC voltage has no amplitude."""
-        low, high = self.levels()
+        low, high = self.voltage_limits()
         half = 0.0 if self["waveform"] == "DC" else self.number("amplitude_vpp") / 2
         return min(0.0, low + half), max(0.0, high - half)
 
-    def shown(self, vpp: float, unit: str) -> float:
+    def from_vpp(self, vpp: float, unit: str) -> float:
         """A peak-to-peak voltage [V] in this unit."""
         if unit == "VPP":
             return vpp
         rms = vpp / self._crest()
         return rms if unit == "VRMS" else 10 * math.log10(rms**2 / self.number("load") / 1e-3)
 
-    def meant(self, value: float, unit: str) -> float:
+    def to_vpp(self, value: float, unit: str) -> float:
         """A number in this unit as a peak-to-peak voltage [V]."""
         if unit == "VPP":
             return value
@@ -228,38 +277,52 @@ class Channel:
             return self.waveform.crest
         return 2.0 / max(float(np.sqrt(np.mean(self.samples**2))), 1e-3)
 
-    def set_level(self, which: str, value: float) -> None:
-        """VOLTage:HIGH or :LOW: the other level stays, or gives way by the smallest step."""
-        low, high = self.level("low"), self.level("high")
-        step = max(1e-3, self.amplitude_limits()[0])
-        if which == "high":
-            high = value
-            if high - low < step * (1 - 1e-9):
-                low = high - step
-                self.conflict("low level changed due to high level")
-        else:
-            low = value
-            if high - low < step * (1 - 1e-9):
-                high = low + step
-                self.conflict("high level changed due to low level")
+    def high(self) -> float:
+        """The high level [V]."""
+        return round(self.number("offset") + self.number("amplitude_vpp") / 2, 12)
+
+    def low(self) -> float:
+        """The low level [V]."""
+        return round(self.number("offset") - self.number("amplitude_vpp") / 2, 12)
+
+    def high_limits(self) -> tuple[float, float]:
+        """Of the high level [V]."""
+        low, high = self.voltage_limits()
+        return low + self._step(), high
+
+    def low_limits(self) -> tuple[float, float]:
+        """Of the low level [V]."""
+        low, high = self.voltage_limits()
+        return low, high - self._step()
+
+    def set_high(self, high: float) -> None:
+        """Set the high level [V]; the low one stays, or gives way by the smallest step."""
+        low, step = self.low(), self._step()
+        if high - low < step * (1 - 1e-9):
+            low = high - step
+            self.conflict("low level changed due to high level")
+        self._set_levels(low, high)
+
+    def set_low(self, low: float) -> None:
+        """Set the low level [V]; the high one stays, or gives way by the smallest step."""
+        high, step = self.high(), self._step()
+        if high - low < step * (1 - 1e-9):
+            high = low + step
+            self.conflict("high level changed due to low level")
+        self._set_levels(low, high)
+
+    def _step(self) -> float:
+        return max(1e-3, self.amplitude_limits()[0])
+
+    def _set_levels(self, low: float, high: float) -> None:
         self["amplitude_vpp"], self["offset"] = round(high - low, 12), round((high + low) / 2, 12)
-
-    def level(self, which: str) -> float:
-        """The high or the low level [V]."""
-        half = self.number("amplitude_vpp") / 2
-        return round(self.number("offset") + (half if which == "high" else -half), 12)
-
-    def level_limits(self, which: str) -> tuple[float, float]:
-        """Of the high or the low level [V]."""
-        low, high = self.levels()
-        return (low + 1e-3, high) if which == "high" else (low, high - 1e-3)
 
     def set_load(self, load: float) -> None:
         """OUTPut:LOAD: what stands at the terminals stays, what is displayed changes."""
-        before = self.share
+        before = self.load_factor
         self["load"] = load
         for name in ("amplitude_vpp", "offset"):
-            self[name] = float(f"{self.number(name) * self.share / before:.12g}")
+            self[name] = float(f"{self.number(name) * self.load_factor / before:.12g}")
         if load >= INFINITE and self["voltage_unit"] == "DBM":
             self["voltage_unit"] = "VPP"
             self.conflict("amplitude units changed to Vpp due to high-Z load")
@@ -275,7 +338,28 @@ class Channel:
         """The width of pulses [s], and with it their duty cycle."""
         self["pulse_width"], self["pulse_duty"] = width, 100 * width * self.number("frequency")
 
+    def pulse_duties(self) -> tuple[float, float]:
+        """Of the duty cycle of pulses at the period there is [%]."""
+        low, high = self.pulse_limits()
+        return 100 * low * self.number("frequency"), 100 * high * self.number("frequency")
+
+    def set_pulse_duty(self, duty: float) -> None:
+        """The duty cycle of pulses [%], and with it their width."""
+        self["pulse_duty"], self["pulse_width"] = duty, duty / 100 / self.number("frequency")
+
+    def set_edges(self, time: float) -> None:
+        """Both edges of pulses [s]."""
+        self["pulse_leading"] = self["pulse_trailing"] = time
+
     # --- triggers ---
+
+    def set_burst_cycles(self, cycles: float) -> None:
+        """How many cycles a burst has, a whole number."""
+        self["burst_cycles"] = float(round(cycles))
+
+    def burst_periods(self) -> tuple[float, float]:
+        """Of the time between bursts that start by themselves [s]."""
+        return 1e-6, self.family.longest_burst
 
     @property
     def repeats(self) -> bool:
@@ -307,7 +391,7 @@ class Channel:
         start, end = self.under_way
         silent = bool(self["burst"]) and (self._gated() or (self.waits and not start <= time < end))
         short, inverted = str(self["waveform"]), self["polarity"] == "INV"
-        volt = 1 / self.share
+        volt = 1 / self.load_factor
         swing = 0.0 if silent or not on or short == "DC" else self.number("amplitude_vpp") / 2 * volt
         return Output(
             waveform=short,

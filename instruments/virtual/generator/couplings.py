@@ -23,18 +23,18 @@ _LONG = {
 }  # fmt: skip
 
 
-def settle(channel: Channel, cause: str) -> None:
+def resolve(channel: Channel, cause: str) -> None:
     """Make the settings fit each other after one of them, the cause, has changed."""
-    _one_mode(channel, cause)
-    _able(channel)
-    _in_band(channel)
-    _in_range(channel, cause)
-    _square(channel)
-    _pulse(channel, cause)
-    _bursts(channel)
+    _turn_off_other_modes(channel, cause)
+    _drop_impossible_modes(channel)
+    _limit_frequency(channel)
+    _limit_voltage(channel, cause)
+    _limit_square_duty(channel)
+    _fit_pulse(channel, cause)
+    _fit_bursts(channel)
 
 
-def _one_mode(channel: Channel, cause: str) -> None:
+def _turn_off_other_modes(channel: Channel, cause: str) -> None:
     if cause not in MODES or not channel[cause]:
         return
     for mode in MODES:
@@ -43,24 +43,24 @@ def _one_mode(channel: Channel, cause: str) -> None:
             channel.conflict(f"turned off {mode} by selection of other mode or modulation")
 
 
-def _able(channel: Channel) -> None:
+def _drop_impossible_modes(channel: Channel) -> None:
     for mode, able in (("burst", channel.waveform.bursts), ("sweep", channel.waveform.sweeps)):
         if channel[mode] and not able:
             channel[mode] = False
             channel.conflict(f"not able to {mode} this function")
 
 
-def _in_band(channel: Channel) -> None:
+def _limit_frequency(channel: Channel) -> None:
     low, high = channel.frequency_limits()
     if channel.frequency > high * (1 + 1e-12):
-        channel.frequency = high
+        channel.set_frequency(high)
         channel.conflict(f"frequency reduced for {_LONG[channel.waveform.short]} function")
     elif channel.frequency < low:
-        channel.frequency = low
+        channel.set_frequency(low)
         channel.conflict(f"frequency changed for {_LONG[channel.waveform.short]} function")
 
 
-def _in_range(channel: Channel, cause: str) -> None:
+def _limit_voltage(channel: Channel, cause: str) -> None:
     least, most = channel.amplitude_limits()
     if not least * (1 - 1e-9) <= channel.number("amplitude_vpp") <= most * (1 + 1e-9):
         channel["amplitude_vpp"] = min(max(channel.number("amplitude_vpp"), least), most)
@@ -74,7 +74,7 @@ def _in_range(channel: Channel, cause: str) -> None:
         )
 
 
-def _square(channel: Channel) -> None:
+def _limit_square_duty(channel: Channel) -> None:
     if channel["waveform"] != "SQU":
         return
     low, high = channel.family.square(channel.number("frequency"))
@@ -83,7 +83,7 @@ def _square(channel: Channel) -> None:
         channel.conflict("duty cycle changed due to frequency")
 
 
-def _pulse(channel: Channel, cause: str) -> None:
+def _fit_pulse(channel: Channel, cause: str) -> None:
     """Width and edges have to fit into the period, while pulses are what comes out."""
     frequency = channel.number("frequency")
     if cause not in {"pulse_width", "pulse_duty"}:
@@ -105,7 +105,7 @@ def _pulse(channel: Channel, cause: str) -> None:
             channel.conflict("edge time decreased due to pulse width")
 
 
-def _bursts(channel: Channel) -> None:
+def _fit_bursts(channel: Channel) -> None:
     least = channel.number("burst_cycles") / channel.frequency + channel.family.burst_rest
     if channel.repeats and channel.number("burst_cycles") < INFINITE and channel.number("burst_period") < least:
         channel["burst_period"] = min(least, channel.family.longest_burst)

@@ -2,34 +2,34 @@
 
 Sources: SDG Programming Guide PG02-E04A as public drivers quote it; an emulator that its authors compared with an
 SDG1032X (state after ``*RST``, forms of the answers, amplitudes that are clipped, the load that halves what is shown);
-an answer of an SDG2042X to ``C1:BSWV?`` as a public driver keeps it.  Inferred: which field gives way where amplitude
-and offset together go beyond 10 V (the one that is set), that a message has no path memory, limits of the ramp.
+what the authors of a public driver measured on an SDG2042X (the answer to ``C1:BSWV?`` after a reset; six digits of a
+number, ten of a frequency; volts r.m.s. of a sine are 0.3535 of its peak to peak, of a ramp 1/3.464; the fraction of a
+load is cut off).  Inferred: which field gives way where amplitude and offset together go beyond 10 V (the one that is
+set), that a message has no path memory, limits of the ramp.
 Modulation, sweep, burst and arbitrary waveforms are missing.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.parameters import choice, number
-from instruments.virtual.core.parser import ScpiError
-from instruments.virtual.core.rows import Both, Do, Row
+from instruments.virtual.core.parser import Row, ScpiError, Value
+from instruments.virtual.core.rows import Do, Own
 from instruments.virtual.generator.channel import INFINITE, OPEN_V, SOURCE_OHM, Output
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from instruments.clock import Clock
-    from instruments.virtual.core.device import Value
 
 #: WVTP → the waveform as the other generators call it, its highest frequency [Hz], peak to peak over r.m.s.
 _WAVEFORMS = {
-    "SINE": ("SIN", 30e6, 2 * math.sqrt(2)),
+    "SINE": ("SIN", 30e6, 1 / 0.3535),
     "SQUARE": ("SQU", 30e6, 2.0),
-    "RAMP": ("RAMP", 500e3, 2 * math.sqrt(3)),
+    "RAMP": ("RAMP", 500e3, 3.464),
     "PULSE": ("PULS", 12.5e6, 2.0),
     "NOISE": ("NOIS", 30e6, 6.6),
     "DC": ("DC", 30e6, 2.0),
@@ -67,15 +67,23 @@ _FIELDS = {
         Field("SYM", "symmetry", 50.0, only=("RAMP",)),
     )
 }
+#: The settings of a channel, with their values after ``*RST``.
+_DEFAULTS: dict[str, Value] = {
+    **{field.name: field.default for field in _FIELDS.values()},
+    "waveform": "SINE",
+    "output": False,
+    "load": INFINITE,
+    "polarity": "NOR",
+}
 _CHANNEL: tuple[Row, ...] = (
-    Both("C{n}:(BSWV|BASIC_WAVE)", lambda s, n, p: s.set_wave(n, p), lambda s, n, p: s.wave(n, p)),
-    Both("C{n}:(OUTP|OUTPUT)", lambda s, n, p: s.set_output(n, p), lambda s, n, p: s.output(n, p)),
+    Own("C{n}:(BSWV|BASIC_WAVE)", lambda s, n, p: s.set_wave(n, p), lambda s, n: s.wave(n)),
+    Own("C{n}:(OUTP|OUTPUT)", lambda s, n, p: s.set_output(n, p), lambda s, n: s.output(n)),
 )
 
 
 def _key(n: int, name: str) -> str:
-    """The name of a channel's setting; those of channel 1 have no prefix, as in the other generators."""
-    return name if n == 1 else f"{n}:{name}"
+    """The name of a channel's setting."""
+    return f"{n}:{name}"
 
 
 def _pairs(parameters: list[str]) -> list[tuple[str, str]]:
@@ -96,36 +104,32 @@ class VirtualSDG1000X(VirtualInstrument):
     numbered = (1, 2)
     CHANNEL_ROWS: ClassVar = _CHANNEL
     ROWS: ClassVar[tuple[Row, ...]] = (Do("(BUZZ|BUZZER)"),)
+    DEFAULTS: ClassVar = {_key(n, name): value for n in numbered for name, value in _DEFAULTS.items()}
 
     def __init__(
         self, clock: Clock, *, listener: Callable[[float, Output], None] | None = None, identity: str | None = None
     ) -> None:
-        self._listener = listener
         super().__init__(clock, identity=identity)
-        for n in self.numbered:
-            self._defaults |= {_key(n, field.name): field.default for field in _FIELDS.values()}
-            others: dict[str, Value] = {"waveform": "SINE", "output": False, "load": INFINITE, "polarity": "NOR"}
-            self._defaults |= {_key(n, name): value for name, value in others.items()}
-        self.settings |= self._defaults
+        self._listener = listener
 
     def spell(self, value: float) -> str:
-        """As few digits as the number needs: 1000, 0.001."""
-        return f"{value:.12g}"
+        """Six digits, and none that is zero at the end: 1000, 0.001."""
+        return f"{value:.6g}"
 
     def changed(self, name: str) -> None:
         """Pass the voltage at the terminals of channel 1 to the listener."""
-        if self._listener and ":" not in name:
+        if self._listener and name.startswith("1:"):
             self._listener(self.clock.now(), self.signal())
 
     def reset(self) -> None:
         """The state after ``*RST``: all outputs off."""
-        self.settings |= self._defaults
-        self.changed("output")
+        self.settings |= self.commands.defaults
+        self.changed("1:output")
 
     def _number(self, n: int, name: str) -> float:
         return float(self.settings[_key(n, name)])
 
-    def _share(self, n: int) -> float:
+    def _load_factor(self, n: int) -> float:
         """Of the open-circuit voltage at the load."""
         load = self._number(n, "load")
         return 1.0 if load >= INFINITE else load / (load + SOURCE_OHM)
@@ -141,7 +145,7 @@ class VirtualSDG1000X(VirtualInstrument):
             elif key in _FIELDS:
                 field = _FIELDS[key]
                 sent = number(text, low=-1e99, high=1e99, default=field.default, unit=field.unit)
-                self._set_number(n, field, sent / self._share(n) if field.shown else sent)
+                self._set_number(n, field, sent / self._load_factor(n) if field.shown else sent)
             else:
                 raise ScpiError(-224, key[:20])
         self.changed(_key(n, "waveform"))
@@ -162,19 +166,17 @@ class VirtualSDG1000X(VirtualInstrument):
             return -reach, reach
         return (0.0, 360.0) if name == "phase" else (0.0, 100.0)
 
-    def wave(self, n: int, parameters: list[str]) -> str:
-        """BSWV?: all fields of the waveform.  Raises ScpiError."""
-        if parameters:
-            raise ScpiError(-108)
+    def wave(self, n: int) -> str:
+        """BSWV?: all fields of the waveform."""
         kind = str(self.settings[_key(n, "waveform")])
-        share, frequency = self._share(n), self._number(n, "frequency")
-        amplitude, offset = share * self._number(n, "amplitude"), share * self._number(n, "offset")
+        factor, frequency = self._load_factor(n), self._number(n, "frequency")
+        amplitude, offset = factor * self._number(n, "amplitude"), factor * self._number(n, "offset")
         fields = {
             "WVTP": kind,
-            "FRQ": self.spell(frequency) + "HZ",
-            "PERI": f"{1 / frequency:.6g}S",
+            "FRQ": f"{frequency:.10g}HZ",
+            "PERI": self.spell(1 / frequency) + "S",
             "AMP": self.spell(amplitude) + "V",
-            "AMPVRMS": f"{amplitude / _WAVEFORMS[kind][2]:.4g}Vrms",
+            "AMPVRMS": self.spell(amplitude / _WAVEFORMS[kind][2]) + "Vrms",
             "OFST": self.spell(offset) + "V",
             "HLEV": self.spell(offset + amplitude / 2) + "V",
             "LLEV": self.spell(offset - amplitude / 2) + "V",
@@ -199,7 +201,7 @@ class VirtualSDG1000X(VirtualInstrument):
             if key == "LOAD":
                 open_circuit = text.upper() == _OPEN
                 ohm = INFINITE if open_circuit else number(text, low=0, high=1e99, default=50, unit="OHM")
-                wanted["load"] = ohm if open_circuit else min(max(ohm, 50.0), _GREATEST_LOAD)
+                wanted["load"] = ohm if open_circuit else float(int(min(max(ohm, 50.0), _GREATEST_LOAD)))
             elif key == "PLRT":
                 wanted["polarity"] = choice(text, _POLARITIES)
             else:
@@ -207,10 +209,8 @@ class VirtualSDG1000X(VirtualInstrument):
         self.settings |= {_key(n, name): value for name, value in wanted.items()}
         self.changed(_key(n, "output"))
 
-    def output(self, n: int, parameters: list[str]) -> str:
-        """OUTP?: state, load, polarity.  Raises ScpiError."""
-        if parameters:
-            raise ScpiError(-108)
+    def output(self, n: int) -> str:
+        """OUTP?: state, load, polarity."""
         load = self._number(n, "load")
         state = "ON" if self.settings[_key(n, "output")] else "OFF"
         shown = _OPEN if load >= INFINITE else self.spell(load)

@@ -12,13 +12,14 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from instruments.virtual.core.device import VirtualInstrument, answers, does
-from instruments.virtual.core.parameters import number
-from instruments.virtual.core.parser import Command, ScpiError
+from instruments.virtual.core.device import VirtualInstrument
+from instruments.virtual.core.parameters import no_parameters, number
+from instruments.virtual.core.parser import Row, ScpiError, Value
+from instruments.virtual.core.rows import Ask, Both, Do, Own
 from instruments.virtual.magnetometer.hall_probe import HallProbe, Reading
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ _NOISE = 0.5
 
 
 @dataclass(frozen=True)
-class Number:
+class Field:
     """One of the numbers behind a header.  whole: printed as n, else as ±nnn.nnnE±nn."""
 
     name: str
@@ -73,6 +74,30 @@ class Number:
         return f"{int(value)}" if self.whole else field_text(value)
 
 
+@dataclass(frozen=True)
+class Fields(Row):
+    """A header with several numbers; those left out at the end stay as they are."""
+
+    fields: tuple[Field, ...]
+
+    def defaults(self) -> dict[str, Value]:
+        """See the base."""
+        return {field.name: field.default for field in self.fields}
+
+    def set(self, device: Any, parameters: list[str]) -> None:
+        """See the base."""
+        if not 1 <= len(parameters) <= len(self.fields):
+            raise ScpiError(-109 if not parameters else -108)
+        given = zip(self.fields, parameters, strict=False)
+        device.settings |= {field.name: field.read(text) for field, text in given}  # all of them or none
+        device.changed(self.fields[0].name)
+
+    def ask(self, device: Any, parameters: list[str]) -> str:
+        """See the base."""
+        no_parameters(parameters)
+        return ",".join(field.spell(device.settings[field.name]) for field in self.fields)
+
+
 def field_text(value: float) -> str:
     """A number as these instruments print it, ±nnn.nnnE±nn.
 
@@ -87,6 +112,42 @@ def field_text(value: float) -> str:
     return f"{value / 10.0**exponent:+08.3f}E{exponent:+03d}"
 
 
+_ALARM_FIELDS = (
+    Field("alarm", 0, 1, 0),
+    Field("alarm_mode", 1, 2, 1),
+    Field("alarm_low", -3.5e9, 3.5e9, 0, whole=False),
+    Field("alarm_high", -3.5e9, 3.5e9, 0, whole=False),
+    Field("alarm_inside", 1, 2, 1),
+    Field("alarm_sort", 0, 1, 0),
+    Field("alarm_audible", 0, 1, 1),
+)
+#: The commands of the family.
+FAMILY: tuple[Row, ...] = (
+    Fields("UNIT", (Field("unit", 1, 4, 1),)),
+    Own("AUTO", lambda d, p: d.set_auto(p), lambda d: f"{d.value('auto'):.0f}", ("auto", 1.0)),
+    Own("RANGE", lambda d, p: d.set_range(p), lambda d: f"{d.range_index() + 1}", ("range", 1.0)),
+    Ask("RDGFIELD", lambda d: d.answer(d.shown)),
+    Ask("RDGREL", lambda d: d.answer(lambda: d.shown() - d.relative_to)),
+    Ask("RDGMNMX", lambda d: d.extremes()),
+    Ask("OPST", lambda d: f"{d.operational_status():03d}"),
+    Ask("TYPE", lambda d: f"{_PROBE_TYPES.get(d.probe or '', 0):02d}"),
+    Ask("PRBSENS", lambda d: field_text(0.0 if d.probe is None else 1.0)),
+    Ask("PRBSNUM", lambda d: "" if d.probe is None else "H00001"),
+    Own("RELSP", lambda d, p: d.set_relative_to(p), lambda d: d.in_unit(d.relative_to)),
+    Do("ZPROBE", lambda d: d.begin_zeroing()),
+    Do("ZCLEAR", lambda d: d.clear_zero()),
+    Do("MXRST", lambda d: d.reset_extremes()),
+    Fields("MXHOLD", (Field("hold", 0, 1, 0),)),
+    Fields("LOCK", (Field("locked", 0, 1, 0), Field("lock_code", 0, 999, 123))),
+    Fields("BEEP", (Field("beep", 0, 1, 1),)),
+    Fields("BRIGT", (Field("brightness", 0, 3, 2),)),
+    Ask("KEYST", lambda _d: "00"),
+    Both("DFLT", lambda d, p: d.restore_factory_settings(p)),
+    Fields("ALARM", _ALARM_FIELDS),
+    Ask("ALARMST", lambda d: ",".join(f"{on:d}" for on in d.alarms())),
+)
+
+
 class VirtualGaussmeter(VirtualInstrument):
     """What 425, 455 and 475 have in common.
 
@@ -96,6 +157,8 @@ class VirtualGaussmeter(VirtualInstrument):
     """
 
     takes_blocks = False
+    COMMON: ClassVar[tuple[Row, ...]] = (Ask("*IDN", lambda d: d.identity), Do("*RST", lambda d: d.reset()))
+    ROWS: ClassVar = FAMILY
     line_end = "\r\n"
     #: Ranges by probe, lowest first [T].
     RANGES_T: ClassVar[dict[str, tuple[float, ...]]]
@@ -109,6 +172,7 @@ class VirtualGaussmeter(VirtualInstrument):
         probe: str | None = "HSE",
         zero_error: float = _ZERO_ERROR,
         seed: int = 0,
+        identity: str | None = None,
         pace: float = 10e-3,  # the manuals of the family: typically 10 ms until the answer begins
     ) -> None:
         self.probe, self._hall = probe, HallProbe(flux_density, zero_error)
@@ -117,11 +181,11 @@ class VirtualGaussmeter(VirtualInstrument):
         self._zeroed_at: float | None = None
         self._zero_done = False
         self._last: Reading | None = None
-        self._told: float | None = None  # the instant of the reading that was told last
-        self._relative_to = 0.0
+        self._answered: float | None = None  # the instant of the latest reading that was answered
+        self.relative_to = 0.0  # of RDGREL [T]
         self._lowest, self._highest = math.inf, -math.inf
         self._last_question = ""
-        super().__init__(clock, pace=pace)
+        super().__init__(clock, identity=identity, pace=pace)
 
     # --- messages ---
 
@@ -134,68 +198,16 @@ class VirtualGaussmeter(VirtualInstrument):
             self._last_question = message
         return super().steps(message)
 
-    def _common(self) -> tuple[Command, ...]:
-        return (Command("*IDN", get=answers(lambda: self.identity)), Command("*RST", set=does(self.reset)))
-
-    def table(self) -> tuple[Command, ...]:
-        """The commands of the family."""
-        self._defaults |= {"auto": 1.0, "range": 1.0}
-        return (
-            self.numbers("UNIT", Number("unit", 1, 4, 1)),
-            Command("AUTO", self._set_auto, answers(lambda: f"{int(self._value('auto'))}")),
-            Command("RANGE", self._set_range, answers(lambda: f"{self._range() + 1}")),
-            Command("RDGFIELD", get=answers(lambda: self._tell(self._shown))),
-            Command("RDGREL", get=answers(lambda: self._tell(lambda: self._shown() - self._relative_to))),
-            Command("RDGMNMX", get=answers(self._extremes)),
-            Command("OPST", get=answers(lambda: f"{self._operational_status():03d}")),
-            Command("TYPE", get=answers(lambda: f"{_PROBE_TYPES.get(self.probe or '', 0):02d}")),
-            Command("PRBSENS", get=answers(lambda: field_text(0.0 if self.probe is None else 1.0))),
-            Command("PRBSNUM", get=answers(lambda: "" if self.probe is None else "H00001")),
-            Command("RELSP", self._set_relative_to, answers(lambda: field_text(self._relative_to / self._unit()))),
-            Command("ZPROBE", set=does(self._begin_zeroing)),
-            Command("ZCLEAR", set=does(self._clear_zero)),
-            Command("MXRST", set=does(self._reset_extremes)),
-            self.numbers("MXHOLD", Number("hold", 0, 1, 0)),
-            self.numbers("LOCK", Number("locked", 0, 1, 0), Number("lock_code", 0, 999, 123)),
-            self.numbers("BEEP", Number("beep", 0, 1, 1)),
-            self.numbers("BRIGT", Number("brightness", 0, 3, 2)),
-            Command("KEYST", get=answers(lambda: "00")),
-            Command("DFLT", set=self._restore_factory_settings),
-            self.numbers(
-                "ALARM",
-                Number("alarm", 0, 1, 0),
-                Number("alarm_mode", 1, 2, 1),
-                Number("alarm_low", -3.5e9, 3.5e9, 0, whole=False),
-                Number("alarm_high", -3.5e9, 3.5e9, 0, whole=False),
-                Number("alarm_inside", 1, 2, 1),
-                Number("alarm_sort", 0, 1, 0),
-                Number("alarm_audible", 0, 1, 1),
-            ),
-            Command("ALARMST", get=answers(lambda: ",".join(f"{int(on)}" for on in self._alarms()))),
-        )
-
-    def numbers(self, pattern: str, *numbers: Number) -> Command:
-        """A row for a header with several numbers; those left out at the end stay as they are."""
-        self._defaults |= {one.name: one.default for one in numbers}
-
-        def set_(parameters: list[str]) -> None:
-            if not 1 <= len(parameters) <= len(numbers):
-                raise ScpiError(-109 if not parameters else -108)
-            given = zip(numbers, parameters, strict=False)
-            self.settings |= {one.name: one.read(text) for one, text in given}  # all of them or none
-            self.changed(numbers[0].name)
-
-        tell = answers(lambda: ",".join(one.spell(self._value(one.name)) for one in numbers))
-        return Command(pattern, set_, tell)
-
-    def _value(self, name: str) -> float:
-        return float(self.settings[name])
-
     def _unit(self) -> float:
-        return _UNITS_T[int(self._value("unit")) - 1]
+        return _UNITS_T[int(self.value("unit")) - 1]
 
-    def _restore_factory_settings(self, parameters: list[str]) -> None:
-        if parameters == ["99"]:  # so that nobody does it by mistake
+    def in_unit(self, value: float) -> str:
+        """A flux density [T] as it is printed in the present unit."""
+        return field_text(value / self._unit())
+
+    def restore_factory_settings(self, parameters: list[str]) -> None:
+        """DFLT 99; the number keeps it from being sent by mistake."""
+        if parameters == ["99"]:
             self.reset()
 
     # --- ranges ---
@@ -203,22 +215,22 @@ class VirtualGaussmeter(VirtualInstrument):
     def _ranges(self) -> tuple[float, ...]:
         return self.RANGES_T[self.probe or "HSE"]
 
-    def _set_auto(self, parameters: list[str]) -> None:
+    def set_auto(self, parameters: list[str]) -> None:
         """AUTO off/on.  PyMeasure sends it bare: taken for on."""
-        self.settings["auto"] = Number("auto", 0, 1, 1).read(parameters[0]) if parameters else 1.0
+        self.settings["auto"] = Field("auto", 0, 1, 1).read(parameters[0]) if parameters else 1.0
 
-    def _set_range(self, parameters: list[str]) -> None:
+    def set_range(self, parameters: list[str]) -> None:
         """RANGE n: a range chosen by hand switches the automatic choice off."""
         if len(parameters) != 1:
             raise ScpiError(-109)
-        self.settings |= {"range": Number("range", 1, len(self._ranges()), 1).read(parameters[0]), "auto": 0.0}
+        self.settings |= {"range": Field("range", 1, len(self._ranges()), 1).read(parameters[0]), "auto": 0.0}
 
-    def _range(self) -> int:
+    def range_index(self) -> int:
         """The index of the range in use; the automatic choice goes down at nine tenths of the lower range."""
         ranges = self._ranges()
-        index = min(int(self._value("range")), len(ranges)) - 1
-        if self._value("auto") and self.probe:
-            size = abs(self._measured())
+        index = min(int(self.value("range")), len(ranges)) - 1
+        if self.value("auto") and self.probe:
+            size = abs(self.measured())
             while index < len(ranges) - 1 and size > ranges[index]:
                 index += 1
             while index > 0 and size <= 0.9 * ranges[index - 1]:
@@ -240,7 +252,7 @@ class VirtualGaussmeter(VirtualInstrument):
         """From one reading to the next [s]."""
         return 1 / 30
 
-    def _reading(self) -> Reading:
+    def reading(self) -> Reading:
         """The latest reading at the time at which the message is worked on."""
         self._finish_zeroing()
         interval = self._interval()
@@ -253,11 +265,11 @@ class VirtualGaussmeter(VirtualInstrument):
 
     def _mode(self) -> int:
         """1: steady, 2: RMS, 3: peak."""
-        return int(self._value("mode"))
+        return int(self.value("mode"))
 
-    def _measured(self) -> float:
+    def measured(self) -> float:
         """The reading in the present mode before it is rounded [T]."""
-        reading = self._reading()
+        reading = self.reading()
         if self._mode() == 2:
             return reading.rms
         if self._mode() == 3:
@@ -268,66 +280,69 @@ class VirtualGaussmeter(VirtualInstrument):
         """Which of the peaks is shown [T]."""
         return reading.highest + self._hall.zero_error
 
-    def _shown(self) -> float:
+    def shown(self) -> float:
         """The reading as the instrument rounds it [T]."""
-        resolution = self._ranges()[self._range()] / self._counts()
-        reading = self._reading()
-        shown = round((self._measured() + _NOISE * reading.noise * resolution) / resolution) * resolution
-        self._told = reading.instant
+        resolution = self._ranges()[self.range_index()] / self._counts()
+        reading = self.reading()
+        shown = round((self.measured() + _NOISE * reading.noise * resolution) / resolution) * resolution
+        self._answered = reading.instant
         self._lowest, self._highest = min(self._lowest, shown), max(self._highest, shown)
         return shown
 
     def _overloaded(self) -> bool:
-        return self.probe is not None and abs(self._measured()) > self._ranges()[self._range()]
+        return self.probe is not None and abs(self.measured()) > self._ranges()[self.range_index()]
 
-    def _tell(self, value: Callable[[], float]) -> str:
+    def answer(self, value: Callable[[], float]) -> str:
         """A field [T] in the present unit, or why there is none."""
         if self.probe is None:
             return "NO PROBE"
-        return "OL" if self._overloaded() else field_text(value() / self._unit())
+        return "OL" if self._overloaded() else self.in_unit(value())
 
-    def _extremes(self) -> str:
+    def extremes(self) -> str:
         """RDGMNMX?: both, or on the 425 zero and the greatest."""
-        self._tell(self._shown)
+        self.answer(self.shown)
         seen = [value if math.isfinite(value) else 0.0 for value in (self._lowest, self._highest)]
-        return ",".join(field_text(value / self._unit()) for value in seen)
+        return ",".join(map(self.in_unit, seen))
 
-    def _reset_extremes(self) -> None:
+    def reset_extremes(self) -> None:
+        """MXRST: the extremes are those of the readings from now on."""
         self._lowest, self._highest = math.inf, -math.inf
 
-    def _set_relative_to(self, parameters: list[str]) -> None:
-        """RELSP: in the present unit."""
+    def set_relative_to(self, parameters: list[str]) -> None:
+        """RELSP: what RDGREL is relative to, in the present unit.  Raises ScpiError."""
         if len(parameters) != 1:
             raise ScpiError(-109)
         limit = 35.0 / self._unit()
-        self._relative_to = self._unit() * number(parameters[0], low=-limit, high=limit, default=0.0)
+        self.relative_to = self._unit() * number(parameters[0], low=-limit, high=limit, default=0.0)
 
-    def _alarms(self) -> tuple[bool, bool]:
+    def alarms(self) -> tuple[bool, bool]:
         """Whether the low and the high alarm are on."""
-        if not self._value("alarm") or self.probe is None:
+        if not self.value("alarm") or self.probe is None:
             return False, False
-        size = self._measured() / self._unit()
-        if self._value("alarm_mode") == 1:
+        size = self.measured() / self._unit()
+        if self.value("alarm_mode") == 1:
             size = abs(size)
-        low, high = self._value("alarm_low"), self._value("alarm_high")
-        if self._value("alarm_inside") == 2:
+        low, high = self.value("alarm_low"), self.value("alarm_high")
+        if self.value("alarm_inside") == 2:
             return (low < size < high,) * 2
         return size < low, size > high
 
     # --- status and zero ---
 
-    def _operational_status(self) -> int:
+    def operational_status(self) -> int:
+        """OPST?: what the probe and the last reading are like."""
         if self.probe is None:
             return _NO_PROBE
-        new = self._reading().instant != self._told
+        new = self.reading().instant != self._answered
         return (
             _OVERLOAD * self._overloaded()
             + _NEW_READING * new
-            + _ALARM * any(self._alarms())
+            + _ALARM * any(self.alarms())
             + _ZERO_DONE * self._zero_done
         )
 
-    def _begin_zeroing(self) -> None:
+    def begin_zeroing(self) -> None:
+        """ZPROBE: in a while the present field counts as zero."""
         self._zero_done = False
         self._zeroed_at = self._ready + _ZEROING
 
@@ -336,5 +351,6 @@ class VirtualGaussmeter(VirtualInstrument):
             self._zero = self._hall.steady(self._zeroed_at, self._time_constant())
             self._zeroed_at, self._zero_done = None, True
 
-    def _clear_zero(self) -> None:
+    def clear_zero(self) -> None:
+        """ZCLEAR: the zero is the probe's own."""
         self._zero, self._zeroed_at, self._zero_done = 0.0, None, False

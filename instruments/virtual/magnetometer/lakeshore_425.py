@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
-from instruments.virtual.core.device import answers
 from instruments.virtual.core.line import LineSettings
-from instruments.virtual.core.parser import Command
-from instruments.virtual.magnetometer.lakeshore import Number, VirtualGaussmeter, field_text
+from instruments.virtual.core.rows import Ask
+from instruments.virtual.magnetometer.lakeshore import FAMILY, Field, Fields, VirtualGaussmeter, field_text
+
+if TYPE_CHECKING:
+    from instruments.virtual.core.parser import Row
+
+_OWN: tuple[Row, ...] = (
+    Fields("RDGMODE", (Field("mode", 1, 2, 1), Field("filter", 0, 1, 1), Field("band", 1, 2, 1))),
+    Ask("RDGMX", lambda d: d.extremes().split(",")[1]),
+    Fields("REL", (Field("relative", 0, 1, 0),)),
+    Fields("RELAY", (Field("relay", 0, 2, 0), Field("relay_alarm", 1, 3, 3))),
+    Ask("RELAYST", lambda d: d.relay()),
+)
 
 
 class Virtual425(VirtualGaussmeter):
@@ -24,27 +34,20 @@ class Virtual425(VirtualGaussmeter):
         "UHS": (35e-6, 350e-6, 3.5e-3),
     }
 
-    def table(self) -> tuple[Command, ...]:
-        """The family's commands and its own."""
-        return (
-            *super().table(),
-            self.numbers("RDGMODE", Number("mode", 1, 2, 1), Number("filter", 0, 1, 1), Number("band", 1, 2, 1)),
-            Command("RDGMX", get=answers(lambda: self._extremes().split(",")[1])),
-            self.numbers("REL", Number("relative", 0, 1, 0)),
-            self.numbers("RELAY", Number("relay", 0, 2, 0), Number("relay_alarm", 1, 3, 3)),
-            Command("RELAYST", get=answers(self._relay)),
-        )
+    ROWS: ClassVar = (*FAMILY, *_OWN)
 
     def _time_constant(self) -> float:
-        return 0.1 if self._value("filter") else 0.01
+        return 0.1 if self.value("filter") else 0.01
 
     def _counts(self) -> float:
-        return 35_000.0 if self._value("filter") and self._mode() == 1 else 3500.0
+        return 35_000.0 if self.value("filter") and self._mode() == 1 else 3500.0
 
-    def _extremes(self) -> str:
-        return field_text(0.0) + "," + super()._extremes().split(",")[1]
+    def extremes(self) -> str:
+        """See the base: zero and the greatest."""
+        return field_text(0.0) + "," + super().extremes().split(",")[1]
 
-    def _relay(self) -> str:
-        low, high = self._alarms()
-        by_alarm = (low, high, low or high)[int(self._value("relay_alarm")) - 1]
-        return f"{int((False, True, by_alarm)[int(self._value('relay'))])}"
+    def relay(self) -> str:
+        """RELAYST?: whether the relay is on."""
+        low, high = self.alarms()
+        by_alarm = (low, high, low or high)[int(self.value("relay_alarm")) - 1]
+        return f"{int((False, True, by_alarm)[int(self.value('relay'))])}"

@@ -54,26 +54,35 @@ class Acquisition:
     """Run, stop, single: whether the scope acquires, and the latest record.  It knows times, and no settings.
 
     plan: what is acquired when the scope is armed at a time [s]; keeps_old: whether the old record can be read until a
-    single one is complete.  now: the time at which a message is worked on [s].
+    single one is complete; switched_on: when the scope begins to acquire, over and over [s].  now: the time at which a
+    message is worked on [s].
 
     latest: the latest record; armed: since when the scope acquires [s], None when it has stopped; once: for a single
     record; blocked: by a single record whose trigger never comes; was_armed, was_triggered: until the event is read.
     """
 
-    def __init__(self, plan: Callable[[float], Plan], *, keeps_old: bool) -> None:
+    def __init__(self, plan: Callable[[float], Plan], *, keeps_old: bool, switched_on: float) -> None:
         self._make_plan, self._keeps_old = plan, keeps_old
         self.latest: Record | None = None
-        self.armed: float | None = None
+        self.armed: float | None = switched_on
         self.once = self.blocked = False
-        self.was_armed = self.was_triggered = False
+        self.was_armed, self.was_triggered = True, False
+        self._planned: Plan | None = None
         self._edge: Edge | None = None
         self._forced = math.inf
+
+    @property
+    def _plan(self) -> Plan:
+        """What is acquired; of the first record, for which nothing was set yet, it is made when it is needed."""
+        if self._planned is None:
+            self._planned = self._make_plan(self.armed or 0.0)
+        return self._planned
 
     # --- transitions ---
 
     def arm(self, now: float, *, once: bool) -> None:
         """Begin to acquire, over and over or once."""
-        self._plan = self._make_plan(now)
+        self._planned = self._make_plan(now)
         self.latest, self.armed, self.once = None, now, once
         self._edge, self._forced = None, math.inf
         self.was_armed = True

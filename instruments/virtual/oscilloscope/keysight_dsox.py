@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from instruments.virtual.core.parameters import choice, none, number, one
-from instruments.virtual.core.parser import ScpiError
-from instruments.virtual.core.rows import Ask, Both, Do, Number, Row, Switch, Text, Word, whole
+from instruments.virtual.core.parameters import choice, number, parameter
+from instruments.virtual.core.parser import Row, ScpiError
+from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Switch, Text, Word, whole
 from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope, at_input
 from instruments.virtual.oscilloscope.screenshot import bmp8, bmp24, draw, grey, png
 
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from instruments.clock import Clock
-    from instruments.virtual.core.device import Value
-    from instruments.virtual.oscilloscope.record import Record, Signal
+    from instruments.virtual.core.signal import Signal
+    from instruments.virtual.oscilloscope.record import Record
 
 #: The fastest rate [1/s].
 _FASTEST = 2e9
@@ -141,7 +141,7 @@ _TIME: tuple[Row, ...] = (
 )
 _TRIGGER: tuple[Row, ...] = (
     Word("TRIGger:MODE", "trigger_mode", "EDGE GLITch PATTern TV SHOLd TRANsition SBUS1"),
-    Word("TRIGger[:EDGE]:SOURce", "trigger_source", lambda s: _names(s) + " EXTernal LINE WGEN"),
+    Word("TRIGger[:EDGE]:SOURce", "trigger_source", lambda s: _names(s) + " EXTernal LINE WGEN", "CHAN1"),
     Word("TRIGger[:EDGE]:SLOPe", "trigger_slope", "NEGative *POSitive EITHer ALTernate"),
     Number("TRIGger[:EDGE]:LEVel", "trigger_level", 0.0, _levels, "V"),
     Do("TRIGger:LEVel:ASETup", lambda s: s.half_level()),
@@ -157,19 +157,19 @@ _TRIGGER: tuple[Row, ...] = (
 _PARTS = {"TYPE": 1, "COUNt": 3, "XINCrement": 4, "XORigin": 5, "XREFerence": 6}
 _PARTS |= {"YINCrement": 7, "YORigin": 8, "YREFerence": 9}
 _WAVEFORM: tuple[Row, ...] = (
-    Word("WAVeform:SOURce", "wav_source", lambda s: " ".join((_names(s), *_EMPTY_SOURCES))),
+    Word("WAVeform:SOURce", "wav_source", lambda s: " ".join((_names(s), *_EMPTY_SOURCES)), "CHAN1"),
     Word("WAVeform:FORMat", "wav_format", "WORD *BYTE ASCii"),
     Word("WAVeform:BYTeorder", "wav_order", "LSBFirst *MSBFirst"),
     Switch("WAVeform:UNSigned", "wav_unsigned", default=True),
     Word("WAVeform:VIEW", "wav_view", "MAIN"),
     Word("WAVeform:POINts:MODE", "wav_mode", "NORMal MAXimum RAW"),
-    Both("WAVeform:POINts", lambda s, p: s.set_points(p), lambda s, p: s.points(p)),
+    Own("WAVeform:POINts", lambda s, p: s.set_points(p), lambda s: f"{s.sequence()[2]:+d}"),
     Ask("WAVeform:PREamble", lambda s: ",".join(s.preamble())),
     *(Ask(f"WAVeform:{word}", lambda s, k=k: s.preamble()[k]) for word, k in _PARTS.items()),
     Ask("WAVeform:DATA", lambda s: s.data()),
 )
 _REST: tuple[Row, ...] = (
-    Both("MEASure:SOURce", lambda s, p: s.set_source(p), lambda s, p: s.source(p)),
+    Own("MEASure:SOURce", lambda s, p: s.set_source(p), lambda s: str(s.settings["measure_source"])),
     Word("MEASure:SHOW", "measure_shown", "1 ON"),
     Do("MEASure:CLEar", lambda s: s.clear_results()),
     Ask("MEASure:RESults", lambda s: s.all_results()),
@@ -196,6 +196,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
     columns, lowest, digits = 10, 1, 8
     transfer = 5e6
     CHANNEL_ROWS: ClassVar = _CHANNEL
+    DEFAULTS: ClassVar = {"wav_points": float(_FOR_SCREEN), "measure_source": "CHAN1"}
     ROWS: ClassVar = (*_CONTROL, *_TIME, *_TRIGGER, *_WAVEFORM, *_REST)
 
     def __init__(
@@ -210,9 +211,6 @@ class VirtualDSOX1000(VirtualOscilloscope):
         self._memory = memory
         self._results: list[tuple[str, int]] = []
         super().__init__(clock, signals=signals, channels=channels, identity=identity)
-        own: dict[str, Value] = {"wav_points": float(_FOR_SCREEN), "measure_source": "CHAN1"}
-        self._defaults |= own
-        self.settings |= own
 
     def spell(self, value: float) -> str:
         """Seven digits, as in the preamble of a real one."""
@@ -326,7 +324,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
         volts_per_code = 8 * self.division(channel) / _CODES_ON_SCREEN
         return volts_per_code, self.middle - round(self.value(f"chan{channel}_offset") / volts_per_code)
 
-    def window(self, channel: int) -> tuple[float, float]:
+    def codes_on_screen(self, channel: int) -> tuple[float, float]:
         """Eight divisions around the middle."""
         return float(self.middle), float(_CODES_ON_SCREEN)
 
@@ -338,7 +336,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
 
     def set_points(self, parameters: list[str]) -> None:
         """A number, rounded to the next the scope can give when it is asked for; MAXimum takes all."""
-        self.settings["wav_points"] = number(one(parameters), low=1, high=8e6, default=_FOR_SCREEN)
+        self.settings["wav_points"] = number(parameter(parameters), low=1, high=8e6, default=_FOR_SCREEN)
 
     def sequence(self) -> tuple[Record, float, int]:
         """The record, the distance of the points that can be read [s], how many.  Raises ScpiError."""
@@ -350,13 +348,6 @@ class VirtualDSOX1000(VirtualOscilloscope):
         wanted = self.value("wav_points")
         every = math.ceil(record.points / min(max(wanted, 1), most))
         return record, every / record.rate, max(1, record.points // every)
-
-    def _source(self) -> int:
-        """Raises ScpiError for a source with nothing in it."""
-        source = str(self.settings["wav_source"])
-        if not source.startswith("CHAN"):
-            raise ScpiError(-230)
-        return int(source[4:])
 
     def preamble(self) -> list[str]:
         """WAVeform:PREamble?: its ten fields.  Raises ScpiError."""
@@ -410,11 +401,6 @@ class VirtualDSOX1000(VirtualOscilloscope):
         scale = record.inputs[channel]
         return ",".join(f"{v:+.5E}" for v in (codes - scale.zero) * scale.volts_per_code).encode()
 
-    def points(self, parameters: list[str]) -> str:
-        """WAVeform:POINts?: how many there are."""
-        none(parameters)
-        return f"{self.sequence()[2]:+d}"
-
     # --- measurements and pictures ---
 
     def set_source(self, parameters: list[str]) -> None:
@@ -430,11 +416,6 @@ class VirtualDSOX1000(VirtualOscilloscope):
         if not parameters or parameters[-1].upper() in {"CYCL", "CYCLE", "DISP", "DISPLAY", "AC", "DC"}:
             return self.channel_of(str(self.settings["measure_source"]))
         return self.channel_of(parameters[-1])
-
-    def source(self, parameters: list[str]) -> str:
-        """MEASure:SOURce?."""
-        none(parameters)
-        return str(self.settings["measure_source"])
 
     def install(self, name: str, parameters: list[str]) -> None:
         """MEASure:FREQuency and its like: a measurement more on the screen.  Raises ScpiError."""
@@ -463,7 +444,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
         form, palette = (*parameters, *("BMP", "COLor")[len(parameters) :])
         writers = {"BMP": bmp24, "BMP8": bmp8, "PNG": png}
         write = writers[choice(form, ("BMP", "BMP8bit", "PNG"))]
-        picture = draw(self.heights(), columns=self.columns)
+        picture = draw(self.traces_on_screen(), columns=self.columns)
         grey_wanted = choice(palette, ("COLor", "GRAYscale", "MONochrome")) != "COL"
         picture = grey(picture) if grey_wanted else picture
         return self.block(write(255 - picture if self.settings["ink_saver"] else picture))

@@ -64,9 +64,11 @@ class Measured:
 
     @cached_property
     def period(self) -> float:
-        """Mean time between edges of the same kind [s]; raises IndexError if there are not two."""
+        """Mean time between edges of the same kind [s]; raises NotMeasurable if there are not two."""
         found = self.rises if self.rises.size > 1 else self.falls
-        return float((found[-1] - found[0]) / (found.size - 1 or _nothing())) * self.step
+        if found.size < 2:
+            raise NotMeasurable
+        return float((found[-1] - found[0]) / (found.size - 1)) * self.step
 
     @cached_property
     def positive_width(self) -> float:
@@ -85,8 +87,9 @@ class Measured:
 
     def whole_periods(self) -> Volts:
         """The samples from the first rising edge to the last."""
-        first, last = round(self.rises[0]), round(self.rises[-1])
-        return self.volts[first:last] if last > first else self.volts[_nothing() :]
+        if self.rises.size < 2:
+            raise NotMeasurable
+        return self.volts[round(self.rises[0]) : round(self.rises[-1])]
 
     def overshoot(self) -> float:
         """How far the trace goes beyond its top, in parts of the amplitude."""
@@ -97,12 +100,13 @@ class Measured:
         return (self.base - float(self.volts.min())) / self._amplitude()
 
     def _amplitude(self) -> float:
-        return self.top - self.base or _nothing()
+        if self.top == self.base:
+            raise NotMeasurable
+        return self.top - self.base
 
 
-def _nothing() -> int:
-    """In the place of a number that the trace does not give."""
-    raise IndexError
+class NotMeasurable(Exception):
+    """The trace does not show what a measurement needs."""
 
 
 def _level(volts: Volts, *, upper: bool) -> float:
@@ -123,7 +127,7 @@ def _mean_gap(starts: Volts, ends: Volts) -> float:
     following = np.searchsorted(ends, starts)
     there = following < ends.size
     if not there.any():
-        _nothing()
+        raise NotMeasurable
     return float(np.mean(ends[following[there]] - starts[there]))
 
 
@@ -176,5 +180,5 @@ def measure(name: str, trace: Measured) -> float | None:
     """
     try:
         return MEASUREMENTS[name](trace)
-    except (IndexError, ZeroDivisionError):
+    except (NotMeasurable, ZeroDivisionError):
         return None

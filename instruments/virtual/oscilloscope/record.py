@@ -8,14 +8,17 @@ functions of time.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-#: The voltage at an input: (start [s], step [s], n) → shape (n,) [V].
-Signal = Callable[[float, float, int], NDArray[np.float64]]
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from instruments.virtual.core.signal import Signal
+
 Codes = NDArray[np.uint8]
 
 #: Samples taken from a signal at once, and at which places a record is cut into pieces: a multiple of what one block
@@ -25,11 +28,6 @@ PIECE = 250_000
 COARSEST = 50e-6
 #: So many looks are as fine as the record wants; a signal too fast for the coarse ones has triggered by then.
 _FINE_LOOKS = 100_000
-
-
-def open_input(_start: float, _step: float, n: int) -> NDArray[np.float64]:
-    """Nothing is connected: 0 V."""
-    return np.zeros(n)
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
-from instruments.virtual.core.parameters import at_most_one, boolean, choice, limit, number, one
-from instruments.virtual.core.parser import ScpiError
-from instruments.virtual.core.rows import Ask, Both, Do, Number, Row, Switch, Word, whole
+from instruments.virtual.core.parameters import boolean, choice, limit, number, optional_parameter, parameter
+from instruments.virtual.core.parser import Row, ScpiError
+from instruments.virtual.core.rows import Ask, Both, Do, Number, Switch, Word, whole
 from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope, at_input, one_two_five
 from instruments.virtual.oscilloscope.screenshot import bmp8, bmp24, draw, grey, png
 
@@ -129,7 +129,7 @@ _TIME: tuple[Row, ...] = (
 )
 _TRIGGER: tuple[Row, ...] = (
     Word("TRIGger:MODE", "trigger_mode", "EDGE PULSe SLOPe VIDeo TIMeout"),
-    Word("TRIGger:EDGe:SOURce", "trigger_source", lambda s: _names(s) + " EXT EXT5 ACLine"),
+    Word("TRIGger:EDGe:SOURce", "trigger_source", lambda s: _names(s) + " EXT EXT5 ACLine", "CHAN1"),
     Word("TRIGger:EDGe:SLOPe", "trigger_slope", "POSitive NEGative RFALl"),
     Number("TRIGger[:EDGe]:LEVel", "trigger_level", 0.0, _levels, "V"),
     Word("TRIGger:SWEep", "trigger_sweep", "AUTO NORMal SINGle"),
@@ -141,7 +141,7 @@ _TRIGGER: tuple[Row, ...] = (
 )
 _PARTS = ("XINCrement", "XORigin", "XREFerence", "YINCrement", "YORigin", "YREFerence")
 _WAVEFORM: tuple[Row, ...] = (
-    Word("WAVeform:SOURce", "wav_source", _names),
+    Word("WAVeform:SOURce", "wav_source", _names, "CHAN1"),
     Word("WAVeform:MODE", "wav_mode", "NORMal MAXimum RAW"),
     Word("WAVeform:FORMat", "wav_format", "WORD *BYTE ASCii"),
     whole("WAVeform:STARt", "wav_start", 1.0, (1, 24e6)),
@@ -154,7 +154,7 @@ _WAVEFORM: tuple[Row, ...] = (
 #: What only changes the picture.
 _IGNORED = ("CLEar", "RECover", "ADISplay", "AMSource", "STATistic:DISPlay", "STATistic:RESet")
 _REST: tuple[Row, ...] = (
-    Word("MEASure:SOURce", "measure_source", _names),
+    Word("MEASure:SOURce", "measure_source", _names, "CHAN1"),
     Both("MEASure:ITEM", lambda s, p: s.install(p), lambda s, p: s.item(p)),
     Both("MEASure:STATistic:ITEM", lambda s, p: s.install(p), lambda s, p: s.statistic(p)),
     *(
@@ -174,7 +174,7 @@ _REST: tuple[Row, ...] = (
     Ask("SYSTem:ERRor:COUNt", lambda s: str(len(s.parser.errors))),
     Ask("SYSTem:GAM", lambda _s: "12"),
     Ask("SYSTem:RAM", lambda s: str(len(s.channels))),
-    Both("MATH:DISPlay", lambda _s, p: _never(boolean(one(p))), lambda _s, _p: "0"),
+    Both("MATH:DISPlay", lambda _s, p: _refuse_mathematics(boolean(parameter(p))), lambda _s, _p: "0"),
 )
 
 
@@ -255,7 +255,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
 
     def set_depth(self, parameters: list[str]) -> None:
         """ACQuire:MDEPth: AUTO, or one of the depths.  Raises ScpiError."""
-        text = one(parameters).upper()
+        text = parameter(parameters).upper()
         if text != "AUTO":
             depths = self._depths()
             points = int(number(text, low=depths[0], high=depths[-1], default=depths[0]))
@@ -267,7 +267,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
 
     def depth(self, parameters: list[str]) -> str:
         """ACQuire:MDEPth?: what is set, or its limits.  Raises ScpiError."""
-        asked, depths = at_most_one(parameters), self._depths()
+        asked, depths = optional_parameter(parameters), self._depths()
         return (
             str(int(limit(asked, low=depths[0], high=depths[-1], default=depths[0])))
             if asked
@@ -386,13 +386,13 @@ class VirtualDS1000Z(VirtualOscilloscope):
         colour, invert, form = (*parameters, *("ON", "OFF", "BMP24")[len(parameters) :])
         writers = {"BMP24": lambda p: bmp24(p) + b"\0\0", "BMP8": bmp8, "PNG": png}
         name = choice(form, tuple(writers))
-        picture = draw(self.heights(), columns=self.columns)
+        picture = draw(self.traces_on_screen(), columns=self.columns)
         picture = picture if boolean(colour) else grey(picture)
         picture = 255 - picture if invert.upper() in {"ON", "1", "INVERT", "INV"} else picture
         return self.block(writers[name](picture))
 
 
-def _never(on: bool) -> None:  # noqa: FBT001
+def _refuse_mathematics(on: bool) -> None:  # noqa: FBT001
     """There is no mathematics in this model.  Raises ScpiError when it is switched on."""
     if on:
         raise ScpiError(-221)

@@ -12,14 +12,15 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from instruments.virtual.core.device import Value, VirtualInstrument
-from instruments.virtual.core.parameters import block_content, block_text, choice, number, one
+from instruments.virtual.core.device import VirtualInstrument
+from instruments.virtual.core.parameters import block_content, block_text, choice, number, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Both, short_header
+from instruments.virtual.core.signal import Signal, no_signal
 from instruments.virtual.core.trigger import crossings
 from instruments.virtual.oscilloscope.acquisition import LOOK_AHEAD, Acquisition, Plan
 from instruments.virtual.oscilloscope.measure import Measured, measure
-from instruments.virtual.oscilloscope.record import COARSEST, Edge, Input, Record, open_input
+from instruments.virtual.oscilloscope.record import COARSEST, Edge, Input, Record
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from instruments.clock import Clock
-    from instruments.virtual.oscilloscope.record import Signal
+    from instruments.virtual.core.parser import Value
 
 #: Below the level by this part of a division the trigger is armed again.
 _HYSTERESIS = 0.3
@@ -50,9 +51,10 @@ class VirtualOscilloscope(VirtualInstrument):
 
     signals: the voltage at each input, by channel; an input without one is open, 0 V.
 
-    Each row of a setting that is part of the setup is remembered with its header, to keep and restore it.
+    Each setting that has a row is part of the setup, which can be kept and restored.
     """
 
+    lenient = True
     #: Divisions of the screen from left to right.
     columns: ClassVar[int]
     #: What a code cannot go beyond.
@@ -72,14 +74,12 @@ class VirtualOscilloscope(VirtualInstrument):
     def __init__(
         self, clock: Clock, *, signals: Mapping[int, Signal], channels: int = 4, identity: str | None = None
     ) -> None:
-        self.channels = self.numbered = range(1, channels + 1)
+        self.channels = range(1, channels + 1)
         self._signals = signals
-        self.acquisition = Acquisition(self._plan, keeps_old=self.keeps_old)
-        self._headers: dict[str, str] = {}
+        self.acquisition = Acquisition(self._plan, keeps_old=self.keeps_old, switched_on=clock.now())
         self._restoring = False
         self._kept: dict[int, str] = {}
-        super().__init__(clock, identity=identity)
-        self.run()
+        super().__init__(clock, identity=identity, numbered=self.channels)
 
     # --- what a subclass says of its numbers and its scaling ---
 
@@ -103,7 +103,7 @@ class VirtualOscilloscope(VirtualInstrument):
         volts_per_code = self.division(channel) / self.codes_per_division
         return volts_per_code, self.middle + round(self.value(f"chan{channel}_offset") / volts_per_code)
 
-    def window(self, channel: int) -> tuple[float, float]:
+    def codes_on_screen(self, channel: int) -> tuple[float, float]:
         """The code in the middle of the screen, and how many codes it is high: eight divisions."""
         return float(self.middle), 8.0 * self.codes_per_division
 
@@ -112,15 +112,6 @@ class VirtualOscilloscope(VirtualInstrument):
         self.settings |= {f"chan{channel}_scale": division, f"chan{channel}_offset": -middle}
 
     # --- settings ---
-
-    def declare(self, name: str, header: str, default: Value) -> None:
-        """There is this setting; it is part of the setup."""
-        super().declare(name, header, default)
-        self._headers[name] = ":" + short_header(header)
-
-    def value(self, name: str) -> float:
-        """A setting that is a number."""
-        return float(self.settings[name])
 
     def level_name(self, channel: int) -> str:
         """The setting that holds the trigger level of a channel."""
@@ -188,7 +179,12 @@ class VirtualOscilloscope(VirtualInstrument):
 
     def setup(self) -> bytes:
         """All settings, as messages that restore them."""
-        return "\n".join(f"{header} {self._spelled(name)}" for name, header in self._headers.items()).encode("latin-1")
+        headers = self._headers().items()
+        return "\n".join(f"{header} {self._spelled(name)}" for name, header in headers).encode("latin-1")
+
+    def _headers(self) -> dict[str, str]:
+        """Each setting that is part of the setup, and the shortest header of its row."""
+        return {name: ":" + short_header(row.header) for row in self.commands.rows for name in row.defaults()}
 
     def _spelled(self, name: str) -> str:
         value: Value = self.settings[name]
@@ -202,7 +198,7 @@ class VirtualOscilloscope(VirtualInstrument):
         """Settings from messages; a setup that is none leaves what it had already set.  Raises ScpiError."""
         if self._restoring:
             raise ScpiError(-224)
-        known = set(self._headers.values())
+        known = set(self._headers().values())
         self._restoring = True
         try:
             for line in setup.split("\n"):
@@ -247,10 +243,10 @@ class VirtualOscilloscope(VirtualInstrument):
         return Plan(record, partial(self._search, record), automatic=self.settings["trigger_sweep"] == "AUTO")
 
     def _input(self, channel: int, start: float) -> Input:
-        signal = self._signals.get(channel, open_input)
+        signal = self._signals.get(channel, no_signal)
         coupling = self.settings[f"chan{channel}_coupling"]
         if coupling == "GND":
-            signal = open_input
+            signal = no_signal
         mean = 0.0
         if str(coupling).startswith("A"):
             begin = max(0.0, start - 0.5)
@@ -350,14 +346,14 @@ class VirtualOscilloscope(VirtualInstrument):
         value = measure(name, self.on_screen(channel))
         return self.no_measurement if value is None else value
 
-    def heights(self) -> dict[int, NDArray[np.float64]]:
+    def traces_on_screen(self) -> dict[int, NDArray[np.float64]]:
         """For the picture: each shown trace, 800 columns from the lower edge of the screen, 0, to the upper, 1."""
         record = self.record()
         heights: dict[int, NDArray[np.float64]] = {}
         start, length = record.screen
         for n in self.shown():
             codes = record.codes(n, 0, 800, of=800, start=start, step=length / 800)
-            middle, span = self.window(n)
+            middle, span = self.codes_on_screen(n)
             heights[n] = 0.5 + (codes.astype(np.float64) - middle) / span
         return heights
 
@@ -374,7 +370,7 @@ class VirtualOscilloscope(VirtualInstrument):
     def autoscale(self) -> None:
         """Scale, offset, time base and level to fit what stands at the inputs."""
         for n in self.channels:
-            signal, factor = self._signals.get(n, open_input), self.probe(n)
+            signal, factor = self._signals.get(n, no_signal), self.probe(n)
             volts = factor * signal(max(0.0, self.now - 0.5), COARSEST, round(0.5 / COARSEST))
             low, high = float(volts.min()), float(volts.max())
             if high - low < 0.02 * factor:
@@ -393,13 +389,13 @@ class VirtualOscilloscope(VirtualInstrument):
 
 
 def _place(parameters: list[str]) -> int:
-    return int(number(one(parameters), low=0, high=9, default=0))
+    return int(number(parameter(parameters), low=0, high=9, default=0))
 
 
 #: The setup as a block, and setups in ten places.
 SETUP = Both(
     "SYSTem:SETup",
-    lambda s, p: s.restore(block_content(one(p)).decode("latin-1")),
+    lambda s, p: s.restore(block_content(parameter(p)).decode("latin-1")),
     lambda s, _p: s.block(s.setup()),
 )
 PRESETS = (Both("*SAV", lambda s, p: s.keep(p)), Both("*RCL", lambda s, p: s.recall(p)))

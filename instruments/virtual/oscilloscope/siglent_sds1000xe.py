@@ -13,9 +13,9 @@ import math
 import struct
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from instruments.virtual.core.parameters import choice, one
-from instruments.virtual.core.parser import Command, ScpiError
-from instruments.virtual.core.rows import Ask, Both, Do, Number, Row, Switch, Word, short_header
+from instruments.virtual.core.parameters import choice, parameter
+from instruments.virtual.core.parser import Row, ScpiError
+from instruments.virtual.core.rows import Ask, Both, Do, Number, Switch, Word, short_header
 from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope, at_input, one_two_five
 from instruments.virtual.oscilloscope.screenshot import bmp24, draw
 
@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from instruments.clock import Clock
-    from instruments.virtual.oscilloscope.record import Record, Signal
+    from instruments.virtual.core.signal import Signal
+    from instruments.virtual.oscilloscope.record import Record
 
 _COLUMNS = 14
 #: The fastest rate [1/s] and the points of the memory, where one channel of a pair is on; half of both with two.
@@ -111,17 +112,13 @@ class VirtualSDS1000XE(VirtualOscilloscope):
     path_memory = False
     ROWS: ClassVar = (*_REST, *PRESETS)
     CHANNEL_ROWS: ClassVar = _CHANNEL
+    DEFAULTS: ClassVar = {"trigger_source": "C1"}
 
     def __init__(
         self, clock: Clock, *, signals: Mapping[int, Signal], channels: int = 4, identity: str | None = None
     ) -> None:
         self._setup = {"SP": 0, "NP": 0, "FP": 0}
         super().__init__(clock, signals=signals, channels=channels, identity=identity)
-
-    def table(self) -> tuple[Command, ...]:
-        """Its commands, and the source of its trigger."""
-        self._defaults["trigger_source"] = "C1"
-        return super().table()
 
     def reset(self) -> None:
         """The state after ``*RST``; how answers look stays."""
@@ -196,8 +193,8 @@ class VirtualSDS1000XE(VirtualOscilloscope):
 
     def stop_key(self) -> None:
         """STOP: the mode says so."""
-        self.settings["trigger_sweep"] = "STOP"
         self.stop()
+        self.settings["trigger_sweep"] = "STOP"
 
     def running(self) -> bool:
         """See the base; a single record ends the mode SINGLE."""
@@ -238,7 +235,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
     def set_depth(self, parameters: list[str]) -> None:
         """MSIZ 14K: obeyed when stopped.  Raises ScpiError."""
         words = [*_DEPTHS, *_HALVES]
-        word = choice(one(parameters).upper(), tuple(words))
+        word = choice(parameter(parameters).upper(), tuple(words))
         if self.running():
             raise ScpiError(-221)
         self.settings["depth"] = list(_DEPTHS)[words.index(word) % len(_DEPTHS)]
@@ -285,7 +282,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
 
     def waveform(self, n: int, parameters: list[str]) -> str:
         """WF? DESC, DAT2 or ALL.  Raises ScpiError."""
-        part = choice(one(parameters), ("DESC", "DAT2", "ALL"))
+        part = choice(parameter(parameters), ("DESC", "DAT2", "ALL"))
         record = self.record()
         data = b"" if part == "DAT2" else self._descriptor(record, n)
         if part != "DESC":
@@ -325,14 +322,14 @@ class VirtualSDS1000XE(VirtualOscilloscope):
 
     def sample_number(self, parameters: list[str]) -> str:
         """SANU? C1: points of the record, as 14Mpts."""
-        choice(one(parameters), tuple(f"C{n}" for n in self.channels))
+        choice(parameter(parameters), tuple(f"C{n}" for n in self.channels))
         points = self.full_scale()[1]
         scale, prefix = (1e6, "M") if points >= 1e6 else (1e3, "k") if points >= 1e3 else (1, "")
         return self.reply("SANU", f"{points / scale:g}{prefix}", "pts")
 
     def parameter_value(self, n: int, parameters: list[str]) -> str:
         """PAVA? PKPK: name and value, stars where the trace does not show it."""
-        word = choice(one(parameters), tuple(_MEASUREMENTS))
+        word = choice(parameter(parameters), tuple(_MEASUREMENTS))
         name, unit = _MEASUREMENTS[word]
         value = self.measured(name, n)
         shown = "****" if value >= self.no_measurement or math.isnan(value) else self.spell(value)
@@ -340,4 +337,4 @@ class VirtualSDS1000XE(VirtualOscilloscope):
 
     def picture(self) -> str:
         """SCDP: a bitmap, in no block."""
-        return bmp24(draw(self.heights(), columns=self.columns)).decode("latin-1")
+        return bmp24(draw(self.traces_on_screen(), columns=self.columns)).decode("latin-1")

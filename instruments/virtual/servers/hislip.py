@@ -106,7 +106,7 @@ class Client:
     async def _let_in(self, message: Message) -> bool:
         """Wait until the instrument may take a message; whether it may: a device clear ends the wait."""
         await self.link.turn(given_up=lambda: self.clearing)
-        if not self.link.cut_off_by(message.payload, end=message.type == Type.DATA_END):
+        if not self.link.is_abort(message.payload, end=message.type == Type.DATA_END):
             await self.link.finished(given_up=lambda: self.clearing)
         return not self.clearing
 

@@ -76,7 +76,7 @@ class Job:
         """Whether the instrument may take the message now."""
         link = self.link
         if link.station.working:
-            return link.session.cut_off_by(self.message or "") and not link.kept_out()
+            return link.session.is_abort(self.message or "") and not link.kept_out()
         if self.work or not link.session.stream:  # the servers of the other protocols have waited for the lock
             return True
         return not link.kept_out() and not link.answers_wait()  # they follow each other: the last one goes first
@@ -124,7 +124,7 @@ class Station:
         """Nothing more of what this client has sent."""
         if self._under_way and self._under_way.link is link:
             if self._under_way.work:
-                link.session.give_up(self._under_way.work)
+                link.session.cancel(self._under_way.work)
             self._under_way = None
         self._jobs = deque(job for job in self._jobs if job.link is not link)
 
@@ -235,7 +235,7 @@ class Link:
         time [s].
         """
         self.station.bus.heard()
-        if not self.cut_off_by(data, end=end) and not await self.finished(within, given_up=given_up):
+        if not self.is_abort(data, end=end) and not await self.finished(within, given_up=given_up):
             return False
         self._raise_error()
         job = Job(self, self.session.messages(data, end=end))
@@ -247,9 +247,9 @@ class Link:
         if self.error:
             raise self.error
 
-    def cut_off_by(self, data: bytes, *, end: bool = True) -> bool:
-        """Whether these bytes end what the instrument works on; see Session.cut_off_by."""
-        return self.station.working and not self.kept_out() and self.session.cut_off_by_bytes(data, end=end)
+    def is_abort(self, data: bytes, *, end: bool = True) -> bool:
+        """Whether these bytes end what the instrument works on; see Session.is_abort."""
+        return self.station.working and not self.kept_out() and self.session.bytes_are_abort(data, end=end)
 
     def busy(self) -> bool:
         """Whether the instrument has not yet worked on everything."""

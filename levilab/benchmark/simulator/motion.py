@@ -1,4 +1,4 @@
-"""The motion that everybody integrates: scene `undriven`, IC1, 30 Hz, 25.26 g, 5 s, with its equations once more.
+"""The motion that every contender integrates: scene `undriven`, IC1, 30 Hz, 25.26 g, 5 s, with its equations once more.
 
 Written apart from the simulator, for the peers: in place, velocity, axis and angular momentum (12 numbers), and in
 Euler angles as the master's thesis on the Levitron has them (12 numbers, singular at θ = 0).

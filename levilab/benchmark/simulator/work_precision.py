@@ -55,9 +55,9 @@ class Comparison:
 
 
 def compare(*, quick: bool = False, tell: Callable[[str], None] = lambda _: None) -> Comparison:
-    """Measure everything in one process.  tell: is told what is under way.
+    """Measure everything in one process.  tell: called with what is under way.
 
-    In ROUNDS, of which each point keeps its best: a machine that slows down for a while does so for everybody.
+    In ROUNDS, of which each point keeps its best: a machine that slows down for a while slows every contender.
     """
     sides: dict[str, Callable[[bool], Iterable[Point]]] = {
         "one top": ours.scalar,

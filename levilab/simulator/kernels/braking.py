@@ -44,11 +44,11 @@ class Mixed(NamedTuple):
 
 #: Taylor coefficients of exp(−x) and of (1 − exp(−x))/x.
 _DECAY: tuple[float, ...] = tuple((-1) ** k / math.factorial(k) for k in range(12))
-_GONE: tuple[float, ...] = tuple((-1) ** k / math.factorial(k + 1) for k in range(12))
+_MEAN_DECAY: tuple[float, ...] = tuple((-1) ** k / math.factorial(k + 1) for k in range(12))
 
 
 @part
-def _twelve(c: tuple[float, ...], x: float) -> float:
+def _polynomial_12(c: tuple[float, ...], x: float) -> float:
     """A polynomial of twelve terms, in pairs that do not wait for each other."""
     x2 = x * x
     x4 = x2 * x2
@@ -60,32 +60,32 @@ def _twelve(c: tuple[float, ...], x: float) -> float:
 @part
 def decay(x: float) -> float:
     """exp(−x) for |x| ≤ 0.2, which the step is chosen for; error below rounding; no call, so that lanes stay lanes."""
-    return _twelve(_DECAY, x)
+    return _polynomial_12(_DECAY, x)
 
 
 @part
-def gone(x: float) -> float:
+def mean_decay(x: float) -> float:
     """(1 − exp(−x))/x for |x| ≤ 0.2, with no 0/0."""
-    return _twelve(_GONE, x)
+    return _polynomial_12(_MEAN_DECAY, x)
 
 
-def _stokes_slowed(law: Any, spin: Any, d: Any) -> Any:
+def _spin_after_stokes(law: Any, spin: Any, d: Any) -> Any:
     return spin * decay(law.c * d)
 
 
-def _newton_slowed(law: Any, spin: Any, d: Any) -> Any:
+def _spin_after_newton(law: Any, spin: Any, d: Any) -> Any:
     return spin / (1 + law.c * abs(spin) * d)
 
 
-def _disc_slowed(law: Any, spin: Any, d: Any) -> Any:
+def _spin_after_disc(law: Any, spin: Any, d: Any) -> Any:
     root = 1 + 0.5 * law.c * math.sqrt(abs(spin)) * d
     return spin / (root * root)
 
 
-def _mixed_slowed(law: Any, spin: Any, d: Any) -> Any:
-    # Bernoulli's equation; gone(c1 d) d is the part of the time that counts for the quadratic term
+def _spin_after_mixed(law: Any, spin: Any, d: Any) -> Any:
+    # Bernoulli's equation; mean_decay(c1 d) d is the part of the time that counts for the quadratic term
     x = law.c1 * d
-    return spin * decay(x) / (1 + law.c2 * abs(spin) * d * gone(x))
+    return spin * decay(x) / (1 + law.c2 * abs(spin) * d * mean_decay(x))
 
 
 def _stokes_rate(law: Any, spin: Any) -> Any:
@@ -105,28 +105,30 @@ def _mixed_rate(law: Any, spin: Any) -> Any:
 
 
 #: The spin [rad/s] after drag alone has acted for the time d [s], of either sign: (law, spin, d).
-slowed = by_type({Stokes: _stokes_slowed, Newton: _newton_slowed, LaminarDisc: _disc_slowed, Mixed: _mixed_slowed})
+spin_after = by_type(
+    {Stokes: _spin_after_stokes, Newton: _spin_after_newton, LaminarDisc: _spin_after_disc, Mixed: _spin_after_mixed}
+)
 
 #: dω/dt [rad/s²] at this spin: (law, spin).
-rate = by_type({Stokes: _stokes_rate, Newton: _newton_rate, LaminarDisc: _disc_rate, Mixed: _mixed_rate})
+spin_rate = by_type({Stokes: _stokes_rate, Newton: _newton_rate, LaminarDisc: _disc_rate, Mixed: _mixed_rate})
 
 
 # --- how a law acts in a model ---
 
 
-class Clocked(NamedTuple):
+class PrescribedDrag(NamedTuple):
     """Drag on a top whose spin nothing else changes."""
 
     law: Any
 
 
-class Flowing(NamedTuple):
+class DragFlow(NamedTuple):
     """Drag on a top whose spin the field changes, too."""
 
     law: Any
 
 
-class LooseFlowing(NamedTuple):
+class WasherDragFlow(NamedTuple):
     """Drag and friction of loose washers: the washers' and the core's law, 1/I of either, and the coupling.
 
     washers, core: laws; inverse_washers, inverse_core [1/(kg m²)]; coupling [N m s]: torque per slip.
@@ -139,32 +141,32 @@ class LooseFlowing(NamedTuple):
     coupling: float
 
 
-def _stopped(drag: Any, clock: Any, d: Any) -> Any:
+def _constant_clock(drag: Any, clock: Any, d: Any) -> Any:
     return clock
 
 
-def _running(drag: Any, clock: Any, d: Any) -> Any:
-    return slowed(drag.law, clock, d)
+def _slowing_clock(drag: Any, clock: Any, d: Any) -> Any:
+    return spin_after(drag.law, clock, d)
 
 
 def _free(drag: Any, body: Any, s: Any, torque: Any, k: Any) -> Any:
     return plus(s.L, k, torque), s.loose
 
 
-def _clocked(drag: Any, body: Any, s: Any, torque: Any, k: Any) -> Any:
-    brake = body.axial * rate(drag.law, s.clock)
+def _prescribed(drag: Any, body: Any, s: Any, torque: Any, k: Any) -> Any:
+    brake = body.axial * spin_rate(drag.law, s.clock)
     return plus(plus(s.L, k, torque), k * brake, s.n), s.loose
 
 
 def _flowing(drag: Any, body: Any, s: Any, torque: Any, k: Any) -> Any:
     half = plus(s.L, k / 2, torque)
     spin = dot(half, s.n) / body.axial
-    change = body.axial * (slowed(drag.law, spin, k) - spin)
+    change = body.axial * (spin_after(drag.law, spin, k) - spin)
     return plus(plus(half, change, s.n), k / 2, torque), s.loose
 
 
 @part
-def _rubbed(drag: Any, total: Any, loose: Any, k: Any) -> Any:
+def _washers_after_friction(drag: Any, total: Any, loose: Any, k: Any) -> Any:
     """The washers' momentum after friction on the core alone has acted: the slip decays, the total stays."""
     # slip Δ = ω_w − ω_c; J_w = (total/I_c + Δ)/(1/I_w + 1/I_c)
     both = drag.inverse_washers + drag.inverse_core
@@ -172,20 +174,29 @@ def _rubbed(drag: Any, total: Any, loose: Any, k: Any) -> Any:
     return (total * drag.inverse_core + slip * decay(drag.coupling * both * k)) / both
 
 
-def _loose_flowing(drag: Any, body: Any, s: Any, torque: Any, k: Any) -> Any:
+def _flowing_with_washers(drag: Any, body: Any, s: Any, torque: Any, k: Any) -> Any:
     half = plus(s.L, k / 2, torque)
     total = dot(half, s.n)
-    washers = _rubbed(drag, total, s.loose, k / 2)
-    core = slowed(drag.core, (total - washers) * drag.inverse_core, k) / drag.inverse_core
-    washers = slowed(drag.washers, washers * drag.inverse_washers, k) / drag.inverse_washers
+    washers = _washers_after_friction(drag, total, s.loose, k / 2)
+    core = spin_after(drag.core, (total - washers) * drag.inverse_core, k) / drag.inverse_core
+    washers = spin_after(drag.washers, washers * drag.inverse_washers, k) / drag.inverse_washers
     after = core + washers
-    washers = _rubbed(drag, after, washers, k / 2)
+    washers = _washers_after_friction(drag, after, washers, k / 2)
     return plus(plus(half, after - total, s.n), k / 2, torque), washers
 
 
 #: The clock after a drift of d [s]: (drag, clock, d).
-ticked = by_type({type(None): _stopped, Clocked: _running, Flowing: _stopped, LooseFlowing: _stopped})
+clock_after = by_type(
+    {
+        type(None): _constant_clock,
+        PrescribedDrag: _slowing_clock,
+        DragFlow: _constant_clock,
+        WasherDragFlow: _constant_clock,
+    }
+)
 
 #: Angular momentum, and the washers' part of it, after torque and drag have acted for the time k [s]:
 #: (drag, body, state, torque, k).
-braked = by_type({type(None): _free, Clocked: _clocked, Flowing: _flowing, LooseFlowing: _loose_flowing})
+momentum_after = by_type(
+    {type(None): _free, PrescribedDrag: _prescribed, DragFlow: _flowing, WasherDragFlow: _flowing_with_washers}
+)

@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 Field = Paraxial2 | Paraxial | ParaxialThick | Sheet | Thick
 
 #: p, q, bz, s, g of a field at a height [m] and r² [m²]: (field, z, r2).
-axial = by_type(
+field_functions = by_type(
     {
         Paraxial2: to_second_power,
         Paraxial: to_any_power,
@@ -44,4 +44,4 @@ def evaluate(field: Any, positions: Array, values: Array) -> None:
     """The five functions at places of shape (n, 3) [m], written into values of shape (n, 5)."""
     for i in range(positions.shape[0]):
         x, y, z = positions[i, 0], positions[i, 1], positions[i, 2]
-        values[i, 0], values[i, 1], values[i, 2], values[i, 3], values[i, 4] = axial(field, z, x * x + y * y)
+        values[i, 0], values[i, 1], values[i, 2], values[i, 3], values[i, 4] = field_functions(field, z, x * x + y * y)

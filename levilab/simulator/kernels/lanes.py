@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from levilab.simulator.kernels.compiled import PART_OPTIONS, kernel, part
 from levilab.simulator.kernels.motion import STATE_SIZE, Model, drift, kick
-from levilab.simulator.kernels.splitting import put, taken, tidied
+from levilab.simulator.kernels.splitting import load_state, renormalize, store_state
 from levilab.simulator.kernels.vectors import plus
 
 Array = NDArray[np.float64]
@@ -66,7 +66,7 @@ overload(of_lane, jit_options=PART_OPTIONS, strict=False)(_of_lane)
 
 
 @part
-def _seated(
+def _start_job(
     model: Any,
     block: Any,
     numbers: Any,
@@ -80,7 +80,7 @@ def _seated(
 ) -> Any:
     """Put a job's numbers into lane j, and its state a first drift on.
 
-    A lane without a job moves the first one again, for nobody.
+    An idle lane computes job 0 again; its result is discarded.
     """
     source = max(job, 0)
     for i in range(all_numbers.shape[1]):
@@ -88,7 +88,7 @@ def _seated(
     for i in range(STATE_SIZE):
         block[i * LANES + j] = starts[source, i]
     h[j] = steps[source]
-    put(block, LANES, j, drift(of_lane(model, numbers, j), taken(block, LANES, j), first * h[j]))
+    store_state(block, LANES, j, drift(of_lane(model, numbers, j), load_state(block, LANES, j), first * h[j]))
 
 
 @kernel
@@ -122,7 +122,7 @@ def advance_many(  # noqa: C901
             for j in range(LANES):
                 if over[j]:
                     job[j] = waiting if waiting < counts.size else -1
-                    _seated(model, block, numbers, h, j, job[j], starts, all_numbers, steps, first)
+                    _start_job(model, block, numbers, h, j, job[j], starts, all_numbers, steps, first)
                     done[j], goal[j] = 0, counts[job[j]] if job[j] >= 0 else 1 << 60
                     begin[j] = starts[max(job[j], 0), STATE_SIZE - 1]
                     running += job[j] >= 0
@@ -134,13 +134,13 @@ def advance_many(  # noqa: C901
             a, b = drifts[stage + 1] if stage + 1 < stages else first + last, kicks[stage]
             for j in range(LANES):
                 lane = of_lane(model, numbers, j)
-                s = kick(lane, taken(block, LANES, j), b * h[j], 1.0, 0.0)
-                put(block, LANES, j, drift(lane, s, a * h[j]))
+                s = kick(lane, load_state(block, LANES, j), b * h[j], 1.0, 0.0)
+                store_state(block, LANES, j, drift(lane, s, a * h[j]))
         ended = 0
         for j in range(LANES):
             done[j] += 1
-            s = tidied(taken(block, LANES, j), begin[j] + (done[j] + first) * h[j])
-            put(block, LANES, j, s)
+            s = renormalize(load_state(block, LANES, j), begin[j] + (done[j] + first) * h[j])
+            store_state(block, LANES, j, s)
             # where the step ended: the first drift of the next one has been made already
             x, y, z = plus(s.r, -first * h[j], s.v)
             inside = (z > height) & (x * x + y * y < radius2)
@@ -150,7 +150,7 @@ def advance_many(  # noqa: C901
             for j in range(LANES):
                 if over[j] and job[j] >= 0:
                     # the first drift of the step that does not come is taken back
-                    s = drift(of_lane(model, numbers, j), taken(block, LANES, j), -first * h[j])
-                    put(ends[job[j]], 1, 0, s)
+                    s = drift(of_lane(model, numbers, j), load_state(block, LANES, j), -first * h[j])
+                    store_state(ends[job[j]], 1, 0, s)
                     taken_steps[job[j]] = done[j]
                     running -= 1

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from levilab.simulator.kernels.compiled import by_type, part
-from levilab.simulator.kernels.fields import axial
+from levilab.simulator.kernels.fields import field_functions
 from levilab.simulator.kernels.paraxial import Paraxial, Paraxial2, ParaxialThick
 from levilab.simulator.kernels.ring import Sheet, Thick
 from levilab.simulator.kernels.vectors import Vector, cross, plus, sine_of_turns
@@ -30,7 +30,7 @@ class Sine(NamedTuple):
     phase: float
 
 
-class Kinked(NamedTuple):
+class PiecewiseLinear(NamedTuple):
     """A uniform field that is linear in time between its kinks; level and slope come with each interval."""
 
     amplitude: Vector
@@ -51,7 +51,7 @@ def _kinked_drive(drive: Any, b: Any, at: Any) -> Any:
 
 
 #: The field b with the drive's added to it: (drive, b, (time, level, slope)).
-driven = by_type({type(None): _no_drive, Sine: _sine_drive, Kinked: _kinked_drive})
+with_drive = by_type({type(None): _no_drive, Sine: _sine_drive, PiecewiseLinear: _kinked_drive})
 
 
 # --- magnets ---
@@ -101,8 +101,8 @@ force_on = by_type({Paraxial2: _force_without_q, Paraxial: _force, ParaxialThick
 def dipole_load(model: Any, r: Vector, moment: Vector, at: Any) -> tuple[Vector, Vector]:
     """Force [N] and torque [N m] on a dipole in the fields of base and drive."""
     x, y, z = r
-    five = axial(model.field, z, x * x + y * y)
-    b = driven(model.drive, (five[0] * x, five[0] * y, five[2]), at)
+    five = field_functions(model.field, z, x * x + y * y)
+    b = with_drive(model.drive, (five[0] * x, five[0] * y, five[2]), at)
     return force_on(model.field, five, x, y, moment), cross(moment, b)
 
 
@@ -135,7 +135,7 @@ def _disc_load(magnet: Any, model: Any, s: Any, at: Any) -> Any:
 
 
 #: Force [N] and torque [N m] on a magnet: (magnet, model, state, moment of the drive).
-load = by_type({Aligned: _aligned_load, Tilted: _tilted_load, Disc: _disc_load})
+force_and_torque = by_type({Aligned: _aligned_load, Tilted: _tilted_load, Disc: _disc_load})
 
 # --- the weight ---
 
@@ -154,13 +154,13 @@ class Leaning(NamedTuple):
     z: float
 
 
-def _straight(gravity: Any, v: Any, k: Any) -> Any:
+def _upright_gravity(gravity: Any, v: Any, k: Any) -> Any:
     return (v[0], v[1], v[2] - k * gravity.g)
 
 
-def _aslant(gravity: Any, v: Any, k: Any) -> Any:
+def _leaning_gravity(gravity: Any, v: Any, k: Any) -> Any:
     return (v[0] + k * gravity.x, v[1] + k * gravity.y, v[2] + k * gravity.z)
 
 
 #: The velocity after the time k of weight alone: (gravity, velocity, k).
-weighed = by_type({Upright: _straight, Leaning: _aslant})
+velocity_after_gravity = by_type({Upright: _upright_gravity, Leaning: _leaning_gravity})

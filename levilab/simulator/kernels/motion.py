@@ -15,10 +15,10 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from levilab.simulator.kernels.braking import braked, ticked
+from levilab.simulator.kernels.braking import clock_after, momentum_after
 from levilab.simulator.kernels.compiled import by_type, part
-from levilab.simulator.kernels.loads import load, weighed
-from levilab.simulator.kernels.vectors import Vector, dot, plus, rotation, turned
+from levilab.simulator.kernels.loads import force_and_torque, velocity_after_gravity
+from levilab.simulator.kernels.vectors import Vector, dot, plus, rotate, rotation
 
 
 class State(NamedTuple):
@@ -88,30 +88,30 @@ def _no_twist(turning: Any, n: Any, arm: Any, along: Any, loose: Any, inverse_i1
 def _rigid_twist(turning: Any, n: Any, arm: Any, along: Any, loose: Any, inverse_i1: Any, d: Any) -> Any:
     angle = turning.twist * along * d
     sinc, cosc = rotation(angle * angle)
-    return turned(arm, n, angle * sinc, angle * angle * cosc)
+    return rotate(arm, n, angle * sinc, angle * angle * cosc)
 
 
 def _loose_twist(turning: Any, n: Any, arm: Any, along: Any, loose: Any, inverse_i1: Any, d: Any) -> Any:
     spin = (along - loose) * turning.inverse_core
     angle = (spin - along * inverse_i1) * d
     sinc, cosc = rotation(angle * angle)
-    return turned(arm, n, angle * sinc, angle * angle * cosc)
+    return rotate(arm, n, angle * sinc, angle * angle * cosc)
 
 
 #: The arm after its turn about the axis itself: (turning, axis, arm, L·n, washers' part of it, 1/I₁, d).
-twisted = by_type({type(None): _no_twist, Rigid: _rigid_twist, Loose: _loose_twist})
+arm_about_axis = by_type({type(None): _no_twist, Rigid: _rigid_twist, Loose: _loose_twist})
 
 
-def _not_swung(turning: Any, arm: Any, axis: Any, sine: Any, cosine: Any) -> Any:
+def _no_arm(turning: Any, arm: Any, axis: Any, sine: Any, cosine: Any) -> Any:
     return arm
 
 
-def _swung(turning: Any, arm: Any, axis: Any, sine: Any, cosine: Any) -> Any:
-    return turned(arm, axis, sine, cosine)
+def _turn_arm(turning: Any, arm: Any, axis: Any, sine: Any, cosine: Any) -> Any:
+    return rotate(arm, axis, sine, cosine)
 
 
 #: The arm after its turn about the angular momentum: (turning, arm, L, sine, cosine).
-swung = by_type({type(None): _not_swung, Rigid: _swung, Loose: _swung})
+arm_about_momentum = by_type({type(None): _no_arm, Rigid: _turn_arm, Loose: _turn_arm})
 
 
 @part
@@ -121,14 +121,14 @@ def drift(model: Model, s: State, d: float) -> State:
     k = d * body.inverse_transverse
     turn = (k * s.L[0], k * s.L[1], k * s.L[2])
     sinc, cosc = rotation(dot(turn, turn))
-    arm = twisted(model.turning, s.n, s.arm, dot(s.L, s.n), s.loose, body.inverse_transverse, d)
+    arm = arm_about_axis(model.turning, s.n, s.arm, dot(s.L, s.n), s.loose, body.inverse_transverse, d)
     return State(
         plus(s.r, d, s.v),
         s.v,
-        turned(s.n, turn, sinc, cosc),
+        rotate(s.n, turn, sinc, cosc),
         s.L,
-        swung(model.turning, arm, turn, sinc, cosc),
-        ticked(model.drag, s.clock, d),
+        arm_about_momentum(model.turning, arm, turn, sinc, cosc),
+        clock_after(model.drag, s.clock, d),
         s.loose,
         s.t + d,
     )
@@ -144,9 +144,11 @@ def kick(model: Model, s: State, k: float, level: float, slope: float) -> State:
     level, slope: of the drive, whose field is (level + slope·t) × amplitude × its carrier.
     """
     body = model.body
-    force, torque = load(model.magnet, model, s, (s.t, level, slope))
-    v = plus(weighed(body.gravity, s.v, k), k * body.inverse_mass, force)  # what is known first is added first
-    momentum, loose = braked(model.drag, body, s, torque, k)
+    force, torque = force_and_torque(model.magnet, model, s, (s.t, level, slope))
+    v = plus(
+        velocity_after_gravity(body.gravity, s.v, k), k * body.inverse_mass, force
+    )  # what is known first is added first
+    momentum, loose = momentum_after(model.drag, body, s, torque, k)
     return State(s.r, v, s.n, momentum, s.arm, s.clock, loose, s.t)
 
 

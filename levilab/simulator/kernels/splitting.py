@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 
 @part
-def taken(block: Array, stride: int, j: int) -> State:
+def load_state(block: Array, stride: int, j: int) -> State:
     """The state of lane j from a block of rows, flat, row after row."""
     s = stride
     return State(
@@ -28,7 +28,7 @@ def taken(block: Array, stride: int, j: int) -> State:
 
 
 @part
-def put(block: Array, stride: int, j: int, state: State) -> None:
+def store_state(block: Array, stride: int, j: int, state: State) -> None:
     """Write the state of lane j into a block of rows."""
     s = stride
     block[j], block[s + j], block[2 * s + j] = state.r
@@ -42,7 +42,7 @@ def put(block: Array, stride: int, j: int, state: State) -> None:
 
 
 @part
-def tidied(s: State, t: float) -> State:
+def renormalize(s: State, t: float) -> State:
     """The axis at length 1 again, which rounding takes away by 1e-16 a step, and the time [s] as it should be.
 
     A time added up from a million drifts is off by 1e-8 s, and with it the drive's phase.
@@ -72,8 +72,8 @@ def advance(
     drifts, kicks: the composition's coefficients; escape: the radius and the height [m] outside of which it
     ends; states: shape (n + 1, 18), row 0 is the start.  A state that is no number counts as outside.
     """
-    s = taken(block, 1, 0)
-    put(states[0], 1, 0, s)
+    s = load_state(block, 1, 0)
+    store_state(states[0], 1, 0, s)
     stages = kicks.size
     radius2, height = escape[0] * escape[0], escape[1]
     a, b = np.empty(stages + 1), np.empty(stages)
@@ -89,9 +89,9 @@ def advance(
             s = kick(model, s, b[stages - 1], level, slope)
             # the last drift of a step and the first of the next are one
             ahead = first if step + 1 < counts[i] else 0.0
-            s = tidied(drift(model, s, last + ahead), stops[i] + (step + 1) * h + ahead)
+            s = renormalize(drift(model, s, last + ahead), stops[i] + (step + 1) * h + ahead)
             if not (s.r[2] > height and s.r[0] * s.r[0] + s.r[1] * s.r[1] < radius2):
                 return i
-        s = tidied(s, stops[i + 1])
-        put(states[i + 1], 1, 0, s)
+        s = renormalize(s, stops[i + 1])
+        store_state(states[i + 1], 1, 0, s)
     return counts.size

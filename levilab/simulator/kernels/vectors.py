@@ -47,7 +47,7 @@ def rotation(square: float) -> tuple[float, float]:
 
 
 @part
-def turned(a: Vector, axis: Vector, sine: float, cosine: float) -> Vector:
+def rotate(a: Vector, axis: Vector, sine: float, cosine: float) -> Vector:
     """The vector a turned about an axis w by the angle |w| (Rodrigues): a + sine w×a + cosine w×(w×a)."""
     once = cross(axis, a)
     return plus(plus(a, sine, once), cosine, cross(axis, once))

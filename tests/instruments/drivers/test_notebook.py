@@ -51,7 +51,7 @@ def test_the_output_is_off_at_the_end_of_a_with_block(bench):
     with Keysight33500B.connect(VIRTUAL["generator"].address, **way) as generator:
         generator.prepare(waveform="SIN", frequency_hz=30.0, amplitude_vpp=1.0)
         generator.output = True
-    assert bus.instruments[VIRTUAL["generator"].address].settings["output"] is False
+    assert bus.instruments[VIRTUAL["generator"].address].settings["1:output"] is False
 
 
 @pytest.mark.parametrize(("name", "meant"), [("tigger_level", "trigger_level"), ("gate_s", "gate"), ("xyzzy", None)])

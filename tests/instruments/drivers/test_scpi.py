@@ -5,7 +5,9 @@ import math
 import pytest
 
 from instruments.drivers.counter.keysight_53230a import Keysight53230A
+from instruments.drivers.generator.agilent_33220a import Agilent33220A
 from instruments.drivers.generator.keysight_33500b import Keysight33500B
+from instruments.drivers.generator.siglent_sdg1000x import SiglentSDG1000X
 from instruments.drivers.scpi import ScpiInstrument, Setting, parse_reading
 from instruments.errors import BadAnswer, CommandRefused, InstrumentError, OutOfRange, WrongInstrument
 from support.conversation import CLEAR, NO_ERROR, accepted, conversation
@@ -223,11 +225,18 @@ def test_what_stands_for_no_reading_is_none(answer, reading):
         (Keysight53230A, "coupling", "DC", "AC"),
         (Keysight53230A, "automatic_level", False, True),
         (Keysight33500B, "amplitude", 2e-3, 6e-3),
-        (Keysight33500B, "amplitude", 10.0, 9.89),
+        (Keysight33500B, "amplitude", 10.0, 9.98),
+        (Keysight33500B, "amplitude", 1.0, 1.002),
         (Keysight33500B, "frequency", 1e-3, 5e-3),
-        (Keysight33500B, "frequency", 30.0, 30.1),
+        (Keysight33500B, "frequency", 30.0, 30.000002),
+        (Agilent33220A, "frequency", 2e7, 2e7 + 2e-6),
         (Keysight33500B, "offset", 0.0, -1.1e-3),
+        (Keysight33500B, "offset", 9.0, 9.0011),
         (Keysight33500B, "load", 9.9e37, 50.0),
+        (SiglentSDG1000X, "frequency", 1234.56789, 1234.56791),
+        (SiglentSDG1000X, "amplitude", 3.0, 3.0001),
+        (SiglentSDG1000X, "offset", 0.5, 0.500011),
+        (SiglentSDG1000X, "load", 75.0, 50.0),
         (Keysight33500B, "waveform", "SIN", "SQU"),
     ],
 )
@@ -237,16 +246,20 @@ def test_a_changed_setting_is_noticed_in_whatever_unit_it_is(driver, name, asked
 
 
 @pytest.mark.parametrize(
-    ("name", "asked", "now"),
+    ("driver", "name", "asked", "now"),
     [
-        ("gate", 1e-3, 1.0099e-3),
-        ("trigger_level", 0.0, 2.4e-3),
-        ("trigger_level", 0.6, 0.5975),
-        ("slope", "pos", "POS"),
+        (Keysight53230A, "gate", 1e-3, 1.0099e-3),
+        (Keysight53230A, "trigger_level", 0.0, 2.4e-3),
+        (Keysight53230A, "trigger_level", 0.6, 0.5975),
+        (Keysight53230A, "slope", "pos", "POS"),
+        (Keysight33500B, "amplitude", 1.23456, 1.235),  # four digits
+        (SiglentSDG1000X, "frequency", 1234.56789012, 1234.56789),  # ten
+        (SiglentSDG1000X, "amplitude", 2 / 0.7070, 2.82885),  # six
+        (SiglentSDG1000X, "load", 1234.5, 1234.0),
     ],
 )
-def test_what_the_instrument_rounds_is_no_change(name, asked, now):
-    assert not getattr(Keysight53230A, name).differs(asked, now)
+def test_what_the_instrument_rounds_is_no_change(driver, name, asked, now):
+    assert not getattr(driver, name).differs(asked, now)
 
 
 def test_a_gate_that_another_program_changed_is_named():

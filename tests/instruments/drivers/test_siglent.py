@@ -46,8 +46,19 @@ def test_a_field_is_read_by_its_name_and_the_state_by_its_place():
         assert it.output is True
 
 
-@pytest.mark.parametrize("answer", ["C2:BSWV WVTP,SINE,FRQ,1000HZ", "C1:BSWV WVTP,SINE,PERI,0.001S", "1000HZ"])
-def test_the_answer_to_another_question_is_no_frequency(answer):
+NO_FREQUENCIES = {
+    "another channel's": "C2:BSWV WVTP,SINE,FRQ,1000HZ",
+    "none": "C1:BSWV WVTP,SINE,PERI,0.001S",
+    "no header": "1000HZ",
+    "twice": "C1:BSWV WVTP,SINE,FRQ,1000HZ,FRQ,1900HZ",
+    "volts": "C1:BSWV WVTP,SINE,FRQ,1000V",
+    "no unit": "C1:BSWV WVTP,SINE,FRQ,1000",
+    "a zero that is not printed": "C1:BSWV WVTP,SINE,FRQ,0100HZ",
+}
+
+
+@pytest.mark.parametrize("answer", NO_FREQUENCIES.values(), ids=NO_FREQUENCIES)
+def test_what_is_no_frequency_is_refused(answer):
     with conversation(SiglentSDG1000X, ("C1:BSWV?", answer), (CLEAR, None)) as generator, pytest.raises(BadAnswer):
         _ = generator.frequency
 
@@ -59,6 +70,38 @@ def test_an_amplitude_that_the_generator_clips_is_refused():
         pytest.raises(OutOfRange, match=r"12\.0 is refused.*10\.0"),
     ):
         generator.amplitude = 12.0
+
+
+def test_a_generator_prints_six_digits_and_ten_of_a_frequency():
+    device = VirtualSDG1000X(VirtualClock())
+    send(device, b"C1:BSWV FRQ,12345678.123456,AMP,1.23456789\nC1:OUTP LOAD,1234.5\nC1:OUTP LOAD,HZ\n")
+    assert "FRQ,12345678.12HZ,PERI,8.1e-08S,AMP,1.23457V,AMPVRMS,0.43642Vrms," in ask(device, "C1:BSWV?")
+    send(device, b"C1:OUTP LOAD,1234.5\nC1:BSWV FRQ,1e-6\n")
+    assert ask(device, "C1:OUTP?") == "C1:OUTP OFF,LOAD,1234,PLRT,NOR"
+    assert "FRQ,1e-06HZ,PERI,1e+06S" in ask(device, "C1:BSWV?")
+
+
+FIELDS = [  # the waveform that has it, the field, two values, what is there after a reset
+    ("SINE", "FRQ", ("25HZ", "1e-06HZ"), "1000HZ"),
+    ("SINE", "PERI", ("0.04S", "1000S"), "0.001S"),
+    ("SINE", "AMP", ("3V", "0.002V"), "4V"),
+    ("SINE", "OFST", ("-1.5V", "8V"), "0V"),
+    ("SINE", "PHSE", ("90", "360"), "0"),
+    ("SQUARE", "DUTY", ("20", "99"), "50"),
+    ("RAMP", "SYM", ("0", "100"), "50"),
+]
+
+
+@pytest.mark.parametrize(("waveform", "name", "values", "default"), FIELDS)
+def test_a_field_of_each_channel_is_set_asked_and_reset(waveform, name, values, default):
+    device = VirtualSDG1000X(VirtualClock())
+    for n, other in ((1, 2), (2, 1)):
+        for value in values:
+            send(device, f"C{n}:BSWV WVTP,{waveform},{name},{value}\n".encode())
+            assert f",{name},{value}" in ask(device, f"C{n}:BSWV?")
+        assert f",{name},{value}" not in ask(device, f"C{other}:BSWV WVTP,{waveform};C{other}:BSWV?")
+        send(device, b"*RST\n")
+        assert f",{name},{default}" in ask(device, f"C{n}:BSWV WVTP,{waveform};C{n}:BSWV?")
 
 
 def test_a_switch_that_did_not_move_is_refused():
@@ -76,6 +119,12 @@ def test_a_scope_answers_with_header_and_unit_unless_CHDR_is_OFF(setting, answer
     assert (ask(device, "C1:VDIV?"), ask(device, "TIME_DIV?")) == answers
     # a header stands for itself: there is no path memory
     assert ask(device, "C1:TRA?;C1:TRA?") is not None
+
+
+@pytest.mark.parametrize("answer", ["TDIV 0.000100S", "TDIV 1.00E-03V", "TDIV 1.00E-03", "TDIV 1.00E-3S"])
+def test_a_time_that_no_scope_prints_so_is_refused(answer):
+    with conversation(SiglentSDS1000XE, ("TDIV?", answer), (CLEAR, None)) as it, pytest.raises(BadAnswer):
+        _ = it.time_scale
 
 
 def test_the_descriptor_says_how_the_codes_are_read():

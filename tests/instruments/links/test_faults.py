@@ -11,8 +11,8 @@ from instruments.links.visa import VisaTransport
 from instruments.virtual.bench.bus import Bus
 from instruments.virtual.bench.faults import AWAY, FAULTS, LATE, Fault
 from instruments.virtual.bench.visa_library import library_for
-from instruments.virtual.core.device import VirtualInstrument, answers
-from instruments.virtual.core.parser import Command
+from instruments.virtual.core.device import VirtualInstrument
+from instruments.virtual.core.rows import Ask, Number
 from instruments.virtual.servers.server import BenchServer
 
 MESSAGES, STREAM = "TCPIP0::box.levilab::inst0::INSTR", "TCPIP0::box.levilab::5025::SOCKET"
@@ -24,13 +24,11 @@ class VirtualBox(VirtualInstrument):
 
     identity = "levilab,box,VIRTUAL,0"
 
-    def table(self):
-        block = f"#3{len(DATA)}" + DATA.decode("latin-1")
-        return (
-            self.numeric("LEVel", "level", low=-5, high=5, default=1.5, unit="V"),
-            Command("READ", get=answers(lambda: "+2.500000000000000E+01")),
-            Command("DATA", get=answers(lambda: block)),
-        )
+    ROWS = (
+        Number("LEVel", "level", 1.5, (-5, 5), "V"),
+        Ask("READ", lambda _d: "+2.500000000000000E+01"),
+        Ask("DATA", lambda _d: f"#3{len(DATA)}" + DATA.decode("latin-1")),
+    )
 
 
 class Box(ScpiInstrument):

@@ -22,9 +22,9 @@ from instruments.links.serial_port import SerialTransport, port_name
 from instruments.virtual.bench.bus import Bus
 from instruments.virtual.bench.faults import FAULTS, Fault
 from instruments.virtual.bench.serial_line import benches
-from instruments.virtual.core.device import VirtualInstrument, answers
+from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.line import LineSettings, carried
-from instruments.virtual.core.parser import Command
+from instruments.virtual.core.rows import Ask
 from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
 
 METER = "levilab://magnetometer"
@@ -43,15 +43,13 @@ class Slow(VirtualInstrument):
 
     identity = IDENTITY
 
-    def table(self):
-        block = f"#4{len(ANY_BYTES):04d}" + ANY_BYTES.decode("latin-1")
-        return (
-            Command("SLOW", get=answers(self._slow)),
-            Command("DATA", get=answers(lambda: block)),
-            Command("CUT", get=answers(lambda: "#4102")),
-            Command("LIST", get=answers(lambda: "1,2,1,1,1")),
-            Command("BINary", get=answers(lambda: "\xff\xfe")),
-        )
+    ROWS = (
+        Ask("SLOW", lambda d: d._slow()),
+        Ask("DATA", lambda _d: f"#4{len(ANY_BYTES):04d}" + ANY_BYTES.decode("latin-1")),
+        Ask("CUT", lambda _d: "#4102"),
+        Ask("LIST", lambda _d: "1,2,1,1,1"),
+        Ask("BINary", lambda _d: "\xff\xfe"),
+    )
 
     def _slow(self):
         self.busy_until(self.clock.now() + 5.0)

@@ -11,8 +11,8 @@ from instruments.errors import BadAnswer, NoAnswer, NotConnected, Occupied
 from instruments.links.visa import VisaTransport
 from instruments.virtual.bench.bus import Bus
 from instruments.virtual.bench.visa_library import LevilabVisaLibrary, library_for
-from instruments.virtual.core.device import VirtualInstrument, answers
-from instruments.virtual.core.parser import Command
+from instruments.virtual.core.device import VirtualInstrument
+from instruments.virtual.core.rows import Ask
 
 ADDRESS = "TCPIP0::slow.levilab::inst0::INSTR"
 SOCKET = "TCPIP0::slow.levilab::5025::SOCKET"
@@ -26,8 +26,7 @@ class Slow(VirtualInstrument):
 
     identity = IDENTITY
 
-    def table(self):
-        return (Command("SLOW", get=answers(self._slow)), Command("BINary", get=answers(lambda: "\xff\xfe")))
+    ROWS = (Ask("SLOW", lambda d: d._slow()), Ask("BINary", lambda _d: "\xff\xfe"))
 
     def _slow(self):
         self.busy_until(self.clock.now() + 5.0)
@@ -247,8 +246,7 @@ class SlowOnce(Slow):
 
     slow = 0
 
-    def table(self):
-        return (*super().table(), Command("LIST", get=answers(self._list)), Command("*IDN", get=answers(self._who)))
+    COMMON = (Ask("LIST", lambda d: d._list()), Ask("*IDN", lambda d: d._who()), *Slow.COMMON)
 
     def _late(self, answer):
         if self.slow:
@@ -266,7 +264,6 @@ class SlowOnce(Slow):
 @pytest.mark.parametrize("questions", [["LIST?"], ["*IDN?"], ["LIST?", "*IDN?"], ["*IDN?", "*IDN?"], ["SLOW?"]])
 def test_on_a_serial_line_no_late_answer_is_taken_for_another(clock, questions):
     device = SlowOnce(clock)
-    device.parser.commands = (*device.table(), *device.parser.commands)
     transport = VisaTransport(LINE, library=library_for(Bus({LINE: device})))
     device.slow = len(questions)
     right = {"*OPC?": "1", "LIST?": "1,2,1,1,1", "*IDN?": IDENTITY, "SLOW?": "slow"}

@@ -27,13 +27,17 @@ tally = collections.Counter()
 #: A digit may be another digit, and a sign the other one.
 _REST = str.maketrans("012345678+-", "999999999±±")
 _EXPONENT = re.compile(r"[Ee][+-]\d+")
+#: "1000HZ", "-1.5V", "1e-06HZ": as few digits as the number needs.
+_SIGLENT = r"-?(0|[1-9]\d{0,11})(\.\d{0,14}[1-9])?(e[+-]\d{2})?(?P<unit>HZ|V)?"
 #: Numbers whose length is not known, by model: as many digits as the resolution gives (CNT-91, handbook 8-36), NR3 and
-#: NR1 of any length (InfiniiVision), codes with and without a leading zero (Lake Shore).
+#: NR1 of any length (InfiniiVision), codes with and without a leading zero (Lake Shore), numbers of Siglent.
 _OF_ANY_LENGTH = {
     "CNT-91": r"[+-]\d\.\d{1,15}E[+-]\d{2}",
     "DSOX1000": r"[+-]\d{1,3}(\.\d{1,12})?E[+-]\d{2,3}|[+-]?\d+",
     "425": r"\d{1,2}",
     "475": r"\d{1,2}",
+    "SDG1000X": _SIGLENT,
+    "SDS1000X-E": r"0|[1-9]\d{0,4}",
 }
 #: Those that print a sign where the number is negative, and no other.
 _MINUS_ALONE = {"DS1000Z"}
@@ -46,7 +50,12 @@ def form(name, text):
     """How an instrument prints numbers: ±9.99E±99 for -1.25E+03, N for one that may have any length."""
     if name in _OF_ANY_LENGTH:
         any_length = re.compile(_OF_ANY_LENGTH[name])
-        text = re.sub(r"[^,;]+", lambda field: "N" if any_length.fullmatch(field[0]) else field[0], text)
+
+        def shortened(field):
+            found = any_length.fullmatch(field[0])
+            return "N" + (found.groupdict().get("unit") or "") if found else field[0]
+
+        text = re.sub(r"[^,; ]+", shortened, text)
     if name in _MINUS_ALONE:
         text = re.sub(r"(?<![\w.])-", "", text)
     return text.translate(_REST)
@@ -55,6 +64,8 @@ def form(name, text):
 def has_the_form(name, question, honest, taken):
     """Whether an instrument could have answered this to the question, as far as its form goes."""
     question, honest, taken = (part.decode("latin-1").strip() for part in (question, honest, taken))
+    if taken == honest:
+        return True
     if not taken:  # of a CNT-91 this is "no reading"
         return name == "CNT-91" and question == "READ?"
     if question == "*IDN?":
@@ -72,12 +83,24 @@ def has_the_form_of_values(name, question, honest, taken):
     """The same for settings and numbers."""
     if question == ":WAV:PRE?" and len({len(exponent) for exponent in _EXPONENT.findall(taken)}) > 1:
         return False
-    for row in rows(KINDS[name]):
-        if re.fullmatch(rf"(:?CHAN\d:)?{re.escape(row.header)}\?", question):
-            if row.kind is bool:
-                return taken in {"0", "1"}
-            if row.choices and not honest.isdigit():
-                return taken.upper() in spellings((*row.choices, *row.answers))
+    asked = [(row, part) for row, part in rows(KINDS[name]) if part.header_in_use(row.header) + "?" == question]
+    if not asked:
+        return form(name, taken) == form(name, honest)
+    return any(field_has_the_form(name, row, part, honest, taken) for row, part in asked)
+
+
+def field_has_the_form(name, row, part, honest, taken):
+    """The same for what an answer says of one setting."""
+    try:
+        honest, taken = (part.field_of(answer, row.header, row.key) for answer in (honest, taken))
+    except ValueError:  # it has not the header of an answer to this question, or not its fields
+        return False
+    if honest == taken:
+        return False
+    if row.kind is bool:
+        return taken in {"0", "1"}
+    if row.choices and not honest.isdigit():
+        return taken.upper() in spellings((*row.choices, *row.answers))
     return form(name, taken) == form(name, honest)
 
 
@@ -87,8 +110,10 @@ def spellings(choices):
 
 
 def rows(kind):
-    """The settings that a driver declares, those of a scope's inputs included."""
-    return [*kind.driver.declared(), *(kind.driver.CHANNEL.declared() if hasattr(kind.driver, "CHANNEL") else ())]
+    """The settings that a driver declares, those of a scope's input included, each with the part that has it."""
+    driver = kind.driver(None)
+    parts = [driver, *([driver.CHANNEL(driver, 1)] if hasattr(driver, "CHANNEL") else ())]
+    return [(row, part) for part in parts for row in part.declared()]
 
 
 def excuse(pair):
@@ -99,8 +124,8 @@ def excuse(pair):
                 return reason
         elif struck.what == "late":
             pass  # the program has waited in vain: what comes then is dropped
-        elif struck.honest.startswith(b"#"):
-            if len(struck.arrived) == len(struck.honest) and struck.arrived[:2] == struck.honest[:2]:
+        elif head := re.match(rb"[^#\n]{0,16}#\d", struck.honest):
+            if len(struck.arrived) == len(struck.honest) and struck.arrived[: head.end()] == head[0]:
                 return "bytes of a block become others, and a block has no check"
         elif (taken := taken_of(pair, struck)) != struck.honest.strip() and has_the_form(
             pair.name, struck.question, struck.honest, taken

@@ -46,8 +46,8 @@ def outputs(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     changed = Virtual33500B.changed
 
     def watched(self: Virtual33500B, name: str) -> None:
-        if name == "output":
-            seen.append(bool(self.settings["output"]))
+        if name == "1:output":
+            seen.append(bool(self.settings["1:output"]))
         changed(self, name)
 
     monkeypatch.setattr(listener, watched)

@@ -209,12 +209,12 @@ def test_the_second_output_is_off_as_soon_as_the_bench_is_open_and_when_it_is_le
 
         def __init__(self, *args, **kwargs):
             super().__init__(*args, **kwargs)
-            self.settings |= {"output": True, "2:output": True}
+            self.settings |= {"1:output": True, "2:output": True}
             made.append(self)
 
     monkeypatch.setitem(MODELS["generator"], "33500B", at_the_coil(LeftOn))
     with open_bench(virtual_wiring(world), KINDS):
-        assert (made[0].settings["output"], made[0].settings["2:output"]) == (False, False)
+        assert (made[0].settings["1:output"], made[0].settings["2:output"]) == (False, False)
         made[0].settings["2:output"] = True
     assert made[0].settings["2:output"] is False
 

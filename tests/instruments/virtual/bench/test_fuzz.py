@@ -414,7 +414,7 @@ class Pairing(RuleBasedStateMachine):
         return all(now[name] == value for name, value in self.wanted.items() if name not in self.CHANGING)
 
     #: What a reading changes, or what has no part in it.
-    CHANGING = frozenset({"samples", "armings", "range", "output", "wav_source", "wav_stop", "wav_start"})
+    CHANGING = frozenset({"samples", "armings", "range", "1:output", "wav_source", "wav_stop", "wav_start"})
 
     def come_back(self):
         """What a program does when it has lost an instrument, or another one has taken it."""
@@ -488,13 +488,13 @@ class CounterPairing(Pairing):
 
 class GeneratorPairing(Pairing):
     def read(self):
-        return self.driver.frequency == 25.0 and self.driver.output is self.pair.liar.settings["output"]
+        return self.driver.frequency == 25.0 and self.driver.output is self.pair.liar.settings["1:output"]
 
     @rule()
     def it_is_switched_off(self):
         with contextlib.suppress(InstrumentError):
             self.driver.off()
-            assert self.pair.liar.settings["output"] is False
+            assert self.pair.liar.settings["1:output"] is False
 
     @rule()
     def it_is_switched_on(self):

@@ -13,8 +13,8 @@ from instruments.clock import VirtualClock
 from instruments.virtual.bench.bus import Bus
 from instruments.virtual.bench.faults import Fault
 from instruments.virtual.bench.visa_library import LevilabVisaLibrary, library_for
-from instruments.virtual.core.device import VirtualInstrument, answers
-from instruments.virtual.core.parser import Command
+from instruments.virtual.core.device import VirtualInstrument
+from instruments.virtual.core.rows import Ask
 from levilab.bench.config import ConfigError
 from support.waiting import HANG_GUARD_S
 
@@ -31,9 +31,7 @@ ANY_BYTES = bytes(range(256)) * 100
 class Blocks(VirtualInstrument):
     """Answers ``DATA?`` with a definite-length block (IEEE 488.2, 8.7.9)."""
 
-    def table(self):
-        header = f"#5{len(ANY_BYTES):05d}"
-        return (Command("DATA", get=answers(lambda: header + ANY_BYTES.decode("latin-1"))),)
+    ROWS = (Ask("DATA", lambda _d: f"#5{len(ANY_BYTES):05d}" + ANY_BYTES.decode("latin-1")),)
 
 
 @pytest.fixture

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
-from instruments.virtual.core.device import VirtualInstrument, answers
+from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.message import LONGEST_LINE
-from instruments.virtual.core.parser import Command
+from instruments.virtual.core.rows import Ask, Both, Do
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from support.wire import ask, cable, errors, received, send
@@ -21,12 +21,11 @@ class Display(VirtualInstrument):
         self.texts = []
         super().__init__(clock)
 
-    def table(self):
-        return (
-            Command("DISPlay:TEXT", set=self.texts.append),
-            Command("DISPlay:TEXT:CLEar", set=lambda _: self.texts.clear()),
-            Command("TWO", get=answers(lambda: "2")),
-        )
+    ROWS = (
+        Both("DISPlay:TEXT", lambda d, p: d.texts.append(p)),
+        Do("DISPlay:TEXT:CLEar", lambda d: d.texts.clear()),
+        Ask("TWO", lambda _d: "2"),
+    )
 
 
 def no_light(start, step, n):

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from instruments.virtual.core.trigger import crossings
-from instruments.virtual.counter.edges import RATE, EdgeFinder, Input
+from instruments.virtual.counter.edges import RATE, EdgeFinder, TriggerInput
 
 
 def brute_force(voltage, level, hysteresis):
@@ -53,7 +53,7 @@ def test_edges_found_in_pieces_are_those_of_the_whole(voltage, level, hysteresis
         first = round(start * RATE)
         return np.array((voltage + [voltage[-1]] * 100)[first : first + n])
 
-    finder = EdgeFinder(signal, Input(level, hysteresis, 0.02, falling=falling), 0.0)
+    finder = EdgeFinder(signal, TriggerInput(level, hysteresis, 0.02, falling=falling), 0.0)
     for reached in itertools.accumulate(steps):
         finder.look(reached / RATE, min(reached, len(voltage) - 1 + 1e-6) / RATE)
     sign = -1 if falling else 1
@@ -79,7 +79,7 @@ def test_a_signal_that_knows_its_edges_is_not_sampled_while_it_does():
             return edges[(edges >= start) & (edges < stop)] if stop < 2.0 else None
 
     signal = Known()
-    finder = EdgeFinder(signal, Input(0.0, 0.1, 0.02), 0.0)
+    finder = EdgeFinder(signal, TriggerInput(0.0, 0.1, 0.02), 0.0)
     found, at = [], 0.0
     while at < 3.0:
         if (edge := finder.find(at)) is None:

@@ -331,6 +331,12 @@ def test_on_the_bus_it_waits_for_a_trigger(five):
     assert len(numbers(ask(five, "FETC?"))) == 10
 
 
+def test_a_trigger_that_no_run_waits_for_is_ignored(five):
+    send(five, b"*TRG\nTRIG:SOUR IMM;:INIT\n")
+    cable(five).trigger()
+    assert errors(five) == [-211, -211]  # SCPI-1999, volume 2, 21.8.10
+
+
 def test_a_trigger_delay_passes_before_the_gate_opens(five):
     send(five, b"TRIG:DEL 2;:SAMP:COUN 1\n")
     assert reading(five)[1] == pytest.approx(2.1, abs=0.06)

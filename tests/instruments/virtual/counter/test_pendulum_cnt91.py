@@ -250,7 +250,8 @@ def test_without_a_time_out_it_waits_until_it_is_cleared(ready):
 
 @pytest.mark.parametrize(("native", "answer"), [(False, "+9.9100000000000E+37"), (True, "")])
 def test_with_a_time_out_it_says_that_there_was_nothing(native, answer):
-    device = counter(pulses(40.0), FIXED_LEVEL, "INP:LEV 3;:SYST:TOUT ON;:SYST:TOUT:TIME 2", native=native)
+    device = counter(pulses(40.0), FIXED_LEVEL, "INP:LEV 3;:SYST:TOUT ON;:SYST:TOUT:TIME 2")
+    device.native = native
     before = device.clock.now()
     assert ask(device, "READ?") == answer
     assert device.clock.now() - before == pytest.approx(2.0, abs=0.01)

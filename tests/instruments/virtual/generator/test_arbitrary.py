@@ -146,3 +146,13 @@ def test_the_older_one_keeps_four_copies_and_forgets_what_is_not_selected(older)
     assert errors(older) == [781]
     send(older, b"FUNC:USER A\nDATA:DEL B\nDATA:DEL:ALL\n")
     assert ask(older, "DATA:NVOL:CAT?") == '"A"'
+
+
+def test_a_waveform_that_is_refused_leaves_the_one_before(older):
+    send(older, b"DATA VOLATILE,-1,0,1,0\nFUNC:USER VOLATILE;:FUNC USER\nDATA VOLATILE,5\n")
+    assert errors(older) == [-222]
+    assert list(older.signal().samples) == [-1, 0, 1, 0]
+    # 40 000 points fit twice into the memory only in the place of each other
+    for _ in range(2):
+        send(older, b"DATA VOLATILE," + b",".join([b"0"] * 40_000) + b"\n")
+    assert errors(older) == []

@@ -90,7 +90,7 @@ def test_whatever_is_set_the_settings_fit_each_other(commands):
         for header, word in commands:
             send(device, f"{header} {word}\n".encode())
         channel = device.channels[0]
-        low, high = channel.levels()
+        low, high = channel.voltage_limits()
         half = 0.0 if channel["waveform"] == "DC" else channel.number("amplitude_vpp") / 2
         if low < high:  # voltage limits that leave no room count for nothing
             assert channel.number("offset") + half <= high + 1e-6 or half >= (high - low) / 2 - 1e-6

@@ -3,10 +3,13 @@
 Source: Agilent/Keysight 33500 Series Operating and Service Guide, unless a test names another.
 """
 
+import math
+
 import pytest
 
 from instruments.clock import VirtualClock
 from instruments.virtual.generator.keysight_33500b import Virtual33500B
+from support.generators import number
 from support.wire import ask, errors, send
 
 
@@ -72,12 +75,19 @@ def test_the_state_after_reset_is_that_of_the_family(generator):
         assert ask(generator, header + "?") == value
         send(generator, entry.encode() + b"\n")
     assert errors(generator) == []
-    assert dict(generator.settings) == Virtual33500B(VirtualClock()).settings | {"list": "100.0,1000.0,550.0"}
+    assert dict(generator.settings) == Virtual33500B(VirtualClock()).settings | {"1:list": "100.0,1000.0,550.0"}
 
 
 def test_a_text_is_displayed_until_it_is_cleared(either):
     assert ask(either, "DISP:TEXT 'coil on; do not touch';:DISP:TEXT?") == '"coil on; do not touch"'
     assert ask(either, "DISP:TEXT:CLE;:DISP:TEXT?") == '""'
+
+
+@pytest.mark.parametrize("text", ["hello", "x", "'half", "\"other'"])
+def test_a_text_without_its_quotes_is_refused(either, text):
+    assert ask(either, f"DISP:TEXT {text}") is None
+    assert errors(either)[0] in {-102, -104}
+    assert ask(either, "DISP:TEXT?") == '""'
 
 
 def test_the_channels_can_be_brought_into_phase(generator):
@@ -90,3 +100,21 @@ def test_reset_leaves_no_entry_and_what_stood_before(either):
     assert errors(either) == []
     state = dict(either.settings)
     assert state == type(either)(VirtualClock()).settings
+
+
+@pytest.mark.parametrize("header", ["PHAS", "BURS:PHAS"])
+def test_an_angle_is_in_the_unit_that_is_sent_or_that_of_UNIT_ANGL(either, header):
+    send(either, f"{header} 1 RAD\n".encode())
+    assert number(either, f"{header}?") == pytest.approx(math.degrees(1), rel=1e-12)
+    send(either, f"{header} -90 DEG;:UNIT:ANGL RAD\n".encode())
+    assert number(either, f"{header}?") == pytest.approx(-math.pi / 2, rel=1e-12)
+    assert number(either, f"{header}? MAX") == pytest.approx(2 * math.pi, rel=1e-12)
+    send(either, f"{header} 0.5\n".encode())
+    assert number(either, f"UNIT:ANGL DEG;:{header}?") == pytest.approx(math.degrees(0.5), rel=1e-12)
+    assert errors(either) == []
+
+
+def test_a_sample_rate_has_a_unit_with_a_slash(generator):
+    assert number(generator, "FUNC:ARB:SRAT 2 KSA/S;SRAT?") == 2000.0
+    assert ask(generator, "FREQ 1000 SA/S") is None
+    assert errors(generator) == [-131]

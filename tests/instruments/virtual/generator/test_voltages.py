@@ -93,3 +93,16 @@ def test_voltage_limits_hold_when_they_are_switched_on(generator):
     send(generator, b"VOLT:LIM:HIGH 1;LOW -1;STAT ON\nVOLT 4\n")
     assert number(generator, "VOLT?") == 2.0
     assert errors(generator) == [-222]
+
+
+def test_voltage_limits_without_room_leave_the_smallest_amplitude(either):
+    send(either, b"VOLT:UNIT DBM;:VOLT:LIM:LOW 4;HIGH -4;STAT ON\n")
+    assert number(either, "VOLT:UNIT VPP;:VOLT?") == number(either, "VOLT? MIN") > 0
+    assert number(either, "VOLT:UNIT DBM;:VOLT?") < 0
+
+
+def test_a_limit_is_taken_as_it_is_printed(either):
+    send(either, b"FUNC SQU\n")
+    shortest = ask(either, "FUNC:SQU:PER? MIN")  # a third of 10 ns, at 30 MHz
+    send(either, f"FUNC:SQU:PER {shortest}\n".encode())
+    assert (ask(either, "FUNC:SQU:PER?"), errors(either)) == (shortest, [])

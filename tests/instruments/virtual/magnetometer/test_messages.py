@@ -17,7 +17,7 @@ from support.wire import ask, received, send
     [
         (meter(), "LSCI,MODEL425,VIRTUAL,1.0"),
         (meter(Virtual475), "LSCI,MODEL475,VIRTUAL,01012020"),
-        (meter(Virtual475, model="455"), "LSCI,MODEL455,VIRTUAL,01012020"),
+        (meter(Virtual475, identity="LSCI,MODEL455,VIRTUAL,01012020"), "LSCI,MODEL455,VIRTUAL,01012020"),
     ],
 )
 def test_who_they_are(device, identity):

@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from instruments.virtual.oscilloscope.scope import one_two_five
-from support.scopes import pulses, rigol
-from support.wire import errors, received, send
+from support.scopes import keysight, pulses, rigol
+from support.wire import ask, errors, received, send
 
 
 @pytest.mark.parametrize(
@@ -30,6 +30,14 @@ def test_what_is_wrong_has_no_answer_but_an_entry_in_the_queue(message):
     send(device, message.encode() + b"\n")
     assert received(device, 1.0) is None
     assert len(errors(device)) == 1
+
+
+def test_the_limits_of_a_full_scale_and_of_the_memory_can_be_asked_for():
+    device = rigol(pulses)
+    # 80 V at the input, ten times as much at the tip of the probe after a reset
+    assert ask(device, ":CHAN1:PROB 10;RANG? MAX;:CHAN1:SCAL? MAX") == "8.000000e+02;1.000000e+02"
+    assert ask(device, ":ACQ:MDEP? MAX;MDEP? MIN") == "24000000;12000"
+    assert ask(keysight(pulses), ":TIM:RANG? MAX") == "+5.000000E+02"
 
 
 @given(value=st.floats(1e-9, 1e9))

@@ -9,8 +9,7 @@ import pyvisa
 
 from instruments.clock import VirtualClock, WallClock
 from instruments.virtual.bench.bus import Bus
-from instruments.virtual.core.device import answers
-from instruments.virtual.core.parser import Command
+from instruments.virtual.core.rows import Ask
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
 from instruments.virtual.servers.server import BenchServer
@@ -34,8 +33,7 @@ class BusyCounter(Virtual53230A):
     def __init__(self, clock):
         super().__init__(clock, signal=pulses)
 
-    def table(self):
-        return (Command("ENDLess", get=answers(self._work_without_end)), *super().table())
+    COMMON = (Ask("ENDLess", lambda d: d._work_without_end()), *Virtual53230A.COMMON)
 
     def _work_without_end(self):
         while True:
@@ -346,4 +344,4 @@ def test_a_counter_that_was_not_asked_for_long_catches_up_in_slices(monkeypatch)
     assert session.go_on(work)
     while session.go_on(work):
         pass
-    assert counter._memory.held > 5000
+    assert counter._memory.size > 5000

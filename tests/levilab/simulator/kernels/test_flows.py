@@ -15,7 +15,7 @@ from levilab.simulator.spin import DECAYS
 def test_a_turn_is_that_of_rodrigues_to_rounding(angle):
     axis, a = np.array([0.6, -0.64, 0.48]), np.array([0.1, 0.2, -0.97])
     sinc, cosc = vectors.rotation(angle**2)
-    turned = vectors.turned(tuple(a), tuple(axis), angle * sinc, angle**2 * cosc)
+    turned = vectors.rotate(tuple(a), tuple(axis), angle * sinc, angle**2 * cosc)
     assert turned == pytest.approx(Rotation.from_rotvec(axis * angle).apply(a), abs=4e-16)
 
 
@@ -35,7 +35,7 @@ def test_the_sine_of_turns_agrees_with_the_library_at_any_phase():
 @pytest.mark.parametrize("x", [-0.2, -1e-5, 0.0, 1e-9, 0.05, 0.2])
 def test_decay_and_its_average_are_those_of_the_library(x):
     assert braking.decay(x) == pytest.approx(math.exp(-x), rel=3e-16)
-    assert braking.gone(x) == pytest.approx(-math.expm1(-x) / x if x else 1.0, rel=3e-16)
+    assert braking.mean_decay(x) == pytest.approx(-math.expm1(-x) / x if x else 1.0, rel=3e-16)
 
 
 LAWS = {
@@ -48,12 +48,12 @@ LAWS = {
 
 @numba.njit
 def slowed(law, spin, d):
-    return braking.slowed(law, spin, d)
+    return braking.spin_after(law, spin, d)
 
 
 @numba.njit
 def rate(law, spin):
-    return braking.rate(law, spin)
+    return braking.spin_rate(law, spin)
 
 
 @pytest.mark.parametrize("name", LAWS)

@@ -1,0 +1,248 @@
+"""The rows that the generators of both families have, and what a number of theirs is: clipped, and told in its unit.
+
+Sources: Keysight 33500 Series Operating and Service Guide; Agilent 33220A User's Guide, chapter 4.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Self
+
+from instruments.virtual.core.parameters import limit, optional_parameter, parameter
+from instruments.virtual.core.parser import Row
+from instruments.virtual.core.rows import Ask, Both, Do, Own, Switch, Word
+from instruments.virtual.generator.channel import INFINITE, Channel, quantity_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from instruments.virtual.core.parser import Value
+    from instruments.virtual.generator.generator import VirtualGenerator
+
+
+@dataclass(frozen=True)
+class Quantity(Row):
+    """A number of a channel that is clipped at its limits, with an entry in the error queue.
+
+    default: after ``*RST``, and what DEF means; limits: lowest and highest, or how they follow from the channel; unit:
+    that may be sent with it; get, put: where the number is not kept as it is sent; endless: it may be infinite; alias:
+    another row has the setting, too, and gives its value after ``*RST``.
+    """
+
+    name: str
+    default: float
+    limits: tuple[float, float] | Callable[[Channel], tuple[float, float]]
+    unit: str = ""
+    get: Callable[[Channel], float] | None = field(default=None, repr=False)
+    put: Callable[[Channel, float], None] | None = field(default=None, repr=False)
+    endless: bool = False
+    alias: bool = False
+    channel: int = 1
+
+    def of_channel(self, n: int) -> Self:
+        """See the base."""
+        return replace(super().of_channel(n), channel=n)
+
+    def defaults(self) -> dict[str, Value]:
+        """See the base."""
+        return {} if self.alias else {self.name: self.default}
+
+    def range(self, channel: Channel) -> tuple[float, float]:
+        """The lowest and the highest number that can be sent now."""
+        return self.limits(channel) if callable(self.limits) else self.limits
+
+    def _is_infinite(self, text: str) -> bool:
+        if not self.endless:
+            return False
+        if text[:1].isalpha():
+            return text.upper() in {"INF", "INFINITY"}
+        return quantity_of(text, (self.unit,))[0] >= INFINITE
+
+    def read(self, channel: Channel, text: str) -> float:
+        """The number as it is sent, within its limits.  Raises ScpiError."""
+        if self._is_infinite(text):
+            return INFINITE
+        return channel.read(text, *self.range(channel), self.default, self.unit)
+
+    def set(self, device: VirtualGenerator, parameters: list[str]) -> None:
+        """See the base."""
+        channel = device.channel(self.channel)
+        value = self.read(channel, parameter(parameters))
+        if self.put:
+            self.put(channel, value)
+        else:
+            device.settings[self.name] = value
+        device.changed(self.name)
+
+    def ask(self, device: VirtualGenerator, parameters: list[str]) -> str:
+        """See the base."""
+        return device.spell(self.asked(device.channel(self.channel), parameters))
+
+    def asked(self, channel: Channel, parameters: list[str]) -> float:
+        """The number, or the limit that is asked for.  Raises ScpiError."""
+        if text := optional_parameter(parameters):
+            low, high = self.range(channel)
+            return limit(text, low=low, high=high, default=self.default)
+        return self.get(channel) if self.get else channel.number(self.name.rpartition(":")[2])
+
+
+@dataclass(frozen=True)
+class Angle(Quantity):
+    """A phase, kept in degrees; what is sent without a unit, and what is answered, is in that of UNIT:ANGLe."""
+
+    def read(self, channel: Channel, text: str) -> float:
+        """See the base."""
+        if text[:1].isalpha():
+            return super().read(channel, text)
+        value, unit = quantity_of(text, ("", "DEG", "RAD"))
+        degrees = {"": channel.degrees_per_unit(), "DEG": 1.0, "RAD": math.degrees(1)}
+        return channel.clip(value * degrees[unit], *self.range(channel))
+
+    def ask(self, device: VirtualGenerator, parameters: list[str]) -> str:
+        """See the base."""
+        channel = device.channel(self.channel)
+        return device.spell(self.asked(channel, parameters) / channel.degrees_per_unit())
+
+
+_PULSE = "[SOURce[n]:][FUNCtion:]PULSe:"
+_LEVEL = "[SOURce[n]:]VOLTage[:LEVel][:IMMediate]"
+_TURN = (-360.0, 360.0)
+#: The waveforms that modulate.
+INNER = "SINusoid SQUare TRIangle RAMP NRAMp NOISe PRBS ARB USER"
+
+#: Of each channel of either family; a setting's name begins with the number of its channel.
+CHANNEL: tuple[Row, ...] = (
+    # waveform, frequency, phase
+    Quantity(
+        *("[SOURce[n]:]FREQuency[:CW|:FIXed]", "{n}:frequency", 1e3, Channel.frequency_limits, "HZ"),
+        get=lambda c: c.frequency,
+        put=Channel.set_frequency,
+    ),
+    Quantity(
+        *("[SOURce[n]:]FUNCtion:SQUare:PERiod", "{n}:frequency", 1e-3, Channel.square_periods, "S"),
+        get=Channel.period,
+        put=Channel.set_period,
+        alias=True,
+    ),
+    Angle("[SOURce[n]:]PHASe[:ADJust]", "{n}:phase", 0.0, _TURN),
+    Do("[SOURce[n]:]PHASe:REFerence", lambda _s, _n: None),
+    Quantity("[SOURce[n]:]FUNCtion:SQUare:DCYCle", "{n}:duty", 50.0, Channel.square_duties, "PCT"),
+    Quantity("[SOURce[n]:]FUNCtion:RAMP:SYMMetry", "{n}:symmetry", 100.0, (0, 100), "PCT"),
+    # voltages
+    Both(
+        f"{_LEVEL}[:AMPLitude]",
+        lambda s, n, p: s.set_amplitude(n, p),
+        lambda s, n, p: s.amplitude(n, p),
+        keeps=("{n}:amplitude_vpp", 0.1),
+    ),
+    Own(
+        "[SOURce[n]:]VOLTage:UNIT",
+        lambda s, n, p: s.set_voltage_unit(n, p),
+        lambda s, n: s.channel(n)["voltage_unit"],
+        keeps=("{n}:voltage_unit", "VPP"),
+    ),
+    Quantity(f"{_LEVEL}:OFFSet", "{n}:offset", 0.0, Channel.offset_limits, "V"),
+    Quantity(
+        *(f"{_LEVEL}:HIGH", "{n}:amplitude_vpp", 0.05, Channel.high_limits, "V"),
+        get=Channel.high,
+        put=Channel.set_high,
+        alias=True,
+    ),
+    Quantity(
+        *(f"{_LEVEL}:LOW", "{n}:amplitude_vpp", -0.05, Channel.low_limits, "V"),
+        get=Channel.low,
+        put=Channel.set_low,
+        alias=True,
+    ),
+    Switch("[SOURce[n]:]VOLTage:LIMit:STATe", "{n}:limits_on"),
+    Quantity("[SOURce[n]:]VOLTage:LIMit:HIGH", "{n}:limit_high", 5.0, (-10, 10), "V"),
+    Quantity("[SOURce[n]:]VOLTage:LIMit:LOW", "{n}:limit_low", -5.0, (-10, 10), "V"),
+    Switch("[SOURce[n]:]VOLTage:RANGe:AUTO", "{n}:automatic_range", default=True),
+    Switch("OUTPut[n][:STATe]", "{n}:output"),
+    Quantity("OUTPut[n]:LOAD", "{n}:load", 50.0, (1, 1e4), "OHM", put=Channel.set_load, endless=True),
+    Word("OUTPut[n]:POLarity", "{n}:polarity", "NORMal INVerted"),
+    # pulses
+    Quantity(f"{_PULSE}WIDTh", "{n}:pulse_width", 1e-4, Channel.pulse_limits, "S", put=Channel.set_width),
+    Quantity(f"{_PULSE}DCYCle", "{n}:pulse_duty", 10.0, Channel.pulse_duties, "PCT", put=Channel.set_pulse_duty),
+    Word("[SOURce[n]:]FUNCtion:PULSe:HOLD", "{n}:pulse_hold", "WIDTh DCYCle"),
+    # bursts and triggers
+    Switch("[SOURce[n]:]BURSt:STATe", "{n}:burst"),
+    Word("[SOURce[n]:]BURSt:MODE", "{n}:burst_mode", "TRIGgered GATed"),
+    Word("[SOURce[n]:]BURSt:GATE:POLarity", "{n}:gate_polarity", "NORMal INVerted"),
+    Angle("[SOURce[n]:]BURSt:PHASe", "{n}:burst_phase", 0.0, _TURN),
+    Quantity("[SOURce[n]:]BURSt:INTernal:PERiod", "{n}:burst_period", 1e-2, Channel.burst_periods, "S"),
+    Word("TRIGger[n]:SLOPe", "{n}:trigger_slope", "POSitive NEGative"),
+    Do("TRIGger[n][:IMMediate]", lambda s, n: s.start(n)),
+    # sweeps
+    Switch("[SOURce[n]:]SWEep:STATe", "{n}:sweep"),
+    Word("[SOURce[n]:]FREQuency:MODE", "{n}:frequency_mode", "CW LIST SWEep FIXed"),
+    Word("[SOURce[n]:]SWEep:SPACing", "{n}:sweep_spacing", "LINear LOGarithmic"),
+    Quantity("[SOURce[n]:]FREQuency:STARt", "{n}:sweep_start", 100.0, (1e-6, 30e6), "HZ"),
+    Quantity("[SOURce[n]:]FREQuency:STOP", "{n}:sweep_stop", 1e3, (1e-6, 30e6), "HZ"),
+    Quantity(
+        *("[SOURce[n]:]FREQuency:CENTer", "{n}:sweep_start", 550.0, (1e-6, 30e6), "HZ"),
+        get=Channel.sweep_centre,
+        put=Channel.set_sweep_centre,
+        alias=True,
+    ),
+    Quantity(
+        *("[SOURce[n]:]FREQuency:SPAN", "{n}:sweep_start", 900.0, (-30e6, 30e6), "HZ"),
+        get=Channel.sweep_span,
+        put=Channel.set_sweep_span,
+        alias=True,
+    ),
+    Quantity("[SOURce[n]:]SWEep:HTIMe", "{n}:sweep_hold", 0.0, (0, 3600), "S"),
+    Quantity("[SOURce[n]:]SWEep:RTIMe", "{n}:sweep_return", 0.0, (0, 3600), "S"),
+    Quantity("[SOURce[n]:]MARKer:FREQuency", "{n}:marker_frequency", 500.0, (1e-6, 30e6), "HZ"),
+    # modulation, of which the model keeps the settings
+    Switch("[SOURce[n]:]AM:STATe", "{n}:am"),
+    Word("[SOURce[n]:]AM:SOURce", "{n}:am_source", "INTernal EXTernal"),
+    Quantity("[SOURce[n]:]AM[:DEPTh]", "{n}:am_depth", 100.0, (0, 120), "PCT"),
+    Word("[SOURce[n]:]AM:INTernal:FUNCtion", "{n}:am_function", INNER),
+    Quantity("[SOURce[n]:]AM:INTernal:FREQuency", "{n}:am_frequency", 100.0, (1e-6, 30e6), "HZ"),
+    Switch("[SOURce[n]:]FM:STATe", "{n}:fm"),
+    Word("[SOURce[n]:]FM:SOURce", "{n}:fm_source", "INTernal EXTernal"),
+    Quantity("[SOURce[n]:]FM[:DEViation]", "{n}:fm_deviation", 100.0, (1e-6, 15e6), "HZ"),
+    Word("[SOURce[n]:]FM:INTernal:FUNCtion", "{n}:fm_function", INNER),
+    Quantity("[SOURce[n]:]FM:INTernal:FREQuency", "{n}:fm_frequency", 10.0, (1e-6, 30e6), "HZ"),
+    Switch("[SOURce[n]:]PM:STATe", "{n}:pm"),
+    Word("[SOURce[n]:]PM:SOURce", "{n}:pm_source", "INTernal EXTernal"),
+    Quantity("[SOURce[n]:]PM[:DEViation]", "{n}:pm_deviation", 180.0, (0, 360), "DEG"),
+    Word("[SOURce[n]:]PM:INTernal:FUNCtion", "{n}:pm_function", INNER),
+    Quantity("[SOURce[n]:]PM:INTernal:FREQuency", "{n}:pm_frequency", 10.0, (1e-6, 30e6), "HZ"),
+    Switch("[SOURce[n]:]PWM:STATe", "{n}:pwm"),
+    Word("[SOURce[n]:]PWM:SOURce", "{n}:pwm_source", "INTernal EXTernal"),
+    Quantity("[SOURce[n]:]PWM[:DEViation]", "{n}:pwm_deviation", 1e-5, (0, 1e6), "S"),
+    Word("[SOURce[n]:]PWM:INTernal:FUNCtion", "{n}:pwm_function", INNER),
+    Quantity("[SOURce[n]:]PWM:INTernal:FREQuency", "{n}:pwm_frequency", 10.0, (1e-6, 30e6), "HZ"),
+    Switch("[SOURce[n]:]FSKey:STATe", "{n}:fsk"),
+    Word("[SOURce[n]:]FSKey:SOURce", "{n}:fsk_source", "INTernal EXTernal"),
+    Quantity("[SOURce[n]:]FSKey:FREQuency", "{n}:fsk_frequency", 100.0, (1e-6, 30e6), "HZ"),
+    Quantity("[SOURce[n]:]FSKey:INTernal:RATE", "{n}:fsk_rate", 10.0, (1e-6, 1e6), "HZ"),
+    # a signal in one command, and what a waveform in the memory is like
+    Ask("[SOURce[n]:]APPLy", lambda s, n: s.applied(n)),
+    Both("[SOURce[n]:]DATA:ATTRibute:AVERage", None, lambda s, n, p: s.attribute(n, "AVER", p)),
+    Both("[SOURce[n]:]DATA:ATTRibute:CFACtor", None, lambda s, n, p: s.attribute(n, "CFAC", p)),
+    Both("[SOURce[n]:]DATA:ATTRibute:POINts", None, lambda s, n, p: s.attribute(n, "POIN", p)),
+    Both("[SOURce[n]:]DATA:ATTRibute:PTPeak", None, lambda s, n, p: s.attribute(n, "PTP", p)),
+)
+
+#: Of the whole instrument, of either family.
+SHARED: tuple[Row, ...] = (
+    Ask("*OPT", lambda _s: '"0,0"'),
+    Do("ABORt", lambda s: s.abort()),
+    Own("DISPlay:TEXT[:DATA]", lambda s, p: s.set_text(p), lambda s: s.text()),
+    Do("DISPlay:TEXT:CLEar", lambda s: s.clear_text()),
+    Switch("DISPlay[:WINDow][:STATe]", "display", default=True),
+    Switch("OUTPut[1|2]:SYNC[:STATe]", "sync", default=True),
+    Switch("OUTPut:TRIGger[:STATe]", "trigger_out"),
+    Word("OUTPut:TRIGger:SLOPe", "trigger_out_slope", "POSitive NEGative"),
+    Word("UNIT:ANGLe", "angle_unit", "DEGree RADian SECond"),
+    Word("FORMat:BORDer", "byte_order", "NORMal SWAPped"),
+    Switch("SYSTem:BEEPer:STATe", "beeper", default=True),
+    Word("SYSTem:COMMunicate:RLSTate", "remote", "LOCal REMote RWLock"),
+    Do("STATus:PRESet"),
+    Ask("STATus:QUEStionable[:EVENt|:CONDition]", lambda _s: "+0"),
+    Ask("STATus:OPERation[:EVENt|:CONDition]", lambda _s: "+0"),
+)
