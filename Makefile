@@ -24,14 +24,17 @@ demo: setup  ## the main job on the virtual bench: acquire, analyze, report (int
 	$(BIN)/levilab analyze spindown $(DEMO)
 	$(BIN)/levilab report $(DEMO) --output $(DEMO)/report.html
 
-test: setup lint  ## everything that must pass: style, types, imports, tests
-	$(BIN)/python -m pytest
+# mypy works beside the tests: alone it would leave a core idle
+test: setup  ## everything that must pass: style, types, imports, tests
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports --no-cache
+	@$(BIN)/mypy & types=$$!; $(BIN)/python -m pytest && tests=0 || tests=$$?; wait $$types && exit $$tests
 
 quick: setup  ## within a minute: style and types, and the tests that are not slow
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
-	@$(BIN)/mypy
-	$(BIN)/python -m pytest -m 'not slow'
+	@$(BIN)/mypy & types=$$!; $(BIN)/python -m pytest -m 'not slow' && tests=0 || tests=$$?; wait $$types && exit $$tests
 
 explore: setup  ## the property tests with new random examples
 	HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest tests/levilab/formats tests/analysis tests/instruments

@@ -18,7 +18,11 @@ class TooFewReadings(AnalysisError):
 
 
 class TooFewPulses(AnalysisError):
-    """Fewer pulses than a frequency and its slope need, or none that return regularly; duration [s]: of the record."""
+    """Fewer pulses than a frequency and its slope need, or none that return regularly.
+
+    Attributes:
+        duration: of the record [s].
+    """
 
     def __init__(self, *, seen: int, needed: int, duration: float) -> None:
         self.seen, self.needed, self.duration = seen, needed, duration
@@ -120,7 +124,11 @@ class NoRange(AnalysisError):
 
 
 class TooFewHeights(AnalysisError):
-    """A scan at too few heights to tell strength, origin and background apart.  lowest, highest: of those seen [m]."""
+    """A scan at too few heights to tell strength, origin and background apart.
+
+    Attributes:
+        lowest, highest: of those seen [m].
+    """
 
     def __init__(self, *, seen: int, needed: int, lowest: float, highest: float) -> None:
         self.seen, self.needed, self.lowest, self.highest = seen, needed, lowest, highest
@@ -133,7 +141,12 @@ class TooFewHeights(AnalysisError):
 
 
 class FieldStandsStill(AnalysisError):
-    """A flux density that is the same at several heights.  low, high: of these heights [m]; value: of all [T]."""
+    """A flux density that is the same at several heights.
+
+    Attributes:
+        low, high: of these heights [m].
+        value: of all [T].
+    """
 
     def __init__(self, *, low: float, high: float, value: float) -> None:
         self.low, self.high, self.value = low, high, value
@@ -146,7 +159,9 @@ class FieldStandsStill(AnalysisError):
 class FieldTurnsOver(AnalysisError):
     """A flux density that changes its sign where that of a ring does not.
 
-    low, high: heights between which it does [m]; reversal: where the base's own changes its sign [m].
+    Attributes:
+        low, high: heights between which it does [m].
+        reversal: where the base's own changes its sign [m].
     """
 
     def __init__(self, *, low: float, high: float, reversal: float) -> None:
@@ -158,7 +173,12 @@ class FieldTurnsOver(AnalysisError):
 
 
 class NoField(AnalysisError):
-    """A scan in which the probe sees nothing of a base.  largest: of its readings, background_u: of their zero [T]."""
+    """A scan in which the probe sees nothing of a base.
+
+    Attributes:
+        largest: of its readings [T].
+        background_u: of their zero [T].
+    """
 
     def __init__(self, *, largest: float, background_u: float) -> None:
         self.largest, self.background_u = largest, background_u

@@ -48,10 +48,16 @@ class Lines:
 def spectral_lines(signal: Signal, rate: float, *, most: int = 12, weakest: float = 1e-3) -> Lines:
     """The lines of an evenly sampled signal, as far as they stand out.
 
-    signal: shape (n,); rate [Hz]: samples per second, above twice the highest frequency or lines are seen at a wrong
-    place; most: so many lines at most; weakest: amplitude of the weakest in parts of the strongest.  A line whose
-    frequency drifts by more than the resolution is broken up into several: take a shorter piece.
-    Raises TooFewReadings, NotFinite.
+    Args:
+        signal: shape (n,).
+        rate: samples per second, above twice the highest frequency or lines are seen at a wrong place [Hz].
+        most: so many lines at most.
+        weakest: amplitude of the weakest in parts of the strongest.
+
+    Raises:
+        TooFewReadings, NotFinite: for what is no signal.
+
+    A line whose frequency drifts by more than the resolution is broken up into several: take a shorter piece.
 
     >>> t = np.arange(1000) / 100
     >>> found = spectral_lines(3 * np.exp(2j * np.pi * 7.3456 * t) + np.exp(-2j * np.pi * 0.6 * t), 100.0)
@@ -81,8 +87,15 @@ def spectral_lines(signal: Signal, rate: float, *, most: int = 12, weakest: floa
 def amplitude_spectrum(signal: Signal, rate: float) -> tuple[Array, Array]:
     """Frequencies [Hz], rising from −rate/2, and amplitudes: a line of amplitude 1 stands 1 high, to 1 % below.
 
-    signal: shape (n,); rate: samples per second; both results: shape (4 n,), four values to a bin, for drawing.
-    Hann window.  Raises TooFewReadings, NotFinite.
+    Args:
+        signal: shape (n,).
+        rate: samples per second [Hz].
+
+    Returns:
+        Both of shape (4 n,), four values to a bin, for drawing.  Hann window.
+
+    Raises:
+        TooFewReadings, NotFinite: for what is no signal.
     """
     signal = _checked(signal)
     transform = np.fft.fft(signal * _hann(signal.size), 4 * signal.size)

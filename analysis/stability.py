@@ -33,11 +33,16 @@ def _zero(function: Callable[[float], float], low: float, high: float, *, xtol: 
 
 
 @dataclass(frozen=True)
-class Symmetric:
-    """A symmetric top.  mass [kg]; transverse, axial: I₁, I₃ [kg m²]; moment [A m²], signed; gravity [m/s²].
+class SymmetricTop:
+    """A symmetric top.
 
-    stiffnesses: of an upright magnet that is no point, heights, shape (n,) → ∂²E/∂θ², ∂²E/∂x², ∂²E/∂x∂θ of its energy,
-    shape (3, n) [J, J/m², J/m]; None: those of a point, μB, μB″/2, μB′/2.
+    Attributes:
+        mass: [kg].
+        transverse, axial: I₁, I₃ [kg m²].
+        moment: signed [A m²].
+        gravity: [m/s²].
+        stiffnesses: of an upright magnet that is no point, heights, shape (n,) → ∂²E/∂θ², ∂²E/∂x², ∂²E/∂x∂θ of its
+            energy, shape (3, n) [J, J/m², J/m]; None: those of a point, μB, μB″/2, μB′/2.
     """
 
     mass: float
@@ -59,7 +64,9 @@ class Symmetric:
 class Window:
     """Heights at which a top whose moment follows the field is stable; masses that float there.
 
-    low, high [m]; light, heavy [kg]: of a top of the given moment, which stands against the field.
+    Attributes:
+        low, high: [m].
+        light, heavy: of a top of the given moment, which stands against the field [kg].
     """
 
     low: float
@@ -72,8 +79,10 @@ class Window:
 class Equilibrium:
     """A height at which field and weight balance for an upright top.
 
-    height [m]; axial, radial: stiffness over mass [1/s²] of a moment that follows the field, positive if stable;
-    spins: the windows of spin [Hz] in which small motions stay small, from the quartic.
+    Attributes:
+        height: [m].
+        axial, radial: stiffness over mass of a moment that follows the field, positive if stable [1/s²].
+        spins: the windows of spin in which small motions stay small, from the quartic [Hz].
     """
 
     height: float
@@ -90,7 +99,7 @@ class Equilibrium:
 # --- adiabatic: the moment follows the field ---
 
 
-def _conditions(field: AxialField, top: Symmetric, z: Array) -> Array:
+def _conditions(field: AxialField, top: SymmetricTop, z: Array) -> Array:
     """Three functions, positive where stable: lift away from the base, axial and radial stiffness; shape (3, n).
 
     In φ₁ = −B: φ₁φ₂ < 0, φ₁φ₃ > 0, φ₂² − 2φ₃φ₁ > 0 for U = mgz + |μ||B|.  The last is the sideways stiffness of a
@@ -101,7 +110,7 @@ def _conditions(field: AxialField, top: Symmetric, z: Array) -> Array:
     return np.array([-b * slope, b * bend, 4 * (both**2 - sideways * tilt)])
 
 
-def windows(field: AxialField, top: Symmetric, low: float, high: float) -> tuple[Window, ...]:
+def windows(field: AxialField, top: SymmetricTop, low: float, high: float) -> tuple[Window, ...]:
     """The stable heights between low and high [m], for a moment against the field, each with its masses.
 
     Scanned in HEIGHTS steps, each edge then found to the last digits.
@@ -117,7 +126,7 @@ def windows(field: AxialField, top: Symmetric, low: float, high: float) -> tuple
     return tuple(found)
 
 
-def _edge(field: AxialField, top: Symmetric, inside: float, outside: float) -> float:
+def _edge(field: AxialField, top: SymmetricTop, inside: float, outside: float) -> float:
     """The height at which one of the conditions passes zero."""
     size = _sizes(field, inside)
     worst = lambda z: float(np.min(_conditions(field, top, np.array([z]))[:, 0] / size))  # noqa: E731
@@ -129,18 +138,18 @@ def _sizes(field: AxialField, z: float) -> Array:
     return np.array([b * slope, b * bend + slope**2, slope**2])
 
 
-def floating_mass(field: AxialField, top: Symmetric, height: float) -> float:
+def floating_mass(field: AxialField, top: SymmetricTop, height: float) -> float:
     """The mass [kg] that floats at a height: |μ||B′|/g; infinite where nothing weighs."""
     return float(_masses(field, top, np.array([height]))[0])
 
 
-def _masses(field: AxialField, top: Symmetric, heights: Array) -> Array:
+def _masses(field: AxialField, top: SymmetricTop, heights: Array) -> Array:
     if top.gravity == 0:
         return np.full(heights.shape, math.inf)
     return np.asarray(np.abs(top.moment * field(heights)[1]) / top.gravity)
 
 
-def reduced_mass(mass: float, top: Symmetric, radius: float, strength: float) -> float:
+def reduced_mass(mass: float, top: SymmetricTop, radius: float, strength: float) -> float:
     """M = m g a²/(2π|μ|ρ), without dimension."""
     return mass * top.gravity * radius**2 / (2 * math.pi * abs(top.moment) * strength)
 
@@ -148,7 +157,7 @@ def reduced_mass(mass: float, top: Symmetric, radius: float, strength: float) ->
 # --- the equilibria of an upright top ---
 
 
-def equilibria(field: AxialField, top: Symmetric, low: float, high: float) -> tuple[Equilibrium, ...]:
+def equilibria(field: AxialField, top: SymmetricTop, low: float, high: float) -> tuple[Equilibrium, ...]:
     """All heights between low and high [m] at which the force μB′ carries the weight."""
     z = np.linspace(low, high, HEIGHTS)
     weight = top.mass * top.gravity
@@ -161,7 +170,7 @@ def equilibria(field: AxialField, top: Symmetric, low: float, high: float) -> tu
     return tuple(_described(field, top, place) for place in places)
 
 
-def _described(field: AxialField, top: Symmetric, height: float) -> Equilibrium:
+def _described(field: AxialField, top: SymmetricTop, height: float) -> Equilibrium:
     bend = float(field(np.array([height]))[2, 0])
     tilt, sideways, both = top.stiffness(field, np.array([height]))[:, 0]
     # U = −μB for the upright top; sideways |B| changes by B′²/4B − B″/2 (Berry), and −μ = |μ| against the field
@@ -173,7 +182,7 @@ def _described(field: AxialField, top: Symmetric, height: float) -> Equilibrium:
 # --- linear: small motions of the whole top ---
 
 
-def quartic(field: AxialField, top: Symmetric, height: float, spin: float) -> Array:
+def quartic(field: AxialField, top: SymmetricTop, height: float, spin: float) -> Array:
     """Coefficients of (I₁α² − I₃ω₃α + P)(α² + Ω²/2) = (μB′)²/4m, highest power first, over I₁; spin ω₃ [rad/s].
 
     For u = x + iy and N = n_x + i n_y ∝ e^{iαt}; P = −μB = −E_θθ, Ω²/2 = −μB″/2m = −E_xx/m, μB′/2 = E_xθ, which is
@@ -185,19 +194,19 @@ def quartic(field: AxialField, top: Symmetric, height: float, spin: float) -> Ar
     return np.array([i1, -turn, p + i1 * half, -turn * half, p * half - both**2 / top.mass]) / i1
 
 
-def modes(field: AxialField, top: Symmetric, height: float, spin_hz: float) -> NDArray[np.complex128]:
+def modes(field: AxialField, top: SymmetricTop, height: float, spin_hz: float) -> NDArray[np.complex128]:
     """The four frequencies α/2π [Hz] of the sideways motion; real if it is stable, negative if it turns backwards."""
     roots = np.roots(quartic(field, top, height, 2 * math.pi * spin_hz)) / (2 * math.pi)
     return np.asarray(roots[np.argsort(roots.real)], dtype=np.complex128)
 
 
-def vertical_mode(field: AxialField, top: Symmetric, height: float) -> float:
+def vertical_mode(field: AxialField, top: SymmetricTop, height: float) -> float:
     """The frequency [Hz] of the up-and-down motion; NaN where it is unstable."""
     square = -top.moment * float(field(np.array([height]))[2, 0]) / top.mass
     return math.sqrt(square) / (2 * math.pi) if square > 0 else math.nan
 
 
-def spin_windows(field: AxialField, top: Symmetric, height: float) -> tuple[tuple[float, float], ...]:
+def spin_windows(field: AxialField, top: SymmetricTop, height: float) -> tuple[tuple[float, float], ...]:
     """The windows of spin [Hz] with four real roots, between 0 and 20 times the sleeping top's limit.
 
     Four real roots: two conditions that the discriminant alone does not tell apart, so the scan (SPINS steps) looks
@@ -239,19 +248,19 @@ def _discriminant(coefficients: Array) -> float:
     return (4 * first**3 - second**2) / 27
 
 
-def sleeping_limit(field: AxialField, top: Symmetric, height: float) -> float:
+def sleeping_limit(field: AxialField, top: SymmetricTop, height: float) -> float:
     """2√(I₁P)/I₃ in turns per second: below, a top on a fixed point would not sleep.  NaN where the field rights it."""
     p = -float(top.stiffness(field, np.array([height]))[0, 0])
     return 2 * math.sqrt(top.transverse * p) / top.axial / (2 * math.pi) if p > 0 else math.nan
 
 
-def thesis_limit(field: AxialField, top: Symmetric, height: float) -> float:
+def thesis_limit(field: AxialField, top: SymmetricTop, height: float) -> float:
     """The thesis's own estimate √(mg/I₃·|φ₁/φ₂|)/2π [Hz]; it lacks the factor 2√(I₁/I₃)."""
     b, slope = (float(value) for value in field(np.array([height]))[:2, 0])
     return math.sqrt(top.mass * top.gravity / top.axial * abs(b / slope)) / (2 * math.pi)
 
 
-def wobble_resonance(field: AxialField, top: Symmetric, height: float) -> float:
+def wobble_resonance(field: AxialField, top: SymmetricTop, height: float) -> float:
     """√(P/(I₃ − I₁)) in turns per second: at this spin a moment that is not along the axis tilts the top without end.
 
     A transverse part δ of the moment makes it lean by δ P/((I₃ − I₁)ω² − P), once per turn.  NaN where there is none:

@@ -22,8 +22,13 @@ Array = NDArray[np.float64]
 class Cylinder:
     """A uniform part of the top, on its axis.
 
-    mass [kg]; outer_radius, inner_radius (0: full), height [m]; offset: of its middle along the axis, from any mark of
-    the top [m]; each with its standard uncertainty.
+    Attributes:
+        name: for messages.
+        mass: [kg].
+        outer_radius, inner_radius: [m]; inner_radius 0: full.
+        height: [m].
+        offset: of its middle along the axis, from any mark of the top [m].
+        mass_u, outer_radius_u, inner_radius_u, height_u, offset_u: standard uncertainties.
     """
 
     name: str

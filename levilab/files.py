@@ -6,6 +6,7 @@ import contextlib
 import json
 import math
 import os
+import re
 import time
 import tomllib
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from levilab.errors import LevilabError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
 
@@ -33,12 +35,22 @@ def parse_json(text: str) -> Any:
         ValueError: it is not JSON, or it holds what no program of ours writes and much of Python stumbles over:
             nesting beyond DEEPEST, a whole number beyond LARGEST, NaN, infinity, half a surrogate pair.
     """
+    _refuse_surrogates(text)
+    if "\\u" not in text and text.count("{") + text.count("[") <= DEEPEST:  # nothing to look for afterwards
+        return json.loads(text, parse_int=_whole_number, parse_float=_finite_number, parse_constant=_finite_number)
     try:
         value = json.loads(text, parse_int=_whole_number)
     except RecursionError:
         raise ValueError(_TOO_DEEP) from None
     _refuse_oddities(value, finite=True)
     return value
+
+
+def _finite_number(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(_NOT_FINITE)
+    return number
 
 
 def parse_toml(text: str) -> dict[str, Any]:
@@ -49,7 +61,8 @@ def parse_toml(text: str) -> dict[str, Any]:
     """
     try:
         table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError:
+    except tomllib.TOMLDecodeError as error:
+        error.args = (f"{error}{_hint(text, str(error))}",)
         raise
     except RecursionError:
         raise ValueError(_TOO_DEEP) from None
@@ -59,7 +72,19 @@ def parse_toml(text: str) -> dict[str, Any]:
     return table
 
 
+def _hint(text: str, said: str) -> str:
+    """What is wrong with a number at which TOML was left, as the rest of a sentence; empty for anything else."""
+    place = re.search(r"line (\d+)", said)
+    line = text.splitlines()[int(place[1]) - 1] if place and int(place[1]) <= len(text.splitlines()) else ""
+    if re.search(r"=\s*[+-]?\d+,\d", line):
+        return "; write a decimal point, not a comma"
+    if re.search(r"=\s*[+-]?\d[\d.]*\s*[A-Za-zµ°%]", line):
+        return "; write the number without its unit, which is in the key's name"
+    return ""
+
+
 _TOO_DEEP = f"it is nested more than {DEEPEST} levels deep"
+_NOT_FINITE = "a number in it is not finite"
 _TOO_LARGE = "a whole number in it has more than 300 digits"
 
 
@@ -77,9 +102,9 @@ def finite(value: Any) -> Any:
 
 
 def _whole_number(digits: str) -> int:
-    if len(digits) > 301:
+    if len(digits) > 302 or abs(number := int(digits)) > LARGEST:
         raise ValueError(_TOO_LARGE)
-    return int(digits)
+    return number
 
 
 def _refuse_oddities(value: Any, *, finite: bool) -> None:
@@ -93,7 +118,7 @@ def _refuse_oddities(value: Any, *, finite: bool) -> None:
             elif isinstance(item, int) and abs(item) > LARGEST:
                 raise ValueError(_TOO_LARGE)
             elif isinstance(item, float) and finite and not math.isfinite(item):
-                raise ValueError("a number in it is not finite")
+                raise ValueError(_NOT_FINITE)
         level = [inner for item in level for inner in _parts(item)]
         depth += 1
 
@@ -109,6 +134,20 @@ def _refuse_surrogates(text: str) -> None:
         text.encode()
     except UnicodeEncodeError:
         raise ValueError("a text in it holds half a surrogate pair") from None
+
+
+@contextlib.contextmanager
+def writing(what: str, advice: str = "choose another place with `out`") -> Iterator[None]:
+    """Raise CannotWrite, in a sentence, for what the operating system refuses.
+
+    Args:
+        what: the beginning of the sentence: what could not be written, and where.
+        advice: what to do.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise CannotWrite(f"{what} ({error.strerror or error}): {advice}") from error
 
 
 def replace_atomically(path: Path, content: str | bytes) -> None:

@@ -1,4 +1,10 @@
-"""Ctrl-C and SIGTERM, asked for politely: a reading is finished, the outputs go off, the run is kept."""
+"""What asks a program to end, and what it does then: the only place that handles signals.
+
+An acquisition finishes its reading, switches the outputs off and keeps the run (`watching_for_interruption`); a server
+ends when its event loop has its turn (`watching_for_end`); what must not be torn lets Ctrl-C wait
+(`interruption_postponed`).  Elsewhere Ctrl-C is Python's KeyboardInterrupt, which the command line turns into one line
+and an exit status.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +22,10 @@ _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "S
 
 
 class Interrupted(BaseException):
-    """The run was asked to end.  by: the signal's name.
+    """The run was asked to end.
+
+    Attributes:
+        by: the signal's name.
 
     No Exception, so that no library on the way takes it for a failure of its own.
     """
@@ -27,7 +36,7 @@ class Interrupted(BaseException):
 
 
 class Stop:
-    """Whether somebody asked for the end.
+    """Whether the end was asked for.
 
     The first signal is only noted, so that no exchange with an instrument is torn; `check()` raises it
     where the program can end well.  The second one breaks through, in case an exchange hangs; from then on
@@ -40,7 +49,7 @@ class Stop:
         self._at_once = False
 
     def check(self) -> None:
-        """Raise Interrupted if somebody asked."""
+        """Raise Interrupted if the end was asked for."""
         if self.by:
             raise Interrupted(self.by)
 
@@ -71,19 +80,47 @@ def _ignored_by_nohup(number: int) -> bool:
     return signal.Signals(number).name == "SIGHUP" and signal.getsignal(number) is signal.SIG_IGN
 
 
+class End:
+    """Whether a signal asked for the end, and which.  by: its name; wake: called by the signal's handler, if given."""
+
+    def __init__(self) -> None:
+        self.by: str | None = None
+        self.wake: Callable[[], object] | None = None
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        """The signal handler."""
+        self.by = self.by or signal.Signals(number).name
+        if self.wake:
+            self.wake()
+
+
+@contextlib.contextmanager
+def watching_for_end() -> Iterator[End]:
+    """Signals go to the End given here, for as long as this lasts (main thread only)."""
+    end = End()
+    with _handled_by(end):
+        yield end
+
+
 @contextlib.contextmanager
 def watching_for_interruption() -> Iterator[Stop]:
     """Signals go to the Stop given here, for as long as this lasts (main thread only)."""
     stop = Stop()
+    with _handled_by(stop):
+        yield stop
+
+
+@contextlib.contextmanager
+def _handled_by(handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
-        yield stop
+        yield
         return
-    before = {number: signal.signal(number, stop) for number in _SIGNALS if not _ignored_by_nohup(number)}
+    before = {number: signal.signal(number, handler) for number in _SIGNALS if not _ignored_by_nohup(number)}
     try:
-        yield stop
+        yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        for number, earlier in before.items():
+            signal.signal(number, earlier)
 
 
 @contextlib.contextmanager

@@ -22,7 +22,9 @@ class Settings(BaseModel):
 def in_one_line(error: ValidationError, of: type[BaseModel] | None = None) -> str:
     """The first thing that is wrong, with its path and what is allowed, and how many more there are.
 
-    of: what did not suit, so that an unknown key can be compared with those that it has.
+    Args:
+        error: of the table.
+        of: what did not suit, so that an unknown key can be compared with those that it has.
     """
     # a key that is unknown may be why another one is missing
     first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
@@ -58,12 +60,17 @@ _NUMBERS = (
     (re.compile(r"\s*[+-]?\d+,\d+\s*"), "; write a decimal point, not a comma"),
     (
         re.compile(r"\s*[+-]?\d*\.?\d+(e[+-]?\d+)?\s*[A-Za-zµ°%][\w/²^*°]*\s*", re.IGNORECASE),
-        "; write the number without its unit, which is in the key's name",
+        "; write the number without its unit, {unit}",
     ),
 )
 
 
-def hint_about(seen: object) -> str:
-    """What is wrong with a text that was nearly a number, as the rest of a sentence; empty for any other."""
+def hint_about(seen: object, unit: str = "which is in the key's name") -> str:
+    """What is wrong with a text that was nearly a number, as the rest of a sentence; empty for any other.
+
+    Args:
+        seen: what was given.
+        unit: where the unit stands.
+    """
     found = (text for pattern, text in _NUMBERS if isinstance(seen, str) and pattern.fullmatch(seen))
-    return next(found, "")
+    return next(found, "").format(unit=unit)

@@ -13,7 +13,7 @@ from instruments.catalogue import CATALOGUE
 from instruments.clock import WallClock
 from instruments.virtual.bench.visa_library import LevilabVisaLibrary
 from levilab.bench.config import ConfigError
-from levilab.world.bench import own_world, virtual_bus
+from levilab.world.bench import practice_world, virtual_bus
 
 if TYPE_CHECKING:
     from instruments.virtual.bench.bus import Bus
@@ -31,7 +31,7 @@ class PracticeBench(LevilabVisaLibrary):
         words = [word.strip() for word in str(self.library_path).split(",")]
         clock = WallClock() if REALTIME in words else None
         models = [word for word in words if word not in {REALTIME, *map(str, self.get_library_paths())}]
-        return virtual_bus(own_world(clock), dict(map(kind_and_name, models)))
+        return virtual_bus(practice_world(clock), dict(map(kind_and_name, models)))
 
 
 def kind_and_name(model: str) -> tuple[str, str]:

@@ -14,19 +14,22 @@ collect_ignore = ["golden/make_trajectories.py"]
 #: Files and folders that take more than two seconds of a processor, or compile the simulator: `make quick` leaves them
 #: out.  A test is slow, too, where it is marked so itself.
 SLOW = """
-    analysis/precession/test_sweep.py  analysis/pulses/test_trace.py
+    analysis/precession/test_gates.py  analysis/precession/test_sweep.py  analysis/pulses/test_trace.py
     analysis/spindown/test_fit.py  analysis/spindown/test_tilt.py
     instruments/virtual/bench/test_fuzz.py  instruments/virtual/core/test_long_lines.py
     instruments/virtual/servers/test_at_work.py
-    instruments/wire_faults
-    levilab/acquisition/test_limit.py  levilab/acquisition/test_loop.py  levilab/acquisition/test_losses.py
-    levilab/acquisition/test_precession.py
-    levilab/benchmark  levilab/cli/test_main.py  levilab/crosscheck  levilab/motion  levilab/notebook
+    instruments/links/test_wire_faults.py  instruments/links/test_wire_proxy.py
+    levilab/acquisition/experiments/test_limit.py  levilab/acquisition/experiments/test_precession.py
+    levilab/acquisition/experiments/test_trace.py  levilab/acquisition/test_loop.py
+    levilab/acquisition/test_losses.py
+    levilab/benchmark  levilab/cli/test_main.py  levilab/crosscheck
+    levilab/formats/waveforms/test_memory.py  levilab/motion  levilab/notebook
     levilab/pipelines/spindown  levilab/pipelines/test_result.py
     levilab/report/test_page.py
     levilab/runs/test_hostile.py  levilab/runs/test_kill.py
-    levilab/simulator
-    levilab/world/test_motion_world.py  levilab/world/test_serve.py  levilab/world/test_spin_world.py
+    levilab/simulator  ../levilab/simulator  levilab/stability
+    levilab/world/test_base.py  levilab/world/test_motion_world.py  levilab/world/test_serve.py
+    levilab/world/test_spin_world.py
     test_documentation.py
 """
 
@@ -34,7 +37,7 @@ SLOW = """
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark what is slow, and let it go first: at the end no worker waits for another's long test."""
     tests = Path(__file__).parent
-    slow = [tests / name for name in SLOW.split()]
+    slow = [(tests / name).resolve() for name in SLOW.split()]
     assert all(path.exists() for path in slow), "SLOW in tests/conftest.py names a file that is gone"
     for item in items:
         if any(item.path.is_relative_to(path) for path in slow):

@@ -92,6 +92,13 @@ def test_virtual_instruments_have_seven_rooms() -> None:
     assert files(ROOT / "instruments/virtual") == ["__init__.py"]
 
 
+def test_tests_lie_in_the_room_of_their_subject() -> None:
+    tests = ROOT / "tests"
+    folders = {path.parent.relative_to(tests) for path in tests.rglob("test_*.py")}
+    strange = [folder.as_posix() for folder in folders if not (ROOT / folder).is_dir()]
+    assert strange == ["peers"]  # of other people's drivers
+
+
 def test_no_folder_holds_a_family_of_files_with_one_prefix() -> None:
     folders = {path.parent for _, path in modules()}
     families = Counter(

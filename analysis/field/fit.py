@@ -65,7 +65,12 @@ _START_THICKNESS = 0.3
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known before the scan.  value; u: standard uncertainty, 0: it is exact."""
+    """What is known before the scan.
+
+    Attributes:
+        value: in SI.
+        u: standard uncertainty, 0: it is exact.
+    """
 
     value: float
     u: float
@@ -75,8 +80,12 @@ class Prior:
 class Known:
     """What calliper and data sheet say.
 
-    inner_radius, outer_radius [m]; origin: height of the middle of the thickness, thickness [m], None: not known;
-    background: what all readings are off by [T]; gain_u: relative standard uncertainty of the instrument's scale.
+    Attributes:
+        inner_radius, outer_radius: [m].
+        origin: height of the middle of the thickness [m], None: not known.
+        thickness: [m], None: not known.
+        background: what all readings are off by [T].
+        gain_u: relative standard uncertainty of the instrument's scale.
     """
 
     inner_radius: Prior
@@ -96,9 +105,13 @@ class Known:
 class Statistics:
     """How well the model fits.
 
-    n: readings; n_parameters: fitted; rms_residual [T]; chi_square: of readings and priors, None where no uncertainty
-    of the readings was given; degrees_of_freedom: readings and priors less parameters; durbin_watson, runs_test_p: of
-    the residuals in the order of the heights.
+    Attributes:
+        n: readings.
+        n_parameters: fitted.
+        rms_residual: [T].
+        chi_square: of readings and priors, None where no uncertainty of the readings was given.
+        degrees_of_freedom: readings and priors less parameters.
+        durbin_watson, runs_test_p: of the residuals in the order of the heights.
     """
 
     n: int

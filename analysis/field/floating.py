@@ -16,7 +16,7 @@ from analysis.field.fit import FieldScan
 from analysis.field.magnet import Disc, axial_field, stiffnesses
 from analysis.field.ring import Ring
 from analysis.numbers import digits
-from analysis.stability import AxialField, Symmetric, Window, equilibria, windows
+from analysis.stability import AxialField, SymmetricTop, Window, equilibria, windows
 from analysis.uncertainty import Estimate, propagate
 
 Array = NDArray[np.float64]
@@ -50,9 +50,13 @@ _OF_TOP = ("mass", "transverse", "axial", "moment", "height")
 class KnownTop:
     """What is known of the top.
 
-    transverse, axial: I₁, I₃ [kg m²]; moment: its size [A m²]; mass [kg]; height: where it floats, on the scale of the
-    scan's heights [m]; with mass and height the moment follows from them.  covariance: of mass, I₁ and I₃, where they
-    come from the same parts, shape (3, 3).
+    Attributes:
+        transverse, axial: I₁, I₃ [kg m²].
+        moment: its size [A m²].
+        mass: [kg].
+        height: where it floats, on the scale of the scan's heights [m]; with mass and height the moment follows from
+            them.
+        covariance: of mass, I₁ and I₃, where they come from the same parts, shape (3, 3).
     """
 
     transverse: Estimate
@@ -74,9 +78,11 @@ class KnownTop:
 class Floating:
     """What follows.
 
-    values: name → estimate, of RESULTS; the heights and masses of the window far above the base, the spins of a top of
-    mass_to_set, floating at height_at_mass; height_per_mass: how it moves with the mass; moment and mass_to_add only
-    where the top's mass is known, and for the moment its height.  warnings: what to know.
+    Attributes:
+        values: name → estimate, of RESULTS: the heights and masses of the window far above the base; the spins of a top
+            of mass_to_set, floating at height_at_mass; height_per_mass, how it moves with the mass; moment and
+            mass_to_add only where the top's mass is known, and for the moment its height.
+        warnings: what to know.
     """
 
     values: Mapping[str, Estimate]
@@ -150,7 +156,7 @@ def _carried(evaluate: Callable[[Array], Array], values: Array, found: Array, co
     return sizes
 
 
-def floating_top(ring: Ring, top: KnownTop) -> Symmetric:
+def floating_top(ring: Ring, top: KnownTop) -> SymmetricTop:
     """The top as the theory takes it, its mass 1 kg; the moment stands against the field high above the ring.
 
     Raises FloatsNowhere where the field has no slope at the height from which the moment follows.
@@ -167,7 +173,7 @@ def floating_top(ring: Ring, top: KnownTop) -> Symmetric:
     moment = -math.copysign(moment, ring.strength)
     stiffness = None if top.magnet is None else stiffnesses(ring, top.magnet, moment)
     inertias = float(top.transverse.value or 0.0), float(top.axial.value or 0.0)
-    return Symmetric(1.0, *inertias, moment, top.gravity, stiffness)
+    return SymmetricTop(1.0, *inertias, moment, top.gravity, stiffness)
 
 
 def floating_spins(ring: Ring, top: KnownTop, mass: float, window: tuple[float, float]) -> tuple[float, float] | None:
@@ -217,7 +223,7 @@ def _with_values(top: KnownTop, values: Mapping[str, float]) -> KnownTop:
     return replace(top, **known)
 
 
-def _upper_window(field: AxialField, top: Symmetric, ring: Ring, near: list[Window]) -> Window:
+def _upper_window(field: AxialField, top: SymmetricTop, ring: Ring, near: list[Window]) -> Window:
     """The window farthest above the base."""
     if near:
         margin = _AROUND * (near[0].high - near[0].low)

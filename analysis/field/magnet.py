@@ -63,7 +63,7 @@ def axial_field(ring: Ring, disc: Disc | None) -> AxialField:
 
 
 def stiffnesses(ring: Ring, disc: Disc, moment: float) -> AxialField:
-    """∂²E/∂θ², ∂²E/∂x², ∂²E/∂x∂θ of an upright magnet on the axis, for `analysis.stability.Symmetric`: shape (3, n)."""
+    """∂²E/∂θ², ∂²E/∂x², ∂²E/∂x∂θ of an upright magnet on the axis, for `stability.SymmetricTop`: shape (3, n)."""
     weights = _weights(disc)
 
     def of(z: Array) -> Array:

@@ -22,8 +22,10 @@ _THIN = 1e-3
 class Ring:
     """A ring magnet.
 
-    strength: ρ [T m], signed: positive if the field points up high above the ring; origin: height of the middle of its
-    thickness [m]; thickness, inner_radius, outer_radius [m].
+    Attributes:
+        strength: ρ [T m], signed: positive if the field points up high above the ring.
+        origin: height of the middle of its thickness [m].
+        thickness, inner_radius, outer_radius: [m].
     """
 
     strength: float

@@ -111,8 +111,12 @@ def first_harmonic(signal: Array, dt: float, near: float) -> tuple[float, float]
     """Frequency [Hz] and phase of the cosine at the first sample [rad] of a periodic signal's first harmonic.
 
     The phases of sixteenths of the record, each a least-squares cosine, lie on a line whose slope corrects the
-    frequency.  near: the frequency to better than one period in the record [Hz].  Missing samples are NaN; a part of
-    which hardly any are left is left out.
+    frequency.  A part of which hardly any samples are left is left out.
+
+    Args:
+        signal: shape (n,), missing samples are NaN.
+        dt: from one sample to the next [s].
+        near: the frequency to better than one period in the record [Hz].
 
     Raises:
         TooFewReadings: below two parts.

@@ -73,7 +73,10 @@ class Gates:
 class Swing:
     """The phase of a locked top about its drive: size·cos 2πf(t − crest) [turns], ahead of the drive where it is > 0.
 
-    frequency: f [Hz]; size: [turns]; crest: [s].
+    Attributes:
+        frequency: f [Hz].
+        size: [turns].
+        crest: [s].
     """
 
     frequency: float
@@ -85,9 +88,13 @@ class Swing:
 class Rate:
     """The rate of the pulses at a point.
 
-    value: [Hz]; scatter: standard deviation of the periods in a gate [turns], with so many degrees of freedom;
-    per_scatter: u(value) over it [Hz]; swing: that was taken off, None where it was not looked for; wrong: gates that
-    are left out, with the pulses that they have too many; missing: gates without a count.
+    Attributes:
+        value: [Hz].
+        scatter: standard deviation of the periods in a gate [turns], with so many degrees of freedom.
+        per_scatter: u(value) over it [Hz].
+        swing: that was taken off, None where it was not looked for.
+        wrong: gates that are left out, with the pulses that they have too many.
+        missing: gates without a count.
     """
 
     value: float

@@ -115,9 +115,12 @@ class Line:
 class Influence:
     """What each point does to the line, shape (n,) each.
 
-    leverage: how far the line follows the point, 0 to 1; residual: y − line [Hz]; studentised: the same in units of its
-    own standard deviation, with scatter taken from the other points where u is not known, NaN where it is undefined;
-    slope_change, intercept_change: by which the line without the point differs.
+    Attributes:
+        leverage: how far the line follows the point, 0 to 1.
+        residual: y − line [Hz].
+        studentised: the same in units of its own standard deviation, with scatter taken from the other points where u
+            is not known, NaN where it is undefined.
+        slope_change, intercept_change: by which the line without the point differs.
     """
 
     leverage: Array

@@ -48,8 +48,12 @@ class Robust:
 class Miscount:
     """A point far off the median line.
 
-    index: of the point; times: the count in parts of the line, as (1, 2), where it is such a part; counts: whole counts
-    too many in a gate, where it is so many; neither: no cause is known.
+    Attributes:
+        index: of the point.
+        times: the count in parts of the line, as (1, 2), where it is such a part.
+        counts: whole counts too many in a gate, where it is so many.
+
+    Where neither is given no cause is known.
     """
 
     index: int

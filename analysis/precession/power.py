@@ -63,7 +63,10 @@ class Power:
 def probability_of_telling(difference: float, u_slope: float, degrees_of_freedom: int | None) -> float:
     """How probable it is that a two-sided test at 95 % tells a slope that differs so much from 1.
 
-    degrees_of_freedom: of the scatter that u_slope is from; None: u_slope is known.
+    Args:
+        difference: of the slope from 1.
+        u_slope: its standard uncertainty.
+        degrees_of_freedom: of the scatter that u_slope is from; None: u_slope is known.
 
     >>> round(probability_of_telling(3.2415, 1.0, None), 3), round(probability_of_telling(0.0, 1.0, 7), 3)
     (0.9, 0.05)

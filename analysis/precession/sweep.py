@@ -103,7 +103,9 @@ class SweepFit:
 class Sweep:
     """What was measured, shape (n,) each [Hz]; u and the spin where they are known.
 
-    gate_s: of the counter [s]; gates: of the laser behind each point, where they are known.
+    Attributes:
+        gate_s: of the counter [s].
+        gates: of the laser behind each point, where they are known.
     """
 
     drive: Array

@@ -80,6 +80,18 @@ class Fit:
         unit = 6 / self.half**3
         return Estimate(unit * float(self.coefficients[3]), unit * float(np.sqrt(self.covariance[3, 3])), "Hz/s^2")
 
+    def correlations(self, time: float) -> tuple[float, float, float]:
+        """Of frequency and slope, frequency and bend, slope and bend at a time; none of them below degree three."""
+        if self.coefficients.size < 4:
+            return 0.0, 0.0, 0.0
+        rows = np.stack([*_derivatives((time - self.centre) / self.half, 4), (0.0, 0.0, 0.0, 6.0)])
+        covariance = rows @ self.covariance @ rows.T
+        u = np.sqrt(np.diag(covariance))
+        if not u.all():
+            return 0.0, 0.0, 0.0
+        correlation = covariance / np.outer(u, u)
+        return float(correlation[0, 1]), float(correlation[0, 2]), float(correlation[1, 2])
+
     def times(self, factor: float) -> Fit:
         """The phase multiplied: half or twice the frequency."""
         return replace(self, coefficients=self.coefficients * factor)

@@ -35,7 +35,7 @@ class SpinFrequency:
 
     Attributes:
         frequency: at the reference time [Hz].
-        chirp: its slope there [Hz/s]; independent of the frequency.
+        chirp: its slope there [Hz/s]; independent of the frequency, nearly so where there is a bend.
         phase: there [turns], from 0 to 1; the middle of a pulse passes at 0.
         reference_time: [s]; the middle of the record, moved a little where pulses are missing on one side.
         method: that found it.
@@ -48,6 +48,7 @@ class SpinFrequency:
         snr_db: 20 log₁₀ of the pulse's height over the noise of a sample; None for lists of times.
         notes: findings.
         bend: how the slope itself changes [Hz/s²], the same at all times; None where no third degree was fitted.
+        correlations: of frequency and chirp, frequency and bend, chirp and bend; 0 without a bend.
     """
 
     frequency: Estimate
@@ -63,16 +64,23 @@ class SpinFrequency:
     snr_db: float | None
     notes: tuple[Finding, ...] = ()
     bend: Estimate | None = None
+    correlations: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def at(self, time: float) -> Estimate:
-        """The frequency at another time [s], along the slope."""
+        """The frequency at another time [s], along the slope and its bend."""
         away = time - self.reference_time
-        frequency, chirp = self.frequency, self.chirp
+        frequency, chirp, bend = self.frequency, self.chirp, self.bend or Estimate(0.0, 0.0, "Hz/s^2")
         assert frequency.value is not None
         assert chirp.value is not None
-        value = frequency.value + chirp.value * away
-        u = None if frequency.u is None or chirp.u is None else math.hypot(frequency.u, chirp.u * away)
-        return Estimate(value, u, "Hz")
+        assert bend.value is not None
+        value = frequency.value + chirp.value * away + bend.value * away**2 / 2
+        if frequency.u is None or chirp.u is None or bend.u is None:
+            return Estimate(value, None, "Hz")
+        f, c, b = frequency.u, chirp.u * away, bend.u * away**2 / 2
+        fc, fb, cb = self.correlations
+        return Estimate(
+            value, math.sqrt(max(f * f + c * c + b * b + 2 * (fc * f * c + fb * f * b + cb * c * b), 0.0)), "Hz"
+        )
 
     def under_drag(self) -> SpinFrequency:
         """The same for a top whose slope may change as air drag or an even ramp has it.

@@ -72,6 +72,7 @@ def spin_of_times(pulse_times: ArrayLike, *, degree: int | None = None) -> SpinF
         None,
         findings_of(train),
         train.fit.bend,
+        train.fit.correlations(reference),
     )
 
 

@@ -329,4 +329,5 @@ def _result(pulses: Found, start: float) -> SpinFrequency:
         snr_db=20 * math.log10(found.height / found.noise) if found.noise > 0 and found.height > 0 else None,
         notes=tuple(more),
         bend=fit.bend,
+        correlations=fit.correlations(reference),
     )

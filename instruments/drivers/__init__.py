@@ -33,8 +33,10 @@ class Instrument(Protocol):
     def settings(self) -> dict[str, Value]:
         """Its settings as they stand, unit at the end of the name."""
 
-    def unlike(self, now: dict[str, Value]) -> dict[str, tuple[object, object]]:
-        """Settings that stand in the instrument otherwise than they were set: name → (as set, now)."""
+    def changed_settings(
+        self, now: Mapping[str, Value] | None = None, *, since: Mapping[str, Value] | None = None
+    ) -> dict[str, tuple[object, object]]:
+        """Settings that are no longer as they were answered, or by default as they were set: name → (then, now)."""
 
     def forget_errors(self) -> None:
         """Empty the error queue."""

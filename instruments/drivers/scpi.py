@@ -197,11 +197,21 @@ class ScpiInstrument:
         """Every declared setting as it stands in the instrument, unit at the end of the name."""
         return {setting.full_name: getattr(self, setting.name) for setting in self.declared()}
 
-    def unlike(self, now: dict[str, bool | float | str] | None = None) -> dict[str, tuple[object, object]]:
-        """Settings that stand in the instrument otherwise than they were set: name → (as set, now).
+    def changed_settings(
+        self,
+        now: Mapping[str, bool | float | str] | None = None,
+        *,
+        since: Mapping[str, bool | float | str] | None = None,
+    ) -> dict[str, tuple[object, object]]:
+        """Settings that are no longer as they were: name → (then, now).
 
-        now: what `settings` has returned; by default the instrument is asked for those that were set.
+        now: what `settings` has returned; by default the instrument is asked.  since: what `settings` returned before;
+        an instrument answers the same setting in the same way each time, so that any other answer is a change.  By
+        default `now` is compared with what was set, which the instrument rounds; see :meth:`Setting.differs`.
         """
+        if since is not None:
+            now = now or self.settings()
+            return {name: (then, now[name]) for name, then in since.items() if now[name] != then}
         found: dict[str, tuple[object, object]] = {}
         rows = {row.full_name: row for row in self.declared()}
         for name, asked in self.set_to.items():

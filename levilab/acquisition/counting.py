@@ -139,12 +139,12 @@ class FreeTop(Generic[S]):
 
     def _read_or_ask_again(self) -> Row | Missed:
         first = self._count()
-        if first and self._follows(first):
+        if first and self._is_plausible(first):
             return first
         what = "no reading" if first is None else f"{first['spin_frequency_hz']:.4g} Hz does not follow"
         self.session.event("asked again", f"{what}, asking once more", **_spin_of(first))
         second = self._count()
-        if second and self._follows(second):
+        if second and self._is_plausible(second):
             return second
         if first and second and _is_same_spin(first, second):
             return self._agreed(second)
@@ -189,7 +189,7 @@ class FreeTop(Generic[S]):
         u = session.settings.reading_u_hz
         return row | ({"spin_frequency_u_hz": u} if u else {})
 
-    def _follows(self, reading: Row) -> bool:
+    def _is_plausible(self, reading: Row) -> bool:
         """Whether a reading is the first, or plausible after the last one."""
         return self.last is None or is_plausible(self.last, reading)
 

@@ -51,8 +51,9 @@ TRIES, MOST_FAILED = 2, 3
 class DriveSettings(CounterSettings):
     """Drive up to a frequency, hold the top there, switch off.
 
-    ramp_hz_per_s: no faster than the drive can pull the top; of the 0.4 Hz/s that 0.4 mT can, drag takes up to 0.17 and
-    the swing about the drive most of the rest.
+    Attributes:
+        ramp_hz_per_s: no faster than the drive can pull the top; of the 0.4 Hz/s that 0.4 mT can, drag takes up to 0.17
+            and the swing about the drive most of the rest.
     """
 
     drive_frequency_hz: PositiveFloat = Field(default=40.0, description="drive the top up to this,")
@@ -75,21 +76,20 @@ class DriveSettings(CounterSettings):
 def check_drive(table: str, limits: Limits, amplitude_vpp: float, frequencies: Iterable[tuple[str, float]]) -> None:
     """Raise ConfigError for a drive that the bench does not allow.
 
-    table: of the settings in the bench file; frequencies: names of its settings, with what they ask for [Hz].
+    Args:
+        table: of the settings in the bench file.
+        limits: of the bench.
+        amplitude_vpp: that is asked for [V].
+        frequencies: names of its settings, with what they ask for [Hz].
     """
-    asked = [("drive_amplitude_vpp", amplitude_vpp, "drive_amplitude_vpp")]
-    asked += [(name, frequency, "drive_frequency_hz") for name, frequency in frequencies]
-    for name, wanted, limit in asked:
-        if wanted > getattr(limits, limit):
+    drive = limits.of_the_drive()
+    asked = [("drive_amplitude_vpp", amplitude_vpp, drive.beyond(amplitude_vpp=amplitude_vpp))]
+    asked += [(name, frequency, drive.beyond(frequency_hz=frequency)) for name, frequency in frequencies]
+    for name, wanted, found in asked:
+        if found:
             raise ConfigError(
-                f"{table}.{name} = {wanted:g} is more than this bench allows, limits.{limit} = "
-                f"{getattr(limits, limit):g}"
-            )
-    for name, wanted, _ in asked[1:]:
-        if wanted < limits.drive_lowest_hz:
-            raise ConfigError(
-                f"{table}.{name} = {wanted:g} is less than this bench allows, limits.drive_lowest_hz = "
-                f"{limits.drive_lowest_hz:g}"
+                f"{table}.{name} = {wanted:g} is {'more' if found.is_highest else 'less'} than this bench allows, "
+                f"limits.{found.name} = {found.limit:g}"
             )
 
 
@@ -103,13 +103,19 @@ class DidNotFollow(ExperimentFailed):
 class NotHeld(Exception):
     """The top does not spin with the drive; what is seen instead.
 
-    spin: None where no light pulses are seen; drive [Hz].
+    Attributes:
+        spin: [Hz]; None where no light pulses are seen.
+        drive: [Hz].
     """
 
     def __init__(self, spin: float | None, drive: float) -> None:
         self.spin, self.drive = spin, drive
         seen = "no light pulses" if spin is None else f"a spin of {spin:.2f} Hz"
         super().__init__(f"{seen} under a drive of {drive:.2f} Hz")
+
+
+class PointFailed(Exception):
+    """Nothing can be measured at a point of a sweep, though the top is held: the sweep goes on to the next one."""
 
 
 # --- up ---
@@ -156,8 +162,13 @@ def reach_generator_again(session: Session[D], error: InstrumentError) -> None:
 def drive_up(session: Session[D], to: float | None = None) -> None:
     """Let the drive take hold of the top at its own spin, bring it to a frequency, and hold it there.
 
-    to: that frequency [Hz]; None: as the settings say.  Raises DidNotFollow, with the drive off; ExperimentFailed in
-    the dark.
+    Args:
+        session: the acquisition.
+        to: that frequency [Hz]; None: as the settings say.
+
+    Raises:
+        DidNotFollow: the drive is off.
+        ExperimentFailed: no light is seen.
     """
     settings = session.settings
     target = settings.drive_frequency_hz if to is None else to
@@ -250,7 +261,10 @@ def _hold(session: Session[D], drive: float) -> None:
 def has_drifted(counts: Sequence[float]) -> bool:
     """Whether the second half of the counts lies off the first half, as those of a top that was lost meanwhile do.
 
-    A tape that slips is as far behind at first as it is at last.  counts: at least two, in order [Hz].
+    A tape that slips is as far behind at first as it is at last.
+
+    Args:
+        counts: at least two, in order [Hz].
     """
     half = len(counts) // 2
     first, last = np.array(counts[:half]), np.array(counts[-half:])
@@ -307,7 +321,12 @@ def is_over(session: Session[D]) -> bool:
 
 @dataclass(frozen=True)
 class FailedPoint:
-    """A point of a sweep at which nothing was measured.  drive: its frequency [Hz]; reason: of the last try."""
+    """A point of a sweep at which nothing was measured.
+
+    Attributes:
+        drive: its frequency [Hz].
+        reason: of the last try.
+    """
 
     drive: float
     reason: str
@@ -332,7 +351,7 @@ def sweep_drive(
         session: the acquisition.
         points: frequencies of the drive, in order [Hz].
         measure: measures at a frequency at which the drive now is, and keeps the reading itself.  Raises NotHeld where
-            the top is lost, or not locked.
+            the top is lost, or not locked; PointFailed where another try at this point would not help.
         within_s: how long a person has to float a top [s].
         most_failed: so many points that fail one after the other end the sweep.
 
@@ -394,6 +413,9 @@ class _Sweep:
             except InstrumentError as error:
                 self.at = None
                 reach_generator_again(session, error)
+            except PointFailed as failed:
+                self.at = self.held = drive
+                return str(failed)
             else:
                 self.at = self.held = drive
                 return ""

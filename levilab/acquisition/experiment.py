@@ -27,7 +27,12 @@ class ExperimentSettings(Settings):
     """
 
     def check(self, table: str, limits: Limits) -> None:
-        """Raise ConfigError for what the bench does not allow.  table: the name of these settings in the bench file."""
+        """Raise ConfigError for what the bench does not allow.
+
+        Args:
+            table: the name of these settings in the bench file.
+            limits: of the bench.
+        """
 
     def for_scene(self, scene: Scene) -> Self:
         """These settings for a virtual bench whose top is a scene's: what was not set may suit it better."""
@@ -37,8 +42,9 @@ class ExperimentSettings(Settings):
 class CounterSettings(ExperimentSettings):
     """Readings of the counter at an interval.
 
-    one_top: whether all readings are of one top, which falls meanwhile: then longest_s counts from time zero, else a
-    resumed run has it anew.
+    Attributes:
+        one_top: whether all readings are of one top, which falls meanwhile: then longest_s counts from time zero, else
+            a resumed run has it anew.
     """
 
     one_top: ClassVar[bool] = True
@@ -74,10 +80,15 @@ S = TypeVar("S", bound=ExperimentSettings)
 class Experiment(Generic[S]):
     """An experiment.
 
-    about: one line; instruments: the kinds that it needs; settings: its table in the bench file; channels: the columns
-    that it writes, given its settings; run: carries it out; also_needs: the kinds of instrument that it needs only
-    with some settings, given these; mock_scene: the scene of a mock unless another is asked
-    for, None: a top that only spins; called: what one reading of it is called.
+    Attributes:
+        about: one line.
+        instruments: the kinds that it needs.
+        settings: its table in the bench file.
+        channels: the columns that it writes, given its settings.
+        run: carries it out.
+        also_needs: the kinds of instrument that it needs only with some settings, given these.
+        mock_scene: the scene of a mock unless another is asked for, None: a top that only spins.
+        called: what one reading of it is called.
     """
 
     name: str

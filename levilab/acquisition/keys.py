@@ -39,7 +39,14 @@ _LISTS = {"integer": "[1, 3]", "number": "[44.0, 38.0]", "string": '["tape", "la
 
 @dataclass(frozen=True)
 class Key:
-    """A setting.  name: without its table's; value: what it is now; expected: what may stand there; meaning: of it."""
+    """A setting.
+
+    Attributes:
+        name: without its table's.
+        value: what it is now.
+        expected: what may stand there.
+        meaning: of it.
+    """
 
     name: str
     value: Any
@@ -68,7 +75,11 @@ def _as_typed(value: Any) -> str:
 
 
 def expected(name: str, schema: Mapping[str, Any]) -> str:
-    """What may stand at a key, with its unit.  schema: of the key, as JSON Schema describes it.
+    """What may stand at a key, with its unit.
+
+    Args:
+        name: of the key, which ends with its unit.
+        schema: of the key, as JSON Schema describes it.
 
     >>> expected("gate_s", {"exclusiveMinimum": 0, "type": "number"})
     'a number above 0 [s]'

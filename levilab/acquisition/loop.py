@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from levilab.bench.config import BenchConfig
     from levilab.bench.wiring import Wiring
     from levilab.interruption import Stop
-    from levilab.present.progress import Show
+    from levilab.present.progress import Display
     from levilab.runs.run import Status
 
 
@@ -62,7 +62,7 @@ class AcquisitionRequest:
     resume: Run | None = None
 
 
-def acquire(request: AcquisitionRequest, show: Show) -> Run:
+def acquire(request: AcquisitionRequest, show: Display) -> Run:
     """Run an experiment.  Returns the run, finished or interrupted; other ends raise, and the run is kept, too.
 
     A bench that could not be opened leaves no new run, unless it was to be logged.
@@ -89,14 +89,14 @@ def acquire(request: AcquisitionRequest, show: Show) -> Run:
     return Run.load(writer.folder)
 
 
-def _writer(request: AcquisitionRequest, show: Show) -> RunWriter:
+def _writer(request: AcquisitionRequest, show: Display) -> RunWriter:
     if request.resume is None:
         return RunWriter.create(request.out, _record(request), tell=show.message)
     return RunWriter.reopen(request.resume, note=request.note, tell=show.message)
 
 
 def _at_the_bench(
-    experiment: Experiment[Any], request: AcquisitionRequest, writer: RunWriter, show: Show, stop: Stop
+    experiment: Experiment[Any], request: AcquisitionRequest, writer: RunWriter, show: Display, stop: Stop
 ) -> None:
     """The steps of the experiment, between opening the bench and leaving it."""
     settings = settings_of(request.config, experiment.name)

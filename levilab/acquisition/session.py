@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from levilab.bench.bench import Bench
     from levilab.bench.person import Person, Task
     from levilab.interruption import Stop
-    from levilab.present.progress import Show
+    from levilab.present.progress import Display
     from levilab.runs.channel import Channel
     from levilab.runs.run import Run
     from levilab.runs.writer import RunWriter
@@ -44,7 +44,11 @@ class ExperimentFailed(LevilabError):
 
 @dataclass(frozen=True)
 class Earlier:
-    """The run that is resumed.  replay: its world is virtual, and is brought to where the run left it."""
+    """The run that is resumed.
+
+    Attributes:
+        replay: its world is virtual, and is brought to where the run left it.
+    """
 
     run: Run
     rows: list[Row]
@@ -66,7 +70,7 @@ class Session(Generic[S]):
         earlier: the run that is resumed, if one is.
         rows: the readings so far, those of the resumed run included.
         zero: bench time of time_s = 0 [s], None before it is reached.
-        asked: when the last reading was asked for [s].
+        last_request_time: when the last reading was asked for [s].
         called: what one reading of this experiment is called.
         began: when this session began to measure: at time zero, or when it resumed the run, maybe days later [s].
     """
@@ -75,13 +79,13 @@ class Session(Generic[S]):
     settings: S
     channels: tuple[Channel, ...]
     writer: RunWriter
-    show: Show
+    show: Display
     stop: Stop
     person: Person = ask_no_person
     earlier: Earlier | None = None
     rows: list[Row] = field(default_factory=list)
     zero: float | None = None
-    asked: float = 0.0
+    last_request_time: float = 0.0
     began: float = 0.0
     called: str = "reading"
     _replaying: bool = False
@@ -116,7 +120,10 @@ class Session(Generic[S]):
 
         A resumed run is taken up where it was left, without starting again: a real top has gone on meanwhile; the one
         of a virtual bench is started once more, which is no event of the run, and left alone up to the last reading.
-        resumed: how it goes on, for the event of a resumed run.
+
+        Args:
+            start: brings the top there.
+            resumed: how it goes on, for the event of a resumed run.
         """
         if self.earlier is None:
             start()
@@ -150,8 +157,8 @@ class Session(Generic[S]):
         k = int(self.now() // interval_s) + 1 if self.rows else 0
         while True:
             self.wait(k * interval_s - self.now())
-            self.asked, self._lost = self.now(), False
-            yield self.asked
+            self.last_request_time, self._lost = self.now(), False
+            yield self.last_request_time
             k = max(k + 1, math.ceil(self.now() / interval_s)) if self._lost else k + 1
             if self.now() > longest_s:
                 name = self.writer.record.experiment
@@ -174,7 +181,12 @@ class Session(Generic[S]):
         self.event(WARNING, text)
 
     def progress(self, text: str, share: float) -> None:
-        """Show how far the bench is on the way to the first reading.  share: from 0 to 1."""
+        """Show how far the bench is on the way to the first reading.
+
+        Args:
+            text: what it is doing.
+            share: of the way, from 0 to 1.
+        """
         if not self._replaying:
             self.show.preparing(text, share)
 
@@ -194,7 +206,12 @@ class Session(Generic[S]):
     def keep(self, row: Row, time_left_s: float) -> None:
         """Write a reading down, then show it: what was shown is on the disk.
 
-        time_left_s: expected until the end.  Raises ExperimentFailed if its time does not come after the last one's.
+        Args:
+            row: the reading.
+            time_left_s: expected until the end.
+
+        Raises:
+            ExperimentFailed: its time does not come after the last one's.
         """
         if self.rows and not row["time_s"] > self.rows[-1]["time_s"]:
             raise ExperimentFailed(f"the clock went back: {row['time_s']} s after {self.rows[-1]['time_s']} s")
@@ -206,9 +223,34 @@ class Session(Generic[S]):
             self.show.message("  ".join(f"{_head(one):>{_width(one)}}" for one in self._shown))
         self.show.reading(self._in_words(row), row["time_s"], time_left_s)
 
-    def keep_trace(self, trace: Trace, channel: str) -> int:
-        """Write an oscilloscope's record down, raw.  channel: what it shows.  Returns its number in the run."""
-        return self.writer.trace(self.now(), trace, channel)
+    def keep_trace(self, input_: int, channel: str, time_s: float) -> Trace:
+        """Fetch a record from the oscilloscope and write it down, raw, while it comes.
+
+        What has come when the link breaks is kept as a record that is shorter than announced.
+
+        Args:
+            input_: of the oscilloscope.
+            channel: what it shows.
+            time_s: when the record was taken.
+
+        Raises:
+            InstrumentError: as the driver's `trace`.
+        """
+
+        def arrived(part: Trace, points: int) -> None:
+            self.writer.arriving(time_s, part, channel, points)
+
+        try:
+            trace = self.bench.oscilloscope.trace(input_, arrived)
+        except SettingsLost:
+            self.writer.forget_what_arrived()
+            raise
+        except InstrumentError:
+            if cut_short := self.writer.keep_what_arrived():
+                self.event("cut short", cut_short)
+            raise
+        self.writer.trace(time_s, trace, channel)
+        return trace
 
     def _in_words(self, row: Row) -> str:
         """The values of a reading as they stand in a line, below their heads."""

@@ -6,7 +6,6 @@ import contextlib
 from typing import TYPE_CHECKING, TypeVar
 
 from instruments.drivers import Instrument
-from instruments.drivers.generator import Limits
 from instruments.errors import InstrumentError, SettingsLost
 from levilab.bench.kinds import COUNTER, GENERATOR, MAGNETOMETER, OSCILLOSCOPE, transport_to
 
@@ -59,14 +58,13 @@ class Bench:
         Raises SettingsLost where some settings are not as the driver set them: the instrument was reset meanwhile.
         """
         now = self.instruments[kind].settings()
-        if lost := self.instruments[kind].unlike(now):
+        if lost := self.instruments[kind].changed_settings(now):
             raise SettingsLost(self.address(kind), lost)
         self._prepared[kind] = now
 
     def changed_settings(self, kind: str) -> dict[str, tuple[object, object]]:
         """Settings that are no longer as they were set up, by name: (as set up, now)."""
-        now = self.instruments[kind].settings()
-        return {name: (then, now[name]) for name, then in self._prepared.get(kind, {}).items() if now[name] != then}
+        return self.instruments[kind].changed_settings(since=self._prepared.get(kind, {}))
 
     def address(self, kind: str) -> str:
         """Where an instrument is."""
@@ -128,7 +126,7 @@ def open_bench(
             if GENERATOR.name in kinds:  # first: a program that was killed may have left its output on
                 # never locked: if its link is lost, its output must be switched off over another one
                 bench.generator = connect(GENERATOR, alone=False)
-                bench.generator.limits = Limits(**wiring.limits.model_dump())
+                bench.generator.limits = wiring.limits.of_the_drive()
                 bench.outputs_off()
             if COUNTER.name in kinds:
                 bench.counter = connect(COUNTER)

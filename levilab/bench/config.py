@@ -12,6 +12,7 @@ from pydantic import (
     ValidationError,
 )
 
+from instruments.drivers.generator import Limits as DriveLimits
 from levilab.errors import LevilabError
 from levilab.files import parse_toml
 from levilab.settings import Settings, in_one_line
@@ -56,6 +57,10 @@ class Limits(Settings):
     drive_offset_v: NonNegativeFloat = 5.0
     drive_frequency_hz: PositiveFloat = 100.0
     drive_lowest_hz: NonNegativeFloat = 0.0
+
+    def of_the_drive(self) -> DriveLimits:
+        """The same for the generator's driver, which compares with them."""
+        return DriveLimits(**self.model_dump())
 
 
 class BenchConfig(Settings):

@@ -6,7 +6,7 @@ import json
 import sys
 from typing import TYPE_CHECKING, Any
 
-from levilab.files import CannotWrite, replace_atomically
+from levilab.files import replace_atomically, writing
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -29,7 +29,16 @@ def give(
 ) -> None:
     """Print the tables, or the document as JSON; write name.json and name.png into a folder, if one is given.
 
-    save_figure: draws and writes it; imports matplotlib, which takes long.  Raises CannotWrite.
+    Args:
+        name: of the files.
+        document: for JSON.
+        print_tables: for people.
+        save_figure: draws and writes it; imports matplotlib, which takes long.
+        out: the folder.
+        as_json: whether the document is printed.
+
+    Raises:
+        CannotWrite: of the folder.
     """
     text = json.dumps(document, indent=2, allow_nan=False)
     if as_json:
@@ -37,12 +46,8 @@ def give(
     else:
         print_tables()
     if out is not None:
-        try:
+        with writing(f"{out}: the result cannot be written"):
             out.mkdir(parents=True, exist_ok=True)
             replace_atomically(out / f"{name}.json", text + "\n")
             save_figure(out / f"{name}.png")
-        except OSError as error:
-            raise CannotWrite(
-                f"{out}: the result cannot be written ({error.strerror or error}): choose another place with `out`"
-            ) from None
         print(f"wrote {out / name}.json and {out / name}.png", file=sys.stderr)  # noqa: T201

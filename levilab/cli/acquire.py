@@ -9,7 +9,7 @@ import typer
 from levilab.cli import exit_codes
 from levilab.cli.later import Later
 from levilab.cli.options import Json
-from levilab.cli.output import message, print_json
+from levilab.cli.output import message, print_json, result
 
 if TYPE_CHECKING:
     from levilab.bench.config import BenchConfig
@@ -103,7 +103,7 @@ def acquire_experiment(
         print_json({"run": str(run.folder), "status": run.status, "readings": readings}, indent=None)
     else:
         called = EXPERIMENTS[experiment].called
-        typer.echo(f"{run.status}: {readings} {called}{'s' * (readings != 1)} in {run.folder}")
+        result(f"{run.status}: {readings} {called}{'s' * (readings != 1)} in {run.folder}")
     if run.status == "interrupted":
         if readings:
             message(f"go on with it: levilab acquire {experiment} --resume {run.folder}")

@@ -83,8 +83,11 @@ class Method(StrEnum):
 class Option(NamedTuple):
     """An option of some analyses.
 
-    kind: its type, as typer reads it; default: where it is not given; read: from what was given, unless that is None,
-    to what the analysis takes (raises UsageError); to: how the analysis calls it, if otherwise.
+    Attributes:
+        kind: its type, as typer reads it.
+        default: where it is not given.
+        read: from what was given, unless that is None, to what the analysis takes (raises UsageError).
+        to: how the analysis calls it, if otherwise.
     """
 
     kind: Any
@@ -385,7 +388,7 @@ def _write_and_print(
             failures += [failure] if failure else []
             messages += [f"wrote {path}" for path in written]
     if as_json:
-        documents = [analysis.document(found, out or found.home) for analysis, found in results]
+        documents = [analysis.document(found, out or found.output_folder) for analysis, found in results]
         print_json(documents[0] if len(documents) == 1 else documents, sort_keys=True)
     else:
         for analysis, found in results:

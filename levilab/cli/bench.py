@@ -7,7 +7,7 @@ import typer
 
 from levilab.cli import exit_codes
 from levilab.cli.options import Json
-from levilab.cli.output import message, print_json
+from levilab.cli.output import message, print_json, result
 from levilab.errors import NoInstrument, UsageError
 
 if TYPE_CHECKING:
@@ -64,9 +64,9 @@ def _tell_found(found: "list[Found]") -> None:
     for one in found:
         if one.identity:
             what = f"{one.kind} {one.model}" if one.kind else "no driver of levilab's"
-            typer.echo(f"{one.address}\n  {one.identity}: {what}")
+            result(f"{one.address}\n  {one.identity}: {what}")
         else:
-            typer.echo(f"{one.address}\n  {one.trouble.removeprefix(one.address + ': ')}")
+            result(f"{one.address}\n  {one.trouble.removeprefix(one.address + ': ')}")
 
 
 @bench_app.command("check", epilog="Example: levilab bench check --bench lab2.toml")
@@ -85,12 +85,12 @@ def bench_check(
     from levilab.bench.check import Light, check
     from levilab.bench.config import read_bench
     from levilab.bench.wiring import described_wiring
-    from levilab.world.bench import own_world, virtual_wiring
+    from levilab.world.bench import practice_world, virtual_wiring
 
     if mock and bench:
         raise UsageError("bench", "does not go with `mock`, the virtual bench, which no file describes")
     config = Configuration() if mock else read_bench(bench or Path("bench.toml"), Configuration)
-    wiring = virtual_wiring(own_world()) if mock else described_wiring(config)
+    wiring = virtual_wiring(practice_world()) if mock else described_wiring(config)
     counting = counter_settings(config)
     checked = []
     for one in check(wiring, Light(counting.gate_s, counting.trigger_level_v)):
@@ -106,12 +106,10 @@ def bench_check(
 
 
 def _tell_checked(one: "Checked") -> None:
-    typer.echo(f"{one.kind} at {one.address}")
+    result(f"{one.kind} at {one.address}")
     if one.model:
-        typer.echo(
-            f"  {one.maker} {one.model}, serial number {one.serial_number or '-'}, firmware {one.firmware or '-'}"
-        )
-    typer.echo(f"  {'FAILED: ' + one.trouble if one.trouble else one.reading}")
+        result(f"  {one.maker} {one.model}, serial number {one.serial_number or '-'}, firmware {one.firmware or '-'}")
+    result(f"  {'FAILED: ' + one.trouble if one.trouble else one.reading}")
 
 
 @bench_app.command("serve", epilog="Example: levilab bench serve --speed 10 --port-base 15000")
@@ -134,6 +132,14 @@ def bench_serve(
         int | None,
         typer.Option(metavar="N", min=1, max=65535, help="The first port, the others follow.", show_default="any free"),
     ] = None,
+    portmapper: Annotated[
+        bool,
+        typer.Option(
+            "--portmapper",
+            help="For programs that know a host alone: each instrument at an address of its own, 127.0.0.2 and on, "
+            "with a port mapper at port 111.",
+        ),
+    ] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one line of JSON when all can be reached, and nothing else.")
     ] = False,
@@ -142,6 +148,7 @@ def bench_serve(
 
     Ctrl-C or SIGTERM ends it.  Nobody is asked for a password: at another host than 127.0.0.1 all can use it.
     """
+    from instruments.virtual.servers.port_mapper import PORT
     from levilab.world.serve import Service, chosen_models, serve
 
     moving = None
@@ -149,7 +156,8 @@ def bench_serve(
         from levilab.simulator.scene import read_scene
 
         moving = read_scene(scene)
-    service = Service(host, port_base, speed, chosen_models(models or []), moving)
+    mapper = PORT if portmapper else None
+    service = Service(host, port_base, speed, chosen_models(models or []), moving, mapper)
     told = serve(service, _tell_as_json if as_json else _tell, message)
     if told == "SIGINT":
         raise typer.Exit(exit_codes.INTERRUPTED)
@@ -167,8 +175,8 @@ _HINTS = {"socket": "a line feed ends every message", "pty": "8 data bits, no pa
 def _tell(instruments: "tuple[Served, ...]") -> None:
     width = max(len(name) for served in instruments for name in served.resources.values())
     for served in instruments:
-        typer.echo(f"{served.kind} {served.model}")
+        result(f"{served.kind} {served.model}")
         for way, name in served.resources.items():
             hint = _HINTS.get(way)
-            typer.echo(f"  {way:7} {name:{width}}  ({hint})" if hint else f"  {way:7} {name}")
+            result(f"  {way:7} {name:{width}}  ({hint})" if hint else f"  {way:7} {name}")
     message("Ctrl-C ends the bench")

@@ -7,7 +7,7 @@ import typer
 
 from levilab.cli import exit_codes
 from levilab.cli.options import Json
-from levilab.cli.output import message
+from levilab.cli.output import message, result
 
 
 def crosscheck(
@@ -26,7 +26,7 @@ def crosscheck(
 
     checked = command.check(subjects or [], trials, seed)
     if as_json:
-        typer.echo(command.as_json(checked))
+        result(command.as_json(checked))
     else:
         command.print_checked(checked)
     if out is not None:

@@ -28,24 +28,33 @@ class Commands(typer.core.TyperGroup):
         try:
             return super().invoke(ctx)
         except typer.BadParameter as error:
-            error.message = in_plain_words(error.message)
+            error.message = in_plain_words(error.message, _refused(error))
             raise
         except KeyboardInterrupt:  # while a command is imported; what can be lost later is said by the command itself
             message("levilab: interrupted")
             raise typer.Exit(exit_codes.INTERRUPTED) from None
 
 
-def in_plain_words(text: str) -> str:
-    """What typer says of a wrong value.
+def _refused(error: typer.BadParameter) -> object:
+    """The value that pydantic refused, None where something else did."""
+    errors = getattr(error.__context__, "errors", None)
+    return errors()[0]["input"] if errors else None
 
-    >>> in_plain_words("Input should be a valid number, unable to parse string as a number")
-    'a number is expected'
+
+def in_plain_words(text: str, seen: object = None) -> str:
+    """What typer says of a wrong value, with the value and what is wrong with it.
+
+    >>> in_plain_words("Input should be a valid number, unable to parse string as a number", "0,03")
+    "'0,03': a number is expected; write a decimal point, not a comma"
     >>> in_plain_words("Input should be greater than or equal to 10")
     'a number greater than or equal to 10 is expected'
     """
     if found := re.fullmatch(_SHOULD_BE, text):
+        from levilab.settings import hint_about  # with pydantic
+
         what = found[2].replace("integer", "whole number")
-        return f"a {what} is expected" if found[1] else f"a number {what} is expected"
+        expected = f"a {what} is expected" if found[1] else f"a number {what} is expected"
+        return (f"{seen!r}: " if seen is not None else "") + expected + hint_about(seen, "which --help names")
     return text.removeprefix("Value error, ")
 
 
@@ -197,8 +206,7 @@ def _exit_with(error: Exception) -> NoReturn:
 
 
 def _in_one_line(text: str) -> str:
-    """Without line ends, and without what would steer the terminal: a file's name may hold it."""
-    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in " ".join(text.split()))
+    return " ".join(text.split())
 
 
 def _silence_output() -> None:

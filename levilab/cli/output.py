@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from levilab.cli import exit_codes
+from levilab.present.characters import printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -20,9 +21,14 @@ def print_json(document: Any, *, indent: int | None = 2, sort_keys: bool = False
     typer.echo(json.dumps(document, indent=indent, sort_keys=sort_keys, allow_nan=False))
 
 
+def result(text: str) -> None:
+    """A line on standard output; names in it, which others chose, do not steer the terminal."""
+    typer.echo(printable(text))
+
+
 def message(text: str) -> None:
-    """A line on standard error."""
-    typer.echo(text, err=True)
+    """A line on standard error, as `result` writes it."""
+    typer.echo(printable(text), err=True)
 
 
 @contextlib.contextmanager

@@ -20,7 +20,8 @@ _QUANTITY = re.compile(r"`([a-z]\w*)`( = False\b| = True\b| = )?")
 def option_names(app: Any) -> dict[str, tuple[str, str]]:
     """Quantity → the option that sets it, and the one that switches it off (empty if there is none), of all commands.
 
-    app: the application, or the command of its name.
+    Args:
+        app: the application, or the command of its name.
 
     A quantity has the name of the parameter by which a command takes it.
     """
@@ -49,7 +50,12 @@ def in_options(error: Exception, app: Any) -> str:
 
 
 def with_options(text: str, app: Any) -> str:
-    """A text with options in the place of quantities.  app: see `option_names`, which makes every command."""
+    """A text with options in the place of quantities.
+
+    Args:
+        text: a message.
+        app: see `option_names`, which makes every command.
+    """
     if not _QUANTITY.search(text):
         return text
     names = option_names(app)

@@ -7,7 +7,7 @@ import typer
 
 from levilab.cli.analyze import OPTIONS, as_analyses_take
 from levilab.cli.options import Channel, Columns, Json, KeepOutliers, Paths, Rate, ReadingU
-from levilab.cli.output import interruptible, message, print_json
+from levilab.cli.output import interruptible, message, print_json, result
 from levilab.cli.quantities import with_options
 
 
@@ -37,7 +37,7 @@ def report(
     app = context.find_root().command
     with interruptible("no report is written"):
         written = write_report(paths, output, as_analyses_take(given), lambda text: message(with_options(text, app)))
-    typer.echo(f"the report is in {written}")
+    result(f"the report is in {written}")
 
 
 def runs(

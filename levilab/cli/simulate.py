@@ -54,13 +54,13 @@ def simulate(
     chosen = _scene(scene, settings)
 
     from levilab.files import finite
-    from levilab.motion.simulation import SimulationOrder, carry_out
+    from levilab.motion.simulation import SimulationRequest, run_simulation
     from levilab.motion.summary import as_document
-    from levilab.present.progress import Share
+    from levilab.present.progress import ShareBar
 
-    order = SimulationOrder(chosen, duration, tolerance, rate, out)
-    with interruptible("nothing was written"), contextlib.closing(Share("simulating")) as share:
-        done = carry_out(order, message, share)
+    order = SimulationRequest(chosen, duration, tolerance, rate, out)
+    with interruptible("nothing was written"), contextlib.closing(ShareBar("simulating")) as share:
+        done = run_simulation(order, message, share)
     if done.folder:
         message(f"wrote {done.folder}")
     if not as_json:  # at once: what explains it takes longer
@@ -142,12 +142,12 @@ def _span(name: str, text: str | None) -> "Span | None":
 
 
 def _mapped(scene: "Scene", spans: "tuple[Span | None, Span | None]", duration: float, out: Path) -> dict[str, object]:
-    from levilab.present.progress import Share
+    from levilab.present.progress import ShareBar
     from levilab.stability.map import survival_map
     from levilab.stability.table import place_for_map, write_map
 
     place_for_map(out)
-    with interruptible("no map was written"), contextlib.closing(Share("simulating the map")) as share:
+    with interruptible("no map was written"), contextlib.closing(ShareBar("simulating the map")) as share:
         found = survival_map(scene, *spans, duration=duration, progress=share)
     for path in write_map(found, out):
         message(f"wrote {path}")

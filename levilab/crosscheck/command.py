@@ -11,8 +11,8 @@ from levilab.crosscheck.catalogue import SUBJECTS
 from levilab.crosscheck.study import as_document, crosscheck
 from levilab.crosscheck.table import crosscheck_table, failures_in_words
 from levilab.errors import UsageError
-from levilab.files import CannotWrite, replace_atomically
-from levilab.present.progress import Share
+from levilab.files import replace_atomically, writing
+from levilab.present.progress import ShareBar
 from levilab.present.terminal import draw, terminal
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def check(names: Sequence[str], trials: int | None, seed: int) -> list[Checked]:
     found = []
     for name in names or SUBJECTS:
         subject = SUBJECTS[name]
-        progress = Share(f"cross-checking {name}")
+        progress = ShareBar(f"cross-checking {name}")
         try:
             found.append(crosscheck(subject, trials or subject.trials, seed, progress))
         finally:
@@ -59,12 +59,8 @@ def write(checked: Sequence[Checked], out: Path) -> list[Path]:
     from levilab.crosscheck.figure import crosscheck_figure
     from levilab.present.style import save_png
 
-    try:
+    with writing(f"{out}: the result cannot be written"):
         out.mkdir(parents=True, exist_ok=True)
         replace_atomically(out / JSON, as_json(checked) + "\n")
         save_png(crosscheck_figure(checked), out / FIGURE)
-    except OSError as error:
-        raise CannotWrite(
-            f"{out}: the result cannot be written ({error.strerror or error}): choose another place with `out`"
-        ) from None
     return [out / JSON, out / FIGURE]

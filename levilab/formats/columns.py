@@ -11,12 +11,15 @@ from levilab.formats.titles import (
     COMPANIONS,
     UNITS,
     Title,
+    as_a_period,
+    companion,
     dimension,
     foreign_unit,
     implied_unit,
     nearly_a_frequency,
     read_title,
     unit_factor,
+    without_runs_of_blanks,
 )
 
 SHORTHANDS = {
@@ -33,7 +36,7 @@ class TableError(DataError):
 
     def __init__(self, path: Path, message: str, *, line: int | None = None) -> None:
         self.path, self.line = path, line
-        place = f"{shown(str(path), 200)}, line {line}" if line is not None else shown(str(path), 200)
+        place = f"{shorten(str(path), 200)}, line {line}" if line is not None else shorten(str(path), 200)
         super().__init__(f"{place}: {message}")
 
 
@@ -47,24 +50,33 @@ class NoSuchColumn(TableError, DoesNotSuit):
 
 @dataclass(frozen=True)
 class Column:
-    """A column that is used: canonical `name`, 0-based `index` and `label` in the file, `factor` to SI."""
+    """A column that is used.
+
+    Attributes:
+        name: canonical.
+        index: in the file, from 0 on.
+        label: in the file.
+        factor: to SI.
+        inverse: the file has the inverse of the quantity, a period [s] after the factor, or that one's uncertainty.
+    """
 
     name: str
     index: int
     label: str
     factor: float
+    inverse: bool = False
 
 
-def shown(text: str, most: int = 40) -> str:
+def shorten(text: str, most: int = 40) -> str:
     """`text` for a message of one line: no control characters, at most `most` characters."""
     plain = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
     return plain if len(plain) <= most else plain[: most - 1] + "…"
 
 
-def listed(names: Iterable[str]) -> str:
+def quoted(names: Iterable[str]) -> str:
     """Names in quotation marks, with commas, the first dozen of them."""
     names = list(names)
-    return ", ".join(f"'{shown(n)}'" for n in names[:12]) + (", …" if len(names) > 12 else "")
+    return ", ".join(f"'{shorten(n)}'" for n in names[:12]) + (", …" if len(names) > 12 else "")
 
 
 def choose_columns(
@@ -82,13 +94,15 @@ def choose_columns(
         units: the row of units beneath, or nothing.
         wanted: {canonical name, or t, f, u: title or 1-based number}; goes before what the titles say.  A unit may
             follow in brackets where the file gives none: ``Drehzahl [rpm]``.
-
         quantities: canonical names looked for.
+
+    Returns:
+        The columns, in the order of the canonical names, and the warnings.
 
     Raises:
         TableError: a wanted column does not exist, a quantity has two columns, or units contradict each other.
     """
-    titles = [read_title(text) for text in header]
+    titles = _with_periods(header)
     chosen, stated = _wanted_columns(path, header, wanted)
     offered: dict[str, list[int]] = {}
     warnings = []
@@ -97,7 +111,8 @@ def choose_columns(
             continue
         if title.column in chosen or index in chosen.values():
             continue
-        if title.unit is not None and unit_factor(title.unit, dimension(title.column)) is None:
+        known = title.inverse or title.unit is None or unit_factor(title.unit, dimension(title.column)) is not None
+        if not known and not _is_of_a_period(title, titles):
             warnings.append(_unknown_unit(path, header[index], title))
         else:
             offered.setdefault(title.column, []).append(index)
@@ -105,13 +120,19 @@ def choose_columns(
     written = {name: _written_unit(path, name, index, header, units) for name, index in chosen.items()} | stated
     columns = []
     for name, index in chosen.items():
+        period = titles[chosen.get(COMPANIONS.get(name, name), index)]
+        if period.inverse and name not in stated and not written[name]:
+            # an uncertainty without a unit has that of its period
+            unit = (titles[index] if _is_of_a_period(titles[index], titles) else period).unit
+            columns.append(Column(name, index, header[index], unit_factor(unit or "s", "time") or 1, inverse=True))
+            continue
         # An uncertainty without a unit has that of its quantity: "rpm,u" gives both in 1/min.
         unit = written[name] or written.get(COMPANIONS.get(name, ""))
         other = None if unit else foreign_unit(header[index], dimension(name))
         if other:
             raise TableError(
                 path,
-                f"column '{shown(header[index])}' is to be {name} and has the unit {other}, which is none of "
+                f"column '{shorten(header[index])}' is to be {name} and has the unit {other}, which is none of "
                 f"{dimension(name)}: {how_else(header[index])}",
             )
         factor = unit_factor(unit, dimension(name)) if unit else 1
@@ -119,10 +140,28 @@ def choose_columns(
     return tuple(sorted(columns, key=lambda c: CANONICAL.index(c.name))), tuple(warnings)
 
 
+def _with_periods(header: Sequence[str]) -> list[Title]:
+    """What the titles say, with T for a period beside a time; periods do not count beside a frequency."""
+    titles = [read_title(text) for text in header]
+    if sum(title.column == "time_s" for title in titles) > 1:
+        titles = [as_a_period(text) or title for text, title in zip(header, titles, strict=True)]
+    if any(title.column == "spin_frequency_hz" and not title.inverse for title in titles):
+        titles = [Title(None, title.unit) if title.inverse else title for title in titles]
+    return titles
+
+
+def _is_of_a_period(title: Title, titles: Sequence[Title]) -> bool:
+    """Whether a title is that of the uncertainty of a period, in a unit of time."""
+    times = title.unit is not None and unit_factor(title.unit, "time") is not None
+    return times and title.column == companion("spin_frequency_hz") and any(one.inverse for one in titles)
+
+
 def how_else(title: str) -> str:
     """What to do with a column that is not what is wanted."""
-    work_out = nearly_a_frequency(title)
-    return f"write {work_out} into the column, in Hz" if work_out else "say which unit it is, as NAME [Hz]"
+    unit = read_title(title).unit
+    if unit and unit_factor(unit, "time"):
+        return f"correct it, or if these are the times of a turn call the column period [{shorten(unit)}]"
+    return nearly_a_frequency(title) or "say which unit it is, as NAME [Hz]"
 
 
 def _wanted_columns(
@@ -135,7 +174,8 @@ def _wanted_columns(
         name = SHORTHANDS.get(key, key)
         if name not in CANONICAL:
             raise TableError(
-                path, f"`columns` cannot set '{shown(key)}'; it sets {', '.join(SHORTHANDS)} or {', '.join(CANONICAL)}"
+                path,
+                f"`columns` cannot set '{shorten(key)}'; it sets {', '.join(SHORTHANDS)} or {', '.join(CANONICAL)}",
             )
         index = _find(header, title.strip())
         if index is None and (with_unit := re.fullmatch(r"(.+?)\s*\[([^\[\]]+)\]\s*", title)):
@@ -144,10 +184,10 @@ def _wanted_columns(
         if index is None:
             raise TableError(
                 path,
-                f"has no column '{shown(title)}'; it has {listed(header)}: correct `columns` = {key}=NAME or NUMBER",
+                f"has no column '{shorten(title)}'; it has {quoted(header)}: correct `columns` = {key}=NAME or NUMBER",
             )
         if index in chosen.values():
-            raise TableError(path, f"`columns` names column '{shown(title)}' twice; each column holds one quantity")
+            raise TableError(path, f"`columns` names column '{shorten(title)}' twice; each column holds one quantity")
         chosen[name] = index
     return chosen, stated
 
@@ -155,14 +195,14 @@ def _wanted_columns(
 def _stated_unit(path: Path, name: str, unit: str) -> str:
     kind = dimension(name)
     if unit_factor(unit, kind) is None:
-        raise TableError(path, f"`columns`: '{shown(unit)}' is no unit of {kind}; known are {', '.join(UNITS[kind])}")
+        raise TableError(path, f"`columns`: '{shorten(unit)}' is no unit of {kind}; known are {', '.join(UNITS[kind])}")
     return unit
 
 
 def _find(header: Sequence[str], title: str) -> int | None:
     """Index of a title: as it stands, in any case, or without its unit; else a 1-based number."""
     folded = [text.casefold() for text in header]
-    bare = [re.sub(r"\s*/?\s*[\[(][^\[\]()]*[\])]$", "", text) for text in folded]
+    bare = [re.sub(r" ?/? ?[\[(][^\[\]()]*[\])]$", "", without_runs_of_blanks(text)) for text in folded]
     for titles, wanted in ((list(header), title), (folded, title.casefold()), (bare, title.casefold())):
         if titles.count(wanted) == 1:
             return titles.index(wanted)
@@ -177,9 +217,10 @@ def _only_one(path: Path, header: Sequence[str], name: str, indices: list[int]) 
         return (exact or indices)[0]
     key = next((short for short, long in SHORTHANDS.items() if long == name), name)
     numbers = " or ".join(f"{key}={index + 1}" for index in indices)
+    period = "; if T is the time of a turn say its unit, as T [ms]" if any(header[i] == "T" for i in indices) else ""
     raise TableError(
         path,
-        f"columns {listed(header[i] for i in indices)} could each be {name}; say which: `columns` = {numbers}",
+        f"columns {quoted(header[i] for i in indices)} could each be {name}; say which: `columns` = {numbers}{period}",
     )
 
 
@@ -193,7 +234,8 @@ def _written_unit(path: Path, name: str, index: int, header: Sequence[str], unit
     if in_title and beneath and not implied and unit_factor(in_title, kind) != unit_factor(beneath, kind):
         raise TableError(
             path,
-            f"column '{shown(header[index])}' has the unit '{shown(beneath)}' in the row beneath; correct one of them",
+            f"column '{shorten(header[index])}' has the unit '{shorten(beneath)}' in the row beneath; "
+            "correct one of them",
         )
     return beneath or in_title
 
@@ -201,6 +243,6 @@ def _written_unit(path: Path, name: str, index: int, header: Sequence[str], unit
 def _unknown_unit(path: Path, label: str, title: Title) -> str:
     kind = dimension(title.column or "")
     return (
-        f"{shown(str(path), 200)}: column '{shown(label)}' is not used: '{shown(title.unit or '')}' is no unit of "
-        f"{kind} known here ({', '.join(list(UNITS[kind])[:8])} …)"
+        f"{shorten(str(path), 200)}: column '{shorten(label)}' is not used: '{shorten(title.unit or '')}' is no unit "
+        f"of {kind} known here ({', '.join(list(UNITS[kind])[:8])} …)"
     )

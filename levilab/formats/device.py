@@ -23,7 +23,11 @@ class DeviceError(DataError):
 
 
 class BaseTable(Settings):
-    """The ring magnet.  origin_m: height of the middle of its thickness, on the scale of the scan's heights."""
+    """The ring magnet.
+
+    Attributes:
+        origin_m: height of the middle of its thickness, on the scale of the scan's heights.
+    """
 
     inner_radius_m: PositiveFloat | None = None
     inner_radius_u_m: NonNegativeFloat = 1e-4
@@ -43,7 +47,11 @@ class MagnetometerTable(Settings):
 
 
 class PartTable(Settings):
-    """A uniform cylinder of the top.  offset_m: of its middle along the axis, from any mark."""
+    """A uniform cylinder of the top.
+
+    Attributes:
+        offset_m: of its middle along the axis, from any mark.
+    """
 
     name: str
     mass_kg: PositiveFloat

@@ -113,9 +113,9 @@ class Line:
     kinds: tuple[Kind, ...]
 
     @cached_property
-    def filled(self) -> int:
+    def filled_count(self) -> int:
         """Number of fields without the empty ones at the end."""
-        return filled(self.fields)
+        return filled_count(self.fields)
 
     @property
     def is_row(self) -> bool:
@@ -128,18 +128,18 @@ class Line:
         return len(self.kinds) > 1 and "text" in self.kinds and "number" not in self.kinds
 
 
-def filled(fields: Sequence[str]) -> int:
+def filled_count(fields: Sequence[str]) -> int:
     """Number of fields without the empty ones at the end."""
     return next((i for i in range(len(fields), 0, -1) if fields[i - 1]), 0)
 
 
-def usual(counts: Iterable[int]) -> int:
+def most_common(counts: Iterable[int]) -> int:
     """The most frequent of some counts, 0 of none."""
     found = Counter(counts).most_common(1)
     return found[0][0] if found else 0
 
 
-def content(lines: Sequence[str], dialect: Dialect, first: int = 1) -> Iterator[Line]:
+def content_lines(lines: Sequence[str], dialect: Dialect, first: int = 1) -> Iterator[Line]:
     """The lines that are neither blank nor comments; `first` is the number of the first line."""
     for number, line in enumerate(lines, first):
         if not dialect.skips(line):
@@ -153,11 +153,13 @@ def find_dialect(lines: Sequence[str]) -> Dialect | None:
     Rows without text count first: "1,5 2,5" is three fields with commas, one of them text, but two numbers
     with blanks. Where there are no rows, known titles decide, so that a mere header is seen as one.
     """
-    scores = {d: _score(content(lines, d), SEPARATORS.index(d.separator)) for d in DIALECTS}
+    scores = {d: _score(content_lines(lines, d), SEPARATORS.index(d.separator)) for d in DIALECTS}
     best = max(DIALECTS, key=scores.__getitem__)
     if scores[best][1]:
         return best
-    titles = {d: max((known_titles(x.fields) for x in content(lines, d) if x.is_text), default=0) for d in DIALECTS}
+    titles = {
+        d: max((known_titles(x.fields) for x in content_lines(lines, d) if x.is_text), default=0) for d in DIALECTS
+    }
     best = max(DIALECTS, key=titles.__getitem__)
     return best if titles[best] else None
 
@@ -165,8 +167,8 @@ def find_dialect(lines: Sequence[str]) -> Dialect | None:
 def _score(lines: Iterable[Line], rank: int) -> tuple[int, int, int, int]:
     """Rows of equal width without text, such rows at all, the separator's rank, numbers in those rows."""
     rows = [line for line in lines if line.is_row]
-    width = usual(line.filled for line in rows)
-    alike = [line for line in rows if line.filled == width]
+    width = most_common(line.filled_count for line in rows)
+    alike = [line for line in rows if line.filled_count == width]
     clean = sum(not {"text", "clock"} & set(line.kinds) for line in alike)
     return clean, len(alike), -rank, sum(line.kinds.count("number") for line in alike)
 
@@ -175,5 +177,5 @@ def _split_at_blanks(line: str) -> list[str]:
     if '"' in line:
         return [field.strip('"') for field in re.findall(r'"[^"]*"|\S+', line)]
     if any(mark in line for mark in "[(/"):  # "f [Hz]" and "f / Hz" are one title each
-        line = re.sub(r"\s+(?=[\[(/])|(?<=/)\s+", "", line)
+        line = re.sub(r"(?<!\s)\s+(?=[\[(/])|(?<=/)\s+", "", line)
     return line.split()

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from levilab.formats.columns import NoTable, shown
-from levilab.formats.dialect import Dialect, Line, content, filled, find_dialect, usual
+from levilab.formats.columns import NoTable, shorten
+from levilab.formats.dialect import Dialect, Line, content_lines, filled_count, find_dialect, most_common
 from levilab.formats.titles import is_unit, known_titles
 
 HEAD = 65536  # bytes that the guess rests upon
@@ -19,7 +19,7 @@ BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"), (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"), (codecs.BOM_UTF8, "utf-8-sig"),
 )  # fmt: skip
-NO_TABLES = (
+OTHER_SIGNATURES = (
     (b"\x89PNG", "a PNG picture"), (b"PK\x03\x04", "a ZIP or Excel file"), (b"\xd0\xcf\x11\xe0", "an old Excel file"),
     (b"%PDF", "a PDF document"), (b"\x1f\x8b", "a gzip archive"), (b"RIFF", "a WAV recording"),
     (b"{", "a JSON file (of a run, name the folder instead)"), (b"<", "an HTML or XML page"),
@@ -58,7 +58,7 @@ def sniff(path: Path) -> Layout:
     with path.open("rb") as stream:
         head = stream.read(HEAD)
         whole = not stream.read(1)
-    for mark, what in NO_TABLES:
+    for mark, what in OTHER_SIGNATURES:
         if head.startswith(mark):
             raise NoTable(path, f"is {what}; {EXPORT}")
     encoding = _encoding(head)
@@ -74,7 +74,7 @@ def sniff(path: Path) -> Layout:
     if dialect is None:
         at, line = next((n, line) for n, line in enumerate(lines, 1) if line.strip())
         alone = "; number the rows in a column of their own if there is but one"
-        seen = f"'{shown(line.strip())}' begins no table of at least two columns"
+        seen = f"'{shorten(line.strip())}' begins no table of at least two columns"
         raise NoTable(path, f"{seen}; {EXPORT}{alone}", line=at)
     return lay_out(lines, encoding, dialect, head)
 
@@ -91,12 +91,19 @@ def _encoding(head: bytes) -> str:
 
 
 def lay_out(lines: list[str], encoding: str, dialect: Dialect, head: bytes) -> Layout:
-    """Where a table stands in lines that were read.  head: their bytes, for the offset of the first row."""
-    sample = content(lines[-SAMPLE:], dialect, 1 + max(0, len(lines) - SAMPLE))
+    """Where a table stands in lines that were read.
+
+    Args:
+        lines: the first ones of the file.
+        encoding: of the file.
+        dialect: of the table.
+        head: the lines' bytes, for the offset of the first row.
+    """
+    sample = content_lines(lines[-SAMPLE:], dialect, 1 + max(0, len(lines) - SAMPLE))
     rows = [line for line in sample if line.is_row]
-    width = usual(row.filled for row in rows)
+    width = most_common(row.filled_count for row in rows)
     numeric = [i for i in range(width) if 2 * sum(r.kinds[i : i + 1] == ("text",) for r in rows) < len(rows)]
-    above, first_line = _above_rows(content(lines, dialect), width, numeric)
+    above, first_line = _above_rows(content_lines(lines, dialect), width, numeric)
     place = _header(above, width)
     units: tuple[str, ...] = ()
     if place is None:
@@ -106,7 +113,7 @@ def lay_out(lines: list[str], encoding: str, dialect: Dialect, head: bytes) -> L
         header, header_line = above[place].fields, above[place].number
         units = _units(above[place + 1 : place + 2])
         first_line = above[place + bool(units)].number + 1
-    header = header[: filled(header)]
+    header = header[: filled_count(header)]
     return Layout(
         encoding, dialect, header, header_line, units, first_line, _offset(head, first_line), len(header) or width
     )
@@ -130,8 +137,8 @@ def _header(above: list[Line], width: int) -> int | None:
     texts = [i for i, line in enumerate(above) if line.is_text]
     titles = [i for i in texts if not all(is_unit(field) for field in above[i].fields if field)] or texts
     known = {i: known_titles(above[i].fields) for i in titles}
-    likely = [i for i in titles if known[i] or above[i].filled >= width]
-    return max(likely, key=lambda i: (known[i] > 1, above[i].filled >= width, known[i], i), default=None)
+    likely = [i for i in titles if known[i] or above[i].filled_count >= width]
+    return max(likely, key=lambda i: (known[i] > 1, above[i].filled_count >= width, known[i], i), default=None)
 
 
 def _units(below: Sequence[Line]) -> tuple[str, ...]:
@@ -146,7 +153,7 @@ def _header_in_comment(above: list[str], dialect: Dialect, width: int) -> tuple[
     for number in range(len(above), 0, -1):
         if above[number - 1].lstrip().startswith(dialect.comments):
             fields = tuple(dialect.split(above[number - 1].lstrip(" \t#%/;'")))
-            return (fields, number) if known_titles(fields) and filled(fields) >= width else ((), 0)
+            return (fields, number) if known_titles(fields) and filled_count(fields) >= width else ((), 0)
     return (), 0
 
 

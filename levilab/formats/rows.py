@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from levilab.formats.columns import Column, TableError, shown
+from levilab.formats.columns import Column, TableError, shorten
 from levilab.formats.dialect import DATED, MISSING, clock_time
 from levilab.formats.layout import Layout
 
@@ -204,8 +204,8 @@ def _row(path: Path, layout: Layout, chosen: Sequence[Column], line: int, text: 
         hint = "; if the comma is a decimal mark, separate by ; or tab" if layout.dialect.separator == "," else ""
         raise TableError(
             path,
-            f"'{shown(text.strip())}' has {len(fields)} field{'s' * (len(fields) != 1)}, {layout.width} are expected: "
-            f"complete or remove the line{hint}",
+            f"'{shorten(text.strip())}' has {len(fields)} field{'s' * (len(fields) != 1)}, {layout.width} are "
+            f"expected: complete or remove the line{hint}",
             line=line,
         )
     return [_number(path, layout, column, line, fields[column.index]) for column in chosen]
@@ -232,10 +232,10 @@ def _number(path: Path, layout: Layout, column: Column, line: int, text: str) ->
     do = _ITS_OWN_COLUMN if combined else "correct it, or leave it empty if the reading was missed"
     raise TableError(
         path,
-        f"'{shown(text)}' stands in column '{shown(column.label)}', a number with decimal {mark} is expected: {do}",
+        f"'{shorten(text)}' stands in column '{shorten(column.label)}', a number with decimal {mark} is expected: {do}",
         line=line,
     )
 
 
 def _torn(line: int, text: str) -> str:
-    return f"line {line}: '{shown(text.strip())}' was cut off"
+    return f"line {line}: '{shorten(text.strip())}' was cut off"

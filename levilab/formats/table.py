@@ -20,13 +20,22 @@ from levilab.formats.columns import (
     TableError,
     choose_columns,
     how_else,
-    listed,
-    shown,
+    quoted,
+    shorten,
 )
 from levilab.formats.dialect import Dialect
 from levilab.formats.layout import Layout, sniff
 from levilab.formats.rows import Rows, read_rows
-from levilab.formats.titles import CANONICAL, COMPANIONS, EXAMPLES, companion, nearly_a_frequency
+from levilab.formats.titles import (
+    CANONICAL,
+    COMPANIONS,
+    EXAMPLES,
+    QUANTITIES,
+    companion,
+    dimension,
+    nearly_a_frequency,
+    read_title,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -77,7 +86,7 @@ def read_table(
     Args:
         path: the file.
         columns: {canonical column, or t, f, u: title in the file or 1-based number}, where titles are not known.
-        quantities: canonical columns that are wanted; what stands in others is nobody's concern.
+        quantities: canonical columns that are wanted; others are not looked at.
         needed: canonical columns without which the table is of another kind, whatever stands in its rows.
         guess: whether columns without titles are taken as time, spin frequency and its uncertainty.
 
@@ -97,7 +106,7 @@ def read_table(
             wanted_names = needed or [name for name in SHORTHANDS.values() if name in quantities][:2]
             raise NoSuchColumn(
                 path,
-                f"no title is known ({known} …) among {listed(header)}: say `columns` = "
+                f"no title is known ({known} …) among {quoted(header)}: say `columns` = "
                 + ",".join(f"{_key(name)}=NAME" for name in wanted_names),
                 line=layout.header_line or layout.first_line,
             )
@@ -145,9 +154,9 @@ def read_run_readings(path: Path, channels: Collection[str] = ()) -> Table:
         known = dict.fromkeys((*channels, *CANONICAL))
         chosen = tuple(Column(n, header.index(n), n, 1) for n in known if n in header)
         if header and not (chosen and "".join(header).isprintable()):
-            raise TableError(path, f"'{shown(title.strip())}' is no header of a run, as time_s,… is", line=1)
+            raise TableError(path, f"'{shorten(title.strip())}' is no header of a run, as time_s,… is", line=1)
         layout = Layout("utf-8-sig", Dialect(",", "."), header, 1, (), 2, len(first), len(header))
-        nothing = Rows((), np.zeros(0, np.int64), f"line 1: '{shown(title)}' was cut off" if title else None)
+        nothing = Rows((), np.zeros(0, np.int64), f"line 1: '{shorten(title)}' was cut off" if title else None)
         rows = read_rows(path, layout, chosen, drop_unended=True) if header else nothing
     return _table(path, header, chosen, rows, ())
 
@@ -169,10 +178,10 @@ def parse_columns(text: str) -> dict[str, str]:
     found = {name.strip(): title.strip() for name, _, title in parts}
     if len(found) < len(parts) or not all(name and title for name, title in found.items()):
         expected = "NAME=COLUMN,NAME=COLUMN is expected, each NAME once, as t=Zeit,f=3"
-        raise ColumnsError("columns", expected, value=f"'{shown(text)}'")
+        raise ColumnsError("columns", expected, value=f"'{shorten(text)}'")
     unknown = [name for name in found if name not in {*SHORTHANDS, *CANONICAL}]
     if unknown:
-        what = f"'{shown(unknown[0])}' is no quantity known here; {', '.join(SHORTHANDS)} are, as t=Zeit,f=3"
+        what = f"'{shorten(unknown[0])}' is no quantity known here; {', '.join(SHORTHANDS)} are, as t=Zeit,f=3"
         raise ColumnsError("columns", what)
     return found
 
@@ -183,10 +192,14 @@ def _key(name: str) -> str:
 
 
 def _no_column(path: Path, name: str, header: Sequence[str]) -> NoSuchColumn:
-    text = f"no column is known to be {name}; it has {listed(header)}: say `columns` = {_key(name)}=NAME"
+    text = f"no column is known to be {name}; it has {quoted(header)}: say `columns` = {_key(name)}=NAME"
     nearly = next((title for title in header if nearly_a_frequency(title)), None) if "frequency" in name else None
-    if nearly:
-        text = f"no column is known to be {name}; '{shown(nearly)}' could become one: {how_else(nearly)}"
+    foreign = next((title for title in header if read_title(title).column == name), None)
+    if foreign:
+        unit = shorten(read_title(foreign).unit or "")
+        text = f"column '{shorten(foreign)}' is in {unit}, which is no unit of {dimension(name)}: {how_else(foreign)}"
+    elif nearly:
+        text = f"no column is known to be {name}; '{shorten(nearly)}' could become one: {how_else(nearly)}"
     return NoSuchColumn(path, text)
 
 
@@ -235,21 +248,22 @@ def _titles(
             path, f"{layout.width} columns and no header; add one, or say `columns` = t=1,f=2", line=layout.first_line
         )
     taken = dict(zip(TITLES_WITHOUT_HEADER, numbers, strict=False))
-    return numbers, taken, [f"{shown(str(path), 200)}: no header; the columns are taken as {', '.join(taken)}"]
+    return numbers, taken, [f"{shorten(str(path), 200)}: no header; the columns are taken as {', '.join(taken)}"]
 
 
 def _table(
     path: Path, header: tuple[str, ...], chosen: Sequence[Column], rows: Rows, warnings: tuple[str, ...]
 ) -> Table:
-    """Leave out missed readings, and uncertainties that nobody wrote; then to SI."""
+    """Leave out missed readings, and columns of uncertainties with gaps; then convert to SI."""
     import pandas as pd
 
-    name = shown(str(path), 200)
+    name = shorten(str(path), 200)
     notes = [*warnings, *([f"{name}, {rows.torn} and is left out"] if rows.torn else [])]
     notes += [f"{name}: {rows.doubt}"] if rows.doubt else []
     numbers = dict(zip(chosen, rows.values, strict=False))
     # The comparison is false for NaN, too.
     present = {column: np.abs(values) < NO_READING for column, values in numbers.items()}
+    present = {column: there & (numbers[column] != 0) if column.inverse else there for column, there in present.items()}
     companions = {companion(column.name) for column in chosen} | COMPANIONS.keys()
     quantity = [p for c, p in present.items() if c.name not in companions]
     read = np.logical_and.reduce(quantity) if quantity else np.ones(rows.lines.size, bool)
@@ -257,7 +271,7 @@ def _table(
         if missing.any():  # better no uncertainties than readings lost for want of them
             del present[column]
             notes.append(
-                f"{name}: column '{shown(column.label)}' is empty in {missing.sum()} of {read.sum()} rows and "
+                f"{name}: column '{shorten(column.label)}' is empty in {missing.sum()} of {read.sum()} rows and "
                 "is not used"
             )
     good = np.logical_and.reduce(list(present.values())) if present else np.ones(rows.lines.size, bool)
@@ -266,6 +280,10 @@ def _table(
         notes.append(_missed(name, lines[~good], good.size))
         lines, kept = lines[good], {column: values[good] for column, values in kept.items()}
     frame = {c.name: values if c.factor == 1 else values * c.factor for c, values in kept.items()}
+    for name in [c.name for c in kept if c.inverse and c.name in QUANTITIES]:
+        frame[name] = 1 / frame[name]
+        if any(c.inverse and c.name == companion(name) for c in kept):
+            frame[companion(name)] = frame[companion(name)] * frame[name] ** 2  # u(1/T) = u(T)/T²
     return Table(path, pd.DataFrame(frame, dtype=np.float64), tuple(notes), header, lines)
 
 

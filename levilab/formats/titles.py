@@ -12,8 +12,8 @@ PER_RADIAN = 1 / (2 * pi)
 # Factors to SI; spelled as `plain_unit` leaves them (no blanks, no ^ or ·, superscripts made plain).
 UNITS: Mapping[str, Mapping[str, float]] = {
     "time": {
-        "s": 1, "sec": 1, "second": 1, "seconds": 1, "sek": 1, "sekunden": 1, "ms": 1e-3, "μs": 1e-6, "us": 1e-6,
-        "ns": 1e-9, "min": 60, "minutes": 60, "h": 3600,
+        "s": 1, "sec": 1, "second": 1, "seconds": 1, "sek": 1, "sekunde": 1, "sekunden": 1, "ms": 1e-3, "μs": 1e-6,
+        "us": 1e-6, "ns": 1e-9, "min": 60, "minute": 60, "minutes": 60, "minuten": 60, "h": 3600,
     },
     "frequency": {
         "Hz": 1, "kHz": 1e3, "MHz": 1e6, "mHz": 1e-3, "μHz": 1e-6, "1/s": 1, "s-1": 1, "rps": 1, "U/s": 1,
@@ -36,7 +36,8 @@ QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
         "spin_frequency", "f", "freq", "frequency", "frequenz", "nu", "ν", "nu3", "ν3", "f3", "ν_3", "nu_3", "f_3",
         "spin", "spin_freq", "f_spin", "rotation_frequency", "rotation", "drehfrequenz", "hz", "rpm", "rad/s",
         "omega", "ω", "omega3", "ω3", "omega_3", "ω_3", "angular_velocity", "angular_frequency",
-        "winkelgeschwindigkeit", "drehzahl", "speed", "rotation_speed", "rotational_speed", "vitesse", "fréquence")),
+        "winkelgeschwindigkeit", "drehzahl", "speed", "rotation_speed", "rotational_speed", "vitesse", "fréquence",
+        "n")),
     "precession_frequency_hz": ("frequency", (
         "precession_frequency", "precession", "f_precession", "f_p", "fp", "νp", "ν_p", "nu_p", "präzession",
         "präzessionsfrequenz")),
@@ -68,11 +69,21 @@ IMPLIED_UNITS = {
     "rad/s",
 )
 # Names that could as well be in 1/s as in 1/min: known only with a unit.
-NEED_UNITS = ("drehzahl", "speed", "rotation_speed", "rotational_speed", "vitesse")
+NEED_UNITS = ("drehzahl", "speed", "rotation_speed", "rotational_speed", "vitesse", "n")
+# The time of a turn, and turns in a time, are read where the title says their unit: T [ms], turns in 10 s.
+PERIODS = (
+    "period", "periode", "periodendauer", "période", "rotation_period", "spin_period", "umlaufzeit",
+    "umlaufdauer", "drehperiode",
+)  # fmt: skip
+TURNS = ("turns", "rotations", "revolutions", "revs", "rev", "umdrehungen", "umdr.", "umdr", "tours")
 # Titles that begin so hold something from which a frequency is yet to be worked out.
-NEARLY_FREQUENCIES = {"period": "its inverse", "periode": "its inverse", "période": "its inverse",
-    "turns": "turns over the time that they took", "umdrehungen": "turns over the time that they took",
-}  # fmt: skip
+_INVERSE, _OVER_TIME = (
+    "say its unit in the title, as in period [ms]",
+    "say in which time in the title, as in turns in 10 s",
+)
+NEARLY_FREQUENCIES = dict.fromkeys(("period", "periode", "période", "umlauf"), _INVERSE) | dict.fromkeys(
+    ("turns", "umdreh", "umdr", "rotations", "revolutions", "tours"), _OVER_TIME
+)
 # A bare "u" belongs to the spin frequency; the others need their quantity's name in it (u_z, z_err …).
 BARE_UNCERTAINTIES = (
     "u", "sigma", "σ", "uncertainty", "unsicherheit", "error", "err", "fehler", "df", "δf", "sd", "std", "stddev", "se",
@@ -93,10 +104,15 @@ COMPANION_FORMS = (
 
 @dataclass(frozen=True)
 class Title:
-    """What one header field says: a canonical column (None: unknown to us) and a unit (None: none given)."""
+    """What one header field says: a canonical column (None: unknown to us) and a unit (None: none given).
+
+    Attributes:
+        inverse: the field holds the time of a turn, of which the column is the inverse.
+    """
 
     column: str | None
     unit: str | None
+    inverse: bool = False
 
 
 def companion(column: str) -> str:
@@ -151,6 +167,10 @@ def unit_factor(text: str, kind: str) -> float | None:
     units, unit = UNITS[kind], plain_unit(text)
     if unit in units:
         return units[unit]
+    if kind == "frequency" and (turns := _TURNS_IN.fullmatch(unit)):
+        second = unit_factor(turns["unit"], "time")
+        length = float(turns["number"].replace(",", ".") if turns["number"] else 1)
+        return 1 / (length * second) if second and length else None
     factors = {factor for name, factor in units.items() if name.casefold() == unit.casefold()}
     return factors.pop() if len(factors) == 1 else None
 
@@ -164,39 +184,66 @@ def _plain_name(text: str) -> str:
     return re.sub(r"[\s\-]+", "_", unicodedata.normalize("NFKC", text).strip().casefold())
 
 
+_TURNS_IN = re.compile(
+    r"(1|U|umdr\.?|umdrehungen|turns?|rev|revolutions?|tr|tours?)?/(?P<number>\d+([.,]\d+)?)?(?P<unit>[a-zμ]+)",
+    re.IGNORECASE,
+)
 _UNIT_FORMS = tuple(
     re.compile(form)
     for form in (
         r"(?P<name>.+?)\s*/?\s*[\[(](?P<unit>[^\[\]()]*)[\])]",  # f [Hz], f (Hz), f / (1/min)
         r"(?P<name>.+?)\s*/\s*(?P<unit>.+)",  # f/Hz
-        r"(?P<name>.+?)\s+in\s+(?P<unit>.+)",  # f in Hz
+        r"(?P<name>.+?)\s+(in|per|pro|par)\s+(?P<unit>.+)",  # f in Hz, turns per minute
         r"(?P<name>[^,]+),\s*(?P<unit>.+)",  # f, Hz
     )
 )
+
+
+#: A title that is longer names nothing that is known here: the forms above look at each pair of its places.
+LONGEST_TITLE = 200
+
+
+def without_runs_of_blanks(text: str) -> str:
+    """A title with a blank where there are many: a program that lays out columns writes thousands."""
+    return " ".join(text.split())
 
 
 def read_title(text: str) -> Title:
     """Read one header field.
 
     >>> read_title("f / kHz")
-    Title(column='spin_frequency_hz', unit='kHz')
+    Title(column='spin_frequency_hz', unit='kHz', inverse=False)
     >>> read_title("zeit_ms")
-    Title(column='time_s', unit='ms')
+    Title(column='time_s', unit='ms', inverse=False)
+    >>> read_title("turns in 10 s").unit, read_title("period [ms]").inverse
+    ('/10 s', True)
     """
-    text = text.strip()
+    text = without_runs_of_blanks(text)
+    if len(text) > LONGEST_TITLE:
+        return Title(None, None)
     name = _plain_name(text)
     if name in NAMES and name not in NEED_UNITS:
         return Title(NAMES[name], IMPLIED_UNITS.get(name))
     forms = (form.fullmatch(text) for form in _UNIT_FORMS)
-    found = [(_plain_name(m["name"]), m["unit"]) for m in forms if m]
+    found = [(m["name"], m["unit"]) for m in forms if m]
     for label, unit in found:
-        if label in NAMES:
-            return Title(NAMES[label], unit)
+        if title := _named(label, unit):
+            return title
     for place in (m.start() for m in re.finditer("_", text)):
-        column = NAMES.get(_plain_name(text[:place]))
-        if column and unit_factor(text[place + 1 :], dimension(column)) is not None:
-            return Title(column, text[place + 1 :])
+        title = _named(text[:place], text[place + 1 :])
+        if title and (title.inverse or unit_factor(text[place + 1 :], dimension(title.column or "")) is not None):
+            return title
     return Title(None, found[0][1] if found else None)
+
+
+def _named(label: str, unit: str) -> Title | None:
+    """What a name says together with what may be its unit; None where we do not know the name."""
+    name = _plain_name(label)
+    if (name in TURNS or label == "U") and unit_factor(f"/{unit}", "frequency"):
+        return Title("spin_frequency_hz", f"/{unit}")
+    if name in PERIODS and unit_factor(unit, "time"):
+        return Title("spin_frequency_hz", unit, inverse=True)
+    return Title(NAMES[name], unit) if name in NAMES else None
 
 
 def known_titles(header: Sequence[str]) -> int:
@@ -209,13 +256,27 @@ def nearly_a_frequency(text: str) -> str | None:
     return next((how for word, how in NEARLY_FREQUENCIES.items() if _plain_name(text).startswith(word)), None)
 
 
+def as_a_period(text: str) -> Title | None:
+    """The title of a T as that of a period, where it says its unit; beside a time it is one, with a capital letter.
+
+    >>> as_a_period("T [ms]")
+    Title(column='spin_frequency_hz', unit='ms', inverse=True)
+    """
+    form = re.fullmatch(r"T\s*(?:[/_,]|in\b)?\s*[\[(]?([^\[\]()]+)[\])]?", text.strip())
+    unit = form and form[1].strip()
+    return Title("spin_frequency_hz", unit, inverse=True) if unit and unit_factor(unit, "time") else None
+
+
 def foreign_unit(text: str, kind: str) -> str | None:
     """The unit in a title, if it is one of another dimension.
 
     >>> foreign_unit("period_ms", "frequency")
     'ms'
     """
-    form = re.fullmatch(r".*?[\[(]([^\[\]()]*)[\])]", text.strip())
+    text = without_runs_of_blanks(text)
+    if len(text) > LONGEST_TITLE:
+        return None
+    form = re.fullmatch(r".*?[\[(]([^\[\]()]*)[\])]", text)
     unit = form[1] if form else text.rpartition("_")[2] if "_" in text else ""
     return unit if unit and is_unit(unit) and unit_factor(unit, kind) is None else None
 

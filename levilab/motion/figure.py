@@ -134,7 +134,7 @@ def _draw_spin(axes: Axes, summary: Summary) -> None:
         axes.legend(loc="lower right", bbox_to_anchor=(1, 0.98), ncols=3, fontsize=8, borderpad=0)
     axes.set_ylabel("spin ω₃/2π  [Hz]")
     axes.set_title(f"Spin: {summary.spin}", loc="left")
-    _not_finer(axes, 1e-6 * abs(float(motion.spin_hz[0])))
+    _limit_zoom(axes, 1e-6 * abs(float(motion.spin_hz[0])))
 
 
 def _draw_tilt(axes: Axes, summary: Summary) -> None:
@@ -178,7 +178,7 @@ def _curve(axes: Axes, time: Array, values: Array, colour: str, label: str | Non
     axes.fill_between(time[edges], low, high, color=colour, linewidth=0.5, label=label)
 
 
-def _not_finer(axes: Axes, span: float) -> None:
+def _limit_zoom(axes: Axes, span: float) -> None:
     """No range so small that rounding would look like a motion."""
     low, high = axes.get_ylim()
     if high - low < span:
@@ -217,7 +217,7 @@ def _outline(frequency: Array, amplitude: Array) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True)
-class _Flag:
+class _Label:
     """A name beside the pole of its line, in parts of the panel's width, and its row above the spectrum."""
 
     pole: float
@@ -225,16 +225,16 @@ class _Flag:
     right: float
     row: int
 
-    def fits(self, others: list[_Flag]) -> bool:
+    def fits(self, others: list[_Label]) -> bool:
         """Whether it is inside of the panel and neither it nor its pole crosses another one."""
         inside = self.left >= 0 and self.right <= 1
         return inside and not any(self._crosses(other) or other._under(self) or self._under(other) for other in others)
 
-    def _crosses(self, other: _Flag) -> bool:
+    def _crosses(self, other: _Label) -> bool:
         beside = self.right + _GAP < other.left or other.right + _GAP < self.left
         return self.row == other.row and not beside
 
-    def _under(self, other: _Flag) -> bool:
+    def _under(self, other: _Label) -> bool:
         """Whether the other's pole goes up through this name."""
         return self.row <= other.row and self.covers([other.pole])
 
@@ -245,7 +245,7 @@ class _Flag:
 
 def _name_lines(axes: Axes, summary: Summary) -> None:
     """Frequency and name of the strongest lines, where there is room; of sidebands, which come last, the frequency."""
-    flags: list[_Flag] = []
+    flags: list[_Label] = []
     lines = sorted(summary.lines.lines, key=lambda line: line.sideband)[:MOST_NAMED]
     for k, line in enumerate(lines):
         waiting = [_pole(axes, other.frequency) for other in lines[k + 1 :] if not other.sideband]
@@ -256,7 +256,7 @@ def _name_lines(axes: Axes, summary: Summary) -> None:
             # the first place that leaves room for the poles to come, if there is one
             found = next((place for place in places if not place[1].covers(waiting)), places[0])
             flags.append(found[1])
-            _hoist(axes, line, *found)
+            _draw_label(axes, line, *found)
 
 
 def _pole(axes: Axes, frequency: float) -> float:
@@ -264,19 +264,19 @@ def _pole(axes: Axes, frequency: float) -> float:
     return float((frequency - low) / (high - low))
 
 
-def _flags(axes: Axes, frequency: float, text: str) -> Iterator[_Flag]:
+def _flags(axes: Axes, frequency: float, text: str) -> Iterator[_Label]:
     """Where a name may hang: away from zero or towards it, in the lowest row first."""
     pole = _pole(axes, frequency)
     probe = axes.text(0, 0, text, fontsize=_FONT)
     width = 1.03 * probe.get_window_extent().width / axes.get_window_extent().width
     probe.remove()
-    right = _Flag(pole, pole + _GAP / 2, pole + _GAP / 2 + width, 0)
-    left = _Flag(pole, pole - _GAP / 2 - width, pole - _GAP / 2, 0)
+    right = _Label(pole, pole + _GAP / 2, pole + _GAP / 2 + width, 0)
+    left = _Label(pole, pole - _GAP / 2 - width, pole - _GAP / 2, 0)
     for flag in (left, right) if frequency < 0 else (right, left):
         yield from (replace(flag, row=k) for k in range(ROWS))
 
 
-def _hoist(axes: Axes, line: NamedLine, text: str, flag: _Flag) -> None:
+def _draw_label(axes: Axes, line: NamedLine, text: str, flag: _Label) -> None:
     height = 1 - _NAMES_SHARE + 0.01 + flag.row * _ROW
     mixed = axes.get_xaxis_transform()  # frequencies across, parts of the panel up
     low, high = np.log10(axes.get_ylim())

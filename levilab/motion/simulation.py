@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from levilab.errors import UsageError
-from levilab.files import CannotWrite
+from levilab.files import writing
 from levilab.interruption import interruption_postponed
 from levilab.motion.lines import rate_for
 from levilab.motion.summary import as_document, summarise
@@ -56,10 +56,11 @@ COLUMNS: tuple[tuple[str, str, str, Callable[[Trajectory], Any]], ...] = (
 
 
 @dataclass(frozen=True)
-class SimulationOrder:
+class SimulationRequest:
     """What is to be simulated: scene, duration [s], tolerance [m and rad], rate [states per second].
 
-    out: where a run folder is made, None for none.
+    Attributes:
+        out: where a run folder is made, None for none.
     """
 
     scene: Scene
@@ -73,8 +74,10 @@ class SimulationOrder:
 class Simulation:
     """What came of it.
 
-    summary: of the motion, with all its samples; folder: the run folder, if there is one; samples_per_state: every so
-    manieth sample is a state that was asked for.
+    Attributes:
+        summary: of the motion, with all its samples.
+        folder: the run folder, if there is one.
+        samples_per_state: every so manieth sample is a state that was asked for.
     """
 
     summary: Summary
@@ -82,13 +85,19 @@ class Simulation:
     samples_per_state: int = 1
 
 
-def carry_out(
-    order: SimulationOrder, message: Callable[[str], None], progress: Callable[[float], None] | None = None
+def run_simulation(
+    order: SimulationRequest, message: Callable[[str], None], progress: Callable[[float], None] | None = None
 ) -> Simulation:
     """Simulate, look at the motion, and write it down; what does not come to its end leaves nothing behind.
 
-    message: called with what takes a moment; progress: the share that is done.  Raises UsageError, SimulationError,
-    CannotWrite.
+    Args:
+        order: what is simulated, and how.
+        message: called with what takes a moment.
+        progress: called with the share that is done.
+
+    Raises:
+        UsageError, SimulationError: for what cannot be simulated.
+        CannotWrite: the run folder cannot be written.
     """
     factor = _samples_per_state(order)
     if order.out is None:
@@ -104,7 +113,7 @@ def carry_out(
     return Simulation(summary, writer.folder, factor)
 
 
-def _samples_per_state(order: SimulationOrder) -> int:
+def _samples_per_state(order: SimulationRequest) -> int:
     """Samples for each state that is kept: the spectrum needs more of them than a file does.  Checks the numbers."""
     for name, value in (("duration", order.duration), ("tolerance", order.tolerance), ("rate", order.rate)):
         if not 0 < value <= LONGEST_S:
@@ -122,7 +131,7 @@ def _samples_per_state(order: SimulationOrder) -> int:
 
 
 def _simulated(
-    order: SimulationOrder,
+    order: SimulationRequest,
     factor: int,
     message: Callable[[str], None],
     progress: Callable[[float], None] | None,
@@ -139,7 +148,7 @@ def _simulated(
 # --- the run folder ---
 
 
-def _record(order: SimulationOrder) -> RunRecord:
+def _record(order: SimulationRequest) -> RunRecord:
     return RunRecord(
         experiment="simulate",
         status="running",
@@ -168,13 +177,8 @@ def _write(summary: Summary, factor: int, writer: RunWriter) -> None:
     writer.states(state_rows(summary.motion, rows))
     if summary.motion.fell is not None:
         writer.event(summary.motion.fell.time, "fell", f"the top {summary.fell}")
-    try:
+    with writing(f"could not write {FIGURE} in {writer.folder}", "free space, or choose another place with `out`"):
         save_png(motion_figure(summary), writer.folder / FIGURE)
-    except OSError as error:
-        raise CannotWrite(
-            f"could not write {FIGURE} in {writer.folder} ({error.strerror or error}): "
-            "free space, or choose another place with `out`"
-        ) from error
     writer.finish("finished", simulation=as_document(summary) | {"states": len(rows)})
 
 

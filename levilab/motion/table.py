@@ -24,7 +24,9 @@ if TYPE_CHECKING:
 def print_motion(summary: Summary, console: Console | None = None) -> None:
     """How it ended, the motion in numbers, the lines of the axis, how good it is, and what to mind.
 
-    console: where it is printed, by default the terminal.
+    Args:
+        summary: of the motion.
+        console: where it is printed, by default the terminal.
     """
     out = console or terminal()
     out.print(f"[bold]{escape(headline(summary))}[/bold]")

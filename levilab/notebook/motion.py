@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from levilab.motion.simulation import COLUMNS, SimulationOrder, carry_out, kept_rows
+from levilab.motion.simulation import COLUMNS, SimulationRequest, kept_rows, run_simulation
 from levilab.motion.summary import as_document
 from levilab.motion.table import headline, print_motion
 from levilab.present.html import facts_as_html
@@ -28,8 +28,9 @@ if TYPE_CHECKING:
 class SimulatedMotion(Trajectory):
     """A trajectory with what `levilab simulate` says of it.
 
-    found: the motion in numbers, with all samples that its spectrum needed; folder: of the run, None if none was
-    written.
+    Attributes:
+        found: the motion in numbers, with all samples that its spectrum needed.
+        folder: of the run, None if none was written.
     """
 
     found: Summary | None = None
@@ -94,8 +95,8 @@ def simulate_motion(
 ) -> SimulatedMotion:
     """Simulate a scene with changes at dotted keys.  Raises SceneError, UsageError, SimulationError, CannotWrite."""
     chosen = (scene if isinstance(scene, Scene) else read_scene(Path(scene))).changed(settings)
-    order = SimulationOrder(chosen, duration, tolerance, rate, None if out is None else Path(out))
-    done = carry_out(order, lambda _: None)
+    order = SimulationRequest(chosen, duration, tolerance, rate, None if out is None else Path(out))
+    done = run_simulation(order, lambda _: None)
     motion = done.summary.motion
     rows = kept_rows(motion, done.samples_per_state)
     own = {one.name: getattr(motion, one.name) for one in fields(motion)}

@@ -29,7 +29,12 @@ FOR_THIS_PAGE = "analyzed for this page"
 
 @dataclass(frozen=True)
 class Origin(Generic[Opt]):
-    """Where the numbers of one input come from.  options: how they were made; text: for people."""
+    """Where the numbers of one input come from.
+
+    Attributes:
+        options: how they were made.
+        text: for people.
+    """
 
     options: Opt
     text: str = NOW
@@ -60,7 +65,7 @@ class Analyzed(Generic[S, R, T, Opt]):
     origins: tuple[Origin[Opt], ...]
 
     @property
-    def home(self) -> Path:
+    def output_folder(self) -> Path:
         """The folder that the result belongs to."""
         return self.place.folder
 

@@ -59,8 +59,13 @@ MOST_STARTS = 6
 class Analysis(Generic[A]):
     """One analysis.
 
-    result: how it is carried out, and its result.json; tables: for the terminal; part: of a report; columns: the
-    readings of each input as columns of a table, with residuals.  Its figure is in `levilab.pipelines.figures`.
+    Attributes:
+        result: how it is carried out, and its result.json.
+        tables: for the terminal.
+        part: of a report.
+        columns: the readings of each input as columns of a table, with residuals.
+
+    Its figure is in `levilab.pipelines.figures`.
     """
 
     result: Document[Any, Any, Any, A, Any]
@@ -241,7 +246,7 @@ def save(analysis: Analysis[A], found: A, folder: Path | None = None) -> list[Pa
     rows = [row for row in ANALYSES.values() if run is None or row.needs.take(run)]
     if run is not None:
         rows = [row for row in rows if _is_for_run(row, run)] or rows
-    place = replace(found.place, folder=folder or found.home)
+    place = replace(found.place, folder=folder or found.output_folder)
     first = rows[0].name == analysis.name and not (folder and is_of_another(place.result(), analysis.name))
     return save_files(analysis.result.of(found, place), place, analysis.png(found), first=first)
 
@@ -251,7 +256,11 @@ def print_analysis(
 ) -> None:
     """The tables, what the data say, and the warnings.
 
-    in_words: a message as the person reads it; console: where it is printed, by default the terminal.
+    Args:
+        analysis: the row of the catalogue.
+        found: what it found.
+        in_words: a message as the person reads it.
+        console: where it is printed, by default the terminal.
     """
     from rich.markup import escape
 

@@ -55,8 +55,12 @@ NO_RESULT = "there was no result yet"
 class Looked(Generic[S, Opt, D]):
     """Inputs as they lie there, and the results that were written of them.
 
-    paths: where they were looked for; found: the inputs; archive: the results; options: as given; given: those of them
-    that are not at their defaults.
+    Attributes:
+        paths: where they were looked for.
+        found: the inputs.
+        archive: the results.
+        options: as given.
+        given: those of them that are not at their defaults.
     """
 
     paths: Sequence[Path]

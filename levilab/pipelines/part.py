@@ -13,8 +13,11 @@ if TYPE_CHECKING:
 class InputPart:
     """What the analysis says of one input.
 
-    readings: the readings in a few lines of words; origin: where the numbers come from; alone: what the input says by
-    itself; context: for the template.
+    Attributes:
+        readings: the readings in a few lines of words.
+        origin: where the numbers come from.
+        alone: what the input says by itself.
+        context: for the template.
     """
 
     readings: tuple[str, ...]
@@ -27,9 +30,13 @@ class InputPart:
 class ReportPart:
     """What the analysis says of all inputs.
 
-    subject: in the title of the page; heading: of the page; lead: how much was used; figure_text: what the figure
-    shows, for readers who do not see it; template: has the macros result(part), runs(part) and readings(input);
-    context: for the template.
+    Attributes:
+        subject: in the title of the page.
+        heading: of the page.
+        lead: how much was used.
+        figure_text: what the figure shows, for readers who do not see it.
+        template: has the macros result(part), runs(part) and readings(input).
+        context: for the template.
     """
 
     subject: str

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
-from levilab.files import CannotWrite, parse_json, replace_atomically
+from levilab.files import parse_json, replace_atomically, writing
 from levilab.runs.run import RECORD
 from levilab.settings import in_one_line
 from levilab.software import software_versions
@@ -165,15 +165,11 @@ def save(result: Result, place: Place, picture: bytes, *, first: bool = True) ->
     """
     text = json.dumps(result.as_dict(), indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False)
     files = [place.result("" if first else result.analysis), place.figure(result.analysis)]
-    try:
+    advice = "choose another place with `out`, or print only with `save` = False"
+    with writing(f"the result could not be written into {place.folder}", advice):
         place.folder.mkdir(parents=True, exist_ok=True)
         replace_atomically(files[0], text + "\n")
         replace_atomically(files[1], picture)
-    except OSError as error:
-        raise CannotWrite(
-            f"the result could not be written into {place.folder} ({error.strerror or error}): "
-            "choose another place with `out`, or print only with `save` = False"
-        ) from error
     return files
 
 
@@ -229,7 +225,11 @@ def _read(path: Path) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Written:
-    """A result that was named by its own path.  inputs: the run folders and data files that it says it is of."""
+    """A result that was named by its own path.
+
+    Attributes:
+        inputs: the run folders and data files that it says it is of.
+    """
 
     file: Path
     analysis: str
@@ -276,7 +276,12 @@ def results_in(folder: Path) -> list[Written]:
 
 @dataclass(frozen=True)
 class Earlier(Generic[R]):
-    """An input as it was found in a result written before.  file: the result; number: of the input in it."""
+    """An input as it was found in a result written before.
+
+    Attributes:
+        file: the result.
+        number: of the input in it.
+    """
 
     file: Path
     result: R

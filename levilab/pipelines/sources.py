@@ -25,8 +25,11 @@ if TYPE_CHECKING:
 class InputOptions:
     """How inputs are read, whatever is done with them; each analysis adds its own options.
 
-    columns: the data file's own names; channel: of a record with several; rate: samples per second [Hz], in the place
-    of what the file says; guess: whether a file without titles is taken for what it looks like.
+    Attributes:
+        columns: the data file's own names.
+        channel: of a record with several.
+        rate: samples per second [Hz], in the place of what the file says.
+        guess: whether a file without titles is taken for what it looks like.
     """
 
     columns: Mapping[str, str] | None = None
@@ -55,9 +58,14 @@ R = TypeVar("R", bound=Readings)
 class Needs(Generic[R]):
     """What an analysis needs of its inputs.
 
-    analysis: its name; experiments: those whose runs suit it; read_file, read_run: to readings, which raise DoesNotSuit
-    for what is of another kind and DataError for what cannot be used; data: the file of a run that the readings come
-    from; also: whether a run of any experiment suits; wanted: such runs in words, where the experiment says too little.
+    Attributes:
+        analysis: its name.
+        experiments: those whose runs suit it.
+        read_file, read_run: to readings, which raise DoesNotSuit for what is of another kind and DataError for what
+            cannot be used.
+        data: the file of a run that the readings come from.
+        also: whether a run of any experiment suits.
+        wanted: such runs in words, where the experiment says too little.
     """
 
     analysis: str
@@ -82,8 +90,13 @@ class Needs(Generic[R]):
 class Source(Generic[R]):
     """One input.
 
-    path: what was given or found; data: the file with the readings; sha256: of that file;
-    run: None for a data file; name: for people, as short as tells it from the others; warnings: about the input.
+    Attributes:
+        path: what was given or found.
+        data: the file with the readings.
+        sha256: of that file.
+        run: None for a data file.
+        name: for people, as short as tells it from the others.
+        warnings: about the input.
     """
 
     path: Path
@@ -114,7 +127,9 @@ class Source(Generic[R]):
 class Found(Generic[R]):
     """What lies at some paths.
 
-    warnings: about what cannot be used; remarks: about what does not belong to the analysis.
+    Attributes:
+        warnings: about what cannot be used.
+        remarks: about what does not belong to the analysis.
     """
 
     sources: tuple[Source[R], ...]
@@ -147,7 +162,7 @@ def collect(paths: Sequence[Path], needs: Needs[R], options: Callable[[Path], In
             remarks += here.remarks
         else:
             found.append(_one(path, needs, options(path)))
-    return Found(_named(_without_copies(found, warnings)), tuple(warnings), tuple(remarks))
+    return Found(_with_short_names(_without_copies(found, warnings)), tuple(warnings), tuple(remarks))
 
 
 def _without_copies(found: Sequence[Source[R]], warnings: list[str]) -> list[Source[R]]:
@@ -163,7 +178,7 @@ def _without_copies(found: Sequence[Source[R]], warnings: list[str]) -> list[Sou
     return [source for source in found if any(source is one for one in kept[len(source.readings)])]
 
 
-def _named(sources: Sequence[Source[R]]) -> tuple[Source[R], ...]:
+def _with_short_names(sources: Sequence[Source[R]]) -> tuple[Source[R], ...]:
     """Names that differ: the last part of the path, or as many more as it takes."""
     for parts in range(1, 10):
         names = ["/".join(source.path.resolve().parts[-parts:]) for source in sources]

@@ -24,7 +24,11 @@ SCHEMA = "levilab-top/1"
 
 @dataclass(frozen=True, eq=False)
 class Calculated:
-    """A top from its parts.  alone: each part as if it were the whole top."""
+    """A top from its parts.
+
+    Attributes:
+        alone: each part as if it were the whole top.
+    """
 
     parts: tuple[Cylinder, ...]
     alone: tuple[Top, ...]

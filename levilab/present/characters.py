@@ -20,6 +20,20 @@ _POWER_OF_TEN = re.compile(f"(?<=[0-9)])×10([{''.join(_RAISED)}]+)")
 _EXPONENT = re.compile(f"[{''.join(_RAISED)}]+")
 
 
+#: What steers a terminal (ISO 6429: all of C0 but the line feed, DEL, C1), ends a line, or turns the direction of
+#: writing (Unicode Standard Annex 9).
+_STEERING = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+
+
+def printable(text: str) -> str:
+    r"""A text of unknown origin as it is printed: nothing in it steers the terminal; line feeds stay.
+
+    >>> print(printable("a file's name \x1b[31min red\x1b]0;and a title\x07"))
+    a file's name �[31min red�]0;and a title�
+    """
+    return _STEERING.sub("\N{REPLACEMENT CHARACTER}", text)
+
+
 def for_encoding(text: str, encoding: str | None) -> str:
     """The text itself where the encoding has all its characters, else the nearest that it has.
 

@@ -13,7 +13,12 @@ _CELL = '<td style="text-align: left">'
 
 
 def facts_as_html(title: str, facts: Iterable[tuple[str, str]], after: str = "") -> str:
-    """A heading and (what, in words), all escaped; what says nothing is left out.  after: HTML that follows.
+    """A heading and facts below it, all escaped; what says nothing is left out.
+
+    Args:
+        title: the heading.
+        facts: (what, in words).
+        after: HTML that follows.
 
     >>> facts_as_html("a run", [("note", "<b>"), ("scene", "")]).count("&lt;b&gt;")
     1

@@ -6,11 +6,13 @@ import sys
 import time
 from typing import TYPE_CHECKING, Protocol
 
+from levilab.present.characters import printable
+
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
 
-class Show(Protocol):
+class Display(Protocol):
     """What the acquisition tells."""
 
     def preparing(self, text: str, fraction: float) -> None:
@@ -42,7 +44,7 @@ class Mute:
         """Nothing is open."""
 
 
-class Lines:
+class LineDisplay:
     """One line a reading, for logs, pipes and tests."""
 
     def __init__(self) -> None:
@@ -64,7 +66,7 @@ class Lines:
         if self._gone:
             return
         try:
-            print(text, file=sys.stderr, flush=True)  # noqa: T201 - this is where it is shown
+            print(printable(text), file=sys.stderr, flush=True)  # noqa: T201 - this is where it is shown
         except OSError:
             self._gone = True
 
@@ -72,7 +74,7 @@ class Lines:
         """Nothing is open."""
 
 
-class Bar:
+class BarDisplay:
     """A progress bar with the time left and the last reading."""
 
     def __init__(self) -> None:
@@ -101,19 +103,19 @@ class Bar:
 
     def message(self, text: str) -> None:
         """A line above the bar."""
-        self._progress.console.print(text, markup=False, highlight=False)
+        self._progress.console.print(printable(text), markup=False, highlight=False)
 
     def close(self) -> None:
         """Take the bar away; the lines stay."""
         self._progress.stop()
 
 
-def to_stderr() -> Show:
+def to_stderr() -> Display:
     """A bar on a terminal, lines elsewhere."""
-    return Bar() if sys.stderr.isatty() else Lines()
+    return BarDisplay() if sys.stderr.isatty() else LineDisplay()
 
 
-class Share:
+class ShareBar:
     """A bar for work whose share is known, on a terminal, once it takes longer than a second.
 
     A share that goes back is a new attempt: a simulation tries shorter steps until its error is small enough.

@@ -11,7 +11,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Row:
-    """One row.  cells: text, of several lines perhaps; kind: "best", "outlier", "together" (below a line), or none."""
+    """One row.
+
+    Attributes:
+        cells: text, of several lines perhaps.
+        kind: "best", "outlier", "together" (below a line), or none.
+    """
 
     cells: tuple[str, ...]
     kind: str = ""
@@ -19,7 +24,12 @@ class Row:
 
 @dataclass(frozen=True)
 class Table:
-    """A table.  heads: of the columns; numbers: which columns are aligned to the right."""
+    """A table.
+
+    Attributes:
+        heads: of the columns.
+        numbers: which columns are aligned to the right.
+    """
 
     title: str
     heads: tuple[str, ...]
@@ -30,7 +40,13 @@ class Table:
 def table(
     title: str, heads: Sequence[str], rows: Iterable[Row | Sequence[str]], *, numbers: Iterable[str] = ()
 ) -> Table:
-    """A table from rows of cells; numbers: heads of the columns that are aligned to the right.
+    """A table from rows of cells.
+
+    Args:
+        title: above it, empty for none.
+        heads: of its columns.
+        rows: of cells.
+        numbers: heads of the columns that are aligned to the right.
 
     >>> table("", ["law", "rms"], [("disc", "0.03")], numbers=["rms"]).numbers
     frozenset({1})

@@ -24,7 +24,13 @@ _DRIVE = ("drive_waveform", "drive_frequency_hz", "drive_amplitude_vpp")
 
 @dataclass(frozen=True)
 class About:
-    """What one analysis says of an input.  whole: of all its inputs; part: of this one; several: if it has more."""
+    """What one analysis says of an input.
+
+    Attributes:
+        whole: of all its inputs.
+        part: of this one.
+        several: if it has more.
+    """
 
     source: Source[Any]
     whole: ReportPart
@@ -36,7 +42,10 @@ class About:
 class Input:
     """One input as the page shows it.
 
-    facts: (what, in words), in the order of the page; events: (when, text); parts: what each analysis says of it.
+    Attributes:
+        facts: (what, in words), in the order of the page.
+        events: (when, text).
+        parts: what each analysis says of it.
     """
 
     name: str

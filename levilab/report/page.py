@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import UsageError, unquoted
-from levilab.files import CannotWrite, replace_atomically
+from levilab.files import replace_atomically, writing
 from levilab.pipelines.catalogue import recall_suiting, remarks
 from levilab.pipelines.document import NO_RESULT
 from levilab.report.inputs import About, describe
@@ -46,23 +46,29 @@ def write_report(
 ) -> Path:
     """Report what was found of the inputs at the paths; what has no result yet is analyzed, and nothing is stored.
 
-    given: options by their names; those at their defaults count as not given, see
-    `levilab.pipelines.document.Document.look`; tell: called with what lies there and is not in the report, and
-    with what has no result.
-    Raises DataError, UnknownFormat, CannotWrite.
+    Args:
+        paths: run folders, data files, folders to search, results.
+        output: the file to write.
+        given: options by their names; those at their defaults count as not given, see
+            `levilab.pipelines.document.Document.look`.
+        tell: called with what lies there and is not in the report, and with what has no result.
+
+    Returns:
+        The file.
+
+    Raises:
+        DataError: nothing can be reported of.
+        UnknownFormat: of the output's name.
+        CannotWrite: of the output.
     """
     if output.suffix.lower() not in {".html", ".htm"}:
         expected = "reports are written as HTML, name the file report.html; a browser prints it to PDF"
         raise UnknownFormat("output", expected, value=output)
     results = recall_suiting(paths, given or {}, tell)
     page = render(results)
-    try:
+    with writing(f"{output}: could not be written", "choose another place with `output`"):
         output.parent.mkdir(parents=True, exist_ok=True)
         replace_atomically(output, page)
-    except OSError as error:
-        raise CannotWrite(
-            f"{output}: could not be written ({error.strerror or error}): choose another place with `output`"
-        ) from error
     if tell:
         for remark in remarks([found.remarks for _, found in results]):
             tell(remark)
@@ -91,8 +97,11 @@ def _without_result(results: Results) -> Iterator[str]:
 class Section:
     """What the page says of one analysis.
 
-    part: in its own words; count: of its inputs, in words; banner: which of them are synthetic, where that matters
-    here; figure: as an address of data.
+    Attributes:
+        part: in its own words.
+        count: of its inputs, in words.
+        banner: which of them are synthetic, where that matters here.
+        figure: as an address of data.
     """
 
     part: ReportPart

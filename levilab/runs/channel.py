@@ -7,7 +7,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Channel:
-    """A column of readings.csv.  unit: "" for a pure number; source: where it comes from, in words."""
+    """A column of readings.csv.
+
+    Attributes:
+        unit: "" for a pure number.
+        source: where it comes from, in words.
+    """
 
     name: str
     unit: str

@@ -97,7 +97,8 @@ def lock_of(folder: Path) -> Any:
 class Run:
     """A run folder as it lies on the disk.
 
-    status: as in run.json, but a run that says "running" and whose process is gone is "interrupted".
+    Attributes:
+        status: as in run.json, but a run that says "running" and whose process is gone is "interrupted".
     """
 
     folder: Path
@@ -275,13 +276,23 @@ def find_run(name: Path, root: Path = Path("runs")) -> Path:
 
 def find_runs(root: Path) -> list[Path]:
     """The run folders at or below a folder, by name; links are followed, each folder is visited once."""
-    found, seen = [], set()
+    found: list[Path] = []
+    seen: set[object] = set()
     for folder, below, files in os.walk(root, followlinks=True):
-        real = os.path.realpath(folder)
-        if real in seen:
+        this = _identity(folder)
+        if this in seen:
             below.clear()
             continue
-        seen.add(real)
+        seen.add(this)
         if RECORD in files:
             found.append(Path(folder))
-    return sorted(found)
+    return sorted(found, key=lambda folder: folder.parts)
+
+
+def _identity(folder: str) -> object:
+    """What no two folders have in common; some file systems of networks number none."""
+    try:
+        there = os.stat(folder)  # noqa: PTH116 - of ten thousand folders
+    except OSError:
+        return os.path.realpath(folder)
+    return (there.st_dev, there.st_ino) if there.st_ino else os.path.realpath(folder)

@@ -1,11 +1,17 @@
-"""Oscilloscope records of a run: raw codes in traces/, how to read each in a line of traces.jsonl."""
+"""Oscilloscope records of a run: raw codes in traces/, how to read each in a line of traces.jsonl.
+
+A long record is minutes on its way.  Meanwhile `traces/arriving.json` says how to read it, and its codes are appended
+to `traces/arriving.codes` as they come; both go once the record has its own file and its line.  A process that is
+killed leaves them behind, and with them what had come.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import io
+import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from pydantic import Field, ValidationError
@@ -18,18 +24,26 @@ from levilab.settings import Settings, in_one_line
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from numpy.typing import NDArray
+
+    Codes = NDArray[np.uint8] | NDArray[np.uint16]
+
 #: The folder of the codes, and the file with a line for each record.
 FOLDER, INDEX = "traces", "traces.jsonl"
+#: What is there while a record is on its way: how to read it, and the codes so far, one byte after the other.
+ARRIVING, ARRIVING_CODES = f"{FOLDER}/arriving.json", f"{FOLDER}/arriving.codes"
 
 
-class Record(Settings):
-    """A line of the index: when and of what the record is, its codes, and how to read them in the names of `Trace`."""
+class Head(Settings):
+    """When and of what a record is, and how to read its codes in the names of `Trace`.
+
+    Attributes:
+        announced: points that it was to have, where it has fewer.
+    """
 
     number: int
     time_s: float
     channel: str
-    path: str = Field(pattern=rf"^{FOLDER}/\d+\.npy$")
-    sha256: str
     scope_channel: int
     dt_s: float
     t0_s: float
@@ -38,6 +52,20 @@ class Record(Settings):
     lowest: int
     highest: int
     none: int | None
+    announced: int | None = None
+
+
+class Record(Head):
+    """A line of the index: the head of a record, and its codes."""
+
+    path: str = Field(pattern=rf"^{FOLDER}/\d+\.npy$")
+    sha256: str
+
+
+class Arriving(Head):
+    """The head of a record on its way."""
+
+    dtype: Literal["uint8", "uint16"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,30 +77,37 @@ class StoredTrace:
         time_s: when it was kept, on the clock of the readings.
         channel: what it shows.
         trace: the record itself.
+        announced: points that it was to have, None where it has them all.
     """
 
     number: int
     time_s: float
     channel: str
     trace: Trace
+    announced: int | None = None
+
+    @property
+    def how_short(self) -> str:
+        """How much there is of it, in words; empty where it is whole."""
+        if self.announced is None:
+            return ""
+        return f"was cut short: {self.trace.codes.size} of its {self.announced} points are kept"
 
 
-def save_codes(folder: Path, number: int, time_s: float, trace: Trace, channel: str) -> str:
-    """Write the codes of a record; returns its line for the index.  Raises OSError."""
-    if not (folder / FOLDER).is_dir():
-        (folder / FOLDER).mkdir(exist_ok=True)
-        sync_folder(folder)
-    buffer = io.BytesIO()
-    np.save(buffer, trace.codes, allow_pickle=False)
-    content = buffer.getvalue()
-    name = f"{FOLDER}/{number:06d}.npy"
-    replace_atomically(folder / name, content)
-    record = Record(
+def head_of(trace: Trace, number: int, time_s: float, channel: str, announced: int | None = None) -> Head:
+    """The head of a record.
+
+    Args:
+        trace: the record.
+        number: in the run, from 1 on.
+        time_s: when it was taken, on the clock of the readings.
+        channel: what it shows.
+        announced: points that it is to have, where it has fewer.
+    """
+    return Head(
         number=number,
         time_s=time_s,
         channel=channel,
-        path=name,
-        sha256=hashlib.sha256(content).hexdigest(),
         scope_channel=trace.channel,
         dt_s=trace.dt_s,
         t0_s=trace.t0_s,
@@ -81,8 +116,85 @@ def save_codes(folder: Path, number: int, time_s: float, trace: Trace, channel: 
         lowest=trace.lowest,
         highest=trace.highest,
         none=trace.none,
+        announced=announced,
     )
-    return record.model_dump_json()
+
+
+def begin_arriving(folder: Path, head: Head, codes: Codes) -> None:
+    """Say how to read a record whose codes are about to come.  Raises OSError."""
+    _make_folder(folder)
+    (folder / ARRIVING_CODES).unlink(missing_ok=True)
+    about = Arriving.model_validate(head.model_dump() | {"dtype": str(codes.dtype)})
+    replace_atomically(folder / ARRIVING, about.model_dump_json() + "\n")
+
+
+def append_arriving(folder: Path, codes: Codes) -> None:
+    """Append the next codes of the record that is on its way; they are on the disk afterwards.  Raises OSError."""
+    with (folder / ARRIVING_CODES).open("ab") as file:
+        file.write(codes.tobytes())
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def is_arriving(folder: Path) -> bool:
+    """Whether a run folder says how to read a record that is on its way."""
+    return (folder / ARRIVING).is_file()
+
+
+def forget_arriving(folder: Path) -> None:
+    """Take away what is there of a record on its way, which is kept elsewhere, or of no use.  Raises OSError."""
+    for name in (ARRIVING, ARRIVING_CODES):
+        (folder / name).unlink(missing_ok=True)
+
+
+def arrived(folder: Path) -> StoredTrace | None:
+    """What had come of the record that was on its way when a process was killed; None where there is nothing.
+
+    Raises:
+        DataError: what is there of it cannot be read.
+    """
+    about, codes = folder / ARRIVING, folder / ARRIVING_CODES
+    try:
+        if not about.is_file():
+            return None
+        head = Arriving.model_validate(parse_json(about.read_text(encoding="utf-8")))
+        if any(_line(folder / INDEX, line).number == head.number for line in _lines(folder)):
+            return None
+        whole = folder / _path(head.number)
+        if whole.is_file():  # killed between codes and line
+            return _stored(head.model_copy(update={"announced": None}), np.load(whole, allow_pickle=False))
+        content = codes.read_bytes() if codes.is_file() else b""
+    except OSError as error:
+        raise DataError(f"{about}: cannot be read ({error.strerror})") from error
+    except ValueError as error:
+        raise DataError(f"{about}: does not say how to read {codes.name}, remove both ({error})") from error
+    dtype = np.dtype(head.dtype)
+    count = len(content) // dtype.itemsize
+    return _stored(head, np.frombuffer(content, dtype=dtype, count=count)) if count else None
+
+
+def save_codes(folder: Path, head: Head, codes: Codes) -> str:
+    """Write the codes of a record; returns its line for the index.  Raises OSError."""
+    _make_folder(folder)
+    buffer = io.BytesIO()
+    np.save(buffer, codes, allow_pickle=False)
+    content = buffer.getvalue()
+    name = _path(head.number)
+    replace_atomically(folder / name, content)
+    file = {"path": name, "sha256": hashlib.sha256(content).hexdigest()}
+    record = Record.model_validate(head.model_dump(exclude_defaults=True) | file)
+    return record.model_dump_json(exclude_defaults=True)
+
+
+def _path(number: int) -> str:
+    """Of the codes of a record, in the run folder."""
+    return f"{FOLDER}/{number:06d}.npy"
+
+
+def _make_folder(folder: Path) -> None:
+    if not (folder / FOLDER).is_dir():
+        (folder / FOLDER).mkdir(exist_ok=True)
+        sync_folder(folder)
 
 
 def has_codes(folder: Path, line: str) -> bool:
@@ -106,8 +218,10 @@ def described_times(folder: Path) -> list[float]:
 
 
 def undescribed_codes(folder: Path) -> list[str]:
-    """Codes in a run folder that no line of the index describes, as their paths in it.  Raises DataError."""
+    """Codes in a run folder that nothing describes, as their paths in it.  Raises DataError."""
     described = {_line(folder / INDEX, line).path for line in _lines(folder)}
+    if found := arrived(folder):
+        described.add(_path(found.number))
     there = sorted(path.relative_to(folder).as_posix() for path in (folder / FOLDER).glob("*.npy"))
     return [path for path in there if path not in described]
 
@@ -116,10 +230,13 @@ def load_traces(folder: Path) -> list[StoredTrace]:
     """The records of a run folder, in the order in which they were kept.
 
     The codes of a record are on the disk before its line: a process that was killed between the two, or in the middle
-    of the line, has left codes without a line, and these are left out.  Raises DataError for codes that are missing or
-    are not those that were written.
+    of the line, has left codes without a line, and these are left out.  One that was killed while a long record was on
+    its way has left what had come: it is the last one, and shorter than announced.  Raises DataError for codes that are
+    missing or are not those that were written.
     """
-    return [_load(folder, _line(folder / INDEX, line)) for line in _lines(folder)]
+    whole = [_load(folder, _line(folder / INDEX, line)) for line in _lines(folder)]
+    cut_short = arrived(folder)
+    return whole if cut_short is None else [*whole, cut_short]
 
 
 def _lines(folder: Path) -> list[str]:
@@ -150,15 +267,19 @@ def _load(folder: Path, record: Record) -> StoredTrace:
         raise DataError(f"{path}: cannot be read ({error.strerror}): {advice}") from error
     if hashlib.sha256(content).hexdigest() != record.sha256:
         raise DataError(f"{path}: is not what was recorded: its sha256 differs from the one in {INDEX}")
+    return _stored(record, np.load(io.BytesIO(content), allow_pickle=False))
+
+
+def _stored(head: Head, codes: Codes) -> StoredTrace:
     trace = Trace(
-        np.load(io.BytesIO(content), allow_pickle=False),
-        record.dt_s,
-        record.t0_s,
-        record.volts_per_code,
-        record.offset_v,
-        record.scope_channel,
-        record.lowest,
-        record.highest,
-        record.none,
+        codes,
+        head.dt_s,
+        head.t0_s,
+        head.volts_per_code,
+        head.offset_v,
+        head.scope_channel,
+        head.lowest,
+        head.highest,
+        head.none,
     )
-    return StoredTrace(record.number, record.time_s, record.channel, trace)
+    return StoredTrace(head.number, head.time_s, head.channel, trace, head.announced)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from levilab.formats.waveforms.waveform import Signal, Waveform
-from levilab.runs.traces import INDEX, load_traces
+from levilab.runs.traces import INDEX, is_arriving, load_traces
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 
 def has_traces(run: Run) -> bool:
-    """Whether a run keeps records of an oscilloscope."""
-    return (run.folder / INDEX).is_file()
+    """Whether a run keeps records of an oscilloscope, or what had come of one when it was killed."""
+    return (run.folder / INDEX).is_file() or is_arriving(run.folder)
 
 
 def run_waveforms(run: Run) -> list[Waveform]:

@@ -71,13 +71,24 @@ class RunWriter:
         self._kept: dict[str, list[bytes]] = {}  # what was appended line by line, to be written anew
         self._created = False
         self._records = 0  # of the oscilloscope
+        self._arriving: tuple[Path, int] | None = None  # the record on its way: its folder, and points that are there
         self._lock = lock_of(folder)
 
     @classmethod
     def create(
         cls, out: Path, record: RunRecord, table: str = READINGS, *, tell: Callable[[str], None] = lambda _: None
     ) -> Self:
-        """A new folder ``<UTC>-<experiment>-<four hex digits>`` below `out`; table: its rows.  Raises CannotWrite."""
+        """A new folder ``<UTC>-<experiment>-<four hex digits>``.
+
+        Args:
+            out: the folder below which it is made.
+            record: what run.json is to say.
+            table: the file of its rows.
+            tell: called with a sentence for the person at the bench.
+
+        Raises:
+            CannotWrite: it cannot be made.
+        """
         with _told("create the run folder", out, safe=""):
             _make_folder(out)
             writer = cls(_new_folder(out, record.experiment), record, tell)
@@ -120,11 +131,14 @@ class RunWriter:
             _cut_torn_line(self.folder / name)
         self._check_header()
         self._records = traces.last_number(self.folder)
+        cut_short = self.keep_what_arrived()
         for name in _KEPT:
             if name not in self._files and (self.folder / name).exists():
                 self._open(name)
         notes = "; ".join(filter(None, (self.record.note, note)))
         self.update(status="running", ended_utc=None, note=notes)
+        if cut_short:
+            self.event(None, "cut short", cut_short)
 
     def _header(self) -> str:
         return ",".join(channel["name"] for channel in self.record.channels)
@@ -211,16 +225,68 @@ class RunWriter:
 
     def trace(self, time_s: float, trace: Trace, channel: str) -> int:
         """Keep an oscilloscope's record; returns its number.  Raises CannotWrite."""
-        self._records += 1
-        with _told(f"write the record {self._records}", self.folder):
+        return self._keep_record(traces.head_of(trace, self._records + 1, time_s, channel), trace)
+
+    def _keep_record(self, head: traces.Head, trace: Trace) -> int:
+        """What it is, its codes, and their line: a process that is killed after the first leaves all that had come."""
+        self._records = max(self._records, head.number)
+        with _told(f"write the record {head.number}", self.folder):
             self._rescue_if_lost()
             written = None
             while written != self.folder:  # once more where the folder was removed meanwhile
                 written = self.folder
-                line = traces.save_codes(written, self._records, time_s, trace, channel)
-                self._append(traces.INDEX, line)
+                if not traces.is_arriving(written):
+                    traces.begin_arriving(written, head, trace.codes)
+                self._append(traces.INDEX, traces.save_codes(written, head, trace.codes))
                 self._rescue_if_lost()
-        return self._records
+            traces.forget_arriving(self.folder)
+        self._arriving = None
+        return head.number
+
+    def arriving(self, time_s: float, trace: Trace, channel: str, points: int) -> None:
+        """Put down what has come so far of a record; the whole one is kept by `trace`.
+
+        Args:
+            time_s: when the record was taken, on the clock of the readings.
+            trace: its first samples, at each call some more of one record.
+            channel: what it shows.
+            points: it is to have.
+
+        Raises:
+            CannotWrite: the disk is full, or gone.
+        """
+        if trace.codes.size >= points:
+            return
+        number = self._records + 1
+        with _told(f"write the record {number}", self.folder):
+            self._rescue_if_lost()
+            here, there = self._arriving or (None, 0)
+            if here != self.folder:
+                there = 0
+                traces.begin_arriving(self.folder, traces.head_of(trace, number, time_s, channel, points), trace.codes)
+            traces.append_arriving(self.folder, trace.codes[there:])
+        self._arriving = self.folder, trace.codes.size
+
+    def keep_what_arrived(self) -> str | None:
+        """Keep what has come of a record that was broken off; says what that is.  Raises CannotWrite."""
+        try:
+            found = traces.arrived(self.folder)
+        except DataError:  # the analysis says so
+            return None
+        self._arriving = None
+        if found is None:
+            with _told("clear up", self.folder):
+                traces.forget_arriving(self.folder)
+            return None
+        head = traces.head_of(found.trace, found.number, found.time_s, found.channel, found.announced)
+        self._keep_record(head, found.trace)
+        return f"{traces.INDEX}: record {found.number} ({found.channel}) {found.how_short or 'was kept whole'}"
+
+    def forget_what_arrived(self) -> None:
+        """Take away what has come of a record that is of no use.  Raises CannotWrite."""
+        self._arriving = None
+        with _told("clear up", self.folder):
+            traces.forget_arriving(self.folder)
 
     def event(self, time_s: float | None, kind: str, text: str, **data: Any) -> None:
         """Append a line to events.jsonl."""

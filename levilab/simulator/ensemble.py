@@ -23,7 +23,7 @@ from levilab.simulator.keys import SceneError
 from levilab.simulator.model import model_of
 from levilab.simulator.problem import NOWHERE, Problem, end_at, scheme_for, travelled
 from levilab.simulator.schemes import SCHEMES
-from levilab.simulator.single import ROOM, check, simulate
+from levilab.simulator.single import MIN_STEPS_FOR_DOUBLING, check, simulate
 from levilab.simulator.start import start_of
 from levilab.simulator.stops import stops_between
 
@@ -47,10 +47,16 @@ SLOW_RAD_S = 2 * math.pi * 5.0
 class Ensemble:
     """The ends of many motions.  All arrays have the shape of the values that were varied, states one axis more.
 
-    scene: what they have in common; values: what differs, by dotted keys; survived: still up after `duration` [s];
-    time [s]: of the end, or of the escape; states: at the end, shape (…, 18); position_error [m], axis_error [rad]:
-    estimated, NaN where they were not asked for.  Where an error is larger than the tolerance, the motion was
-    chaotic, and whether it survived is chance.
+    Attributes:
+        scene: what they have in common.
+        values: what differs, by dotted keys.
+        survived: still up after `duration` [s].
+        time: of the end, or of the escape [s].
+        states: at the end, shape (…, 18).
+        position_error: estimated [m], NaN where it was not asked for.
+        axis_error: likewise [rad].
+
+    Where an error is larger than the tolerance, the motion was chaotic, and whether it survived is chance.
     """
 
     scene: Scene
@@ -94,12 +100,20 @@ def simulate_many(
 ) -> Ensemble:
     """Simulate a scene for many values at once.
 
-    over: dotted keys of the scene with their values, broadcast against each other; duration [s]; tolerance: wanted
-    error of place [m] and axis [rad] at the end, from which one step is chosen on a few of the tops; step [s]:
-    fixes it for all instead; cores: threads, as many as there are where None; errors: estimate every top's error by a
-    second, coarser run, which takes half as long again; progress: is told the share of the work done.
+    Args:
+        scene: what the tops have in common.
+        over: dotted keys of the scene with their values, broadcast against each other.
+        duration: of each motion [s].
+        tolerance: wanted error of place [m] and axis [rad] at the end, from which one step is chosen on a few of the
+            tops.
+        step: fixes it for all instead [s].
+        cores: threads, as many as there are where None.
+        errors: estimate every top's error by a second, coarser run, which takes half as long again.
+        progress: called with the share of the work that is done.
 
-    Raises SceneError for keys and values that a scene does not allow, SimulationError for senseless numbers.
+    Raises:
+        SceneError: a scene does not allow these keys or values.
+        SimulationError: a number makes no sense.
 
     >>> import numpy as np
     >>> from levilab.simulator import preset, simulate_many
@@ -261,7 +275,7 @@ def _estimates(some: list[_Top], states: Array, steps: Array) -> tuple[Array, Ar
     """Estimated errors of places [m] and axes [rad] at the ends, shape (n,) each."""
     problem, lasted = some[0].problem, states[:, TIME]
     # where a fall or a kink of the drive leaves no room for longer steps, half of them tell as much
-    room = (lasted > ROOM * steps) & ~np.array([one.kinked for one in some])
+    room = (lasted > MIN_STEPS_FOR_DOUBLING * steps) & ~np.array([one.kinked for one in some])
     lengths = [np.where(room, times * steps, np.minimum(steps, lasted) / 2) for times in (2, 4)]
     twice = _coarse(some, lasted, lengths[0])
     four = _coarse(some, lasted, lengths[1]) if np.any(room) else twice

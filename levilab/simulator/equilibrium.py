@@ -33,14 +33,18 @@ HEAVIEST_KG = 1.0
 class Stability:
     """What the theory says of a scene.
 
-    top, field: the scene's, as `analysis.stability` takes them; windows: heights and masses, adiabatic; equilibria: of
-    the scene's own mass; floating: the one in which it floats, None if there is none; modes [Hz]: sideways, at the
-    scene's spin, complex where unstable; vertical, sleeping [Hz]: the up-and-down mode and the sleeping top's limit
-    there; nearest: the mass [kg] nearest to the scene's that floats, None where no mass does.
+    Attributes:
+        top, field: the scene's, as `analysis.stability` takes them.
+        windows: heights and masses, adiabatic.
+        equilibria: of the scene's own mass.
+        floating: the one in which it floats, None if there is none.
+        modes: sideways, at the scene's spin, complex where unstable [Hz].
+        vertical, sleeping: the up-and-down mode and the sleeping top's limit there [Hz].
+        nearest: the mass [kg] nearest to the scene's that floats, None where no mass does.
     """
 
     scene: Scene
-    top: stability.Symmetric
+    top: stability.SymmetricTop
     field: stability.AxialField
     windows: tuple[stability.Window, ...]
     equilibria: tuple[stability.Equilibrium, ...]
@@ -57,10 +61,10 @@ class Stability:
         return tuple(w for w in self.windows if _lifts(w, self.top, self.field))
 
 
-def symmetric(scene: Scene) -> stability.Symmetric:
+def top_of(scene: Scene) -> stability.SymmetricTop:
     """The scene's top, with the part of its moment that lies along the axis."""
     top = scene.top
-    return stability.Symmetric(
+    return stability.SymmetricTop(
         top.mass_kg,
         top.inertia_transverse_kg_m2,
         top.inertia_axial_kg_m2,
@@ -112,7 +116,7 @@ def _disc_stiffnesses(scene: Scene) -> Callable[[Array], Array]:
 def axial_field(scene: Scene) -> stability.AxialField:
     """B, B′ and B″ on the axis as an upright top feels them: at its centre, or averaged over its magnet.
 
-    The average's force and its stiffness up and down are those of a point in it; what tilting does is in `symmetric`.
+    The average's force and its stiffness up and down are those of a point in it; what tilting does is in `top_of`.
     """
     field = base_field(scene)
     if scene.top.magnet == "point":
@@ -136,14 +140,14 @@ def axial_field(scene: Scene) -> stability.AxialField:
 
 def modes_at(scene: Scene, height: float, spin_hz: float) -> NDArray[np.complex128]:
     """The four sideways modes [Hz] of the scene's top at a height [m] and a spin [Hz]; complex where unstable."""
-    return stability.modes(axial_field(scene), symmetric(scene), height, spin_hz)
+    return stability.modes(axial_field(scene), top_of(scene), height, spin_hz)
 
 
 def stability_of(scene: Scene) -> Stability:
     """Windows, equilibria and modes of a scene's top, upright on the axis of its base (a lean of it is left out)."""
     if scene.gravity_m_s2 == 0:
         raise SceneError("gravity_m_s2 = 0: without weight there is nothing to float; a number above 0 is expected")
-    top, field = symmetric(scene), axial_field(scene)
+    top, field = top_of(scene), axial_field(scene)
     low, high = _range(scene)
     found = stability.windows(field, top, low, high)
     balance = stability.equilibria(field, top, low, high)
@@ -170,12 +174,12 @@ def _range(scene: Scene) -> tuple[float, float]:
     return top_face + _LOW * scene.base.inner_radius_m, top_face + _HIGH * scene.base.outer_radius_m
 
 
-def _lifts(window: stability.Window, top: stability.Symmetric, field: stability.AxialField) -> bool:
+def _lifts(window: stability.Window, top: stability.SymmetricTop, field: stability.AxialField) -> bool:
     return top.moment * float(field(np.array([(window.low + window.high) / 2]))[1, 0]) > 0
 
 
 def nearest_mass(
-    windows: tuple[stability.Window, ...], top: stability.Symmetric, field: stability.AxialField
+    windows: tuple[stability.Window, ...], top: stability.SymmetricTop, field: stability.AxialField
 ) -> float | None:
     """The mass [kg] nearest to the top's that floats; a thousandth inside of its window, whose edge holds nothing."""
     candidates = []

@@ -50,7 +50,11 @@ def at_the_crossing(
 ) -> Array:
     """The states at the limits, shape (n, 18), of tops that a step of these lengths [s] took there.
 
-    after: at the step's end; moved: (states, times [s]) → states, each in one step.  The integrator can go back.
+    Args:
+        after: at the step's end, shape (n, 18).
+        lengths: of the steps, shape (n,) [s].
+        escape: the limits, radius and height [m].
+        moved: (states, times [s]) → states, each in one step.  The integrator can go back.
     """
     before = moved(after, -lengths)
     height = crossed_height(after, escape)
@@ -60,7 +64,7 @@ def at_the_crossing(
         up, sideways = _margins(states, escape)
         margin = np.where(height, up, sideways)
         low, high = np.where(margin > 0, time, low), np.where(margin > 0, high, time)
-        newton = time + margin / (_signed(states, height))
+        newton = time + margin / (_margin_rates(states, height))
         better = np.where((newton > low) & (newton < high), newton, (low + high) / 2)
         if np.all(np.abs(better - time) <= 1e-15 * lengths):
             break
@@ -70,7 +74,7 @@ def at_the_crossing(
     return states
 
 
-def _signed(states: Array, height: NDArray[np.bool_]) -> Array:
+def _margin_rates(states: Array, height: NDArray[np.bool_]) -> Array:
     """How fast the margin shrinks [m/s]; 1e-300 where it does not, which sends Newton out of the bracket."""
     x, y, _ = states[:, R].T
     vx, vy, vz = states[:, V].T
@@ -95,7 +99,14 @@ def exit_speed(state: Array, name: str) -> float:
 def locate_escape(
     before: Array, length: float, moved: Callable[[Array, float], Array], escape: tuple[float, float]
 ) -> Event:
-    """The escape within a step of this length [s] from a state; moved: (state, time) → state."""
+    """The escape within a step from a state.
+
+    Args:
+        before: that state, shape (18,).
+        length: of the step [s].
+        moved: (state, time) → state.
+        escape: the limits, radius and height [m].
+    """
     after = moved(before, length)
     name = min(margins(after, escape), key=lambda key: margins(after, escape)[key])
     return locate_zero(name, before, length, moved, lambda state: margins(state, escape)[name])

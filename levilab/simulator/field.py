@@ -39,9 +39,16 @@ def field_of(
 ) -> Field:
     """The field of a ring magnet.
 
-    Radii and thickness [m]; strength: dipole density over the thickness [T m]; kind: "paraxial-2" … "paraxial-20",
-    the highest power of r in the potential, or "exact"; origin: height of the middle of the thickness [m].
-    Raises FieldError.
+    Args:
+        inner_radius: [m].
+        outer_radius: [m].
+        strength: dipole density over the thickness [T m].
+        kind: "paraxial-2" … "paraxial-20", the highest power of r in the potential, or "exact".
+        thickness: [m].
+        origin: height of the middle of the thickness [m].
+
+    Raises:
+        FieldError: there is no such ring, or no such kind.
     """
     _check(inner_radius, outer_radius, strength, thickness, origin)
     ring = (2 * math.pi * strength, inner_radius**2, outer_radius**2, origin)

@@ -69,7 +69,7 @@ def _value(text: str) -> Any:
     except ValueError as error:
         raise SceneError(f"{shown(text)!r}: {error}") from None
     try:
-        return float(text)  # .5 and 5. are numbers to everybody but TOML
+        return float(text)  # .5 and 5. are numbers, but not in TOML
     except ValueError:
         return text
 
@@ -109,7 +109,7 @@ def _step(table: Table, at: Any, way: list[str], given: str) -> str | int:
 
 
 def _unknown(table: Table, at: Table, way: list[str]) -> str:
-    """What to say about a key that nobody knows: what was meant, perhaps, and what there is."""
+    """What to say about an unknown key: what was meant, perhaps, and the keys that exist."""
     before = way[:-1]
     meant = _meant(table, at, way)
     asked = f"; did you mean {' or '.join(meant)}? Known" if meant else "; known"
@@ -118,7 +118,7 @@ def _unknown(table: Table, at: Table, way: list[str]) -> str:
 
 
 def _meant(table: Table, at: Table, way: list[str]) -> list[str]:
-    """What a key that nobody knows may stand for: the same name elsewhere, one of its meaning, one that is alike."""
+    """Suggestions for an unknown key: the same name in another table, a synonym, a similar spelling."""
     *before, part = way
     leaves = [(f"{name}.{key}", key) for name, inner in table.items() if isinstance(inner, dict) for key in inner]
     same = [path for path, key in leaves if key == part]

@@ -76,9 +76,16 @@ class Part(Settings):
 
 
 class Base(Part):
-    """The ring magnet.  strength_t_m: dipole density integrated over the thickness [T m].
+    """The ring magnet.
 
-    origin_m: height of the middle of its thickness; tilt: the base leans by tilt_rad towards tilt_azimuth_rad.
+    Attributes:
+        inner_radius_m, outer_radius_m: its radii.
+        strength_t_m: dipole density integrated over the thickness [T m].
+        field: how it is computed.
+        thickness_m: 0 for a thin ring.
+        origin_m: height of the middle of its thickness.
+        tilt_rad: by so much the base leans ...
+        tilt_azimuth_rad: ... in this direction.
     """
 
     inner_radius_m: Length = 0.030
@@ -92,10 +99,14 @@ class Base(Part):
 
 
 class Top(Part):
-    """The symmetric top.  moment_a_m2: signed along its axis, negative when it floats over the thesis's base.
+    """The symmetric top.
 
-    moment_tilt: transverse and axial part of the moment, as fractions of moment_a_m2.  magnet "disc": the moment
-    is spread evenly over a disc of magnet_radius_m and magnet_height_m.
+    Attributes:
+        mass_kg: of the whole.
+        inertia_transverse_kg_m2, inertia_axial_kg_m2: of the whole.
+        moment_a_m2: signed along its axis, negative when it floats over the thesis's base.
+        moment_tilt: transverse and axial part of the moment, as fractions of moment_a_m2.
+        magnet: "disc": the moment is spread evenly over a disc of magnet_radius_m and magnet_height_m.
     """
 
     mass_kg: Mass = 0.02526
@@ -114,9 +125,12 @@ class Top(Part):
 
 
 class Washers(Part):
-    """Washers that an O-ring holds.  inertia_kg_m2: the part of the axial inertia that is loose, 0 = none.
+    """Washers that an O-ring holds.
 
-    coupling_n_m_s: torque between washers and top per slip [N m s]; drag_share: part of the drag that they take.
+    Attributes:
+        inertia_kg_m2: the part of the axial inertia that is loose, 0 = none.
+        coupling_n_m_s: torque between washers and top per slip [N m s].
+        drag_share: part of the drag that they take.
     """
 
     inertia_kg_m2: NonNegativeFloat = 0.0
@@ -127,7 +141,8 @@ class Washers(Part):
 class Drag(Part):
     """Drag of the air on the spin, dω/dt = −C|ω|^(n−1) ω: n = 1 stokes, 2 newton, 3/2 disc; mixed: c1 and c2.
 
-    coefficient: where none is given, that of the thesis's spin-downs.
+    Attributes:
+        coefficient: where none is given, that of the thesis's spin-downs.
     """
 
     law: Law = "none"
@@ -174,8 +189,10 @@ class Start(Part):
     """How the motion begins: IC1 of the thesis.  place "equilibrium": at rest where the top floats.
 
     precession "thesis": φ̇ = ψ̇ = 2π spin_hz/(1 + cos tilt); "steady": the slow precession without nutation, or, below
-    about 21.7 Hz, where there is none, the rate nearest to one; "none": the axis starts at rest.  spin_hz: turns about
-    the axis per second, ω₃/2π.
+    about 21.7 Hz, where there is none, the rate nearest to one; "none": the axis starts at rest.
+
+    Attributes:
+        spin_hz: turns about the axis per second, ω₃/2π.
     """
 
     place: Literal["given", "equilibrium"] = "given"

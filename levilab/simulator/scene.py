@@ -1,7 +1,7 @@
 """A scene: what is simulated, from the magnets to the start, with the thesis's device as default.
 
 The frame is the base's: origin at its centre, z up its axis; a base that leans has a gravity that leans.
-A scene is a preset, a TOML file, or either of them with some keys changed; what does not go together is told
+A scene is a preset, a TOML file, or either of them with some keys changed; what does not go together raises SceneError
 with the key, its value and what is allowed.
 """
 

@@ -22,7 +22,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Scheme:
-    """drifts: a, shape (stages + 1,); kicks: b, shape (stages,); order: of the error of the whole motion."""
+    """The coefficients of a composition.
+
+    Attributes:
+        drifts: a, shape (stages + 1,).
+        kicks: b, shape (stages,).
+        order: of the error of the whole motion.
+    """
 
     name: str
     order: int

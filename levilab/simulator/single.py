@@ -29,17 +29,17 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: A chaotic motion has no step that is small enough: below this part of the longest step it is told instead.
-SMALLEST = 1 / 256
+#: A chaotic motion has no step that is small enough: below this part of the longest step the error is given instead.
+SMALLEST_STEP_SHARE = 1 / 256
 
 #: Shorter steps in succession that did not halve the error: once is chance in the estimates, twice is chaos.
-MOST_IN_VAIN = 2
+MAX_FAILED_REFINEMENTS = 2
 
 #: Thirty years [s].
 LONGEST_S = 1e9
 
 #: Steps between kinks from which on rounding their number up changes twice their length by little.
-ROOM = 16
+MIN_STEPS_FOR_DOUBLING = 16
 
 Watch = Mapping[str, Callable[[Trajectory], Array]]
 
@@ -78,13 +78,19 @@ def simulate(
 ) -> Trajectory:
     """Simulate a scene, with an error at the end within the tolerance.
 
-    duration [s], negative to go back in time; tolerance: wanted error of the place [m] and the axis [rad] at the
-    end; rate: samples per second (the last sample is the end), None for the start and the end alone; events:
-    functions of a Trajectory, shape (n,), whose zeros are located; scheme: a name of SCHEMES, chosen where none is
-    given; step: fixes the step [s] instead of choosing it; start: a state to start from instead of the scene's,
-    shape (18,), whose time is kept; progress: is told the share of the work that is done.
+    Args:
+        scene: what is simulated.
+        duration: [s], negative to go back in time.
+        tolerance: wanted error of the place [m] and the axis [rad] at the end.
+        rate: samples per second (the last sample is the end), None for the start and the end alone.
+        events: functions of a Trajectory, shape (n,), whose zeros are located.
+        scheme: a name of SCHEMES, chosen where none is given.
+        step: fixes the step instead of choosing it [s].
+        start: a state to start from instead of the scene's, shape (18,), whose time is kept.
+        progress: called with the share of the work that is done.
 
-    Raises SimulationError for numbers that make no sense, and where the motion leaves the numbers' range.
+    Raises:
+        SimulationError: a number makes no sense, or the motion leaves the numbers' range.
 
     >>> from levilab.simulator import preset, simulate
     >>> motion = simulate(preset("undriven"), 5, tolerance=1e-10)
@@ -144,7 +150,7 @@ def _to_tolerance(problem: Problem, wanted: _Wanted, tolerance: float, step: flo
             return run, accuracy
         if max(of_steps) <= tolerance / 2:  # the rest is the nodes', of a magnet that has come near the base
             return run, accuracy
-        if step or in_vain == MOST_IN_VAIN or h < longest * SMALLEST:
+        if step or in_vain == MAX_FAILED_REFINEMENTS or h < longest * SMALLEST_STEP_SHARE:
             return best
         h *= min(max(0.9 * (tolerance / worst) ** (1 / problem.scheme.order), 0.1), 0.7)
 
@@ -155,7 +161,7 @@ def _errors(problem: Problem, run: Run, step: float) -> tuple[Array, Array]:
     From the same motion with longer steps, and with fewer nodes in a magnet of finite size.
     """
     end = run.states[-1]
-    twice, four, length = _others(problem, end[TIME], step)
+    twice, four, length = _coarser_ends(problem, end[TIME], step)
     # rounding: a random walk of half a unit in the last place, twice for each stage
     floor = 2.2e-16 * math.sqrt(2 * run.steps * problem.scheme.stages)
     rounding = floor * np.array([np.linalg.norm(end[R]), 1.0])
@@ -189,7 +195,7 @@ def _crosses_kink(problem: Problem, run: Run, step: float) -> bool:
     return bool(np.any(comes_near_zero(spins_of(problem.scene, states))))
 
 
-def _others(problem: Problem, until: float, step: float) -> tuple[Array, Array, float]:
+def _coarser_ends(problem: Problem, until: float, step: float) -> tuple[Array, Array, float]:
     """The state at a time with steps twice and four times as long, to tell the error from, and the former length [s].
 
     Where there is no room for them, because a fall or the next kink of the drive comes first, with half the steps.
@@ -197,7 +203,7 @@ def _others(problem: Problem, until: float, step: float) -> tuple[Array, Array, 
     begin = float(problem.start[TIME])
     lasted = abs(until - begin)
     pieces = 1 + kinks(problem.scene.drive, min(begin, until), max(begin, until)).size
-    if lasted / pieces > ROOM * step:
+    if lasted / pieces > MIN_STEPS_FOR_DOUBLING * step:
         return _with_steps(problem, until, 2 * step), _with_steps(problem, until, 4 * step), 2 * step
     length = min(step, lasted) / 2
     half = _with_steps(problem, until, length)

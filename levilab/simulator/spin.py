@@ -28,7 +28,10 @@ Array = NDArray[np.float64]
 class SpinDecay:
     """One law of drag in closed form.
 
-    after: (ω₀, t, *constants) → ω;  elapsed: (ω₀, ω, *constants) → t;  turned: (ω₀, ω, *constants) → angle.
+    Attributes:
+        after: (ω₀, t, *constants) → ω.
+        elapsed: (ω₀, ω, *constants) → t.
+        turned: (ω₀, ω, *constants) → angle.
     """
 
     after: Callable[..., Array]

@@ -24,7 +24,12 @@ STEPS_BETWEEN_STOPS = 1000
 
 @dataclass(frozen=True)
 class Stops:
-    """times: shape (n + 1,) [s]; counts: steps to the next, shape (n,); levels, slopes: of the drive, shape (n,).
+    """When the integrator stops, and how far the drive is then.
+
+    Attributes:
+        times: shape (n + 1,) [s].
+        counts: steps to the next, shape (n,).
+        levels, slopes: of the drive, shape (n,).
 
     Within an interval the drive's field is (level + slope·t) × its carrier, which is smooth: no step crosses a kink,
     so the order of the integrator is kept.

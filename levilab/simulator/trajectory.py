@@ -30,10 +30,18 @@ class Event:
 class Accuracy:
     """How good the end of a trajectory is.
 
-    position [m], axis [rad]: estimated errors of the last state, made to bound the true ones; tolerance: what was
-    asked for; scheme, step [s], steps: how it was integrated; nodes: the larger of both errors as far as the nodes of
-    a magnet of finite size make it, which are enough where the top starts, and not at the base.  A chaotic motion has
-    errors as large as the motion itself whatever the step: then `reached` is False and the estimate says so.
+    A chaotic motion has errors as large as the motion itself whatever the step: then `reached` is False and the
+    estimate says so.
+
+    Attributes:
+        position: estimated error of the last state, made to bound the true one [m].
+        axis: likewise [rad].
+        tolerance: what was asked for.
+        scheme: by which it was integrated.
+        step: of the integrator [s].
+        steps: how many.
+        nodes: the larger of both errors as far as the nodes of a magnet of finite size make it, which are enough where
+            the top starts, and not at the base.
     """
 
     position: float
@@ -54,8 +62,12 @@ class Accuracy:
 class Trajectory:
     """The motion of one top, in the base's frame: origin at the base's centre, z up its axis.
 
-    scene: what was simulated; states: shape (n, 18), see `kernels.motion.State`; energies [J], shape (n,);
-    fell: the escape that ended it, None if it stayed to the end; events: found on the way, in their order.
+    Attributes:
+        scene: what was simulated.
+        states: shape (n, 18), see `kernels.motion.State`.
+        energies: shape (n,) [J].
+        fell: the escape that ended it, None if it stayed to the end.
+        events: found on the way, in their order.
     """
 
     scene: Scene

@@ -30,9 +30,12 @@ Span = tuple[float, float, int]
 
 @dataclass(frozen=True)
 class Map:
-    """survived: shape (masses, spins); slowest, fastest: the linear window [Hz] of each mass, NaN where none floats.
+    """Which tops survived.
 
-    floating: lightest and heaviest mass [kg] of each region in which the top can float.
+    Attributes:
+        survived: shape (masses, spins).
+        slowest, fastest: the linear window [Hz] of each mass, NaN where none floats.
+        floating: lightest and heaviest mass [kg] of each region in which the top can float.
     """
 
     scene: Scene
@@ -59,7 +62,14 @@ class Map:
 
 
 def span_of(name: str, text: str) -> Span:
-    """LOW:HIGH:STEP as the first, the last and how many; name: of the quantity.  Raises UsageError.
+    """LOW:HIGH:STEP as the first, the last and how many.
+
+    Args:
+        name: of the quantity.
+        text: what was given.
+
+    Raises:
+        UsageError: it is no range.
 
     >>> span_of("spins", "20:30:0.5")
     (20.0, 30.0, 21)

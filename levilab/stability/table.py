@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
 
-from levilab.files import CannotWrite, replace_atomically
+from levilab.files import CannotWrite, replace_atomically, writing
 from levilab.present.terminal import new_table, terminal
 from levilab.simulator.equilibrium import advice
 
@@ -174,17 +174,18 @@ def _finite(value: float) -> float | None:
 TABLE, PICTURE = "survival.csv", "survival.png"
 
 
+_ELSEWHERE = "give another folder with `out`"
+
+
 def place_for_map(folder: Path) -> None:
     """Make the folder, before anything is simulated; a map that is there stays.  Raises CannotWrite."""
     for path in (folder / TABLE, folder / PICTURE):
         if path.exists():
             raise CannotWrite(f"{path} is there already: give another folder with `out`, or move it away")
-    try:
+    with writing(f"{folder}: the map cannot be written", _ELSEWHERE):
         folder.mkdir(parents=True, exist_ok=True)
         (folder / TABLE).touch()
         (folder / TABLE).unlink()
-    except OSError as error:
-        raise _cannot(folder, error) from None
 
 
 def write_map(found: Map, folder: Path) -> list[Path]:
@@ -196,14 +197,8 @@ def write_map(found: Map, folder: Path) -> list[Path]:
     rows = ["mass_kg,spin_hz,survived"]
     for mass, alive in zip(found.masses, found.survived, strict=True):
         rows += [f"{mass:.8g},{spin:.6g},{one:d}" for spin, one in zip(found.spins, alive, strict=True)]
-    try:
+    with writing(f"{folder}: the map cannot be written", _ELSEWHERE):
         folder.mkdir(parents=True, exist_ok=True)
         replace_atomically(folder / TABLE, "\n".join(rows) + "\n")
         save_png(map_figure(found), folder / PICTURE)
-    except OSError as error:
-        raise _cannot(folder, error) from None
     return [folder / TABLE, folder / PICTURE]
-
-
-def _cannot(folder: Path, error: OSError) -> Exception:
-    return CannotWrite(f"{folder}: the map cannot be written: {error.strerror}; give another folder with `out`")

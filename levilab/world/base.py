@@ -15,8 +15,10 @@ _SHEETS = 16
 class Base:
     """A ring magnet.  Defaults: the thesis's sheet, in a room without a field of its own.
 
-    strength_t_m: ρ; origin_m: height of the middle of its thickness; background_t: a field along the axis that is the
-    same everywhere, such as the earth's.
+    Attributes:
+        strength_t_m: ρ.
+        origin_m: height of the middle of its thickness.
+        background_t: a field along the axis that is the same everywhere, such as the earth's.
     """
 
     strength_t_m: float = 1.40e-3
@@ -39,7 +41,9 @@ class Base:
 class Stand:
     """Where a probe is put on the base's axis.
 
-    height_m: None: in its zero-gauss chamber; scatter_m: by how much it misses a height that is asked for, 1σ.
+    Attributes:
+        height_m: None: in its zero-gauss chamber.
+        scatter_m: by how much it misses a height that is asked for, 1σ.
     """
 
     height_m: float | None = 0.072

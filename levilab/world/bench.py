@@ -95,7 +95,7 @@ _CONNECTED: dict[str, Callable[[Callable[..., VirtualInstrument]], Maker]] = {
     "magnetometer": in_the_field,
 }
 #: Kind → model → what makes it.
-MODELS: dict[str, dict[str, Maker]] = {
+VIRTUAL_MODELS: dict[str, dict[str, Maker]] = {
     kind: {model.name: _CONNECTED[kind](model.twin) for model in models} for kind, models in CATALOGUE.items()
 }
 
@@ -103,17 +103,26 @@ MODELS: dict[str, dict[str, Maker]] = {
 def virtual_bus(world: World | None = None, models: Mapping[str, str] | None = None) -> Bus:
     """A virtual bench.
 
-    world: by default a top of its own, on a virtual clock; models: kind → model, for those that are to be others than
-    in VIRTUAL.  Raises ConfigError for one that there is not.
+    Args:
+        world: by default a top of its own, on a virtual clock.
+        models: kind → model, for those that are to be others than in VIRTUAL.
+
+    Raises:
+        ConfigError: there is no such kind or model.
     """
-    world = world or own_world()
+    world = world or practice_world()
     chosen = {kind: settings.model for kind, settings in VIRTUAL.items()} | dict(models or {})
     instruments = {kind: _maker(kind, model)(world) for kind, model in chosen.items()}
     return Bus({VIRTUAL[kind].address: instrument for kind, instrument in instruments.items()})
 
 
 def virtual_wiring(world: World, limits: Limits | None = None) -> Wiring:
-    """The wiring of a virtual bench that measures this world.  limits: by default those of a bench file without any."""
+    """The wiring of a virtual bench.
+
+    Args:
+        world: that it measures.
+        limits: by default those of a bench file without any.
+    """
     return Wiring(VIRTUAL, limits or Limits(), library_for(virtual_bus(world)), world.clock, VirtualPerson(world))
 
 
@@ -121,7 +130,10 @@ def plug_in_serial(bus: Bus | None = None) -> Bus:
     """Let pyserial find a virtual bench; which one.
 
     From then on ``serial.serial_for_url("levilab://magnetometer")`` is its magnetometer, and for pyvisa-py
-    ``ASRLlevilab://magnetometer::INSTR``.  bus: by default a fresh bench with a top of its own.
+    ``ASRLlevilab://magnetometer::INSTR``.
+
+    Args:
+        bus: by default a fresh bench with a top of its own.
     """
     bus = bus or virtual_bus()
     plug_in(lambda: bus)
@@ -129,12 +141,16 @@ def plug_in_serial(bus: Bus | None = None) -> Bus:
 
 
 #: A top that falls on a bench to practise at is put back after so long [s].
-AGAIN_S = 15.0
+PUT_BACK_AFTER_S = 15.0
 
 
-def own_world(clock: Clock | None = None) -> World:
-    """A top to practise with, put back whenever it falls.  clock: by default one that jumps."""
-    return SpinWorld(SpinScene(again_s=AGAIN_S), clock or VirtualClock())
+def practice_world(clock: Clock | None = None) -> World:
+    """A top to practise with, put back whenever it falls.
+
+    Args:
+        clock: by default one that jumps.
+    """
+    return SpinWorld(SpinScene(put_back_after_s=PUT_BACK_AFTER_S), clock or VirtualClock())
 
 
 def scene_world(
@@ -142,27 +158,34 @@ def scene_world(
     clock: Callable[[], Clock],
     tell: Callable[[str], None],
     *,
-    again_s: float | None = None,
+    put_back_after_s: float | None = None,
     seed: int = 0,
 ) -> World:
     """The top of a scene in full motion.
 
-    clock: makes one, when all is ready; tell: is told when code must be compiled first; again_s: so long after a fall
-    the top is put back, None: it is not.  Raises SceneError for a scene without motion, SimulationError for one that
-    cannot be simulated.
+    Args:
+        scene: what is to move.
+        clock: makes one, when all is ready.
+        tell: called where code must be compiled first.
+        put_back_after_s: so long after a fall the top is put back [s]; None: it is not.
+        seed: of the light's noise, and of the place of the tape.
+
+    Raises:
+        SceneError: the scene has no motion.
+        SimulationError: it cannot be simulated.
     """
     from levilab.simulator.compilation import announce_compilation  # the compiler takes a moment to load
     from levilab.world.motion_world import MotionWorld, prepare
 
     with announce_compilation(tell):
         prepare(scene)
-    return MotionWorld(scene, clock(), again_s=again_s, seed=seed)
+    return MotionWorld(scene, clock(), put_back_after_s=put_back_after_s, seed=seed)
 
 
 def _maker(kind: str, model: str) -> Callable[[World], VirtualInstrument]:
-    if kind not in MODELS:
-        raise ConfigError(f"there is no virtual {kind!r}: known are {', '.join(MODELS)}")
-    models = {name.upper(): maker for name, maker in MODELS[kind].items()}
+    if kind not in VIRTUAL_MODELS:
+        raise ConfigError(f"there is no virtual {kind!r}: known are {', '.join(VIRTUAL_MODELS)}")
+    models = {name.upper(): maker for name, maker in VIRTUAL_MODELS[kind].items()}
     if model.upper() not in models:
-        raise ConfigError(f"there is no virtual {kind} {model!r}: known are {', '.join(MODELS[kind])}")
+        raise ConfigError(f"there is no virtual {kind} {model!r}: known are {', '.join(VIRTUAL_MODELS[kind])}")
     return models[model.upper()]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from instruments.virtual.generator.channel import Output
 from instruments.virtual.generator.voltage import voltage
-from levilab.world.timeline import History
+from levilab.world.timeline import Timeline
 
 if TYPE_CHECKING:
     from instruments.virtual.generator.channel import Burst
@@ -59,7 +59,7 @@ class Coil:
     """
 
     def __init__(self) -> None:
-        self.history = History(-math.inf, _Stretch(Output("DC", 0.0, 0.0, 0.0), 0.0, 0.0))
+        self.history = Timeline(-math.inf, _Stretch(Output("DC", 0.0, 0.0, 0.0), 0.0, 0.0))
 
     def change(self, time: float, output: Output) -> None:
         """From this time [s] on it is this, amplitude and offset in T; what was said of later times is gone."""

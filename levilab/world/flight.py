@@ -14,7 +14,7 @@ from levilab.simulator.kernels.motion import ARM, TIME, L, N, R, V
 from levilab.simulator.keys import SceneError
 from levilab.simulator.single import simulate
 from levilab.simulator.start import start_of
-from levilab.world.timeline import History
+from levilab.world.timeline import Timeline
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -33,11 +33,11 @@ _AT_ONCE = 1e-9
 
 #: A tape is seen at every turn, so the attitude is needed; an aligned moment has it with this transverse part, which is
 #: less than the rounding of the other.
-_HARDLY = 1e-17
+_NEGLIGIBLE_TILT = 1e-17
 
 
 @dataclass(frozen=True)
-class _Up:
+class _Flying:
     """A piece of a top's life.
 
     scene: with the drive; state: where it begins, shape (18,); step: of the integration [s]; times [s], turns of the
@@ -62,7 +62,7 @@ class _Up:
 
 
 @dataclass(frozen=True)
-class _Down:
+class _Absent:
     """No top is up from this time on [s]."""
 
     start: float
@@ -71,20 +71,24 @@ class _Down:
 class Flight:
     """A top from time 0 on; before, and after it has fallen, there is none.
 
-    scene: its drive is left out, `change` tells of drives; again_s: so long after a fall the top is put back to where
-    the scene starts, None: it is not [s]; stem_height_m: of the place on the stem that is looked at, above the centre
-    of mass [m].  Raises SceneError for a scene without motion.
+    Args:
+        scene: its drive is left out, `change` brings drives.
+        put_back_after_s: so long after a fall the top is put back to where the scene starts [s]; None: it is not.
+        stem_height_m: of the place on the stem that is looked at, above the centre of mass [m].
+
+    Raises:
+        SceneError: the scene has no motion.
     """
 
-    def __init__(self, scene: Scene, again_s: float | None = None, *, stem_height_m: float = 0.03) -> None:
+    def __init__(self, scene: Scene, put_back_after_s: float | None = None, *, stem_height_m: float = 0.03) -> None:
         if scene.observed != "motion":
             raise SceneError(f"observed = {scene.observed}: a scene for the bench is expected to have motion")
         transverse, axial = scene.top.moment_tilt
         self._scene = scene.changed(
-            {"drive.waveform": "off", "drive.off_s": None, "top.moment_tilt": [transverse or _HARDLY, axial]}
+            {"drive.waveform": "off", "drive.off_s": None, "top.moment_tilt": [transverse or _NEGLIGIBLE_TILT, axial]}
         )
-        self._again_s, self._stem_height = again_s, stem_height_m
-        self._pieces: History[_Up | _Down] = History(-math.inf, _Down(-math.inf))
+        self._put_back_after_s, self._stem_height = put_back_after_s, stem_height_m
+        self._pieces: Timeline[_Flying | _Absent] = Timeline(-math.inf, _Absent(-math.inf))
         self._step: float | None = None
         # what comes next: a top in this state, or none until a new one is put there; and when [s]
         self._state: Array | None = self._begin(0.0)
@@ -106,7 +110,7 @@ class Flight:
         self.look(time)
         self._step = None  # what another drive needs
         now = self._pieces.at(time)
-        if isinstance(now, _Up):
+        if isinstance(now, _Flying):
             self._pieces.cut(time)
             self._slip = float(np.interp(time, now.times, now.slips))
             self._state, self._known = _later(now, time), time
@@ -118,7 +122,7 @@ class Flight:
     def put_back(self, time: float) -> None:
         """At this time the top is put back to where the scene starts, if it is down."""
         self.look(time)
-        if isinstance(self._pieces.at(time), _Down):
+        if isinstance(self._pieces.at(time), _Absent):
             self._pieces.cut(math.nextafter(time, math.inf))
             self._state, self._step, self._known = self._begin(time), None, time
 
@@ -134,7 +138,7 @@ class Flight:
         self.look(float(times.max(initial=0.0)))
         turns, up = np.zeros_like(times), np.zeros(times.shape, dtype=np.bool_)
         for piece, part in self._pieces.pieces(times):
-            if isinstance(piece, _Up):
+            if isinstance(piece, _Flying):
                 turns[part], up[part] = np.interp(times[part], piece.times, piece.turns), True
         return turns, up
 
@@ -146,7 +150,7 @@ class Flight:
         self.look(float(times.max(initial=0.0)))
         turns, rate, lift = np.zeros_like(times), np.zeros_like(times), np.zeros_like(times)
         for piece, part in self._pieces.pieces(times):
-            if isinstance(piece, _Up):
+            if isinstance(piece, _Flying):
                 turns[part], rate[part] = np.interp(times[part], piece.times, piece.turns), _rate(piece)
                 lift[part] = np.interp(times[part], piece.times, piece.lift)
         return turns, rate, lift
@@ -155,17 +159,20 @@ class Flight:
         """The mean of this height over the first second without a drive, in which a top bobs once or more [m]."""
         self.look(0.0)
         piece = self._pieces.at(0.0)
-        return float(piece.lift.mean()) if isinstance(piece, _Up) else self._scene.start.position_m[2]
+        return float(piece.lift.mean()) if isinstance(piece, _Flying) else self._scene.start.position_m[2]
 
     def passages(self, place: Callable[[float], float], start: float, stop: float) -> Array:
         """When the tape's turn has a place in [0, 1) between two times [s], increasing, shape (n,) [s].
 
-        place: given the rate of turns [Hz].
+        Args:
+            place: given the rate of turns [Hz].
+            start: the first time [s].
+            stop: the second one [s].
         """
         self.look(stop)
         found = [np.empty(0)]
         for piece, end in self._pieces.between(start, stop):
-            if isinstance(piece, _Up) and piece.times.size > 1:
+            if isinstance(piece, _Flying) and piece.times.size > 1:
                 turns, at = piece.turns, place(_rate(piece))
                 whole = np.arange(math.floor(turns[0]) - 1, math.ceil(turns[-1]) + 1) + at
                 whole = whole[(whole >= turns[0]) & (whole < turns[-1])]
@@ -182,7 +189,7 @@ class Flight:
         self.look(float(times.max(initial=0.0)))
         place, up = np.zeros_like(times), np.zeros(times.shape, dtype=np.bool_)
         for piece, part in self._pieces.pieces(times):
-            if isinstance(piece, _Up):
+            if isinstance(piece, _Flying):
                 place[part], up[part] = _cubic(times[part], piece.times, *piece.stem), True
         return place, up
 
@@ -193,7 +200,7 @@ class Flight:
         while self._known <= until:
             if self._state is None:
                 self._state, self._step = self._begin(self._known), None
-            self._live(self._state)
+            self._advance(self._state)
 
     def _begin(self, time: float) -> Array:
         """The state of a top that is put there at this time, shape (18,)."""
@@ -202,7 +209,7 @@ class Flight:
         self._slip = 0.0
         return state
 
-    def _live(self, state: Array) -> None:
+    def _advance(self, state: Array) -> None:
         """The next piece of the life of a top in this state."""
         begin = float(state[TIME])
         try:
@@ -214,7 +221,7 @@ class Flight:
         slips = self._slip + _slips(motion)
         self._slip = float(slips[-1])
         seen = (motion.time.copy(), _turns(motion) + slips, slips, _stem(motion, self._stem_height), _lift(motion))
-        self._pieces.append(begin, _Up(self._scene, state, motion.accuracy.step, *seen))
+        self._pieces.append(begin, _Flying(self._scene, state, motion.accuracy.step, *seen))
         if motion.fell is not None:
             self._fall(motion.fell.time)
         else:
@@ -232,15 +239,15 @@ class Flight:
         return motion
 
     def _fall(self, time: float) -> None:
-        self._pieces.append(time, _Down(time))
+        self._pieces.append(time, _Absent(time))
         self._wait(time)
 
     def _wait(self, fallen: float) -> None:
         """Nothing happens until the top is put back."""
-        self._state, self._known = None, math.inf if self._again_s is None else fallen + self._again_s
+        self._state, self._known = None, math.inf if self._put_back_after_s is None else fallen + self._put_back_after_s
 
 
-def _later(piece: _Up, time: float) -> Array:
+def _later(piece: _Flying, time: float) -> Array:
     """The state within a piece at this time, shape (18,)."""
     state = piece.state.copy()
     if time - piece.start > _AT_ONCE:
@@ -269,7 +276,7 @@ def _turns(motion: Trajectory) -> Array:
     return np.asarray(np.unwrap(np.arctan2(arm[:, 1], arm[:, 0]) - spot) / (2 * np.pi))
 
 
-def _rate(piece: _Up) -> float:
+def _rate(piece: _Flying) -> float:
     """The mean rate of turns in a piece [Hz], which wobble and drag change by some per cent of it."""
     if piece.times.size < 2:
         return 1.0

@@ -42,10 +42,15 @@ _ERFC = (
 class Tape:
     """A strip of white tape on the rim, a lamp beside it, a lens, and a phototransistor on which the lens shows it.
 
-    width: of its light pulse, FWHM in turns; dark, bright: voltage without the tape, and at a tape in the middle of
-    what the lens shows [V], which differ by the gain; saturation: greatest voltage [V]; bandwidth_hz: of the
-    phototransistor, one pole; view_m: how far above or below the middle the tape has 1/e² of its light; ripple: of the
-    lamp's light at twice the frequency of the mains, in parts of it; noise: of the voltage, 1σ [V].
+    Attributes:
+        width: of its light pulse, FWHM in turns.
+        dark, bright: voltage without the tape, and at a tape in the middle of what the lens shows [V], which differ by
+            the gain.
+        saturation: greatest voltage [V].
+        bandwidth_hz: of the phototransistor, one pole.
+        view_m: how far above or below the middle the tape has 1/e² of its light.
+        ripple: of the lamp's light at twice the frequency of the mains, in parts of it.
+        noise: of the voltage, 1σ [V].
     """
 
     width: float = 0.03
@@ -75,8 +80,12 @@ class Tape:
     def pulse(self, turns: Array, rate: Array) -> Array:
         """The pulses behind the phototransistor's pole, shape (n,): a Gaussian of height 1 in the middle of every turn.
 
-        turns: since the tape was opposite to the lamp; rate: of turns [Hz], 0: there is no top.  A Gaussian behind a
-        pole is an exponentially modified one, √(π/2) q exp(−u²/2) erfcx((q − u)/√2) at u σ behind its middle, q = σ/τ.
+        Args:
+            turns: since the tape was opposite to the lamp.
+            rate: of turns [Hz], 0: there is no top.
+
+        A Gaussian behind a pole is an exponentially modified one, √(π/2) q exp(−u²/2) erfcx((q − u)/√2) at u σ behind
+        its middle, q = σ/τ.
         """
         late = self.delay * np.maximum(rate, 0.0)
         place = turns - np.floor(turns) - 0.5
@@ -89,7 +98,14 @@ class Tape:
         return answer
 
     def clean(self, turns: Array, rate: Array, times: Array, height: Array | float = 1.0) -> Array:
-        """The voltage without its noise at these times [s], shape (n,) [V]; height: see above."""
+        """The voltage without its noise, shape (n,) [V].
+
+        Args:
+            turns: since the tape was opposite to the lamp, shape (n,).
+            rate: of turns [Hz], 0: there is no top.
+            times: shape (n,) [s].
+            height: of the pulses, 1 in the middle of what the lens shows.
+        """
         light = self.dark + (self.bright - self.dark) * height * self.pulse(turns, rate)
         if self.ripple:
             light = light * (1 + self.ripple * np.sin(4 * math.pi * self.mains_hz * times))
@@ -104,9 +120,15 @@ class Tape:
     def offset(self, triggers: Thresholds, rate: float, least: float = 1.0) -> float | None:
         """Where a trigger fires about the middle of a turn [turns], to 1e-3 of a turn.
 
-        rate: of turns [Hz]; least: height of the lowest pulse.  None where it does not fire once a turn for certain, or
-        only a trace can say where: a level in the noise, near the top of a pulse or above saturation, a
-        hysteresis smaller than the noise, ripple, a phototransistor slower than the pulse.
+        Args:
+            triggers: where the trigger fires, and where it arms again.
+            rate: of turns [Hz].
+            least: height of the lowest pulse.
+
+        Returns:
+            None where it does not fire once a turn for certain, or only a trace can say where: a level in the noise,
+            near the top of a pulse or above saturation, a hysteresis smaller than the noise, ripple, a phototransistor
+            slower than the pulse.
         """
         margin, share = 5 * self.noise, (triggers.fire - self.dark) / (self.bright - self.dark)
         low, high = min(triggers.fire, triggers.arm), max(triggers.fire, triggers.arm)
@@ -118,7 +140,13 @@ class Tape:
         return behind - triggers.sign * self.sigma * math.sqrt(-2 * math.log(share))
 
     def crossing(self, near: Array, clean: Callable[[Array], Array], level: float, seed: int) -> Array:
-        """When the voltage crosses a level [V], from times near that [s]; clean: the voltage then.
+        """When the voltage crosses a level, shape (n,) [s].
+
+        Args:
+            near: times near that, shape (n,) [s].
+            clean: the voltage without its noise at times [V].
+            level: [V].
+            seed: of the noise.
 
         Where the voltage does not change there is no crossing, so there may be fewer than times.
         One step of Newton's method on the clean voltage, which the offset has brought within some µs of it; noise then
@@ -152,11 +180,16 @@ class Laser:
     amplified until it saturates.  So a top that is driven gives one pulse down a turn.  A narrow beam without the
     capacitor (coupling_hz None) has to stand where the stem's circle cuts it; else pulses are missed or doubled.
 
-    height_m: of the beam above the top's centre of mass; offset_m: of its middle from the base's axis, along x;
-    waist_m: its radius at the stem, where the light is down to 1/e²; stem_radius_m: of the stem; dark, bright: the
-    amplifier's least and greatest voltage [V]; gain: voltage of the whole beam, before it saturates [V]; coupling_hz:
-    corner of the capacitor, None: there is none, and the voltage is dark + gain·light; bandwidth_hz: of the
-    phototransistor; noise: of the voltage, 1σ [V].
+    Attributes:
+        height_m: of the beam above the top's centre of mass.
+        offset_m: of its middle from the base's axis, along x.
+        waist_m: its radius at the stem, where the light is down to 1/e².
+        stem_radius_m: of the stem.
+        dark, bright: the amplifier's least and greatest voltage [V].
+        gain: voltage of the whole beam, before it saturates [V].
+        coupling_hz: corner of the capacitor, None: there is none, and the voltage is dark + gain·light.
+        bandwidth_hz: of the phototransistor.
+        noise: of the voltage, 1σ [V].
     """
 
     height_m: float = 0.03
@@ -185,7 +218,10 @@ class Laser:
     def voltage(self, times: Array, stem: Callable[[Array], tuple[Array, NDArray[np.bool_]]], seed: int) -> Array:
         """The amplifier's voltage at evenly spaced times [s], shape (n,) [V].
 
-        stem: its displacement along x [m] at times [s], and whether it is there at all.
+        Args:
+            times: shape (n,) [s].
+            stem: its displacement along x [m] at times [s], and whether it is there at all.
+            seed: of the noise.
 
         The light is known every GRID_S from absolute zero on and taken as straight between; both filters are exact for
         that.  They begin so long before that what they were before is 2e-9 of it.

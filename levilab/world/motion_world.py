@@ -51,9 +51,18 @@ class MotionWorld:
     """The top of a scene, and what instruments see of it; see :class:`levilab.world.spin_world.World`.
 
     The generator takes the place of the scene's drive, whose direction is the coil's; its offset moves nothing.
-    again_s: see Flight; seed: of the light's noise, and of the place of the tape on the rim (0: where the transverse
-    part of the moment points): who switches a drive on after a pulse meets the moment there; tape, laser: how the lamp
-    and the beam are set up.  Raises SceneError for a scene without motion.
+
+    Args:
+        scene: what is to move.
+        clock: of the bench.
+        tape: how the lamp is set up.
+        laser: how the beam is set up.
+        put_back_after_s: see Flight.
+        seed: of the light's noise, and of the place of the tape on the rim (0: where the transverse part of the moment
+            points); a drive that is switched on after a pulse meets the moment there.
+
+    Raises:
+        SceneError: the scene has no motion.
 
     >>> from instruments.clock import VirtualClock
     >>> from levilab.simulator import preset
@@ -70,12 +79,12 @@ class MotionWorld:
         *,
         tape: Tape | None = None,
         laser: Laser | None = None,
-        again_s: float | None = None,
+        put_back_after_s: float | None = None,
         seed: int = 0,
     ) -> None:
         self.clock = clock
         self._tape, self._laser, self._seed = tape or Tape(), laser or Laser(), seed
-        self._coil, self._flight = Coil(), Flight(scene, again_s, stem_height_m=self._laser.height_m)
+        self._coil, self._flight = Coil(), Flight(scene, put_back_after_s, stem_height_m=self._laser.height_m)
         self._tape_at = float(np.random.default_rng(seed).uniform()) if seed else 0.0
         self._told = 0.0  # the last time that a change was told for [s]
         self._aim_m = self._flight.first_lift()  # where the lens looks
@@ -96,7 +105,7 @@ class MotionWorld:
         """Put the top back to where the scene starts; see World."""
         self._flight.put_back(self.clock.now())
 
-    def keep_up(self) -> None:
+    def catch_up(self) -> None:
         """Simulate up to the present time, so that no question has to wait for hours of it."""
         self._forget()
         self._flight.look(self.clock.now())

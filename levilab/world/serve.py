@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import signal
+import errno
+import sys
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -12,19 +13,17 @@ from instruments.clock import WallClock
 from instruments.virtual.servers.server import LOOPBACK, PORTS_PER_INSTRUMENT, Place, offered
 from instruments.virtual.servers.station import first_of
 from levilab.errors import LevilabError, UsageError
-from levilab.world.bench import AGAIN_S, MODELS, VIRTUAL, own_world, scene_world, virtual_bus
+from levilab.interruption import watching_for_end
+from levilab.world.bench import PUT_BACK_AFTER_S, VIRTUAL, VIRTUAL_MODELS, practice_world, scene_world, virtual_bus
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from types import FrameType
+    from collections.abc import Callable
 
     from instruments.virtual.bench.bus import Bus
     from instruments.virtual.servers.server import Offer
+    from levilab.interruption import End
     from levilab.simulator.scene import Scene
     from levilab.world.spin_world import World
-
-#: What asks a server to end: Ctrl-C, kill, a closed terminal, and on Windows Ctrl-Break.
-_SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
 
 #: A top in full motion is simulated some 700 times faster than it moves; half of the time and more is for the clients.
 FASTEST_MOTION = 200.0
@@ -34,6 +33,19 @@ _KEEP_UP_S = 0.2
 
 #: The greatest port there is.
 _LAST_PORT = 0xFFFF
+
+
+#: How a program that is not privileged may listen at any port, by the system.
+_PORTS_FOR_ALL = {
+    "linux": (
+        "`sudo sysctl net.ipv4.ip_unprivileged_port_start={port}` lets all use it until the next start, "
+        "`sudo setcap cap_net_bind_service=+ep PYTHON` this Python"
+    ),
+    "darwin": "start it with sudo",
+}
+
+#: How a loopback address is added where there is one alone.
+_ADD_ADDRESS = "`sudo ifconfig lo0 alias 127.0.0.2 up`, and so on for 127.0.0.3 and 127.0.0.4"
 
 
 class CannotServe(LevilabError):
@@ -46,7 +58,7 @@ class Service:
 
     host: an address of this machine; port_base: the first port, None: free ones; speed: seconds of the bench per
     second; models: by kind of instrument, where it is not the first one; scene: of the top's full motion, None: it
-    only spins.
+    only spins; port_mapper: the port of each instrument's port mapper, None: there is none.
     """
 
     host: str = LOOPBACK
@@ -54,6 +66,7 @@ class Service:
     speed: float = 1.0
     models: dict[str, str] = field(default_factory=dict)
     scene: Scene | None = None
+    port_mapper: int | None = None
 
 
 @dataclass(frozen=True)
@@ -70,9 +83,11 @@ def chosen_models(words: list[str]) -> dict[str, str]:
     chosen = {}
     for word in words:
         kind, _, model = word.partition("=")
-        if kind not in MODELS:
-            raise UsageError("models", f"{kind!r} is no kind of instrument, known are {', '.join(MODELS)}", value=word)
-        known = {name.upper(): name for name in MODELS[kind]}
+        if kind not in VIRTUAL_MODELS:
+            raise UsageError(
+                "models", f"{kind!r} is no kind of instrument, known are {', '.join(VIRTUAL_MODELS)}", value=word
+            )
+        known = {name.upper(): name for name in VIRTUAL_MODELS[kind]}
         if model.upper() not in known:
             raise UsageError("models", f"no such {kind}, known are {', '.join(known.values())}", value=word)
         chosen[kind] = known[model.upper()]
@@ -87,7 +102,7 @@ def serve(
     ready: called once, when all can be reached; tell: is told what takes long before.  Raises CannotServe,
     UsageError, SceneError.
     """
-    with _asked_to_end() as end:
+    with watching_for_end() as end:
         world = _world(service, tell)
         if not end.by:
             asyncio.run(_serve(service, world, ready, end))
@@ -95,7 +110,7 @@ def serve(
     return end.by
 
 
-async def _serve(service: Service, world: World, ready: Callable[[tuple[Served, ...]], None], end: _End) -> None:
+async def _serve(service: Service, world: World, ready: Callable[[tuple[Served, ...]], None], end: End) -> None:
     bus = virtual_bus(world, service.models)
     # the top spins down from the first message on, not while no program is there
     assert isinstance(world.clock, WallClock)
@@ -105,10 +120,27 @@ async def _serve(service: Service, world: World, ready: Callable[[tuple[Served, 
         try:
             offers = await opened.enter_async_context(offered(bus, place))
         except OSError as error:
-            why = f"the bench cannot be offered at {service.host} ({error})"
-            raise CannotServe(f"{why}: try another `host` or `port_base`") from error
+            raise _not_served(service, error) from error
         ready(tuple(_served(service, offer) for offer in offers))
-        await first_of(end.comes(), _kept_up(bus, world))
+        await first_of(_comes(end), _kept_up(bus, world))
+
+
+def _not_served(service: Service, error: OSError) -> CannotServe:
+    """What to do where an address or a port cannot be had."""
+    if service.port_mapper is None:
+        why = f"the bench cannot be offered at {service.host} ({error})"
+        return CannotServe(f"{why}: try another `host` or `port_base`")
+    port = service.port_mapper
+    if isinstance(error, PermissionError):
+        system = _PORTS_FOR_ALL.get(sys.platform, "run it with the rights of the system's administrator")
+        what = f"this system gives port {port} to privileged programs alone: {system.format(port=port)}"
+    elif error.errno == errno.EADDRINUSE:
+        what = "another port mapper (rpcbind) is there, or another program has `port_base`: end it, or change that"
+    elif error.errno == errno.EADDRNOTAVAIL:
+        what = "each instrument needs a loopback address of its own: add them, on macOS with " + _ADD_ADDRESS
+    else:
+        what = "try without `portmapper`"
+    return CannotServe(f"the port mapper cannot be offered ({error}): {what}")
 
 
 async def _kept_up(bus: Bus, world: World) -> None:
@@ -116,16 +148,16 @@ async def _kept_up(bus: Bus, world: World) -> None:
     while True:
         await asyncio.sleep(_KEEP_UP_S)
         with bus.lock:
-            world.keep_up()
+            world.catch_up()
 
 
 def _world(service: Service, tell: Callable[[str], None]) -> World:
     clock = _clock(service)
     if service.scene is None:
-        return own_world(clock)
+        return practice_world(clock)
     if service.speed > FASTEST_MOTION:
         raise UsageError("speed", f"with `scene` up to {FASTEST_MOTION:g} is possible", value=service.speed)
-    return scene_world(service.scene, lambda: _clock(service), tell, again_s=AGAIN_S)
+    return scene_world(service.scene, lambda: _clock(service), tell, put_back_after_s=PUT_BACK_AFTER_S)
 
 
 def _clock(service: Service) -> WallClock:
@@ -138,10 +170,17 @@ def _clock(service: Service) -> WallClock:
 def _place(service: Service, instruments: int) -> Place:
     if ":" in service.host:  # a resource name is cut at its colons
         raise UsageError("host", "IPv6 has no place in VISA resource names, give an IPv4 address", value=service.host)
+    if service.port_mapper is not None and service.host != LOOPBACK:
+        why = "does not go with `portmapper`, which gives each instrument a loopback address of its own"
+        raise UsageError("host", why, value=service.host)
+    try:
+        service.host.encode("idna")
+    except UnicodeError:
+        raise UsageError("host", "no host can have this name", value=service.host) from None
     last = (service.port_base or 0) + PORTS_PER_INSTRUMENT * instruments - 1
     if last > _LAST_PORT:
         raise UsageError("port_base", f"the ports end at {_LAST_PORT}, {last} would be needed", value=service.port_base)
-    return Place(service.host, service.port_base)
+    return Place(service.host, service.port_base, service.port_mapper)
 
 
 def _served(service: Service, offer: Offer) -> Served:
@@ -149,35 +188,10 @@ def _served(service: Service, offer: Offer) -> Served:
     return Served(kind, service.models.get(kind, VIRTUAL[kind].model), offer.resources)
 
 
-class _End:
-    """Whether a signal asked for the end, and which; a signal handler that wakes an event loop."""
-
-    def __init__(self) -> None:
-        self.by: str | None = None
-        self._woken: tuple[asyncio.AbstractEventLoop, asyncio.Event] | None = None
-
-    def __call__(self, number: int, frame: FrameType | None) -> None:
-        self.by = self.by or signal.Signals(number).name
-        if self._woken:
-            loop, event = self._woken
-            loop.call_soon_threadsafe(event.set)
-
-    async def comes(self) -> None:
-        """Wait for a signal."""
-        event = asyncio.Event()
-        self._woken = asyncio.get_running_loop(), event
-        if self.by is None:
-            await event.wait()
-        self._woken = None
-
-
-@contextlib.contextmanager
-def _asked_to_end() -> Iterator[_End]:
-    """Signals go to the one given here (main thread only); one that was ignored from the start still is."""
-    end = _End()
-    before = {number: signal.signal(number, end) for number in _SIGNALS if signal.getsignal(number) != signal.SIG_IGN}
-    try:
-        yield end
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+async def _comes(end: End) -> None:
+    """Wait for a signal."""
+    event, loop = asyncio.Event(), asyncio.get_running_loop()
+    end.wake = lambda: loop.call_soon_threadsafe(event.set)
+    if end.by is None:
+        await event.wait()
+    end.wake = None

@@ -6,6 +6,7 @@ What the instruments need of a world is the little protocol `World`; `motion_wor
 
 from __future__ import annotations
 
+import enum
 import math
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Protocol
@@ -18,7 +19,7 @@ from levilab.simulator.spin import DECAYS
 from levilab.world.base import Base, Stand, drawn_base
 from levilab.world.coil import Coil
 from levilab.world.light import Laser, Tape
-from levilab.world.timeline import History
+from levilab.world.timeline import Timeline
 
 if TYPE_CHECKING:
     from instruments.clock import Clock
@@ -37,11 +38,15 @@ _LOOK_S, _AROUND_S = 0.01, 0.02
 
 
 class World(Protocol):
-    """What the virtual instruments see and do.  clock: the bench's."""
+    """What the virtual instruments see and do.
+
+    Attributes:
+        clock: the bench's.
+    """
 
     clock: Clock
 
-    def keep_up(self) -> None:
+    def catch_up(self) -> None:
         """Simulate up to the present time, and drop history older than KEPT_S."""
 
     def light(self, start: float, step: float, n: int) -> Array:
@@ -57,7 +62,11 @@ class World(Protocol):
         """From this time on the coil's field is this: a generator's output, amplitude and offset in T."""
 
     def float_top(self, number: int) -> None:
-        """Spin the top by hand and let it float, if it is down.  number: how many tops came before."""
+        """Spin the top by hand and let it float, if it is down.
+
+        Args:
+            number: how many tops came before.
+        """
 
     def coil_field(self, start: float, step: float, n: int) -> Array:
         """The coil's field at start + step·k, shape (n,) [T]."""
@@ -73,14 +82,22 @@ class World(Protocol):
 class SpinScene:
     """A top that only spins.  Defaults: the thesis's device and what its spin-downs showed.
 
-    start_hz: the spin at time 0, given by hand; drag: a name in DECAYS, with its constants;
-    fall_hz: spin at which the top falls; later_falls_hz: the same of tops that are floated later, by their number from
-    1 on, and again from the first of them; none: as the first top; lock_torque: the greatest angular acceleration per
-    tesla of drive [rad s⁻² T⁻¹], the dipole's transverse part over I₃, half of it because half of a field along one
-    line turns with the top; tape: what the phototransistor sees; laser: the beam beside the stem; jitter: scatter of a
-    pulse's place, in turns, 1σ (0.0212 makes 0.03 Hz of a reading over 1 s); base: the magnet below it; stand:
-    where the probe is at first, about where a top floats; again_s: so long after a fall the top is put back, None: it
-    is not [s].
+    Attributes:
+        start_hz: the spin at time 0, given by hand.
+        drag: a name in DECAYS.
+        constants: of the drag (SI).
+        fall_hz: spin at which the top falls.
+        later_falls_hz: the same of tops that are floated later, by their number from 1 on, and again from the first of
+            them; none: as the first top.
+        lock_torque: the greatest angular acceleration per tesla of drive [rad s⁻² T⁻¹], the dipole's transverse part
+            over I₃, half of it because half of a field along one line turns with the top.
+        tape: what the phototransistor sees.
+        laser: the beam beside the stem.
+        jitter: scatter of a pulse's place, in turns, 1σ (0.0212 makes 0.03 Hz of a reading over 1 s).
+        base: the magnet below it.
+        stand: where the probe is at first, about where a top floats.
+        put_back_after_s: so long after a fall the top is put back [s]; None: it is not.
+        seed: of noise and jitter.
     """
 
     start_hz: float = 30.0
@@ -94,11 +111,15 @@ class SpinScene:
     jitter: float = 0.03 / math.sqrt(2)
     base: Base = field(default_factory=Base)
     stand: Stand = field(default_factory=Stand)
-    again_s: float | None = None
+    put_back_after_s: float | None = None
     seed: int = 0
 
     def fall_of(self, number: int) -> float:
-        """The spin at which a top falls [Hz].  number: how many tops came before."""
+        """The spin at which a top falls [Hz].
+
+        Args:
+            number: how many tops came before.
+        """
         later = self.later_falls_hz
         return later[(number - 1) % len(later)] if number and later else self.fall_hz
 
@@ -126,18 +147,27 @@ def drawn(seed: int, scene: SpinScene | None = None) -> SpinScene:
     )
 
 
+class Phase(enum.Enum):
+    """What a top does: it coasts by the law of drag, is pulled to the drive's frequency, is locked to it, or fell."""
+
+    COASTING = enum.auto()
+    PULLED = enum.auto()
+    LOCKED = enum.auto()
+    FALLEN = enum.auto()
+
+
 @dataclass(frozen=True)
 class _Stretch:
-    """A piece of the top's life under one rule.
+    """A piece of the top's life in one phase.
 
-    start [s]; spin [rad/s] and angle [rad] at its start; rule: "coasts" by the law of drag, "pulled" with
-    the constant acceleration [rad/s²] to the drive's frequency, "locked" to it, or "fallen"; number: of the top.
+    start [s]; spin [rad/s] and angle [rad] at its start; acceleration: constant, of a top that is pulled [rad/s²];
+    number: of the top.
     """
 
     start: float
     spin: float
     angle: float
-    rule: str
+    phase: Phase
     acceleration: float = 0.0
     number: int = 0
 
@@ -157,10 +187,10 @@ class SpinWorld:
         self._coil, self._stand, self._probe_t = Coil(), scene.stand, scene.stand.sees(scene.base)
         self._drive_spin, self._hold = 0.0, 0.0  # [rad/s], [rad/s²]
         self._told = 0.0  # the last time that a change was told for [s]
-        first = _Stretch(0.0, 2 * math.pi * scene.start_hz, 0.0, "coasts")
-        self._stretches = History(0.0, first)
+        first = _Stretch(0.0, 2 * math.pi * scene.start_hz, 0.0, Phase.COASTING)
+        self._stretches = Timeline(0.0, first)
         self._stretches.cut(0.0)
-        self._go_on(first)
+        self._plan_future(first)
 
     # --- the drive ---
 
@@ -176,24 +206,24 @@ class SpinWorld:
             return  # nothing that the top could feel
         self._put_back_until(time)
         now = self._state(time)
-        fallen = now.rule == "fallen"
+        fallen = now.phase is Phase.FALLEN
         # what would have come without this change; a fall at this moment stays
         self._stretches.cut(math.nextafter(time, math.inf) if fallen else time)
         self._told, self._drive_spin, self._hold = time, 2 * math.pi * output.frequency, hold
         if not fallen:
-            self._go_on(now)
+            self._plan_future(now)
 
     def float_top(self, number: int) -> None:
         """Spin the top by hand; see :class:`World`."""
         time = self.clock.now()
         self._put_back_until(time)
         now = self._stretches.at(time)
-        if now.rule == "fallen":
+        if now.phase is Phase.FALLEN:
             self._stretches.cut(math.nextafter(time, math.inf))
             spin = 2 * math.pi * self.scene.start_hz
-            self._go_on(_Stretch(time, spin, now.angle, "coasts", number=number))
+            self._plan_future(_Stretch(time, spin, now.angle, Phase.COASTING, number=number))
 
-    def keep_up(self) -> None:
+    def catch_up(self) -> None:
         """Nothing takes long here; see :class:`World`."""
         self._forget()
 
@@ -204,26 +234,26 @@ class SpinWorld:
 
     def _put_back_until(self, time: float) -> None:
         """Lay down the life of every top that follows on one that falls."""
-        while self.scene.again_s is not None and self._stretches.last.rule == "fallen":
+        while self.scene.put_back_after_s is not None and self._stretches.last.phase is Phase.FALLEN:
             fallen = self._stretches.last
-            begin = fallen.start + self.scene.again_s
+            begin = fallen.start + self.scene.put_back_after_s
             if begin > time:
                 return
             self._forget()
             spin = 2 * math.pi * self.scene.start_hz
-            self._go_on(_Stretch(begin, spin, fallen.angle, "coasts", number=fallen.number + 1))
+            self._plan_future(_Stretch(begin, spin, fallen.angle, Phase.COASTING, number=fallen.number + 1))
 
     def _state(self, time: float) -> _Stretch:
-        """The stretch that would begin now, before a rule is chosen for it."""
+        """The stretch that would begin now, before a phase is chosen for it."""
         here = self._stretches.at(time)
         spin, angle = self._motion(here, np.array([time]))
         return replace(here, start=time, spin=float(spin[0]), angle=float(angle[0]), acceleration=0.0)
 
-    def _go_on(self, now: _Stretch) -> None:
+    def _plan_future(self, now: _Stretch) -> None:
         """Lay down the future from this state on, as it is without a further change."""
         fall, hold, drive_spin = 2 * math.pi * self.scene.fall_of(now.number), self._hold, self._drive_spin
         if now.spin <= fall:
-            self._lay(replace(now, rule="fallen", spin=0.0))
+            self._append(replace(now, phase=Phase.FALLEN, spin=0.0))
             return
         # deceleration by drag at this spin: its change over a time that is short against 1/C ~ 300 s
         drag = (now.spin - float(self._decay.after(now.spin, 1e-3, *self.scene.constants))) / 1e-3
@@ -231,10 +261,10 @@ class SpinWorld:
         if captured:
             self._lock(now, drive_spin, hold, drag)
         else:
-            self._lay(replace(now, rule="coasts"))
+            self._append(replace(now, phase=Phase.COASTING))
             lasts = float(self._decay.elapsed(now.spin, fall, *self.scene.constants))
             angle = now.angle + float(self._decay.turned(now.spin, fall, *self.scene.constants))
-            self._lay(_Stretch(now.start + lasts, 0.0, angle, "fallen", number=now.number))
+            self._append(_Stretch(now.start + lasts, 0.0, angle, Phase.FALLEN, number=now.number))
 
     def _lock(self, now: _Stretch, drive_spin: float, hold: float, drag: float) -> None:
         missing = drive_spin - now.spin
@@ -242,10 +272,10 @@ class SpinWorld:
         lasts = missing / acceleration
         angle = now.angle + (now.spin + drive_spin) / 2 * lasts
         if lasts > 0:
-            self._lay(replace(now, rule="pulled", acceleration=acceleration))
-        self._lay(_Stretch(now.start + lasts, drive_spin, angle, "locked", number=now.number))
+            self._append(replace(now, phase=Phase.PULLED, acceleration=acceleration))
+        self._append(_Stretch(now.start + lasts, drive_spin, angle, Phase.LOCKED, number=now.number))
 
-    def _lay(self, stretch: _Stretch) -> None:
+    def _append(self, stretch: _Stretch) -> None:
         self._stretches.append(stretch.start, stretch)
 
     # --- the motion ---
@@ -253,7 +283,7 @@ class SpinWorld:
     def _motion(self, stretch: _Stretch, times: Array) -> tuple[Array, Array]:
         """Spin [rad/s] and angle [rad] at times within one stretch."""
         t = times - stretch.start
-        if stretch.rule == "coasts":
+        if stretch.phase is Phase.COASTING:
             spin = self._decay.after(stretch.spin, t, *self.scene.constants)
             return spin, stretch.angle + self._decay.turned(stretch.spin, spin, *self.scene.constants)
         spin = stretch.spin + stretch.acceleration * t

@@ -20,10 +20,10 @@ Array = NDArray[np.float64]
 _AT_ONCE = 1000
 
 
-class History(Generic[T]):
+class Timeline(Generic[T]):
     """Items, each from its start [s] until the next.
 
-    >>> history = History(0.0, "a")
+    >>> history = Timeline(0.0, "a")
     >>> history.append(1.0, "b")
     >>> [(item, list(range(5))[part]) for item, part in history.pieces(np.array([-1.0, 0.5, 1.0, 1.5, 2.0]))]
     [('a', [0, 1]), ('b', [2, 3, 4])]

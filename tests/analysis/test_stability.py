@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.stability import (
-    Symmetric,
+    SymmetricTop,
     equilibria,
     floating_mass,
     modes,
@@ -20,7 +20,7 @@ from analysis.stability import (
 )
 
 RHO = 1.40e-3
-THESIS = Symmetric(mass=0.02526, transverse=1.04e-6, axial=1.731314e-6, moment=-0.714)
+THESIS = SymmetricTop(mass=0.02526, transverse=1.04e-6, axial=1.731314e-6, moment=-0.714)
 
 
 def ring(a, b):
@@ -64,7 +64,7 @@ def test_the_masses_of_the_upper_window_are_those_published():
 
 
 def test_a_heavier_top_than_the_field_can_lift_has_no_equilibrium_above():
-    printed = Symmetric(0.0255, THESIS.transverse, THESIS.axial, THESIS.moment)
+    printed = SymmetricTop(0.0255, THESIS.transverse, THESIS.axial, THESIS.moment)
     assert not equilibria(BASE, printed, 0.05, 0.15)
     floating = equilibria(BASE, THESIS, 0.05, 0.15)
     assert [e.stable for e in floating] == [False, True]  # below the heaviest one's height it is thrown up and away
@@ -75,7 +75,7 @@ def test_a_heavier_top_than_the_field_can_lift_has_no_equilibrium_above():
 
 def test_the_linear_window_and_its_modes_are_those_published():
     # at 7.30 cm, with the mass that floats there
-    top = Symmetric(floating_mass(BASE, THESIS, 0.073), THESIS.transverse, THESIS.axial, THESIS.moment)
+    top = SymmetricTop(floating_mass(BASE, THESIS, 0.073), THESIS.transverse, THESIS.axial, THESIS.moment)
     ((low, high),) = spin_windows(BASE, top, 0.073)
     assert low == pytest.approx(21.65, abs=0.005)
     assert high == pytest.approx(80.6, abs=0.05)
@@ -95,7 +95,7 @@ def test_the_synchronous_wobble_resonates_where_published():
 
 
 def test_the_estimate_of_the_thesis_is_reproduced_with_the_mass_it_must_have_used():
-    top = Symmetric(0.0253, THESIS.transverse, 1.73e-6, THESIS.moment)
+    top = SymmetricTop(0.0253, THESIS.transverse, 1.73e-6, THESIS.moment)
     assert thesis_limit(BASE, top, 0.073) == pytest.approx(14.005, abs=0.01)
     # and lacks the factor 2√(I₁/I₃) = 1.55 of the sleeping top's
     ratio = sleeping_limit(BASE, top, 0.073) / thesis_limit(BASE, top, 0.073)
@@ -114,7 +114,7 @@ def test_the_estimate_of_the_thesis_is_reproduced_with_the_mass_it_must_have_use
 def test_the_limits_of_simon_1997(top, field, published, quartics):
     mass, moment, axial, transverse = top
     # their numbers are rounded: what floats there is what μB′ carries
-    top = Symmetric(mass, transverse, axial, -moment, gravity=moment * abs(field[1]) / mass)
+    top = SymmetricTop(mass, transverse, axial, -moment, gravity=moment * abs(field[1]) / mass)
     ((low, high),) = spin_windows(lambda z: np.array(field)[:, None] + 0 * z, top, 0.0)
     seen = 2 * math.pi * low, 2 * math.pi * high
     assert seen == pytest.approx(quartics, abs=0.6)
@@ -152,14 +152,14 @@ def test_the_quartic_has_the_roots_of_the_full_equations(spin_hz):
         [(rate(rest + h * e) - rate(rest - h * e)) / (2 * h) for h, e in zip(scale, np.eye(12), strict=True)]
     ).T
     frequencies = np.linalg.eigvals(jacobian / 1.0).imag / (2 * np.pi)
-    top = Symmetric(mass, i1, i3, mu)
+    top = SymmetricTop(mass, i1, i3, mu)
     for mode in modes(BASE, top, height, spin_hz):
         assert np.min(np.abs(frequencies - mode.real)) < 2e-4 * max(1, abs(mode.real))
     assert np.min(np.abs(np.abs(frequencies) - vertical_mode(BASE, top, height))) < 1e-4
 
 
 def test_a_moment_along_the_field_has_no_spin_that_helps():
-    along = Symmetric(THESIS.mass, THESIS.transverse, THESIS.axial, +0.714)
+    along = SymmetricTop(THESIS.mass, THESIS.transverse, THESIS.axial, +0.714)
     assert spin_windows(BASE, along, 0.073) == ()
     assert math.isnan(sleeping_limit(BASE, along, 0.073))
     assert np.all(np.isfinite(quartic(BASE, along, 0.073, 100.0)))

@@ -13,7 +13,7 @@ from instruments.links.visa import VisaTransport
 from instruments.virtual.bench.bus import Bus
 from instruments.virtual.bench.visa_library import library_for
 from levilab.bench.discover import driver_for_identity
-from levilab.world.bench import own_world, virtual_bus
+from levilab.world.bench import practice_world, virtual_bus
 from support import hostile
 from support.models import KIND_OF, ROWS, calls, measure
 from support.paths import ROOT
@@ -66,12 +66,12 @@ def test_settings_survive_a_round_trip(name):
         for row in rows:
             setattr(driver, row, before[row])
     assert {row: getattr(driver, row) for row in rows} == before
-    assert driver.unlike(driver.settings()) == {}
+    assert driver.changed_settings(driver.settings()) == {}
 
 
 @pytest.mark.parametrize("kind", CATALOGUE)
 def test_a_model_is_chosen_in_any_case_of_its_letters(kind):
     for model in CATALOGUE[kind]:
-        bus = virtual_bus(own_world(), {kind: model.name.lower()})
+        bus = virtual_bus(practice_world(), {kind: model.name.lower()})
         found = [twin.identity for twin in bus.instruments.values() if re.search(model.driver.MODELS, twin.identity)]
         assert driver_for_identity(found[0]) == (kind, model.name)

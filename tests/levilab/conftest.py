@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 import pytest
 
 from support.commands import command
+from support.figures import undrawn
 from support.paths import SAMPLE_DATA
 from support.waiting import HANG_GUARD_S
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
     Command = Callable[..., subprocess.CompletedProcess[str]]
@@ -22,6 +23,13 @@ if TYPE_CHECKING:
 @pytest.fixture
 def sample_data() -> Path:
     return SAMPLE_DATA
+
+
+@pytest.fixture
+def undrawn_figures() -> Iterator[None]:
+    """For a test that looks at no figure; see `undrawn`."""
+    with undrawn():
+        yield
 
 
 @pytest.fixture

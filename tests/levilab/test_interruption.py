@@ -95,7 +95,7 @@ def test_in_another_thread_signals_are_left_to_the_main_one():
 
     thread = threading.Thread(target=watch)
     thread.start()
-    thread.join(5.0)
+    thread.join()
     assert seen == [before]
 
 

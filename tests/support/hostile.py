@@ -14,7 +14,7 @@ from instruments.clock import VirtualClock
 from instruments.virtual.bench.session import Session
 from instruments.virtual.core.message import LONGEST_LINE
 from instruments.virtual.core.parser import LONGEST_ANSWER
-from levilab.world.bench import MODELS
+from levilab.world.bench import VIRTUAL_MODELS
 
 #: One message may make a model look at so many samples: three channels for three hours at 20 kHz (see `counting`).
 MOST_LOOKS = 3 * 12_100 * 20_000
@@ -59,13 +59,13 @@ class Room:
         return 0.019
 
 
-NAMES = {name: (kind, name) for kind, models in MODELS.items() for name in models}
+NAMES = {name: (kind, name) for kind, models in VIRTUAL_MODELS.items() for name in models}
 
 
 def instrument(name, room=None):
     """A virtual instrument of this model, in a room of its own."""
     kind, model = NAMES[name]
-    return MODELS[kind][model](room or Room())
+    return VIRTUAL_MODELS[kind][model](room or Room())
 
 
 # --- words ---

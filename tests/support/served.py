@@ -22,9 +22,10 @@ from instruments.virtual.core.rows import Ask, Number, Own
 from instruments.virtual.servers.hislip_messages import HEADER, Type
 from instruments.virtual.servers.serial_port import HAS_PSEUDO_TERMINALS
 from instruments.virtual.servers.server import BenchServer, Place
+from support.waiting import HANG_GUARD_S
 
-#: What a client waits for at most [s], reached by a failure only; a time-out that is meant to be reached [ms].
-AT_MOST, SHORT = 600.0, 20
+#: What a client waits for at most [s]; a time-out that is meant to be reached [ms].
+AT_MOST, SHORT = HANG_GUARD_S, 20
 
 #: How long the slow answer takes [s].
 SLOW = 3600.0

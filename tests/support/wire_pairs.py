@@ -15,6 +15,7 @@ import pyvisa_py.protocols.rpc
 import pyvisa_py.tcpip
 import serial.urlhandler.protocol_socket
 
+import instruments.virtual.servers.hislip
 from instruments.drivers.oscilloscope.keysight_dsox import KeysightDSOX
 from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.drivers.oscilloscope.siglent_sds1000xe import SiglentSDS1000XE
@@ -32,10 +33,11 @@ from instruments.virtual.servers.server import BenchServer
 from support import hostile
 from support.models import FAMILIES, KIND_OF, ROWS
 from support.proxy import LOOPBACK, Proxy
+from support.waiting import HANG_GUARD_S
 from support.wire_faults import FaultyBus, Tapped, Wire
 
 #: A time-out that a fault may make a program wait for, and one that only a failure reaches [s].
-SHORT, AT_MOST = 0.03, 10.0
+SHORT, AT_MOST = 0.03, HANG_GUARD_S
 
 NETWORK, SOCKET, SERIAL = "TCPIP0::box::inst0::INSTR", "TCPIP0::box::5025::SOCKET", "ASRLbox::INSTR"
 
@@ -377,7 +379,10 @@ class _Bound:
 
 @contextlib.contextmanager
 def hasty_clients():
-    """The clients without waits of their own: at a device clear, at the end of a connection, and for its last words."""
+    """The clients without waits of their own: at a device clear, at the end of a connection, and for its last words.
+
+    The servers send away none that a busy machine delays.
+    """
     receive = pyvisa_py.protocols.rpc._recvrecord
 
     def receive_soon(sock, timeout, **more):
@@ -389,6 +394,7 @@ def hasty_clients():
         mock.patch.object(pyvisa_py.tcpip.Vxi11CoreClient, "destroy_link", return_value=0),
         mock.patch.object(serial.urlhandler.protocol_socket, "time", SimpleNamespace(sleep=lambda _: None)),
         mock.patch.object(serial, "protocol_handler_packages", ["serial.urlhandler", "instruments.virtual.bench"]),
+        mock.patch.multiple(instruments.virtual.servers.hislip, FIRST_WORDS=AT_MOST, SECOND_CHANNEL=AT_MOST),
     ):
         yield
 

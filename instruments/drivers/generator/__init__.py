@@ -4,13 +4,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from instruments.drivers import Instrument
 from instruments.errors import OutOfRange
 
 #: The highest voltage of either family without a load [V]: offset and half of peak to peak together.
 OPEN_V = 10.0
+
+
+class Beyond(NamedTuple):
+    """A value that a limit forbids.  name: the limit's; is_highest: whether the value is above it, not below."""
+
+    name: str
+    value: float
+    limit: float
+    is_highest: bool
 
 
 @dataclass(frozen=True)
@@ -26,10 +35,13 @@ class Limits:
     drive_frequency_hz: float = math.inf
     drive_lowest_hz: float = -math.inf
 
-    def check(
-        self, address: str, *, frequency_hz: float | None = None, amplitude_vpp: float = 0.0, offset_v: float = 0.0
-    ) -> None:
-        """Raise OutOfRange if this signal is more than they allow.  frequency_hz: None where there is none."""
+    def beyond(
+        self, *, frequency_hz: float | None = None, amplitude_vpp: float = 0.0, offset_v: float = 0.0
+    ) -> Beyond | None:
+        """What of this signal is more, or less, than they allow; None where nothing is.
+
+        frequency_hz: None where there is none.
+        """
         rows = (
             ("drive_amplitude_vpp", amplitude_vpp, 0.0, self.drive_amplitude_vpp),
             ("drive_offset_v", abs(offset_v), 0.0, self.drive_offset_v),
@@ -38,8 +50,17 @@ class Limits:
         )
         for name, value, low, high in rows if self != NO_LIMITS else ():
             if value is not None and not low <= value <= high:  # nan is in no range
-                allowed = f"up to {high:g}" if high < math.inf else f"from {low:g} on"
-                raise OutOfRange(address, name, value, f"{allowed} (limits.{name} in the bench file)")
+                return Beyond(name, value, high if high < math.inf else low, is_highest=high < math.inf)
+        return None
+
+    def check(
+        self, address: str, *, frequency_hz: float | None = None, amplitude_vpp: float = 0.0, offset_v: float = 0.0
+    ) -> None:
+        """Raise OutOfRange if this signal is more than they allow, as `beyond` says."""
+        found = self.beyond(frequency_hz=frequency_hz, amplitude_vpp=amplitude_vpp, offset_v=offset_v)
+        if found:
+            allowed = f"up to {found.limit:g}" if found.is_highest else f"from {found.limit:g} on"
+            raise OutOfRange(address, found.name, found.value, f"{allowed} (limits.{found.name} in the bench file)")
 
 
 #: Of a generator by itself.

@@ -16,7 +16,7 @@ from instruments.drivers import Instrument
 from instruments.errors import InstrumentError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -128,10 +128,17 @@ class Oscilloscope(Instrument, Protocol):
         the scope is no longer as it was prepared.
         """
 
-    def trace(self, channel: int) -> Trace:
+    def trace(self, channel: int, arrived: Callable[[Trace, int], None] | None = None) -> Trace:
         """The record of one channel, whole: one byte per point.
 
-        Raises NothingAcquired; SettingsLost if the scope is no longer as it was prepared.
+        Args:
+            channel: an input that was prepared.
+            arrived: called after each piece with the record so far, and how many points it is to have; a transfer may
+                take minutes, and what is kept meanwhile is not lost with the process.
+
+        Raises:
+            NothingAcquired: no record was taken.
+            SettingsLost: the scope is no longer as it was prepared; what arrived is of no use.
         """
 
     def blocks(self, channel: int) -> Iterator[NDArray[np.uint8]]:

@@ -21,7 +21,7 @@ from instruments.errors import InstrumentError, NoAnswer, OutOfRange, SettingsLo
 from instruments.ieee488 import PLAIN_BLOCK
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -219,7 +219,7 @@ class Scope(ScpiInstrument):
         differing: dict[str, tuple[object, object]] = {}
         for part in self._prepared:
             head = f"channel{part.number}_" if isinstance(part, Channel) else ""
-            found = part.unlike()
+            found = part.changed_settings()
             differing |= {
                 head + name: both for name, both in found.items() if both[1] != self.CHANGED_BY_ACQUIRE.get(name)
             }
@@ -302,18 +302,20 @@ class Scope(ScpiInstrument):
 
     # --- reading ---
 
-    def trace(self, channel: int) -> Trace:
+    def trace(self, channel: int, arrived: Callable[[Trace, int], None] | None = None) -> Trace:
         """The record of one channel; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
         self._check_readable(channel)
         with self._reporting_changed_settings():
             preamble = self.preamble(channel)
+            scaling = (preamble.dt_s, preamble.t0_s, preamble.volts_per_code, preamble.offset_v)
             codes = np.empty(preamble.points, dtype=np.uint8)
             at = 0
             for piece in self._pieces(preamble):
                 codes[at : at + piece.size] = piece
                 at += piece.size
+                if arrived:
+                    arrived(Trace(codes[:at], *scaling, channel, *self.CODES), preamble.points)
         self._check_kept()
-        scaling = (preamble.dt_s, preamble.t0_s, preamble.volts_per_code, preamble.offset_v)
         return Trace(codes, *scaling, channel, *self.CODES)
 
     def blocks(self, channel: int) -> Iterator[NDArray[np.uint8]]:

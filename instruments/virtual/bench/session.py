@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import threading
-import time
 from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
+from instruments.clock import WallClock
 from instruments.ieee488 import INFINITY
 from instruments.virtual.core.message import Framer, Overrun
 from instruments.virtual.core.parser import LONGEST_ANSWER, ScpiError
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from instruments.virtual.core.device import Answer, VirtualInstrument
     from instruments.virtual.core.steps import Steps
 
-_NOTHING = memoryview(b"")
+_NOTHING, _WALL = memoryview(b""), WallClock()
 #: Answers that wait to be read, at most.
 MOST_ANSWERS = 1000
 #: How long an instrument works in one slice [s], as the clock on the wall tells.
@@ -143,8 +143,8 @@ class Session:
     def go_on(self, work: Work[None]) -> bool:
         """Work for a slice; whether there is more to do.  The bus is locked meanwhile, and free between slices."""
         with self.lock:
-            end = time.monotonic() + SLICE
-            while work.step() and time.monotonic() < end:
+            end = _WALL.now() + SLICE
+            while work.step() and _WALL.now() < end:
                 pass
         if work.error:
             raise work.error

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, ClassVar
 from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.parameters import choice, number
 from instruments.virtual.core.parser import Row, ScpiError, Value
-from instruments.virtual.core.rows import Do, Own
+from instruments.virtual.core.rows import Both, Do
 from instruments.virtual.generator.channel import INFINITE, OPEN_V, SOURCE_OHM, Output
 
 if TYPE_CHECKING:
@@ -76,8 +76,8 @@ _DEFAULTS: dict[str, Value] = {
     "polarity": "NOR",
 }
 _CHANNEL: tuple[Row, ...] = (
-    Own("C{n}:(BSWV|BASIC_WAVE)", lambda s, n, p: s.set_wave(n, p), lambda s, n: s.wave(n)),
-    Own("C{n}:(OUTP|OUTPUT)", lambda s, n, p: s.set_output(n, p), lambda s, n: s.output(n)),
+    Both("C{n}:(BSWV|BASIC_WAVE)", lambda s, n, p: s.set_wave(n, p), lambda s, n, p: s.wave(n, p)),
+    Both("C{n}:(OUTP|OUTPUT)", lambda s, n, p: s.set_output(n, p), lambda s, n, p: s.output(n, p)),
 )
 
 
@@ -166,8 +166,10 @@ class VirtualSDG1000X(VirtualInstrument):
             return -reach, reach
         return (0.0, 360.0) if name == "phase" else (0.0, 100.0)
 
-    def wave(self, n: int) -> str:
-        """BSWV?: all fields of the waveform."""
+    def wave(self, n: int, parameters: list[str]) -> str:
+        """BSWV?: all fields of the waveform; it has no parameter, no list of channels either.  Raises ScpiError."""
+        if parameters:
+            raise ScpiError(-108)
         kind = str(self.settings[_key(n, "waveform")])
         factor, frequency = self._load_factor(n), self._number(n, "frequency")
         amplitude, offset = factor * self._number(n, "amplitude"), factor * self._number(n, "offset")
@@ -209,8 +211,10 @@ class VirtualSDG1000X(VirtualInstrument):
         self.settings |= {_key(n, name): value for name, value in wanted.items()}
         self.changed(_key(n, "output"))
 
-    def output(self, n: int) -> str:
-        """OUTP?: state, load, polarity."""
+    def output(self, n: int, parameters: list[str]) -> str:
+        """OUTP?: state, load, polarity; as with BSWV?.  Raises ScpiError."""
+        if parameters:
+            raise ScpiError(-108)
         load = self._number(n, "load")
         state = "ON" if self.settings[_key(n, "output")] else "OFF"
         shown = _OPEN if load >= INFINITE else self.spell(load)

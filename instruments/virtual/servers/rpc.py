@@ -101,14 +101,15 @@ async def serve(program: Program, reader: asyncio.StreamReader, writer: asyncio.
 
     async def work() -> None:
         while True:
-            answer = await _carried_out(program, await calls.get())
-            writer.write(struct.pack("!I", 1 << 31 | len(answer)) + answer)
+            record = await answer(program, await calls.get())
+            writer.write(struct.pack("!I", 1 << 31 | len(record)) + record)
             await writer.drain()
 
     await first_of(receive(), work())
 
 
-async def _carried_out(program: Program, record: bytes) -> bytes:
+async def answer(program: Program, record: bytes) -> bytes:
+    """Carry out the call in a record; the record that answers it.  Raises Disconnected when it is no call."""
     try:
         call = read_call(record)
     except Garbage:

@@ -6,14 +6,15 @@ import asyncio
 import contextlib
 import socket
 import threading
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Self
 
 from instruments.virtual.servers import serial_port
 from instruments.virtual.servers.hislip import HislipServer
+from instruments.virtual.servers.port_mapper import PORT, TCP, PortMapper
 from instruments.virtual.servers.socket_server import socket_listener
 from instruments.virtual.servers.station import Listener, Station
-from instruments.virtual.servers.vxi11 import Vxi11Server
+from instruments.virtual.servers.vxi11 import ABORT, CORE, PROGRAM_VERSION, Vxi11Server
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Iterator
@@ -40,14 +41,24 @@ class Offer:
 
 @dataclass(frozen=True)
 class Place:
-    """Where to listen.  host: an address of this machine; port_base: the first of the ports, None: any free ones."""
+    """Where to listen.
+
+    host: an address of this machine; port_base: the first of the ports, None: any free ones; port_mapper: the port at
+    which each instrument with VXI-11 has a port mapper, and so a loopback address of its own, from 127.0.0.2 on; None:
+    there is none.
+    """
 
     host: str = LOOPBACK
     port_base: int | None = None
+    port_mapper: int | None = None
 
     def shown(self) -> str:
         """The host as it stands in resource names."""
         return socket.gethostname() if self.host in {"", "0.0.0.0"} else self.host  # noqa: S104 - only asked for
+
+    def own_host(self, index: int) -> Place:
+        """Where the instrument of this index listens that has a port mapper."""
+        return self if self.port_mapper is None else replace(self, host=f"127.0.0.{2 + index}")
 
     def ports(self, index: int) -> Iterator[int]:
         """The ports of one instrument."""
@@ -76,6 +87,8 @@ async def _offer(
     station: Station, address: str, place: Place, index: int, opened: contextlib.AsyncExitStack
 ) -> dict[str, str]:
     """Begin to listen; the resource names by the way that they go."""
+    if not address.upper().startswith("ASRL"):
+        place = place.own_host(index)
     ports, host = place.ports(index), place.shown()
 
     async def listen(listener: Listener) -> int:
@@ -98,6 +111,13 @@ async def _offer(
         "vxi11": f"TCPIP0::{host},{await listen(vxi11.core)}::inst0::INSTR",
     }
     await listen(vxi11.abort)
+    if place.port_mapper is not None:
+        programs = {(CORE, PROGRAM_VERSION, TCP): vxi11.core.port, (ABORT, PROGRAM_VERSION, TCP): vxi11.abort.port}
+        mapper = PortMapper(station, programs)
+        opened.push_async_callback(mapper.close)
+        await mapper.open(place.host, place.port_mapper)
+        if mapper.port == PORT:
+            resources["vxi11"] = f"TCPIP0::{host}::inst0::INSTR"
     return resources
 
 

@@ -328,14 +328,14 @@ class Link:
 
         given_up: looked at whenever something happened to the instrument.
         """
-        loop = asyncio.get_running_loop()
-        end = None if within is None else loop.time() + within
-        while (due := self.due()) != 0.0 and not given_up():
-            left = None if end is None else end - loop.time()
-            if left is not None and left <= 0:
-                return False
-            await self.station.stirred(min((wait for wait in (due, left) if wait is not None), default=None))
-        return due == 0.0
+        due: float | None = None
+
+        def there() -> bool:
+            nonlocal due
+            due = self.due()
+            return due == 0.0
+
+        return await self._comes(there, within, given_up, lambda: due)
 
     def take(self, count: int, *, until: bytes = b"") -> tuple[bytes, bool]:
         """At most count bytes of what is there, and whether the answer ends with them; see Session.take."""
@@ -375,16 +375,26 @@ class Link:
         self.session.hold.let_go(self.session)
         self.station.stir()
 
-    async def _comes(self, there: Callable[[], bool], within: float | None, given_up: Callable[[], bool]) -> bool:
-        loop = asyncio.get_running_loop()
+    async def _comes(
+        self,
+        there: Callable[[], bool],
+        within: float | None,
+        given_up: Callable[[], bool],
+        next_look: Callable[[], float | None] = lambda: _LOOK_AGAIN,
+    ) -> bool:
+        """Wait until something is there; whether it is, within this time by the clock on the wall [s].
+
+        It is looked at whenever something happened to the instrument, and after `next_look` [s]; None: only then.
+        """
+        loop = asyncio.get_running_loop()  # whose timers are waited for, so it is its time that counts
         end = None if within is None else loop.time() + within
-        while not self.closed and not given_up():
+        while not self.closed:
             if there():
                 return True
-            left = _LOOK_AGAIN if end is None else min(_LOOK_AGAIN, end - loop.time())
-            if left <= 0:
+            left = None if end is None else end - loop.time()
+            if given_up() or (left is not None and left <= 0):
                 return False
-            await self.station.stirred(left)
+            await self.station.stirred(min((wait for wait in (next_look(), left) if wait is not None), default=None))
         return False
 
 

@@ -1,4 +1,7 @@
-"""Instruments over VXI-11, which is remote procedure calls over TCP; no port mapper, the port is told instead.
+"""Instruments over VXI-11, which is remote procedure calls over TCP.
+
+Its port is part of the resource name, or a port mapper at the host has it; see
+:mod:`instruments.virtual.servers.port_mapper`.
 
 Source: VXI-11 revision 1.0, TCP/IP Instrument Protocol (section numbers below are its).  No interrupt channel: a client
 polls the status byte.

@@ -28,6 +28,7 @@ from levilab.acquisition.driving import (
 from levilab.acquisition.experiment import Experiment
 from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import ConfigError
+from levilab.present.numbers import with_uncertainty
 from levilab.runs.channel import Channel
 
 if TYPE_CHECKING:
@@ -200,14 +201,16 @@ def _limit_of_fall(session: Session[LimitSettings], seen: list[Row], missed_sinc
     limit = spin_at_fall(times, spins, settings.reading_u_hz, between)
     assert limit.value is not None
     assert limit.u is not None
-    session.event(
-        "fell", f"{text}; {limit.value:.2f} Hz, lowest seen {spins.min():.2f} Hz", spin_frequency_hz=limit.value
-    )
+    lowest = float(spins.min())
+    words = f"{with_uncertainty(limit)} by a line through the last counts, the lowest of which is {lowest:.2f} Hz"
+    if lowest < limit.value:  # not the bound that it seems to be
+        words += ", by its scatter"
+    session.event("fell", f"{text}; {words}", spin_frequency_hz=limit.value)
     return {
         "time_s": session.now(),
         "spin_frequency_hz": limit.value,
         "spin_frequency_u_hz": limit.u,
-        "spin_seen_hz": float(spins.min()),
+        "spin_seen_hz": lowest,
         "drive_frequency_hz": settings.drive_frequency_hz,
         "drive_amplitude_v": settings.drive_amplitude_vpp / 2,
     }

@@ -13,7 +13,7 @@ from pydantic_core import PydanticCustomError
 from analysis.precession.gates import FEWEST, Gates, Rate, Swing, pulses_too_many, rates_at_point, swing_of
 from instruments.errors import InstrumentError
 from levilab.acquisition.counting import gate_began, prepare_counter
-from levilab.acquisition.driving import DriveSettings, NotHeld, check_drive, held_spin, sweep_drive
+from levilab.acquisition.driving import DriveSettings, NotHeld, PointFailed, check_drive, held_spin, sweep_drive
 from levilab.acquisition.experiment import Experiment
 from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.person import Task
@@ -38,6 +38,8 @@ _MOST_POINTS = 1000
 _LOOKS, _LOCKED_WITHIN_HZ, _MOST_LOOKS = 3, 0.25, 12
 #: Shortest and longest gate, in parts of `gate_s`, and longest pause before one, in periods of the drive.
 _GATES, _PAUSES = (0.75, 1.25), 4.0
+#: So many gates of the laser with a count make a reading.
+_FEWEST_COUNTS = 3
 #: No count is better than that: the resolution of the counters over a second [Hz].
 _LEAST_U_HZ = 1e-7
 #: A swing of more than this [turns] is taken off by a step of the drive's phase of this duration [s], if that is at
@@ -119,7 +121,7 @@ def channels(settings: PrecessionSettings) -> tuple[Channel, ...]:
     if not settings.reading_u_hz and settings.counts >= FEWEST:
         u = f"{one}, the swing about the drive taken off"
     return (
-        Channel("time_s", "s", "bench clock, from the beginning of the sweep, at the end of the point"),
+        Channel("time_s", "s", "bench clock, from the beginning of the sweep, when the point was counted"),
         Channel("drive_frequency_hz", "Hz", "generator, as set"),
         Channel("drive_frequency_u_hz", "Hz", "its clock by the counter's, from the configuration"),
         Channel("spin_frequency_hz", "Hz", f"frequency counter on the phototransistor at the tape, mean of {over}"),
@@ -169,18 +171,16 @@ def _time_left(settings: PrecessionSettings, done: int) -> float:
 
 
 def _point(session: Session[PrecessionSettings], drive: float) -> None:
-    """Wait for the lock, measure, and keep the reading.  Raises NotHeld, ExperimentFailed."""
+    """Wait for the lock, measure, and keep the reading.  Raises NotHeld, PointFailed, ExperimentFailed."""
     settings = session.settings
     _wait_for_lock(session, drive)
     row, counts = _measure(session, drive)
     text = f"spin and laser were counted at {drive:g} Hz"
     session.writer.event(session.now(), COUNTED, text, drive_frequency_hz=drive, **counts)
-    try:
-        if settings.record_s:
-            _record(session, drive)
-    finally:  # what was counted is kept if the record is broken off; by their order a record belongs to its point
-        left = _time_left(settings, _points_done([*session.rows, row], settings.sweep))
-        session.keep(row | {"time_s": session.now()}, left)
+    left = _time_left(settings, _points_done([*session.rows, row], settings.sweep))
+    session.keep(row | {"time_s": session.now()}, left)
+    if settings.record_s:  # last: what was counted is kept where the record is broken off
+        _record(session, drive)
 
 
 def _wait_for_lock(session: Session[PrecessionSettings], drive: float) -> None:
@@ -200,7 +200,7 @@ def _wait_for_lock(session: Session[PrecessionSettings], drive: float) -> None:
 
 
 def _measure(session: Session[PrecessionSettings], drive: float) -> tuple[Row, dict[str, Any]]:
-    """Spin and precession of a locked top, and the gates that they are from.  Raises NotHeld, ExperimentFailed."""
+    """Spin and precession of a locked top, and the gates that they are from.  Raises as `_point`."""
     settings = session.settings
     spins = _counted(session, drive, settings.trigger_level_v, 1)
     _still_held(session, drive, spins.frequency)
@@ -212,7 +212,7 @@ def _measure(session: Session[PrecessionSettings], drive: float) -> tuple[Row, d
         session.ask(Task("Connect the tape's phototransistor to the counter's input 1 again."))
     _count_the_tape_again(session)
     held_spin(session, drive)  # else what the laser counted is of a top on its way down
-    _check_pulses(settings, laser)
+    _check_pulses(session, laser)
     spin, precession = rates_at_point(spins, laser)
     _say_what_was_miscounted(session, laser, precession, drive)
     row = {
@@ -323,14 +323,25 @@ def _still_held(session: Session[PrecessionSettings], drive: float, spins: Array
         raise NotHeld(worst, drive)
 
 
-def _check_pulses(settings: PrecessionSettings, laser: Gates) -> None:
-    """Raise ExperimentFailed where the laser is hardly ever cut."""
-    if np.isfinite(laser.frequency).sum() < 3:
-        raise ExperimentFailed(
-            f"the counter sees no laser pulses at {settings.laser_trigger_level_v:g} V, input {settings.laser_input}: "
-            "does the stem cut the beam, and is the trigger level between free and cut "
-            "(precession.laser_trigger_level_v)?"
+def _check_pulses(session: Session[PrecessionSettings], laser: Gates) -> None:
+    """Raise where the laser is hardly ever cut: ExperimentFailed before the first reading, later PointFailed.
+
+    At first the set-up is at fault, and all that follows would be as dark; a beam that was cut before is missed by a
+    stem that now stands more upright or farther off, and maybe not at the next frequency.
+    """
+    settings, counted = session.settings, int(np.isfinite(laser.frequency).sum())
+    if counted >= _FEWEST_COUNTS:
+        return
+    where = f"at {settings.laser_trigger_level_v:g} V, input {settings.laser_input}"
+    if session.rows:
+        raise PointFailed(
+            f"the laser was counted in {counted} of {len(laser)} gates {where}, {_FEWEST_COUNTS} are needed: move the "
+            "beam until the stem cuts it once a turn of its wobble again, while the sweep goes on"
         )
+    raise ExperimentFailed(
+        f"the counter sees no laser pulses {where}: does the stem cut the beam, and is the trigger level between free "
+        "and cut (precession.laser_trigger_level_v)?"
+    )
 
 
 def _say_what_was_miscounted(session: Session[PrecessionSettings], laser: Gates, found: Rate, drive: float) -> None:
@@ -364,12 +375,11 @@ def _record(session: Session[PrecessionSettings], drive: float) -> None:
             trigger_source=settings.record_drive_channel,
         )
         scope.acquire(timeout_s=5.0)
-        traces = {what: scope.trace(channel) for what, channel in shown.items()}
+        now = session.now()
+        for what, channel in shown.items():
+            session.keep_trace(channel, what, now)
     except InstrumentError as error:
         session.event("no record", f"no record at {drive:g} Hz: {error}", drive_frequency_hz=drive)
-        return
-    for what, trace in traces.items():
-        session.keep_trace(trace, what)
 
 
 EXPERIMENT = Experiment(

@@ -48,7 +48,8 @@ def _distinct(channels: tuple[int, ...]) -> tuple[int, ...]:
 class TraceSettings(ExperimentSettings):
     """Records of one or several channels, all with one scaling, at an interval.
 
-    drive_frequency_hz: without it the generator is not needed and not touched.
+    Attributes:
+        drive_frequency_hz: without it the generator is not needed and not touched.
     """
 
     channels: Annotated[tuple[PositiveInt, ...], Field(min_length=1), AfterValidator(_distinct)] = Field(
@@ -137,7 +138,6 @@ def run(session: Session[TraceSettings]) -> None:
     watch = _Watch(session)
     for _ in session.readings_every(settings.interval_s, math.inf):
         if traces := _take(session):
-            _keep(session, traces)
             watch.look(traces)
         if len(session.rows) >= settings.records:
             return
@@ -249,21 +249,32 @@ def spin_of_record(trace: Trace, level_v: float) -> float | None:
 
 
 def _take(session: Session[TraceSettings]) -> list[Trace]:
-    """The traces of one record, one a channel; none where the oscilloscope was lost and is set up anew.
+    """Take and keep a record, a trace each channel; none where the oscilloscope was lost and is set up anew.
 
     Raises ExperimentFailed where no trigger comes.
     """
-    settings, scope = session.settings, session.bench.oscilloscope
+    settings, number = session.settings, len(session.rows) + 1
+    traces: list[Trace] = []
     try:
-        scope.acquire(timeout_s=settings.trigger_patience_s)
-        return [scope.trace(channel) for channel in settings.channels]
+        session.bench.oscilloscope.acquire(timeout_s=settings.trigger_patience_s)
+        now = session.now()
+        for channel in settings.channels:
+            trace = session.keep_trace(channel, settings.label(channel), now)
+            traces.append(trace)
+            if problem := _problem(trace, settings):
+                session.event("look at the scale", f"record {number}: {problem}", record=number, channel=trace.channel)
     except NeverTriggered as never:
         raise ExperimentFailed(_why_no_trigger(session)) from never
     except OutOfRange:
         raise
     except InstrumentError as error:
+        if traces:
+            text = f"record {number} was cut short after {len(traces)} of {len(settings.channels)} channels"
+            session.event("cut short", f"{text}; it is taken anew", record=number)
         session.reconnect("oscilloscope", error, lambda: _prepare_scope(session))
         return []
+    _keep(session, traces, now)
+    return traces
 
 
 def _why_no_trigger(session: Session[TraceSettings]) -> str:
@@ -297,17 +308,12 @@ def _range(trace: Trace) -> tuple[float, float]:
     return (float(volts.min()), float(volts.max())) if volts.size else (math.nan, math.nan)
 
 
-def _keep(session: Session[TraceSettings], traces: list[Trace]) -> None:
-    """The traces, then the row that says that they are there."""
+def _keep(session: Session[TraceSettings], traces: list[Trace], time_s: float) -> None:
+    """Keep the row that says that the traces of a record are there.  time_s: when it was taken."""
     settings, number = session.settings, len(session.rows) + 1
-    now = session.now()
-    for trace in traces:
-        session.keep_trace(trace, settings.label(trace.channel))
-        if problem := _problem(trace, settings):
-            session.event("look at the scale", f"record {number}: {problem}", record=number, channel=trace.channel)
     shown = next(trace for trace in traces if trace.channel == _shown(settings))
     low, high = _range(shown)
-    row: Row = {"time_s": now, "record": number}
+    row: Row = {"time_s": time_s, "record": number}
     if not math.isnan(low):
         row |= {"lowest_v": low, "highest_v": high}
     session.keep(row, (settings.records - number) * settings.interval_s)

@@ -98,7 +98,13 @@ class Score:
 
 @dataclass(frozen=True)
 class Study:
-    """All scores: by method and SNR, and of the default on the hard cases."""
+    """All scores.
+
+    Attributes:
+        trials: of each score.
+        scores: by method and SNR.
+        hard: of the default on the hard cases.
+    """
 
     trials: int
     scores: tuple[Score, ...]
@@ -106,7 +112,12 @@ class Study:
 
 
 def study(*, trials: int, tell: Callable[[str], None] = lambda _: None) -> Study:
-    """Carry it all out, with seeds that stay; tell: is called with what is under way."""
+    """Carry it all out, with seeds that stay.
+
+    Args:
+        trials: of each score.
+        tell: called with what is under way.
+    """
     scores: list[Score] = []
     for snr in SNR:
         tell(f"{snr:g} dB, {trials} traces")

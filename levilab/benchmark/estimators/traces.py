@@ -89,7 +89,13 @@ HARD = {
 
 @dataclass(frozen=True)
 class Trace:
-    """samples: shape (n,), or, of a switch, times [s]; frequency [Hz] at the middle of the record [s]."""
+    """A record that is made up, with its truth.
+
+    Attributes:
+        samples: shape (n,), or, of a switch, times [s].
+        frequency: at the middle of the record [Hz].
+        middle: of the record [s].
+    """
 
     samples: Array
     frequency: float

@@ -25,7 +25,13 @@ OPERATIONS = 57 + 2 * 52 + 7 + 4
 
 @dataclass(frozen=True)
 class Rate:
-    """ns: time of a stage of one top; gflops: its floating-point operations per nanosecond; share: of the peak."""
+    """How fast a kernel is.
+
+    Attributes:
+        ns: time of a stage of one top.
+        gflops: its floating-point operations per nanosecond.
+        share: of the peak.
+    """
 
     ns: float
     gflops: float

@@ -23,8 +23,11 @@ Array = NDArray[np.float64]
 class Point:
     """One integrator at one setting.
 
-    error [m]: largest of the place's components at the end, against the reference; speed: simulated seconds per
-    second of one core.
+    Attributes:
+        method: its name.
+        setting: in words.
+        error: largest of the place's components at the end, against the reference [m].
+        speed: simulated seconds per second of one core.
     """
 
     method: str

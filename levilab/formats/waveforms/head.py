@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from levilab.formats.columns import NoTable, TableError
-from levilab.formats.layout import BYTE_ORDER_MARKS, EXPORT, HEAD, NO_TABLES
+from levilab.formats.layout import BYTE_ORDER_MARKS, EXPORT, HEAD, OTHER_SIGNATURES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -25,7 +25,13 @@ _CONTROL = re.compile("[\x01-\x08\x0e-\x19]")
 
 @dataclass(frozen=True)
 class Head:
-    """The first lines of a text file.  encoding: of all of it; lines: the whole ones; whole: whether these are all."""
+    """The first lines of a text file.
+
+    Attributes:
+        encoding: of all of it.
+        lines: the whole ones.
+        whole: whether these are all.
+    """
 
     path: Path
     encoding: str
@@ -43,7 +49,7 @@ def read_head(path: Path) -> Head:
     with path.open("rb") as stream:
         head = stream.read(HEAD)
         whole = not stream.read(1)
-    for mark, what in NO_TABLES:
+    for mark, what in OTHER_SIGNATURES:
         if head.startswith(mark):
             raise NoTable(path, f"is {what}; {EXPORT}")
     encoding = _encoding(head)

@@ -17,10 +17,18 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from levilab.formats.columns import NoSuchColumn, TableError, listed, shown
-from levilab.formats.dialect import Dialect, filled, find_dialect
+from levilab.formats.columns import NoSuchColumn, TableError, quoted, shorten
+from levilab.formats.dialect import Dialect, filled_count, find_dialect
 from levilab.formats.layout import SAMPLE, Layout, lay_out
-from levilab.formats.titles import QUANTITIES, is_unit, plain_unit, read_title, unit_factor
+from levilab.formats.titles import (
+    LONGEST_TITLE,
+    QUANTITIES,
+    is_unit,
+    plain_unit,
+    read_title,
+    unit_factor,
+    without_runs_of_blanks,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -49,7 +57,11 @@ class NoRate(NoWaveform):
 
 @dataclass(frozen=True)
 class Printed:
-    """A number as it stands in a text.  resolution: one unit of its last digit."""
+    """A number as it stands in a text.
+
+    Attributes:
+        resolution: one unit of its last digit.
+    """
 
     value: float
     resolution: float
@@ -57,7 +69,12 @@ class Printed:
 
 @dataclass(frozen=True)
 class SampleColumn:
-    """A channel.  index: of its column; factor: to its unit."""
+    """A channel.
+
+    Attributes:
+        index: of its column.
+        factor: to its unit.
+    """
 
     name: str
     unit: str
@@ -153,7 +170,7 @@ def dialect_of(head: Head) -> Dialect:
         return found
     if sum(bool(re.fullmatch(r"[+-]?\d*[.,]?\d+([eE][+-]?\d+)?[,;]?", text)) for text in texts) < 0.5 * len(texts):
         at, line = next((n, line) for n, line in enumerate(head.lines, 1) if line.strip())
-        raise NoWaveform(head.path, f"'{shown(line.strip())}' begins no table of samples; {WANTED}", line=at)
+        raise NoWaveform(head.path, f"'{shorten(line.strip())}' begins no table of samples; {WANTED}", line=at)
     return Dialect(None, "," if any(match for match in one_comma) else ".")
 
 
@@ -163,11 +180,11 @@ def _unit(text: str) -> tuple[str, float]:
     if not plain or plain.casefold() in _VOLTS:
         return "V", 1.0
     factor = unit_factor(plain, "voltage")
-    return ("V", factor) if factor is not None else (shown(plain, 12), 1.0)
+    return ("V", factor) if factor is not None else (shorten(plain, 12), 1.0)
 
 
 def _signal(title: str) -> str:
-    return f"CH{title}" if title.isdecimal() else shown(title)
+    return f"CH{title}" if title.isdecimal() else shorten(title)
 
 
 def _is_number(text: str, dialect: Dialect) -> bool:
@@ -232,7 +249,7 @@ def _titled(_: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header 
     first = _first_row(rows, 1, 0, dialect)
     if factor is None or first is None:
         return None
-    columns = [SampleColumn(_signal(rows[0][k]), *_from_unit(rows[1], k)) for k in range(1, filled(rows[0]))]
+    columns = [SampleColumn(_signal(rows[0][k]), *_from_unit(rows[1], k)) for k in range(1, filled_count(rows[0]))]
     return Header(
         "Keysight CSV" if rows[0][0].casefold() == "x-axis" else "Rigol CSV with times",
         dialect,
@@ -247,7 +264,7 @@ def _beside(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Head
     """Tektronix TDS: the header stands beside the first rows, time and samples in the last columns."""
     if len(rows) < 2 or rows[0][0].casefold() != "record length" or len(rows[0]) < 5:
         return None
-    time = filled(rows[0]) - 2
+    time = filled_count(rows[0]) - 2
     if time < 2 or not all(_is_number(text, dialect) for text in rows[0][time : time + 2]):
         return None
     keys = _keys(rows)
@@ -256,7 +273,7 @@ def _beside(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Head
         "Tektronix TDS CSV",
         dialect,
         1,
-        (SampleColumn(shown(_value(keys, "source") or "CH1"), unit, time + 1, factor),),
+        (SampleColumn(shorten(_value(keys, "source") or "CH1"), unit, time + 1, factor),),
         time=time,
         time_factor=unit_factor(_value(keys, "horizontal units"), "time") or 1.0,
         step=_interval(head, keys, dialect),
@@ -282,7 +299,7 @@ def _keyed(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Heade
     names = [cell for cell in keys.get("source", ()) if cell]
     units = [cell.partition(":") for cell in keys.get("vertical units", ()) if cell]
     columns = []
-    for k in range(1, filled(rows[titles])):
+    for k in range(1, filled_count(rows[titles])):
         title, given = rows[titles][k], units[k - 1] if k <= len(units) else ("", "", "")
         worded = title.casefold() in _VOLTS or is_unit(title)
         name = names[k - 1] if k <= len(names) else (given[0] if given[1] else "")
@@ -351,7 +368,7 @@ def _plain(head: Head, dialect: Dialect, wanted: Mapping[str, str]) -> Header:
     rows = [dialect.split(line) for line in head.lines[layout.first_line - 1 :][:MOST_LINES] if not dialect.skips(line)]
     kept = _with_samples(columns, rows, 0, dialect) if rows else ()
     if not kept:
-        raise NoWaveform(head.path, f"has no samples beside its times, its columns are {listed(names)}")
+        raise NoWaveform(head.path, f"has no samples beside its times, its columns are {quoted(names)}")
     return Header(
         "CSV",
         dialect,
@@ -369,7 +386,8 @@ _NO_READINGS = ("time_s", "drive_amplitude_v")
 
 def _bare(title: str) -> str:
     """A title without its unit."""
-    return shown(re.sub(r"\s*/?\s*[\[(][^\[\]()]*[\])]$|\s*/\s*\S+$", "", title).strip() or title)
+    bare = re.sub(r" ?/? ?[\[(][^\[\]()]*[\])]$| ?/ ?\S+$", "", without_runs_of_blanks(title)[:LONGEST_TITLE])
+    return shorten(bare.strip() or title)
 
 
 def _time_column(head: Head, layout: Layout, wanted: Mapping[str, str]) -> int:
@@ -381,13 +399,15 @@ def _time_column(head: Head, layout: Layout, wanted: Mapping[str, str]) -> int:
             return folded.index(name.casefold())
         if name.isdecimal() and 1 <= int(name) <= layout.width:
             return int(name) - 1
-        raise TableError(head.path, f"has no column '{shown(name)}'; it has {listed(layout.header)}: correct `columns`")
+        raise TableError(
+            head.path, f"has no column '{shorten(name)}'; it has {quoted(layout.header)}: correct `columns`"
+        )
     if not layout.header:
         return 0
     known = [k for k, text in enumerate(layout.header) if read_title(text).column == "time_s" or folded[k] in _TIMES]
     if len(known) != 1:
         raise NoWaveform(
-            head.path, f"no title is known to be a time among {listed(layout.header)}: say `columns` = t=NAME"
+            head.path, f"no title is known to be a time among {quoted(layout.header)}: say `columns` = t=NAME"
         )
     return known[0]
 
@@ -399,6 +419,8 @@ def _time_factor(head: Head, layout: Layout, time: int) -> float:
     factor = unit_factor(unit, "time") if unit else 1.0
     if factor is None:
         raise TableError(
-            head.path, f"'{shown(unit or '')}' is no unit of time: correct the title", line=layout.header_line or None
+            head.path,
+            f"'{shorten(unit or '')}' is no unit of time: correct the title",
+            line=layout.header_line or None,
         )
     return factor

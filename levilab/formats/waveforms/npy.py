@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from levilab.formats.columns import TableError, shown
+from levilab.formats.columns import TableError, shorten
 from levilab.formats.waveforms.header import NoRate
 from levilab.formats.waveforms.waveform import BLOCK, PulseTimes, Signal, Waveform, check_count, check_step
 
@@ -67,7 +67,9 @@ def _load(path: Path) -> NDArray[Any]:
     try:
         data: NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
     except _BROKEN as error:
-        raise TableError(path, f"is no NumPy array that can be read ({shown(str(error), 80)}): save it anew") from error
+        raise TableError(
+            path, f"is no NumPy array that can be read ({shorten(str(error), 80)}): save it anew"
+        ) from error
     if data.dtype.kind not in "iuf" or data.dtype.itemsize > 8:
         raise TableError(path, f"holds {data.dtype}, plain numbers are expected: save them with numpy.save")
     if data.ndim not in {1, 2} or 0 in data.shape or (data.ndim == 2 and min(data.shape) > MOST_CHANNELS):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from levilab.formats.columns import TableError, shown
+from levilab.formats.columns import TableError, shorten
 from levilab.formats.titles import is_unit, plain_unit, read_title, unit_factor
 from levilab.formats.waveforms.header import NoRate, NoWaveform
 from levilab.formats.waveforms.rows import read_blocks
@@ -80,7 +80,7 @@ def _refuse_another_quantity(path: Path, titles: list[str]) -> None:
         other_unit = bool(unit) and is_unit(unit) and unit_factor(unit, "time") is None
         if other_unit or title.column not in {None, "time_s"}:
             raise NoWaveform(
-                path, f"holds one column, '{shown(text)}', which is no time: times of pulses are expected, as t [s]"
+                path, f"holds one column, '{shorten(text)}', which is no time: times of pulses are expected, as t [s]"
             )
 
 
@@ -106,5 +106,5 @@ def _samples(head: Head, rate: float, blocks: Callable[[], Iterator[Block]]) -> 
     def read(_: int) -> Iterator[NDArray[np.float64]]:
         return (block.numbers[:, 0] for block in blocks() if block.numbers.size)
 
-    told = (f"{shown(path.name)}, {torn}",) if torn else ()
+    told = (f"{shorten(path.name)}, {torn}",) if torn else ()
     return Waveform(path, "one column of samples", 0.0, 1 / rate, count, (Signal("CH1"),), read, told)

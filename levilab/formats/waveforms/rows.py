@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from levilab.formats.columns import TableError, shown
+from levilab.formats.columns import TableError, shorten
 from levilab.formats.dialect import MISSING
 from levilab.formats.waveforms.head import pieces
 from levilab.formats.waveforms.waveform import HIGHEST
@@ -102,7 +102,7 @@ def _line_by_line(path: Path, text: str, first: int, dialect: Dialect, used: Seq
         except TableError:
             if not (last and number == first + len(lines) - 1):
                 raise
-            torn = f"line {number}: '{shown(line.strip())}' was cut off and is left out"
+            torn = f"line {number}: '{shorten(line.strip())}' was cut off and is left out"
     return Block(np.array(rows, dtype=np.float64).reshape(len(rows), len(used)), first, text, torn)
 
 
@@ -111,8 +111,8 @@ def _row(path: Path, text: str, line: int, dialect: Dialect, used: Sequence[int]
     if max(used) >= len(fields):
         raise TableError(
             path,
-            f"'{shown(text.strip())}' has {len(fields)} field{'s' * (len(fields) != 1)}, {max(used) + 1} are expected: "
-            "complete or remove the line",
+            f"'{shorten(text.strip())}' has {len(fields)} field{'s' * (len(fields) != 1)}, {max(used) + 1} are "
+            "expected: complete or remove the line",
             line=line,
         )
     return [_number(path, fields[index], line, dialect) for index in used]
@@ -125,12 +125,12 @@ def _number(path: Path, text: str, line: int, dialect: Dialect) -> float:
     except ValueError:
         mark = "comma" if dialect.decimal == "," else "point"
         raise TableError(
-            path, f"'{shown(text)}' is no number with decimal {mark}: correct it, or remove the line", line=line
+            path, f"'{shorten(text)}' is no number with decimal {mark}: correct it, or remove the line", line=line
         ) from None
     if not abs(value) < HIGHEST:
         raise TableError(
             path,
-            f"'{shown(text)}' is a missing sample, but samples are evenly spaced: export the record anew, or cut the "
+            f"'{shorten(text)}' is a missing sample, but samples are evenly spaced: export the record anew, or cut the "
             "file there",
             line=line,
         )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from levilab.formats.columns import TableError, shown
+from levilab.formats.columns import TableError, shorten
 from levilab.formats.waveforms.header import LONGEST_DOUBTFUL_STEP_S, Header, NoRate, NoWaveform, printed, read_header
 from levilab.formats.waveforms.rows import read_blocks
 from levilab.formats.waveforms.waveform import Signal, Waveform, about_rate, check_count, check_step
@@ -261,4 +261,4 @@ def _contradiction(path: Path, header: Header, first: float, mean: float) -> _Ti
             f"`rate` = {1 / step:.6g} or {1 / mean:.6g}",
         )
     told = f"its printed times are {mean:.6g} s apart where its header says {step:.6g} s: the times are taken to be in "
-    return _Times(first / factor, step, (f"{shown(path.name, 200)}: {told}units of {1 / factor:g} s",))
+    return _Times(first / factor, step, (f"{shorten(path.name, 200)}: {told}units of {1 / factor:g} s",))

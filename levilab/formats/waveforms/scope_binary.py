@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from levilab.formats.columns import TableError, shown
+from levilab.formats.columns import TableError, shorten
 from levilab.formats.waveforms.waveform import Signal, Waveform, check_count, check_step
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def read_scope_binary(path: Path) -> Waveform:
             record = Wfm.from_file(str(path))
             channels = [(c, np.asarray(c.volts, np.float64)) for c in record.channels if c.volts is not None]
     except Exception as error:
-        what = shown(str(error).strip().split("\n")[0], 80)
+        what = shorten(str(error).strip().split("\n")[0], 80)
         raise TableError(path, f"is not read by RigolWFM ({what}): export it as CSV") from error
     channels = [(c, volts) for c, volts in channels if volts.size]
     if not channels:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from levilab.formats.columns import TableError, shown
+from levilab.formats.columns import TableError, shorten
 from levilab.formats.waveforms.waveform import BLOCK, Signal, Waveform, check_count
 
 if TYPE_CHECKING:
@@ -50,7 +50,9 @@ def read_wav(path: Path) -> Waveform:
         ZeroDivisionError,
         UnboundLocalError,
     ) as error:
-        raise TableError(path, f"is no WAV recording that can be read ({shown(str(error), 80)}): {_ADVICE}") from error
+        raise TableError(
+            path, f"is no WAV recording that can be read ({shorten(str(error), 80)}): {_ADVICE}"
+        ) from error
     return _waveform(path, rate, data)
 
 
@@ -96,7 +98,9 @@ def _read_three_bytes(path: Path) -> Waveform:
         with wave.open(str(path), "rb") as stream:
             channels, rate, count = stream.getnchannels(), stream.getframerate(), stream.getnframes()
     except (wave.Error, EOFError, struct.error) as error:
-        raise TableError(path, f"is no WAV recording that can be read ({shown(str(error), 80)}): {_ADVICE}") from error
+        raise TableError(
+            path, f"is no WAV recording that can be read ({shorten(str(error), 80)}): {_ADVICE}"
+        ) from error
     size = 3 * channels
     count = min(count, path.stat().st_size // size)
     if rate <= 0:

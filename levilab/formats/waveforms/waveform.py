@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from levilab.errors import UsageError
-from levilab.formats.columns import TableError, listed, shown
+from levilab.formats.columns import TableError, quoted, shorten
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -34,7 +34,11 @@ class NoSuchSignal(UsageError):
 
 @dataclass(frozen=True)
 class Signal:
-    """A channel of a record.  unit: V, or what the file says it is."""
+    """A channel of a record.
+
+    Attributes:
+        unit: V, or what the file says it is.
+    """
 
     name: str
     unit: str = "V"
@@ -88,9 +92,9 @@ class Waveform:
             return names.index(wanted.strip().casefold())
         if wanted.strip().isdecimal() and 1 <= int(wanted) <= len(names):
             return int(wanted) - 1
-        has = listed(signal.name for signal in self.signals)
+        has = quoted(signal.name for signal in self.signals)
         raise NoSuchSignal(
-            "channel", f"{shown(str(self.path), 200)} has {has}: name one of them", value=f"'{shown(wanted)}'"
+            "channel", f"{shorten(str(self.path), 200)} has {has}: name one of them", value=f"'{shorten(wanted)}'"
         )
 
     def blocks(self, wanted: str | None = None) -> Iterator[Array]:
@@ -112,7 +116,12 @@ class Waveform:
 
 @dataclass(frozen=True, eq=False)
 class PulseTimes:
-    """Times at which pulses came.  times: shape (n,), increasing [s]; path, format, warnings: as of a waveform."""
+    """Times at which pulses came.
+
+    Attributes:
+        times: shape (n,), increasing [s].
+        path, format, warnings: as of a waveform.
+    """
 
     path: Path
     format: str
@@ -121,14 +130,26 @@ class PulseTimes:
 
 
 def about_rate(path: Path, known: float | None, rate: float | None) -> list[str]:
-    """A warning where a given rate [Hz] is not the file's.  known: step of the file [s]."""
+    """A warning where a given rate is not the file's.
+
+    Args:
+        path: the file.
+        known: its step [s], None where it says none.
+        rate: that was given [Hz].
+    """
     if rate is None or known is None or known <= 0 or abs(known * rate - 1) <= 1e-6:
         return []
     return [f"{path.name}: the given rate of {rate:g} Hz takes the place of {1 / known:.9g} Hz in the file"]
 
 
 def check_step(path: Path, step: float, what: str) -> None:
-    """Raise TableError for a sampling interval [s] that is none.  what: where it comes from."""
+    """Raise TableError for a sampling interval that is none.
+
+    Args:
+        path: the file.
+        step: the interval [s].
+        what: where it comes from.
+    """
     if not SHORTEST_STEP_S <= step <= LONGEST_STEP_S:
         raise TableError(path, f"{what} is {step:g} s, above 0 is expected: say `rate` in Hz, or correct the file")
 

@@ -43,8 +43,12 @@ _STRONG = 0.9
 class FieldRun:
     """One scan.
 
-    scan: its fit; top: of which top what follows is; floating: what follows, None where no top floats; text: what it
-    says, in a few sentences; warnings: what to know before using the numbers.
+    Attributes:
+        scan: its fit.
+        top: of which top what follows is.
+        floating: what follows, None where no top floats.
+        text: what it says, in a few sentences.
+        warnings: what to know before using the numbers.
     """
 
     scan: FieldScan
@@ -61,7 +65,12 @@ class FieldRun:
 
 @dataclass(frozen=True)
 class Mean(Estimate):
-    """A mean over scans.  scatter: of one from another; runs: how many."""
+    """A mean over scans.
+
+    Attributes:
+        scatter: of one from another.
+        runs: how many.
+    """
 
     scatter: float = 0.0
     runs: int = 1

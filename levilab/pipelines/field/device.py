@@ -28,8 +28,10 @@ if TYPE_CHECKING:
 class FieldOptions(InputOptions):
     """How scans are analyzed.
 
-    device: what calliper and data sheet say; height_m, height_u_m: where the top was seen to float; free_radii: let the
-    scan move the radii.
+    Attributes:
+        device: what calliper and data sheet say.
+        height_m, height_u_m: where the top was seen to float.
+        free_radii: let the scan move the radii.
     """
 
     device: Device | None = None
@@ -112,7 +114,12 @@ def parts_of(top: TopTable) -> list[Cylinder]:
 def known_top(options: FieldOptions, height_u: float | None) -> tuple[KnownTop, list[str]]:
     """What is known of the top, the thesis's where nothing is, and what to know of that.
 
-    height_u: standard uncertainty of the scan's heights [m].  Raises ImpossibleCylinder.
+    Args:
+        options: with what calliper and data sheet say.
+        height_u: standard uncertainty of the scan's heights [m].
+
+    Raises:
+        ImpossibleCylinder: a part of the top has no such size.
     """
     device = options.device or Device()
     table, warnings = device.top, []

@@ -14,7 +14,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Shown:
-    """words: of the quantity; unit: that it is shown in; factor: as many of them make one in SI."""
+    """How people are shown a quantity.
+
+    Attributes:
+        words: of the quantity.
+        unit: that it is shown in.
+        factor: as many of them make one in SI.
+    """
 
     words: str
     unit: str = ""

@@ -38,8 +38,13 @@ OWN_U = "flux_density_mean_u_t"
 class FieldReadings:
     """Flux density against height, each array of shape (n,).
 
-    height [m], flux_density [T]; height_u [m], u [T]: standard uncertainties, None where not given; has_own_u: whether
-    u is each reading's own, without what is common to all.
+    Attributes:
+        height: [m].
+        flux_density: [T].
+        height_u: standard uncertainty, None where not given [m].
+        u: likewise [T].
+        has_own_u: whether u is each reading's own, without what is common to all.
+        warnings: about the file.
     """
 
     height: Array

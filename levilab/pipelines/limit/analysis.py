@@ -47,7 +47,11 @@ RESONANCE = "resonance of the wobble"
 
 @dataclass(frozen=True)
 class LimitOptions(InputOptions):
-    """How limits are analyzed.  reading_u: of every limit [Hz], in the place of what the data say."""
+    """How limits are analyzed.
+
+    Attributes:
+        reading_u: of every limit [Hz], in the place of what the data say.
+    """
 
     reading_u: float | None = None
 

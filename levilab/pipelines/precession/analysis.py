@@ -44,8 +44,10 @@ NEEDS = Needs(
 class PrecessionOptions(InputOptions):
     """How sweeps are analyzed.
 
-    reading_u: of every count of the precession [Hz], in the place of what the data say; keep_outliers: points that
-    miscounted are kept; orthogonal: the uncertainty of the drive's frequency counts, too.
+    Attributes:
+        reading_u: of every count of the precession [Hz], in the place of what the data say.
+        keep_outliers: points that miscounted are kept.
+        orthogonal: the uncertainty of the drive's frequency counts, too.
     """
 
     reading_u: float | None = None
@@ -61,7 +63,11 @@ DIFFERENT_P = 0.01
 
 @dataclass(frozen=True)
 class PointCoherence:
-    """How firmly the laser's pulses follow the drive at a point.  point: its number, from 0 on."""
+    """How firmly the laser's pulses follow the drive at a point.
+
+    Attributes:
+        point: its number, from 0 on.
+    """
 
     point: int
     coherence: Coherence
@@ -69,7 +75,12 @@ class PointCoherence:
 
 @dataclass(frozen=True)
 class PrecessionRun:
-    """One sweep.  coherences: of the records that were kept; warnings: about these."""
+    """One sweep.
+
+    Attributes:
+        coherences: of the records that were kept.
+        warnings: about these.
+    """
 
     fit: SweepFit
     coherences: tuple[PointCoherence, ...] = ()
@@ -196,9 +207,9 @@ def _coherences(source: Source[Readings]) -> tuple[tuple[PointCoherence, ...], t
     for laser, drive in pairwise(traces):
         if (laser.channel, drive.channel) != ("laser", "drive"):
             continue
-        # a record is kept before its point's reading is
-        point = int(np.searchsorted(source.readings.time, laser.time_s - _AT_ONCE_S))
-        if point >= len(source.readings):
+        # a record is taken once its point's reading is kept
+        point = int(np.searchsorted(source.readings.time, laser.time_s + _AT_ONCE_S, side="right")) - 1
+        if point < 0:
             continue
         try:
             found.append(PointCoherence(point, _coherence(laser, drive, float(source.readings.drive[point]))))

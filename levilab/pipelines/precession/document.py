@@ -61,7 +61,11 @@ class CentredPart(Part):
 
 
 class ModelPart(Part):
-    """A line.  covariance: of slope and intercept."""
+    """A line.
+
+    Attributes:
+        covariance: of slope and intercept.
+    """
 
     name: Literal["weighted", "orthogonal", "robust"]
     parameters: dict[str, Value]

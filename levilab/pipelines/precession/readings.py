@@ -50,7 +50,8 @@ _OF = {"precession_frequency_hz": "precession", "drive_frequency_hz": "drive", "
 class Readings:
     """The points of a sweep, each array of shape (n,) [Hz], None where the table has no such column.
 
-    laser: the gates of each point, which a run holds.
+    Attributes:
+        laser: the gates of each point, which a run holds.
     """
 
     drive: Array

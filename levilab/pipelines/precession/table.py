@@ -100,7 +100,14 @@ def points_table(
     most: int = MOST_POINTS,
     clock: tuple[Sequence[str], Sequence[tuple[str, ...]]] = ((), ()),
 ) -> Table:
-    """The points, the first of many.  clock: heads and, of each point, cells that go before the others."""
+    """The points, the first of many.
+
+    Args:
+        run: the sweep.
+        name: of the run, for the title.
+        most: so many points at most.
+        clock: heads and, of each point, cells that go before the others.
+    """
     fit = run.fit
     shown = fit.points[:most]
     departures = column(

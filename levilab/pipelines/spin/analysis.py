@@ -59,8 +59,12 @@ class SpinOptions(InputOptions):
 class Series:
     """Frequency against time.
 
-    time [s], frequency [Hz], u [Hz]: shape (m,), a value for each window or record; phases: (what the top did, from, to
-    [s]); of: what each value is of, in words.
+    Attributes:
+        time: a value for each window or record, shape (m,) [s].
+        frequency: likewise [Hz].
+        u: its standard uncertainty [Hz].
+        phases: (what the top did, from, to [s]).
+        of: what each value is of, in words.
     """
 
     time: Array
@@ -77,8 +81,10 @@ class Series:
 class SpinRun:
     """One input.
 
-    spin: its frequency; of a long record or of several, that of the window or record in the middle; series: all of
-    them; notes: findings.
+    Attributes:
+        spin: its frequency; of a long record or of several, that of the window or record in the middle.
+        series: all of them.
+        notes: findings.
     """
 
     spin: SpinFrequency

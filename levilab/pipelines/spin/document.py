@@ -14,6 +14,8 @@ from levilab.pipelines.result import Part, Result, RunPart, Value
 from levilab.pipelines.spin.analysis import METHOD, Series, SpinAnalysis, SpinRun
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from levilab.pipelines.sources import Source
     from levilab.pipelines.spin.readings import Records
 
@@ -56,8 +58,11 @@ class SeriesPart(Part):
 #: Values that a run has, and their units.
 _UNITS = {
     "frequency": "Hz", "chirp": "Hz/s", "bend": "Hz/s^2", "phase": "1", "reference_time": "s", "bound": "Hz",
-    "scatter": "s", "snr": "dB",
+    "scatter": "s", "snr": "dB", "correlation_frequency_chirp": "1", "correlation_frequency_bend": "1",
+    "correlation_chirp_bend": "1",
 }  # fmt: skip
+#: With a bend: what the frequency at another time needs for its uncertainty.
+_CORRELATIONS = ("correlation_frequency_chirp", "correlation_frequency_bend", "correlation_chirp_bend")
 
 
 class SpinPart(RunPart):
@@ -88,7 +93,12 @@ class SettingsPart(Settings):
 
 
 class SpinResult(Result):
-    """result.json of spin frequencies.  method: of the only input; models: none compete."""
+    """result.json of spin frequencies.
+
+    Attributes:
+        method: of the only input.
+        models: none compete.
+    """
 
     analysis: Literal["spin"] = "spin"
     settings: SettingsPart
@@ -109,6 +119,8 @@ def _values(spin: SpinFrequency) -> dict[str, Any]:
     estimates = {"frequency": spin.frequency, "chirp": spin.chirp, "phase": spin.phase}
     estimates |= {"bend": spin.bend} if spin.bend else {}
     plain = {"reference_time": spin.reference_time, "bound": spin.bound, "scatter": spin.scatter, "snr": spin.snr_db}
+    if spin.bend:
+        plain |= dict(zip(_CORRELATIONS, spin.correlations, strict=True))
     values = {name: number(one.value, _UNITS[name], one.u) for name, one in estimates.items()}
     return values | {name: number(value, _UNITS[name]) for name, value in plain.items()}
 
@@ -151,12 +163,19 @@ def _run(part: SpinPart, *_: object) -> SpinRun:
         snr_db=values["snr"].value if "snr" in values else None,
         notes=notes,
         bend=values["bend"].estimate if "bend" in values else None,
+        correlations=_correlations(values),
     )
     series = part.series
     columns = (series.time_s, series.frequency_hz, series.frequency_u_hz)
     time, frequency, u = (np.array(column, dtype=np.float64) for column in columns)
     phases = tuple((phase.kind, phase.start_s, phase.end_s) for phase in series.phases)
     return SpinRun(spin, Series(time, frequency, u, phases, series.of), notes)
+
+
+def _correlations(values: Mapping[str, Value]) -> tuple[float, float, float]:
+    """Of result.json; 0 where it has none, as without a bend, and from earlier versions."""
+    of_two, of_ends, of_last = ((values[name].value or 0.0) if name in values else 0.0 for name in _CORRELATIONS)
+    return of_two, of_ends, of_last
 
 
 def _number(value: Value) -> float:

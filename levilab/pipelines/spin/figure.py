@@ -284,14 +284,12 @@ def _draw_series(axes: Axes, run: SpinRun, excerpt: _Excerpt) -> None:
         t = np.linspace(float(excerpt.time[0]), float(excerpt.time[-1]), 50)
         along = [spin.at(float(x)) for x in t]
         nu = np.array([one.value for one in along], dtype=np.float64)
-        nu += _bend(spin) * (t - spin.reference_time) ** 2 / 2
         u = np.array([one.u if one.u is not None else np.nan for one in along])
-        if not spin.bend:
-            axes.fill_between(t, nu - u, nu + u, color=BLUE, alpha=0.25, linewidth=0)
+        axes.fill_between(t, nu - u, nu + u, color=BLUE, alpha=0.25, linewidth=0)
         axes.plot(t, nu, color=BLUE)
         axes.plot(spin.reference_time, spin.frequency.value or 0.0, "o", color="black", markersize=5)
-        curve = "with its change" if spin.bend else "± u"
-        axes.set_title(f"Frequency along the slope, {curve}", loc="left")
+        curve = "slope and its change" if spin.bend else "slope"
+        axes.set_title(f"Frequency along the {curve}, ± u", loc="left")
     else:
         axes.errorbar(series.time, series.frequency, series.u, color=BLUE, fmt=".", markersize=3, elinewidth=0.8)
         colours = {"coasting": GREEN, "held": VERMILION, "speeding-up": "#E69F00"}

@@ -19,12 +19,19 @@ if TYPE_CHECKING:
     from levilab.runs.run import Run
 
 
+#: Channels whose frequency is no spin, as experiments call them, with what it is.
+NO_SPIN = {"laser": "how often the stem cuts the laser: its precession", "drive": "that of the drive"}
+
+
 @dataclass(frozen=True, eq=False)
 class Records:
     """One input.
 
-    waveforms: one for a file, one a record for a run, none for a list of times; channel: its name; pulses: the list;
-    origin: the file or folder.
+    Attributes:
+        waveforms: one for a file, one a record for a run, none for a list of times.
+        channel: its name.
+        pulses: the list.
+        origin: the file or folder.
     """
 
     origin: Path
@@ -73,15 +80,17 @@ def read_spin_file(path: Path, options: InputOptions) -> Records:
 def read_spin_run(run: Run, options: InputOptions) -> Records:
     """The records of a run: of one channel, the one with the most records unless it is named.
 
+    A laser and a drive are taken where they are named alone: theirs is the frequency of something else.
+
     Raises:
-        DoesNotSuit: the run keeps none.
+        DoesNotSuit: the run keeps none that show a spin.
         DataError: one is damaged, or none is of the channel.
     """
     found = run_waveforms(run)
     if not found:
         raise DoesNotSuit(f"{run.folder}: keeps no record of an oscilloscope")
     names = Counter(waveform.signals[0].name for waveform in found)
-    chosen = options.channel or names.most_common(1)[0][0]
+    chosen = options.channel or _shows_a_spin(run, names)
     of_channel = tuple(w for w in found if w.signals[0].name.casefold() == chosen.casefold())
     if not of_channel:
         raise DataError(
@@ -91,9 +100,23 @@ def read_spin_run(run: Run, options: InputOptions) -> Records:
         f"{run.folder.name}: {path} has no line in {INDEX}, as a process that was killed leaves it: it is left out"
         for path in undescribed_codes(run.folder)
     ]
+    warnings += [f"{run.folder.name}: record {one.number} {one.how_short}" for one in run.traces() if one.announced]
+    if chosen.casefold() in NO_SPIN:
+        warnings.append(f"{run.folder.name}: the frequency of {chosen} is no spin, but {NO_SPIN[chosen.casefold()]}")
     if options.channel is None and len(names) > 1:
         warnings.append(
             f"{run.folder.name}: has records of {', '.join(names)}; {chosen} is analyzed, "
             "the option `channel` chooses another"
         )
     return Records(run.folder, of_channel, chosen, None, tuple(warnings))
+
+
+def _shows_a_spin(run: Run, names: Counter[str]) -> str:
+    """The channel with the most records of those that show a spin.  Raises DoesNotSuit."""
+    spins = [name for name, _ in names.most_common() if name.casefold() not in NO_SPIN]
+    if spins:
+        return spins[0]
+    raise DoesNotSuit(
+        f"{run.folder}: keeps records of {' and '.join(names)}, none of which shows the spin: levilab analyze "
+        f"precession reads such a run; `channel` = {next(iter(names))} takes the frequency of its pulses"
+    )

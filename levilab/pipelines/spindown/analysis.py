@@ -40,9 +40,11 @@ _TILTED: dict[Tilt, bool | None] = {"auto": None, "none": False, "fitted": True}
 class SpinDownOptions(InputOptions):
     """How spin-downs are analyzed.
 
-    reading_u: of every reading [Hz], in the place of what the data say; bootstrap_samples, seed: of the bootstrap,
-    where it is asked for; tilt: whether the count holds the tilt of the top's moment, auto: where readings demand it,
-    and what they may hide of it is in u.
+    Attributes:
+        reading_u: of every reading [Hz], in the place of what the data say.
+        bootstrap_samples, seed: of the bootstrap, where it is asked for.
+        tilt: whether the count holds the tilt of the top's moment, auto: where readings demand it, and what they may
+            hide of it is in u.
     """
 
     reading_u: float | None = None
@@ -75,9 +77,15 @@ class SpinDownAnalysis(Analyzed[Readings, SpinDown, Combined, SpinDownOptions]):
 
 
 def fit_source(source: Source[Readings], options: SpinDownOptions, *, tilt: bool | None = None) -> SpinDown:
-    """All laws fitted to one input.  Raises DataError, which names the file.
+    """All laws fitted to one input.
 
-    tilt: whether the count has the top's tilt; None: as the options say.
+    Args:
+        source: the input.
+        options: of the fit.
+        tilt: whether the count has the top's tilt; None: as the options say.
+
+    Raises:
+        DataError: with the name of the file.
     """
     readings = source.readings
     try:

@@ -60,7 +60,8 @@ class CorrelationPart(Part):
 class FitPart(Part):
     """What it takes to draw and to combine a fit.
 
-    solution: in the dimensionless numbers of `analysis.spindown.drag`.
+    Attributes:
+        solution: in the dimensionless numbers of `analysis.spindown.drag`.
     """
 
     n_parameters: int = Field(ge=1)

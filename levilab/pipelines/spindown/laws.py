@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 class StraightLine:
     """What falls or rises in a straight line where a law holds.
 
-    quantity: for text; axis: for the axis of a figure, with its unit; transform: of ω [rad/s].
+    Attributes:
+        quantity: for text.
+        axis: for the axis of a figure, with its unit.
+        transform: of ω [rad/s].
     """
 
     quantity: str
@@ -30,7 +33,13 @@ class StraightLine:
 
 @dataclass(frozen=True)
 class ShownLaw:
-    """equation: as a figure's label; colour: the same in every figure; straight: None if nothing is."""
+    """How people are shown a law.
+
+    Attributes:
+        equation: as a figure's label.
+        colour: the same in every figure.
+        straight: None if nothing is.
+    """
 
     equation: str
     colour: str

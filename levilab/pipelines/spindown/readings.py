@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.errors import AnalysisError
+from analysis.errors import AnalysisError, NotPositive, TimesNotIncreasing
 from analysis.numbers import digits
 from analysis.pulses import phases, track_of_blocks, track_of_times
-from analysis.spindown.readings import must_fall
+from analysis.spindown.readings import checked
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
-from levilab.formats.table import FEWEST, Table, must_be_positive, read_table
+from levilab.formats.table import FEWEST, Table, read_table
 from levilab.formats.waveforms.header import NoRate, NoWaveform
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes
@@ -149,17 +149,12 @@ def spin_readings(table: Table, *, fewest: int = FEWEST) -> Readings:
     if time.size < fewest:
         raise TableError(table.path, f"holds {time.size} readings, at least {fewest} are needed: record longer")
     _must_be_ordinary(table, time, frequency)
-    _must_increase(table, time)
-    must_be_positive(table, frequency, "the frequency", "Hz, but a spinning top is above 0: remove the reading")
     if u is not None:
-        must_be_positive(table, u, "the uncertainty", "Hz, but must be above 0: correct it or remove the column")
         _must_be_possible(table, u, frequency)
-    try:
-        must_fall(frequency)
-    except (
-        AnalysisError
-    ) as error:  # here and not in the fit alone: one run under the drive spoils no search of a folder
-        raise TableError(table.path, str(error)) from error
+    try:  # as the fit does; here, too, since one run under the drive spoils no search of a folder
+        checked(time, frequency, u)
+    except AnalysisError as error:
+        raise _in_the_file(table, error) from error
     return Readings(time, frequency, u, (*table.warnings, *_doubts(table, frequency)))
 
 
@@ -196,23 +191,30 @@ def _must_be_ordinary(table: Table, time: "NDArray[np.float64]", frequency: "NDA
             )
 
 
-def _must_increase(table: Table, time: "NDArray[np.float64]") -> None:
-    late = np.flatnonzero(np.diff(time) <= 0)
-    if late.size:
-        i = int(late[0])
-        before, after = (int(line) for line in table.lines[i : i + 2])
-        what = "is repeated" if time[i] == time[i + 1] else "comes"
-        raise TableError(
-            table.path,
-            f"the time {time[i + 1]:.16g} s {what} after {time[i]:.16g} s in line {before}, times must increase: sort "
-            "the readings, or correct one",
-            line=after,
-        )
+def _in_the_file(table: Table, error: AnalysisError) -> TableError:
+    """What is wrong with the readings, with its line in the file and what to do about it there."""
+    if isinstance(error, TimesNotIncreasing):
+        before, after = (int(line) for line in table.lines[error.index - 1 : error.index + 1])
+        what = "is repeated" if error.before == error.after else "comes"
+        text = f"the time {error.after:.16g} s {what} after {error.before:.16g} s in line {before}"
+        return TableError(table.path, f"{text}, times must increase: sort the readings, or correct one", line=after)
+    if isinstance(error, NotPositive):
+        what, advice = _ABOVE_0[error.quantity]
+        return TableError(table.path, f"{what} is {error.value:.9g} {advice}", line=int(table.lines[error.index]))
+    return TableError(table.path, str(error))
+
+
+#: What the analysis calls a column, in the words of a file, and what to do.
+_ABOVE_0 = {
+    "spin frequency": ("the frequency", "Hz, but a spinning top is above 0: remove the reading"),
+    "standard uncertainty": ("the uncertainty", "Hz, but must be above 0: correct it or remove the column"),
+}
 
 
 def _must_be_possible(table: Table, u: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> None:
-    """An uncertainty below the rounding of the number itself is a mistake."""
-    wrong = np.flatnonzero((u < 1e-15 * frequency) | (u > 1e15 * frequency))
+    """An uncertainty below the rounding of the number itself is a mistake; one that is not above 0 is another."""
+    above_0 = (u > 0) & (frequency > 0)
+    wrong = np.flatnonzero(above_0 & ((u < 1e-15 * frequency) | (u > 1e15 * frequency)))
     if wrong.size:
         i = int(wrong[0])
         raise TableError(

@@ -8,9 +8,9 @@ import pytest
 
 from analysis.field.magnet import Disc, axial_field, stiffnesses
 from analysis.field.ring import Ring, on_axis, reversal, slopes
-from analysis.stability import Symmetric, windows
+from analysis.stability import SymmetricTop, windows
 from levilab.simulator.equilibrium import axial_field as scene_field
-from levilab.simulator.equilibrium import symmetric
+from levilab.simulator.equilibrium import top_of
 from levilab.simulator.scene import preset
 
 Z = np.array([-0.04, 0.012, 0.0285, 0.045, 0.073, 0.11, 0.4])
@@ -75,10 +75,10 @@ def test_a_disc_feels_what_the_simulators_quadrature_gives():
     z = np.array([0.066, 0.07, 0.073, 0.078])
     seen, expected = axial_field(ring, disc)(z), scene_field(scene)(z)
     assert seen[:2] == pytest.approx(expected[:2], rel=1e-5)  # the series is left off at 1e-5 of the force
-    stiff = symmetric(scene).stiffnesses
+    stiff = top_of(scene).stiffnesses
     assert stiff is not None
     # of the differences of the simulator 1e-4 is left where the stiffness itself nearly vanishes
     assert stiffnesses(ring, disc, moment)(z) == pytest.approx(stiff(z), rel=4e-4)
-    top = Symmetric(1.0, 1.0, 1.0, moment, 9.82, stiffnesses(ring, disc, moment))
+    top = SymmetricTop(1.0, 1.0, 1.0, moment, 9.82, stiffnesses(ring, disc, moment))
     (window,) = windows(axial_field(ring, disc), top, 0.05, 0.1)
     assert (window.low, window.high) == pytest.approx((0.0680958, 0.0750386), abs=1e-6)

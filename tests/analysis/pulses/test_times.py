@@ -97,6 +97,23 @@ def test_a_slope_that_changes_is_fitted_with_a_third_degree():
     assert abs(spin_of_times(times, degree=2).frequency.value / truth - 1) > 5e-5
 
 
+@pytest.mark.parametrize("missing", [0, 100])
+def test_the_frequency_at_another_time_follows_the_whole_polynomial(missing):
+    """Its value and its u, by numpy's fit of a polynomial to the turns; missed pulses make the middle no middle."""
+    grid = np.linspace(0, 20, 200001)
+    turns = np.arange(1, 500)
+    times = np.interp(turns, 30 * grid - 0.06 * grid**2 + 1e-3 * grid**3, grid)
+    times += 1e-5 * np.random.default_rng(6).standard_normal(times.size)
+    turns, times = (np.delete(column, slice(300, 300 + missing)) for column in (turns, times))
+    found = spin_of_times(times)
+    coefficients, covariance = np.polyfit(times - 9.0, turns, 3, cov=True)
+    for time in (0.0, 4.0, found.reference_time, 15.0, 25.0):
+        along = np.array([3 * (time - 9.0) ** 2, 2 * (time - 9.0), 1.0, 0.0])
+        at = found.at(time)
+        assert at.value == pytest.approx(along @ coefficients, rel=1e-9)
+        assert at.u == pytest.approx(np.sqrt(along @ covariance @ along), rel=0.02)  # Student's factor of 200 and more
+
+
 def test_wrong_lists_are_refused_with_the_reason():
     with pytest.raises(TooFewPulses, match=r"3 pulses in 0\.2 s, at least 4 are needed"):
         spin_of_times([0.0, 0.1, 0.2])

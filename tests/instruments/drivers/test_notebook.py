@@ -12,14 +12,14 @@ from instruments.drivers.magnetometer.lakeshore_425 import LakeShore425
 from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.errors import NotConnected, OutOfRange, WrongInstrument
 from instruments.virtual.bench.visa_library import library_for
-from levilab.world.bench import VIRTUAL, own_world, virtual_bus
+from levilab.world.bench import VIRTUAL, practice_world, virtual_bus
 from support.models import ROWS
 
 
 @pytest.fixture
 def bench():
     """A bench, and what `connect` needs to reach it."""
-    world = own_world()
+    world = practice_world()
     bus = virtual_bus(world)
     return bus, {"library": library_for(bus), "clock": world.clock}
 

@@ -20,7 +20,7 @@ from instruments.virtual.generator.siglent_sdg1000x import VirtualSDG1000X
 from instruments.virtual.oscilloscope.siglent_sds1000xe import VirtualSDS1000XE
 from support.conversation import CLEAR, conversation
 from support.scopes import pulses
-from support.wire import ask, received, send
+from support.wire import ask, errors, received, send
 
 AFTER_RESET = "C1:BSWV WVTP,SINE,FRQ,1000HZ,PERI,0.001S,AMP,4V,AMPVRMS,1.414Vrms,OFST,0V,HLEV,2V,LLEV,-2V,PHSE,0"
 
@@ -102,6 +102,13 @@ def test_a_field_of_each_channel_is_set_asked_and_reset(waveform, name, values, 
         assert f",{name},{value}" not in ask(device, f"C{other}:BSWV WVTP,{waveform};C{other}:BSWV?")
         send(device, b"*RST\n")
         assert f",{name},{default}" in ask(device, f"C{n}:BSWV WVTP,{waveform};C{n}:BSWV?")
+
+
+@pytest.mark.parametrize("question", ["C1:BSWV? FRQ", "C1:OUTP? (@1)"])
+def test_a_generator_is_asked_without_parameters(question):
+    device = VirtualSDG1000X(VirtualClock())
+    assert ask(device, question) is None
+    assert errors(device) == [-108]
 
 
 def test_a_switch_that_did_not_move_is_refused():

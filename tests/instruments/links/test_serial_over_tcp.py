@@ -21,7 +21,7 @@ def converter():
 
 def test_a_message_behind_one_without_an_answer_is_sent_at_once(converter):
     transport, _ = converter
-    assert transport._port._socket.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+    assert transport.port.connection().getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
 
 
 def test_a_converter_that_hung_up_is_called_again(monkeypatch):
@@ -42,7 +42,7 @@ def test_a_converter_that_hung_up_is_called_again(monkeypatch):
 
 def test_closing_leaves_nothing_open_when_the_other_side_has_hung_up(converter):
     transport, far_end = converter
-    link = transport._port._socket
+    link = transport.port.connection()
     far_end.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # hang up hard, with a reset
     far_end.close()
     with pytest.raises(NotConnected):

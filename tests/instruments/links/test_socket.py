@@ -9,9 +9,8 @@ import pytest
 
 from instruments.errors import NoAnswer, NotConnected
 from instruments.links.visa import VisaTransport
+from support.waiting import HANG_GUARD_S as AT_MOST
 
-#: How long a test waits for its own server before it fails [s]; reached by a failure only.
-AT_MOST = 5.0
 #: A time-out that is meant to be reached [s].
 SHORT = 0.05
 
@@ -65,15 +64,15 @@ def serving(port=0):
 
 
 def test_question_and_answer_over_a_bare_socket():
-    with serving() as server, contextlib.closing(VisaTransport(server.address)) as transport:
+    with serving() as server, contextlib.closing(VisaTransport(server.address, timeout=AT_MOST)) as transport:
         assert transport.query("*IDN?") == "levilab,loopback,0,0"
         assert transport.query("*IDN?") == "levilab,loopback,0,0"
 
 
 def test_a_bare_socket_sends_at_once():
     """VISA's default; without it a message behind another without an answer waits 0.04 s for its acknowledgement."""
-    with serving() as server, contextlib.closing(VisaTransport(server.address)) as transport:
-        link = transport._resource.visalib.sessions[transport._resource.session].interface
+    with serving() as server, contextlib.closing(VisaTransport(server.address, timeout=AT_MOST)) as transport:
+        link = transport.port.resource.visalib.sessions[transport.port.resource.session].interface
         assert link.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
 
 

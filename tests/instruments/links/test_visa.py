@@ -311,7 +311,7 @@ def test_a_link_without_locks_is_no_trouble_and_one_that_breaks_is(bus, monkeypa
     def broken(**_):
         raise trouble
 
-    monkeypatch.setattr(transport._resource, "lock_excl", broken)
+    monkeypatch.setattr(transport.port.resource, "lock_excl", broken)
     if error is None:
         transport.lock()
     else:

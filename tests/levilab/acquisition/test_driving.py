@@ -18,7 +18,7 @@ from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.table import EXPERIMENTS, Configuration, with_settings
 from levilab.runs.channel import Channel
 from levilab.world.bench import virtual_wiring
-from levilab.world.spin_world import SpinScene, SpinWorld
+from levilab.world.spin_world import Phase, SpinScene, SpinWorld
 from support.acquisitions import Silent
 
 if TYPE_CHECKING:
@@ -112,7 +112,9 @@ def test_a_top_that_no_drive_takes_up_again_ends_the_sweep_with_what_was_measure
     def forbid(session: Session[Any], drive: float) -> None:
         if drive > 31.0:
             session.bench.generator.off()
-            monkeypatch.setattr(SpinWorld, "_lock", lambda world, now, *_: world._lay(replace(now, rule="coasts")))
+            monkeypatch.setattr(
+                SpinWorld, "_lock", lambda world, now, *_: world._append(replace(now, phase=Phase.COASTING))
+            )
             session.wait(20.0)  # 2 Hz
 
     run, failed = swept(tmp_path, monkeypatch, [31.0, 31.5, 32.0, 32.5, 33.0], forbid)

@@ -6,8 +6,8 @@ import dataclasses
 import itertools
 import json
 import signal
-from datetime import UTC, datetime, timedelta
-from typing import TYPE_CHECKING, Any
+from datetime import UTC, datetime, tzinfo
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ from levilab.files import CannotWrite
 from levilab.runs.run import Run
 from levilab.runs.writer import RunWriter
 from levilab.world.bench import VIRTUAL, virtual_bus
-from levilab.world.spin_world import SpinScene, SpinWorld, drawn
+from levilab.world.spin_world import Phase, SpinScene, SpinWorld, drawn
 from support.acquisitions import BEFORE, Impatient, Silent, in_world, mock, of_scene
 
 if TYPE_CHECKING:
@@ -281,7 +281,7 @@ def test_the_time_of_a_reading_is_the_middle_of_its_gate(tmp_path: Path) -> None
     for seed in range(15):
         world = SpinWorld(drawn(seed), VirtualClock())
         frame = acquire(in_world(mock(tmp_path, seed), world), Silent()).readings().frame
-        released = [stretch for stretch in world._stretches if stretch.rule == "coasts"][-1].start
+        released = [stretch for stretch in world._stretches if stretch.phase is Phase.COASTING][-1].start
         spin, _ = world.motion(released + frame["time_s"].to_numpy()[:8])
         off += list(frame["spin_frequency_hz"].to_numpy()[:8] - spin / (2 * np.pi))
     # 120 readings of 0.03 Hz: 0.0027 Hz; 5 ms between the drive's end and time zero: 0.0005 Hz; the reciprocal
@@ -423,7 +423,7 @@ def test_a_wire_log_that_cannot_be_written_does_not_keep_the_output_on(
     assert (run.record.model_extra or {})["wire_log_ended"] == "No space left on device"
 
 
-def test_a_real_run_is_gone_on_with_by_the_time_on_the_wall(tmp_path: Path) -> None:
+def test_a_real_run_is_gone_on_with_by_the_time_on_the_wall(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As without a world: instruments from the configuration, and a top that has gone on since its time zero."""
     clock = VirtualClock()
     library = library_for(virtual_bus(SpinWorld(SpinScene(), clock)))
@@ -433,13 +433,19 @@ def test_a_real_run_is_gone_on_with_by_the_time_on_the_wall(tmp_path: Path) -> N
     )
     half = acquire(request, Impatient(4))
     assert half.record.synthetic  # the instruments say so themselves
-    zero = datetime.now(UTC) - timedelta(seconds=72.5)
+    zero = datetime(2026, 7, 1, 12, tzinfo=UTC)
+
+    class Then(datetime):
+        @classmethod
+        def now(cls, tz: tzinfo | None = None) -> Self:
+            return cls.fromtimestamp(zero.timestamp() + 72.5, tz)
+
+    monkeypatch.setattr("levilab.runs.run.datetime", Then)
     left = dataclasses.replace(half, record=half.record.model_copy(update={"time_zero_utc": zero.isoformat()}))
     run = acquire(dataclasses.replace(request, resume=left), Silent())
     times = run.readings().frame["time_s"].to_numpy()
     assert len(times) > 6
-    # the next whole ten seconds, and half a gate; a slow machine may take some seconds from zero to there
-    assert 80 <= times[4] < 92
+    assert 80 <= times[4] < 81  # the next whole ten seconds, and half a gate
     assert (np.diff(times) > 0).all()
 
 

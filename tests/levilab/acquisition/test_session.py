@@ -59,8 +59,7 @@ def scan(session: Session[ScanSettings]) -> None:
         flux_density = bench.magnetometer.flux_density()
         assert flux_density is not None
         bench.oscilloscope.acquire(timeout_s=5.0)
-        record = bench.oscilloscope.trace(1)
-        session.keep_trace(record, "phototransistor")
+        record = session.keep_trace(1, "phototransistor", session.now())
         row = {"time_s": session.now(), "height_m": height, "flux_density_t": flux_density}
         row["light_v"] = float(np.nanmean(record.volts))
         session.keep(row, time_left_s=2.0 * (len(session.settings.heights_m) - k - 1))

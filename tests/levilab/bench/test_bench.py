@@ -19,7 +19,7 @@ from levilab.bench.config import (
 from levilab.bench.wiring import described_wiring
 from levilab.errors import LevilabError
 from levilab.interruption import Interrupted
-from levilab.world.bench import MODELS, VIRTUAL, at_the_coil, virtual_wiring
+from levilab.world.bench import VIRTUAL, VIRTUAL_MODELS, at_the_coil, virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld
 from support.waiting import HANG_GUARD_S
 
@@ -68,7 +68,7 @@ def faulty(monkeypatch):
     """The virtual bench with a generator whose faults a test can switch on."""
     monkeypatch.setattr(Faulty, "silent", 0)
     monkeypatch.setattr(Faulty, "stuck", False)
-    monkeypatch.setitem(MODELS["generator"], "33500B", at_the_coil(Faulty))
+    monkeypatch.setitem(VIRTUAL_MODELS["generator"], "33500B", at_the_coil(Faulty))
     return Faulty
 
 
@@ -212,7 +212,7 @@ def test_the_second_output_is_off_as_soon_as_the_bench_is_open_and_when_it_is_le
             self.settings |= {"1:output": True, "2:output": True}
             made.append(self)
 
-    monkeypatch.setitem(MODELS["generator"], "33500B", at_the_coil(LeftOn))
+    monkeypatch.setitem(VIRTUAL_MODELS["generator"], "33500B", at_the_coil(LeftOn))
     with open_bench(virtual_wiring(world), KINDS):
         assert (made[0].settings["1:output"], made[0].settings["2:output"]) == (False, False)
         made[0].settings["2:output"] = True
@@ -425,7 +425,8 @@ def test_an_empty_description_is_a_bench_without_instruments(tmp_path):
         ("counter = 3", "counter = '3'"),
         ("[spin]\ngate = 1\nlevel = 2", "(and 1 more)"),
         ("[spin\n", "not readable as TOML"),
-        ("[spin]\ngate_s = 1,0", "not readable as TOML"),
+        ("[spin]\ngate_s = 1,0", "; write a decimal point, not a comma"),
+        ("[spin]\ngate_s = 1 s", "; write the number without its unit"),
     ],
 )
 def test_what_is_wrong_with_a_description_is_told_in_one_line_with_its_path(tmp_path, text, says):

@@ -17,7 +17,7 @@ from levilab.bench.template import bench_text
 from levilab.bench.wiring import described_wiring
 from levilab.cli.bench import bench_init
 from levilab.errors import NoInstrument
-from levilab.world.bench import VIRTUAL, own_world, virtual_wiring
+from levilab.world.bench import VIRTUAL, practice_world, virtual_wiring
 
 #: Answers to *IDN? as instruments give them.
 IDENTITIES = {
@@ -93,7 +93,7 @@ def test_kinds_that_were_not_found_stand_there_as_comments_and_others_are_told(t
 
 
 def test_a_check_reads_each_kind_and_leaves_the_output_off():
-    seen = {one.kind: one for one in check(virtual_wiring(own_world()), Light())}
+    seen = {one.kind: one for one in check(virtual_wiring(practice_world()), Light())}
     assert all(not one.trouble for one in seen.values())
     assert seen["counter"].value == pytest.approx(30, abs=0.2)  # the virtual top spins at 30 Hz
     assert seen["oscilloscope"].value == pytest.approx(1.1, abs=0.1)  # between dark, 0.1 V, and the tape, 1.2 V

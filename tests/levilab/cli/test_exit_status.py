@@ -167,6 +167,20 @@ def test_the_virtual_bench_is_no_advice_to_those_who_use_it(place: Path) -> None
     assert advice not in command("acquire", "spin", "--mock", "--bench", "other.toml", cwd=place).err
 
 
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (f"analyze spindown {SAMPLE} --reading-u 0,03", "'0,03': a number is expected; write a decimal point"),
+        ("simulate undriven --duration 5s", "'5s': a number is expected; write the number without its unit"),
+        ("acquire spin --mock --seed abc", "'abc': a whole number is expected"),
+    ],
+)
+def test_a_number_written_otherwise_is_shown_with_how_to_write_it(place: Path, words: str, says: str) -> None:
+    ended = command(*words.split(), cwd=place)
+    assert ended.status == exit_codes.WRONG_USAGE
+    assert says in " ".join(ended.err.replace("│", " ").split())
+
+
 @pytest.mark.parametrize("words", NOT_UNDERSTOOD)
 def test_what_is_not_understood_is_wrong_usage(place: Path, words: str) -> None:
     assert command(*words.split(), cwd=place).status == exit_codes.WRONG_USAGE

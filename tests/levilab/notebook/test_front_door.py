@@ -21,7 +21,7 @@ from levilab.acquisition.request import AcquisitionOptions
 from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.person import Task
 from levilab.errors import DataError, DoesNotSuit, UsageError
-from levilab.motion.simulation import SimulationOrder
+from levilab.motion.simulation import SimulationRequest
 from levilab.notebook.acquisition import ask_with_input
 from levilab.notebook.analysis import write_frame
 from levilab.pipelines.catalogue import ANALYSES
@@ -322,7 +322,7 @@ def test_every_option_is_a_keyword_with_its_default() -> None:
     of_acquire = set(inspect.signature(levilab.acquire).parameters) - {"experiment"}
     assert of_acquire == {one.name for one in fields(AcquisitionOptions)} - {"tell"}
     of_simulate = inspect.signature(levilab.simulate).parameters
-    order = {one.name: one.default for one in fields(SimulationOrder) if one.name != "scene"}
+    order = {one.name: one.default for one in fields(SimulationRequest) if one.name != "scene"}
     assert {name: one.default for name, one in of_simulate.items() if name not in {"scene", "settings"}} == order
 
 

@@ -58,6 +58,7 @@ def test_no_two_files_share_a_result_whoever_lies_beside_them(names: set[str]) -
     assert len({str(file).casefold() for file in files}) == 5 * len(places)
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_files_that_differ_in_their_ending_alone_keep_their_results(tmp_path: Path) -> None:
     paths = [spin_down_csv(tmp_path / name, seed=k) for k, name in enumerate(("run.001", "run.002", "run"))]
     assert [saved(path) for path in paths] == [
@@ -67,6 +68,7 @@ def test_files_that_differ_in_their_ending_alone_keep_their_results(tmp_path: Pa
     ]
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_the_result_of_a_run_folder_is_result_json_in_it(tmp_path: Path, sample_data: Path) -> None:
     import shutil
 

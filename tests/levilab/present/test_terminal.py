@@ -20,7 +20,7 @@ WORDS = {word for text in (*HEADS[1:], *ROWS[0], *ROWS[1]) for word in text.spli
 
 def drawn(width: int) -> list[str]:
     out = io.StringIO()
-    terminal._Terminal(width=width, file=out, highlight=False).print(terminal.draw(TABLE))
+    terminal.Terminal(width=width, file=out, highlight=False).print(terminal.draw(TABLE))
     return [line.rstrip() for line in out.getvalue().splitlines()]
 
 

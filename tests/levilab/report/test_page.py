@@ -15,12 +15,13 @@ from typing import Any
 import pytest
 
 from levilab.errors import DataError, LevilabError
-from levilab.pipelines.catalogue import ANALYSES, Analysis, save
+from levilab.pipelines.catalogue import ANALYSES, save
 from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions, analyze_spindowns
 from levilab.report.inputs import _drive
 from levilab.report.page import render as render_found
 from levilab.report.page import write_report
 from levilab.runs.run import RunRecord
+from support.figures import undrawn
 from support.paths import SAMPLE_DATA
 from support.spin_downs import spin_down_csv
 from support.waiting import HANG_GUARD_S
@@ -76,7 +77,8 @@ def changed(run: Path, **entries: object) -> Path:
 
 
 def text_of(*paths: Path, options: SpinDownOptions | None = None) -> str:
-    return " ".join(Page(render(analyze_spindowns(paths, options or SpinDownOptions()))).text.split())
+    with undrawn():
+        return " ".join(Page(render(analyze_spindowns(paths, options or SpinDownOptions()))).text.split())
 
 
 @pytest.fixture
@@ -198,6 +200,7 @@ def test_intervals_are_shown_where_they_were_asked_for(run: Path) -> None:
     assert re.search(r"\[2\.365\d×10⁻⁴ … 2\.371\d×10⁻⁴\]|\[2\.366\d×10⁻⁴ … 2\.372\d×10⁻⁴\]", text)
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 @pytest.mark.parametrize("readings", [3, 20])
 def test_a_law_is_marked_best_only_where_the_readings_decide(tmp_path: Path, readings: int) -> None:
     analysis = analyze_spindowns([spin_down_csv(tmp_path / "a.csv", n=readings)], SpinDownOptions())
@@ -208,10 +211,12 @@ def test_a_law_is_marked_best_only_where_the_readings_decide(tmp_path: Path, rea
 
 
 def reported(*paths: Path, output: Path, tell: Any = None, **options: Any) -> str:
-    page = write_report(paths, output, options, tell).read_text(encoding="utf-8")
+    with undrawn():
+        page = write_report(paths, output, options, tell).read_text(encoding="utf-8")
     return " ".join(Page(page).text.split())
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_the_report_shows_what_analyze_found_intervals_included(run: Path, tmp_path: Path) -> None:
     options = SpinDownOptions(uncertainty="bootstrap", bootstrap_samples=50, tilt="none")
     save(ANALYSES["spindown"], analyze_spindowns([run], options))
@@ -223,6 +228,7 @@ def test_the_report_shows_what_analyze_found_intervals_included(run: Path, tmp_p
     assert f"as levilab analyze found it: {run / 'result.json'}" in text
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_the_report_does_not_fit_what_has_a_result(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     analysis = analyze_spindowns([run], SpinDownOptions())
     save(ANALYSES["spindown"], analysis)
@@ -233,6 +239,7 @@ def test_the_report_does_not_fit_what_has_a_result(run: Path, tmp_path: Path, mo
     assert all("Analysis" in here or "written" in here for here, _ in differ)
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_the_report_says_what_it_had_to_analyze(run: Path, tmp_path: Path) -> None:
     before = sorted(run.rglob("*"))
     assert "analyzed for this page: there was no result yet" in reported(run, output=tmp_path / "report.html")
@@ -258,6 +265,13 @@ def test_one_p_value_is_the_same_number_on_the_page_and_the_terminal(page: Page)
     assert "2.3×10⁻¹⁴" in page.text
 
 
+def test_a_figure_keeps_its_text_on_a_telephone_and_is_moved_sideways(page: Page) -> None:
+    """A figure is 10 in wide and its text 9 pt high: as wide as a telephone of 390 px, that would be 4.5 px."""
+    assert ("div", {"class": "scroll", "tabindex": "0"}) in page.tags
+    (width,) = re.findall(r"\.scroll > img \{ width: (\d+)rem; \}", page.text)
+    assert 9 / 72 / 10 * int(width) * 16 > 10
+
+
 def test_nothing_is_folded_away_so_that_all_is_printed(page: Page) -> None:
     assert "details" not in {tag for tag, _ in page.tags}
 
@@ -281,18 +295,11 @@ def test_many_readings_are_cut_in_the_page_and_the_figure_stays_small(tmp_path: 
     assert len(html) < 3e6
 
 
-@pytest.fixture
-def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Figures take longer than all the rest."""
-    monkeypatch.setattr(Analysis, "svg", lambda *_: "<svg/>")
-    monkeypatch.setattr(Analysis, "png", lambda *_: b"")
-
-
 def headings(page: Path) -> list[str]:
     return re.findall("<h1>(.*)</h1>", page.read_text(encoding="utf-8"))
 
 
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("undrawn_figures")
 def test_all_analyses_of_a_folder_are_on_the_page_in_their_order(tmp_path: Path, sample_data: Path) -> None:
     for name in ("upper-limits", "spin-down-1"):
         shutil.copytree(sample_data / name, tmp_path / "runs" / name)
@@ -308,7 +315,7 @@ def test_all_analyses_of_a_folder_are_on_the_page_in_their_order(tmp_path: Path,
     assert "no result lies beside spin-down-1, upper-limits" in told[0]
 
 
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("undrawn_figures")
 def test_a_run_that_has_two_results_is_described_once(tmp_path: Path, sample_data: Path) -> None:
     run = shutil.copytree(sample_data / "precession-sweep", tmp_path / "sweep")
     options = {"reading_u": 0.1}
@@ -324,7 +331,7 @@ def test_a_run_that_has_two_results_is_described_once(tmp_path: Path, sample_dat
     assert text.count("as levilab analyze found it") == 2
 
 
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("undrawn_figures")
 def test_a_result_that_lies_elsewhere_is_found_by_its_own_path(tmp_path: Path, run: Path) -> None:
     elsewhere = tmp_path / "elsewhere"
     spindown = ANALYSES["spindown"]
@@ -342,7 +349,7 @@ def test_a_result_that_lies_elsewhere_is_found_by_its_own_path(tmp_path: Path, r
         reported(elsewhere, output=tmp_path / "page.html")
 
 
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("undrawn_figures")
 def test_a_report_that_cannot_be_written_is_told_in_one_line(tmp_path: Path, sample_data: Path) -> None:
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     with pytest.raises(LevilabError, match="`output`"):

@@ -1,17 +1,22 @@
 """The run folder: nothing that was written is lost, and what is broken says so."""
 
+import errno
 import hashlib
 import json
 import re
+import tempfile
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from levilab.errors import DataError
 from levilab.files import CannotWrite, replace_atomically
-from levilab.runs.listing import list_runs
+from levilab.runs.listing import Listed, list_runs, print_runs
 from levilab.runs.run import Run, RunRecord, find_run, find_runs
 from levilab.runs.writer import RunWriter
 
@@ -174,6 +179,17 @@ def test_runs_are_found_below_a_folder_and_listed_oldest_first(tmp_path: Path) -
     ]
 
 
+def test_the_length_of_a_run_is_from_time_zero_or_not_known(tmp_path: Path) -> None:
+    """The first reading of a limit comes when the first top has fallen; a list of limits has no times."""
+    with RunWriter.create(tmp_path / "1", record(time_zero_utc="2026-11-20T00:00:00Z")) as one:
+        one.reading(row(5))
+    limits = record(channels=[{"name": "spin_frequency_hz", "unit": "Hz", "source": "a list"}])
+    with RunWriter.create(tmp_path / "2", limits) as other:
+        other.reading({"spin_frequency_hz": 21.7})
+    listed = list_runs(tmp_path)
+    assert [run.length_s for run in listed] == [50.0, None]
+
+
 def test_a_run_is_found_by_its_name_below_a_folder(tmp_path: Path) -> None:
     folder = written(tmp_path)
     short = folder.name.split("Z-")[1]
@@ -211,9 +227,10 @@ def test_a_clock_that_was_set_back_is_found_before_a_run_is_gone_on_with(tmp_pat
     changed = run.record.model_copy(update={"time_zero_utc": ahead})
     with pytest.raises(DataError, match="set back"):
         Run(run.folder, changed, "interrupted").elapsed()
-    past = (datetime.now(UTC) - timedelta(seconds=100)).isoformat()
-    changed = run.record.model_copy(update={"time_zero_utc": past})
-    assert Run(run.folder, changed, "interrupted").elapsed() == pytest.approx(100, abs=5)
+    past = datetime.now(UTC) - timedelta(seconds=100)
+    changed = run.record.model_copy(update={"time_zero_utc": past.isoformat()})
+    elapsed = Run(run.folder, changed, "interrupted").elapsed()
+    assert 100 <= elapsed <= (datetime.now(UTC) - past).total_seconds()
 
 
 def test_a_link_that_leads_nowhere_is_no_place_for_runs(tmp_path: Path) -> None:
@@ -228,3 +245,77 @@ def test_a_linked_run_is_found_once(tmp_path: Path) -> None:
     (tmp_path / "look" / "link").symlink_to(folder, target_is_directory=True)
     (tmp_path / "look" / "loop").symlink_to(tmp_path / "look", target_is_directory=True)
     assert find_runs(tmp_path / "look") == [tmp_path / "look" / "link"]
+
+
+# --- the list ---
+
+#: Fields of a line as this program writes them, and others.
+FIELDS = st.sampled_from(
+    ["0.0", "10.5", "-3", "1e-05", "", "nan", "inf", "9.91E37", "9.9e+37", "1e400", "2,0", '"1"', "x", " 1"]
+)
+ENDS = st.sampled_from(["\n", "\n", "\n", "\r\n", "\n\n", "\n# note\n", ""])
+
+
+@given(st.lists(st.tuples(st.lists(FIELDS, min_size=2, max_size=4), ENDS), max_size=5), st.booleans())
+@settings(max_examples=60)
+def test_a_glance_at_readings_says_what_reading_them_does(lines: list[tuple[list[str], str]], three: bool) -> None:
+    channels = CHANNELS if three else [*CHANNELS[:2], {"name": "record"}]
+    header = ",".join(channel["name"] for channel in channels)
+    with tempfile.TemporaryDirectory() as place:
+        (Path(place) / "run.json").write_text(record(status="finished", channels=channels).as_json(), encoding="utf-8")
+        text = f"{header}\n" + "".join(",".join(fields) + end for fields, end in lines)
+        (Path(place) / "readings.csv").write_bytes(text.encode())
+        glanced = list_runs(Path(place))
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("levilab.runs.listing._glance", lambda _: None)
+            assert glanced == list_runs(Path(place))
+
+
+def test_a_sound_run_is_listed_by_a_glance_at_its_readings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with RunWriter.create(tmp_path, record()) as writer:
+        for k in (0, 2, 3):
+            writer.reading(row(k))
+        writer.finish("finished")
+    monkeypatch.delattr(Run, "readings")
+    assert [(run.readings, run.length_s) for run in list_runs(tmp_path)] == [(3, 30.0)]
+
+
+def test_a_list_of_many_runs_looks_like_one_of_a_few(capsys: pytest.CaptureFixture[str]) -> None:
+    run = Listed(
+        "r/20261120T101500Z-spin-7f3a", "2026-11-20T10:15", "spin", "finished", 20, 190.0, synthetic=True, note="n ü"
+    )
+    odd = replace(run, note="", status="\x1b]0;x\x07", experiment="[red]limit")
+    print_runs([run, odd], Path("r"))
+    few = capsys.readouterr().out.splitlines()
+    print_runs([run, odd] * 150, Path("r"))
+    many = capsys.readouterr().out.splitlines()
+    assert [line.rstrip() for line in many[:5]] == [line.rstrip() for line in few[:5]]
+    assert len(many) == len(few) + 298
+    assert "[red]limit" in few[4]
+    assert "\x1b" not in "".join(many)
+
+
+# --- the disk ---
+
+
+def test_every_new_folder_above_a_run_is_on_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    synchronised: list[Path] = []
+    monkeypatch.setattr("levilab.runs.writer.sync_folder", synchronised.append)
+    with RunWriter.create(tmp_path / "a" / "b" / "c", record()):
+        pass
+    assert {tmp_path, tmp_path / "a", tmp_path / "a" / "b", tmp_path / "a" / "b" / "c"} <= set(synchronised)
+
+
+@pytest.mark.parametrize(
+    ("number", "advice"), [(errno.ENOSPC, "free space"), (errno.EIO, "look at the folder and its disk")]
+)
+def test_a_disk_that_fails_is_no_full_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, advice: str
+) -> None:
+    def fail(_: int) -> None:
+        raise OSError(number, "no")
+
+    with RunWriter.create(tmp_path, record()) as writer:
+        monkeypatch.setattr("os.fsync", fail)
+        with pytest.raises(CannotWrite, match=advice):
+            writer.reading(row(0))

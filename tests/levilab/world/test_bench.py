@@ -11,7 +11,7 @@ from instruments.links.visa import VisaTransport
 from instruments.virtual.bench import serial_line
 from instruments.virtual.bench.visa_library import library_for
 from levilab.bench.config import ConfigError
-from levilab.world.bench import VIRTUAL, own_world, plug_in_serial, virtual_bus
+from levilab.world.bench import VIRTUAL, plug_in_serial, practice_world, virtual_bus
 
 LINE = {"baudrate": 57600, "bytesize": 7, "parity": "O", "timeout": 1.0}
 
@@ -59,7 +59,7 @@ def test_what_there_is_not_is_told_with_what_there_is():
 
 @pytest.mark.parametrize("counter", ["53230A", "CNT-91"])
 def test_the_laser_is_at_the_counters_second_input_and_channel_three(counter):
-    world = own_world()
+    world = practice_world()
     pulses = lambda start, step, n: 0.65 + 0.5 * np.sin(2 * np.pi * 33.0 * (start + step * np.arange(n)))  # noqa: E731
     world.laser = pulses
     library = library_for(virtual_bus(world, models={"counter": counter}))

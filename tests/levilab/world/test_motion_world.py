@@ -122,7 +122,7 @@ def test_a_top_that_falls_is_gone_at_the_moment_of_its_fall():
 
 def test_a_top_that_is_put_back_begins_anew_whatever_the_drive_does_meanwhile():
     fell = simulate(FALLING, 5.0).fell.time
-    flight = Flight(FALLING, again_s=2.0)
+    flight = Flight(FALLING, put_back_after_s=2.0)
     flight.change(fell + 1.0, SINE)
     flight.change(fell + 1.5, OFF)
     begins = fell + 2.0
@@ -273,7 +273,9 @@ def test_a_pulse_is_lower_while_the_tape_bobs_out_of_the_lenss_view():
 
 
 def test_the_times_of_the_pulses_are_those_that_the_light_shows():
-    top = world(FALLING.changed({"start.spin_hz": 21.0}), again_s=1.0, seed=5, tape=Tape(noise=0.0, view_m=1.0))
+    top = world(
+        FALLING.changed({"start.spin_hz": 21.0}), put_back_after_s=1.0, seed=5, tape=Tape(noise=0.0, view_m=1.0)
+    )
     top.drive(0.7, Output("SIN", 21.0, 4e-4, 0.0))
     seen = 5e-5 * crossings(top.light(0.0, 5e-5, 80_000), 0.6, 0.04)
     said = np.concatenate([top.crossings(a, a + 0.37, Thresholds(0.6, 0.56)) for a in 0.37 * np.arange(11)])
@@ -307,10 +309,10 @@ def test_the_probe_sees_the_field_of_the_scenes_base():
 
 
 @pytest.mark.parametrize(
-    "look", [lambda top: top.light(top.clock.now(), 1e-3, 10), lambda top: top.keep_up()], ids=["light", "keep up"]
+    "look", [lambda top: top.light(top.clock.now(), 1e-3, 10), lambda top: top.catch_up()], ids=["light", "keep up"]
 )
 def test_a_bench_that_runs_for_hours_lets_go_what_nobody_asks_for(look):
-    top = world(FALLING, again_s=60.0)
+    top = world(FALLING, put_back_after_s=60.0)
     for _ in range(24):
         top.clock.sleep(3600.0)
         look(top)

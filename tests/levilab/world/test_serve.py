@@ -1,6 +1,7 @@
 """``levilab bench serve``: a process that other programs talk to, and that ends when it is asked to."""
 
 import contextlib
+import errno
 import json
 import os
 import signal
@@ -18,11 +19,9 @@ from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.servers.server import LOOPBACK, BenchServer
 from levilab.cli.bench import bench_app
 from levilab.errors import UsageError
-from levilab.world.bench import own_world, virtual_bus
-from levilab.world.serve import Service, chosen_models, serve
-
-#: How long something is waited for [s]; reached by a failure only, however busy the machine is.
-AT_MOST = 600.0
+from levilab.world.bench import practice_world, virtual_bus
+from levilab.world.serve import CannotServe, Service, chosen_models, serve
+from support.waiting import HANG_GUARD_S as AT_MOST
 
 
 @contextlib.contextmanager
@@ -73,7 +72,7 @@ def test_the_line_names_every_instrument_each_answers_and_sigterm_ends_it():
 
 
 def test_a_served_top_begins_to_spin_down_with_the_first_message():
-    world = own_world(WallClock(waits=True))
+    world = practice_world(WallClock(waits=True))
     bus = virtual_bus(world)
     bus.heard = world.clock.begin
     with BenchServer(bus) as server:
@@ -117,12 +116,12 @@ def interrupt_when(said, name="SIGTERM"):
 
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
 def test_a_signal_ends_it_and_threads_and_handlers_are_as_before(name):
-    before, threads = signal.getsignal(signal.SIGINT), threading.active_count()
+    before, threads = signal.getsignal(signal.SIGINT), set(threading.enumerate())
     said = []
     assert serve(Service(), interrupt_when(said, name)) == name
     assert {served.kind for served in said} >= {"counter", "generator"}
     assert signal.getsignal(signal.SIGINT) is before
-    assert threading.active_count() <= threads  # one of another test may have ended meanwhile
+    assert set(threading.enumerate()) <= threads
 
 
 def test_models_are_chosen_by_kind_in_any_case():
@@ -234,3 +233,38 @@ def test_a_signal_ends_it_in_the_middle_of_a_flood(line, monkeypatch):
     assert serve(Service(), flood) == "SIGTERM"
     flooding[0].join()
     assert 10 <= resets < 100
+
+
+# --- the port mapper ---
+
+
+@pytest.mark.parametrize(
+    ("error", "platform", "words"),
+    [
+        (PermissionError(errno.EACCES, "denied"), "linux", r"sysctl net.ipv4.ip_unprivileged_port_start=111.*setcap"),
+        (PermissionError(errno.EACCES, "denied"), "darwin", "start it with sudo"),
+        (OSError(errno.EADDRINUSE, "in use"), "linux", r"another port mapper \(rpcbind\) is there"),
+        (OSError(errno.EADDRNOTAVAIL, "no such address"), "darwin", r"`sudo ifconfig lo0 alias 127.0.0.2 up`"),
+    ],
+)
+def test_a_port_mapper_that_cannot_be_had_says_what_to_do(monkeypatch, error, platform, words):
+    @contextlib.asynccontextmanager
+    async def refused(*_):
+        raise error
+        yield
+
+    monkeypatch.setattr("levilab.world.serve.offered", refused)
+    monkeypatch.setattr("levilab.world.serve.sys.platform", platform)
+    with pytest.raises(CannotServe, match=words) as told:
+        serve(Service(port_mapper=111), lambda _: None)
+    assert "\n" not in str(told.value)
+
+
+def test_a_host_that_cannot_be_one_is_wrong_usage():
+    with pytest.raises(UsageError, match="no host can have this name"):
+        serve(Service(host="é" * 80), lambda _: None)
+
+
+def test_a_port_mapper_goes_with_loopback_addresses_alone():
+    with pytest.raises(UsageError, match="does not go with `portmapper`"):
+        serve(Service(host="192.168.1.5", port_mapper=111), lambda _: None)

@@ -20,7 +20,7 @@ from instruments.virtual.generator.voltage import fundamental, voltage
 from levilab.simulator.spin import DECAYS
 from levilab.world import bench as virtual_bench
 from levilab.world.light import Tape
-from levilab.world.spin_world import KEPT_S, SpinScene, SpinWorld, drawn
+from levilab.world.spin_world import KEPT_S, Phase, SpinScene, SpinWorld, drawn
 from support.wire import ask, received, send
 
 TURN = 2 * math.pi
@@ -261,7 +261,7 @@ def test_light_depends_on_what_is_asked_and_on_nothing_else():
 @pytest.mark.parametrize(("tape", "close"), [(Tape(noise=0.0), 2e-6), (Tape(), 6e-5)], ids=["quiet", "noisy"])
 @pytest.mark.parametrize("triggers", [Thresholds(0.6, 0.56), Thresholds(0.3, 0.34, -1.0)], ids=["rising", "falling"])
 def test_the_times_of_the_pulses_are_those_that_the_light_shows(tape, close, triggers):
-    top = world(replace(drawn(3), tape=tape, again_s=5.0))
+    top = world(replace(drawn(3), tape=tape, put_back_after_s=5.0))
     drive(top, 10.0, "SIN", 30.5, FIELD)  # coasts, is pulled and held, and coasts again
     off(top, 12.0)
     fall = next(t for t in np.arange(12.0, 300.0, 0.5) if spin_hz(top, t) == 0.0)
@@ -494,7 +494,7 @@ def second_channel(top, at):
 )  # fmt: skip
 def test_the_oscilloscope_sees_what_the_generator_was_told(model, commands, at, volts):
     top = world()
-    device = virtual_bench.MODELS["generator"][model](top)
+    device = virtual_bench.VIRTUAL_MODELS["generator"][model](top)
     send(device, f"OUTP:LOAD INF;:{commands}\n".encode())
     assert list(iter(lambda: ask(device, "SYST:ERR?"), device.no_error)) == []
     # a message takes a little time, and so the signal began a little before now
@@ -510,7 +510,7 @@ def test_the_oscilloscope_sees_what_the_generator_was_told(model, commands, at, 
 )
 def test_it_sees_an_arbitrary_waveform_too(model, load):
     top = world()
-    device = virtual_bench.MODELS["generator"][model](top)
+    device = virtual_bench.VIRTUAL_MODELS["generator"][model](top)
     send(device, f"OUTP:LOAD INF;:{load};:VOLT 4;VOLT:OFFS 1;:OUTP ON\n".encode())
     at = (np.arange(8) + 0.5) / 8
     assert second_channel(top, at) == pytest.approx([3, 1, -1, 1, 1, 1, 2, 2], abs=1e-3)
@@ -583,7 +583,7 @@ def test_settings_at_one_time_and_of_an_output_that_is_off_leave_no_trace():
 
 def test_a_change_at_the_time_of_a_fall_or_of_a_burst_that_was_to_end_changes_nothing_before():
     top = world()
-    fallen = next(s.start for s in top._stretches if s.rule == "fallen")
+    fallen = next(s.start for s in top._stretches if s.phase is Phase.FALLEN)
     drive(top, fallen, "SIN", 30.0, FIELD)
     assert spin_hz(top, fallen - 0.1) > 21.8
     assert spin_hz(top, fallen + 10.0) == 0
@@ -604,8 +604,8 @@ def test_the_magnetometer_sees_the_base_as_the_simulator_has_it():
 
 
 def test_a_top_that_falls_is_put_back_where_somebody_does_so():
-    top = world(SpinScene(again_s=10.0))
-    fallen = next(s.start for s in top._stretches if s.rule == "fallen")
+    top = world(SpinScene(put_back_after_s=10.0))
+    fallen = next(s.start for s in top._stretches if s.phase is Phase.FALLEN)
     spin, angle = top.motion(np.array([fallen - 1, fallen + 9, fallen + 10.001, fallen + 11 + fallen]))
     assert spin[0] > 0
     assert spin[1] == 0

@@ -130,12 +130,12 @@ def run_with_records(folder: Path, drift: float) -> Path:
     t = 1e-3 * np.arange(5000)
     with RunWriter.create(folder, record) as writer:
         for k, drive in enumerate((44.0, 40.0, 36.0)):
+            writer.reading(dict(zip(names, (10.0 * (k + 1), drive, drive, 0.02), strict=True)))
             if k == 1:
                 cut = np.cos(2 * np.pi * (drive + drift) * t) > 0.8
                 for channel, volts in (("laser", 1.0 - cut), ("drive", np.sin(2 * np.pi * drive * t))):
                     codes = np.rint(100 + 100 * volts).astype(np.uint8)
-                    writer.trace(10.0 * k + 9, Trace(codes, 1e-3, -2.5, 0.01, -1.0, 1), channel)
-            writer.reading(dict(zip(names, (10.0 * (k + 1), drive, drive, 0.02), strict=True)))
+                    writer.trace(10.0 * k + 16, Trace(codes, 1e-3, -2.5, 0.01, -1.0, 1), channel)
         writer.finish("finished")
         return writer.folder
 

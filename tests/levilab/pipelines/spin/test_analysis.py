@@ -44,6 +44,14 @@ def test_every_sample_file_gives_the_spin_that_it_was_made_with(sample_data: Pat
     assert [remark for remark in analysis.remarks if "samples-4000hz.npy" in remark]
 
 
+def test_a_laser_and_a_drive_are_no_spin(sample_data: Path) -> None:
+    sweep = sample_data / "precession-sweep"
+    with pytest.raises(DoesNotSuit, match="records of laser and drive, none of which shows the spin: levilab analyze"):
+        analyze_spins([sweep], SpinOptions())
+    named = analyze_spins([sweep], SpinOptions(channel="laser"))
+    assert any("the frequency of laser is no spin, but how often" in text for text in named.all_warnings)
+
+
 def test_options_reach_the_file_and_the_method(sample_data: Path) -> None:
     array = sample_data / "scope-files" / "samples-4000hz.npy"
     (run,) = analyze_spins([array], SpinOptions(rate=4000.0, method="edges")).runs
@@ -217,7 +225,7 @@ def test_each_analysis_takes_its_own_out_of_a_folder(sample_data: Path, tmp_path
     down, spin = found["spindown"], found["spin"]
     assert [source.name for source in down.sources][:2] == ["spin-down-1", "spin-down-2"]
     assert [source.name for source in down.sources][4:] == ["long.wav"]
-    assert len(spin.sources) == 15  # eleven files, the long one, three runs with traces
+    assert len(spin.sources) == 14  # eleven files, the long one, two runs with traces of a tape
     quiet = [text for each in (down, spin) for text in (*each.warnings, *each.remarks)]
     assert not [text for text in quiet if any(name in text for name in ("notes", "field.csv", "no titles"))]
     assert [text for text in down.remarks if "npy" in text] == []

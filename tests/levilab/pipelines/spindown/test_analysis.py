@@ -98,7 +98,7 @@ def test_the_result_is_written_as_the_interface_says(sample_data: Path, tmp_path
 
 def test_one_run_has_its_start_and_covariance_at_the_top(sample_data: Path) -> None:
     analysis = analyze_spindowns([sample_data / "spin-down-1"], SpinDownOptions())
-    result = ANALYSES["spindown"].document(analysis, analysis.home)
+    result = ANALYSES["spindown"].document(analysis, analysis.output_folder)
     disc = next(model for model in result["models"] if model["name"] == "disc")
     assert set(disc["parameters"]) == {"start_frequency", "c32"}
     assert np.array(disc["covariance"]).shape == (2, 2)
@@ -108,8 +108,8 @@ def test_one_run_has_its_start_and_covariance_at_the_top(sample_data: Path) -> N
 
 def test_a_plain_csv_is_analyzed_and_knows_nothing_of_synthetic(tmp_path: Path) -> None:
     analysis = analyze_spindowns([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions())
-    result = ANALYSES["spindown"].document(analysis, analysis.home)
-    assert analysis.home == tmp_path
+    result = ANALYSES["spindown"].document(analysis, analysis.output_folder)
+    assert analysis.output_folder == tmp_path
     assert (result["synthetic"], result["best_model"]) == (False, "disc")
     assert result["values"]["c32"]["value"] == pytest.approx(2.34e-4, abs=4 * result["values"]["c32"]["u"])
 
@@ -136,7 +136,7 @@ def test_real_and_synthetic_inputs_together_are_warned_of(sample_data: Path, tmp
     path = spin_down_csv(tmp_path / "my.csv")
     analysis = analyze_spindowns([path, sample_data / "spin-down-1"], SpinDownOptions())
     assert "1 of 2 inputs are SYNTHETIC" in analysis.warnings[0]
-    assert analysis.home == Path()
+    assert analysis.output_folder == Path()
 
 
 def test_inputs_of_the_same_name_are_told_apart(tmp_path: Path) -> None:
@@ -178,11 +178,12 @@ def test_a_stated_reading_uncertainty_takes_the_place_of_the_scatter(tmp_path: P
 @pytest.mark.parametrize("how", ["profile", "bootstrap"])
 def test_intervals_are_there_when_asked_for(tmp_path: Path, how: str) -> None:
     path = spin_down_csv(tmp_path / "my.csv", u=False)
-    analysis = analyze_spindowns([path], SpinDownOptions(uncertainty=how))  # type: ignore[arg-type]
+    options = SpinDownOptions(uncertainty=how, bootstrap_samples=300)  # type: ignore[arg-type]
+    analysis = analyze_spindowns([path], options)
     c = ANALYSES["spindown"].document(analysis, tmp_path)["runs"][0]["values"]["c32"]
     low, high = c["interval_68"]
     assert low < c["value"] < high
-    # no u was stated: both stand on the residuals' own scatter; 1000 samples tell a quantile to some 5 %
+    # no u was stated: both stand on the residuals' own scatter; 300 samples tell half a width to some 6 %
     assert (high - low) / 2 == pytest.approx(c["u"], rel=0.15)
 
 
@@ -208,6 +209,7 @@ def test_a_folder_without_runs_says_what_it_found(sample_data: Path, tmp_path: P
         analyze_spindowns([tmp_path], SpinDownOptions())
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_a_folder_that_cannot_be_written_is_told_in_one_line(sample_data: Path, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     analysis = analyze_spindowns([sample_data], SpinDownOptions())

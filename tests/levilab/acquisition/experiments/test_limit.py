@@ -58,6 +58,9 @@ def test_the_lower_limits_are_those_of_the_world_within_their_uncertainty(tmp_pa
     assert (frame["spin_seen_hz"] > frame["spin_frequency_hz"] - 0.3).all()
     assert kinds(run).count("asked the person") == 13  # the first one floats already
     assert kinds(run).count("fell") == 14
+    said = [event["text"] for event in run.events() if event["kind"] == "fell"]
+    above = (frame["spin_seen_hz"] < frame["spin_frequency_hz"]).tolist()
+    assert [text.endswith("Hz, by its scatter") for text in said] == above  # a count below the line is no contradiction
     assert run.record.instruments["generator"]["settings_end"]["output"] is False
 
 
@@ -77,10 +80,10 @@ def test_the_upper_limit_is_where_drag_takes_all_that_the_drive_can_give(tmp_pat
 class Slipping(SpinWorld):
     """The drive loses the top when it is set above 36 Hz."""
 
-    def _go_on(self, now: Any) -> None:
+    def _plan_future(self, now: Any) -> None:
         if self._drive_spin > 2 * math.pi * 36:
             self._hold = 0.0
-        super()._go_on(now)
+        super()._plan_future(now)
 
 
 #: An upper limit, soon: from 34 Hz at 0.1 Hz/s.

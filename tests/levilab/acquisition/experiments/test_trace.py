@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -17,14 +18,15 @@ from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import ConfigError
 from levilab.runs.listing import list_runs
+from levilab.runs.run import Run
+from levilab.runs.writer import RunWriter
 from levilab.world.bench import VIRTUAL, virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld, drawn
 from support.acquisitions import Impatient, Silent
+from support.commands import command
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    from levilab.runs.run import Run
 
 
 #: The thesis's driven top, put where it floats: as IC1 it swings so far that the laser misses it now and then.
@@ -150,8 +152,8 @@ def test_a_channel_that_shows_nothing_or_too_much_is_told(tmp_path: Path) -> Non
 def test_a_record_without_a_single_sample_is_kept_and_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = RigolDS1000Z.trace
 
-    def hollow(scope: Any, channel: int) -> Any:
-        trace = whole(scope, channel)
+    def hollow(scope: Any, channel: int, arrived: Any = None) -> Any:
+        trace = whole(scope, channel, arrived)
         return replace(trace, codes=np.zeros_like(trace.codes), none=0)
 
     monkeypatch.setattr(RigolDS1000Z, "trace", hollow)
@@ -229,6 +231,47 @@ def test_what_was_cut_short_is_said_and_taken_anew(tmp_path: Path) -> None:
     assert cut[1] == "record 2 was cut short after 1 of 2 channels; it is taken anew"
     assert [one.number for one in run.traces()] == [1, 2, 3, 5, 6]
     assert run.count() == 2
+
+
+def test_what_had_come_of_a_record_when_killed_is_found_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Killed before the third of three pieces of the second record: of the folder at that moment a copy is made."""
+    left, copied = tmp_path / "left", 0
+    monkeypatch.setattr(RigolDS1000Z, "_LONGEST_BLOCK", 5000)
+    whole = RunWriter.arriving
+
+    def arriving(writer: RunWriter, time_s: float, trace: Any, *more: Any) -> None:
+        nonlocal copied
+        whole(writer, time_s, trace, *more)
+        if trace.codes.size == 10_000 and (writer.folder / "traces" / "000001.npy").exists():
+            shutil.copytree(writer.folder, left)
+            copied += 1
+
+    monkeypatch.setattr(RunWriter, "arriving", arriving)
+    run = acquire(mock_trace(tmp_path, "records = 2\ninterval_s = 2.0\npoints = 12000", seed=3), Silent())
+    assert copied == 1
+    assert not (run.folder / "traces" / "arriving.json").exists()
+    assert not (run.folder / "traces" / "arriving.codes").exists()
+    codes = run.traces()[1].trace.codes
+
+    monkeypatch.undo()
+    found = Run.load(left)
+    assert found.status == "interrupted"
+    assert [(one.number, one.announced) for one in found.traces()] == [(1, None), (2, 12_000)]
+    np.testing.assert_array_equal(found.traces()[1].trace.codes, codes[:10_000])
+    ended = command("analyze", "spin", left, "--no-save", cwd=tmp_path)
+    assert ended.status == 0, ended.err
+    assert "record 2 was cut short: 10000 of its 12000 points are kept" in " ".join((ended.out + ended.err).split())
+
+    again = acquire(request_for("trace", AcquisitionOptions(resume=left, out=tmp_path)), Silent())
+    assert again.count() == 2
+    assert [(one.number, one.trace.codes.size, one.announced) for one in again.traces()] == [
+        (1, 12_000, None),
+        (2, 10_000, 12_000),
+        (3, 12_000, None),
+    ]
+    np.testing.assert_array_equal(again.traces()[1].trace.codes, codes[:10_000])
+    told = [event["text"] for event in again.events() if event["kind"] == "cut short"]
+    assert told[0] == "traces.jsonl: record 2 (tape) was cut short: 10000 of its 12000 points are kept"
 
 
 def test_the_generator_is_needed_only_by_a_drive(tmp_path: Path) -> None:

@@ -303,7 +303,7 @@ def test_each_input_counts_its_own_signal(bench):
         assert counter.frequency() == pytest.approx(hertz, rel=1e-4)
         np.testing.assert_allclose(counter.readings(3), hertz, rtol=1e-4)
         assert counter.settings()["trigger_level_v"] == 0.6
-        assert not counter.unlike(counter.settings())
+        assert not counter.changed_settings(counter.settings())
 
 
 def test_a_dark_room_is_no_reading_and_no_error(bench):

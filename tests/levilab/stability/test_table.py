@@ -1,0 +1,35 @@
+"""The linear theory's window, as the terminal and the document have it."""
+
+import json
+
+from levilab.simulator.equilibrium import stability_of
+from levilab.simulator.scene import preset
+from levilab.stability.table import as_document, print_stability, remarks
+
+UNDRIVEN = preset("undriven")
+DISC = UNDRIVEN.changed({"base.field": "exact", "top.magnet": "disc"})
+
+
+def test_the_table_has_the_figures_of_the_thesis_beside(capsys):
+    print_stability(stability_of(UNDRIVEN))
+    shown = capsys.readouterr().out
+    for figure in ("7.0035 – 7.5683", "24.742 – 25.485", "21.65", "80.60", "14.005, lacks it", "21.86 ± 0.08"):
+        assert figure in shown
+    print_stability(stability_of(UNDRIVEN.changed({"top.moment_a_m2": -0.715})))
+    assert "thesis's estimate" in (other := capsys.readouterr().out)
+    assert "lacks the factor 2√(I₁/I₃)" in other
+    assert "21.86" not in other
+
+
+def test_the_document_has_no_number_that_json_has_not():
+    for scene in (UNDRIVEN, UNDRIVEN.changed({"top.mass_kg": 0.03}), DISC):
+        json.dumps(as_document(stability_of(scene)), allow_nan=False)
+
+
+def test_what_the_theory_leaves_out_of_a_scene_is_told():
+    assert remarks(stability_of(UNDRIVEN)) == []
+    (drag,) = remarks(stability_of(preset("friction")))
+    assert "drag is left out" in drag
+    assert "lost" in drag
+    loose = " ".join(remarks(stability_of(preset("loose-washers"))))
+    assert all(f"{word} left out" in loose for word in ("the drag is", "the drive is", "the loose washers are"))
