@@ -108,7 +108,8 @@ def named() -> Iterator[tuple[str, Mutation | None]]:
         source = (trial.TREE / edits[0].file).read_bytes()
         line = source[: edits[0].start].count(b"\n") + 1
         text = f"`{' '.join(row['old'].split())}` → `{' '.join(row['new'].split())}`"
-        key = f"named: {row['name']}: {hashlib.sha256(repr(row).encode()).hexdigest()[:8]}"
+        change = repr([row["old"], row["new"], row.get("also")])
+        key = f"named: {row['name']}: {hashlib.sha256(change.encode()).hexdigest()[:8]}"
         place = function_at(edits[0].file, line)
         mutation = Mutation(key, room_of(edits[0].file), text, edits, place, line, tuple(row["tests"]))
         yield row["name"], mutation
