@@ -4,7 +4,7 @@ BIN    := .venv/bin
 DEMO   := demo
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test quick explore fuzz lint all-pythons wheel peers bench clean
+.PHONY: help setup demo test quick explore fuzz mutants lint all-pythons wheel peers bench clean
 
 help:  ## list the targets
 	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -41,6 +41,9 @@ explore: setup  ## the property tests with new random examples
 
 fuzz: setup  ## what a fuzzer guided by coverage finds, SECONDS for each target (60); see docs/fuzzing.md
 	$(BIN)/nox --session fuzz -- --seconds $(or $(SECONDS),60)
+
+mutants: setup  ## which mistakes in the code the tests would miss, an hour or more the first time; see docs/mutants.md
+	$(BIN)/python benchmarks/mutants
 
 lint: setup  ## style, types and import rules
 	$(BIN)/ruff check .

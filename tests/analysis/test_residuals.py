@@ -4,6 +4,7 @@ from itertools import combinations, groupby
 
 import numpy as np
 import pytest
+from scipy.stats import t as student
 
 from analysis.residuals import durbin_watson, gross_errors, runs_test_p, studentised
 from analysis.uncertainty import curvature
@@ -80,3 +81,11 @@ def test_noise_is_called_a_gross_error_as_rarely_as_promised():
     rng = np.random.default_rng(2)
     found = sum(gross_errors(rng.standard_t(16, size=20), 3).size > 0 for _ in range(20000))
     assert found <= 38  # 1e-3 of 20000 are 20; four standard deviations above
+
+
+def test_a_gross_error_lies_beyond_both_tails_of_students_t_for_all_readings():
+    # scipy.stats, two-sided, Bonferroni: 1e-3 of one run in all, so 1e-3/20/2 in each tail
+    limit = float(student.isf(1e-3 / 20 / 2, 20 - 3 - 1))
+    t = np.zeros(20)
+    t[[4, 9, 15]] = [1.001 * limit, -1.002 * limit, 0.999 * limit]
+    assert gross_errors(t, 3).tolist() == [9, 4]

@@ -163,3 +163,10 @@ def test_the_sign_may_change_where_that_of_the_base_does():
     low = np.arange(0.012, 0.10, 0.006)
     found = fit_scan(low, on_axis(TRUTH, low)[0], KNOWN, U_B, U_Z)
     assert found.values[0] == pytest.approx(TRUTH.strength, rel=0.02)
+
+
+@pytest.mark.parametrize(("strength", "doubted"), [(1e-5, True), (1.43e-3, False)])
+def test_a_strength_within_three_of_its_uncertainties_is_doubted(strength, doubted):
+    rough = 1e-4  # of a reading [T]: as noise of this size alone may make
+    found = fit_scan(Z, scan(1, replace(TRUTH, strength=strength), u_b=rough), KNOWN, rough, U_Z)
+    assert any("not significantly different from zero" in text for text in found.warnings) is doubted

@@ -83,3 +83,10 @@ def test_missing_samples_do_not_shift_the_pulses():
     for signal, beside in ((np.full_like(beam, np.nan), DRIVE), (beam, np.full_like(DRIVE, np.nan))):
         with pytest.raises(TooFewReadings):
             coherence(pulse_times(signal, DT), beside, DT, 30.0)
+
+
+def test_a_last_pulse_half_a_turn_late_is_one_of_many_in_its_window():
+    # against some dozen others it shortens their mean vector, and does not turn it
+    regular = pulses(DRIVE_HZ)
+    late = np.append(regular, regular[-1] + 1.5 / DRIVE_HZ)
+    assert coherence(late, DRIVE, DT, 30.0).excursion_turns < 1e-3

@@ -82,6 +82,14 @@ def test_pearsons_data_with_yorks_weights_give_the_published_line():
     assert (line.u_slope, line.u_intercept) == (pytest.approx(0.0579850, abs=1e-7), pytest.approx(0.294971, abs=1e-6))
 
 
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+def test_the_units_of_the_two_axes_do_not_matter(factor):
+    wide = 20 * U[::-1]  # so that the slope takes several rounds
+    line, other = fit_orthogonal(X, Y, wide, U), fit_orthogonal(X, factor * Y, wide, factor * U)
+    assert other.slope == pytest.approx(factor * line.slope, rel=1e-12, abs=0)
+    assert other.chi_square == pytest.approx(line.chi_square, rel=1e-9)
+
+
 def test_an_exact_drive_makes_the_orthogonal_line_the_weighted_one():
     weighted, both = fit_line(X, Y, U), fit_orthogonal(X, Y, np.full_like(X, 1e-9), U)
     for name in ("slope", "intercept", "u_slope", "u_intercept", "chi_square"):

@@ -110,17 +110,14 @@ def test_laws_that_a_run_lacks_are_left_out():
     assert [fit.name for fit in together.fits] == ["stokes", "disc"]
 
 
-@pytest.mark.parametrize("u", [0.03, None])
-def test_one_exponent_for_all_runs_costs_what_a_common_fit_finds(u):
-    """Against a fit of all runs at once with one exponent: the parabola is exact to a few per cent of the growth."""
-    fitted = runs(u)
-    stats = combine(fitted).fit("power").statistics
+def common_fit(fitted, u):
+    """χ² of all runs fitted at once with one exponent."""
 
     def residuals(parameters):
         exponent, rest = parameters[0], parameters[1:].reshape(len(fitted), 2)
         return np.concatenate([
-            (run.frequency - spin("power", run.time - run.start_time, start, np.exp(log_c), exponent)) / 0.03
-            for run, (start, log_c) in zip(fitted, rest, strict=True)
+            (run.frequency - spin("power", run.time - run.start_time, start, np.exp(log_c), exponent)) / sigma
+            for run, (start, log_c), sigma in zip(fitted, rest, u, strict=True)
         ])  # fmt: skip
 
     own = [
@@ -130,12 +127,29 @@ def test_one_exponent_for_all_runs_costs_what_a_common_fit_finds(u):
     exponent = np.mean([each[2] for each in own])
     shift = [np.log(c) + (n - exponent) * np.log(2 * np.pi * 30) for _, c, n in own]
     start = [exponent, *np.ravel([(each[0], log_c) for each, log_c in zip(own, shift, strict=True)])]
-    joint = least_squares(residuals, start, x_scale=np.abs(start), xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    return 2 * least_squares(residuals, start, x_scale=np.abs(start), xtol=1e-15, ftol=1e-15, gtol=1e-15).cost
+
+
+@pytest.mark.parametrize("u", [0.03, None])
+def test_one_exponent_for_all_runs_costs_what_a_common_fit_finds(u):
+    """Against a fit of all runs at once with one exponent: the parabola is exact to a few per cent of the growth."""
+    fitted = runs(u)
+    stats = combine(fitted).fit("power").statistics
     assert stats.n_parameters == 2 * len(fitted) + 1
     separate = sum(fit.fit("power").statistics.rss for fit in fitted)
-    growth = 2 * joint.cost * 0.03**2 - separate
+    growth = common_fit(fitted, [0.03] * len(fitted)) * 0.03**2 - separate
     assert growth > 0
     assert stats.rss - separate == pytest.approx(growth, rel=0.05)
+
+
+def test_runs_weigh_in_their_common_exponent_by_the_uncertainties_that_were_stated():
+    """Though one states a tenth of its scatter, and its uncertainties are enlarged: χ² is that of the stated ones."""
+    stated = [0.03, 0.003, 0.03]
+    fitted = [runs(u, constants=THESIS[:3])[k] for k, u in enumerate(stated)]
+    assert fitted[1].fit("power").statistics.inflation > 10
+    separate = sum(run.fit("power").statistics.chi_square for run in fitted)
+    growth = common_fit(fitted, stated) - separate
+    assert combine(fitted).fit("power").statistics.chi_square - separate == pytest.approx(growth, rel=0.05)
 
 
 def test_more_runs_make_no_law_more_excluded_for_its_constants():
@@ -150,3 +164,10 @@ def test_more_runs_make_no_law_more_excluded_for_its_constants():
 def test_few_runs_say_how_little_they_tell():
     assert "Student's t" in combine(runs()[:2]).warnings[-1]
     assert "1.8 u" in combine(runs()[:2]).warnings[-1]  # t of one degree of freedom at 84.1 %: 1.84
+
+
+def test_runs_without_stated_uncertainties_say_so_all_and_some():
+    with_u, without = runs(constants=THESIS[:2]), runs(None, constants=THESIS[:2])
+    said = [" ".join(combine(each).warnings) for each in (without, [with_u[0], without[1]], with_u)]
+    assert ["no uncertainties of the readings were given" in text for text in said] == [True, False, False]
+    assert ["1 of 2 runs give no uncertainties" in text for text in said] == [False, True, False]

@@ -407,6 +407,7 @@ def failing(monkeypatch, error):
         ("win32", serial.SerialException("PermissionError(13, 'Access is denied.')"), Occupied, "another program"),
         ("win32", serial.SerialException("FileNotFoundError(2, ...)"), NotConnected, "serial ports of this computer"),
         ("linux", ValueError("no such\nbaud rate"), NotConnected, "no such baud rate"),
+        ("linux", serial.SerialException(errno.EACCES, "denied"), NotConnected, "ask whoever runs this computer"),
     ],
 )
 def test_a_port_that_does_not_open_is_told_with_what_to_try(monkeypatch, platform, error, told, words):

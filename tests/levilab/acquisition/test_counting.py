@@ -79,3 +79,12 @@ def test_a_lower_spin_that_two_counts_agree_on_is_a_reading() -> None:
     reading = top.read()
     assert reading
     assert reading["spin_frequency_hz"] == 12.0
+
+
+@pytest.mark.parametrize(("spin", "taken"), [(31.9, True), (15.4, True), (15.0, False), (32.6, False), (40.0, False)])
+def test_a_first_count_is_taken_from_half_of_the_last_spin_to_five_per_cent_more(spin: float, taken: bool) -> None:
+    """The gate's middle is 2.5 s after the last reading: a top loses half at once, and half again each 100 s."""
+    bench = Bench(spin, None)
+    reading = bench.top((90.0, 31.0)).read()
+    assert (reading is not None) is taken
+    assert bool(bench.events) is not taken

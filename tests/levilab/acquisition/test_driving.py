@@ -146,6 +146,8 @@ def test_a_generator_that_fails_on_the_way_costs_no_point(tmp_path: Path, monkey
         ([30.0 + 0.3 * math.sin(2 * math.pi * 0.21 * k) for k in range(20)], False),  # swings about the drive
         ([30.0 - 0.1 * max(k - 11, 0) for k in range(20)], True),  # lost after 11 s: the air takes 0.1 Hz/s
         ([30.0, 29.0], False),
+        ([30.0, 30.0, 29.8, 29.8], False),  # two in a half tell too little of their scatter
+        ([30.0, 30.0, 30.0, 29.8, 29.8, 29.8], True),
     ],
 )
 def test_counts_of_a_top_that_was_lost_drift_off(counts: list[float], drifts: bool) -> None:

@@ -81,6 +81,18 @@ def test_a_jump_is_followed_within_the_capture_range_only(step, followed):
     assert reached is followed
 
 
+@pytest.mark.parametrize("step", [0.3, -0.3])
+def test_drag_holds_back_a_drive_that_pulls_up_and_helps_one_that_pulls_down(step):
+    top = world()
+    drive(top, 0.0, "SIN", 30.0, FIELD)
+    drive(top, 1.0, "SIN", 30.0 + step, FIELD)
+    drag = 2.34e-4 * (TURN * 30.0) ** 1.5  # 0.61 rad/s², a quarter of the hold
+    lasts = TURN * step / (math.copysign(HOLD, step) - drag)
+    # a constant acceleration, by the drag at 30 Hz, which a time step of 1 ms tells to 1e-4
+    assert spin_hz(top, 1.0 + 0.9 * lasts) == pytest.approx(30.0 + 0.9 * step, abs=1e-3 * abs(step))
+    assert spin_hz(top, 1.0 + 1.01 * lasts) == 30.0 + step
+
+
 def test_a_top_out_of_the_drives_reach_spins_down_as_if_there_were_none():
     driven, free = world(), world()
     drive(driven, 0.0, "SIN", 35.0, FIELD)

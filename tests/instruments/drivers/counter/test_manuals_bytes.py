@@ -229,6 +229,22 @@ def test_the_cnt91_gives_time_stamps_beside_the_readings():
         np.testing.assert_array_equal(counter.timed_readings(2), [[25.0, 700.0], [np.nan, 710.0]])
 
 
+def test_time_stamps_of_more_readings_than_an_answer_holds_come_in_parts():
+    lines = [
+        *accepted("FORM:TINF ON", "ARM:COUN 1002", "INIT"),
+        NONE_WRONG,
+        ("*OPC?", "1"),
+        NONE_WRONG,
+        ("FETC:ARR? 1000", ",".join(["+2.5E+01,+7.0E+02"] * 1000)),
+        NONE_WRONG,
+        ("FETC:ARR? 2", "+2.6E+01,+7.1E+02,+2.7E+01,+7.2E+02"),
+        *accepted("ARM:COUN 1", "FORM:TINF OFF"),
+    ]
+    with conversation(PendulumCNT91, *lines) as counter:
+        found = counter.timed_readings(1002)
+    np.testing.assert_array_equal(found[-3:], [[25.0, 700.0], [26.0, 710.0], [27.0, 720.0]])
+
+
 @pytest.mark.parametrize(
     "identity",
     ["PENDULUM, CNT-91, 123456, V1.28 7 Jan 2012", "TEKTRONIX,FCA3000,579249,V1.32 26 May 2022 09:54"],

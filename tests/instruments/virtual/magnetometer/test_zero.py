@@ -24,6 +24,16 @@ def test_zeroing_takes_its_time_and_then_the_present_field_is_zero(kind):
     assert value(ask(device, "RDGFIELD?")) == pytest.approx(25e-6, rel=0.1)
 
 
+def test_peaks_are_counted_from_the_zero_that_was_taken():
+    device = meter(Virtual475, zero_error=5e-6)  # a steady 12.3 mT: both peaks are the field, and its probe's error
+    device.clock.sleep(2.0)
+    before = [float(part) for part in ask(device, "UNIT 2;RDGMODE 3;RDGPEAK?").split(",")]
+    assert before == pytest.approx([12.305e-3] * 2, rel=1e-5)
+    assert ask(device, "ZPROBE;*OPC?") == "1"
+    device.clock.sleep(2.0)
+    assert [float(part) for part in ask(device, "RDGPEAK?").split(",")] == pytest.approx([0.0] * 2, abs=5e-7)
+
+
 def test_the_475_holds_its_answer_until_it_is_zeroed():
     device = meter(Virtual475)
     before = device.clock.now()

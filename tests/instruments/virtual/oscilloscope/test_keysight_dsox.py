@@ -59,3 +59,12 @@ def test_whole_settings_of_the_keysight():
         ":CHAN1:RANG +4.00000E+01;OFFS +0.00000E+00;COUP DC;IMP ONEM;DISP 1;BWL 0;INV 0;"
         'LAB "1";UNIT VOLT;PROB +1.00000E+01;PROB:SKEW +0.00E+00;STYP SING'
     )
+
+
+@pytest.mark.parametrize(("kind", "number", "count"), [("NORM", 0, 1), ("AVER", 2, 4), ("HRES", 3, 1)])
+def test_the_preamble_names_the_kind_of_acquisition(kind, number, count):
+    # Keysight InfiniiVision 1000 X-Series, Programmer's Guide, :WAVeform:PREamble: 0 normal, 1 peak, 2 average, 3 hres
+    device = keysight(pulses, *KEYSIGHT_READY, f":ACQ:TYPE {kind}", ":ACQ:COUN 4", ":SING")
+    device.clock.sleep(5.0)
+    fields = ask(device, ":WAV:PRE?").split(",")
+    assert (int(fields[1]), int(fields[3])) == (number, count)

@@ -1,35 +1,28 @@
-"""Pictures of the virtual oscilloscopes' screens."""
+"""What the picture of a screen shows."""
 
 import io
 import struct
-import zlib
 
+import numpy as np
 import pytest
+from PIL import Image
 
-from support.scopes import block, keysight, pulses, rigol
-from support.wire import received, send
-
-
-def png_size(data):
-    """Width and height; every part's sum is checked and the pixels unpacked."""
-    stream = io.BytesIO(data)
-    assert stream.read(8) == b"\x89PNG\r\n\x1a\n"
-    parts = {}
-    while head := stream.read(8):
-        length, kind = struct.unpack(">I4s", head)
-        content = stream.read(length)
-        assert stream.read(4) == struct.pack(">I", zlib.crc32(kind + content))
-        parts[kind] = content
-    width, height = struct.unpack(">II", parts[b"IHDR"][:8])
-    assert len(zlib.decompress(parts[b"IDAT"])) == height * (1 + 3 * width)
-    return width, height
+from instruments.virtual.oscilloscope.screenshot import HEIGHT, WIDTH, bmp8, bmp24, draw
 
 
-@pytest.mark.parametrize(("make", "question"), [(rigol, ":DISP:DATA? ON,OFF,PNG"), (keysight, ":DISP:DATA? PNG, COL")])
-def test_the_picture_is_a_png(make, question):
-    assert png_size(block(make(pulses), question)[1]) == (800, 480)
+def test_a_jump_is_a_line_from_the_height_before_to_the_one_after():
+    yellow = np.array([255, 255, 0])
+    picture = draw({1: np.where(np.arange(WIDTH) < 300, 0.25, 0.75)}, columns=10)
+    lit = (picture == yellow).all(axis=2).sum(axis=0)
+    jump = round((HEIGHT - 1) / 2)  # from a quarter to three quarters, with both ends
+    assert lit[300] in {jump, jump + 1, jump + 2}
+    assert (np.delete(lit, 300) == 1).all()
 
 
-def test_the_picture_of_the_rigol_is_by_default_a_bmp_of_the_size_that_public_drivers_expect():
-    send(device := rigol(pulses), b":DISP:DATA?\n")
-    assert len(received(device, 10.0)) == 1_152_068
+@pytest.mark.parametrize("form", [bmp24, bmp8])
+def test_a_bitmap_is_what_another_library_reads(form):
+    picture = draw({1: np.linspace(0, 1, WIDTH)}, columns=10)
+    data = form(picture)
+    assert struct.unpack_from("<H", data, 26) == (1,)  # planes: always one (Windows GDI, BITMAPINFOHEADER)
+    read = np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
+    assert np.abs(read.astype(int) - picture).max() <= (0 if form is bmp24 else 25)  # half a step of 51

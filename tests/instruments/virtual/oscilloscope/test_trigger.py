@@ -109,3 +109,9 @@ def test_grounded_shows_nothing_and_inverted_the_negative():
     for setting, expected in (("COUP GND", 0.0), ("INV ON", -0.3)):
         device = rigol(constant(0.3), "CHAN1:PROB 1;SCAL 0.2;OFFS 0", f"CHAN1:{setting}", ":STOP")
         assert rigol_volts(device)[1] == pytest.approx(expected, abs=0.0041)
+
+
+@pytest.mark.parametrize("how", [":RUN", ":SING"])
+def test_while_the_part_before_the_trigger_fills_the_scope_says_that_it_runs(how):
+    slow_sweep = (*RIGOL_READY, "CHAN1:OFFS 0", ":TRIG:EDGE:LEV 0", ":TIM:SCAL 0.1")
+    assert ask(rigol(ramp, *slow_sweep, ":STOP", how), ":TRIG:STAT?") == "RUN"

@@ -10,7 +10,7 @@ import pytest
 from pydantic import ValidationError
 
 from instruments.clock import VirtualClock
-from levilab.acquisition.experiments.field import FieldSettings, typed_height
+from levilab.acquisition.experiments.field import FieldSettings, _mean, typed_height
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
@@ -166,3 +166,9 @@ def test_heights_that_make_no_scan_are_refused(settings: dict[str, float], says:
 def test_bases_and_heights_that_cannot_be_are_refused(settings: dict[str, float], says: str) -> None:
     with pytest.raises(ConfigError, match=says):
         FieldSettings(**settings).check("field", Limits())  # type: ignore[arg-type]
+
+
+def test_readings_that_all_show_the_same_are_uncertain_by_their_last_digit() -> None:
+    # a rectangular distribution, GUM 4.3.7: its width over 2√3, here that of the last of six digits, 10 nT
+    row = _mean(SHORT, [1.2345e-3] * 4)
+    assert row["flux_density_mean_u_t"] == pytest.approx(1e-8 / 2 / 3**0.5)

@@ -14,7 +14,7 @@ from instruments.clock import VirtualClock
 from instruments.drivers.generator import Limits
 from instruments.errors import NoAnswer
 from levilab.acquisition.counting import prepare_counter
-from levilab.acquisition.experiments.precession import PrecessionSettings, calming_step
+from levilab.acquisition.experiments.precession import PrecessionSettings, _time_left, calming_step
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
@@ -245,3 +245,10 @@ def test_what_is_no_sweep_costs_one_line(tmp_path: Path, table: str, said: str) 
     assert ended.status == 1
     (line,) = [line for line in ended.err.splitlines() if not line.startswith("compiling")]
     assert said in line
+
+
+def test_the_time_left_of_a_sweep_is_that_of_its_way_and_of_its_holds() -> None:
+    settings = PrecessionSettings(first_hz=34.0, last_hz=30.0, step_hz=2.0, ramp_hz_per_s=0.2)
+    faster = settings.model_copy(update={"ramp_hz_per_s": 0.4})
+    assert _time_left(settings, 0) - _time_left(faster, 0) == pytest.approx((34.0 - 30.0) / 0.2 / 2)
+    assert _time_left(settings, 3) == 0.0
