@@ -86,7 +86,7 @@ def _outcome(
         return before
     start = time.monotonic()
     tried = dataclasses.replace(mutation, tests=tuple(asked.tests)) if asked.tests else mutation
-    found = attempt(tried, reached) | {"digest": digest}
+    found = attempt(tried, reached, before.get("test", "") if before else "") | {"digest": digest}
     if before and asked.tests and found["state"] == "survived":
         return before  # they are not all that reach it
     known[mutation.key] = found
@@ -96,9 +96,11 @@ def _outcome(
     return found
 
 
-def attempt(mutation: places.Mutation, reached: reach.Reach) -> dict[str, Any]:
-    """Run the tests against a mutation, the likeliest first."""
+def attempt(mutation: places.Mutation, reached: reach.Reach, killer: str = "") -> dict[str, Any]:
+    """Run the tests against a mutation, the likeliest first: above all the one that killed it the last time."""
     rounds = _rounds(mutation, reached)
+    if mutation.tests is None and killer in reached.seconds and (trial.TREE / _file_of(killer)).exists():
+        rounds.insert(0, ([_file_of(killer)], [killer], reached.seconds[killer]))
     if not rounds:
         return {"state": "unreached", "tests": 0}
     tests = 0

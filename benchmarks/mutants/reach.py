@@ -136,10 +136,9 @@ class Reach:
 
 
 def load() -> Reach:
-    """The map, joined from its groups; tests that fail without any change are not in it."""
+    """The map, joined from its groups; tests that fail without any change, or are gone, are not in it."""
     reach = Reach({}, defaultdict(lambda: defaultdict(set)), defaultdict(lambda: defaultdict(list)))
-    for path in sorted(KEPT.glob("*.json")):
-        group = json.loads(path.read_text(encoding="utf-8"))
+    for group in filter(None, (_known(name) for files in groups().values() for name in files)):
         failed = set(group["failed"])
         reach.seconds |= {test: seconds for test, seconds in group["tests"].items() if test not in failed}
         for name, lines in group["lines"].items():

@@ -111,7 +111,7 @@ class Session:
                 if message:
                     run_to_end(self._run(message, self.device.work))
 
-    def messages(self, data: bytes, *, end: bool = True) -> Iterator[str]:
+    def messages(self, data: bytes, *, end: bool) -> Iterator[str]:
         """The messages that these bytes complete, for begin().
 
         Some are empty, where the work may be interrupted: a million line feeds take a second to be cut apart.

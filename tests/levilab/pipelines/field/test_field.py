@@ -13,13 +13,14 @@ from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.device import Device, DeviceError, read_device
 from levilab.formats.table import parse_columns
 from levilab.pipelines.catalogue import ANALYSES, Analysis
-from levilab.pipelines.field.analysis import FieldAnalysis, analyze_scans
-from levilab.pipelines.field.device import FieldOptions
+from levilab.pipelines.field.analysis import NEEDS, FieldAnalysis, analyze_scans
+from levilab.pipelines.field.device import FieldOptions, known_of
 from levilab.pipelines.field.document import DOCUMENT
 from levilab.pipelines.field.figure import field_figure
 from levilab.pipelines.field.report import field_part
 from levilab.pipelines.field.table import field_tables
 from levilab.pipelines.result import save
+from levilab.pipelines.sources import collect
 from levilab.pipelines.top import calculate_top
 from levilab.report.page import render
 from levilab.world.base import Base
@@ -109,6 +110,16 @@ def test_a_result_that_does_not_go_with_the_readings_is_refused(scan: Path) -> N
     file.write_text(json.dumps(document), encoding="utf-8")
     with pytest.raises(DataError, match="each with a value"):
         ANALYSES["field"].recall([scan], FieldOptions())
+
+
+@pytest.mark.parametrize("said", [-0.01, "much"])
+def test_a_gain_that_no_gauss_meter_has_is_taken_for_none(scan: Path, said: object) -> None:
+    record = json.loads((scan / "run.json").read_text(encoding="utf-8"))
+    record["configuration"]["field"]["gain_u"] = said
+    (scan / "run.json").write_text(json.dumps(record), encoding="utf-8")
+    (source,) = collect([scan], NEEDS, lambda _: FieldOptions()).sources
+    assert source.readings.has_own_u
+    assert known_of(source, None).gain_u == 0
 
 
 def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(

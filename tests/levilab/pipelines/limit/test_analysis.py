@@ -13,6 +13,7 @@ from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
 from levilab.pipelines.catalogue import ANALYSES, analyze_suiting, save
 from levilab.pipelines.limit.analysis import LOWER_EDGE, RESONANCE, UPPER_EDGE, LimitOptions, analyze_limits
+from levilab.pipelines.limit.report import limit_part
 from levilab.pipelines.limit.table import limit_tables
 from levilab.report.page import write_report
 from support.spin_downs import spin_down_csv
@@ -134,6 +135,21 @@ def test_runs_of_other_conditions_stand_apart(sample_data: Path, tmp_path: Path)
     assert any("are of 3 conditions and are not put together" in text for text in analysis.all_warnings)
     values = ANALYSES["limit"].document(analysis, tmp_path)["values"]
     assert {"upper_1_mean", "upper_2_mean", "upper_3_standard_error", "upper_1_between_runs"} <= values.keys()
+
+
+def test_a_repetition_far_off_is_numbered_among_all_and_the_page_shows_200(tmp_path: Path) -> None:
+    """The 14th of 250 in all, the fourth of the second run."""
+    for name, n in (("one", 10), ("two", 240)):
+        limits = 21.9 + 0.1 * np.sin(1.0 + np.arange(n))
+        limits[3] += 2.0 * (name == "two")
+        (tmp_path / f"{name}.csv").write_text("\n".join(f"{one:.3f}" for one in limits), encoding="utf-8")
+    analysis = analyze_limits([tmp_path / "one.csv", tmp_path / "two.csv"], LimitOptions())
+    of_all, of_second = (text for text in analysis.all_warnings if "not belong to the others" in text)
+    assert of_all.startswith("repetition 14 does not")
+    assert of_second.startswith("two.csv: repetition 4 does not")
+    one, two = (part.context for part in limit_part(analysis).inputs)
+    assert (one["shown"], two["shown"], two["count"]) == (10, 200, 240)
+    assert [len(block.rows) for block in two["blocks"]] == 20 * [10]
 
 
 def test_upper_limits_that_do_not_scatter_are_no_better_than_a_step(sample_data: Path, tmp_path: Path) -> None:

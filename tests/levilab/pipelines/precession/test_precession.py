@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +14,7 @@ from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
 from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionOptions, analyze_precessions
 from levilab.pipelines.precession.document import DOCUMENT
+from levilab.pipelines.precession.figure import precession_figure
 from levilab.pipelines.result import save
 from levilab.report.page import render
 from levilab.runs.gates import COUNTED, gates_event
@@ -52,6 +54,7 @@ def test_a_file_of_ones_own_is_analyzed_without_naming_its_columns(tmp_path: Pat
     assert values["intercept"]["unit"] == "Hz"
     assert 0.01 < values["p_locked"]["value"] <= 1
     assert values["power"]["value"] > 0.99
+    assert "the smallest difference that they tell in nine cases of ten is 0.00" in found.text
     assert "half the frequency was counted, left out of the line" in document["warnings"][0]
     weighted, robust = document["models"]
     (a, b), (_, c) = weighted["covariance"]
@@ -161,6 +164,9 @@ def test_figure_and_page_show_what_was_found(tmp_path: Path) -> None:
     assert "mean vector" in page
     assert "half the frequency was counted" in page
     assert "left out" in page
+    line, _, leverage, *_ = precession_figure(found).axes
+    assert re.fullmatch(r"The precession follows the drive one to one \(p = 0\.\d+\)", line.get_title("left"))
+    assert leverage.get_title("left") == "Leverage; dotted: the mean, 0.67"  # of the shortest sweep, 2 of 3 points
 
 
 def test_a_reading_that_is_not_that_of_its_gates_is_believed_itself(tmp_path: Path) -> None:

@@ -257,6 +257,11 @@ def test_the_figure_shows_the_trace_the_turns_the_residuals_and_the_frequency(
     figure = spin_figure(analyze_spins(files[what], SpinOptions()))
     panels = figure.get_axes()
     assert len(panels) == (12 if what == "many" else 4)
+    if what in {"trace", "long"}:
+        marks = [line for line in panels[0].get_lines() if len(line.get_xdata()) == 2]
+        assert 5 <= len(marks) <= 7  # a turn each, of six that are shown
+    if what != "long":
+        assert panels[3].get_title("left") == "Frequency along the slope, ± u"
     residuals = np.concatenate([np.asarray(line.get_ydata(), float) for line in panels[2].get_lines()[1:]])
     assert len(residuals) > 10
     assert np.abs(residuals).max() < 200  # µs: a fifth of a pulse's width
@@ -280,7 +285,8 @@ def test_residuals_from_a_third_degree_have_no_bend_left(what: str, tmp_path: Pa
     file.write_text(text, encoding="utf-8")
     analysis = analyze_spins([file], SpinOptions())
     assert any(note.name == "curved" for note in analysis.runs[0].spin.notes)
-    panel = spin_figure(analysis).get_axes()[2]
+    panel, beside = spin_figure(analysis).get_axes()[2:]
+    assert beside.get_title("left") == "Frequency along the slope and its change, ± u"
     (dots,) = [line for line in panel.get_lines() if line.get_marker() == "."]
     at, residuals = (np.asarray(values, dtype=float) for values in (dots.get_xdata(), dots.get_ydata()))
     assert len(at) > 140  # of 150 turns

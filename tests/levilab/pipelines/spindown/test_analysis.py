@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import re
 import shutil
 from pathlib import Path
 
@@ -13,6 +14,8 @@ from levilab.errors import DataError, LevilabError
 from levilab.files import CannotWrite
 from levilab.pipelines.catalogue import ANALYSES, save
 from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
+from levilab.pipelines.spindown.report import spindown_part
+from levilab.pipelines.spindown.table import spindown_tables
 from levilab.runs.run import Run
 from support.spin_downs import spin_down_csv
 
@@ -64,7 +67,12 @@ def test_the_sample_traces_are_small_and_labelled_synthetic(sample_data: Path) -
 
 
 def test_the_four_runs_exclude_stokes_and_newton_and_favour_the_disc(sample_data: Path) -> None:
-    combined = analyze_spindowns([sample_data], SpinDownOptions()).combined
+    analysis = analyze_spindowns([sample_data], SpinDownOptions())
+    combined = analysis.combined
+    lines = spindown_tables(analysis)[-1]
+    assert [row.kind for row in lines.rows] == ["", "", "", "", "together"]
+    cells = {row.cells[0]: row.cells[2] for row in spindown_part(analysis).context["laws"].rows}
+    assert re.fullmatch(r"5\.\d\(2\.\d\)×10⁻⁶ .*", cells["disc (best)"]), cells  # as below; u of it: s/√(2·3)
     assert combined.best == "disc"
     assert {name for name, _ in combined.verdict.excluded} == {"stokes", "newton"}
     disc = combined.fit("disc").constants["c32"]

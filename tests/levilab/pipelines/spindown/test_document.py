@@ -216,6 +216,10 @@ def one_outlier(index: int) -> dict[str, Any]:
         ({"outliers": [one_outlier(20)]}, "names an outlier"),
         ({"outliers": [one_outlier(k) for k in range(20)]}, "so many outliers that 0 readings"),
         ({"outliers": [one_outlier(k) for k in range(18)]}, "so many outliers that 2 readings"),
+        (
+            {"reference": {"frequency_hz": 2.1e12, "time_s": 1.0}},
+            r"reference\.frequency_hz = .* or equal to 2000000000000",
+        ),
     ],
 )
 def test_a_result_that_the_readings_belie_is_an_error(tmp_path: Path, entries: dict[str, Any], says: str) -> None:
