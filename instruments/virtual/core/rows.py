@@ -74,7 +74,7 @@ class Number(Row):
 
     name: str
     default: float
-    limits: tuple[float, float] | Callable[..., tuple[float, float]] = (0.0, 0.0)
+    limits: tuple[float, float] | Callable[..., tuple[float, float]]
     unit: str = ""
     rounded: Callable[[float], float] = field(default=float, repr=False)
     spell: Callable[[float], str] | None = field(default=None, repr=False)

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import io
+import os
+import shutil
+import sys
 
 import pytest
 
 from levilab.present import terminal
+from levilab.present.progress import BarDisplay
 from levilab.present.tables import table
 
 HEADS = ("what is set", "now", "what may stand there", "what it means to the person at the bench")
@@ -36,3 +40,30 @@ def test_where_the_words_do_not_fit_beside_each_other_a_row_is_a_list() -> None:
     assert lines[lines.index("drive_amplitude_vpp") + 1].split() == ["now", "10.0"]
     assert not any("───" in line for line in lines)
     assert any("───" in line for line in drawn(80))
+
+
+class Screen(io.StringIO):
+    """A terminal's stream."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_table_is_as_wide_as_the_terminal_and_wider_into_a_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shutil, "get_terminal_size", lambda: os.terminal_size((57, 24)))
+    monkeypatch.setattr(sys, "stdout", Screen())
+    assert terminal.terminal().width == 57
+    monkeypatch.setattr(sys, "stdout", io.StringIO())
+    assert terminal.terminal().width == 160
+
+
+def test_at_the_end_the_bar_is_taken_away_and_the_lines_stay(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in {"TERM": "xterm", "COLUMNS": "100", "LINES": "24"}.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr(sys, "stderr", screen := Screen())
+    display = BarDisplay()
+    display.reading("40.123 Hz", 1.0, 3.0)
+    display.close()
+    shown = screen.getvalue()
+    assert "40.123 Hz" in shown
+    assert "\x1b[2K" in shown.rpartition("about 3 s left")[2]  # the line of the bar is erased
