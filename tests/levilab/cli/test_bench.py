@@ -15,9 +15,10 @@ from levilab.bench.config import ConfigError, InstrumentSettings, Limits, read_b
 from levilab.bench.discover import Found, driver_for_identity, identify, search
 from levilab.bench.template import bench_text
 from levilab.bench.wiring import described_wiring
-from levilab.cli.bench import bench_init
+from levilab.cli.bench import _tell, bench_init
 from levilab.errors import NoInstrument
 from levilab.world.bench import VIRTUAL, practice_world, virtual_wiring
+from levilab.world.serve import Served
 
 #: Answers to *IDN? as instruments give them.
 IDENTITIES = {
@@ -198,3 +199,14 @@ def test_no_library_and_no_bench_are_told(levilab, tmp_path):
     assert "no such file" in levilab("bench", "check", check=1).stderr
     (tmp_path / "empty.toml").write_text("", encoding="utf-8")
     assert "describes no instrument" in levilab("bench", "check", "--bench", "empty.toml", check=1).stderr
+
+
+def test_beside_the_name_of_a_served_instrument_stands_what_its_link_needs(capsys):
+    names = {"hislip": "TCPIP::localhost::hislip0,4881::INSTR", "socket": "TCPIP::localhost::5025::SOCKET"}
+    _tell((Served("counter", "53230A", names),))
+    shown = capsys.readouterr().out.splitlines()
+    assert shown == [
+        "counter 53230A",
+        "  hislip  TCPIP::localhost::hislip0,4881::INSTR",
+        "  socket  TCPIP::localhost::5025::SOCKET         (a line feed ends every message)",
+    ]

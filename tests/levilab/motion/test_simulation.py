@@ -128,6 +128,9 @@ def test_a_chaotic_motion_is_told_to_be_one() -> None:
     (note,) = summarise(magnified, 1.0, 100.0, 0.01).notes[:1]
     assert "1e-07" in note
     assert "chaotic" not in note
+    near = replace(motion, accuracy=replace(motion.accuracy, position=5e-7, nodes=4e-7))
+    (note,) = summarise(near, 1.0, 100.0, 0.01).notes[:1]
+    assert "nodes it is averaged over leave an error of 4e-07" in note
 
 
 def test_too_low_a_rate_for_the_lines_is_told(levilab: Command) -> None:
