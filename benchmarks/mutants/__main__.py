@@ -81,7 +81,8 @@ def _outcome(
     digest = hashlib.sha256(b"".join((trial.TREE / edit.file).read_bytes() for edit in mutation.edits)).hexdigest()[:16]
     before = known.get(mutation.key)
     wanted = not asked.only or any(word in f"{mutation.file} {name} {mutation.text}" for word in asked.only)
-    fresh = before and before["digest"] == digest and before["state"] not in asked.again
+    again = before and before["state"] in asked.again and not kept.is_equivalent(mutation)
+    fresh = before and before["digest"] == digest and not again
     if fresh or not wanted:
         return before
     start = time.monotonic()

@@ -48,6 +48,11 @@ def reasons() -> dict[tuple[str, str, str], dict[str, str]]:
     return {(row["file"], row["function"], row["change"]): row for row in rows}
 
 
+def is_equivalent(mutation: Mutation) -> bool:
+    """Whether it is said to change nothing that anyone could notice."""
+    return bool(reasons().get((mutation.file, mutation.function, mutation.text), {}).get("equivalent"))
+
+
 def row_of(kind: str, mutation: Mutation, outcome: dict[str, Any], name: str = "") -> Row:
     """The row of a mutation that has been tried."""
     known = reasons().get((mutation.file, mutation.function, mutation.text), {})

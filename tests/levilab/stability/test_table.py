@@ -1,6 +1,7 @@
 """The linear theory's window, as the terminal and the document have it."""
 
 import json
+from dataclasses import replace
 
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import preset
@@ -19,6 +20,14 @@ def test_the_table_has_the_figures_of_the_thesis_beside(capsys):
     assert "thesis's estimate" in (other := capsys.readouterr().out)
     assert "lacks the factor 2√(I₁/I₃)" in other
     assert "21.86" not in other
+
+
+def test_the_region_above_the_others_is_the_upper_one_and_a_single_one_is_not(capsys):
+    found = stability_of(UNDRIVEN)
+    for count, names in ((1, ["lower"]), (2, ["lower", "upper"]), (3, ["lower", "lower", "upper"])):
+        print_stability(replace(found, windows=(found.windows * 2)[:count]))
+        shown = [line.split()[0] for line in capsys.readouterr().out.splitlines() if line.strip()]
+        assert [word for word in shown if word in {"lower", "upper"}] == names
 
 
 def test_the_document_has_no_number_that_json_has_not():
