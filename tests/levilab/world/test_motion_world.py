@@ -14,7 +14,7 @@ from instruments.virtual.generator.voltage import fundamental
 from levilab.errors import LeftRange, SimulationError
 from levilab.simulator import SceneError, preset, simulate
 from levilab.world.base import Base
-from levilab.world.flight import RATE, Flight
+from levilab.world.flight import RATE, Flight, _cubic
 from levilab.world.light import Tape
 from levilab.world.motion_world import MotionWorld
 from levilab.world.spin_world import KEPT_S
@@ -44,6 +44,14 @@ def expected_turns(motion):
 
 
 # --- the flight ---
+
+
+def test_between_the_states_a_cubic_motion_is_itself():
+    cubic = np.polynomial.Polynomial([1.0, -2.0, 3.0, -0.5])
+    nodes, times = np.array([0.0, 0.5, 1.25, 3.0]), np.linspace(-0.2, 3.2, 69)
+    values, rates = (each(nodes).astype(np.float32) for each in (cubic, cubic.deriv()))
+    np.testing.assert_allclose(_cubic(times, nodes, values, rates), cubic(times), atol=1e-5)  # of numbers of 32 bits
+    assert list(_cubic(times[:2], nodes[:1], values[:1], rates[:1])) == [1.0, 1.0]
 
 
 def test_the_tape_turns_as_the_simulated_top_does():
