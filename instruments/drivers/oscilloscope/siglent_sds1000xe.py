@@ -106,6 +106,8 @@ class SiglentSDS1000XE(Scope):
     SLOPES: ClassVar[Mapping[str, str]] = SLOPES | {"either": "WINDOW"}
     #: It acquires in acquire() alone.
     SWEEPS: ClassVar[Mapping[str, str]] = {"normal": "STOP", "single": "STOP", "auto": "STOP"}
+    #: While it waits for its trigger; then it is STOP again.
+    CHANGED_BY_ACQUIRE: ClassVar[Mapping[str, str]] = {"sweep": "SINGLE"}
     COUPLINGS: ClassVar[Mapping[str, str]] = {"DC": "D1M", "AC": "A1M"}
 
     sweep = Setting("TRMD", str, choices=("AUTO", "NORM", "SINGLE", "STOP"))

@@ -126,6 +126,14 @@ def test_alternating_coupling_and_level_nought_find_nothing_or_count_noise_at_25
     assert sum(map(right, readings_at_all_places(messages))) <= 4  # by chance
 
 
+def test_the_input_has_two_ranges():
+    device = counter(pulses(40.0))
+    for range_v in (50, 5):
+        assert float(ask(device, f"INP:RANG {range_v};RANG?")) == range_v
+    send(device, b"INP:RANG 6\n")
+    assert errors(device) == [-224]
+
+
 @pytest.mark.parametrize(("coupling", "seen"), [("DC", True), ("AC", False)])
 def test_alternating_coupling_takes_the_mean_away(coupling, seen):
     # dark 0.1 V and a mean of 1.1 V·0.03·1.064 on it: without them the pulses reach 1.065 V

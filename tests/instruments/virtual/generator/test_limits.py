@@ -65,3 +65,8 @@ def test_every_waveform_is_answered_in_its_short_form(generator, older):
     assert errors(generator) == errors(older) == []
     assert ask(older, "FUNC TRI") is None
     assert errors(older) == [-224]
+
+
+def test_a_pulse_lasts_a_tenth_of_its_period_after_reset(generator):
+    assert number(generator, "FUNC:PULS:DCYC? DEF") == number(generator, "FUNC:PULS:DCYC?") == 10.0
+    assert number(generator, "FUNC PRBS;FREQ? MIN") == 1e-3

@@ -45,3 +45,11 @@ def test_the_475_reads_peaks_and_frequency():
 def test_a_mode_set_in_part_keeps_the_rest():
     # so does a driver of fsc2 with the 455
     assert ask(meter(Virtual475), "RDGMODE 2, 3;RDGMODE?") == "2,3,1,1,1"
+
+
+def test_the_475_keeps_its_control_and_the_compensations_of_its_probe():
+    device = meter(Virtual475)
+    assert ask(device, "PRBFCOMP?;PRBTCOMP?") == "1;1"  # both on, as the maker delivers it
+    assert [float(part) for part in ask(device, "CPARAM 0.25,0.5,100,3;CPARAM?").split(",")] == [0.25, 0.5, 100, 3]
+    assert float(ask(device, "PRBSENS?")) == 1.0
+    assert float(ask(meter(Virtual475, probe=None), "PRBSENS?")) == 0.0

@@ -95,7 +95,7 @@ def test_alarms_and_the_relay(alarm, on):
 
 
 def test_an_alarm_is_told_as_it_was_set():
-    assert ask(meter(), "ALARM 1,1,100,300,1,0,0;ALARM?") == "1,1,+100.000E+00,+300.000E+00,1,0,0"
+    assert ask(meter(), "ALARM 1,1,100.5,300.25,1,0,0;ALARM?") == "1,1,+100.500E+00,+300.250E+00,1,0,0"
 
 
 @EACH
