@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from levilab.simulator.ensemble import simulate_many
-from levilab.simulator.equilibrium import advice, axial_field, floating_height, stability_of
+from levilab.simulator.equilibrium import _disc_stiffnesses, advice, axial_field, floating_height, stability_of
 from levilab.simulator.field import flux_density
 from levilab.simulator.model import base_field
 from levilab.simulator.scene import SceneError, preset
@@ -115,3 +115,9 @@ def test_the_stiffnesses_of_an_equilibrium_are_those_of_the_field_strength_over_
     scale = abs(UNDRIVEN.top.moment_a_m2) / UNDRIVEN.top.mass_kg / h**2
     assert found.floating.radial == pytest.approx(scale * (sum(sides) - 2 * middle), rel=1e-4)
     assert found.floating.axial == pytest.approx(scale * (up + down - 2 * middle), rel=1e-4)
+
+
+def test_of_a_moment_that_leans_in_a_disc_its_part_along_the_axis_counts():
+    leaning = DISC.changed({"top.moment_tilt": [0.0, 0.8], "top.moment_a_m2": DISC.top.moment_a_m2 / 0.8})
+    one, other = (_disc_stiffnesses(scene)(np.array([0.07, 0.073])) for scene in (DISC, leaning))
+    np.testing.assert_allclose(one, other, rtol=1e-6)

@@ -48,6 +48,14 @@ def test_a_failure_is_ten_standard_deviations_off():
     assert study._score("x", 20.0, found, 10.0).failures == 1  # only the refusal: 50 are five bounds
 
 
+def test_a_case_by_name_is_the_only_one_that_is_carried_out(monkeypatch):
+    monkeypatch.setattr(study, "_at", lambda *_: pytest.fail("the study of all methods was begun"))
+    monkeypatch.setattr(study, "hard_case", lambda name, *_: name)
+    told = []
+    assert study.study(trials=1, cases=["5 pulses only"], tell=told.append).hard == ("5 pulses only",)
+    assert told == ["5 pulses only, 1 traces"]
+
+
 def test_the_document_has_no_nan_and_names_units(small):
     document = json.loads(json.dumps(study.as_document(small), allow_nan=False))
     assert {row["name"] for row in document["methods"]} == {*study.OURS, *PEERS}

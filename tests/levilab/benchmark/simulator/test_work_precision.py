@@ -1,6 +1,8 @@
 """The benchmark's own arithmetic, and that every side integrates the same motion."""
 
 import math
+import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from levilab.benchmark.simulator import motion
 from levilab.benchmark.simulator.command import print_comparison
 from levilab.benchmark.simulator.kernel import Rate
 from levilab.benchmark.simulator.ours import problem
-from levilab.benchmark.simulator.peers import PEERS, Peer, Point
+from levilab.benchmark.simulator.peers import PEERS, Peer, Point, heyoka_system
 from levilab.benchmark.simulator.work_precision import Comparison, as_document, best_speed, ratios
 from levilab.simulator.single import simulate
 
@@ -32,6 +34,14 @@ def test_the_two_forms_of_the_equations_and_the_simulator_describe_one_motion():
     ours = simulate(problem("levitron-6").scene, 0.2, tolerance=1e-11, rate=None)
     assert vector.y[:3, -1] == pytest.approx(ours.position[-1], abs=1e-11)
     assert euler.y[:3, -1] == pytest.approx(ours.position[-1], abs=1e-9)
+
+
+def test_the_equations_for_heyoka_are_those_of_the_other_sides(monkeypatch):
+    """Of numbers in the place of heyoka's symbols."""
+    state = np.array([2e-3, -1e-3, 0.073, 0.02, 0.03, -0.01, 0.1, -0.2, 0.97, 2e-6, -3e-6, 4e-4])
+    monkeypatch.setitem(sys.modules, "heyoka", SimpleNamespace(make_vars=lambda *names: state[: len(names)]))
+    rates = [rate for _, rate in heyoka_system()]
+    np.testing.assert_allclose(rates, motion.vector_rate(0.0, state), rtol=1e-12)
 
 
 def test_the_reference_is_the_golden_end_of_the_first_start():
