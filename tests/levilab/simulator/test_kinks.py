@@ -4,8 +4,13 @@ import numpy as np
 import pytest
 
 from levilab.simulator.ensemble import simulate_many
+from levilab.simulator.kernels.motion import TIME
+from levilab.simulator.model import model_of
+from levilab.simulator.problem import Problem, at_every_step, scheme_for
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
+from levilab.simulator.start import start_of
+from levilab.simulator.stops import Stops, every_step
 
 # far above the base, in its field alone, so that a tilted moment turns the spin back and forth through zero
 SLOW = preset("tilted").changed(
@@ -64,3 +69,20 @@ def test_a_spin_that_stays_away_from_zero_has_its_order():
 def test_newton_drag_leaves_a_spin_of_zero_at_zero():
     still = SLOW.changed({"base.strength_t_m": 0.0, "start.spin_hz": 0.0, "start.tilt_rad": 0.3, **DRAGS["newton"]})
     assert np.all(simulate(still, 1.0).spin_hz == 0)
+
+
+def test_there_is_a_state_after_each_step():
+    scene = SLOW.changed(DRAGS["newton"])
+    model, start = model_of(scene), start_of(scene)
+    stops = Stops(np.array([0.0, 0.001, 0.003]), np.array([2, 4]), np.zeros(2), np.zeros(2))
+    expected = [0.0, 0.0005, 0.001, 0.0015, 0.002, 0.0025, 0.003]
+    each = every_step(stops)
+    assert each.times == pytest.approx(expected)
+    assert each.counts.tolist() == 6 * [1]
+    states = at_every_step(Problem(scene, model, start, scheme_for(None, model)), stops)
+    assert states[:, TIME] == pytest.approx(expected)
+
+
+def test_the_spin_alone_has_no_error_of_steps():
+    accuracy = simulate(preset("friction").changed({"observed": "spin"}), 5.0).accuracy
+    assert (accuracy.position, accuracy.axis, accuracy.steps, accuracy.reached) == (0.0, 0.0, 0, True)
