@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from levilab.errors import DataError, UsageError
-from levilab.formats.columns import Column, TableError
+from levilab.formats.columns import Column, TableError, shorten
 from levilab.formats.dialect import Dialect
 from levilab.formats.layout import Layout
 from levilab.formats.rows import _read_at_once, _read_lines
@@ -540,3 +540,7 @@ def test_a_title_of_many_blanks_or_brackets_is_read_at_once(tmp_path: Path, titl
         read_table(file, needed=["spin_frequency_hz"])
     table = read_table(file, columns={"t": "1", "f": "2"})
     assert len(table.frame) == 5
+
+
+def test_a_text_that_is_cut_is_as_long_as_it_may_be():
+    assert [shorten("precession", most) for most in (5, 9, 10)] == ["prec…", "precessi…", "precession"]
