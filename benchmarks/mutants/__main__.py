@@ -100,8 +100,8 @@ def _outcome(
 def attempt(mutation: places.Mutation, reached: reach.Reach, killer: str = "") -> dict[str, Any]:
     """Run the tests against a mutation, the likeliest first: above all the one that killed it the last time."""
     rounds = _rounds(mutation, reached)
-    if mutation.tests is None and killer in reached.seconds and (trial.TREE / _file_of(killer)).exists():
-        rounds.insert(0, ([_file_of(killer)], [killer], reached.seconds[killer]))
+    if mutation.tests is None and "::" in killer and (trial.TREE / _file_of(killer)).exists():
+        rounds.insert(0, ([_file_of(killer)], [killer], reached.seconds.get(killer, FIRST_S)))
     if not rounds:
         return {"state": "unreached", "tests": 0}
     tests = 0

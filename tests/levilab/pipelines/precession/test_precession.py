@@ -120,8 +120,8 @@ def test_what_is_no_sweep_costs_one_line(tmp_path: Path, content: str, said: str
     assert not ended.out
 
 
-def run_with_records(folder: Path, drift: float) -> Path:
-    """A run of three points; the laser is recorded at the second one and drifts beside the drive [Hz]."""
+def run_with_records(folder: Path, drift: float, kept_s: float = 26.0) -> Path:
+    """A run of three points; the laser is recorded at the second one, at 20 s, and drifts beside the drive [Hz]."""
     names = ("time_s", "drive_frequency_hz", "precession_frequency_hz", "precession_frequency_u_hz")
     record = RunRecord(
         experiment="precession",
@@ -138,13 +138,13 @@ def run_with_records(folder: Path, drift: float) -> Path:
                 cut = np.cos(2 * np.pi * (drive + drift) * t) > 0.8
                 for channel, volts in (("laser", 1.0 - cut), ("drive", np.sin(2 * np.pi * drive * t))):
                     codes = np.rint(100 + 100 * volts).astype(np.uint8)
-                    writer.trace(10.0 * k + 16, Trace(codes, 1e-3, -2.5, 0.01, -1.0, 1), channel)
+                    writer.trace(kept_s, Trace(codes, 1e-3, -2.5, 0.01, -1.0, 1), channel)
         writer.finish("finished")
         return writer.folder
 
 
 def test_a_record_says_whether_the_pulses_keep_to_the_drives_phase(tmp_path: Path) -> None:
-    found = analyze_precessions([run_with_records(tmp_path / "locked", 0.0)], PrecessionOptions())
+    found = analyze_precessions([run_with_records(tmp_path / "locked", 0.0, kept_s=20.0)], PrecessionOptions())
     ((point, coherence),) = [(one.point, one.coherence) for one in found.runs[0].coherences]
     assert point == 1
     assert coherence.length > 0.99
