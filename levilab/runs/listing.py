@@ -58,7 +58,7 @@ class Listed:
         """How much there is, in words where it is not readings."""
         if self.states:
             return f"{self.states} states"
-        return f"{self.records} records" if self.records else str(self.readings)
+        return f"{self.records} record{'s' * (self.records > 1)}" if self.records else str(self.readings)
 
 
 def list_runs(root: Path) -> list[Listed]:
