@@ -41,7 +41,9 @@ def report(
 
 
 def runs(
-    folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="The folder to search.")] = Path("runs"),
+    folder: Annotated[Path, typer.Argument(metavar="[DIR]", readable=False, help="The folder to search.")] = Path(
+        "runs"
+    ),
     as_json: Json = False,
 ) -> None:
     """List the runs in a folder."""

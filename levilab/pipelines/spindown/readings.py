@@ -159,20 +159,23 @@ def spin_readings(table: Table, *, fewest: int = FEWEST) -> Readings:
         checked(time, frequency, u)
     except AnalysisError as error:
         raise _in_the_file(table, error) from error
-    return Readings(time, frequency, u, (*table.warnings, *_doubts(table, frequency)))
+    return Readings(time, frequency, u, (*table.warnings, *_doubts(table, time, frequency)))
 
 
 #: A Levitron spins at 20 to 60 Hz, driven to about 60 Hz; far above that the unit is in doubt [Hz].
 FASTEST_HZ = 200.0
 
 
-def _doubts(table: Table, frequency: "NDArray[np.float64]") -> list[str]:
-    """A spin that no such top has: most likely turns per minute."""
-    middle = float(np.median(frequency))
-    if middle <= FASTEST_HZ:
-        return []
-    doubt = f"{table.path.name}: the spin is about {middle:.4g} Hz, a Levitron spins at 20 to 60 Hz"
-    return [f"{doubt}; if these are turns per minute, say so with their column, as f=NAME [rpm]"]
+def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> list[str]:
+    """A spin that no such top has: most likely turns per minute; readings that no counter gives: most likely seconds."""
+    middle, step = float(np.median(frequency)), float(np.median(np.diff(time)))
+    if middle > FASTEST_HZ:
+        doubt = f"{table.path.name}: the spin is about {middle:.4g} Hz, a Levitron spins at 20 to 60 Hz"
+        return [f"{doubt}; if these are turns per minute, say so with their column, as f=NAME [rpm]"]
+    if step * middle < 1:
+        doubt = f"{table.path.name}: the readings lie {1e3 * step:.3g} ms apart, the top needs {1e3 / middle:.3g} ms"
+        return [f"{doubt} for a turn; if the times are in seconds, say so with their column, as t=NAME [s]"]
+    return []
 
 
 #: Beyond these a number is no measurement, and its powers would leave the range of floating point.
