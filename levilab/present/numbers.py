@@ -34,6 +34,8 @@ def with_uncertainty(estimate: Estimate) -> str:
     '3.182(31)×10⁻³ s⁻¹'
     >>> with_uncertainty(Estimate(40.0123, None, "Hz"))
     '40.01 Hz, u not determined'
+    >>> with_uncertainty(Estimate(1.047e-5, None, "1/rad"))
+    '1.047×10⁻⁵ rad⁻¹, u not determined'
     """
     text = f"{without_unit(estimate)} {in_words(estimate.unit)}".strip()
     return text if estimate.u is not None or estimate.value is None else f"{text}, u not determined"
@@ -108,7 +110,7 @@ def _number(value: float, u: float | None, *, ordinary: bool | None = None) -> s
     from uncertainties import ufloat
 
     if not u:
-        return f"{value:.4g}"
+        return digits(value, 4)
     if ordinary is None:
         ordinary = 1e-2 <= abs(value) < 1e5 or abs(value) < u < 1e5
     text = f"{ufloat(value, u):SP}" if ordinary else f"{ufloat(value, u):eSP}"

@@ -167,12 +167,12 @@ FASTEST_HZ = 200.0
 
 
 def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> list[str]:
-    """A spin that no such top has: most likely turns per minute; readings that no counter gives: most likely seconds."""
+    """A spin that no such top has, as in turns per minute; readings closer than a turn, as of seconds named ms."""
     middle, step = float(np.median(frequency)), float(np.median(np.diff(time)))
     if middle > FASTEST_HZ:
         doubt = f"{table.path.name}: the spin is about {middle:.4g} Hz, a Levitron spins at 20 to 60 Hz"
         return [f"{doubt}; if these are turns per minute, say so with their column, as f=NAME [rpm]"]
-    if step * middle < 1:
+    if step * middle < 1:  # nor does a counter give a reading in less
         doubt = f"{table.path.name}: the readings lie {1e3 * step:.3g} ms apart, the top needs {1e3 / middle:.3g} ms"
         return [f"{doubt} for a turn; if the times are in seconds, say so with their column, as t=NAME [s]"]
     return []

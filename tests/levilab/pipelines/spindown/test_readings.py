@@ -58,3 +58,11 @@ def test_a_run_with_too_few_readings_is_told(tmp_path):
     path.write_text(HEADER + "0,61,.1\n")
     with pytest.raises(TableError, match="holds 1 readings, at least 3"):
         spin_readings(read_run_readings(path))
+
+
+def test_readings_closer_than_a_turn_are_doubted(tmp_path):
+    """T [ms] above seconds; in seconds there is no doubt."""
+    rows = "0,40\n10,39\n20,38.1\n30,37.2\n"
+    for unit, said in (("ms", ["the readings lie 10 ms apart, the top needs 25.9 ms for a turn"]), ("s", [])):
+        warnings = spin_readings(table_of(tmp_path, f"T [{unit}],f [Hz]\n{rows}")).warnings
+        assert [text.partition(";")[0].partition(": ")[2] for text in warnings] == said
