@@ -126,10 +126,10 @@ def test_a_copied_preset_is_the_preset(tmp_path):
         assert read_scene(tmp_path / f"{name}.toml") == preset(name)
 
 
-def test_an_unknown_name_is_told_the_nearest_all_presets_and_that_a_path_goes():
+def test_the_error_of_an_unknown_name_lists_the_nearest_and_all_presets():
     with pytest.raises(LevilabError) as refused:
         read_scene("drivne")
-    for word in ("'drivne'", "did you mean driven?", *presets(), "path to a TOML file"):
+    for word in ("'drivne'", "did you mean driven?", *presets(), "path of a TOML file"):
         assert word in str(refused.value)
 
 
@@ -143,7 +143,7 @@ def test_any_unknown_name_is_refused_in_one_line(name):
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (None, "there is no such file; scenes that ship are driven, friction"),
+        (None, "there is no such file; scenes that come with levilab are driven, friction"),
         (b"top = ", "not readable as TOML"),
         (b"\xff", "not readable as TOML"),
         (b"[top]\nmas_kg = 1", "there is no key top.mas_kg; did you mean top.mass_kg?"),
