@@ -36,7 +36,7 @@ class Power:
     """What tells OTHER_SLOPE from 1 with POWER at 95 % confidence, two-sided, each change by itself.
 
     Attributes:
-        slope: that is to be told from 1.
+        slope: that the test is to distinguish from 1.
         now: probability that these points tell it.
         smallest_difference: from 1 that these points tell with POWER.
         points, points_needed: now, and with the same u spread over the same range; None: more than a million.

@@ -23,7 +23,7 @@ from levilab.settings import in_one_line
 from levilab.simulator.keys import parse_setting
 from levilab.simulator.scene import SceneError, read_scene, scene_of
 from levilab.world.bench import VIRTUAL, scene_world, virtual_wiring
-from levilab.world.spin_world import SpinScene, SpinWorld, drawn
+from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -229,7 +229,7 @@ def _on_the_virtual_bench(request: AcquisitionRequest, options: AcquisitionOptio
         return VirtualClock(realtime=options.realtime)
 
     if scene is None:
-        return _with_a_spinning_top(request, drawn(seed), clock)
+        return _with_a_spinning_top(request, random_scene(seed), clock)
     if run is None:
         settings = settings_of(config, request.experiment).for_scene(scene)
         settings.check(request.experiment, config.limits)

@@ -109,12 +109,12 @@ def test_what_it_takes_tells_a_slope_of_105_nine_times_in_ten(known):
         "u": (drive, power.u_needed_hz),
     }
     for x, sigma in cases.values():
-        told = 0
+        detected = 0
         for _ in range(300):
             y = 1.05 * x + sigma * random.standard_normal(x.size)
             found = fit_line(x, y, np.full(x.size, sigma) if known else None)
-            told += abs(found.slope - 1) > found.u_slope * (1.959964 if known else stats.t(x.size - 2).ppf(0.975))
-        assert told / 300 == pytest.approx(0.9, abs=0.06)  # 3 standard errors of a share from 300
+            detected += abs(found.slope - 1) > found.u_slope * (1.959964 if known else stats.t(x.size - 2).ppf(0.975))
+        assert detected / 300 == pytest.approx(0.9, abs=0.06)  # 3 standard errors of a share from 300
 
 
 # --- the whole ---

@@ -216,7 +216,7 @@ def test_never_takes_back_when_the_drive_is_switched_off():
 
 
 @pytest.mark.parametrize("word", ["foo", "=3", "top.mass_kg", ""])
-def test_a_setting_without_key_or_value_is_told_what_one_looks_like(word):
+def test_a_setting_without_key_or_value_is_reported_what_one_looks_like(word):
     assert "KEY=VALUE is expected" in refusal(word)
 
 
@@ -436,10 +436,10 @@ def test_a_drive_without_amplitude_and_a_constant_without_a_law_are_remarked_upo
         ("loose-washers", ["washers.drag_share=0.5"], []),
     ],
 )
-def test_what_is_set_of_a_part_that_is_off_is_told_with_what_switches_it_on(name, words, said):
-    told = remarks(with_settings(preset(name), words))
-    assert len(told) == len(said)
-    assert all(text in one for text, one in zip(said, told, strict=True))
+def test_what_is_set_of_a_part_that_is_off_is_reported_with_what_switches_it_on(name, words, said):
+    found = remarks(with_settings(preset(name), words))
+    assert len(found) == len(said)
+    assert all(text in one for text, one in zip(said, found, strict=True))
 
 
 # --- there and back ---
