@@ -14,7 +14,7 @@ from support.paths import ROOT
 if TYPE_CHECKING:
     from pathlib import Path
 
-#: Words that hide what acts, in lower case: in names as well as in sentences, over the end of a line or a comment's sign.
+#: Words that hide what acts, in lower case: in sentences and names, also over the end of a line or a comment's sign.
 MANNERED = re.compile(
     r"(?<![a-z])(?:somebody|nobody|everybody|whoever|so[\s#:_]+long[\s#:_]+as|of[\s#:_]+old|all[\s#:_]+the[\s#:_]+same)"
     r"(?![a-z])|\b(?:is|was)[\s#:]+told\b|\bwhat[\s#:]+there[\s#:]+is\b"
