@@ -300,14 +300,15 @@ class MessageLink:
     def reopen(self) -> None:
         """Make the link anew; see :class:`Transport`."""
         self._check_open()
-        asks = self.port.resynchronising is Resynchronising.QUESTION
-        self._out_of_step, self._lost = True, asks  # if it cannot be opened now, then perhaps at the next message
+        self._lost = True  # if it cannot be opened, or locked again, now, then perhaps at the next message
         with contextlib.suppress(Exception):  # it may be gone for good
             self.port.close()
         self.port.open()
-        self._lost, self._out_of_step = False, asks  # at a serial line the instrument may still be answering
         if self._locked:
             self.lock()
+        self._lost = False
+        # at a serial line the instrument may still be answering
+        self._out_of_step = self.port.resynchronising is Resynchronising.QUESTION
 
     def lock(self) -> None:
         """Keep other programs away until it is closed, over a link made anew, too; see :class:`Transport`."""

@@ -30,9 +30,11 @@ TCP, UDP = 6, 17
 
 def port_of(place):
     """A port that is free for TCP and UDP."""
-    with socket.socket() as probe:
-        probe.bind((place, 0))
-        return probe.getsockname()[1]
+    with socket.socket() as stream, socket.socket(type=socket.SOCK_DGRAM) as datagrams:
+        stream.bind((place, 0))
+        port = stream.getsockname()[1]
+        datagrams.bind((place, port))
+        return port
 
 
 @pytest.fixture(scope="module")
