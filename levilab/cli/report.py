@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from levilab.cli.analyze import OPTIONS, as_analyses_take
+from levilab.cli.analyze import OPTIONS, analysis_options
 from levilab.cli.options import Channel, Columns, Json, KeepOutliers, Paths, Rate, ReadingU
 from levilab.cli.output import interruptible, message, print_json, result
 from levilab.cli.quantities import with_options
@@ -36,7 +36,7 @@ def report(
     }
     app = context.find_root().command
     with interruptible("no report is written"):
-        written = write_report(paths, output, as_analyses_take(given), lambda text: message(with_options(text, app)))
+        written = write_report(paths, output, analysis_options(given), lambda text: message(with_options(text, app)))
     result(f"the report is in {written}")
 
 

@@ -100,9 +100,9 @@ def in_words(unit: str) -> str:
 
 
 def _number(value: float, u: float | None, *, ordinary: bool | None = None) -> str:
-    """By the rule of the Particle Data Group, with a power of ten for what would begin with zeros.
+    """Round by the rule of the Particle Data Group, with a power of ten instead of leading zeros.
 
-    ordinary: whether without one, where that is not for the number alone to say.
+    ordinary: True without a power of ten, False with one; None: the number decides.
 
     >>> _number(-0.0012, 0.05), _number(-0.012, 0.05)
     ('0.00(5)', '-0.01(5)')
@@ -150,7 +150,7 @@ def plain(value: float | None, count: int = 3) -> str:
 
 
 def share(weight: float | None) -> str:
-    """The weight of a law among all; what is practically nothing is said to be so.
+    """Return the weight of a law as text; below 10⁻⁶ only that.
 
     >>> share(0.974), share(3e-17)
     ('0.97', '< 10⁻⁶')

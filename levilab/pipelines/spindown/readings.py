@@ -121,12 +121,12 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
         raise DoesNotSuit(f"{path}: {seen}, {expected}")
     notes = [f"{path.name}: {note.text}" for note in track.notes]
     what = f"{path.name}: a {'list of pulse times' if times is not None else 'record'} of {digits(duration, 3)} s: "
-    told = [f"{what}each reading is the frequency in a window of {WINDOW_S:g} s"]
+    how_read = [f"{what}each reading is the frequency in a window of {WINDOW_S:g} s"]
     if last - first < len(track.time):
         span = f"{track.time[first]:.1f} s to {track.time[last - 1]:.1f} s"
-        told.append(f"{path.name}: the top coasts from {span}; the windows before and after are left out")
+        how_read.append(f"{path.name}: the top coasts from {span}; the windows before and after are left out")
     part = slice(first, last)
-    return Readings(track.time[part], track.frequency[part], track.u[part], (*record.warnings, *told, *notes))
+    return Readings(track.time[part], track.frequency[part], track.u[part], (*record.warnings, *how_read, *notes))
 
 
 def _coasting(track: "Track") -> tuple[int, int]:

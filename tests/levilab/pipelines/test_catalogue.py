@@ -152,9 +152,9 @@ def test_what_one_analysis_cannot_use_keeps_no_other_from_its_own(tmp_path: Path
         readings = shutil.copytree(sample_data / name, root / name) / "readings.csv"
         lines = readings.read_text(encoding="utf-8").splitlines(keepends=True)
         readings.write_text("".join(lines[: 1 + rows]), encoding="utf-8")
-    told: list[str] = []
-    assert [row.name for row, _ in analyze_suiting([root], {}, told.append)] == ["limit"]
-    assert [text.split(": no ")[1].split(" to analyze")[0] for text in told] == ["spin run", "field run"]
+    messages: list[str] = []
+    assert [row.name for row, _ in analyze_suiting([root], {}, messages.append)] == ["limit"]
+    assert [text.split(": no ")[1].split(" to analyze")[0] for text in messages] == ["spin run", "field run"]
 
 
 def test_of_several_paths_each_analysis_takes_those_that_suit_it(tmp_path: Path, sample_data: Path) -> None:

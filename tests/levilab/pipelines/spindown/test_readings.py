@@ -1,4 +1,4 @@
-"""What a spin-down's table must fulfil, and how it is told if it does not."""
+"""What a spin-down's table must fulfil, and the error if it does not."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def test_uncertainties_may_be_absent(tmp_path):
         ("0,61,.1\n1,60,.1\n2,59,-.1\n", 4, ["the uncertainty is -0.1 Hz"]),
     ],
 )
-def test_what_cannot_be_a_spin_down_is_told_with_its_line(rows, line, words, tmp_path):
+def test_what_cannot_be_a_spin_down_is_reported_with_its_line(rows, line, words, tmp_path):
     with pytest.raises(TableError) as caught:
         spin_readings(table_of(tmp_path, HEADER + rows))
     assert caught.value.line == line
@@ -48,12 +48,12 @@ def test_what_cannot_be_a_spin_down_is_told_with_its_line(rows, line, words, tmp
     assert all(word in str(caught.value) for word in words), str(caught.value)
 
 
-def test_a_missing_column_is_told_with_those_there_are(tmp_path):
+def test_a_missing_column_is_reported_with_those_there_are(tmp_path):
     with pytest.raises(TableError, match=r"spin_frequency_hz; it has 't', 'z': say `columns` = f=NAME"):
         spin_readings(table_of(tmp_path, "t,z\n0,1\n1,2\n2,3\n"))
 
 
-def test_a_run_with_too_few_readings_is_told(tmp_path):
+def test_a_run_with_too_few_readings_is_reported(tmp_path):
     path = tmp_path / "readings.csv"
     path.write_text(HEADER + "0,61,.1\n")
     with pytest.raises(TableError, match="holds 1 readings, at least 3"):
