@@ -20,7 +20,7 @@ import numpy as np
 from levilab.simulator import preset
 from levilab.simulator.kernels.motion import R
 from levilab.simulator.model import model_of
-from levilab.simulator.problem import Problem, end_at
+from levilab.simulator.problem import Problem, integrate_to_end
 from levilab.simulator.schemes import SCHEMES, Scheme
 from levilab.simulator.start import start_of
 from levilab.simulator.stops import stops_between
@@ -84,7 +84,7 @@ class Case:
 
 def after(problem: Problem, steps: int) -> np.ndarray:
     """The state after the time."""
-    return end_at(problem, stops_between(0.0, DURATION, DURATION / steps, problem.scene.drive))
+    return integrate_to_end(problem, stops_between(0.0, DURATION, DURATION / steps, problem.scene.drive))
 
 
 def cases(count: int, seed: int) -> list[Case]:

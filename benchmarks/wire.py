@@ -45,7 +45,7 @@ from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.present.progress import Show
 from levilab.world.bench import virtual_wiring
-from levilab.world.spin_world import SpinScene, SpinWorld, drawn
+from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -378,7 +378,7 @@ def acquisition(rounds: int) -> dict[str, float]:
 def _acquired() -> dict[str, float]:
     with tempfile.TemporaryDirectory() as folder, ExitStack() as patched:
         request = request_for("spin", AcquisitionOptions(mock=True, out=Path(folder), seed=1))
-        world: Any = SpinWorld(drawn(1), VirtualClock())
+        world: Any = SpinWorld(random_scene(1), VirtualClock())
         light = world.crossings = Stopwatch(world.crossings)
         disk = Stopwatch(os.fsync)
         patched.enter_context(mock.patch("os.fsync", disk))

@@ -1,4 +1,4 @@
-"""What goes wrong in ways that a person can mend: told in one line, never as a traceback."""
+"""Failures that a user can mend: each is one line, never a traceback."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _QUANTITY = re.compile(r"`([a-z]\w*)`")
 
 
 def unquoted(text: str) -> str:
-    """A message as it is stored for people who may never see the command line: quantities without backquotes.
+    """Return a message without its backquotes, for a file: its reader may not use the command line.
 
     >>> unquoted("f.csv: say `columns` = t=1,f=2; `levilab analyze` reads it then")
     'f.csv: say columns = t=1,f=2; `levilab analyze` reads it then'
@@ -27,7 +27,7 @@ def unquoted(text: str) -> str:
 
 
 class UsageError(LevilabError):
-    """A setting that the caller gave wrongly. The command line ends with the exit status of wrong usage.
+    """A wrong value of a setting. The command line ends with the exit status of wrong usage.
 
     >>> print(UsageError("duration", "a number above 0 is expected", value=-1))
     duration = -1: a number above 0 is expected
@@ -35,14 +35,14 @@ class UsageError(LevilabError):
     seed: goes with `mock` alone
 
     Attributes:
-        name: the quantity, as the function's argument is called: ``duration``.
+        name: the name of the function's argument, such as ``duration``.
         text: what is wrong with it, what was expected, what to do; other quantities stand between backquotes.
-        value: what was given, as text; None where it does not matter.
+        value: the wrong value as text; None where it does not matter.
     """
 
     def __init__(self, name: str, text: str, *, value: object = None) -> None:
         self.name, self.text = name, text
-        self.value = None if value is None else _shown(value)
+        self.value = None if value is None else _short_text(value)
         super().__init__(f"{name}: {text}" if self.value is None else f"{name} = {self.value}: {text}")
 
 
@@ -51,15 +51,15 @@ class DataError(LevilabError):
 
 
 class DoesNotSuit(DataError):
-    """What lies there is sound, but of another kind than an analysis needs: another experiment, other columns."""
+    """The data are sound, but not what an analysis needs: they are of another experiment, or have other columns."""
 
 
 class NoneUsable(DataError):
-    """A folder that was searched: of what an analysis takes there, nothing can be used."""
+    """A folder without anything that an analysis can use."""
 
 
 class NoInstrument(LevilabError):
-    """No instrument answered that there is a driver for."""
+    """No instrument with a driver answered."""
 
 
 class SimulationError(LevilabError):
@@ -67,10 +67,10 @@ class SimulationError(LevilabError):
 
 
 class LeftRange(SimulationError):
-    """A motion that cannot be followed on because its numbers leave their range, as at the base's edges."""
+    """A motion whose numbers leave their range, as at the base's edges, so that it cannot be continued."""
 
 
-def _shown(value: object) -> str:
-    """A number as one writes it, anything else as it was given, cut where it is long."""
+def _short_text(value: object) -> str:
+    """Return a value as text of at most 60 characters."""
     text = f"{value:g}" if isinstance(value, float) else str(value)
     return text if len(text) <= 60 else f"{text[:59]}…"

@@ -1,7 +1,7 @@
-"""What asks a program to end, and what it does then: the only place that handles signals.
+"""Signals that ask a program to end, and how it ends; no other module handles signals.
 
-An acquisition finishes its reading, switches the outputs off and keeps the run (`watching_for_interruption`); a server
-ends when its event loop has its turn (`watching_for_end`); what must not be torn lets Ctrl-C wait
+An acquisition finishes its reading, switches the outputs off and keeps the run (`watching_for_interruption`).  A server
+ends when its event loop has its turn (`watching_for_end`).  Work that must not be torn postpones Ctrl-C
 (`interruption_postponed`).  Elsewhere Ctrl-C is Python's KeyboardInterrupt, which the command line turns into one line
 and an exit status.
 """
@@ -17,17 +17,17 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from types import FrameType
 
-#: What asks a program to end: Ctrl-C, kill, a closed terminal, and on Windows Ctrl-Break.
+#: Signals that ask a program to end: Ctrl-C, kill, a closed terminal, and on Windows Ctrl-Break.
 _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
 
 
 class Interrupted(BaseException):
-    """The run was asked to end.
+    """A signal asked the run to end.
+
+    It is no Exception, so that no library takes it for a failure of its own.
 
     Attributes:
         by: the signal's name.
-
-    No Exception, so that no library on the way takes it for a failure of its own.
     """
 
     def __init__(self, by: str) -> None:
@@ -36,52 +36,60 @@ class Interrupted(BaseException):
 
 
 class Stop:
-    """Whether the end was asked for.
+    """Whether a signal asked for the end.
 
-    The first signal is only noted, so that no exchange with an instrument is torn; `check()` raises it
-    where the program can end well.  The second one breaks through, in case an exchange hangs; from then on
-    signals are ignored, so that nothing can keep the outputs from going off.
+    The first signal is only noted, so that it tears no exchange with an instrument; `check()` raises Interrupted where
+    the program can end well.  The second signal raises Interrupted at once, in case an exchange hangs.  Later signals
+    are ignored, so that nothing can keep the outputs from going off.
+
+    Attributes:
+        by: the name of the latest signal; None: there was none.
     """
 
     def __init__(self) -> None:
         self.by: str | None = None
-        self._shielded = False
-        self._at_once = False
+        self._is_shielded = False
+        self._raises_at_once = False
 
     def check(self) -> None:
-        """Raise Interrupted if the end was asked for."""
+        """Raise Interrupted if a signal asked for the end."""
         if self.by:
             raise Interrupted(self.by)
 
     def shield(self) -> None:
-        """From here on nothing breaks through: the outputs are going off."""
-        self._shielded = True
+        """Let no signal raise Interrupted from now on: the outputs are going off."""
+        self._is_shielded = True
 
     @contextlib.contextmanager
     def at_once(self) -> Iterator[None]:
-        """Here already the first signal breaks through: what waits for a person need not end well."""
+        """Let the first signal raise Interrupted at once, while the program waits for a person."""
         self.check()
-        self._at_once = True
+        self._raises_at_once = True
         try:
             yield
         finally:
-            self._at_once = False
+            self._raises_at_once = False
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         """The signal handler."""
         second, self.by = self.by is not None, signal.Signals(number).name
-        if (second or self._at_once) and not self._shielded:
-            self._shielded = True
+        if (second or self._raises_at_once) and not self._is_shielded:
+            self._is_shielded = True
             raise Interrupted(self.by)
 
 
 def _ignored_by_nohup(number: int) -> bool:
-    """Whether the run was started to outlive its terminal."""
+    """Whether a signal is the one that nohup ignores, so that the run outlives its terminal."""
     return signal.Signals(number).name == "SIGHUP" and signal.getsignal(number) is signal.SIG_IGN
 
 
 class End:
-    """Whether a signal asked for the end, and which.  by: its name; wake: called by the signal's handler, if given."""
+    """Whether a signal asked for the end.
+
+    Attributes:
+        by: the name of the first signal; None: there was none.
+        wake: called by the signal's handler, unless it is None.
+    """
 
     def __init__(self) -> None:
         self.by: str | None = None
@@ -96,22 +104,22 @@ class End:
 
 @contextlib.contextmanager
 def watching_for_end() -> Iterator[End]:
-    """Signals go to the End given here, for as long as this lasts (main thread only)."""
+    """Yield an End that takes all signals while the context lasts (main thread only)."""
     end = End()
-    with _handled_by(end):
+    with _handle_signals_by(end):
         yield end
 
 
 @contextlib.contextmanager
 def watching_for_interruption() -> Iterator[Stop]:
-    """Signals go to the Stop given here, for as long as this lasts (main thread only)."""
+    """Yield a Stop that takes all signals while the context lasts (main thread only)."""
     stop = Stop()
-    with _handled_by(stop):
+    with _handle_signals_by(stop):
         yield stop
 
 
 @contextlib.contextmanager
-def _handled_by(handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
+def _handle_signals_by(handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -125,9 +133,11 @@ def _handled_by(handler: Callable[[int, FrameType | None], None]) -> Iterator[No
 
 @contextlib.contextmanager
 def interruption_postponed() -> Iterator[Callable[[], None]]:
-    """Ctrl-C waits, for what is short and must not be torn, as the compiler must not (main thread only).
+    """Postpone Ctrl-C while a short piece of work, such as a compilation, must not be torn (main thread only).
 
-    It waits until the function given here is called, or until the end; KeyboardInterrupt is raised then.
+    Yields:
+        A function that raises KeyboardInterrupt if Ctrl-C came meanwhile, and lets it through from then on.  The end of
+        the context does the same.
     """
     if threading.current_thread() is not threading.main_thread():
         yield lambda: None

@@ -1,9 +1,9 @@
-"""A scan of the base's field on its axis → strength, origin, thickness, with what the calliper says beside.
+"""Fit of a scan of the base's field on its axis: strength, origin and thickness, with the calliper's values as priors.
 
 The readings are fitted with the closed form of `analysis.field.ring` and a background that is the same everywhere (the
-probe's zero, the earth's field).  What the calliper and the instrument's data sheet say are Gaussian residuals beside
+probe's zero, the earth's field).  The calliper's values and the instrument's data sheet add Gaussian residuals to
 those of the readings, so that the covariance holds all that is known.  An uncertainty of height counts by the slope of
-the field there (effective variance: Orear, Am. J. Phys. 50, 912 (1982)).
+the field at that height (effective variance: Orear, Am. J. Phys. 50, 912 (1982)).
 """
 
 import math
@@ -45,19 +45,20 @@ UNITS: Mapping[str, str] = {
 }
 PARAMETERS = tuple(UNITS)
 _RADII = ("inner_radius", "outer_radius")
-#: Strength, origin, thickness and background: fewer heights tell nothing of the model.
+#: Strength, origin, thickness and background are four unknowns: fewer heights do not test the model.
 FEWEST_HEIGHTS = 4
-#: Heights closer than this are one [m]: no stand is set better.
+#: Heights closer than this count as one [m]: no stand is set more exactly.
 SAME_HEIGHT_M = 1e-5
-#: The effective variance follows the slope; after so many turns it has settled to 1e-6.
+#: The effective variance depends on the fitted slope; after so many iterations it has settled to 1e-6.
 _MOST_TURNS = 8
-#: A field below so many u of the background is none.
+#: A field below so many u of the background counts as none.
 _NO_FIELD = 5.0
 #: A χ² less probable than this: the model, or the stated uncertainty, is wrong.
 NO_FIT = 1e-3
-#: A χ² so far below its expectation: what the stated uncertainties hold is mostly common to all readings.
+#: A χ² more improbably small than this: the stated uncertainties are mostly common to all readings.
 _TOO_GOOD = 1e-4
-#: What the scan leaves of the calliper's uncertainty when it says nothing of a quantity, and how far apart two may lie.
+#: A scan that leaves more than this share of the calliper's u has learned nothing; scan and calliper may differ by so
+#: many u.
 LEARNS_NOTHING, APART = 0.9, 3.0
 #: Where no prior says how thick the ring is, the search begins at this part of its inner radius.
 _START_THICKNESS = 0.3
@@ -69,7 +70,7 @@ class Prior:
 
     Attributes:
         value: in SI.
-        u: standard uncertainty, 0: it is exact.
+        u: standard uncertainty; 0: the value is exact.
     """
 
     value: float
@@ -78,13 +79,13 @@ class Prior:
 
 @dataclass(frozen=True)
 class Known:
-    """What calliper and data sheet say.
+    """The values from calliper and data sheet.
 
     Attributes:
         inner_radius, outer_radius: [m].
         origin: height of the middle of the thickness [m], None: not known.
         thickness: [m], None: not known.
-        background: what all readings are off by [T].
+        background: common offset of all readings [T].
         gain_u: relative standard uncertainty of the instrument's scale.
     """
 
@@ -96,7 +97,7 @@ class Known:
     gain_u: float = 0.0
 
     def prior(self, name: str) -> Prior | None:
-        """Of a parameter; None where nothing is known."""
+        """Return what is known of a parameter; None if nothing is."""
         found: Prior | None = getattr(self, name, None)
         return found
 
@@ -135,13 +136,13 @@ class FieldScan:
     Attributes:
         parameters: name → estimate, those of PARAMETERS.
         covariance: in the order of PARAMETERS, shape (6, 6).
-        fitted: the parameters that the scan could move; radii that are held have the calliper's uncertainty, which the
-            others' hold, too.
-        known: what was known before.
+        fitted: the parameters that were free; the radii, if held, keep the calliper's uncertainty, which contributes to
+            that of the others.
+        known: the values from calliper and data sheet.
         statistics: how well the model fits.
         height: of the readings, rising [m], shape (n,).
         flux_density: of the readings [T], shape (n,).
-        u: of a reading against the model, that of its height included [T], shape (n,).
+        u: of each reading against the model, with that of its height [T], shape (n,).
         warnings: what to know before using the numbers.
     """
 
@@ -175,13 +176,13 @@ class FieldScan:
         return self.flux_density - self.model(self.height)
 
     def correlation(self, one: str, other: str) -> float:
-        """Of two parameters."""
+        """Return the correlation of two parameters."""
         i, j = PARAMETERS.index(one), PARAMETERS.index(other)
         size = math.sqrt(self.covariance[i, i] * self.covariance[j, j])
         return float(self.covariance[i, j]) / size if size else 0.0
 
     def learned(self, name: str) -> float | None:
-        """What is left of the uncertainty that a parameter had before the scan, 0 to 1; None where there was none."""
+        """Return u after the scan over u before it, 0 to 1; None if there was none before."""
         prior, u = self.known.prior(name), self.parameters[name].u
         return None if prior is None or not prior.u or u is None else u / prior.u
 
@@ -207,15 +208,15 @@ def fit_scan(
         flux_density: along the axis, either sign [T], shape (n,).
         known: what calliper and data sheet say.
         u: standard uncertainty of each reading without what is common to all (`known` holds that) [T], shape (n,).
-            None: unknown, then all count alike and their scatter about the model stands for it.
+            None: unknown, so all count alike and their scatter about the model gives it.
         height_u: standard uncertainty of each height without what is common to all [m].
-        free_radii: let the scan move the radii, too, within what the calliper says.
+        free_radii: fit the radii, too, with the calliper's values as priors.
 
     Raises:
-        ShapesDiffer, NotFinite, NotPositive: no numbers to fit.
-        ImpossibleRing: radii that no ring has.
-        TooFewHeights: fewer than four.
-        NoField: nothing above the background.
+        ShapesDiffer, NotFinite, NotPositive: the arrays cannot be fitted.
+        ImpossibleRing: no ring has such radii.
+        TooFewHeights: fewer than four heights.
+        NoField: no reading is above the background.
         FieldStandsStill: the probe is saturated.
         FieldTurnsOver: the probe was turned over.
         NotFitted: the search did not end.
@@ -230,13 +231,13 @@ def fit_scan(
     return _described(problem, values, sigma)
 
 
-# --- what cannot be fitted ---
+# --- the input ---
 
 
 def _checked(
     height: ArrayLike, flux_density: ArrayLike, u: ArrayLike | None, height_u: ArrayLike | float
 ) -> tuple[Array, Array, Array | None, Array]:
-    """All columns in the order of the heights."""
+    """Check all columns, and return them in the order of the heights."""
     z = np.asarray(height, dtype=float)
     columns = {"height": z, "flux density": np.asarray(flux_density, dtype=float)}
     columns["uncertainty of height"] = np.broadcast_to(np.asarray(height_u, dtype=float), z.shape)
@@ -281,7 +282,7 @@ def _refuse_bad_scans(z: Array, b: Array, known: Known) -> None:
 
 
 def _refuse_plateau(z: Array, b: Array) -> None:
-    """Three heights in succession with one and the same value, the largest of the scan: no magnet makes that."""
+    """Refuse three successive heights with the same value, the largest of the scan: the probe is saturated."""
     same = (b[1:] == b[:-1]) & (np.abs(b[1:]) == np.abs(b).max())
     for i in range(len(same) - 1):
         if same[i] and same[i + 1]:
@@ -293,7 +294,7 @@ def _refuse_plateau(z: Array, b: Array) -> None:
 
 
 def _free(known: Known, *, free_radii: bool) -> tuple[str, ...]:
-    """What the search moves: all but what is exact, and the radii only on request."""
+    """Return the parameters to fit: all that are not exact, and the radii only on request."""
     wanted = PARAMETERS if free_radii else PARAMETERS[:-2]
     priors = {name: known.prior(name) for name in wanted}
     return tuple(name for name, prior in priors.items() if prior is None or prior.u > 0)
@@ -301,7 +302,16 @@ def _free(known: Known, *, free_radii: bool) -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """What is minimised.  z [m], b [T], u_b [T] or None, u_z [m]: the readings; free: the parameters that move."""
+    """The least-squares problem.
+
+    Attributes:
+        z: heights [m].
+        b: readings [T].
+        u_b: their u [T], None if not known.
+        u_z: u of the heights [m].
+        known: the priors.
+        free: the parameters to fit.
+    """
 
     z: Array
     b: Array
@@ -315,7 +325,7 @@ class _Problem:
         return [PARAMETERS.index(name) for name in self.free]
 
     def priors(self) -> list[tuple[int, Prior]]:
-        """Index among all parameters, and what was known, of those that move."""
+        """Return index among all parameters, and prior, of those that are fitted."""
         found = ((PARAMETERS.index(name), self.known.prior(name)) for name in self.free)
         return [(index, prior) for index, prior in found if prior]
 
@@ -323,25 +333,25 @@ class _Problem:
         return np.asarray(on_axis(_ring(values), self.z)[0] + values[3])
 
     def slopes(self, values: Array) -> Array:
-        """Of the model, by all parameters, shape (6, n)."""
+        """Return the slopes of the model by all parameters, shape (6, n)."""
         by_ring = slopes(_ring(values), self.z)
         return np.vstack([by_ring[:3], np.ones_like(self.z), by_ring[3:]])
 
     def sigma(self, values: Array) -> Array:
-        """Of each reading against the model [T], shape (n,)."""
+        """Return u of each reading against the model [T], shape (n,)."""
         by_height = on_axis(_ring(values), self.z)[1] * self.u_z
         u_b = self._scatter(values) if self.u_b is None else self.u_b
         return np.asarray(np.hypot(u_b, by_height))
 
     def _scatter(self, values: Array) -> Array:
-        """Where no uncertainty was given: the scatter about the model, but no less than rounding."""
+        """Return the scatter about the model, or the rounding if that is larger [T], shape (n,)."""
         left = self.b - self.model(values)
         freedom = max(len(self.b) - len(self.free) + len(self.priors()), 1)
         size = math.sqrt(float(left @ left) / freedom)
         return np.full(len(self.b), max(size, 1e-9 * float(np.abs(self.b).max())))
 
     def start(self) -> Array:
-        """The calliper's values; where it has none, the origin of the best fit of the strength alone."""
+        """Return starting values: the calliper's, or else the origin with the best fit of the strength alone."""
         known = self.known
         thickness = known.thickness.value if known.thickness else _START_THICKNESS * known.inner_radius.value
         spread = np.linspace(-1, 1, 41) * known.outer_radius.value
@@ -357,23 +367,23 @@ class _Problem:
         return best[1]
 
     def solve(self) -> tuple[Array, Array]:
-        """The parameters, and the uncertainty of each reading at them."""
+        """Fit; return the parameters and the uncertainty of each reading at them."""
         values = self.start()
         scale = self._scale(values)
         for _ in range(_MOST_TURNS):
             sigma = self.sigma(values)
-            before, values = values, self._turn(values, sigma, scale)
+            before, values = values, self._iterate(values, sigma, scale)
             if np.all(np.abs(values - before) <= 1e-7 * scale):
                 break
         values[2] = abs(values[2])  # the field does not change with its sign
         return values, self.sigma(values)
 
     def _scale(self, start: Array) -> Array:
-        """Of each parameter, a step that the field answers to."""
+        """Return for each parameter a step that changes the field noticeably."""
         lengths = 0.1 * self.known.inner_radius.value
         return np.array([abs(start[0]) or 1e-3, lengths, lengths, 1e-4, lengths, lengths])
 
-    def _turn(self, values: Array, sigma: Array, scale: Array) -> Array:
+    def _iterate(self, values: Array, sigma: Array, scale: Array) -> Array:
         moved, priors, steps = self.indices, self.priors(), scale[self.indices]
 
         def whole(q: Array) -> Array:
@@ -395,14 +405,14 @@ class _Problem:
         return whole(found)
 
     def weighted(self, values: Array, sigma: Array) -> Array:
-        """Slopes of all residuals by all parameters, shape (6, n + priors)."""
+        """Return the slopes of all residuals by all parameters, shape (6, n + priors)."""
         known = np.zeros((6, len(self.priors())))
         for column, (index, prior) in enumerate(self.priors()):
             known[index, column] = 1 / prior.u
         return np.hstack([self.slopes(values) / sigma, known])
 
 
-# --- what was found ---
+# --- the result ---
 
 
 def _described(problem: _Problem, values: Array, sigma: Array) -> FieldScan:
@@ -441,7 +451,7 @@ def _statistics(problem: _Problem, values: Array, sigma: Array) -> Statistics:
 
 
 def _misfit(statistics: Statistics) -> tuple[float, list[str]]:
-    """By what the variances grow because the model leaves more than the uncertainties explain, and a warning."""
+    """Return the factor on the variances if the residuals exceed the uncertainties, and a warning."""
     from scipy.special import chdtr, chdtrc
 
     reduced = statistics.reduced_chi_square
@@ -464,7 +474,7 @@ def _misfit(statistics: Statistics) -> tuple[float, list[str]]:
 
 
 def _whole_covariance(jacobian: Array, free: Array, moved: list[int], known: Known) -> Array:
-    """Of all parameters: what is held moves those that are fitted by as much as the calliper leaves open."""
+    """Return the covariance of all parameters: an uncertain fixed one shifts those that are fitted."""
     whole = np.zeros((6, 6))
     whole[np.ix_(moved, moved)] = free
     held = [k for k, name in enumerate(PARAMETERS) if k not in moved and (prior := known.prior(name)) and prior.u > 0]
@@ -482,12 +492,12 @@ _WORDS = {
     "origin": "origin", "thickness": "thickness", "inner_radius": "inner radius", "outer_radius": "outer radius",
     "background": "background",
 }  # fmt: skip
-#: In which unit a parameter is written, and how many of them one of its own is.
+#: Unit → unit in messages, and their ratio.
 _SHOWN = {"m": ("mm", 1e3), "T": ("µT", 1e6)}
 
 
 def _doubts(scan: FieldScan) -> list[str]:
-    """Where scan and calliper contradict each other, and where the height is not of one base."""
+    """Return warnings: scan and calliper contradict each other, or the strength is not significant."""
     texts = []
     for name in scan.fitted:
         prior, found = scan.known.prior(name), scan.parameters[name]
@@ -533,7 +543,7 @@ def restore_scan(
     statistics: Statistics,
     warnings: tuple[str, ...],
 ) -> FieldScan:
-    """A fit that was made before, with the readings that it was made of; see `fit_scan`."""
+    """Restore an earlier fit from its result and its readings; see `fit_scan`."""
     z, b, u_b, u_z = _checked(height, flux_density, u, height_u)
     values = np.array([parameters[name].value for name in PARAMETERS], dtype=float)
     sigma = _Problem(z, b, u_b, u_z, known, fitted).sigma(values)

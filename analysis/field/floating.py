@@ -1,8 +1,8 @@
-"""What follows from a scan of the base for the tops that float there: heights, masses, spins, and the moment.
+"""Heights, masses and spins of the tops that float above a base, and the moment, from a scan of its field.
 
-The theory is that of `analysis.stability`; the top's magnet is a point or a disc (`analysis.field.magnet`).  All that
-is known, parameters of the scan and those of the top, goes through it once as it is and once beside for each
-uncertainty; the slopes carry the whole covariance to the results.
+The theory is that of `analysis.stability`; the top's magnet is a point or a disc (`analysis.field.magnet`).  It is
+evaluated at the known parameters of scan and top, and once more with each uncertain one shifted; the slopes carry the
+whole covariance to the results.
 """
 
 import math
@@ -21,11 +21,11 @@ from analysis.uncertainty import Estimate, propagate
 
 Array = NDArray[np.float64]
 
-#: Remanence of hard ferrite per kelvin (IEC 60404-8-1: −0.2 %/K); base and top, each of it, lose so much.
+#: Relative change of hard ferrite's remanence per kelvin (IEC 60404-8-1: −0.2 %/K), of base and top alike.
 FERRITE_PER_K = -0.002
-#: Tops are looked for from a tenth of the inner radius to four outer radii above the upper face, as in the simulator.
+#: Tops are searched from a tenth of the inner radius to four outer radii above the upper face, as in the simulator.
 _LOW, _HIGH = 0.1, 4.0
-#: A window is looked for around the one before it, by so many times its width on either side.
+#: A window is searched around the previous one, by so many times its width on either side.
 _AROUND = 2.0
 
 #: The results in the order of their covariance, and their units.
@@ -42,7 +42,7 @@ RESULTS: Mapping[str, str] = {
     "moment": "A m^2",
     "mass_to_add": "kg",
 }
-#: What is put in beside the parameters of the ring.
+#: The input beside the parameters of the ring.
 _OF_TOP = ("mass", "transverse", "axial", "moment", "height")
 
 
@@ -52,11 +52,12 @@ class KnownTop:
 
     Attributes:
         transverse, axial: I₁, I₃ [kg m²].
-        moment: its size [A m²].
+        moment: its magnitude [A m²]; ignored if mass and height are known, from which it follows.
         mass: [kg].
-        height: where it floats, on the scale of the scan's heights [m]; with mass and height the moment follows from
-            them.
-        covariance: of mass, I₁ and I₃, where they come from the same parts, shape (3, 3).
+        height: at which it floats, on the scale of the scan's heights [m].
+        gravity: [m/s²].
+        covariance: of mass, I₁ and I₃, if they come from the same parts, shape (3, 3).
+        magnet: a disc; None: a point.
     """
 
     transverse: Estimate
@@ -76,13 +77,13 @@ class KnownTop:
 
 @dataclass(frozen=True)
 class Floating:
-    """What follows.
+    """The results for a top.
 
     Attributes:
         values: name → estimate, of RESULTS: the heights and masses of the window far above the base; the spins of a top
-            of mass_to_set, floating at height_at_mass; height_per_mass, how it moves with the mass; moment and
-            mass_to_add only where the top's mass is known, and for the moment its height.
-        warnings: what to know.
+            of mass_to_set, floating at height_at_mass; height_per_mass, the slope of height by mass; mass_to_add
+            only if the top's mass is known, moment only if its height is, too.
+        warnings: what to know before using the numbers.
     """
 
     values: Mapping[str, Estimate]
@@ -99,17 +100,18 @@ class FloatsNowhere(Exception):
 
 
 def follow(scan: FieldScan, top: KnownTop) -> Floating | None:
-    """What follows from a scan for a top; None where no top floats over such a base.
+    """Compute where and how a top floats; None if no top floats above such a base.
 
-    Raises ValueError for a top of which neither the moment nor mass and height are known.
+    Raises:
+        ValueError: neither the moment nor mass and height of the top are known.
     """
     if top.moment is None and not top.weighed:
         raise ValueError("a moment, or mass and height, is needed")
-    values, covariance = _together(scan, top)
+    values, covariance = _input(scan, top)
     evaluate = _evaluator(top)
     try:
         found = evaluate(values)
-        u = _carried(evaluate, values, found, covariance)
+        u = _uncertainties(evaluate, values, found, covariance)
     except FloatsNowhere:
         return None
     estimates = {
@@ -121,8 +123,11 @@ def follow(scan: FieldScan, top: KnownTop) -> Floating | None:
     return replace(floating, warnings=tuple(_doubts(floating, top)))
 
 
-def _together(scan: FieldScan, top: KnownTop) -> tuple[Array, Array]:
-    """Strength, origin, thickness, radii, then mass, I₁, I₃, moment, height; NaN and 0 where nothing is known."""
+def _input(scan: FieldScan, top: KnownTop) -> tuple[Array, Array]:
+    """Return all input and its covariance: strength, origin, thickness, radii, mass, I₁, I₃, moment, height.
+
+    An unknown one is NaN, with a variance of 0.
+    """
     ring = [0, 1, 2, 4, 5]
     known = [getattr(top, name) for name in _OF_TOP]
     if top.weighed:
@@ -136,12 +141,12 @@ def _together(scan: FieldScan, top: KnownTop) -> tuple[Array, Array]:
     return values, covariance
 
 
-#: Step of the differences, in standard uncertainties: of a slope 1e-4 is lost to curvature, and less to rounding.
+#: Step of the differences, in standard uncertainties: curvature changes a slope by 1e-4, rounding by less.
 _STEP = 0.01
 
 
-def _carried(evaluate: Callable[[Array], Array], values: Array, found: Array, covariance: Array) -> Array:
-    """Standard uncertainties of the results, to first order, shape (results,)."""
+def _uncertainties(evaluate: Callable[[Array], Array], values: Array, found: Array, covariance: Array) -> Array:
+    """Return the standard uncertainties of the results, to first order, shape (results,)."""
     u = np.sqrt(np.diagonal(covariance))
     moved = np.flatnonzero(u > 0)
     slopes = np.zeros((len(RESULTS), len(values)))
@@ -157,9 +162,10 @@ def _carried(evaluate: Callable[[Array], Array], values: Array, found: Array, co
 
 
 def floating_top(ring: Ring, top: KnownTop) -> SymmetricTop:
-    """The top as the theory takes it, its mass 1 kg; the moment stands against the field high above the ring.
+    """Return the top for the theory, with a mass of 1 kg; its moment is opposite to the field high above the ring.
 
-    Raises FloatsNowhere where the field has no slope at the height from which the moment follows.
+    Raises:
+        FloatsNowhere: the field has no slope at the height from which the moment follows.
     """
     field, moment = axial_field(ring, top.magnet), math.nan
     if top.mass is not None and top.height is not None:
@@ -177,9 +183,9 @@ def floating_top(ring: Ring, top: KnownTop) -> SymmetricTop:
 
 
 def floating_spins(ring: Ring, top: KnownTop, mass: float, window: tuple[float, float]) -> tuple[float, float] | None:
-    """The slowest and the fastest spin [Hz] of a top of this mass [kg] that floats in a window of heights [m].
+    """Return the slowest and the fastest spin [Hz] of a top of this mass [kg] in a window of heights [m].
 
-    None where it does not.
+    None if it does not float there.
     """
     field, body = axial_field(ring, top.magnet), replace(floating_top(ring, top), mass=mass)
     stable = [place for place in equilibria(field, body, *window) if place.stable and place.spins]
@@ -192,7 +198,7 @@ def _range(ring: Ring) -> tuple[float, float]:
 
 
 def _evaluator(top: KnownTop) -> Callable[[Array], Array]:
-    """The results as a function of all that is put in; a window is looked for near that of the first call."""
+    """Return the function input → results; each call searches the window near that of the call before."""
     near: list[Window] = []
 
     def evaluate(values: Array) -> Array:
@@ -224,7 +230,7 @@ def _with_values(top: KnownTop, values: Mapping[str, float]) -> KnownTop:
 
 
 def _upper_window(field: AxialField, top: SymmetricTop, ring: Ring, near: list[Window]) -> Window:
-    """The window farthest above the base."""
+    """Return the window farthest above the base."""
     if near:
         margin = _AROUND * (near[0].high - near[0].low)
         low, high = near[0].low - margin, near[0].high + margin
@@ -252,6 +258,6 @@ def _doubts(found: Floating, top: KnownTop) -> list[str]:
     if u is not None and u > width / 4:
         texts.append(
             f"the mass to set is known to {digits(1e3 * u)} g only, and the window is {digits(1e3 * width)} g wide: "
-            "try masses about it; the height at which one floats tells the moment"
+            "try masses about it; the height at which one floats gives the moment"
         )
     return texts

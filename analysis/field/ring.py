@@ -1,4 +1,4 @@
-"""The field of a magnetised ring on its axis, in closed form, with its slopes.
+"""The field of a magnetised ring on its axis, in closed form, with its derivatives.
 
 A ring of inner radius a, outer radius b and thickness h is a stack of sheets.  With F(z, R) = z/√(R² + z²) the
 potential of a sheet of strength ρ is 2πρ·[F(z, a) − F(z, b)], and the field B_z = −dΦ/dz, averaged over the thickness,
@@ -36,7 +36,7 @@ class Ring:
 
 
 def _edges(highest: int, z: Array, radius: float) -> Array:
-    """The derivatives of F = z/√(R² + z²) up to an order of 1 or more, at z of shape (n,): shape (highest + 1, n).
+    """Return the derivatives of F = z/√(R² + z²), orders 0 to highest ≥ 1, at z of shape (n,): shape (highest + 1, n).
 
     F′ = R²/u³ with u² = R² + z², and dⁿu⁻³/dzⁿ = (−1)ⁿ n! C_n(z/u)/uⁿ⁺³ with Gegenbauer's polynomials of λ = 3/2 (their
     generating function; Abramowitz & Stegun 22.9.3), which follow from one another by 22.7.3.
@@ -62,7 +62,7 @@ def _is_thin(ring: Ring) -> bool:
 
 
 def _mean(orders: int, z: Array, ring: Ring) -> Array:
-    """F′ of a sheet and its derivatives, averaged over the thickness: shape (orders, n)."""
+    """Return F′ of a sheet and its derivatives, averaged over the thickness: shape (orders, n)."""
     at, h = z - ring.origin, ring.thickness
     if _is_thin(ring):
         sheet = _sheet(orders + 2, at, ring)
@@ -72,7 +72,7 @@ def _mean(orders: int, z: Array, ring: Ring) -> Array:
 
 
 def on_axis(ring: Ring, z: Array, orders: int = 3) -> Array:
-    """B_z and its derivatives along the axis at heights of shape (n,) [m]; shape (orders, n) [T/m^order].
+    """Return B_z and its derivatives along the axis at heights of shape (n,) [m]; shape (orders, n) [T/m^order].
 
     >>> thesis = Ring(1.40e-3, 0.0, 0.0, 0.030, 0.055)
     >>> on_axis(thesis, np.array([0.073]))[:, 0].round(6)
@@ -82,7 +82,7 @@ def on_axis(ring: Ring, z: Array, orders: int = 3) -> Array:
 
 
 def slopes(ring: Ring, z: Array) -> Array:
-    """How B_z changes with strength, origin, thickness, inner and outer radius; shape (5, n) [T per unit of each]."""
+    """Return ∂B_z by strength, origin, thickness, inner and outer radius; shape (5, n) [T per unit of each]."""
     at, h, k = z - ring.origin, ring.thickness, -2 * math.pi * ring.strength
     mean, bend = _mean(2, z, ring)
     if _is_thin(ring):
@@ -105,7 +105,9 @@ def _with_radius(at: Array, radius: float, ring: Ring) -> Array:
 
 
 def reversal(ring: Ring) -> float:
-    """The height above which the field has one sign [m]: where a sheet's passes zero, b²/(b²+z²)^(3/2) = a²/(…)^(3/2).
+    """Return the height above which the field keeps its sign [m].
+
+    It is that of a sheet, where b²/(b²+z²)^(3/2) = a²/(a²+z²)^(3/2).
 
     >>> round(reversal(Ring(1.40e-3, 0.0, 0.0, 0.030, 0.055)), 5)
     0.02843

@@ -15,17 +15,17 @@ from analysis.errors import TooFewReadings
 
 Array = NDArray[np.float64]
 
-#: Pulses below which a mean vector says little.
+#: Fewer pulses than this have no meaningful mean vector.
 FEWEST_PULSES = 5
-#: Rayleigh's p below which pulses are held for locked.
+#: With a smaller p of Rayleigh's test, pulses count as locked.
 LOCKED_P = 1e-3
-#: The phase of a locked top swings like a pendulum, by less than this [turns]; one that drifts leaves it some time.
-_STAYS = 1.0
+#: The phase of a locked top swings like a pendulum, within this range [turns]; a drifting phase leaves it.
+_LOCKED_TURNS = 1.0
 #: Phases are means over this [s]: short against the swing of a locked top, some seconds.
 _WINDOW_S = 0.4
-#: Samples of a part of the drive's record from which on it has a phase.
+#: A part of the drive's record needs so many samples for a phase.
 _FEWEST_SAMPLES = 8
-#: Part of the signal's height by which it must fall back before a pulse can begin anew: noise makes no pulses.
+#: The signal must fall back by this part of its height before a new pulse can begin, so that noise makes no pulses.
 _HYSTERESIS = 0.25
 
 
@@ -35,13 +35,13 @@ class Coherence:
 
     Attributes:
         pulses: how many.
-        length: of the mean vector: 1 where all come at one phase of the drive, about 1/√pulses where they come anyhow.
-        phase_rad: of the mean vector on the drive.
-        p_random: how probable so long a vector is for pulses at random (Rayleigh).
-        drift_hz, u_drift_hz: frequency of the pulses − frequency of the drive: the slope of their phase, and its u from
-            the scatter about it; a locked top swings about the drive within some seconds, which a short record shows as
-            a drift.
-        excursion_turns: from the lowest to the highest phase, of means over some tenths of a second.
+        length: of the mean vector: 1 if all pulses come at one phase of the drive, about 1/√pulses if at random ones.
+        phase_rad: phase of the drive in which the mean vector points.
+        p_random: probability that pulses at random phases have such a length (Rayleigh).
+        drift_hz, u_drift_hz: frequency of the pulses less that of the drive, from the slope of their phase, and its u
+            from the scatter about that.  A locked top swings about the drive within some seconds, which a short record
+            shows as a drift.
+        excursion_turns: highest less lowest phase, of means over some tenths of a second.
         drive_hz: frequency of the drive in the same record.
         duration_s: from the first pulse to the last.
     """
@@ -58,22 +58,22 @@ class Coherence:
 
     @property
     def locked(self) -> bool:
-        """Whether the pulses follow the drive: by no chance, and their phase stays within one turn."""
-        return self.p_random < LOCKED_P and self.excursion_turns < _STAYS
+        """Whether the pulses follow the drive: not by chance, and with a phase that stays within one turn."""
+        return self.p_random < LOCKED_P and self.excursion_turns < _LOCKED_TURNS
 
 
 def coherence(pulse_times: Array, drive: Array, dt: float, drive_frequency: float, start: float = 0.0) -> Coherence:
-    """Coherence of pulses with a drive that was recorded beside them.
+    """Compute the coherence of pulses with a drive that was recorded at the same time.
 
     Args:
         pulse_times: shape (n,), increasing [s].
         drive: the drive's voltage, evenly sampled, NaN where one is missing, shape (m,); its first harmonic counts.
-        dt: between its samples [s].
-        drive_frequency: near the drive's, to better than one period in the record [Hz].
-        start: time of its first sample [s].
+        dt: from one sample to the next [s].
+        drive_frequency: of the drive, to better than one period in the record [Hz].
+        start: time of the first sample [s].
 
     Raises:
-        TooFewReadings: below five pulses, or hardly a sample of the drive.
+        TooFewReadings: fewer than five pulses, or too few samples of the drive.
     """
     if pulse_times.size < FEWEST_PULSES:
         raise TooFewReadings(seen=pulse_times.size, needed=FEWEST_PULSES)
@@ -81,7 +81,7 @@ def coherence(pulse_times: Array, drive: Array, dt: float, drive_frequency: floa
     turns = frequency * (pulse_times - start) + phase / (2 * np.pi)
     vectors = np.exp(2j * np.pi * turns)
     mean = complex(vectors.mean())
-    drift, u_drift, excursion = _course(pulse_times, turns)
+    drift, u_drift, excursion = _drift_and_excursion(pulse_times, turns)
     return Coherence(
         pulses=pulse_times.size,
         length=min(abs(mean), 1.0),
@@ -96,7 +96,7 @@ def coherence(pulse_times: Array, drive: Array, dt: float, drive_frequency: floa
 
 
 def rayleigh_p(length: float, n: int) -> float:
-    """How probable a mean vector of this length is for n phases at random.
+    """Return the probability that n random phases have a mean vector of at least this length.
 
     Wilkie, Appl. Stat. 32, 311 (1983): good to three digits above p = 0.001 from n = 10 on.
 
@@ -108,10 +108,10 @@ def rayleigh_p(length: float, n: int) -> float:
 
 
 def first_harmonic(signal: Array, dt: float, near: float) -> tuple[float, float]:
-    """Frequency [Hz] and phase of the cosine at the first sample [rad] of a periodic signal's first harmonic.
+    """Return frequency [Hz] and phase at the first sample [rad] of a periodic signal's first harmonic, a cosine.
 
-    The phases of sixteenths of the record, each a least-squares cosine, lie on a line whose slope corrects the
-    frequency.  A part of which hardly any samples are left is left out.
+    The record is cut into sixteen parts.  A least-squares cosine gives the phase of each, and the slope of these phases
+    corrects the frequency.  A part with too few samples is left out.
 
     Args:
         signal: shape (n,), missing samples are NaN.
@@ -119,7 +119,7 @@ def first_harmonic(signal: Array, dt: float, near: float) -> tuple[float, float]
         near: the frequency to better than one period in the record [Hz].
 
     Raises:
-        TooFewReadings: below two parts.
+        TooFewReadings: fewer than two parts have a phase.
     """
     parts = np.array_split(np.arange(signal.size), 16 if near * dt * signal.size > 32 else 2)
     parts = [seen for part in parts if (seen := part[np.isfinite(signal[part])]).size >= _FEWEST_SAMPLES]
@@ -137,7 +137,7 @@ def first_harmonic(signal: Array, dt: float, near: float) -> tuple[float, float]
 
 
 def pulse_times(signal: Array, dt: float, start: float = 0.0) -> Array:
-    """When a beam is cut, shape (n,) [s]: the middle of each dip of its signal, between its flanks at half height.
+    """Return when a beam is cut, shape (n,) [s]: the middle of each dip, between its flanks at half height.
 
     A dip in which samples are missing is left out.
 
@@ -175,23 +175,23 @@ def pulse_times(signal: Array, dt: float, start: float = 0.0) -> Array:
 
 
 def _last_above(signal: Array, level: float, k: int) -> int:
-    """The last sample above a level at or before k."""
+    """Return the index of the last sample above a level, at or before k."""
     while k > 0 and signal[k] <= level:
         k -= 1
     return k
 
 
 def _crossing(signal: Array, level: float, k: int) -> float:
-    """Where the signal crosses a level between samples k and k + 1, in samples."""
+    """Return where the signal crosses a level between samples k and k + 1, in samples."""
     rise = float(signal[k + 1] - signal[k])
     return k + (level - float(signal[k])) / rise if rise else float(k)
 
 
-def _course(times: Array, turns: Array) -> tuple[float, float, float]:
-    """How the phase goes on: its slope and the u of it [Hz], and from its lowest to its highest [turns].
+def _drift_and_excursion(times: Array, turns: Array) -> tuple[float, float, float]:
+    """Return the drift of the phase and its u [Hz], and the highest less the lowest phase [turns].
 
-    The phase of the mean vector, window by window: a doubled or missing pulse does not upset it as it does a phase that
-    is counted on from pulse to pulse.
+    The phase is that of the mean vector in each window.  A doubled or missing pulse changes it little, while it would
+    shift a phase that is counted from pulse to pulse.
     """
     span = float(np.ptp(times))
     windows = max(4, min(times.size // FEWEST_PULSES, math.ceil(span / _WINDOW_S)))

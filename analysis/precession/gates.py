@@ -1,15 +1,15 @@
-"""The gates of a counter at one point of a sweep: the rate of the pulses, the swing of a locked top taken off.
+"""The gates of a counter at one point of a sweep: the rate of the pulses, freed from the swing of a locked top.
 
 A locked top swings about its drive like a pendulum, with a period of some seconds: gates in a row are not independent,
-and their scatter over √n is up to three times the uncertainty of their mean.  The swing moves the phase, and so in a
-gate from b to e there are
+and their scatter over √n is up to three times the uncertainty of their mean.  The swing shifts the phase, so a gate
+from b to e contains
 
     n = ν (e − b) + φ(e) − φ(b) + noise,  φ(t) = p cos 2πft + q sin 2πft  [turns]
 
-periods; ν, p and q by least squares, f where both series, spin and laser, leave the least.  The noise is that of the
-pulses at both ends of a gate: as large for a long gate as for a short one.
+periods.  Least squares give ν, p and q; f is where the residuals of both series, spin and laser, are smallest.  The
+noise is that of the pulses at both ends of a gate: it is as large for a long gate as for a short one.
 
-Source of the joint choice of f: Seber & Wild, Nonlinear Regression (1989), §2.1.5 (scatters that are not known).
+Source of the joint choice of f: Seber & Wild, Nonlinear Regression (1989), §2.1.5 (unknown scatters).
 """
 
 from __future__ import annotations
@@ -26,26 +26,31 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Gates below which a swing is not looked for: rate, swing and its frequency are four numbers.
+#: With fewer gates no swing is searched: rate, swing and its frequency are four numbers.
 FEWEST = 7
-#: The swing is looked for from so many periods in the series on, in steps of so much, up to so many in a gate.
+#: The swing's frequency is searched from so many periods in the series, in steps of so many, up to so many in a gate.
 _LEAST_PERIODS, _STEP_PERIODS, _MOST_IN_A_GATE = 1.5, 0.1, 0.9
-#: A gate has miscounted where it is within so much of whole pulses, and so many standard deviations off; no more than
-#: this share of them is left out.
+#: A gate has miscounted if it is off by whole pulses to within this, and by so many standard deviations; at most this
+#: share of the gates is left out.
 _OF_A_PULSE, _STANDS_OUT, _MOST_WRONG = 0.25, 5.0, 0.25
-#: A swing stands out where the scatter of a gate is less than this share of it.
+#: A swing is clear if the scatter of a gate is less than this share of its size.
 _CLEAR = 0.3
-#: Points from which on their scatter is taken as a power of the drive's frequency.
+#: With so many points or more, their scatter is modelled as a power of the drive's frequency.
 _FEWEST_POINTS = 5
-#: A point's own scatter counts where it is larger than that of all by less chance than this.
+#: A point keeps its own scatter if chance makes it so much larger than the common one with less than this probability.
 _LARGER_P = 1e-3
-#: The scatter is never less: the rounding of the counts [turns].
+#: The scatter is at least the rounding of the counts [turns].
 _LEAST_SCATTER = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
 class Gates:
-    """What a counter counted, shape (n,) each: begin and end of the gates [s], frequency [Hz] or NaN."""
+    """The gates of a counter, shape (n,) each.
+
+    Attributes:
+        begin, end: of each gate [s].
+        frequency: counted in it [Hz], NaN without a count.
+    """
 
     begin: Array
     end: Array
@@ -56,27 +61,27 @@ class Gates:
 
     @property
     def length(self) -> Array:
-        """Of the gates [s]."""
+        """Length of each gate [s]."""
         return self.end - self.begin
 
     @property
     def periods(self) -> Array:
-        """Counted in each."""
+        """Number of periods in each gate."""
         return self.frequency * self.length
 
     def part(self, which: NDArray[np.bool_]) -> Gates:
-        """Some of them."""
+        """Return some of the gates."""
         return Gates(self.begin[which], self.end[which], self.frequency[which])
 
 
 @dataclass(frozen=True)
 class Swing:
-    """The phase of a locked top about its drive: size·cos 2πf(t − crest) [turns], ahead of the drive where it is > 0.
+    """The phase of a locked top about its drive, size·cos 2πf(t − crest) [turns]; positive: ahead of the drive.
 
     Attributes:
         frequency: f [Hz].
         size: [turns].
-        crest: [s].
+        crest: time of the greatest lead [s].
     """
 
     frequency: float
@@ -90,10 +95,11 @@ class Rate:
 
     Attributes:
         value: [Hz].
-        scatter: standard deviation of the periods in a gate [turns], with so many degrees of freedom.
-        per_scatter: u(value) over it [Hz].
-        swing: that was taken off, None where it was not looked for.
-        wrong: gates that are left out, with the pulses that they have too many.
+        scatter: standard deviation of the periods in a gate [turns].
+        freedom: degrees of freedom of the scatter.
+        per_scatter: u(value) over the scatter [Hz].
+        swing: that the rate is freed from; None if none was searched.
+        wrong: gates that are left out, each with its number of pulses too many.
         missing: gates without a count.
     """
 
@@ -107,19 +113,19 @@ class Rate:
 
     @property
     def u(self) -> float:
-        """Standard uncertainty by this point's own scatter [Hz]."""
+        """Standard uncertainty from this point's own scatter [Hz]."""
         return self.scatter * self.per_scatter
 
 
 def rates_at_point(spin: Gates, laser: Gates) -> tuple[Rate, Rate]:
-    """The rates of the tape's and of the laser's pulses, counted one after the other at one drive.
+    """Return the rates of the tape's and of the laser's pulses, counted one after the other at one drive.
 
     Args:
-        spin: three counts at least.
-        laser: likewise.
+        spin: gates of the tape, at least three with a count.
+        laser: gates of the laser, likewise.
     """
     series = (spin, laser)
-    first = _swing_frequency([_counted(gates) for gates in series])
+    first = _swing_frequency([_with_count(gates) for gates in series])
     kept = [_without_miscounts(gates, first) for gates in series]
     frequency = _swing_frequency([gates for gates, _ in kept])
     rates = [_rate(gates, frequency, wrong, len(all_)) for (gates, wrong), all_ in zip(kept, series, strict=True)]
@@ -127,8 +133,8 @@ def rates_at_point(spin: Gates, laser: Gates) -> tuple[Rate, Rate]:
 
 
 def swing_of(gates: Gates) -> Swing | None:
-    """The swing that the gates of one series show; None where there are few gates, or it does not stand out."""
-    used = _counted(gates)
+    """Return the swing that the gates of one series show; None if there are few gates, or if it is not clear."""
+    used = _with_count(gates)
     if len(used) <= FEWEST:
         return None
     rate = _rate(used, _swing_frequency([used]), (), len(used))
@@ -136,11 +142,11 @@ def swing_of(gates: Gates) -> Swing | None:
 
 
 def shared_scatter(rates: Sequence[Rate], drive: Array) -> Array:
-    """The scatter of a gate at each point of a sweep, from the gates of all points, shape (n,) [turns].
+    """Return the scatter of a gate at each point of a sweep, from the gates of all points, shape (n,) [turns].
 
-    One point has few gates, and a line that weighs its points by what few gates say believes too much in those that
-    agree by chance.  The scatter changes with the drive, for the wobble gets smaller and the nutation does not: it is
-    a power of the frequency.  A point whose own scatter is larger than that, by no chance, keeps it.
+    One point has few gates.  A line weighted by the scatter of few gates would follow those points too closely whose
+    gates agree by chance.  The scatter depends on the drive, for the wobble gets smaller with it and the nutation does
+    not: it is modelled as a power of the frequency.  A point whose own scatter is larger, and not by chance, keeps it.
 
     Args:
         rates: of the points.
@@ -153,7 +159,7 @@ def shared_scatter(rates: Sequence[Rate], drive: Array) -> Array:
     if own.size < _FEWEST_POINTS or not np.ptp(drive) > 0:
         shared = np.full(own.size, math.sqrt(float(np.average(own**2, weights=freedom))))
     else:
-        # the mean of log χ²/dof lies below 0 by this; its variance is 2/dof about
+        # the mean of log(χ²/dof) is digamma(dof/2) − log(dof/2), below 0; its variance is about 2/dof
         logs = np.log(own**2) - (digamma(freedom / 2) - np.log(freedom / 2))
         columns = np.column_stack([np.ones(own.size), np.log(drive / drive.mean())])
         root = np.sqrt(freedom / 2)
@@ -173,7 +179,7 @@ def _columns(gates: Gates, frequency: float | None) -> Array:
     return np.column_stack([gates.length, np.cos(end) - np.cos(begin), np.sin(end) - np.sin(begin)])
 
 
-def _left(gates: Gates, frequency: float) -> float:
+def _residual_sum(gates: Gates, frequency: float) -> float:
     """Σ residual² [turns²]."""
     columns = _columns(gates, frequency)
     found, *_ = np.linalg.lstsq(columns, gates.periods, rcond=None)
@@ -181,7 +187,10 @@ def _left(gates: Gates, frequency: float) -> float:
 
 
 def _swing_frequency(series: Sequence[Gates]) -> float | None:
-    """Where Σ n log(what is left) of the series is least: each has a scatter of its own [Hz]; None if all are short."""
+    """Return the swing's frequency, at which Σ n log(residual²) of the series is least [Hz]; None if all are short.
+
+    Each series has a scatter of its own.
+    """
     series = [gates for gates in series if len(gates) >= FEWEST]
     if not series:
         return None
@@ -189,7 +198,7 @@ def _swing_frequency(series: Sequence[Gates]) -> float | None:
     most = _MOST_IN_A_GATE / max(float(gates.length.mean()) for gates in series)
     tried = np.arange(_LEAST_PERIODS / span, most, _STEP_PERIODS / span)
     least = _LEAST_SCATTER**2
-    totals = [sum(len(gates) * math.log(_left(gates, f) + least) for gates in series) for f in tried.tolist()]
+    totals = [sum(len(gates) * math.log(_residual_sum(gates, f) + least) for gates in series) for f in tried.tolist()]
     return float(tried[int(np.argmin(totals))]) if totals else None
 
 
@@ -208,18 +217,25 @@ def _rate(gates: Gates, frequency: float | None, wrong: tuple[tuple[int, int], .
     return Rate(float(found[0]), scatter, freedom, per_scatter, swing, wrong, missing=count - len(gates) - len(wrong))
 
 
-def _counted(gates: Gates) -> Gates:
-    """Those that have a count."""
+def _with_count(gates: Gates) -> Gates:
+    """Return the gates that have a count."""
     return gates.part(np.isfinite(gates.frequency))
 
 
 def _without_miscounts(gates: Gates, frequency: float | None) -> tuple[Gates, tuple[tuple[int, int], ...]]:
-    """The gates that counted, and those that counted whole pulses too many or too few: (gate, pulses).
+    """Separate the gates that counted whole pulses too many or too few.
 
-    Gate after gate, the one without which the others fit best.  frequency: of the swing [Hz].
+    One after the other, the gate is removed without which the others fit best.
+
+    Args:
+        gates: of a series.
+        frequency: of the swing [Hz].
+
+    Returns:
+        The other gates; of each miscount its index and the pulses too many.
     """
     place = np.flatnonzero(np.isfinite(gates.frequency))
-    used, most = _counted(gates), int(_MOST_WRONG * len(gates))
+    used, most = _with_count(gates), int(_MOST_WRONG * len(gates))
     wrong: list[tuple[int, int]] = []
     while len(wrong) < most and len(used) > FEWEST:
         columns = _columns(used, frequency)
@@ -228,7 +244,7 @@ def _without_miscounts(gates: Gates, frequency: float | None) -> tuple[Gates, tu
         left = used.periods - orthonormal @ (orthonormal.T @ used.periods)
         gains = left**2 / alone
         k = int(np.argmax(gains))
-        off = float(left[k] / alone[k])  # from what the others say
+        off = float(left[k] / alone[k])  # from the fit of the others
         pulses = round(off)
         freedom = len(used) - 1 - columns.shape[1]
         scatter = math.sqrt(max(float(np.sum(left**2) - gains[k]), 0.0) / freedom / float(alone[k]))
@@ -240,16 +256,16 @@ def _without_miscounts(gates: Gates, frequency: float | None) -> tuple[Gates, tu
 
 
 def whole_counts(gates: Gates, expected: float) -> int:
-    """Pulses that every gate has too many, or too few, where whole counts explain a point better than another rate.
+    """Return how many pulses too many, or too few, every gate of a point has; 0 if another rate explains it better.
 
-    Gates differ in length: a rate that is off takes the more pulses the longer the gate, a miscount as many in each.
-    0 where it explains nothing.
+    Gates differ in length: a rate that is off changes a long gate by more pulses than a short one, a miscount changes
+    all by the same number.
 
     Args:
         gates: at a point.
         expected: its rate by the line through the other points [Hz].
     """
-    some = _counted(gates)
+    some = _with_count(gates)
     off = some.periods - expected * some.length
     mean = float(off.mean())
     rate = float(np.sum(off * some.length) / np.sum(some.length**2))
@@ -260,7 +276,7 @@ def whole_counts(gates: Gates, expected: float) -> int:
 
 
 def pulses_too_many(pulses: int) -> str:
-    """A miscount in words.
+    """Return a miscount in words.
 
     >>> pulses_too_many(1), pulses_too_many(-2)
     ('1 pulse too many', '2 pulses too few')

@@ -19,15 +19,15 @@ from analysis.errors import NoRange, TooFewReadings
 
 Array = NDArray[np.float64]
 
-#: Points below which two parameters leave nothing over.
+#: Fewer points leave no degree of freedom beside two parameters.
 FEWEST = 3
 #: A χ² less probable than this: the line, or the stated uncertainty, is wrong.
 NO_FIT = 1e-3
-#: Of the bands.
+#: Confidence of the bands.
 CONFIDENCE = 0.95
-#: York's iteration: so close to the last slope it ends; it takes 5 to 10 rounds, a hundred means that none is found.
+#: York's iteration ends at this relative change of the slope.  It takes 5 to 10 rounds; after a hundred it has failed.
 _CLOSE, _MOST_ROUNDS = 1e-14, 100
-#: A scatter below this share of the values is the rounding of the numbers, and says nothing.
+#: A scatter below this share of the values is rounding.
 _ROUNDING = 1e-13
 
 
@@ -36,17 +36,16 @@ class Line:
     """y = intercept + slope·x.
 
     Attributes:
-        slope, u_slope: [1]; u None where the points leave it undefined.
+        slope, u_slope: [1]; u is None if the points leave it undefined.
         intercept, u_intercept: at x = 0 [Hz].
         centre: weighted mean of x [Hz].
         height, u_height: of the line there [Hz]; uncorrelated with the slope.
         correlation: of slope and intercept.
         n: points.
         chi_square: Σ(residual/u)²; None where no u was given.
-        p_fit: how probable so large a χ² is if the line and the u hold.
-        scale: by which the u of the points count: 1, or √(χ²/dof) where p_fit < 0.001; without u the scatter about the
-            line [Hz].
-        u_known: whether the points' own u are believed: then tests use the normal distribution, else Student's t.
+        p_fit: probability of such a χ², or a larger one, if the line and the u are right.
+        scale: factor on the points' u: 1, or √(χ²/dof) if p_fit < 0.001; without u, the scatter about the line [Hz].
+        u_known: whether the points' own u are used: then tests use the normal distribution, else Student's t.
         orthogonal: whether u along x counts, too.
     """
 
@@ -72,34 +71,35 @@ class Line:
 
     @property
     def quantile(self) -> float:
-        """Half of a 95 % interval in standard uncertainties."""
+        """Half the width of a 95 % interval, in standard uncertainties."""
         from scipy.special import ndtri, stdtrit
 
         level = (1 + CONFIDENCE) / 2
         return float(ndtri(level) if self.u_known else stdtrit(self.degrees_of_freedom, level))
 
     def at(self, x: Array) -> Array:
-        """The line [Hz]."""
+        """Return the line at x [Hz]."""
         return np.asarray(self.height + self.slope * (x - self.centre))
 
     def u_at(self, x: Array) -> Array:
-        """Standard uncertainty of the line [Hz], NaN where it is undefined."""
+        """Return the standard uncertainty of the line at x [Hz], NaN if it is undefined."""
         if self.u_slope is None or self.u_height is None:
             return np.full_like(x, np.nan)
         return np.hypot(self.u_height, self.u_slope * (x - self.centre))
 
     def confidence_band(self, x: Array) -> Array:
-        """Half the width at each x of the band that holds the line with 95 % [Hz]."""
+        """Return half the width, at each x, of the band that contains the line with 95 % [Hz]."""
         return self.quantile * self.u_at(x)
 
     def prediction_band(self, x: Array, u: float) -> Array:
-        """Half the width of the band that holds one more point of this u, or weight, with 95 % [Hz]."""
+        """Return half the width of the band that contains one more point of this u with 95 % [Hz]."""
         return self.quantile * np.hypot(self.u_at(x), self.scale * u)
 
     def p_against(self, slope: float = 1.0, intercept: float = 0.0) -> float | None:
-        """How probable so large a departure from a line is if that line is true: slope and intercept jointly.
+        """Return the probability of such a departure from a line, or a larger one, if that line is true.
 
-        χ² with two degrees of freedom, or F with two and n − 2.  None where the points leave it undefined.
+        Slope and intercept are tested jointly, by χ² with two degrees of freedom, or F with two and n − 2.  None if the
+        points leave it undefined.
         """
         if not self.u_slope or not self.u_height:
             return None
@@ -113,14 +113,14 @@ class Line:
 
 @dataclass(frozen=True)
 class Influence:
-    """What each point does to the line, shape (n,) each.
+    """The effect of each point on the line, shape (n,) each.
 
     Attributes:
         leverage: how far the line follows the point, 0 to 1.
         residual: y − line [Hz].
-        studentised: the same in units of its own standard deviation, with scatter taken from the other points where u
-            is not known, NaN where it is undefined.
-        slope_change, intercept_change: by which the line without the point differs.
+        studentised: the residual in units of its own standard deviation; if u is not known, with the scatter of the
+            other points; NaN if it is undefined.
+        slope_change, intercept_change: of the line without the point, less that of the line with it.
     """
 
     leverage: Array
@@ -131,16 +131,16 @@ class Influence:
 
 
 def fit_line(x: Array, y: Array, u: Array | None = None) -> Line:
-    """The weighted line through points.
+    """Fit the weighted line through points.
 
     Args:
         x: shape (n,) [Hz].
         y: shape (n,) [Hz].
-        u: standard uncertainty of y, shape (n,) [Hz]; None: not known, all weigh alike and the scatter counts.
+        u: standard uncertainty of y, shape (n,) [Hz]; None: not known, so all weigh alike and the scatter gives u.
 
     Raises:
-        TooFewReadings: below three.
-        NoRange: all at one x.
+        TooFewReadings: fewer than three points.
+        NoRange: all points are at one x.
 
     >>> line = fit_line(np.array([26.0, 30.0, 34.0]), np.array([26.01, 30.0, 33.99]), np.full(3, 0.01))
     >>> round(line.slope, 4), round(line.intercept, 4), round(line.u_slope, 5)
@@ -154,7 +154,7 @@ def fit_line(x: Array, y: Array, u: Array | None = None) -> Line:
 
 
 def fit_orthogonal(x: Array, y: Array, u_x: Array, u_y: Array, *, known: bool = True) -> Line:
-    """The most probable line through points with uncertainties along both axes.
+    """Fit the most probable line through points with uncertainties along both axes.
 
     Args:
         x: shape (n,) [Hz].
@@ -186,10 +186,10 @@ def fit_orthogonal(x: Array, y: Array, u_x: Array, u_y: Array, *, known: bool = 
 
 
 def influence(x: Array, y: Array, line: Line, weight: Array) -> Influence:
-    """What each point does to a line.
+    """Compute the effect of each point on a line.
 
-    Where uncertainties along both axes count, the weights and the slope in them are held fixed: the changes are then
-    right to first order.
+    If uncertainties along both axes count, the weights, in which the slope appears, are held fixed: the changes are
+    then right to first order.
 
     Args:
         x: shape (n,) [Hz].
@@ -227,7 +227,7 @@ def _check(x: Array) -> None:
 
 
 def _means(x: Array, y: Array, weight: Array) -> tuple[float, float, float]:
-    """Weighted means of x and y, and Σw(x − mean)²."""
+    """Return the weighted means of x and y, and Σw(x − mean)²."""
     total = np.sum(weight)
     centre, height = float(np.sum(weight * x) / total), float(np.sum(weight * y) / total)
     return centre, height, float(np.sum(weight * (x - centre) ** 2))
@@ -236,7 +236,7 @@ def _means(x: Array, y: Array, weight: Array) -> tuple[float, float, float]:
 def _line(
     x: Array, y: Array, weight: Array, solution: tuple[float, float, float, float], *, u_given: bool, orthogonal: bool
 ) -> Line:
-    """The line with its uncertainties.  solution: centre, height there, slope, Σw(x − centre)²."""
+    """Return the line with its uncertainties; `solution` is centre, height there, slope, Σw(x − centre)²."""
     centre, height, slope, s_xx = solution
     dof = x.size - 2
     residual = y - height - slope * (x - centre)

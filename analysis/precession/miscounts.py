@@ -1,7 +1,7 @@
-"""A line that a few wild points do not move, and counts that lie off it for a reason that can be named.
+"""A line that outliers do not move, and the points off it that a miscount explains.
 
 Source: Theil, Proc. R. Neth. Acad. Sci. 53, 386 (1950), Sen, J. Am. Stat. Assoc. 63, 1379 (1968): the median of the
-slopes between all pairs of points stands up to 29 % of wild ones.
+slopes between all pairs of points withstands up to 29 % of outliers.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Of more points every k-th, in the order of x, takes part: there are n²/2 pairs.
+#: From more points every k-th, in the order of x, is used: there are n²/2 pairs.
 MOST_PAIRED = 500
-#: A point so many standard deviations off the line is looked at.
+#: A point so many standard deviations off the line is examined.
 FAR = 5.0
-#: Counts of a periodic signal that a threshold sees twice, or misses every other time, and their kin.
+#: Counted over true frequency when a threshold sees each period twice, misses every other one, and the like.
 RATIOS = ((1, 2), (2, 1), (1, 3), (3, 1), (2, 3), (3, 2))
-#: A miscount in every turn is not exact where the turns are not alike: within 1 %.
+#: Turns differ, so a miscount in every turn has these ratios to within 1 %.
 _NEAR = 0.01
-#: What is off by whole counts is within a fifth of one, and one count stands out by three standard deviations.
+#: A point is off by whole counts if it is within a fifth of one, and one count is at least three standard deviations.
 _OF_A_COUNT, _STANDS_OUT = 0.2, 3.0
-#: The median distance from the median, in standard deviations of a normal distribution.
+#: Standard deviation of a normal distribution, over the median distance from its median.
 _MAD = 1.482602218505602
 
 
 @dataclass(frozen=True)
 class Robust:
-    """The median line: 68 % intervals, u half of them; shown beside the fit, of all points."""
+    """The median line through all points, shown beside the fit: with 68 % intervals, u being half their width."""
 
     slope: Estimate
     intercept: Estimate
@@ -50,10 +50,10 @@ class Miscount:
 
     Attributes:
         index: of the point.
-        times: the count in parts of the line, as (1, 2), where it is such a part.
-        counts: whole counts too many in a gate, where it is so many.
+        times: (1, 2) if half the line's frequency was counted, and so on; None if no ratio explains it.
+        counts: whole counts too many in a gate; None if they do not explain it.
 
-    Where neither is given no cause is known.
+    Without either, no cause is known.
     """
 
     index: int
@@ -67,7 +67,7 @@ class Miscount:
 
     @property
     def text(self) -> str:
-        """What was counted, in words."""
+        """What the counter counted, in words."""
         if self.times is not None:
             above, below = self.times
             part = {(1, 2): "half", (2, 1): "twice"}.get(self.times, f"{above}/{below} of")
@@ -78,7 +78,7 @@ class Miscount:
 
 
 def robust_line(x: Array, y: Array) -> Robust:
-    """The line through medians: the slope of Theil and Sen, the median of what it leaves.
+    """Return the median line: the slope of Theil and Sen, and the median of its residuals.
 
     Args:
         x: shape (n,), not all alike [Hz].
@@ -99,10 +99,10 @@ def robust_line(x: Array, y: Array) -> Robust:
 
 
 def _median_slope(x: Array, y: Array) -> tuple[float, float, float]:
-    """The median of the slopes of all pairs, and the ends of its 68 % interval.
+    """Return the median of the slopes of all pairs, and the ends of its 68 % interval.
 
-    Sen, eq. (2.6): Kendall's statistic of the residuals has a variance that depends on ties in x alone.  SciPy's
-    theilslopes takes ties in y off as well, and is left with less than nothing where there are many.
+    Sen, eq. (2.6): the variance of Kendall's statistic of the residuals depends on ties in x alone.  SciPy's
+    theilslopes subtracts ties in y as well, and its variance becomes negative if there are many.
     """
     i, j = np.triu_indices(x.size, 1)
     apart = x[j] != x[i]
@@ -126,7 +126,7 @@ def find_miscounts(
     gate_s: float | None = None,
     gates: Sequence[Gates] | None = None,
 ) -> list[Miscount]:
-    """The points far off the median line, with what was counted there.
+    """Find the points far off the median line, and what the counter counted there.
 
     Args:
         x: shape (n,) [Hz].
@@ -134,7 +134,7 @@ def find_miscounts(
         u: standard uncertainty of y, shape (n,) [Hz], if it is known.
         robust: the median line.
         gate_s: of the counter [s]; without it, and without gates, whole counts are not recognised.
-        gates: behind each point, where they are known: then each of them has to be off by the same counts.
+        gates: behind each point, if they are known: each of them must be off by the same counts.
     """
     line = float(robust.intercept.value or 0.0) + float(robust.slope.value or 0.0) * x
     usual = np.maximum(robust.scatter, 1e-9 * np.abs(line))

@@ -1,4 +1,4 @@
-"""What it takes to tell a slope from 1: the power of the test, and the points, range or u that it needs.
+"""The power of the test of a slope against 1, and the number of points, range or u that a wanted power needs.
 
 Source: Cohen, Statistical Power Analysis (1988), §9: the noncentral t distribution as a normal one over that of the
 scatter.
@@ -21,27 +21,28 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: The slope that was published without an uncertainty, and how probable it should be that the test finds it.
+#: The slope that was published without an uncertainty, and the wanted probability that the test detects it.
 OTHER_SLOPE, POWER = 1.05, 0.9
-#: A sweep of more points is no answer any more.
+#: A sweep of more points is no useful answer.
 MOST_POINTS = 1_000_000
-#: Even three points distinguish a slope so many u from 1 almost certainly.
+#: A slope so many u from 1 is detected almost certainly, even with three points.
 _CERTAIN = 100.0
-#: For integrals over the distribution of the scatter: right to 1e-7.
+#: Nodes of the integral over the distribution of the scatter: right to 1e-7.
 _NODES = 200
 
 
 @dataclass(frozen=True)
 class Power:
-    """What tells OTHER_SLOPE from 1 with POWER at 95 % confidence, two-sided, each change by itself.
+    """What the test needs to detect OTHER_SLOPE with POWER, at 95 % confidence, two-sided; each change by itself.
 
     Attributes:
-        slope: that is to be told from 1.
-        now: probability that these points tell it.
-        smallest_difference: from 1 that these points tell with POWER.
-        points, points_needed: now, and with the same u spread over the same range; None: more than a million.
-        range_hz, range_needed_hz: of the drive now, and with as many points of the same u.
-        u_hz, u_needed_hz: of a point now, and at the same drive frequencies.
+        slope: that the test is to distinguish from 1.
+        now: probability that these points detect it.
+        smallest_difference: from 1, that these points detect with POWER.
+        points, points_needed: their number now, and the one needed with the same u over the same range; None: more than
+            a million.
+        range_hz, range_needed_hz: of the drive now, and the one needed with as many points of the same u.
+        u_hz, u_needed_hz: of a point now, and the one needed at the same drive frequencies.
     """
 
     slope: float
@@ -60,15 +61,15 @@ class Power:
         return self.now >= POWER
 
 
-def probability_of_telling(difference: float, u_slope: float, degrees_of_freedom: int | None) -> float:
-    """How probable it is that a two-sided test at 95 % tells a slope that differs so much from 1.
+def detection_probability(difference: float, u_slope: float, degrees_of_freedom: int | None) -> float:
+    """Return the probability that a two-sided test at 95 % detects a slope's difference from 1.
 
     Args:
         difference: of the slope from 1.
         u_slope: its standard uncertainty.
-        degrees_of_freedom: of the scatter that u_slope is from; None: u_slope is known.
+        degrees_of_freedom: of the scatter from which u_slope was estimated; None: u_slope is known.
 
-    >>> round(probability_of_telling(3.2415, 1.0, None), 3), round(probability_of_telling(0.0, 1.0, 7), 3)
+    >>> round(detection_probability(3.2415, 1.0, None), 3), round(detection_probability(0.0, 1.0, 7), 3)
     (0.9, 0.05)
     """
     from scipy.special import ndtr, ndtri, stdtrit
@@ -84,10 +85,10 @@ def probability_of_telling(difference: float, u_slope: float, degrees_of_freedom
 
 @functools.lru_cache(maxsize=8)
 def _shares(degrees_of_freedom: int) -> tuple[Array, Array]:
-    """By how much too small or large an estimated scatter is, with the probability of each, shape (n,) each.
+    """Return values of estimated over true scatter, with the probability of each, shape (n,) each.
 
-    Its quantiles at the nodes of Gauss and Legendre.  SciPy's noncentral t distribution is no way: it is NaN for large
-    shifts.
+    They are quantiles at the nodes of Gauss and Legendre.  SciPy's noncentral t distribution does not do: it is NaN for
+    large shifts.
     """
     from scipy.special import chdtri
 
@@ -95,8 +96,8 @@ def _shares(degrees_of_freedom: int) -> tuple[Array, Array]:
     return np.sqrt(chdtri(degrees_of_freedom, (1 - node) / 2) / degrees_of_freedom), weight / 2
 
 
-def what_it_takes(line: Line, range_hz: float, u_hz: float) -> Power | None:
-    """What tells a slope of 1.05 from 1, from the points at hand; None where the slope has no u.
+def power_of(line: Line, range_hz: float, u_hz: float) -> Power | None:
+    """Return the power of the points at hand against a slope of 1.05; None if the slope has no u.
 
     Args:
         line: through the points.
@@ -111,7 +112,7 @@ def what_it_takes(line: Line, range_hz: float, u_hz: float) -> Power | None:
     shrink = u_slope * reach / difference  # by which u(slope) is too large
     return Power(
         slope=OTHER_SLOPE,
-        now=probability_of_telling(difference, u_slope, dof),
+        now=detection_probability(difference, u_slope, dof),
         smallest_difference=reach * u_slope,
         points=line.n,
         points_needed=_points_needed(line, difference),
@@ -123,19 +124,22 @@ def what_it_takes(line: Line, range_hz: float, u_hz: float) -> Power | None:
 
 
 def _ratio_for(power: float, dof: int | None) -> float:
-    """Difference over u(slope) that a test with this power detects."""
+    """Return the difference that a test with this power detects, over u(slope)."""
     from scipy.optimize import brentq
 
-    return float(brentq(lambda ratio: probability_of_telling(ratio, 1.0, dof) - power, 0.0, _CERTAIN))
+    return float(brentq(lambda ratio: detection_probability(ratio, 1.0, dof) - power, 0.0, _CERTAIN))
 
 
 def _points_needed(line: Line, difference: float) -> int | None:
-    """Points of the same kind: u(slope) falls with the root of their number, and the test gains degrees of freedom."""
+    """Return the number of points of the same kind; None above a million.
+
+    u(slope) falls with the root of their number, and the test gains degrees of freedom.
+    """
 
     def enough(n: int) -> bool:
         dof = None if line.u_known else n - 2
         u_slope = (line.u_slope or 0.0) * math.sqrt(line.n / n)
-        return probability_of_telling(difference, u_slope, dof) >= POWER
+        return detection_probability(difference, u_slope, dof) >= POWER
 
     low, high = 2, 3
     while not enough(high):

@@ -1,7 +1,7 @@
-"""A sweep of the drive's frequency: is what the laser counts the drive's frequency itself?
+"""A sweep of the drive's frequency: does the laser count the drive's frequency itself?
 
 A top that is locked to its drive wobbles at the drive's frequency, and its stem cuts the laser's beam once in each
-period: ν_p = ν_d, slope 1, intercept 0.  That is what is tested, jointly.
+period: ν_p = ν_d, slope 1, intercept 0.  The two are tested jointly.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from analysis.errors import NotFinite, NotPositive, ShapesDiffer
 from analysis.numbers import digits
 from analysis.precession.line import FEWEST, NO_FIT, Line, fit_line, fit_orthogonal, influence
 from analysis.precession.miscounts import Miscount, Robust, find_miscounts, robust_line
-from analysis.precession.power import Power, what_it_takes
+from analysis.precession.power import Power, power_of
 
 if TYPE_CHECKING:
     from analysis.precession.gates import Gates
@@ -26,13 +26,13 @@ Array = NDArray[np.float64]
 
 #: A joint test below this excludes slope 1 and intercept 0.
 EXCLUDED_P = 0.01
-#: A studentised residual, or a leverage in units of the mean one, that is worth a word.
+#: A point deserves a warning above this studentised residual, or this leverage in units of the mean one.
 _FAR, _HEAVY = 3.5, 3.0
-#: An uncertainty of the drive that matters: so large a share of that of the precession.
+#: An uncertainty of the drive matters above this share of that of the precession.
 _MATTERS = 0.3
-#: Shares of u in the drive's frequency that differ by less than this are one clock's.
+#: Relative uncertainties of the drive's frequency that differ by less than this are those of one clock.
 _ONE_CLOCK = 1e-3
-#: A spin that differs from the drive's frequency by so many u, and by this share at least, is a symptom.
+#: A spin that differs from the drive's frequency by so many u, and by this share, deserves a warning.
 _SPIN_FAR, _SPIN_SHARE = 5.0, 1e-3
 
 
@@ -42,12 +42,12 @@ class Point:
 
     Attributes:
         drive, precession: [Hz].
-        u: of the precession, as it counts in the fit [Hz]; None: all weigh alike.
+        u: of the precession, as the fit uses it [Hz]; None: all weigh alike.
         u_drive: [Hz]; None: not known.
         spin, u_spin: [Hz], where they were measured.
         leverage, residual, studentised, slope_change, intercept_change: see `analysis.precession.line.Influence`; None
-            for a point that is left out, and where undefined.  The residual of a point left out is from the line, too.
-        miscount: what was counted in the place of the precession, in words; None: nothing is amiss.
+            for a point that is left out, and if undefined.  A point that is left out has a residual, too.
+        miscount: what the counter counted instead of the precession, in words; None: the point is sound.
         used: whether the line goes through it.
     """
 
@@ -68,13 +68,13 @@ class Point:
 
 @dataclass(frozen=True)
 class SweepFit:
-    """The line through a sweep and what it says.
+    """The line through a sweep, and its test.
 
     Attributes:
-        line: the one asked for, weighted or orthogonal.
+        line: the weighted or the orthogonal one.
         robust: the median line through all points, miscounts included.
-        p_locked: how probable so large a departure from slope 1, intercept 0 is for a locked top.
-        power: what it takes to tell a slope of 1.05 from 1.
+        p_locked: probability that a locked top shows such a departure from slope 1, intercept 0, or a larger one.
+        power: what the test needs to distinguish a slope of 1.05 from 1.
         points: in the order given.
         spin_offset, u_spin_offset: mean of spin − drive [Hz], where the spin was measured.
         warnings: what to know before using the numbers.
@@ -91,17 +91,17 @@ class SweepFit:
 
     @property
     def locked(self) -> bool | None:
-        """Whether the points agree with a locked top; None where they leave it open."""
+        """Whether the points agree with a locked top; None if they leave it open."""
         return None if self.p_locked is None else self.p_locked >= EXCLUDED_P
 
     def column(self, name: str) -> Array:
-        """One attribute of all points, NaN where there is none, shape (n,)."""
+        """Return one attribute of all points, NaN where a point has none, shape (n,)."""
         return np.array([math.nan if (v := getattr(p, name)) is None else v for p in self.points], dtype=np.float64)
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """What was measured, shape (n,) each [Hz]; u and the spin where they are known.
+    """The measured points, shape (n,) each [Hz]; u and the spin are None if they are not known.
 
     Attributes:
         gate_s: of the counter [s].
@@ -123,28 +123,28 @@ def fit_sweep(sweep: Sweep, *, orthogonal: bool = False, keep_miscounts: bool = 
 
     Args:
         sweep: the points.
-        orthogonal: let the uncertainties of the drive's frequency count, too; where they are not known they are taken
-            as large as those of the precession.
-        keep_miscounts: let the line go through points whose miscount can be named, too.
+        orthogonal: use the uncertainties of the drive's frequency, too; if they are not known, they are taken as large
+            as those of the precession.
+        keep_miscounts: keep points whose miscount has a name.
 
     Raises:
-        TooFewReadings: below three points.
-        NoRange: all at one drive frequency.
-        ShapesDiffer, NotFinite, NotPositive: what is no sweep.
+        TooFewReadings: fewer than three points.
+        NoRange: all points are at one drive frequency.
+        ShapesDiffer, NotFinite, NotPositive: the arrays are no sweep.
     """
     _check(sweep)
-    fit_line(sweep.drive, sweep.precession)  # raises for what no line goes through
+    fit_line(sweep.drive, sweep.precession)  # raises if no line goes through the points
     robust = robust_line(sweep.drive, sweep.precession)
     found = find_miscounts(sweep.drive, sweep.precession, sweep.u, robust, gate_s=sweep.gate_s, gates=sweep.gates)
-    used, warnings = _used(sweep, found, keep=keep_miscounts)
+    used, warnings = _used_points(sweep, found, keep=keep_miscounts)
     chosen = _part(sweep, used)
-    line = _fitted(chosen, orthogonal=orthogonal)
+    line = _fit(chosen, orthogonal=orthogonal)
     spin_offset, u_spin_offset = _spin_offset(chosen)
     fit = SweepFit(
         line=line,
         robust=robust,
         p_locked=line.p_against(),
-        power=what_it_takes(line, float(np.ptp(chosen.drive)), _usual_u(chosen, line)),
+        power=power_of(line, float(np.ptp(chosen.drive)), _median_u(chosen, line)),
         points=_points(sweep, used, found, line),
         spin_offset=spin_offset,
         u_spin_offset=u_spin_offset,
@@ -153,7 +153,7 @@ def fit_sweep(sweep: Sweep, *, orthogonal: bool = False, keep_miscounts: bool = 
     return replace(fit, warnings=(*warnings, *_doubts(fit, chosen, found)))
 
 
-# --- what is measured ---
+# --- the points ---
 
 
 def _check(sweep: Sweep) -> None:
@@ -178,8 +178,8 @@ def _check(sweep: Sweep) -> None:
             raise NotPositive(quantity=quantity, unit="Hz", index=int(below[0]), value=float(values[below[0]]))
 
 
-def _used(sweep: Sweep, found: list[Miscount], *, keep: bool) -> tuple[NDArray[np.bool_], list[str]]:
-    """The points that the line goes through: all but those whose miscount has a name."""
+def _used_points(sweep: Sweep, found: list[Miscount], *, keep: bool) -> tuple[NDArray[np.bool_], list[str]]:
+    """Return which points the line uses, all but those whose miscount has a name; and warnings."""
     used = np.ones(sweep.drive.size, dtype=np.bool_)
     named = [one.index for one in found if one.named]
     if keep or not named:
@@ -212,7 +212,7 @@ def _part(sweep: Sweep, used: NDArray[np.bool_]) -> Sweep:
 # --- the line ---
 
 
-def _fitted(sweep: Sweep, *, orthogonal: bool) -> Line:
+def _fit(sweep: Sweep, *, orthogonal: bool) -> Line:
     if not orthogonal:
         return fit_line(sweep.drive, sweep.precession, sweep.u)
     u = np.ones_like(sweep.drive) if sweep.u is None else sweep.u
@@ -229,8 +229,8 @@ def _weight(sweep: Sweep, line: Line) -> Array:
     return np.asarray(1 / (u**2 + line.slope**2 * u_drive**2))
 
 
-def _usual_u(sweep: Sweep, line: Line) -> float:
-    """Of a point, as it counts: the middle one [Hz]."""
+def _median_u(sweep: Sweep, line: Line) -> float:
+    """Return the median of the points' u, as the fit uses them [Hz]."""
     return line.scale * float(np.median(_weight(sweep, line) ** -0.5))
 
 
@@ -268,7 +268,7 @@ def _points(sweep: Sweep, used: NDArray[np.bool_], found: list[Miscount], line: 
 
 
 def _spin_offset(sweep: Sweep) -> tuple[float | None, float | None]:
-    """Mean of spin − drive, weighted where u is known, and its u from the scatter or the u, whichever is larger."""
+    """Return the mean of spin − drive, weighted if u is known, and its u: from the scatter or the u, the larger one."""
     if sweep.spin is None:
         return None, None
     off = sweep.spin - sweep.drive
@@ -279,7 +279,7 @@ def _spin_offset(sweep: Sweep) -> tuple[float | None, float | None]:
     return mean, max(scatter, own)
 
 
-# --- what to know ---
+# --- warnings ---
 
 
 def _doubts(fit: SweepFit, sweep: Sweep, found: list[Miscount]) -> list[str]:
@@ -331,10 +331,10 @@ def _doubts(fit: SweepFit, sweep: Sweep, found: list[Miscount]) -> list[str]:
 
 
 def _about_drive(drive: Array, u_drive: Array, u: Array, line: Line) -> list[str]:
-    """Whether u of the drive's frequency matters.
+    """Return a warning if u of the drive's frequency matters.
 
-    One that is the same share of it at all points is that of a clock: all points are off by one factor, which moves the
-    slope by it and no point beside the line, so it does not ask for another regression.
+    A relative u that is the same at all points is that of a clock.  It scales all frequencies by one factor, which
+    changes the slope and moves no point off the line, so it needs no other regression.
     """
     share = float(np.median(u_drive / drive))
     if np.ptp(u_drive / drive) > _ONE_CLOCK * share:

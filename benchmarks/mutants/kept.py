@@ -74,7 +74,7 @@ def share(rows: Sequence[Row]) -> float:
 
 def write(rows: Sequence[Row], seed: int) -> None:
     """The results, and the table of the page."""
-    told = {
+    results = {
         "seed": seed,
         "summary": {
             kind: dict(Counter(row.state for row in rows if row.kind == kind))
@@ -86,7 +86,7 @@ def write(rows: Sequence[Row], seed: int) -> None:
             for row in sorted(rows, key=lambda row: (row.kind != "named", row.file, row.function, row.text))
         ],
     }
-    RESULTS.write_text(json.dumps(told, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    RESULTS.write_text(json.dumps(results, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     if PAGE.exists():
         before, rest = PAGE.read_text(encoding="utf-8").split(BEGIN)
         _, after = rest.split(END)

@@ -249,6 +249,7 @@ def _hold(session: Session[D], drive: float) -> None:
     n = round(session.settings.hold_s / session.settings.gate_s)
     counts = []
     for k in range(n):
+        session.stop.check()
         counts.append(held_spin(session, drive))
         session.progress(f"held at {drive:.2f} Hz", (k + 1) / n)
     if n > 1:

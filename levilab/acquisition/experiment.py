@@ -50,7 +50,7 @@ class CounterSettings(ExperimentSettings):
     one_top: ClassVar[bool] = True
 
     interval_s: PositiveFloat = Field(default=10.0, description="then read every so often,")
-    gate_s: PositiveFloat = Field(default=1.0, description="counting for so long")
+    gate_s: PositiveFloat = Field(default=1.0, description="length of a count")
     trigger_level_v: float = Field(default=0.6, description="half way between dark and the pulse of the tape")
     reading_u_hz: PositiveFloat | None = Field(
         default=None, description="standard uncertainty of a reading, if you know it", examples=[0.03]

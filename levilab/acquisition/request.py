@@ -20,10 +20,10 @@ from levilab.bench.wiring import described_wiring
 from levilab.errors import LevilabError, UsageError
 from levilab.runs.run import Run, find_run
 from levilab.settings import in_one_line
-from levilab.simulator.keys import parsed
+from levilab.simulator.keys import parse_setting
 from levilab.simulator.scene import SceneError, read_scene, scene_of
 from levilab.world.bench import VIRTUAL, scene_world, virtual_wiring
-from levilab.world.spin_world import SpinScene, SpinWorld, drawn
+from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -156,7 +156,7 @@ def _with_given_settings(config: BenchConfig, experiment: str, settings: Sequenc
             expected = f"is a setting of levilab acquire {name}, this is levilab acquire {experiment}"
             raise UsageError("settings", expected, value=setting)
         refuse_unknown(config, experiment, field)
-        table[name][field] = parsed(f"{field}={text}")[1]
+        table[name][field] = parse_setting(f"{field}={text}")[1]
         given[field] = text
     try:
         return Configuration.model_validate(table)
@@ -229,7 +229,7 @@ def _on_the_virtual_bench(request: AcquisitionRequest, options: AcquisitionOptio
         return VirtualClock(realtime=options.realtime)
 
     if scene is None:
-        return _with_a_spinning_top(request, drawn(seed), clock)
+        return _with_a_spinning_top(request, random_scene(seed), clock)
     if run is None:
         settings = settings_of(config, request.experiment).for_scene(scene)
         settings.check(request.experiment, config.limits)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 acquire_app = typer.Typer(no_args_is_help=True, add_completion=False)
 
 
-#: Experiment → what its command does.  The table of experiments itself takes too long to import for a help page.
+#: Experiment → help of its command.  The table of experiments takes too long to import for a help page.
 EXPERIMENT_HELP = {
     "spin": "Spin-down: drive the top up, switch the drive off, count its spin until it falls.",
     "trace": "Records of the oscilloscope: raw codes into the run folder, written as they come.",
@@ -52,14 +52,14 @@ def acquire_experiment(
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Makes a virtual run repeatable.")] = None,
     note: Annotated[str, typer.Option(help="Kept with the run.")] = "",
-    realtime: Annotated[bool, typer.Option("--realtime", help="Keep the virtual bench to the wall clock.")] = False,
+    realtime: Annotated[bool, typer.Option("--realtime", help="Run the virtual bench in real time.")] = False,
     resume: Annotated[
         Path | None,
-        typer.Option(metavar="RUN", help="Go on with an interrupted run, with the settings that it was begun with."),
+        typer.Option(metavar="RUN", help="Continue an interrupted run, with its own settings."),
     ] = None,
     wire_log: Annotated[bool, typer.Option("--wire-log", help="Keep all bytes sent and received.")] = False,
     yes: Annotated[
-        bool, typer.Option("--yes", help="Ask the person at the bench nothing: all is as the experiment wants it.")
+        bool, typer.Option("--yes", help="Ask no questions: the bench is as the experiment needs it.")
     ] = False,
     settings: Annotated[
         list[str] | None,

@@ -25,7 +25,7 @@ class AnalyzeGroup(typer.core.TyperGroup):
     """`levilab analyze PATH…` without the name of an analysis is `levilab analyze each PATH…`."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Put in the name where there is none, and none was meant."""
+        """Insert the name `each` unless the first word is, or was meant as, the name of an analysis."""
         if args and args[0] not in ctx.help_option_names:
             k = self._first_word(args)
             named = k is not None and (args[k] in self.commands or self._is_misspelt(args[k]))
@@ -33,7 +33,7 @@ class AnalyzeGroup(typer.core.TyperGroup):
         return super().parse_args(ctx, args)
 
     def _first_word(self, args: list[str]) -> int | None:
-        """Where the first word stands that is no option, nor the value of one."""
+        """Return the index of the first word that is neither an option nor the value of one; None if there is none."""
         each: Any = self.commands[_EACH]
         options = [one for one in each.command.params if not getattr(one, "is_flag", True)]
         with_value = {name for option in options for name in option.opts}
@@ -46,7 +46,7 @@ class AnalyzeGroup(typer.core.TyperGroup):
         return None
 
     def _is_misspelt(self, word: str) -> bool:
-        """Whether a word is nearly the name of an analysis, and no path."""
+        """Whether a word is similar to the name of an analysis, and no path."""
         from difflib import get_close_matches  # not for every help
 
         return bool(get_close_matches(word, self.commands)) and not Path(word).exists()
@@ -85,9 +85,9 @@ class Option(NamedTuple):
 
     Attributes:
         kind: its type, as typer reads it.
-        default: where it is not given.
-        read: from what was given, unless that is None, to what the analysis takes (raises UsageError).
-        to: how the analysis calls it, if otherwise.
+        default: its value without the option.
+        read: turns a value of the command line, other than None, into the analysis's; raises UsageError.
+        to: its name in the analysis; empty: the same name.
     """
 
     kind: Any
@@ -109,7 +109,7 @@ def _device(path: Path) -> Any:
 
 
 def _positive(name: str, what: str) -> Callable[[float], float]:
-    """A check of a number."""
+    """Return a check that a number is above 0."""
 
     def check(value: float) -> float:
         if not 0 < value < math.inf:
@@ -120,7 +120,7 @@ def _positive(name: str, what: str) -> Callable[[float], float]:
 
 
 def _metres(name: str, lowest: float) -> Callable[[float], float]:
-    """From millimetres to metres."""
+    """Return a function from millimetres to metres, which checks the range."""
 
     def read(value: float) -> float:
         if not lowest <= value <= 2000.0:
@@ -155,8 +155,8 @@ OPTIONS = {
             Tilt,
             typer.Option(
                 "--tilt",
-                help="Whether counts hold the tilt of the top's moment.  auto: where they demand it, and u has what "
-                "noise may hide of it.  none: a top that only spins.",
+                help="Whether counts hold the tilt of the top's moment.  auto: fitted if the counts demand it; u "
+                "covers a tilt that noise may hide.  none: a top that only spins.",
             ),
         ],
         Tilt.AUTO,
@@ -171,7 +171,7 @@ OPTIONS = {
         str,
     ),
     "orthogonal": Option(
-        Annotated[bool, typer.Option("--orthogonal", help="Let the uncertainty of the drive's frequency count, too.")],
+        Annotated[bool, typer.Option("--orthogonal", help="Use the uncertainty of the drive's frequency, too.")],
         False,
     ),
     "device": Option(
@@ -187,7 +187,7 @@ OPTIONS = {
         Annotated[
             float | None,
             typer.Option(
-                metavar="MM", help="Where the top was seen to float: its moment follows, if its mass is known."
+                metavar="MM", help="Height at which the top floats; its moment follows, if its mass is known."
             ),
         ],
         read=_metres("height", -1000.0),
@@ -208,7 +208,7 @@ OPTIONS = {
     "free_radii": Option(
         Annotated[
             bool,
-            typer.Option("--free-radii", help="Let the scan move the radii, too, within what the calliper says."),
+            typer.Option("--free-radii", help="Fit the radii, too, within the calliper's uncertainty."),
         ],
         False,
     ),
@@ -222,7 +222,7 @@ class Command(NamedTuple):
     options: tuple[str, ...]
 
 
-#: The command that stands for no name, and is not listed.  An option goes to those analyses that know it.
+#: The command without a name; the help does not list it.  Each analysis takes those options that it knows.
 _EACH = "each"
 #: The catalogue itself takes too long to import for a help page.
 COMMANDS = {
@@ -255,7 +255,7 @@ COMMANDS = {
 
 
 def _command(options: Sequence[str]) -> Callable[..., None]:
-    """The command of an analysis: these options stand in its signature, where typer reads them, before --save."""
+    """Return the command of an analysis, with these options in its signature, before --save, where typer reads them."""
 
     def analyze(
         context: typer.Context,
@@ -265,7 +265,7 @@ def _command(options: Sequence[str]) -> Callable[..., None]:
         as_json: Json = False,
         **given: Any,
     ) -> None:
-        _analyze(context, paths, as_analyses_take(given), save=save, out=out, as_json=as_json)
+        _analyze(context, paths, analysis_options(given), save=save, out=out, as_json=as_json)
 
     context, paths, *shared, _ = inspect.signature(analyze).parameters.values()
     own = [
@@ -290,8 +290,8 @@ for _name, _row in COMMANDS.items():
     _add(_name, _row)
 
 
-def as_analyses_take(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Options as analyses take them, in SI, from those of the command line.  Raises UsageError."""
+def analysis_options(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the analyses' options, in SI, from those of the command line.  Raises UsageError."""
     if given.get("height_u") is not None and given.get("height") is None:
         raise UsageError("height_u", "goes with `height` alone")
     return {
@@ -323,10 +323,10 @@ def _analyze(
 
 
 def _analyze_as(analysis: "Analysis[Any]", paths: Sequence[Path], given: Mapping[str, Any]) -> Any:
-    """The result of one analysis; where the inputs do not suit it, the error names those that they suit.
+    """Return the result of one analysis.
 
     Raises:
-        DoesNotSuit: with the analyses that read the inputs.
+        DoesNotSuit: the inputs are for other analyses, which the message names.
     """
     try:
         return analysis.analyze(paths, analysis.options_from(given))
@@ -336,7 +336,7 @@ def _analyze_as(analysis: "Analysis[Any]", paths: Sequence[Path], given: Mapping
 
 
 def _suiting(analysis: "Analysis[Any]", paths: Sequence[Path], given: Mapping[str, Any]) -> str:
-    """Which other analyses read what lies at the paths, as the end of a sentence; empty if none does."""
+    """Return which other analyses read the paths, as the end of a sentence; empty if none does."""
     from levilab.pipelines.catalogue import ANALYSES
     from levilab.runs.run import find_run
 
@@ -373,7 +373,7 @@ def _write_and_print(
     out: Path | None,
     as_json: bool,
 ) -> None:
-    """Write the results, then print them: a reader that goes away must not cost a result.
+    """Write the results before printing them: a closed pipe must not cost a result.
 
     left_out: why other analyses have no result.
     """
@@ -400,7 +400,7 @@ def _write_and_print(
 
 
 def _save(analysis: "Analysis[Any]", found: Any, out: Path | None) -> tuple[LevilabError | None, list[Path]]:
-    """What kept the result from being written, or the files; what was found is shown either way."""
+    """Write a result.  Returns the error, if any, and the files; the caller prints the result either way."""
     from levilab.pipelines.catalogue import save
 
     try:

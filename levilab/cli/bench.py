@@ -22,21 +22,24 @@ bench_app = typer.Typer(no_args_is_help=True, add_completion=False)
 def bench_init(
     addresses: Annotated[
         list[str] | None,
-        typer.Option("--address", metavar="NAME", help="Ask there, too: a resource name or a serial port; repeatable."),
+        typer.Option(
+            "--address", metavar="NAME", help="Search there, too: a resource name or a serial port; repeatable."
+        ),
     ] = None,
     library: Annotated[
         str, typer.Option(metavar="NAME", help="PyVISA's library: @py is its own, '' a vendor's, @levilab virtual.")
     ] = "@py",
     out: Annotated[Path, typer.Option(metavar="FILE", help="The file to write.")] = Path("bench.toml"),
     force: Annotated[
-        bool, typer.Option("--force", help="Replace the file if it is there; write one to fill in if nobody answers.")
+        bool,
+        typer.Option("--force", help="Replace the file if it is there; write one to fill in if no instrument answers."),
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Ask everybody on the buses who they are, and write a commented bench.toml with those that have a driver.
+    """Ask all instruments on the buses for their identity; write a commented bench.toml of those with a driver.
 
-    Only *IDN? is sent.  Instruments on the network are found by themselves where PyVISA can look for them (pip install
-    psutil zeroconf); else name them with --address.
+    It sends *IDN? and nothing else.  PyVISA finds instruments on the network if psutil and zeroconf are installed (pip
+    install psutil zeroconf); else name them with --address.
     """
     from levilab.acquisition.table import tables_to_write
     from levilab.bench.discover import search
@@ -50,20 +53,20 @@ def bench_init(
 
         print_json({"found": [asdict(one) for one in found], "file": str(out)}, indent=None)
     else:
-        _tell_found(found)
+        _print_found(found)
     if not any(one.kind for one in found) and not force:
         raise NoInstrument(
-            "no instrument answered that levilab has a driver for, so no file was written: is it on and connected?  "
+            "no instrument with a driver in levilab answered, so no file was written: is it on and connected?  "
             "Name it with `addresses`, or take `force` for a file to fill in by hand"
         )
     write_bench(out, bench_text(found, library, tables_to_write()))
     message(f"wrote {out}: look it over, then try it with `levilab bench check`")
 
 
-def _tell_found(found: "list[Found]") -> None:
+def _print_found(found: "list[Found]") -> None:
     for one in found:
         if one.identity:
-            what = f"{one.kind} {one.model}" if one.kind else "no driver of levilab's"
+            what = f"{one.kind} {one.model}" if one.kind else "levilab has no driver for it"
             result(f"{one.address}\n  {one.identity}: {what}")
         else:
             result(f"{one.address}\n  {one.trouble.removeprefix(one.address + ': ')}")
@@ -77,9 +80,9 @@ def bench_check(
     mock: Annotated[bool, typer.Option("--mock", help="Check the virtual bench.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Connect to each instrument of the bench: who it is, one reading, what failed and what to try.
+    """Connect to each instrument of the bench, and print its identity and a reading, or what failed and what to try.
 
-    The drive stays off.  Exit status 3 if one did not answer as it should.
+    The drive stays off.  The exit status is 3 if an instrument does not answer as it should.
     """
     from levilab.acquisition.table import Configuration, counter_settings
     from levilab.bench.check import Light, check
@@ -96,7 +99,7 @@ def bench_check(
     for one in check(wiring, Light(counting.gate_s, counting.trigger_level_v)):
         checked.append(one)
         if not as_json:
-            _tell_checked(one)
+            _print_checked(one)
     if as_json:
         from dataclasses import asdict
 
@@ -105,7 +108,7 @@ def bench_check(
         raise typer.Exit(exit_codes.INSTRUMENT)
 
 
-def _tell_checked(one: "Checked") -> None:
+def _print_checked(one: "Checked") -> None:
     result(f"{one.kind} at {one.address}")
     if one.model:
         result(f"  {one.maker} {one.model}, serial number {one.serial_number or '-'}, firmware {one.firmware or '-'}")
@@ -136,8 +139,8 @@ def bench_serve(
         bool,
         typer.Option(
             "--portmapper",
-            help="For programs that know a host alone: each instrument at an address of its own, 127.0.0.2 and on, "
-            "with a port mapper at port 111.",
+            help="For programs that take a host and no port: each instrument has an address of its own, 127.0.0.2 and "
+            "on, with a port mapper at port 111.",
         ),
     ] = False,
     as_json: Annotated[
@@ -146,7 +149,7 @@ def bench_serve(
 ) -> None:
     """Offer the virtual bench to other programs: TCP, HiSLIP, VXI-11, serial.  Prints the resource names to copy.
 
-    Ctrl-C or SIGTERM ends it.  Nobody is asked for a password: at another host than 127.0.0.1 all can use it.
+    Ctrl-C or SIGTERM ends it.  There is no password: at another host than 127.0.0.1 any program can use it.
     """
     from instruments.virtual.servers.port_mapper import PORT
     from levilab.world.serve import Service, chosen_models, serve
@@ -158,21 +161,21 @@ def bench_serve(
         moving = read_scene(scene)
     mapper = PORT if portmapper else None
     service = Service(host, port_base, speed, chosen_models(models or []), moving, mapper)
-    told = serve(service, _tell_as_json if as_json else _tell, message)
-    if told == "SIGINT":
+    ended_by = serve(service, _print_as_json if as_json else _print_served, message)
+    if ended_by == "SIGINT":
         raise typer.Exit(exit_codes.INTERRUPTED)
 
 
-def _tell_as_json(instruments: "tuple[Served, ...]") -> None:
+def _print_as_json(instruments: "tuple[Served, ...]") -> None:
     offers = {served.kind: {"model": served.model, "resources": served.resources} for served in instruments}
     print_json({"ready": True, "instruments": offers}, indent=None)
 
 
-#: What must be said beside a resource name.
+#: What to print beside a resource name.
 _HINTS = {"socket": "a line feed ends every message", "pty": "8 data bits, no parity"}
 
 
-def _tell(instruments: "tuple[Served, ...]") -> None:
+def _print_served(instruments: "tuple[Served, ...]") -> None:
     width = max(len(name) for served in instruments for name in served.resources.values())
     for served in instruments:
         result(f"{served.kind} {served.model}")

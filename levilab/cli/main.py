@@ -196,6 +196,8 @@ def main() -> None:
 def _exit_with(error: Exception) -> NoReturn:
     try:
         status, text = exit_codes.exit_status(error), in_options(error, app)
+        if isinstance(error, PermissionError) and error.filename:
+            text = f"{error.filename}: may not be opened by you; change its permissions or choose another place"
     except OSError:  # no file can be opened any more, not even that of a module
         status, text = exit_codes.FAILED, str(error)
     if status is None:

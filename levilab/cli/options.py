@@ -30,7 +30,10 @@ Rate = Annotated[
     ),
 ]
 KeepOutliers = Annotated[bool, typer.Option("--keep-outliers", help="Fit readings that look like miscounts, too.")]
-Paths = Annotated[list[Path], typer.Argument(metavar="PATH…", help="Run folders, data files, or folders to search.")]
+#: readable=False here and elsewhere: what may not be read is said by the reader, in one line, with what to do.
+Paths = Annotated[
+    list[Path], typer.Argument(metavar="PATH…", readable=False, help="Run folders, data files, or folders to search.")
+]
 Presets = Annotated[
     str,
     typer.Argument(

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from levilab.cli.analyze import OPTIONS, as_analyses_take
+from levilab.cli.analyze import OPTIONS, analysis_options
 from levilab.cli.options import Channel, Columns, Json, KeepOutliers, Paths, Rate, ReadingU
 from levilab.cli.output import interruptible, message, print_json, result
 from levilab.cli.quantities import with_options
@@ -36,12 +36,14 @@ def report(
     }
     app = context.find_root().command
     with interruptible("no report is written"):
-        written = write_report(paths, output, as_analyses_take(given), lambda text: message(with_options(text, app)))
+        written = write_report(paths, output, analysis_options(given), lambda text: message(with_options(text, app)))
     result(f"the report is in {written}")
 
 
 def runs(
-    folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="The folder to search.")] = Path("runs"),
+    folder: Annotated[Path, typer.Argument(metavar="[DIR]", readable=False, help="The folder to search.")] = Path(
+        "runs"
+    ),
     as_json: Json = False,
 ) -> None:
     """List the runs in a folder."""

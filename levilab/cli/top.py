@@ -11,7 +11,10 @@ from levilab.cli.output import print_json
 
 def top(
     device: Annotated[
-        Path, typer.Argument(metavar="FILE", help="Describes the top's parts, as sample_data/device.toml does.")
+        Path,
+        typer.Argument(
+            metavar="FILE", readable=False, help="Describes the top's parts, as sample_data/device.toml does."
+        ),
     ],
     as_json: Json = False,
 ) -> None:

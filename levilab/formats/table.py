@@ -117,7 +117,7 @@ def read_table(
     table = _table(path, header, chosen, rows, (*warnings, *doubts))
     if len(table.frame) >= FEWEST:
         return table
-    what = f"{len(table.frame)} readings" if rows.lines.size else "only a header"
+    what = f"{len(table.frame)} reading{'s' * (len(table.frame) != 1)}" if rows.lines.size else "only a header"
     missed = f" and {rows.lines.size - len(table.frame)} missed ones" if rows.lines.size > len(table.frame) else ""
     raise TableError(
         path,

@@ -1,9 +1,8 @@
-"""What a scene models and what it leaves out, and what each of it amounts to in what can be observed.
+"""The effects that a scene models or leaves out, and how much each of them changes what can be observed.
 
-Nothing is taken from a list of sizes: each effect is switched the other way by itself, and both motions are simulated
-from the start that the scene describes, for LONGEST seconds at most.  The simulator is fast enough that no formula for
-the size of an effect would be quicker to trust.  What is compared: the mean height, the frequency of the precession,
-and the spin.
+Each effect is switched on or off by itself, and both motions are simulated from the start that the scene describes, for
+at most LONGEST seconds.  Their mean heights, precession frequencies and spins are compared.  No formula estimates an
+effect: the simulator is fast enough to compute it.
 """
 
 from __future__ import annotations
@@ -27,18 +26,23 @@ if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
     from levilab.simulator.trajectory import Trajectory
 
-#: Seconds that are compared: some twenty up-and-downs, lines distinguished by 0.1 Hz.
+#: Time that is compared [s]: some twenty oscillations of the height, and a resolution of 0.1 Hz.
 LONGEST = 20.0
-#: Below these a change is nothing that could be seen: a micrometre, a tenth of a millihertz.
+#: A smaller change counts as none: no experiment could see it [m, Hz].
 LEAST_M, LEAST_HZ = 1e-7, 1e-5
 
 
 @dataclass(frozen=True)
 class Effect:
-    """One effect: its name, whether the scene has it, and what it changes.
+    """One effect, and what it changes.
 
-    what: in words, with what is assumed where the scene has it not; height_m, precession_hz, spin_hz: what changes
-    when it is there, NaN where one of the two motions has none; remark: what else happens.
+    Attributes:
+        name: of the effect.
+        included: whether the scene has it.
+        what: a description, with what is assumed if the scene does not have it.
+        height_m, precession_hz, spin_hz: the value with the effect less the one without it; NaN where one of the two
+            motions has no such value.
+        remark: what else it changes, such as that the top falls.
     """
 
     name: str
@@ -52,7 +56,15 @@ class Effect:
 
 @dataclass(frozen=True)
 class _Kind:
-    """An effect of any scene: whether it is there, and the changes that make it so and take it away."""
+    """An effect, for any scene.
+
+    Attributes:
+        name: of the effect.
+        what: a description.
+        included: whether a scene has it.
+        on: changes of a scene that switch it on.
+        off: changes that switch it off.
+    """
 
     name: str
     what: str
@@ -62,12 +74,12 @@ class _Kind:
 
 
 def _leaning(scene: Scene) -> dict[str, Any]:
-    """A moment that leans by 1.77° as the thesis's does, with the same part along the axis."""
+    """Return the change to a moment that leans by 1.77°, as the thesis's does, with the same part along the axis."""
     return {"top.moment_tilt": [0.03 / 0.97 * scene.top.moment_tilt[1], scene.top.moment_tilt[1]]}
 
 
 def field_kinds(scene: Scene) -> tuple[_Kind, ...]:
-    """What the scene's series of the field has beyond r², and what it lacks of the exact ring."""
+    """Return the effects of the field's series: its terms beyond r², and those that it lacks of the exact ring."""
     to_exact, to_least = lambda _: {"base.field": "exact"}, {"base.field": "paraxial-2"}
     if scene.base.field in {"exact", "paraxial-2"}:
         what = "terms r⁴ and higher of the field's potential, all of them: the exact ring"
@@ -133,7 +145,7 @@ KINDS = (
 
 
 def explain(scene: Scene, duration: float = 30.0) -> tuple[Effect, ...]:
-    """Every effect of a scene with what it amounts to, the field's first.  Raises as `simulate` does."""
+    """Return every effect of a scene with what it changes, the field's first.  Raises as `simulate` does."""
     if scene.observed == "spin":
         scene = scene.changed({"observed": "motion"})
     time = min(abs(duration), LONGEST)
@@ -155,9 +167,9 @@ def _effect(kind: _Kind, scene: Scene, as_it_is: Trajectory, time: float) -> Eff
         kind.name,
         included,
         kind.what,
-        _seen(height, LEAST_M),
-        _seen(precession, LEAST_HZ),
-        _seen(spin, LEAST_HZ),
+        _zero_if_below(height, LEAST_M),
+        _zero_if_below(precession, LEAST_HZ),
+        _zero_if_below(spin, LEAST_HZ),
         _remark(included, as_it_is, other),
     )
 
@@ -166,23 +178,23 @@ def _without(kind: _Kind, scene: Scene) -> dict[str, Any]:
     return kind.off or {"top.moment_tilt": [0.0, scene.top.moment_tilt[1]]}
 
 
-def _seen(change: float, least: float) -> float:
+def _zero_if_below(change: float, least: float) -> float:
     return 0.0 if abs(change) < least else change
 
 
 def _observed(motion: Trajectory) -> tuple[float, float, float]:
-    """Mean height [m], frequency of the precession [Hz] and spin at the end [Hz]; NaN of a top that fell."""
+    """Return mean height [m], precession frequency [Hz] and spin at the end [Hz]; NaN of a top that fell."""
     if not motion.survived:
         return math.nan, math.nan, math.nan
     even = slice(None, -1)
-    # whole oscillations cannot be cut out of a motion of several frequencies: a window weighs the ends down
+    # several frequencies have no common period to average over: a window gives the ends less weight instead
     weight = np.hanning(motion.time.size - 1)
     height = float(np.average(motion.position[even, 2], weights=weight))
     return height, _precession(motion), float(motion.spin_hz[-1])
 
 
 def _precession(motion: Trajectory) -> float:
-    """The strongest line of n_x + i n_y near where theory has the precession; NaN if there is none."""
+    """Return the frequency of the strongest line near the theoretical precession [Hz]; NaN if there is none."""
     scene, n = motion.scene, motion.time.size - 1
     height, spin = float(np.mean(motion.position[:, 2])), float(np.mean(motion.spin_hz))
     modes = modes_at(scene, height, spin)
@@ -194,7 +206,7 @@ def _precession(motion: Trajectory) -> float:
 
 
 def _remark(included: bool, as_it_is: Trajectory, other: Trajectory) -> str:  # noqa: FBT001
-    """What the change does to the outcome."""
+    """Return how the change decides whether the top stays up, in words; empty if it stays up either way."""
     if as_it_is.survived == other.survived:
         return "" if as_it_is.survived else "lost either way"
     assert other.fell or as_it_is.fell

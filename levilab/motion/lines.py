@@ -19,24 +19,29 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: A line is called what theory has within so much of it: amplitudes of some tenths of a radian move a line by that.
+#: A line gets the name of a theoretical one within NEAR_HZ plus this share of its frequency: amplitudes of some tenths
+#: of a radian shift a line by as much.
 NEAR_HZ, NEAR_SHARE = 0.1, 0.06
-#: A line so near to a stronger one that has a name is a sideband of it [Hz].
+#: A line within this distance of a stronger, named one is its sideband [Hz].
 SIDEBAND_HZ = 2.0
-#: A spin that is on the average this far from the drive's frequency is not locked to it.
+#: A top whose mean spin is farther than this from the drive's frequency is not locked [Hz].
 UNLOCKED_HZ = 0.5
-#: A motion shorter than this has no lines that could be distinguished [s]; of one longer than this a part shows them
-#: all, and more of it only breaks up lines that are never quite steady.
+#: In a shorter motion lines cannot be distinguished [s]; of a longer one this part shows them all, and the rest would
+#: only broaden lines that are never quite steady.
 SHORTEST_S, LONGEST_S = 1.0, 300.0
-#: Lines that are worth showing, and the weakest of them in parts of the strongest.
+#: The most lines to show, and the amplitude of the weakest relative to the strongest.
 MOST, WEAKEST = 16, 0.01
 
 
 @dataclass(frozen=True)
 class NamedLine:
-    """A line of n_x + i n_y: [Hz], above 0 in the sense of a spin above 0; [rad]; what it is, empty if not known.
+    """A line of n_x + i n_y.
 
-    sideband: whether it stands beside a stronger line that has a name.
+    Attributes:
+        frequency: [Hz], positive in the sense of a positive spin.
+        amplitude: [rad].
+        name: of the motion that makes it; empty if not known.
+        sideband: whether it stands beside a stronger line that has a name.
     """
 
     frequency: float
@@ -47,10 +52,14 @@ class NamedLine:
 
 @dataclass(frozen=True)
 class AxisLines:
-    """The axis's lines, strongest first, from the start until `until` [s]; lines nearer than resolution [Hz] are one.
+    """The lines of the axis.
 
-    until is before the end where the motion is longer than LONGEST_S, or the spin changes so much that the lines
-    would wander.
+    Attributes:
+        lines: the strongest first.
+        resolution: closer lines are not distinguished [Hz].
+        until: end of the time from which they come [s]; before the motion's end if that is longer than LONGEST_S, or if
+            the spin changes so much that the lines would wander.
+        spectrum: frequencies [Hz] and amplitudes [rad]; None where there is none.
     """
 
     lines: tuple[NamedLine, ...] = ()
@@ -60,14 +69,14 @@ class AxisLines:
 
 
 def rate_for(scene: Scene) -> float:
-    """Samples per second [1/s] for a spectrum: four times nutation and spin together, sidebands fit in."""
+    """Return the samples per second for a spectrum: four times nutation plus spin, which leaves room for sidebands."""
     spin = abs(scene.start.spin_hz)
     turning = max(spin, scene.drive.frequency_hz if scene.drive.waveform != "off" else 0.0)
     return 4 * (turning + spin * _flatness(scene)) + 40.0
 
 
 def lines_of(motion: Trajectory) -> AxisLines:
-    """The lines of a motion that is sampled evenly but for its end."""
+    """Find the lines of a motion that is sampled evenly, except for its last sample."""
     time, axis = motion.time[:-1], motion.axis[:-1]
     if time.size < FEWEST or time[-1] - time[0] < SHORTEST_S or motion.scene.observed == "spin":
         return AxisLines()
@@ -77,7 +86,7 @@ def lines_of(motion: Trajectory) -> AxisLines:
     n = max(round(min(_steady_time(motion), LONGEST_S) * rate), FEWEST)
     signal = (axis[:, 0] + 1j * axis[:, 1])[:n]
     found = spectral_lines(signal, rate, most=MOST, weakest=WEAKEST)
-    named = _named(found.lines, motion, found.resolution)
+    named = _name_lines(found.lines, motion, found.resolution)
     return AxisLines(named, found.resolution, len(signal) / rate, amplitude_spectrum(signal, rate))
 
 
@@ -86,10 +95,11 @@ def _flatness(scene: Scene) -> float:
 
 
 def _steady_time(motion: Trajectory) -> float:
-    """So long from the start [s] no line wanders farther than lines are told apart.
+    """Return the time from the start in which no line wanders farther than the resolution [s].
 
-    Nutation follows the spin with the factor I₃/I₁: at a chirp c it moves by c I₃/I₁ T, and LOBE/T are told apart.
-    A spin that only swings to and fro, as a locked one does, counts as steady: its lines have sidebands.
+    The nutation's frequency is I₃/I₁ times the spin.  At a chirp c it moves by c I₃/I₁ T in a time T, and the
+    resolution is LOBE/T.  A spin that swings to and fro, as that of a locked top, counts as steady: its lines have
+    sidebands.
     """
     time, spin = motion.time, motion.spin_hz
     if time.size < 3 or time[-1] == time[0]:
@@ -104,13 +114,13 @@ def _steady_time(motion: Trajectory) -> float:
 # --- names ---
 
 
-def _named(lines: tuple[Line, ...], motion: Trajectory, resolution: float) -> tuple[NamedLine, ...]:
-    expected = _expected(motion)
+def _name_lines(lines: tuple[Line, ...], motion: Trajectory, resolution: float) -> tuple[NamedLine, ...]:
+    expected = _expected_lines(motion)
     names: dict[int, str] = {}
     for what, place in expected.items():
         width = resolution / 2 if what == "drive" else NEAR_HZ + NEAR_SHARE * abs(place)
         near = [i for i, line in enumerate(lines) if abs(line.frequency - place) <= width and i not in names]
-        # the strongest first; a line that has as strong sidebands is the one in their middle
+        # the strongest comes first; if its sidebands are as strong, the line is the one in their middle
         strong = [i for i in near if lines[i].amplitude > lines[near[0]].amplitude / 2]
         if strong:
             names[min(strong, key=lambda i: abs(lines[i].frequency - place))] = what
@@ -127,8 +137,8 @@ def _named(lines: tuple[Line, ...], motion: Trajectory, resolution: float) -> tu
     )
 
 
-def _expected(motion: Trajectory) -> dict[str, float]:
-    """Where theory has lines [Hz], for small motions: the drive, the wobble of a tilted moment, and four modes."""
+def _expected_lines(motion: Trajectory) -> dict[str, float]:
+    """Return name → frequency [Hz] by the theory of small motions: drive, wobble of a tilted moment, four modes."""
     scene = motion.scene
     places: dict[str, float] = {}
     if scene.drive.waveform != "off" and scene.drive.amplitude_t > 0:
@@ -141,12 +151,12 @@ def _expected(motion: Trajectory) -> dict[str, float]:
 
 
 def _modes(motion: Trajectory) -> dict[str, float]:
-    """The modes of small motions about the mean height; none where they are not stable."""
+    """Return the modes of small motions about the mean height; none if they are not stable."""
     scene = motion.scene
     height, spin = float(np.mean(motion.position[:, 2])), float(motion.spin_hz[0])
     modes = modes_at(scene, height, spin)
     if np.abs(modes.imag).max() > 1e-6 * np.abs(modes).max():
-        return {}  # whatever lines there are, they are not these
+        return {}  # the lines are other than these
     slow1, slow2, precession, nutation = sorted(modes.real, key=abs)
     return {
         "nutation": nutation,

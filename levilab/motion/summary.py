@@ -1,4 +1,4 @@
-"""A simulated motion in a few numbers: how it ended, height, spin, lines, and how good it is."""
+"""A simulated motion in a few numbers: its end, heights, spin, lines and errors."""
 
 from __future__ import annotations
 
@@ -17,25 +17,31 @@ if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
     from levilab.simulator.trajectory import Accuracy, Trajectory
 
-#: An error [m, rad] at the end that no figure shows.
+#: A smaller error at the end [m, rad] shows in no figure.
 SMALL = 1e-5
 
-#: A spin that changes by less than this part of itself changes by rounding only.
+#: A relative change of the spin below this is rounding.
 CONSTANT = 1e-9
-#: A spin that leaves the range between its start and its end by more than this [Hz] swings.
+#: A spin swings if it leaves the range between its start and its end by more than this [Hz].
 SWINGS_HZ = 0.002
 
 FALLS = {"radius": "drifted out to {cm:.3g} cm from the axis", "height": "came down to {cm:.3g} cm"}
-#: How a motion ended, before the colon and what happened: a top that drifts out has not fallen yet.
+#: How a motion ended; FALLS follows after a colon.  A top that drifts out has not fallen yet.
 ENDINGS = {"radius": "was lost", "height": "fell"}
 
 
 @dataclass(frozen=True)
 class Summary:
-    """What a summary says of a motion.
+    """A motion in a few numbers.
 
-    rate: states kept per second [1/s]; computing: the time it took [s]; energy_change: greatest departure from the
-    start in parts of the energy then; notes: sentences of what to mind.
+    Attributes:
+        motion: the whole of it.
+        duration: as the user wants it [s].
+        rate: states kept per second [1/s].
+        computing: the time that the computation took [s].
+        lines: of the axis.
+        energy_change: greatest departure from the energy at the start, relative to that.
+        notes: sentences that a reader should know.
     """
 
     motion: Trajectory
@@ -48,12 +54,12 @@ class Summary:
 
     @property
     def end(self) -> float:
-        """When it ended [s]: as asked for, or with the fall."""
+        """The time at which it ended [s]: the duration, or the fall."""
         return float(self.motion.time[-1])
 
     @property
     def speed(self) -> float:
-        """How many times faster than the real top it was."""
+        """How many times faster than the real top the simulation ran."""
         return self.end / max(self.computing, 1e-9)
 
     @property
@@ -65,7 +71,7 @@ class Summary:
 
     @property
     def fell(self) -> str:
-        """How it fell, in words; empty if it did not."""
+        """How the top fell, in words; empty if it did not."""
         if self.motion.fell is None:
             return ""
         escape = self.motion.scene.escape
@@ -95,12 +101,19 @@ class Summary:
 
     @property
     def why_no_lines(self) -> str:
-        """Why there are no lines, and what would give some; empty if there are."""
+        """Why there are no lines, and what to change; empty if there are some."""
         return "" if self.lines.lines else _why_no_lines(self.motion, self.lines)
 
 
 def summarise(motion: Trajectory, duration: float, rate: float, computing: float) -> Summary:
-    """Look at a motion; rate: states per second that are kept."""
+    """Summarise a motion.
+
+    Args:
+        motion: the whole of it.
+        duration: as the user wants it [s].
+        rate: states kept per second [1/s].
+        computing: the time that the computation took [s].
+    """
     energy = motion.energies
     change = float(np.max(np.abs(energy - energy[0]))) / (abs(float(energy[0])) or 1.0)
     lines = lines_of(motion)
@@ -108,7 +121,7 @@ def summarise(motion: Trajectory, duration: float, rate: float, computing: float
 
 
 def changing_energy(scene: Scene) -> tuple[str, ...]:
-    """What in a scene changes the energy, in words; nothing where it stays as it is."""
+    """Return what changes the energy in a scene, in words; empty if the energy is conserved."""
     there = {
         "drag": scene.drag.law != "none" and any(scene.drag.constants),
         "drive": scene.drive.waveform != "off" and scene.drive.amplitude_t > 0,
@@ -124,7 +137,7 @@ def _why_no_lines(motion: Trajectory, lines: AxisLines) -> str:
     if lines.spectrum is not None:
         return "the axis stands still"
     if (states - 1) < end * rate_for(motion.scene) / 2:
-        return f"{states} states in {end:.3g} s are too few to tell them by"
+        return f"{states} states in {end:.3g} s are too few for a spectrum"
     if motion.fell is not None:
         return f"the top was up for {end:.3g} s only, which is too short; 2 s would be enough"
     return f"{end:.3g} s are too short; 2 s are enough, and with a duration of 10 s the resolution is 0.2 Hz"
@@ -147,14 +160,14 @@ def _notes(motion: Trajectory, lines: AxisLines, rate: float) -> list[str]:
         notes.append(f"no lines of the axis: {_why_no_lines(motion, lines)}")
     if lines.lines and lines.until < 0.99 * min(float(motion.time[-1]), LONGEST_S):
         notes.append(
-            f"the lines are those of the first {lines.until:.3g} s: later the changing spin has moved them farther "
-            "than they can be told apart"
+            f"the lines are those of the first {lines.until:.3g} s: later the changing spin has moved them by more "
+            "than their resolution"
         )
     return notes
 
 
 def _cannot_float(scene: Scene) -> list[str]:
-    """Why a top was lost that had no chance."""
+    """Say what to change if the top cannot float at all."""
     found = stability_of(scene)
     return [] if found.floating else [advice(found)]
 
@@ -176,7 +189,7 @@ def _not_reached(accuracy: Accuracy) -> str:
 
 
 def as_document(summary: Summary) -> dict[str, Any]:
-    """The summary for programs, units in the names; what no number can say is null."""
+    """Return the summary for programs, with units in the names; a value that is not finite is null."""
     motion = summary.motion
     height, accuracy, fell = motion.position[:, 2], motion.accuracy, motion.fell
     document = {

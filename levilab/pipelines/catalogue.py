@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Generic
 
-from levilab.errors import DoesNotSuit, NoneUsable, unquoted
+from levilab.errors import DataError, DoesNotSuit, NoneUsable, unquoted
 from levilab.pipelines.analyzed import A
 from levilab.pipelines.field.columns import field_columns
 from levilab.pipelines.field.document import DOCUMENT as FIELD
@@ -23,7 +23,7 @@ from levilab.pipelines.precession.report import precession_part
 from levilab.pipelines.precession.table import precession_tables
 from levilab.pipelines.result import Place, is_of_another, read_inputs, results_in
 from levilab.pipelines.result import save as save_files
-from levilab.pipelines.sources import data_files
+from levilab.pipelines.sources import collect, data_files
 from levilab.pipelines.spin.columns import spin_columns
 from levilab.pipelines.spin.document import DOCUMENT as SPIN
 from levilab.pipelines.spin.report import spin_part
@@ -34,10 +34,10 @@ from levilab.pipelines.spindown.report import spindown_part
 from levilab.pipelines.spindown.table import spindown_tables
 from levilab.present.clock import moment
 from levilab.present.numbers import short_name
-from levilab.runs.run import RECORD, find_runs
+from levilab.runs.run import RECORD, find_run, find_runs
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
 
     import numpy as np
@@ -135,14 +135,20 @@ ANALYSES = MappingProxyType({analysis.name: analysis for analysis in _TABLE})
 def analyze_suiting(
     paths: Sequence[Path], given: Mapping[str, Any], tell: Callable[[str], None] | None = None
 ) -> list[tuple[Analysis[Any], Any]]:
-    """Each analysis that suits what lies at the paths, with what it found.  Raises DataError: none suits, or damage.
+    """Each analysis that suits what lies at the paths, with what it found.
+
+    Of several paths each analysis takes those that suit it.  Raises DataError: no analysis suits a path, or damage.
 
     Args:
         paths: run folders, data files, folders to search.
         given: options by their names, of any analysis.
         tell: called with the reason why an analysis found nothing usable in a folder.
     """
-    return list(_suiting(lambda analysis: analysis.analyze(paths, analysis.options_from(given)), tell))
+
+    def analyze(analysis: Analysis[Any], inputs: Sequence[Path]) -> Any:
+        return analysis.analyze(inputs, analysis.options_from(given))
+
+    return list(_suiting(analyze, paths, given, tell))
 
 
 def recall_suiting(
@@ -151,7 +157,7 @@ def recall_suiting(
     """Each analysis that has a result of what lies at the paths, as it was found; in the order of the catalogue.
 
     An input that has no result is analyzed by those that are for its experiment, and a data file by all that suit.
-    Raises DataError: none suits, or damage.
+    Raises DataError: no analysis suits a path, or damage.
 
     Args:
         paths: run folders, data files, folders to search, and results that lie elsewhere: their files, or a folder with
@@ -161,14 +167,14 @@ def recall_suiting(
     """
     places, written = _split(paths)
 
-    def look(analysis: Analysis[Any]) -> Looked[Any, Any, Any]:
+    def look(analysis: Analysis[Any], places: Sequence[Path]) -> Looked[Any, Any, Any]:
         own = [one for one in written if one.analysis == analysis.name]
         inputs = [*places, *(path for one in own for path in one.inputs)]
         if not inputs:
             raise DoesNotSuit(f"{written[0].file}: is no result of {analysis.name}")
         return analysis.result.look(inputs, analysis.options_from(given), [one.file for one in own])
 
-    looked = list(_suiting(look, tell))
+    looked = list(_suiting(look, places, given, tell, of_none=[one.analysis for one in written]))
     have = {source.path for _, at in looked for source in at.found.sources if at.has_result(source)}
 
     def is_wanted(analysis: Analysis[Any], at: Looked[Any, Any, Any]) -> bool:
@@ -214,25 +220,76 @@ def remarks(of_each: Sequence[Sequence[str]]) -> list[str]:
 
 
 def _suiting(
-    run: Callable[[Analysis[Any]], Any], tell: Callable[[str], None] | None = None
+    run: Callable[[Analysis[Any], Sequence[Path]], Any],
+    paths: Sequence[Path],
+    given: Mapping[str, Any],
+    tell: Callable[[str], None] | None = None,
+    *,
+    of_none: Collection[str] = (),
 ) -> Iterator[tuple[Analysis[Any], Any]]:
-    """What suits, one after the other, each carried out when it is asked for."""
+    """What suits, one after the other, each carried out when it is asked for.
+
+    Args:
+        run: an analysis, and those of the paths that suit it → what it finds.
+        paths: run folders, data files, folders to search.
+        given: options by their names.
+        tell: called with the reason why an analysis found nothing usable.
+        of_none: the analyses that are carried out even where none of the paths suits them.
+    """
     errors: list[DoesNotSuit] = []
     unusable: list[NoneUsable] = []
+    left = dict.fromkeys(paths)  # no analysis took these
     for analysis in ANALYSES.values():
         try:
-            found = run(analysis)
+            found, taken = _of_those_that_suit(run, analysis, paths, given, of_none=analysis.name in of_none)
         except DoesNotSuit as error:
             errors.append(error)
+            continue
         except NoneUsable as error:  # of one analysis; a run that was broken off at once keeps no other from its own
             unusable.append(error)
-        else:
-            yield analysis, found
+            continue
+        left = {path: None for path in left if path not in taken}
+        yield analysis, found
     if len(errors) + len(unusable) == len(ANALYSES):
         raise [*unusable, *errors][0]
+    refusals = (_refusal(analysis, path, given) for path in left for analysis in ANALYSES.values())
+    if not unusable and (refusal := next(filter(None, refusals), None)):
+        raise refusal  # that of the first analysis
     if tell:
         for left_out in unusable:
             tell(str(left_out))
+
+
+def _of_those_that_suit(
+    run: Callable[[Analysis[Any], Sequence[Path]], Any],
+    analysis: Analysis[Any],
+    paths: Sequence[Path],
+    given: Mapping[str, Any],
+    *,
+    of_none: bool,
+) -> tuple[Any, Sequence[Path]]:
+    """What an analysis finds in the paths that suit it, and these.  Raises DoesNotSuit: there are none."""
+    try:
+        return run(analysis, paths), paths
+    except DoesNotSuit:
+        if len(paths) == 1 and not of_none:
+            raise
+        suiting = [path for path in paths if not _refusal(analysis, path, given)]
+        if len(suiting) == len(paths) or not (suiting or of_none):
+            raise
+    return run(analysis, suiting), suiting
+
+
+def _refusal(analysis: Analysis[Any], path: Path, given: Mapping[str, Any]) -> DoesNotSuit | None:
+    """Why a path does not suit an analysis; None where it does, or is damaged, which is for the analysis to say."""
+    options = analysis.options_from(given)
+    try:
+        collect([find_run(path)], analysis.needs, lambda _: options)
+    except DoesNotSuit as error:
+        return error
+    except DataError:
+        return None
+    return None
 
 
 def save(analysis: Analysis[A], found: A, folder: Path | None = None) -> list[Path]:

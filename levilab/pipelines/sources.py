@@ -212,6 +212,8 @@ def _of_run(run: Run, needs: Needs[R], options: InputOptions) -> Source[R]:
         kind = run.record.experiment
         raise DoesNotSuit(f"{run.folder}: holds a {kind} run, {needs.analysis} needs a {needs.runs}")
     data = run.folder / needs.data
+    if not data.exists():  # as after a kill before the first record
+        raise DataError(f"{run.folder}: holds no {data.name}, so nothing was recorded; analyze another run")
     readings = needs.read_run(run, options)
     warnings = (*readings.warnings, *run.warnings())
     return Source(run.folder, data, sha256_of(data), run, readings, run.folder.name, warnings)

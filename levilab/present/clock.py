@@ -42,9 +42,9 @@ def offset(when: datetime) -> str:
 def with_clock(
     zero: datetime | None, times_s: Sequence[float] | None, heads: Sequence[str]
 ) -> tuple[list[str], list[tuple[str, ...]]]:
-    """The heads of a table of readings, and for each what goes before its cells: the clock time where it is known.
+    """Return the heads of a table with the clock time as first column, and its cell of each row; neither if not known.
 
-    The offset from UTC, in the head, is that at time zero throughout.
+    The head has the offset from UTC at time zero; all rows use it.
 
     >>> with_clock(datetime.fromisoformat("2026-11-21T23:59:58+01:00"), [0.0, 1.4, 3.0], ["t [s]"])
     (['clock +01:00', 't [s]'], [('23:59:58',), ('23:59:59',), ('00:00:01',)])

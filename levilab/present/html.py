@@ -13,7 +13,7 @@ _CELL = '<td style="text-align: left">'
 
 
 def facts_as_html(title: str, facts: Iterable[tuple[str, str]], after: str = "") -> str:
-    """A heading and facts below it, all escaped; what says nothing is left out.
+    """Return a heading and facts below it, all escaped; a fact without text is left out.
 
     Args:
         title: the heading.

@@ -34,6 +34,8 @@ def with_uncertainty(estimate: Estimate) -> str:
     '3.182(31)×10⁻³ s⁻¹'
     >>> with_uncertainty(Estimate(40.0123, None, "Hz"))
     '40.01 Hz, u not determined'
+    >>> with_uncertainty(Estimate(1.047e-5, None, "1/rad"))
+    '1.047×10⁻⁵ rad⁻¹, u not determined'
     """
     text = f"{without_unit(estimate)} {in_words(estimate.unit)}".strip()
     return text if estimate.u is not None or estimate.value is None else f"{text}, u not determined"
@@ -98,9 +100,9 @@ def in_words(unit: str) -> str:
 
 
 def _number(value: float, u: float | None, *, ordinary: bool | None = None) -> str:
-    """By the rule of the Particle Data Group, with a power of ten for what would begin with zeros.
+    """Round by the rule of the Particle Data Group, with a power of ten instead of leading zeros.
 
-    ordinary: whether without one, where that is not for the number alone to say.
+    ordinary: True without a power of ten, False with one; None: the number decides.
 
     >>> _number(-0.0012, 0.05), _number(-0.012, 0.05)
     ('0.00(5)', '-0.01(5)')
@@ -108,7 +110,7 @@ def _number(value: float, u: float | None, *, ordinary: bool | None = None) -> s
     from uncertainties import ufloat
 
     if not u:
-        return f"{value:.4g}"
+        return digits(value, 4)
     if ordinary is None:
         ordinary = 1e-2 <= abs(value) < 1e5 or abs(value) < u < 1e5
     text = f"{ufloat(value, u):SP}" if ordinary else f"{ufloat(value, u):eSP}"
@@ -148,7 +150,7 @@ def plain(value: float | None, count: int = 3) -> str:
 
 
 def share(weight: float | None) -> str:
-    """The weight of a law among all; what is practically nothing is said to be so.
+    """Return the weight of a law as text; below 10⁻⁶ only that.
 
     >>> share(0.974), share(3e-17)
     ('0.97', '< 10⁻⁶')

@@ -1,4 +1,4 @@
-"""What is shown while something runs, on standard error: a bar on a terminal; of an acquisition lines elsewhere."""
+"""The progress of a command on standard error: a bar on a terminal; elsewhere an acquisition prints lines."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ if TYPE_CHECKING:
 
 
 class Display(Protocol):
-    """What the acquisition tells."""
+    """What an acquisition reports to."""
 
     def preparing(self, text: str, fraction: float) -> None:
-        """The bench is being brought to where reading begins."""
+        """Show how far the bench is prepared."""
 
     def reading(self, text: str, elapsed: float, remaining: float) -> None:
-        """A reading that is on the disk; bench time since the start and expected until the end [s]."""
+        """Show a reading that is on the disk, with bench time since the start and expected until the end [s]."""
 
     def message(self, text: str) -> None:
-        """Something worth a line of its own."""
+        """Show a line of its own."""
 
     def close(self) -> None:
-        """The end."""
+        """End the display."""
 
 
 class Mute:
@@ -62,7 +62,7 @@ class LineDisplay:
         self.message(f"{text}   about {remaining:.0f} s left" if remaining >= 0.5 else text)
 
     def message(self, text: str) -> None:
-        """A line.  A display that went away does not end a measurement."""
+        """Print a line.  A closed standard error does not end a measurement."""
         if self._gone:
             return
         try:
@@ -116,7 +116,7 @@ def to_stderr() -> Display:
 
 
 class ShareBar:
-    """A bar for work whose share is known, on a terminal, once it takes longer than a second.
+    """A bar on a terminal for work whose progress is known, once it takes longer than a second.
 
     A share that goes back is a new attempt: a simulation tries shorter steps until its error is small enough.
     """

@@ -1,4 +1,4 @@
-"""What all figures look like, and how they are written."""
+"""The style of all figures, and how they are saved."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def as_svg(figure: Figure) -> str:
 
 
 def for_notebooks(figure: Figure) -> Figure:
-    """The figure, which a notebook now shows as a picture, whether pyplot was imported there or not."""
+    """Let a notebook show the figure as a picture, whether pyplot is imported there or not; returns the figure."""
     vars(figure)["_repr_png_"] = partial(as_png, figure)
     return figure
 

@@ -45,7 +45,7 @@ class Terminal(Console):
         return super().render_str(self.spelled(text), **options)
 
     def spelled(self, text: str) -> str:
-        """A text as this terminal has it."""
+        """Return a text in the characters of this terminal."""
         return for_encoding(printable(text), self.encoding)
 
 
@@ -53,7 +53,7 @@ class _Table(RichTable):
     """A table; where the terminal is too narrow for its words, a list: row after row, a line for each column."""
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Any]:
-        """As rich asks for it."""
+        """Yield what rich draws."""
         fits = _share_width(self, console, options)
         yield from super().__rich_console__(console, options) if fits else self._rows(console, options)
 
@@ -94,7 +94,7 @@ def _share_width(table: RichTable, console: Console, options: ConsoleOptions) ->
 
 
 def terminal() -> Terminal:
-    """As wide as the terminal; into a pipe or file as wide as the tables need."""
+    """Return a console as wide as the terminal; into a pipe or file, as wide as the tables need."""
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 160
     return Terminal(width=max(width, _NARROWEST), highlight=False)
 
@@ -128,7 +128,7 @@ def new_table(title: str | None, *columns: str, numbers: Sequence[str] = ()) -> 
     return table
 
 
-#: Rows of text from which on they are laid out here: rich takes 0.1 ms for each cell.
+#: From so many rows on they are laid out here: rich takes 0.1 ms for each cell.
 _MANY_ROWS = 200
 
 
@@ -166,7 +166,7 @@ def print_rows(console: Terminal, heads: Sequence[str], rows: Sequence[Sequence[
 
 
 def draw(table: Table) -> RichTable:
-    """A table that is data."""
+    """Return a table of data as one of rich's."""
     drawn = new_table(escape(table.title), *map(escape, table.heads))
     drawn.show_header = any(table.heads)
     for k in table.numbers:

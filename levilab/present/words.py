@@ -1,4 +1,4 @@
-"""An instrument's settings, as they stand in run.json, in the words of a lab book."""
+"""An instrument's settings, from run.json, in the words of a lab book."""
 
 from __future__ import annotations
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -58,7 +59,7 @@ class Listed:
         """How much there is, in words where it is not readings."""
         if self.states:
             return f"{self.states} states"
-        return f"{self.records} records" if self.records else str(self.readings)
+        return f"{self.records} record{'s' * (self.records > 1)}" if self.records else str(self.readings)
 
 
 def list_runs(root: Path) -> list[Listed]:
@@ -67,6 +68,8 @@ def list_runs(root: Path) -> list[Listed]:
         raise DataError(f"{root}: is a file; name the folder that holds the runs")
     if not root.is_dir():
         raise DataError(f"{root}: there is no such folder; levilab acquire writes runs into runs/")
+    if not os.access(root, os.R_OK | os.X_OK):
+        raise DataError(f"{root}: may not be searched by you; change its permissions or name another folder")
     return sorted((_listed(folder) for folder in find_runs(root)), key=lambda run: (run.started_utc or "", run.path))
 
 

@@ -253,6 +253,8 @@ def read_record(folder: Path) -> RunRecord:
         if path.exists() and not path.is_file():
             raise DataError(f"{path}: is a folder, a pipe or a device; a file is expected; {rescue}")
         data = parse_json(path.read_text(encoding="utf-8"))
+    except PermissionError as error:
+        raise DataError(f"{path}: may not be read by you; change its permissions or copy it") from error
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror}): is {path.parent} a run folder?") from error
     except ValueError as error:

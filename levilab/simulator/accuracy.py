@@ -1,4 +1,4 @@
-"""How long a step may be at most, and how good a result is."""
+"""How long a step may be, and how large the error of a result is."""
 
 from __future__ import annotations
 
@@ -21,34 +21,38 @@ Array = NDArray[np.float64]
 
 
 def longest_step(scene: Scene, model: Model, start: Array, scheme: Scheme) -> float:
-    """The longest step [s] for which the kernels' polynomials hold and no motion is skipped.
+    """Return the longest step [s] for which the kernels' polynomials hold and no motion is skipped.
 
-    An angle of 1 rad in a drift, a slowing by 0.2 in a kick, half a period of the drive.  What a tumbling top can
-    add to its angular momentum is allowed for: the field's torque turns it at about √(|μ|B/I₁).
+    Three limits: a drift turns the axis by 1 rad, a kick slows the spin by a fifth, a step takes half a period of the
+    drive.  A tumbling top turns faster than its angular momentum at the start says: the field's torque adds about
+    √(|μ|B/I₁) to the rate.
     """
     stiffness = float(np.linalg.norm(flux_density(model.field, start[None, R])))  # |μ|B [J]
     turning = float(np.linalg.norm(start[L])) * model.body.inverse_transverse
     turning += math.sqrt(stiffness * model.body.inverse_transverse)
     drift, kick = (float(np.max(np.abs(c))) for c in (scheme.drifts, scheme.kicks))
-    limits = [1 / (drift * turning + 1e-300), 0.2 / (max(drift, kick) * _slowing(model.drag, start) + 1e-300)]
+    limits = [
+        1 / (drift * turning + 1e-300),
+        0.2 / (max(drift, kick) * _strongest_damping(model.drag, start) + 1e-300),
+    ]
     if model.drive is not None:
         limits.append(0.5 / scene.drive.frequency_hz)
     return min(limits)
 
 
-def _slowing(drag: Any, start: Array) -> float:
-    """The greatest relative rate [1/s] at which drag or friction acts."""
+def _strongest_damping(drag: Any, start: Array) -> float:
+    """Return the greatest relative rate |ω̇/ω| [1/s] that drag or the washers' friction has at the start."""
     if drag is None:
         return 0.0
     spin = abs(float(start[CLOCK]))
     if isinstance(drag, braking.WasherDragFlow):
         friction = drag.coupling * (drag.inverse_washers + drag.inverse_core)
-        return max(friction, _relative(drag.washers, spin), _relative(drag.core, spin))
-    return _relative(drag.law, spin)
+        return max(friction, _damping_rate(drag.washers, spin), _damping_rate(drag.core, spin))
+    return _damping_rate(drag.law, spin)
 
 
 def has_kink(drag: Any) -> bool:
-    """Whether drag flows by a law with |ω| in it, which at ω = 0 is not smooth: a step across it loses its order."""
+    """Whether the drag's law has |ω| in it: then it is not smooth at ω = 0, and a step across that loses its order."""
     if isinstance(drag, braking.WasherDragFlow):
         return any(_law_has_kink(law) for law in (drag.washers, drag.core))
     return isinstance(drag, braking.DragFlow) and _law_has_kink(drag.law)
@@ -61,12 +65,17 @@ def _law_has_kink(law: Any) -> bool:
 
 
 def comes_near_zero(spins: Array) -> NDArray[np.bool_]:
-    """Whether spins [rad/s] at successive moments, shape (moments, …), pass zero, or may have passed it in between."""
+    """Whether spins at successive moments pass zero, or may have passed it in between.
+
+    Args:
+        spins: shape (moments, …) [rad/s].
+    """
     changes = np.abs(np.diff(spins, axis=0)).max(axis=0)
     return np.asarray(np.abs(spins).min(axis=0) <= 2 * changes)
 
 
-def _relative(law: Any, spin: float) -> float:
+def _damping_rate(law: Any, spin: float) -> float:
+    """Return |ω̇/ω| of a drag law at a spin [1/s]."""
     if isinstance(law, braking.Stokes):
         return law.c
     if isinstance(law, braking.Newton):
@@ -76,29 +85,38 @@ def _relative(law: Any, spin: float) -> float:
     return float(law.c1 + law.c2 * spin)
 
 
-#: Estimated errors are about so many times the true ones: they are to bound them.
-CAUTION = 6.0
+#: An estimate is to bound the true error; with this factor it is about six times as large.
+SAFETY_FACTOR = 6.0
 
-#: With one ring, layer and angle more the error of a magnet's nodes falls at least by 2 to this power, where they are
-#: enough (`levilab.simulator.disc`): no estimate counts on more than that.
+#: With one ring, layer and angle more, the error of a magnet's nodes falls at least by 2 to this power, if there are
+#: nodes enough (`levilab.simulator.disc`); no estimate counts on more.
 NODES_ORDER = 6
 
 
 def estimate(fine: Array, twice: Array, four: Array, order: int | None) -> Any:
-    """Estimated error of results at step h, from those at 2h and 4h; arrays of shape (…, 3), result (…).
+    """Estimate the error of results at step h from those at 2h and 4h.
 
-    Or of a magnet's nodes, from results with fewer and still fewer of them.  order None: the motion has passed a point
-    where the equations are not smooth.  Each step length then makes an error of low order that depends on where in a
-    step the point lies: two differences that happen to be small say nothing, and both are added up.
+    From 4h to 2h to h the differences shrink by a factor q; the error at h is the sum of those that would follow, about
+    q times the last difference.  A scheme that reaches its order p has q = 2^−p.  If rounding or chaos rules, the
+    differences do not shrink, and the estimate is as large as the last one.
 
-    From one doubling to the next the differences shrink by a factor q, and what is left of them is their sum,
-    about q times the last one.  Where the order p is seen q is 2^−p; where rounding or chaos rules they do not
-    shrink, and the estimate is as large as the difference.
+    The error of a magnet's nodes is estimated alike, from results with fewer and still fewer nodes.
+
+    Args:
+        fine: results at step h, shape (…, 3).
+        twice: at 2h, shape (…, 3).
+        four: at 4h, shape (…, 3).
+        order: of the scheme; None if the motion has passed a point where the equations are not smooth.  Each step
+            length then makes an error of low order that depends on where in a step the point lies.  Two differences
+            that happen to be small prove nothing, so both are added up.
+
+    Returns:
+        The error, shape (…), in the results' unit.
     """
     last = np.linalg.norm(fine - twice, axis=-1)
     before = np.linalg.norm(twice - four, axis=-1)
     if order is None:
-        return CAUTION * (last + before)
+        return SAFETY_FACTOR * (last + before)
     with np.errstate(invalid="ignore", divide="ignore"):
         shrink = np.clip(np.nan_to_num(last / before, nan=1.0, posinf=1.0), 2.0**-order, 1.0)
-    return CAUTION * last * shrink
+    return SAFETY_FACTOR * last * shrink

@@ -21,7 +21,7 @@ from levilab.simulator.kernels.loads import Disc
 from levilab.simulator.kernels.motion import LOOSE, STATE_SIZE, TIME, L, N, R, V
 from levilab.simulator.keys import SceneError
 from levilab.simulator.model import model_of
-from levilab.simulator.problem import NOWHERE, Problem, end_at, scheme_for, travelled
+from levilab.simulator.problem import NO_LIMITS, Problem, integrate, integrate_to_end, scheme_for
 from levilab.simulator.schemes import SCHEMES
 from levilab.simulator.single import MIN_STEPS_FOR_DOUBLING, check, simulate
 from levilab.simulator.start import start_of
@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
-#: Tops whose step is found one by one, to choose that of all: the corners of a map and so many evenly through it.
+#: The step of all tops is chosen on a few, simulated one by one: the corners of a map and so many evenly through it.
 PILOTS = 6
-#: Motion [s] that a step is chosen on; errors grow with the time, and the tolerance is shared out accordingly.
+#: How long these are simulated [s]; errors grow with the time, so they get this share of the tolerance.
 PILOT_DURATION = 3.0
 #: A spin below this [rad/s] may be turned through zero by the field; a top that floats is never as slow.
 SLOW_RAD_S = 2 * math.pi * 5.0
@@ -48,12 +48,12 @@ class Ensemble:
     """The ends of many motions.  All arrays have the shape of the values that were varied, states one axis more.
 
     Attributes:
-        scene: what they have in common.
+        scene: what the tops have in common.
         values: what differs, by dotted keys.
-        survived: still up after `duration` [s].
+        survived: whether a top is still up after `duration` [s].
         time: of the end, or of the escape [s].
         states: at the end, shape (…, 18).
-        position_error: estimated [m], NaN where it was not asked for.
+        position_error: estimated [m], NaN if errors were not estimated.
         axis_error: likewise [rad].
 
     Where an error is larger than the tolerance, the motion was chaotic, and whether it survived is chance.
@@ -104,12 +104,14 @@ def simulate_many(
         scene: what the tops have in common.
         over: dotted keys of the scene with their values, broadcast against each other.
         duration: of each motion [s].
-        tolerance: wanted error of place [m] and axis [rad] at the end, from which one step is chosen on a few of the
-            tops.
-        step: fixes it for all instead [s].
-        cores: threads, as many as there are where None.
+        tolerance: wanted error of place [m] and axis [rad] at the end; the step is chosen for it, on a few of the tops.
+        step: of all tops [s]; None: the tolerance decides it.
+        cores: number of threads; None: one for each core of the machine.
         errors: estimate every top's error by a second, coarser run, which takes half as long again.
         progress: called with the share of the work that is done.
+
+    Returns:
+        The ends of the motions; arrays have the shape of the broadcast values.
 
     Raises:
         SceneError: a scene does not allow these keys or values.
@@ -156,7 +158,7 @@ def simulate_many(
 
 
 def _broadcast(over: Mapping[str, ArrayLike]) -> list[NDArray[Any]]:
-    """The values of all keys in one shape; of no key one value.  Raises SimulationError."""
+    """Broadcast the values of all keys to one shape; without a key there is one value.  Raises SimulationError."""
     if not over:
         return [np.zeros(1)]
     arrays = {key: np.asarray(values) for key, values in over.items()}
@@ -175,7 +177,13 @@ def _plain(value: Any) -> Any:
 
 @dataclass(frozen=True)
 class _Top:
-    """One top, made ready.  longest: the longest step it allows [s]; kinked: its drive is more than a lasting sine."""
+    """One top.
+
+    Attributes:
+        problem: what is to be integrated.
+        longest: the longest step that it allows [s].
+        kinked: whether its drive is other than a sine that lasts.
+    """
 
     problem: Problem
     longest: float
@@ -203,7 +211,7 @@ class _Ends:
 
 
 def _pilots(shape: tuple[int, ...]) -> set[int]:
-    """Places in a map of this shape, as flat indices: its corners and some of the rest."""
+    """Return flat indices into a map of this shape: its corners and some of the rest."""
     size = math.prod(shape)
     if size == 0:
         return set()
@@ -213,7 +221,7 @@ def _pilots(shape: tuple[int, ...]) -> set[int]:
 
 
 def _step_share(tops: list[_Top], pilots: set[int], duration: float, tolerance: float) -> float:
-    """The part of a top's longest step that keeps the errors within the tolerance, from a few of them."""
+    """Return the part of its longest step that keeps a top's error within the tolerance, found on the pilots."""
     time = min(duration, PILOT_DURATION)
     shares = []
     for i in pilots:
@@ -224,7 +232,7 @@ def _step_share(tops: list[_Top], pilots: set[int], duration: float, tolerance: 
 
 
 def _groups(tops: list[_Top]) -> Iterable[list[int]]:
-    """Tops whose models are of the same kind, and so go through the same kernel."""
+    """Group the tops, as indices, by the kind of their model: each kind has a kernel of its own."""
     groups: dict[Any, list[int]] = {}
     for i, one in enumerate(tops):
         kind = (_kind(one.problem.model), one.problem.scheme.name, one.kinked, one.problem.escape)
@@ -241,7 +249,7 @@ def _kind(model: Any) -> Any:
 
 
 def _parts(group: list[int], threads: int) -> list[list[int]]:
-    """Pieces of the work: enough of them to keep the threads evenly busy, large enough to keep the lanes full."""
+    """Cut a group into pieces of work: enough to keep all threads busy, large enough to fill the lanes."""
     size = max(8 * LANES, math.ceil(len(group) / (8 * threads)))
     return [group[i : i + size] for i in range(0, len(group), size)]
 
@@ -253,10 +261,10 @@ def _advance(
     counts = np.maximum(np.ceil(duration / steps * (1 - 1e-12)), 1).astype(np.int64)
     problem = some[0].problem
     if some[0].kinked:
-        states, survived = _one_by_one(some, np.full(len(some), duration), steps, escape=True)
+        states, survived = _integrate_singly(some, np.full(len(some), duration), steps, escape=True)
     else:
         starts = np.array([one.problem.start for one in some])
-        states, taken = _together(some, starts, duration / counts, counts, problem.escape)
+        states, taken = _integrate_in_lanes(some, starts, duration / counts, counts, problem.escape)
         survived = (taken == counts) & within_limits(states, problem.escape)
     if errors:
         ends.position_error[part], ends.axis_error[part] = _estimates(some, states, steps)
@@ -272,20 +280,20 @@ def _advance(
 
 
 def _estimates(some: list[_Top], states: Array, steps: Array) -> tuple[Array, Array]:
-    """Estimated errors of places [m] and axes [rad] at the ends, shape (n,) each."""
+    """Estimate the errors of places [m] and axes [rad] at the ends, shape (n,) each."""
     problem, lasted = some[0].problem, states[:, TIME]
-    # where a fall or a kink of the drive leaves no room for longer steps, half of them tell as much
+    # if a fall or a kink of the drive leaves no room for longer steps, half of the step shows the error as well
     room = (lasted > MIN_STEPS_FOR_DOUBLING * steps) & ~np.array([one.kinked for one in some])
     lengths = [np.where(room, times * steps, np.minimum(steps, lasted) / 2) for times in (2, 4)]
-    twice = _coarse(some, lasted, lengths[0])
-    four = _coarse(some, lasted, lengths[1]) if np.any(room) else twice
+    twice = _integrate_coarsely(some, lasted, lengths[0])
+    four = _integrate_coarsely(some, lasted, lengths[1]) if np.any(room) else twice
     found = [estimate(states[:, part], twice[:, part], four[:, part], problem.scheme.order) for part in (R, N)]
     if has_kink(problem.model.drag):
         lost = _may_have_stopped(some, states)
         for error, part in zip(found, (R, N), strict=True):
             error[lost] = estimate(states[lost][:, part], twice[lost][:, part], four[lost][:, part], None)
     if isinstance(problem.model.magnet, Disc):
-        fewer, fewest = (_coarse(_with_nodes(some, -less), lasted, lengths[0]) for less in (1, 2))
+        fewer, fewest = (_integrate_coarsely(_with_nodes(some, -less), lasted, lengths[0]) for less in (1, 2))
         of_nodes = [estimate(twice[:, part], fewer[:, part], fewest[:, part], NODES_ORDER) for part in (R, N)]
         found = [a + b for a, b in zip(found, of_nodes, strict=True)]
     return found[0], found[1]
@@ -294,7 +302,7 @@ def _estimates(some: list[_Top], states: Array, steps: Array) -> tuple[Array, Ar
 def _may_have_stopped(some: list[_Top], states: Array) -> NDArray[np.bool_]:
     """Whether the spin of each top, or that of its washers, may have passed zero on the way to its end.
 
-    Of the way nothing is known: spins count that are slow at one of its ends, or that have changed by half.
+    Only start and end are known: it may have, if the spin is slow at one of them, or has changed by half.
     """
     ways = [
         spins_of(one.problem.scene, np.array([one.problem.start, state]))
@@ -305,12 +313,12 @@ def _may_have_stopped(some: list[_Top], states: Array) -> NDArray[np.bool_]:
 
 
 def _with_nodes(some: list[_Top], more: int) -> list[_Top]:
-    """The same tops with so many more rings, layers and angles in their magnets."""
+    """Return the same tops with so many more rings, layers and angles in their magnets."""
     return [replace(one, problem=one.problem.with_nodes(more)) for one in some]
 
 
 def _add_uncertain_moment(some: list[_Top], states: Array, where: NDArray[np.intp], ends: _Ends) -> None:
-    """The moment of a fall is uncertain, too: the motion across the limit turns the place's error to time."""
+    """Add to the errors of fallen tops what the error of the fall's time makes: the place's error over the speed."""
     height = crossed_height(states, some[0].problem.escape)
     time = ends.position_error[where] / exit_speeds(states, height)
     inverse = np.array([one.problem.model.body.inverse_transverse for one in some])
@@ -319,23 +327,23 @@ def _add_uncertain_moment(some: list[_Top], states: Array, where: NDArray[np.int
 
 
 def _in_one_step(some: list[_Top], states: Array, times: Array) -> Array:
-    """States so much later [s] or earlier, each in one step."""
-    return _together(some, states, times, np.ones(len(some), dtype=np.int64), NOWHERE)[0]
+    """Return the states that much later, or earlier [s], each in one step."""
+    return _integrate_in_lanes(some, states, times, np.ones(len(some), dtype=np.int64), NO_LIMITS)[0]
 
 
-def _coarse(some: list[_Top], times: Array, steps: Array) -> Array:
-    """The states at these times with steps of these lengths and no escape."""
+def _integrate_coarsely(some: list[_Top], times: Array, steps: Array) -> Array:
+    """Return the states at these times [s], with steps of these lengths [s] and without an escape."""
     if some[0].kinked:
-        return _one_by_one(some, times, steps, escape=False)[0]
+        return _integrate_singly(some, times, steps, escape=False)[0]
     counts = np.maximum(np.ceil(times / steps), 1).astype(np.int64)
     starts = np.array([one.problem.start for one in some])
-    return _together(some, starts, times / counts, counts, NOWHERE)[0]
+    return _integrate_in_lanes(some, starts, times / counts, counts, NO_LIMITS)[0]
 
 
-def _together(
+def _integrate_in_lanes(
     some: list[_Top], starts: Array, steps: Array, counts: Counts, escape: tuple[float, float]
 ) -> tuple[Array, Counts]:
-    """States at the ends and steps taken, by the kernel with lanes."""
+    """Integrate with the kernel that has lanes.  Returns the states at the ends and the steps taken."""
     scheme = SCHEMES[some[0].problem.scheme.name]
     numbers = np.array([numbers_of(one.problem.model) for one in some])
     states, taken = np.empty_like(starts), np.zeros(len(some), dtype=np.int64)
@@ -345,14 +353,18 @@ def _together(
     return states, taken
 
 
-def _one_by_one(some: list[_Top], times: Array, steps: Array, *, escape: bool) -> tuple[Array, NDArray[np.bool_]]:
-    """States at the ends, and whether they were reached: for drives with kinks, whose steps differ from top to top."""
+def _integrate_singly(some: list[_Top], times: Array, steps: Array, *, escape: bool) -> tuple[Array, NDArray[np.bool_]]:
+    """Integrate top after top: with kinks in the drive, steps differ from top to top.
+
+    Returns:
+        The states at the ends, shape (n, 18), and whether each end was reached.
+    """
     states, lasted = np.empty((len(some), STATE_SIZE)), np.ones(len(some), dtype=np.bool_)
     for i, one in enumerate(some):
         stops = stops_between(0.0, times[i], steps[i], one.problem.scene.drive)
         if escape:
-            through, fell, _ = travelled(one.problem, stops)
-            states[i], lasted[i] = through[-1] if fell is None else fell.state, fell is None
+            passed, fell, _ = integrate(one.problem, stops)
+            states[i], lasted[i] = passed[-1] if fell is None else fell.state, fell is None
         else:
-            states[i] = end_at(one.problem, stops)
+            states[i] = integrate_to_end(one.problem, stops)
     return states, lasted

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 Table = dict[str, Any]
 
-#: What people call a key whose name is not at all alike.
+#: Words that people use for a key whose own name is quite different.
 SYNONYMS: dict[str, tuple[str, ...]] = {
     "kind": ("drive.waveform", "drag.law", "top.magnet"),
     "type": ("drive.waveform", "drag.law", "top.magnet"),
@@ -38,7 +38,7 @@ SYNONYMS: dict[str, tuple[str, ...]] = {
     "limit": ("escape.radius_m", "escape.height_m"),
     "g": ("gravity_m_s2",),
 }
-#: How alike names must be, from 0 to 1: beside each other, and anywhere in the tables.
+#: How similar a name must be to be suggested, from 0 to 1: in the same table, and in any table.
 _ALIKE, _ALIKE_ANYWHERE = 0.5, 0.6
 
 
@@ -46,10 +46,13 @@ class SceneError(LevilabError):
     """A scene that cannot be simulated as it is described."""
 
 
-def parsed(setting: str) -> tuple[str, Any]:
-    """KEY=VALUE as a dotted key and a value of TOML; a word without quotes is a string.  Raises SceneError.
+def parse_setting(setting: str) -> tuple[str, Any]:
+    """Split KEY=VALUE into a dotted key and a value of TOML; a word without quotes is a string.
 
-    >>> parsed("drag.law=stokes"), parsed("start.position_m = [0, 0, 0.072]")
+    Raises:
+        SceneError: it has another form, or no TOML value.
+
+    >>> parse_setting("drag.law=stokes"), parse_setting("start.position_m = [0, 0, 0.072]")
     (('drag.law', 'stokes'), ('start.position_m', [0, 0, 0.072]))
     """
     key, equals, text = setting.partition("=")
@@ -67,7 +70,7 @@ def _value(text: str) -> Any:
     except tomllib.TOMLDecodeError:
         pass
     except ValueError as error:
-        raise SceneError(f"{shown(text)!r}: {error}") from None
+        raise SceneError(f"{short_text(text)!r}: {error}") from None
     try:
         return float(text)  # .5 and 5. are numbers, but not in TOML
     except ValueError:
@@ -75,11 +78,17 @@ def _value(text: str) -> Any:
 
 
 def set_key(table: Table, key: str, value: Any) -> None:
-    """Put a value at a dotted key of a table of tables and lists; all keys must be there.  Raises SceneError.
+    """Set the value of a dotted key in a table of tables and lists.
 
-    A table as value changes the keys that it holds and leaves the others.
+    Args:
+        table: is changed; it must have the key already.
+        key: such as ``top.mass_kg`` or ``start.position_m.2``.
+        value: a number, string or list; a table changes the keys that it holds and leaves the others.
+
+    Raises:
+        SceneError: there is no such key, or it is a table and the value is none.
     """
-    given = f"{key} = {shown(value)}"
+    given = f"{key} = {short_text(value)}"
     *way, last = key.split(".")
     at: Any = table
     for depth, part in enumerate(way):
@@ -95,30 +104,40 @@ def set_key(table: Table, key: str, value: Any) -> None:
 
 
 def _step(table: Table, at: Any, way: list[str], given: str) -> str | int:
-    """The last step of a way into a table, which has led to `at`; or what is wrong with it."""
+    """Return the last part of a path into a table as a key or an index.
+
+    Args:
+        table: the whole table, for suggestions.
+        at: what the path before its last part leads to.
+        way: the path, part by part.
+        given: the setting, for messages.
+
+    Raises:
+        SceneError: there is no such part.
+    """
     *before, part = way
     if isinstance(at, dict) and part in at:
         return part
     if isinstance(at, dict):
-        raise SceneError(f"{given}: {_unknown(table, at, way)}")
+        raise SceneError(f"{given}: {_unknown_key(table, at, way)}")
     if not isinstance(at, list):
-        raise SceneError(f"{given}: {'.'.join(before)} = {shown(at)} has no parts, give it as a whole")
+        raise SceneError(f"{given}: {'.'.join(before)} = {short_text(at)} has no parts, give it as a whole")
     if not (part.isdecimal() and int(part) < len(at)):
         raise SceneError(f"{given}: {'.'.join(before)} has {len(at)} numbers, counted from 0 to {len(at) - 1}")
     return int(part)
 
 
-def _unknown(table: Table, at: Table, way: list[str]) -> str:
-    """What to say about an unknown key: what was meant, perhaps, and the keys that exist."""
+def _unknown_key(table: Table, at: Table, way: list[str]) -> str:
+    """Return what to say about an unknown key: suggestions, and the keys that exist."""
     before = way[:-1]
-    meant = _meant(table, at, way)
-    asked = f"; did you mean {' or '.join(meant)}? Known" if meant else "; known"
+    similar = _suggestions(table, at, way)
+    question = f"; did you mean {' or '.join(similar)}? Known" if similar else "; known"
     where = f" in {'.'.join(before)}" if before else ""
-    return f"there is no key {'.'.join(way)}{asked}{where} are {', '.join(at)}"
+    return f"there is no key {'.'.join(way)}{question}{where} are {', '.join(at)}"
 
 
-def _meant(table: Table, at: Table, way: list[str]) -> list[str]:
-    """Suggestions for an unknown key: the same name in another table, a synonym, a similar spelling."""
+def _suggestions(table: Table, at: Table, way: list[str]) -> list[str]:
+    """Return keys to suggest for an unknown one: of the same name in another table, a synonym, a similar spelling."""
     *before, part = way
     leaves = [(f"{name}.{key}", key) for name, inner in table.items() if isinstance(inner, dict) for key in inner]
     same = [path for path, key in leaves if key == part]
@@ -127,7 +146,7 @@ def _meant(table: Table, at: Table, way: list[str]) -> list[str]:
     near = nearest(part, at)
     beside = [".".join([*before, near])] if near else []
     named = _by_meaning(table, before, part)
-    if named or (before and beside):  # in a table one means most likely one of its own keys
+    if named or (before and beside):  # a path that names its table most likely means one of its keys
         return named or beside
     likeness = {path: _likeness(part, key) for path, key in leaves}
     best = max(likeness.values(), default=0.0)
@@ -137,7 +156,7 @@ def _meant(table: Table, at: Table, way: list[str]) -> list[str]:
 
 
 def _by_meaning(table: Table, before: list[str], part: str) -> list[str]:
-    """The keys that are often called so: of the named table where it has one, else of all."""
+    """Return the keys for which a word is a synonym: those of the named table if there are some, else all."""
     known = [path for path in SYNONYMS.get(part.lower(), ()) if _is_key(table, path)]
     own = [path for path in known if path.split(".")[:-1] == before]
     return own or known
@@ -149,31 +168,31 @@ def _is_key(table: Table, path: str) -> bool:
 
 
 def _likeness(word: str, known: str) -> float:
-    """From 0 to 1."""
+    """Return how similar a word is to a known one, from 0 to 1."""
     return difflib.SequenceMatcher(None, known, word.lower()).ratio()
 
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
-    """The known word that was most likely meant, if any is near."""
+    """Return the known word that is spelled most like this one; None if none is similar."""
     found = difflib.get_close_matches(word.lower(), list(known), n=1, cutoff=_ALIKE)
     return found[0] if found else None
 
 
 def plain(value: Any) -> Any:
-    """Numbers and arrays of numpy as Python's own; a list of one's own."""
+    """Return numbers and arrays of numpy as Python's own numbers and lists."""
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
     return value.tolist() if hasattr(value, "tolist") else value
 
 
-def shown(value: Any) -> str:
-    """A value as one would write it, cut where it is long."""
+def short_text(value: Any) -> str:
+    """Return a value as text of at most 60 characters."""
     text = str(plain(value))
     return text if len(text) <= 60 else f"{text[:59]}…"
 
 
 def as_toml(table: Mapping[str, Any]) -> str:
-    """A table of strings, numbers, lists and tables of these as TOML text; what is None is left out.
+    """Return a table of strings, numbers, lists and tables of these as TOML text, without keys that are None.
 
     >>> print(as_toml({"a": 1.5, "b": {"c": [1e-06, "x"], "d": None}}))
     a = 1.5

@@ -18,7 +18,7 @@ from levilab.simulator.kernels.motion import STATE_SIZE, TIME, R
 from levilab.simulator.kernels.splitting import advance
 from levilab.simulator.model import model_of
 from levilab.simulator.schemes import SCHEMES, Scheme
-from levilab.simulator.stops import every_step
+from levilab.simulator.stops import stop_after_each_step
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: No escape: for coarse runs, which a fine one is compared with.
-NOWHERE = (math.inf, -math.inf)
+#: Radius and height of no escape [m]: for coarse runs, which a fine one is compared with.
+NO_LIMITS = (math.inf, -math.inf)
 
-#: Steps in one call of a kernel; between calls progress is told and Ctrl-C is heard (about 50 ms).
+#: Steps in one call of a kernel, about 50 ms; between calls progress is reported, and Ctrl-C takes effect.
 STEPS_IN_A_CALL = 100_000
 
 
@@ -56,11 +56,24 @@ class Problem:
         return self.scene.escape.radius_m, self.scene.escape.height_m
 
     def with_nodes(self, more: int) -> Problem:
-        """The same with so many more rings, layers and angles in a magnet of finite size; fewer where negative."""
+        """Return the problem with other nodes in a magnet of finite size.
+
+        Args:
+            more: rings, layers and angles to add; negative to take away.
+        """
         return replace(self, model=model_of(self.scene, self.start[R], more))
 
-    def advanced(self, start: Array, stops: Stops, escape: tuple[float, float]) -> tuple[Array, bool]:
-        """The states at the stops that were reached, shape (n, 18), and whether that is all of them."""
+    def advance_to_stops(self, start: Array, stops: Stops, escape: tuple[float, float]) -> tuple[Array, bool]:
+        """Integrate from stop to stop, by one call of the kernel.
+
+        Args:
+            start: the state at the first stop, shape (18,).
+            stops: where to stop, and the drive in between.
+            escape: radius and height [m] outside of which the kernel ends.
+
+        Returns:
+            The states at the stops that were reached, shape (n, 18), the start first; and whether all were reached.
+        """
         states = np.empty((stops.times.size, STATE_SIZE))
         a, b = self.coefficients
         reached = advance(
@@ -70,9 +83,17 @@ class Problem:
 
 
 def scheme_for(name: str | None, model: Any) -> Scheme:
-    """The scheme of that name, or the best one for the model: drag that flows allows no Nyström composition.
+    """Return the scheme of that name, or the best one for the model.
 
-    Part of the error of `levitron-6` comes back at each stop, and a drive with corners has many (docs/speed.md).
+    Drag on a top whose spin the field changes allows no Nyström composition.  A stop brings part of the error of
+    `levitron-6` back, and a drive with corners has many stops (docs/speed.md).
+
+    Args:
+        name: of SCHEMES; None: the best one.
+        model: what the kernels compute.
+
+    Raises:
+        SimulationError: there is no such scheme, or it loses its order with this model.
     """
     flows = isinstance(model.drag, DragFlow | WasherDragFlow)
     if name is None:
@@ -88,15 +109,27 @@ def scheme_for(name: str | None, model: Any) -> Scheme:
     return SCHEMES[name]
 
 
-def travelled(
+def integrate(
     problem: Problem, stops: Stops, progress: Callable[[float], None] | None = None
 ) -> tuple[Array, Event | None, int]:
-    """All states at the stops, until an escape; in calls short enough to be interrupted."""
+    """Integrate a problem up to the last stop or an escape, in calls short enough to be interrupted.
+
+    Args:
+        problem: where it starts, and what moves it.
+        stops: shape (n + 1,), the first at the start.
+        progress: called with the share of the steps that are done.
+
+    Returns:
+        The states at the stops, shape (up to n + 1, 18); the escape, None where there was none; the steps taken.
+
+    Raises:
+        LeftRange: the numbers leave their range, as at the base's edges.
+    """
     done = np.cumsum(stops.counts)
     pieces, state, at = [problem.start[None]], problem.start, 0
     while at < stops.counts.size:
         first, last = next(stops.part(at, stops.counts.size).pieces(STEPS_IN_A_CALL))
-        states, through = problem.advanced(state, stops.part(at + first, at + last), problem.escape)
+        states, through = problem.advance_to_stops(state, stops.part(at + first, at + last), problem.escape)
         pieces.append(states[1:])
         state, at = states[-1], at + len(states) - 1
         if not through:
@@ -110,22 +143,32 @@ def travelled(
     return np.concatenate(pieces), None, int(done[-1])
 
 
-def end_at(problem: Problem, stops: Stops) -> Array:
-    """The state at the last stop, with no escape; NaN where the numbers leave their range on the way."""
+def integrate_to_end(problem: Problem, stops: Stops) -> Array:
+    """Integrate a problem up to the last stop, without an escape.
+
+    Returns:
+        The state there, shape (18,); NaN if the numbers left their range on the way.
+    """
     state = problem.start
     for first, last in stops.pieces(STEPS_IN_A_CALL):
-        states, through = problem.advanced(state, stops.part(first, last), NOWHERE)
+        states, through = problem.advance_to_stops(state, stops.part(first, last), NO_LIMITS)
         if not through:
             return np.full_like(state, math.nan)
         state = states[-1]
     return state
 
 
-def at_every_step(problem: Problem, stops: Stops) -> Array:
-    """The states after each step, shape (n, 18), with no escape; up to where the numbers leave their range."""
+def integrate_each_step(problem: Problem, stops: Stops) -> Array:
+    """Integrate a problem with a stop after each step, without an escape.
+
+    Returns:
+        The states, shape (n, 18), up to the last stop or to where the numbers leave their range.
+    """
     states = [problem.start[None]]
     for first, last in stops.pieces(STEPS_IN_A_CALL):
-        some, through = problem.advanced(states[-1][-1], every_step(stops.part(first, last)), NOWHERE)
+        some, through = problem.advance_to_stops(
+            states[-1][-1], stop_after_each_step(stops.part(first, last)), NO_LIMITS
+        )
         states.append(some[1:])
         if not through:
             break
@@ -133,33 +176,44 @@ def at_every_step(problem: Problem, stops: Stops) -> Array:
 
 
 def _escape(problem: Problem, state: Array, interval: Stops) -> tuple[Array, Event | None]:
-    """The escape within an interval, step by step.
+    """Look for an escape within an interval, step by step.
 
-    The kernel looks a little ahead, where the drifts of two steps have become one; a top that only grazes the limit
-    there has not escaped, and the state at the interval's end is returned.
+    The kernel joins the drifts of two steps into one, and tests the place within it, a little ahead of the step's end.
+    A top that only grazes the limit there has not escaped.
+
+    Args:
+        problem: what moves the top.
+        state: at the start of the interval, shape (18,).
+        interval: one interval of the stops.
+
+    Returns:
+        The state after the escape or at the interval's end, shape (18,); the escape, None where there is none.
+
+    Raises:
+        LeftRange: the numbers leave their range.
     """
-    single = every_step(interval)
-    states, through = problem.advanced(state, single, problem.escape)
+    single = stop_after_each_step(interval)
+    states, through = problem.advance_to_stops(state, single, problem.escape)
     if through:
         return states[-1], None
     at = len(states) - 1
-    after, through = problem.advanced(states[-1], single.part(at, at + 1), NOWHERE)
+    after, through = problem.advance_to_stops(states[-1], single.part(at, at + 1), NO_LIMITS)
     if not (through and np.all(np.isfinite(after[-1]))):
         raise LeftRange(
             f"the motion cannot be followed beyond {states[-1][TIME]:.6g} s, where its numbers leave their range; "
             f"the last place was ({', '.join(f'{x:.4g}' for x in states[-1][R])}) m: "
             "start farther from the base's edges, or end at a greater escape.height_m"
         )
-    moved = mover(problem, single.part(at, at + 1))
+    step = one_step_map(problem, single.part(at, at + 1))
     length = float(single.times[at + 1] - single.times[at])
-    return after[-1], locate_escape(states[-1], length, moved, problem.escape)
+    return after[-1], locate_escape(states[-1], length, step, problem.escape)
 
 
-def mover(problem: Problem, interval: Stops) -> Callable[[Array, float], Array]:
-    """(state, time) → the state that much later, in one step, with the drive as it is in the interval."""
+def one_step_map(problem: Problem, interval: Stops) -> Callable[[Array, float], Array]:
+    """Return the map (state, length) → state that much later [s], in one step, under the drive of an interval."""
 
-    def moved(state: Array, length: float) -> Array:
+    def step(state: Array, length: float) -> Array:
         times = np.array([state[TIME], state[TIME] + length])
-        return np.asarray(problem.advanced(state, replace(interval, times=times), NOWHERE)[0][-1])
+        return np.asarray(problem.advance_to_stops(state, replace(interval, times=times), NO_LIMITS)[0][-1])
 
-    return moved
+    return step

@@ -1,8 +1,8 @@
 """A scene: what is simulated, from the magnets to the start, with the thesis's device as default.
 
-The frame is the base's: origin at its centre, z up its axis; a base that leans has a gravity that leans.
-A scene is a preset, a TOML file, or either of them with some keys changed; what does not go together raises SceneError
-with the key, its value and what is allowed.
+The frame is the base's: origin at its centre, z up its axis.  If the base leans, gravity leans in this frame.
+A scene is a preset, a TOML file, or either of them with some keys changed.  Values that contradict each other raise
+SceneError with the key, its value and what is allowed.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pydantic import NonNegativeFloat, ValidationError, model_validator
 
 from levilab.files import parse_toml
 from levilab.settings import in_one_line
-from levilab.simulator.keys import SceneError, Table, as_toml, nearest, parsed, set_key, shown
+from levilab.simulator.keys import SceneError, Table, as_toml, nearest, parse_setting, set_key, short_text
 from levilab.simulator.parts import Base, Drag, Drive, Escape, Part, Start, Top, Washers
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ __all__ = [
 
 
 class Scene(Part):
-    """All that is simulated.  observed "spin": the spin alone, which needs no integration.
+    """What is simulated; with observed "spin" only the spin is, in closed form.
 
     Raises pydantic's ValidationError for a value that its key does not allow, SceneError for values that do not
     go together; `scene_of`, `read_scene`, `with_settings` and `changed` raise SceneError for both.
@@ -50,15 +50,15 @@ class Scene(Part):
     escape: Escape = Escape()
 
     @model_validator(mode="after")
-    def _goes_together(self) -> Scene:
+    def _check_rules(self) -> Scene:
         for rule in RULES:
             if not rule.holds(self):
-                value = shown(attrgetter(rule.key)(self))
+                value = short_text(attrgetter(rule.key)(self))
                 raise SceneError(f"{rule.key} = {value}: {rule.expected.format(s=self)}")
         return self
 
     def changed(self, values: Mapping[str, Any]) -> Scene:
-        """The scene with other values at dotted keys, checked anew.  Raises SceneError.
+        """Return the scene with other values at dotted keys, checked anew.  Raises SceneError.
 
         >>> Scene().changed({"top.mass_kg": 0.025, "start.position_m.2": 0.072}).start.position_m
         (0.001, 0.0, 0.072)
@@ -66,34 +66,40 @@ class Scene(Part):
         table = self.as_table()
         for key, value in values.items():
             set_key(table, key, value)
-        # a constant belongs to its law: with another law goes that law's own, unless one is given with it
+        # a constant belongs to its law: another law brings its own, unless the values hold one
         given = any(key.startswith("drag.coefficient") for key in values) or "coefficient" in values.get("drag", ())
         if table["drag"]["law"] != self.drag.law and not given:
             table["drag"]["coefficient"] = None
         return scene_of(table)
 
     def as_table(self) -> Table:
-        """All keys with their values, as TOML and JSON have them; None where nothing is given."""
+        """Return all keys with their values, as TOML and JSON have them; None for a key without one."""
         return self.model_dump(mode="json")
 
     def as_toml(self) -> str:
-        """The scene as the text of a TOML file."""
+        """Return the scene as the text of a TOML file."""
         return as_toml(self.as_table()) + "\n"
 
 
 class Rule(NamedTuple):
-    """Values that must go together: the key that is named, the test, and what is allowed (with s, the scene)."""
+    """A condition on the values of a scene.
+
+    Attributes:
+        key: of the value that the message shows.
+        holds: whether the scene fulfils it.
+        expected: what is allowed, a format in which s is the scene.
+    """
 
     key: str
     holds: Callable[[Scene], bool]
     expected: str
 
 
-def _given(s: Scene) -> bool:
+def _place_is_given(s: Scene) -> bool:
     return s.start.place == "given"
 
 
-def _coefficients(s: Scene) -> bool:
+def _as_many_coefficients_as_the_law_has(s: Scene) -> bool:
     return s.drag.law == "none" or len(s.drag.constants) == (2 if s.drag.law == "mixed" else 1)
 
 
@@ -123,7 +129,7 @@ RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "drag.coefficient",
-        _coefficients,
+        _as_many_coefficients_as_the_law_has,
         "two numbers, [c1, c2], are expected with drag.law = mixed and one with every other law (here: {s.drag.law})",
     ),
     Rule(
@@ -133,12 +139,12 @@ RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "start.position_m",
-        lambda s: not _given(s) or s.start.position_m[2] > max(0.0, s.escape.height_m),
+        lambda s: not _place_is_given(s) or s.start.position_m[2] > max(0.0, s.escape.height_m),
         "a height (the third number) above the base, 0, and above escape.height_m = {s.escape.height_m} is expected",
     ),
     Rule(
         "start.position_m",
-        lambda s: not _given(s) or math.hypot(*s.start.position_m[:2]) <= s.escape.radius_m,
+        lambda s: not _place_is_given(s) or math.hypot(*s.start.position_m[:2]) <= s.escape.radius_m,
         "a place within escape.radius_m = {s.escape.radius_m} of the base's axis is expected",
     ),
     Rule(
@@ -162,13 +168,18 @@ RULES: tuple[Rule, ...] = (
 
 
 class Remark(NamedTuple):
-    """What is allowed but does nothing: the test, and what to say (with s, the scene)."""
+    """A setting that is allowed but has no effect.
+
+    Attributes:
+        applies: whether the scene has it.
+        text: what to say, a format in which s is the scene.
+    """
 
     applies: Callable[[Scene], bool]
     text: str
 
 
-def _ignored_place(s: Scene) -> bool:
+def _place_is_ignored(s: Scene) -> bool:
     usual = (Start().position_m, Start().velocity_m_s)
     return s.start.place == "equilibrium" and (s.start.position_m, s.start.velocity_m_s) != usual
 
@@ -183,12 +194,19 @@ REMARKS: tuple[Remark, ...] = (
         lambda s: s.drive.waveform != "off" and s.drive.amplitude_t == 0,
         "the drive does nothing: drive.amplitude_t = 0",
     ),
-    Remark(_ignored_place, "start.position_m and start.velocity_m_s do nothing: start.place = equilibrium"),
+    Remark(_place_is_ignored, "start.position_m and start.velocity_m_s do nothing: start.place = equilibrium"),
 )
 
 
 class Switch(NamedTuple):
-    """What must be on for keys to matter: a table, the test that it is off, the keys, why, and what switches it on."""
+    """A part of the scene that can be off; then its other keys have no effect.
+
+    Attributes:
+        table: of the part.
+        is_off: whether the scene has it switched off.
+        keys: of the table, that have no effect then.
+        why: the value that switches it off, and what switches it on.
+    """
 
     table: str
     is_off: Callable[[Scene], bool]
@@ -219,21 +237,21 @@ SWITCHES: tuple[Switch, ...] = (
 
 
 def remarks(scene: Scene) -> list[str]:
-    """What is set in a scene but has no effect, a sentence each."""
-    said = [remark.text.format(s=scene) for remark in REMARKS if remark.applies(scene)]
-    return said + [text for switch in SWITCHES if switch.is_off(scene) and (text := _without_effect(scene, switch))]
+    """Return a sentence for each setting of a scene that has no effect."""
+    texts = [remark.text.format(s=scene) for remark in REMARKS if remark.applies(scene)]
+    return texts + [text for switch in SWITCHES if switch.is_off(scene) and (text := _without_effect(scene, switch))]
 
 
 def _without_effect(scene: Scene, switch: Switch) -> str:
-    """The keys of a table that is off which differ from the defaults; empty if there are none."""
+    """Return a sentence about the keys that differ from their defaults in a part that is off; empty if none does."""
     part, usual = getattr(scene, switch.table), getattr(Scene(), switch.table)
     keys = [key for key in switch.keys if getattr(part, key) != getattr(usual, key)]
-    named = " and ".join(f"{switch.table}.{key} = {shown(getattr(part, key))}" for key in keys)
+    named = " and ".join(f"{switch.table}.{key} = {short_text(getattr(part, key))}" for key in keys)
     return f"{named} {'do' if len(keys) > 1 else 'does'} nothing: {switch.why}" if keys else ""
 
 
 def scene_of(table: Mapping[str, Any]) -> Scene:
-    """The scene that a table of keys describes; keys left out have their defaults.  Raises SceneError."""
+    """Return the scene that a table of keys describes; other keys have their defaults.  Raises SceneError."""
     whole = Scene().as_table()
     whole["drag"] = {"law": "none", "coefficient": None}
     for key, value in table.items():
@@ -245,49 +263,47 @@ def scene_of(table: Mapping[str, Any]) -> Scene:
 
 
 def with_settings(scene: Scene, settings: Iterable[str]) -> Scene:
-    """The scene with changes, each KEY=VALUE, all of them made before it is checked.  Raises SceneError.
+    """Return the scene with changes, each KEY=VALUE; it is checked after the last one.  Raises SceneError.
 
     >>> with_settings(preset("friction"), ["top.mass_kg=0.0255", "drag.law=newton"]).drag.constants
     (1.727e-05,)
     """
-    return scene.changed(dict(map(parsed, settings)))
+    return scene.changed(dict(map(parse_setting, settings)))
 
 
 def presets() -> list[str]:
-    """The names of the scenes that ship."""
-    return sorted(file.name.removesuffix(".toml") for file in _shipped().iterdir() if file.name.endswith(".toml"))
+    """Return the names of the scenes that come with levilab."""
+    return sorted(file.name.removesuffix(".toml") for file in _scenes_folder().iterdir() if file.name.endswith(".toml"))
 
 
 def preset(name: str) -> Scene:
-    """A scene that ships, by its name.  Raises SceneError."""
+    """Return a scene that comes with levilab, by its name.  Raises SceneError."""
     if name in presets():
-        return _described(_shipped() / f"{name}.toml", name)
+        return _read_file(_scenes_folder() / f"{name}.toml", name)
     near = nearest(name, presets())
     meant = f"did you mean {near}? Known" if near else "known"
-    raise SceneError(
-        f"there is no scene {name!r}: {meant} are {', '.join(presets())}; the path to a TOML file goes, too"
-    )
+    raise SceneError(f"there is no scene {name!r}: {meant} are {', '.join(presets())}; or give the path of a TOML file")
 
 
 def read_scene(name_or_path: str | Path) -> Scene:
-    """The scene of a preset's name, or of a TOML file.  Raises SceneError."""
+    """Return the scene that a preset's name or the path of a TOML file stands for.  Raises SceneError."""
     name, path = str(name_or_path), Path(name_or_path)
     if name in presets() or not (path.suffix == ".toml" or len(path.parts) > 1 or path.exists()):
         return preset(name)
-    return _described(path, path.stem)
+    return _read_file(path, path.stem)
 
 
-def _shipped() -> Traversable:
+def _scenes_folder() -> Traversable:
     return resources.files("levilab.simulator") / "scenes"
 
 
-def _described(file: Traversable | Path, name: str) -> Scene:
-    """The scene of a file, which has the file's name if it gives itself none."""
+def _read_file(file: Traversable | Path, name: str) -> Scene:
+    """Return the scene of a file; its name is `name` unless the file says another.  Raises SceneError."""
     try:
         table = parse_toml(file.read_bytes().decode("utf-8-sig"))
     except FileNotFoundError:
         raise SceneError(
-            f"{file}: there is no such file; scenes that ship are {', '.join(presets())}, "
+            f"{file}: there is no such file; scenes that come with levilab are {', '.join(presets())}, "
             "each a TOML file to copy and change"
         ) from None
     except OSError as error:

@@ -1,4 +1,4 @@
-"""One top from its start to the end: the step chosen from the tolerance, the error told with the result."""
+"""One top from its start to its end: the tolerance decides the step, and the result carries its error."""
 
 from __future__ import annotations
 
@@ -17,10 +17,17 @@ from levilab.simulator.escape import exit_speed, locate_zero, margins
 from levilab.simulator.kernels.loads import Disc
 from levilab.simulator.kernels.motion import CLOCK, TIME, L, N, R, V
 from levilab.simulator.model import model_of
-from levilab.simulator.problem import Problem, at_every_step, end_at, mover, scheme_for, travelled
+from levilab.simulator.problem import (
+    Problem,
+    integrate,
+    integrate_each_step,
+    integrate_to_end,
+    one_step_map,
+    scheme_for,
+)
 from levilab.simulator.spin import DECAYS, since_infinity
 from levilab.simulator.start import start_of
-from levilab.simulator.stops import every_step, kinks, stops_between
+from levilab.simulator.stops import kinks, stop_after_each_step, stops_between
 from levilab.simulator.trajectory import Accuracy, Event, Trajectory
 
 if TYPE_CHECKING:
@@ -29,16 +36,18 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: A chaotic motion has no step that is small enough: below this part of the longest step the error is given instead.
+#: No step is small enough for a chaotic motion: at this part of the longest step the search ends.
 SMALLEST_STEP_SHARE = 1 / 256
 
-#: Shorter steps in succession that did not halve the error: once is chance in the estimates, twice is chaos.
+#: After so many shorter steps in succession that did not halve the error, the motion is taken for chaotic: a single one
+#: may be chance in the estimates.
 MAX_FAILED_REFINEMENTS = 2
 
-#: Thirty years [s].
+#: The longest simulation, thirty years [s].
 LONGEST_S = 1e9
 
-#: Steps between kinks from which on rounding their number up changes twice their length by little.
+#: With so many steps between two kinks or more, their number can be halved and rounded up: the step is then about twice
+#: as long.
 MIN_STEPS_FOR_DOUBLING = 16
 
 Watch = Mapping[str, Callable[[Trajectory], Array]]
@@ -46,7 +55,7 @@ Watch = Mapping[str, Callable[[Trajectory], Array]]
 
 @dataclass(frozen=True)
 class _Wanted:
-    """What `simulate` was asked for, beside the accuracy."""
+    """What the caller of `simulate` wants, beside the accuracy."""
 
     duration: float
     rate: float | None
@@ -84,10 +93,13 @@ def simulate(
         tolerance: wanted error of the place [m] and the axis [rad] at the end.
         rate: samples per second (the last sample is the end), None for the start and the end alone.
         events: functions of a Trajectory, shape (n,), whose zeros are located.
-        scheme: a name of SCHEMES, chosen where none is given.
-        step: fixes the step instead of choosing it [s].
-        start: a state to start from instead of the scene's, shape (18,), whose time is kept.
+        scheme: a name of SCHEMES; None: the best one for the scene.
+        step: the longest step [s]; None: the tolerance decides it.
+        start: a state to start from instead of the scene's, shape (18,); its time stays.
         progress: called with the share of the work that is done.
+
+    Returns:
+        The motion at its samples, with its estimated error, up to the end or the fall.
 
     Raises:
         SimulationError: a number makes no sense, or the motion leaves the numbers' range.
@@ -100,9 +112,9 @@ def simulate(
     check(duration=duration, tolerance=tolerance, rate=rate, step=step)
     if scene.observed == "spin":
         given = {"events": events, "scheme": scheme, "step": step, "start": start}
-        if senseless := [name for name, value in given.items() if value is not None]:
+        if useless := [name for name, value in given.items() if value is not None]:
             raise SimulationError(
-                f"{senseless[0]}: a scene with observed = spin has a closed form, nothing is integrated: "
+                f"{useless[0]}: a scene with observed = spin has a closed form, nothing is integrated: "
                 "take observed = motion"
             )
         return spin_alone(scene, duration, tolerance, rate)
@@ -122,7 +134,7 @@ def simulate(
 
 
 def check(*, duration: float, tolerance: float, rate: float | None, step: float | None) -> None:
-    """Refuse numbers that make no sense, by name.  Raises SimulationError."""
+    """Raise SimulationError, with the quantity's name, for a number that makes no sense."""
     if not 0 < abs(duration) <= LONGEST_S:
         raise SimulationError(f"duration = {duration} s: a time other than 0 and up to {LONGEST_S:.0e} s is expected")
     for name, value in (("tolerance", tolerance), ("rate", rate), ("step", step)):
@@ -131,11 +143,15 @@ def check(*, duration: float, tolerance: float, rate: float | None, step: float 
 
 
 def _to_tolerance(problem: Problem, wanted: _Wanted, tolerance: float, step: float | None) -> tuple[Run, Accuracy]:
-    """The run whose estimated error is within the tolerance, or the best one where none is."""
+    """Shorten the step until the estimated error is within the tolerance, or no shorter step helps.
+
+    Returns:
+        The run within the tolerance, else the best one; its accuracy.
+    """
     longest = longest_step(problem.scene, problem.model, problem.start, problem.scheme)
     h = step or min(longest / 2, abs(wanted.duration) / 2)
     best: tuple[Run, Accuracy] | None = None
-    smallest, in_vain = math.inf, 0
+    smallest, failed = math.inf, 0
     while True:
         run = _run(problem, wanted, h)
         of_steps, of_nodes = _errors(problem, run, h)
@@ -143,22 +159,24 @@ def _to_tolerance(problem: Problem, wanted: _Wanted, tolerance: float, step: flo
         accuracy = Accuracy(position, axis, tolerance, problem.scheme.name, h, run.steps, float(max(of_nodes)))
         worst = float(max(of_steps))
         if best is None or worst <= 0.5 * smallest:
-            best, smallest, in_vain = (run, accuracy), worst, 0
+            best, smallest, failed = (run, accuracy), worst, 0
         else:
-            in_vain += 1
+            failed += 1
         if accuracy.reached:
             return run, accuracy
         if max(of_steps) <= tolerance / 2:  # the rest is the nodes', of a magnet that has come near the base
             return run, accuracy
-        if step or in_vain == MAX_FAILED_REFINEMENTS or h < longest * SMALLEST_STEP_SHARE:
+        if step or failed == MAX_FAILED_REFINEMENTS or h < longest * SMALLEST_STEP_SHARE:
             return best
         h *= min(max(0.9 * (tolerance / worst) ** (1 / problem.scheme.order), 0.1), 0.7)
 
 
 def _errors(problem: Problem, run: Run, step: float) -> tuple[Array, Array]:
-    """Estimated errors of the last state that the steps make, and that a magnet's nodes make; place [m] and axis [rad].
+    """Estimate the error of the last state, from the same motion with longer steps, and with fewer nodes in a magnet.
 
-    From the same motion with longer steps, and with fewer nodes in a magnet of finite size.
+    Returns:
+        The error that the steps make, and the one that the nodes of a magnet of finite size make; each of place [m]
+        and axis [rad], shape (2,).
     """
     end = run.states[-1]
     twice, four, length = _coarser_ends(problem, end[TIME], step)
@@ -169,9 +187,9 @@ def _errors(problem: Problem, run: Run, step: float) -> tuple[Array, Array]:
     of_steps = rounding + [estimate(end[part], twice[part], four[part], order) for part in (R, N)]
     of_nodes = np.zeros(2)
     if isinstance(problem.model.magnet, Disc):
-        fewer, fewest = (_with_steps(problem.with_nodes(-less), end[TIME], length) for less in (1, 2))
+        fewer, fewest = (_state_with_steps(problem.with_nodes(-less), end[TIME], length) for less in (1, 2))
         of_nodes += [estimate(twice[part], fewer[part], fewest[part], NODES_ORDER) for part in (R, N)]
-    if run.fell is not None:  # the moment of the fall is uncertain, too: the motion across the limit turns it to time
+    if run.fell is not None:  # the error of the place, over the speed across the limit, is an error of the fall's time
         speed = exit_speed(end, run.fell.name)
         turning = float(np.linalg.norm(np.cross(end[L], end[N]))) * problem.model.body.inverse_transverse
         late = np.array([np.linalg.norm(end[V]), turning]) / speed
@@ -191,56 +209,64 @@ def _crosses_kink(problem: Problem, run: Run, step: float) -> bool:
     states = run.states
     if np.abs(np.diff(states[:, TIME])).max() > _CLOSE_S:
         until = states[-1, TIME]
-        states = at_every_step(problem, stops_between(problem.start[TIME], until, step, problem.scene.drive))
+        states = integrate_each_step(problem, stops_between(problem.start[TIME], until, step, problem.scene.drive))
     return bool(np.any(comes_near_zero(spins_of(problem.scene, states))))
 
 
 def _coarser_ends(problem: Problem, until: float, step: float) -> tuple[Array, Array, float]:
-    """The state at a time with steps twice and four times as long, to tell the error from, and the former length [s].
+    """Integrate up to a time with steps twice and four times as long, to estimate the error from.
 
-    Where there is no room for them, because a fall or the next kink of the drive comes first, with half the steps.
+    If a fall or the next kink of the drive leaves no room for longer steps, half of the step serves as both.
+
+    Returns:
+        The two states, shape (18,) each, and the shorter of their steps [s].
     """
     begin = float(problem.start[TIME])
     lasted = abs(until - begin)
     pieces = 1 + kinks(problem.scene.drive, min(begin, until), max(begin, until)).size
     if lasted / pieces > MIN_STEPS_FOR_DOUBLING * step:
-        return _with_steps(problem, until, 2 * step), _with_steps(problem, until, 4 * step), 2 * step
+        return _state_with_steps(problem, until, 2 * step), _state_with_steps(problem, until, 4 * step), 2 * step
     length = min(step, lasted) / 2
-    half = _with_steps(problem, until, length)
+    half = _state_with_steps(problem, until, length)
     return half, half, length
 
 
-def _with_steps(problem: Problem, until: float, step: float) -> Array:
-    """The state at a time, with steps of that length and no escape."""
+def _state_with_steps(problem: Problem, until: float, step: float) -> Array:
+    """Return the state at a time, shape (18,), integrated with steps of this length [s] and without an escape."""
     stops = stops_between(problem.start[TIME], until, step, problem.scene.drive)
-    return end_at(problem, stops)
+    return integrate_to_end(problem, stops)
 
 
 # --- one run at one step ---
 
 
 def _run(problem: Problem, wanted: _Wanted, step: float) -> Run:
+    """Integrate once, with steps no longer than `step` [s]."""
     begin = float(problem.start[TIME])
     samples = _samples(begin, wanted.duration, wanted.rate)
     stops = stops_between(begin, begin + wanted.duration, step, problem.scene.drive, samples)
     if wanted.events:
-        stops = every_step(stops)
-    states, fell, steps = travelled(problem, stops, wanted.progress)
+        stops = stop_after_each_step(stops)
+    states, fell, steps = integrate(problem, stops, wanted.progress)
     if fell is not None:
         states = np.concatenate([states, fell.state[None]])
     found = _events(problem, states, stops, wanted.events) if wanted.events else ()
-    kept = states[_at(states[:, TIME], samples, abs(wanted.duration) * 1e-11)]
+    kept = states[_are_wanted(states[:, TIME], samples, abs(wanted.duration) * 1e-11)]
     return Run(kept, fell, found, steps)
 
 
-def _at(times: Array, samples: Array, apart: float) -> NDArray[np.bool_]:
-    """Which of the times are samples, or the first or the last; a kink may stand for a sample a rounding away."""
+def _are_wanted(times: Array, samples: Array, apart: float) -> NDArray[np.bool_]:
+    """Whether each time is a sample, the first or the last one, shape (n,).
+
+    A kink within `apart` [s] of a sample, which is rounding, counts as that sample.
+    """
     wanted = np.sort(np.concatenate([samples, times[[0, -1]]]))
     after = np.clip(np.searchsorted(wanted, times), 1, wanted.size - 1)
     return np.asarray(np.minimum(np.abs(wanted[after] - times), np.abs(times - wanted[after - 1])) <= apart)
 
 
 def _samples(begin: float, duration: float, rate: float | None) -> Array:
+    """Return the times of the samples [s], without the first and the last state."""
     if rate is None:
         return np.array([])
     inside = np.arange(1, math.ceil(abs(duration) * rate * (1 - 1e-12))) / rate
@@ -248,7 +274,7 @@ def _samples(begin: float, duration: float, rate: float | None) -> Array:
 
 
 def _events(problem: Problem, states: Array, stops: Stops, events: Watch) -> tuple[Event, ...]:
-    """All zeros of the events' functions, in the order of their time."""
+    """Locate all zeros of the events' functions, in the order of their time."""
 
     def on(function: Callable[[Trajectory], Array], rows: Array) -> Array:
         nothing = Accuracy(0, 0, 0, "", 0, 0)
@@ -262,7 +288,7 @@ def _events(problem: Problem, states: Array, stops: Stops, events: Watch) -> tup
             interval = stops.part(int(i), int(i) + 1)
             length = float(states[i + 1, TIME] - states[i, TIME])
             value = lambda state, function=function: float(on(function, state[None])[0])  # noqa: E731
-            found.append(locate_zero(name, states[i], length, mover(problem, interval), value))
+            found.append(locate_zero(name, states[i], length, one_step_map(problem, interval), value))
     return tuple(sorted(found, key=lambda event: event.time))
 
 
@@ -270,7 +296,11 @@ def _events(problem: Problem, states: Array, stops: Stops, events: Watch) -> tup
 
 
 def spin_alone(scene: Scene, duration: float, tolerance: float, rate: float | None) -> Trajectory:
-    """The spin in closed form; the top stays where it starts, and nothing is integrated."""
+    """Compute the spin in closed form; the top stays where it starts, and nothing is integrated.
+
+    Raises:
+        SimulationError: the spin was infinite at some time on the way back.
+    """
     start = start_of(scene)
     times = np.concatenate([[0.0], _samples(0.0, duration, rate), [duration]])
     states = np.tile(start, (times.size, 1))

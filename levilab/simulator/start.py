@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def start_of(scene: Scene) -> Array:
-    """The state at time 0 in the base's frame, shape (18,)."""
+    """Return the state at time 0 in the base's frame, shape (18,)."""
     start = scene.start
     place, velocity = np.array(start.position_m), np.array(start.velocity_m_s)
     if start.place == "equilibrium":
@@ -36,7 +36,7 @@ def start_of(scene: Scene) -> Array:
 
 
 def _precession(scene: Scene, spin: float, place: Array) -> float:
-    """The azimuth's rate φ̇ [rad/s] at the start."""
+    """Return the rate φ̇ of the azimuth at the start [rad/s]."""
     start = scene.start
     if start.precession == "thesis":  # φ̇ = ψ̇ and ω₃ = ψ̇ + φ̇ cos θ
         return spin / (1 + math.cos(start.tilt_rad))
@@ -46,16 +46,22 @@ def _precession(scene: Scene, spin: float, place: Array) -> float:
 
 
 def steady_precession(scene: Scene, spin: float, place: Array) -> float:
-    """The slow root of I₁ cosθ φ̇² − I₃ω₃ φ̇ + P = 0 [rad/s], P = −μB_z: precession without nutation.
+    """Return the rate of steady precession, without nutation [rad/s].
 
-    Goldstein, Classical Mechanics, § 5.7, with the torque of the field in place of the weight's.  A top too slow for a
-    steady precession, (I₃ω₃)² < 4 I₁ cosθ P, starts at the rate I₃ω₃/(2 I₁ cosθ), at which least torque is missing.
+    It is the slow root of I₁ cosθ φ̇² − I₃ω₃ φ̇ + P = 0, P = −μB_z (Goldstein, Classical Mechanics, § 5.7, with the
+    torque of the field in place of the weight's).  A top too slow for a steady precession, (I₃ω₃)² < 4 I₁ cosθ P,
+    starts at the rate I₃ω₃/(2 I₁ cosθ), at which the missing torque is smallest.
+
+    Args:
+        scene: with top, base and tilt.
+        spin: ω₃ [rad/s].
+        place: of the top, shape (3,) [m].
     """
     return steady_rates(scene, spin, place)[0]
 
 
 def steady_rates(scene: Scene, spin: float, place: Array) -> tuple[float, float]:
-    """Both roots of that equation [rad/s]: of the precession, and of a steady nutation."""
+    """Return both roots of the equation of `steady_precession` [rad/s]: the precession and a steady nutation."""
     top = scene.top
     bz = float(flux_density(base_field(scene), place[None, :])[0, 2])
     restoring = -top.moment_a_m2 * top.moment_tilt[1] * bz
@@ -69,7 +75,7 @@ def steady_rates(scene: Scene, spin: float, place: Array) -> tuple[float, float]
 
 
 def nutating_start(scene: Scene) -> Array:
-    """The state at time 0, shape (18,), of a top whose axis goes round at the fast rate, a nutation of the tilt."""
+    """Return the state at time 0, shape (18,), of a top that nutates: its axis circles at the fast rate."""
     state = start_of(scene)
     spin, tilt, n = 2 * math.pi * scene.start.spin_hz, scene.start.tilt_rad, state[N]
     transverse = np.array([0.0, 0.0, 1.0]) - n * math.cos(tilt)

@@ -1,4 +1,4 @@
-"""Where the integration must stop: samples, kinks of the drive, and often enough to be watched."""
+"""Where the integration must stop: at samples, at kinks of the drive, and after 1000 steps at the latest."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Steps between stops at most: what has to be gone through again to find the moment of an escape.
+#: At most so many steps between stops: they are repeated one by one to find the moment of an escape.
 STEPS_BETWEEN_STOPS = 1000
 
 
 @dataclass(frozen=True)
 class Stops:
-    """When the integrator stops, and how far the drive is then.
+    """When the integrator stops, and the drive between the stops.
 
     Attributes:
-        times: shape (n + 1,) [s].
-        counts: steps to the next, shape (n,).
-        levels, slopes: of the drive, shape (n,).
+        times: of the stops, shape (n + 1,) [s].
+        counts: steps from each stop to the next, shape (n,).
+        levels, slopes: of the drive in each interval, shape (n,); see below.
 
     Within an interval the drive's field is (level + slope·t) × its carrier, which is smooth: no step crosses a kink,
     so the order of the integrator is kept.
@@ -41,7 +41,7 @@ class Stops:
     slopes: Array
 
     def pieces(self, steps: int) -> Iterator[tuple[int, int]]:
-        """First and last of pieces that have about so many steps each; all intervals in their order."""
+        """Yield the first and last interval, exclusive, of successive pieces with about so many steps each."""
         done = np.concatenate([[0], np.cumsum(self.counts)])
         first = 0
         while first < self.counts.size:
@@ -50,14 +50,14 @@ class Stops:
             first = min(last, self.counts.size)
 
     def part(self, first: int, last: int) -> Stops:
-        """The intervals from first to last, without the last."""
+        """Return the intervals from first to last, without the last."""
         return Stops(
             self.times[first : last + 1], self.counts[first:last], self.levels[first:last], self.slopes[first:last]
         )
 
 
-def every_step(stops: Stops) -> Stops:
-    """The same steps, with a stop after each."""
+def stop_after_each_step(stops: Stops) -> Stops:
+    """Return the same steps with a stop after each of them."""
     lengths = np.diff(stops.times) / stops.counts
     index = np.repeat(np.arange(stops.counts.size), stops.counts)
     first = np.cumsum(stops.counts) - stops.counts
@@ -66,12 +66,23 @@ def every_step(stops: Stops) -> Stops:
     return Stops(times, np.ones(index.size, dtype=np.int64), stops.levels[index], stops.slopes[index])
 
 
-#: Steps and kinks at most: more would take days, or the machine's memory.
+#: The most steps and kinks: more would take days, or the machine's memory.
 MOST_STEPS, MOST_KINKS = 10**11, 10**7
 
 
 def stops_between(start: float, end: float, step: float, drive: Drive, samples: Array | None = None) -> Stops:
-    """The stops from start to end (either way in time) with steps no longer than `step` [s]."""
+    """Return the stops from one time to another.
+
+    Args:
+        start: the first stop [s].
+        end: the last stop [s], before the start to go back in time.
+        step: no step is longer [s].
+        drive: no step crosses its kinks.
+        samples: further stops [s]; those outside are left out.
+
+    Raises:
+        SimulationError: it would take too many steps, or the drive has too many kinks.
+    """
     low, high = min(start, end), max(start, end)
     if not (high - low) / step < MOST_STEPS:
         raise SimulationError(
@@ -96,7 +107,7 @@ def stops_between(start: float, end: float, step: float, drive: Drive, samples: 
 
 
 def _distinct(times: Array, apart: float) -> Array:
-    """Sorted, without those that come closer than this after another; the last one stays."""
+    """Return the times sorted, without those less than `apart` [s] after another; the last one stays."""
     times = np.unique(times)
     keep = np.concatenate([[True], np.diff(times) > apart])
     kept = times[keep]
@@ -105,7 +116,11 @@ def _distinct(times: Array, apart: float) -> Array:
 
 
 def kinks(drive: Drive, low: float, high: float) -> Array:
-    """Times strictly between at which the drive's field jumps or bends [s]."""
+    """Return the times strictly between low and high at which the drive's field jumps or bends, shape (n,) [s].
+
+    Raises:
+        SimulationError: there are too many.
+    """
     found = []
     if drive.off_s is not None and low < drive.off_s < high and drive.waveform != "off":
         found.append(drive.off_s)
@@ -124,7 +139,7 @@ def kinks(drive: Drive, low: float, high: float) -> Array:
 
 
 def _shape(drive: Drive, middles: Array) -> tuple[Array, Array]:
-    """Level and slope of each interval, from its middle."""
+    """Return level and slope of the drive in each interval, given the intervals' middles [s]; shape (n,) each."""
     on = np.ones_like(middles) if drive.off_s is None else (middles < drive.off_s).astype(np.float64)
     turns = drive.frequency_hz * middles + drive.phase_rad / (2 * math.pi)
     first_half = turns - np.floor(turns) < 0.5

@@ -43,7 +43,7 @@ class Stand:
 
     Attributes:
         height_m: None: in its zero-gauss chamber.
-        scatter_m: by how much it misses a height that is asked for, 1σ.
+        scatter_m: by how much the probe misses the wanted height, 1σ.
     """
 
     height_m: float | None = 0.072
@@ -51,25 +51,25 @@ class Stand:
     seed: int = 0
 
     def at(self, height_m: float | None) -> Stand:
-        """Put there, near enough: the same height twice is missed by the same."""
+        """Return the stand at another height, missed by its scatter; the same height twice has the same miss."""
         if height_m is None or not self.scatter_m:
             return replace(self, height_m=height_m)
         random = np.random.default_rng((self.seed, 2, round(1e7 * abs(height_m))))
         return replace(self, height_m=height_m + self.scatter_m * float(random.standard_normal()))
 
-    def sees(self, base: Base) -> float:
-        """The flux density there [T]."""
+    def flux_density(self, base: Base) -> float:
+        """Return the flux density at the probe [T]."""
         return 0.0 if self.height_m is None else base.flux_density(self.height_m)
 
 
-#: What differs from one virtual bench to the next, 1σ: the strength, relative, and what a calliper leaves open [m].
+#: Scatter from one virtual bench to the next, 1σ: strength, relative, and the errors of a calliper [m].
 _STRENGTH, _RADIUS_M, _THICKNESS_M, _ORIGIN_M = 0.02, 1e-4, 2e-4, 1e-3
-#: As the settings of the experiment `field` have it; the earth's field along the vertical, 1σ [T].
+#: Thickness [m], as in the settings of the experiment `field`; vertical field of the earth, 1σ [T].
 _THICK_M, _EARTH_T = 0.015, 4e-5
 
 
-def drawn_base(seed: int) -> Base:
-    """The base of one virtual bench, by the seed: thick, and as a calliper and a guess of its strength have it."""
+def random_base(seed: int) -> Base:
+    """Return the base of one virtual bench: a thick ring whose sizes and strength the seed scatters."""
     by = np.random.default_rng((seed, 3)).standard_normal(6).tolist()
     nominal = Base()
     return Base(

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
     from levilab.world.spin_world import Array, World
 
-#: Where the virtual instruments are plugged in, and what they are unless other models are asked for.
+#: Address and default model of the virtual instrument of each kind.
 VIRTUAL = {
     kind: InstrumentSettings(
         model=models[0].name,
@@ -38,13 +38,13 @@ VIRTUAL = {
 COIL_T_PER_V = 0.4e-3 / 5.0
 
 
-#: What makes a virtual instrument in a world.
+#: Makes a virtual instrument that is connected to a world.
 Maker = Callable[["World"], VirtualInstrument]
 
 
 @dataclass(frozen=True)
 class Light:
-    """The light of a world as the signal of a counter, which has the times of its edges without a trace."""
+    """The light of a world as the signal of a counter, with the times of its edges computed without a trace."""
 
     world: World
 
@@ -57,55 +57,55 @@ class Light:
         return self.world.crossings(start, stop, triggers)
 
 
-def at_the_light(model: Callable[..., VirtualInstrument]) -> Maker:
-    """A counter: its input 1 is connected to the phototransistor that sees the tape, 2 to the laser's."""
+def connect_counter(model: Callable[..., VirtualInstrument]) -> Maker:
+    """Connect a counter: input 1 to the phototransistor that sees the tape, input 2 to the laser's."""
     return lambda world: model(world.clock, signal=Light(world), second=world.laser)
 
 
-def at_the_coil(model: Callable[..., VirtualInstrument]) -> Maker:
-    """A generator: its output is connected to the coil."""
+def connect_generator(model: Callable[..., VirtualInstrument]) -> Maker:
+    """Connect a generator: its output to the coil."""
     return lambda world: model(world.clock, listener=lambda time, output: world.drive(time, output.times(COIL_T_PER_V)))
 
 
 def scope_signals(world: World) -> dict[int, Callable[[float, float, int], Array]]:
-    """What an oscilloscope is connected to.
+    """Return the signals of an oscilloscope's channels.
 
-    Channel 1 sees the tape's phototransistor, 2 the generator's output, 3 the laser's phototransistor; one with two
-    channels has no input left for the laser.
+    Channel 1 has the tape's phototransistor, 2 the generator's output, 3 the laser's phototransistor; an oscilloscope
+    with two channels does not show the laser.
     """
     drive = lambda start, step, n: world.coil_field(start, step, n) / COIL_T_PER_V  # noqa: E731
     return {1: world.light, 2: drive, 3: world.laser}
 
 
-def at_light_and_coil(model: Callable[..., VirtualInstrument]) -> Maker:
-    """An oscilloscope."""
+def connect_oscilloscope(model: Callable[..., VirtualInstrument]) -> Maker:
+    """Connect an oscilloscope: see `scope_signals`."""
     return lambda world: model(world.clock, signals=scope_signals(world))
 
 
-def in_the_field(model: Callable[..., VirtualInstrument]) -> Maker:
-    """A gaussmeter: its probe is at the place of the top."""
+def connect_magnetometer(model: Callable[..., VirtualInstrument]) -> Maker:
+    """Connect a gaussmeter: its probe is on the base's axis."""
     return lambda world: model(world.clock, flux_density=world.flux_density)
 
 
-#: How the virtual instruments of each kind are connected to the world.
-_CONNECTED: dict[str, Callable[[Callable[..., VirtualInstrument]], Maker]] = {
-    "counter": at_the_light,
-    "generator": at_the_coil,
-    "oscilloscope": at_light_and_coil,
-    "magnetometer": in_the_field,
+#: Kind → what connects a virtual instrument to the world.
+_CONNECT: dict[str, Callable[[Callable[..., VirtualInstrument]], Maker]] = {
+    "counter": connect_counter,
+    "generator": connect_generator,
+    "oscilloscope": connect_oscilloscope,
+    "magnetometer": connect_magnetometer,
 }
 #: Kind → model → what makes it.
 VIRTUAL_MODELS: dict[str, dict[str, Maker]] = {
-    kind: {model.name: _CONNECTED[kind](model.twin) for model in models} for kind, models in CATALOGUE.items()
+    kind: {model.name: _CONNECT[kind](model.twin) for model in models} for kind, models in CATALOGUE.items()
 }
 
 
 def virtual_bus(world: World | None = None, models: Mapping[str, str] | None = None) -> Bus:
-    """A virtual bench.
+    """Return a virtual bench.
 
     Args:
         world: by default a top of its own, on a virtual clock.
-        models: kind → model, for those that are to be others than in VIRTUAL.
+        models: kind → model, where it differs from VIRTUAL.
 
     Raises:
         ConfigError: there is no such kind or model.
@@ -117,17 +117,17 @@ def virtual_bus(world: World | None = None, models: Mapping[str, str] | None = N
 
 
 def virtual_wiring(world: World, limits: Limits | None = None) -> Wiring:
-    """The wiring of a virtual bench.
+    """Return the wiring of a virtual bench.
 
     Args:
-        world: that it measures.
-        limits: by default those of a bench file without any.
+        world: that its instruments measure.
+        limits: by default those of a bench file without a table of limits.
     """
     return Wiring(VIRTUAL, limits or Limits(), library_for(virtual_bus(world)), world.clock, VirtualPerson(world))
 
 
 def plug_in_serial(bus: Bus | None = None) -> Bus:
-    """Let pyserial find a virtual bench; which one.
+    """Let pyserial find a virtual bench, and return the bench.
 
     From then on ``serial.serial_for_url("levilab://magnetometer")`` is its magnetometer, and for pyvisa-py
     ``ASRLlevilab://magnetometer::INSTR``.
@@ -140,15 +140,15 @@ def plug_in_serial(bus: Bus | None = None) -> Bus:
     return bus
 
 
-#: A top that falls on a bench to practise at is put back after so long [s].
+#: Time from a fall until the top floats again on a bench for practice [s].
 PUT_BACK_AFTER_S = 15.0
 
 
 def practice_world(clock: Clock | None = None) -> World:
-    """A top to practise with, put back whenever it falls.
+    """Return a world to practise with: its top floats again 15 s after each fall.
 
     Args:
-        clock: by default one that jumps.
+        clock: by default a virtual one, which jumps.
     """
     return SpinWorld(SpinScene(put_back_after_s=PUT_BACK_AFTER_S), clock or VirtualClock())
 
@@ -161,18 +161,18 @@ def scene_world(
     put_back_after_s: float | None = None,
     seed: int = 0,
 ) -> World:
-    """The top of a scene in full motion.
+    """Return a world with the top of a scene in full motion.
 
     Args:
-        scene: what is to move.
-        clock: makes one, when all is ready.
-        tell: called where code must be compiled first.
-        put_back_after_s: so long after a fall the top is put back [s]; None: it is not.
+        scene: with the top that moves.
+        clock: makes the clock, once all code is compiled.
+        tell: called with a message before code is compiled.
+        put_back_after_s: time from a fall until the top floats again [s]; None: it stays down.
         seed: of the light's noise, and of the place of the tape.
 
     Raises:
         SceneError: the scene has no motion.
-        SimulationError: it cannot be simulated.
+        SimulationError: the scene cannot be simulated.
     """
     from levilab.simulator.compilation import announce_compilation  # the compiler takes a moment to load
     from levilab.world.motion_world import MotionWorld, prepare

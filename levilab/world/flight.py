@@ -1,4 +1,4 @@
-"""The motion of a top as far as an instrument looks, under a drive that changes; put back when it has fallen."""
+"""The motion of a top under a drive that changes, simulated as far as an instrument needs it."""
 
 from __future__ import annotations
 
@@ -24,26 +24,31 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: The motion is worked out so much at a time [s], to this error of place [m] and axis [rad] at the end of each piece,
-#: with so many states a second: between two of them a tape turns evenly to 1e-4 of a turn.
+#: The motion is simulated in pieces of this length [s], to this error of place [m] and axis [rad] at the end of each,
+#: with so many states per second: between two of them a tape turns evenly to 1e-4 of a turn.
 PIECE_S, TOLERANCE, RATE = 1.0, 1e-7, 400.0
 
-#: Nothing moves in so short a time [s].
+#: In so short a time [s] no motion is to be simulated.
 _AT_ONCE = 1e-9
 
-#: A tape is seen at every turn, so the attitude is needed; an aligned moment has it with this transverse part, which is
-#: less than the rounding of the other.
+#: The tape's place needs the full attitude, which the simulator integrates only for a tilted moment.  An aligned moment
+#: gets this transverse part, which is less than the rounding of the axial one.
 _NEGLIGIBLE_TILT = 1e-17
 
 
 @dataclass(frozen=True)
 class _Flying:
-    """A piece of a top's life.
+    """A piece of motion.
 
-    scene: with the drive; state: where it begins, shape (18,); step: of the integration [s]; times [s], turns of the
-    tape and, as part of them, turns of the washers that it is on beside the top then, shape (n,) each; stem:
-    displacement of the stem along x [m] and its rate [m/s] then, shape (2, n); lift: height of the rim towards x above
-    the base [m] then, shape (n,).
+    Attributes:
+        scene: with the drive.
+        state: at the start, shape (18,).
+        step: of the integration [s].
+        times: of the samples, shape (n,) [s].
+        turns: of the tape at these times, shape (n,).
+        slips: turns of loose washers relative to the top, shape (n,); the tape is on them, so `turns` contain these.
+        stem: displacement of the stem along x [m], and its rate [m/s], shape (2, n).
+        lift: height above the base of the rim's point towards x [m], shape (n,).
     """
 
     scene: Scene
@@ -57,7 +62,7 @@ class _Flying:
 
     @property
     def start(self) -> float:
-        """When it begins [s]."""
+        """Its time [s]."""
         return float(self.state[TIME])
 
 
@@ -72,9 +77,9 @@ class Flight:
     """A top from time 0 on; before, and after it has fallen, there is none.
 
     Args:
-        scene: its drive is left out, `change` brings drives.
-        put_back_after_s: so long after a fall the top is put back to where the scene starts [s]; None: it is not.
-        stem_height_m: of the place on the stem that is looked at, above the centre of mass [m].
+        scene: with the top; its drive is ignored, see `change`.
+        put_back_after_s: time from a fall until the top starts again as the scene says [s]; None: it stays down.
+        stem_height_m: height of the laser's beam on the stem, above the centre of mass [m].
 
     Raises:
         SceneError: the scene has no motion.
@@ -91,51 +96,59 @@ class Flight:
         self._pieces: Timeline[_Flying | _Absent] = Timeline(-math.inf, _Absent(-math.inf))
         self._step: float | None = None
         # what comes next: a top in this state, or none until a new one is put there; and when [s]
-        self._state: Array | None = self._begin(0.0)
-        self._known = 0.0
+        self._state: Array | None = self._start_state(0.0)
+        self._known_until = 0.0
         self._slip = 0.0  # of the washers then [turns]
 
     def prepare(self) -> None:
-        """Have the simulator's code compiled, or brought from the disk, for whatever drive may come."""
+        """Compile the simulator's code, or load it from the disk, for any drive that may come."""
         for waveform in ("off", "sine", "square"):
             simulate(self._scene.changed({"drive.waveform": waveform}), 1e-3, rate=None)
 
     @property
     def driven(self) -> bool:
-        """Whether there is a drive at last."""
+        """Whether the latest drive is on."""
         return self._scene.drive.waveform != "off"
 
     def change(self, time: float, drive: Mapping[str, Any]) -> None:
-        """From this time on the drive is this: keys of the scene's table; what was seen of later times is gone."""
-        self.look(time)
-        self._step = None  # what another drive needs
+        """Change the drive from a time on; motion already simulated beyond that time is discarded.
+
+        Args:
+            time: [s].
+            drive: keys of the scene's table `drive`, and their values.
+        """
+        self.simulate_until(time)
+        self._step = None  # another drive may need another step
         now = self._pieces.at(time)
         if isinstance(now, _Flying):
             self._pieces.cut(time)
             self._slip = float(np.interp(time, now.times, now.slips))
-            self._state, self._known = _later(now, time), time
+            self._state, self._known_until = _state_within(now, time), time
         else:
             self._pieces.cut(math.nextafter(time, math.inf))
             self._wait(now.start)
         self._scene = self._scene.changed({f"drive.{key}": value for key, value in drive.items()})
 
     def put_back(self, time: float) -> None:
-        """At this time the top is put back to where the scene starts, if it is down."""
-        self.look(time)
+        """Start the top again at this time, as the scene says, if it has fallen."""
+        self.simulate_until(time)
         if isinstance(self._pieces.at(time), _Absent):
             self._pieces.cut(math.nextafter(time, math.inf))
-            self._state, self._step, self._known = self._begin(time), None, time
+            self._state, self._step, self._known_until = self._start_state(time), None, time
 
     def forget(self, before: float) -> None:
-        """Drop what ended before this time [s]."""
+        """Drop the pieces that ended before this time [s]."""
         self._pieces.forget(before)
 
     def turns(self, times: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Turns of the tape past a fixed spot on the rim, and whether there is a top; shape (n,) each, as the times.
+        """Return turns of the tape past a fixed spot beside the rim, and whether a top is up; shape (n,) each.
 
-        Whole turns are not counted on from one piece to the next.
+        Whole turns are not continued from one piece to the next.
+
+        Args:
+            times: shape (n,) [s].
         """
-        self.look(float(times.max(initial=0.0)))
+        self.simulate_until(float(times.max(initial=0.0)))
         turns, up = np.zeros_like(times), np.zeros(times.shape, dtype=np.bool_)
         for piece, part in self._pieces.pieces(times):
             if isinstance(piece, _Flying):
@@ -143,11 +156,15 @@ class Flight:
         return turns, up
 
     def tape(self, times: Array) -> tuple[Array, Array, Array]:
-        """What is to be known of the light, shape (n,) each, as the times.
+        """Return what the light of the tape depends on, shape (n,) each.
 
-        Turns as above; their rate [Hz], 0 without a top; height of the rim above the base where the fixed spot is [m].
+        Args:
+            times: shape (n,) [s].
+
+        Returns:
+            Turns, see `turns`; their rate [Hz], 0 without a top; height of the rim above the base at that spot [m].
         """
-        self.look(float(times.max(initial=0.0)))
+        self.simulate_until(float(times.max(initial=0.0)))
         turns, rate, lift = np.zeros_like(times), np.zeros_like(times), np.zeros_like(times)
         for piece, part in self._pieces.pieces(times):
             if isinstance(piece, _Flying):
@@ -156,20 +173,20 @@ class Flight:
         return turns, rate, lift
 
     def first_lift(self) -> float:
-        """The mean of this height over the first second without a drive, in which a top bobs once or more [m]."""
-        self.look(0.0)
+        """Return the mean height of the rim over the first second [m], in which a top bobs at least once."""
+        self.simulate_until(0.0)
         piece = self._pieces.at(0.0)
         return float(piece.lift.mean()) if isinstance(piece, _Flying) else self._scene.start.position_m[2]
 
     def passages(self, place: Callable[[float], float], start: float, stop: float) -> Array:
-        """When the tape's turn has a place in [0, 1) between two times [s], increasing, shape (n,) [s].
+        """Return when the tape passes a place in its turn, increasing, shape (n,) [s].
 
         Args:
-            place: given the rate of turns [Hz].
+            place: rate of turns [Hz] → place in [0, 1).
             start: the first time [s].
-            stop: the second one [s].
+            stop: the last time [s].
         """
-        self.look(stop)
+        self.simulate_until(stop)
         found = [np.empty(0)]
         for piece, end in self._pieces.between(start, stop):
             if isinstance(piece, _Flying) and piece.times.size > 1:
@@ -181,54 +198,57 @@ class Flight:
         return np.concatenate(found)
 
     def stem(self, times: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Displacement of the stem along x [m], and whether there is a top; shape (n,) each, as the times.
+        """Return the displacement of the stem along x [m], and whether a top is up; shape (n,) each.
 
-        Between two states a cubic goes through both displacements with their rates: of the nutation, 42 Hz, it misses
-        5e-4 of the amplitude.
+        A cubic interpolates between two states, from displacements and rates; it misses 5e-4 of the amplitude of a
+        nutation at 42 Hz.
+
+        Args:
+            times: shape (n,) [s].
         """
-        self.look(float(times.max(initial=0.0)))
+        self.simulate_until(float(times.max(initial=0.0)))
         place, up = np.zeros_like(times), np.zeros(times.shape, dtype=np.bool_)
         for piece, part in self._pieces.pieces(times):
             if isinstance(piece, _Flying):
                 place[part], up[part] = _cubic(times[part], piece.times, *piece.stem), True
         return place, up
 
-    # --- as far as an instrument looks ---
+    # --- the simulation ---
 
-    def look(self, until: float) -> None:
-        """Work the motion out up to this time [s]."""
-        while self._known <= until:
+    def simulate_until(self, until: float) -> None:
+        """Simulate the motion up to this time [s]."""
+        while self._known_until <= until:
             if self._state is None:
-                self._state, self._step = self._begin(self._known), None
+                self._state, self._step = self._start_state(self._known_until), None
             self._advance(self._state)
 
-    def _begin(self, time: float) -> Array:
-        """The state of a top that is put there at this time, shape (18,)."""
+    def _start_state(self, time: float) -> Array:
+        """Return the state of a top that starts at this time, shape (18,)."""
         state = start_of(self._scene)
         state[TIME] = time
         self._slip = 0.0
         return state
 
     def _advance(self, state: Array) -> None:
-        """The next piece of the life of a top in this state."""
+        """Simulate the next piece of motion from this state."""
         begin = float(state[TIME])
         try:
             motion = self._motion(state)
         except LeftRange:  # it has hit the base, where the field is infinite
             self._fall(begin)
             return
-        # of the states only the first is kept: a bench may run for hours
+        # a bench may run for hours, so only the first of the states is kept
         slips = self._slip + _slips(motion)
         self._slip = float(slips[-1])
-        seen = (motion.time.copy(), _turns(motion) + slips, slips, _stem(motion, self._stem_height), _lift(motion))
-        self._pieces.append(begin, _Flying(self._scene, state, motion.accuracy.step, *seen))
+        samples = (motion.time.copy(), _turns(motion) + slips, slips, _stem(motion, self._stem_height), _lift(motion))
+        self._pieces.append(begin, _Flying(self._scene, state, motion.accuracy.step, *samples))
         if motion.fell is not None:
             self._fall(motion.fell.time)
         else:
-            self._state, self._known = motion.states[-1].copy(), float(motion.time[-1])
+            self._state, self._known_until = motion.states[-1].copy(), float(motion.time[-1])
 
     def _motion(self, state: Array) -> Trajectory:
-        """A piece with the step of the last one, if that is good enough."""
+        """Simulate a piece with the step of the last one, or with a new one where that is too long."""
         options: dict[str, Any] = {"tolerance": TOLERANCE, "rate": RATE, "start": state}
         if self._step is not None:
             motion = simulate(self._scene, PIECE_S, step=self._step, **options)
@@ -243,12 +263,15 @@ class Flight:
         self._wait(time)
 
     def _wait(self, fallen: float) -> None:
-        """Nothing happens until the top is put back."""
-        self._state, self._known = None, math.inf if self._put_back_after_s is None else fallen + self._put_back_after_s
+        """Leave the top down from the time of its fall until it is put back, if ever."""
+        self._state, self._known_until = (
+            None,
+            math.inf if self._put_back_after_s is None else fallen + self._put_back_after_s,
+        )
 
 
-def _later(piece: _Flying, time: float) -> Array:
-    """The state within a piece at this time, shape (18,)."""
+def _state_within(piece: _Flying, time: float) -> Array:
+    """Return the state at a time within a piece, shape (18,)."""
     state = piece.state.copy()
     if time - piece.start > _AT_ONCE:
         motion = simulate(piece.scene, time - piece.start, step=piece.step, rate=None, start=state)
@@ -258,9 +281,10 @@ def _later(piece: _Flying, time: float) -> Array:
 
 
 def _slips(motion: Trajectory) -> Array:
-    """Turns of the washers beside the top since the first sample, shape (n,): slower, so negative; 0 if none are loose.
+    """Return the turns of loose washers relative to the top since the first sample, shape (n,).
 
-    The trapezium rule: a slip changes in seconds, and the samples are 2.5 ms apart.
+    They are negative, for washers turn more slowly; 0 if none are loose.  The trapezium rule is enough, for the slip
+    changes within seconds, and the samples are 2.5 ms apart.
     """
     if motion.scene.washers.inertia_kg_m2 == 0:
         return np.zeros(motion.time.size)
@@ -270,26 +294,26 @@ def _slips(motion: Trajectory) -> Array:
 
 
 def _turns(motion: Trajectory) -> Array:
-    """Turns of the tape past a spot that lies on the rim in the direction of x while the top stands on the axis."""
+    """Return the turns of the tape past a fixed spot: the rim's point towards x while the top stands on the axis."""
     arm, place = motion.states[:, ARM], motion.position
     spot = np.arctan2(-place[:, 1], motion.scene.top.magnet_radius_m - place[:, 0])
     return np.asarray(np.unwrap(np.arctan2(arm[:, 1], arm[:, 0]) - spot) / (2 * np.pi))
 
 
 def _rate(piece: _Flying) -> float:
-    """The mean rate of turns in a piece [Hz], which wobble and drag change by some per cent of it."""
+    """Return the mean rate of turns in a piece [Hz]; wobble and drag change it by some per cent within the piece."""
     if piece.times.size < 2:
         return 1.0
     return float((piece.turns[-1] - piece.turns[0]) / (piece.times[-1] - piece.times[0]))
 
 
 def _lift(motion: Trajectory) -> NDArray[np.float32]:
-    """Height of the rim towards x above the base, shape (n,) [m]: it bobs with the top and is tilted with it."""
+    """Return the height above the base of the rim's point towards x, shape (n,) [m]: it bobs and tilts with the top."""
     return np.asarray(motion.position[:, 2] - motion.scene.top.magnet_radius_m * motion.axis[:, 0], dtype=np.float32)
 
 
 def _stem(motion: Trajectory, height: float) -> NDArray[np.float32]:
-    """Displacement of the stem along x and its rate at a height above the centre of mass, shape (2, n) [m, m/s].
+    """Return displacement along x and its rate of the stem's point at a height, shape (2, n) [m, m/s].
 
     Single precision: a displacement of 5 mm is right to 0.5 nm.
     """
@@ -303,7 +327,7 @@ def _stem(motion: Trajectory, height: float) -> NDArray[np.float32]:
 
 
 def _cubic(times: Array, nodes: Array, values: NDArray[np.float32], rates: NDArray[np.float32]) -> Array:
-    """The cubic Hermite interpolation of values [u] and their rates [u/s] at nodes [s], shape (n,)."""
+    """Interpolate values and their rates at nodes [s] by cubic Hermite polynomials, shape (n,)."""
     if nodes.size < 2:
         return np.full_like(times, values[0])
     k = np.clip(np.searchsorted(nodes, times, side="right") - 1, 0, nodes.size - 2)

@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: The laser's light is worked out so often [s]: of a wobble at 42 Hz a straight line in between misses 6e-4.
+#: The laser's light is computed in such steps [s]; a straight line in between misses 6e-4 of a wobble at 42 Hz.
 GRID_S = 2.5e-4
-#: Nothing against a pulse [s].
+#: A time that is short against a pulse [s].
 _CLOSE_S = 1e-6
-#: Noise is drawn so often [s].
+#: Time between two random numbers of the noise [s].
 NOISE_S = 5e-6
-#: Of erfcc in Numerical Recipes, from the constant on.
+#: Coefficients of erfcc in Numerical Recipes, the constant first.
 _ERFC = (
     -1.26551223,
     1.00002368,
@@ -40,16 +40,16 @@ _ERFC = (
 
 @dataclass(frozen=True)
 class Tape:
-    """A strip of white tape on the rim, a lamp beside it, a lens, and a phototransistor on which the lens shows it.
+    """A strip of white tape on the rim, a lamp beside it, and a lens that shows the tape to a phototransistor.
 
     Attributes:
         width: of its light pulse, FWHM in turns.
-        dark, bright: voltage without the tape, and at a tape in the middle of what the lens shows [V], which differ by
+        dark, bright: voltage without the tape, and with the tape in the middle of the lens's view [V]; they differ by
             the gain.
         saturation: greatest voltage [V].
         bandwidth_hz: of the phototransistor, one pole.
-        view_m: how far above or below the middle the tape has 1/e² of its light.
-        ripple: of the lamp's light at twice the frequency of the mains, in parts of it.
+        view_m: distance above or below the middle of the view at which the tape gives 1/e² of its light.
+        ripple: of the lamp's light, relative, at twice the frequency of the mains.
         noise: of the voltage, 1σ [V].
     """
 
@@ -70,11 +70,11 @@ class Tape:
 
     @property
     def delay(self) -> float:
-        """Time constant of the phototransistor [s]: so much later comes a pulse that is long against it."""
+        """Time constant of the phototransistor [s]; it delays a much longer pulse by this time."""
         return 1 / (2 * math.pi * self.bandwidth_hz)
 
     def height(self, lift: Array) -> Array:
-        """The share of the pulse that a tape has so far above the middle of what the lens shows [m], shape (n,)."""
+        """Return the height of a pulse, relative, for a tape that far above the middle of the view [m]; shape (n,)."""
         return np.asarray(np.exp(-2 * (lift / self.view_m) ** 2))
 
     def pulse(self, turns: Array, rate: Array) -> Array:
@@ -91,20 +91,20 @@ class Tape:
         place = turns - np.floor(turns) - 0.5
         answer = np.zeros(turns.shape)
         tail = 6 * self.sigma + 16 * float(late.max(initial=0.0))
-        for turns_ago in range(1 + math.floor(tail + 0.5)):  # what is left of the pulses before
+        for turns_ago in range(1 + math.floor(tail + 0.5)):  # the tails of earlier pulses are added
             behind = place + turns_ago
             near = np.flatnonzero((behind > -6 * self.sigma) & (behind < tail) & (rate > 0))
             answer[near] += _behind_a_pole(behind[near] / self.sigma, self.sigma / late[near])
         return answer
 
-    def clean(self, turns: Array, rate: Array, times: Array, height: Array | float = 1.0) -> Array:
+    def mean_voltage(self, turns: Array, rate: Array, times: Array, height: Array | float = 1.0) -> Array:
         """The voltage without its noise, shape (n,) [V].
 
         Args:
             turns: since the tape was opposite to the lamp, shape (n,).
             rate: of turns [Hz], 0: there is no top.
             times: shape (n,) [s].
-            height: of the pulses, 1 in the middle of what the lens shows.
+            height: of the pulses, relative; 1 in the middle of the view.
         """
         light = self.dark + (self.bright - self.dark) * height * self.pulse(turns, rate)
         if self.ripple:
@@ -112,13 +112,13 @@ class Tape:
         return np.minimum(light, self.saturation)
 
     def noise_at(self, times: Array, seed: int) -> Array:
-        """What is to be added to it, shape (n,) [V]."""
+        """Return the noise of the voltage, shape (n,) [V]."""
         return self.noise * noise(times, (seed, 1))
 
     # --- the times of the pulses, without a trace ---
 
     def offset(self, triggers: Thresholds, rate: float, least: float = 1.0) -> float | None:
-        """Where a trigger fires about the middle of a turn [turns], to 1e-3 of a turn.
+        """Return how far from the middle of a turn a trigger fires [turns], to 1e-3 of a turn.
 
         Args:
             triggers: where the trigger fires, and where it arms again.
@@ -126,9 +126,9 @@ class Tape:
             least: height of the lowest pulse.
 
         Returns:
-            None where it does not fire once a turn for certain, or only a trace can say where: a level in the noise,
-            near the top of a pulse or above saturation, a hysteresis smaller than the noise, ripple, a phototransistor
-            slower than the pulse.
+            None if it may not fire once a turn, or if only a trace can show where: a level in the noise, near the top
+            of a pulse or above saturation; a hysteresis smaller than the noise; ripple; a phototransistor slower than
+            the pulse.
         """
         margin, share = 5 * self.noise, (triggers.fire - self.dark) / (self.bright - self.dark)
         low, high = min(triggers.fire, triggers.arm), max(triggers.fire, triggers.arm)
@@ -139,30 +139,30 @@ class Tape:
             return None
         return behind - triggers.sign * self.sigma * math.sqrt(-2 * math.log(share))
 
-    def crossing(self, near: Array, clean: Callable[[Array], Array], level: float, seed: int) -> Array:
-        """When the voltage crosses a level, shape (n,) [s].
+    def crossing_times(self, near: Array, clean: Callable[[Array], Array], level: float, seed: int) -> Array:
+        """Return when the voltage crosses a level, shape (n,) [s].
 
         Args:
-            near: times near that, shape (n,) [s].
+            near: a time near each crossing, shape (n,) [s].
             clean: the voltage without its noise at times [V].
             level: [V].
             seed: of the noise.
 
-        Where the voltage does not change there is no crossing, so there may be fewer than times.
-        One step of Newton's method on the clean voltage, which the offset has brought within some µs of it; noise then
-        moves the crossing by what it is over the slope.
+        Where the voltage does not change there is no crossing, so the result may be shorter than `near`.  Times from
+        `offset` are right within some µs.  One step of Newton's method on the voltage without noise refines them; the
+        noise then moves each crossing by its value over the slope.
         """
         three = near + np.array([[-_CLOSE_S], [0.0], [_CLOSE_S]])
         before, here, after = clean(three.T.ravel()).reshape(-1, 3).T
         slope = (after - before) / (2 * _CLOSE_S)
-        crosses = slope != 0  # where a top is put back or falls, no pulse is near
+        crosses = slope != 0  # no pulse is near where a top falls or is put back
         slope = slope[crosses]
         near = near[crosses] - (here - level)[crosses] / slope
         return np.asarray(near - self.noise_at(near, seed) / slope)
 
 
 def _behind_a_pole(u: Array, q: Array) -> Array:
-    """A Gaussian exp(−u²/2) behind a pole whose time constant is 1/q of its σ, shape (n,)."""
+    """Return a Gaussian exp(−u²/2) behind a pole whose time constant is σ/q, shape (n,)."""
     z = (q - u) / math.sqrt(2)
     t = 1 / (1 + 0.5 * np.abs(z))
     scaled = np.exp(-0.5 * u * u) * t * np.exp(np.polynomial.polynomial.polyval(t, _ERFC))
@@ -175,19 +175,19 @@ def _behind_a_pole(u: Array, q: Array) -> Array:
 class Laser:
     """A laser beam beside the stem, along y, with a phototransistor behind it and an amplifier.
 
-    The beam is widened by a lens, so that the stem stays on its flank, and the amplifier is coupled by a capacitor: the
-    slow swing of the whole top, some mm at less than 1 Hz, is taken away, and what the synchronous wobble leaves is
-    amplified until it saturates.  So a top that is driven gives one pulse down a turn.  A narrow beam without the
-    capacitor (coupling_hz None) has to stand where the stem's circle cuts it; else pulses are missed or doubled.
+    A lens widens the beam, so that the stem stays on its flank.  A capacitor couples the amplifier: it removes the slow
+    swing of the whole top, some mm at less than 1 Hz.  The amplifier saturates on the signal of the synchronous wobble,
+    so a driven top gives one pulse down per turn.  A narrow beam without the capacitor (coupling_hz None) must stand
+    where the stem's circle cuts it; else pulses are missed or doubled.
 
     Attributes:
         height_m: of the beam above the top's centre of mass.
-        offset_m: of its middle from the base's axis, along x.
-        waist_m: its radius at the stem, where the light is down to 1/e².
+        offset_m: of the beam's middle from the base's axis, along x.
+        waist_m: the beam's radius at the stem, where its light is down to 1/e².
         stem_radius_m: of the stem.
         dark, bright: the amplifier's least and greatest voltage [V].
         gain: voltage of the whole beam, before it saturates [V].
-        coupling_hz: corner of the capacitor, None: there is none, and the voltage is dark + gain·light.
+        coupling_hz: corner frequency of the capacitor; None: there is none, and the voltage is dark + gain·light.
         bandwidth_hz: of the phototransistor.
         noise: of the voltage, 1σ [V].
     """
@@ -204,14 +204,14 @@ class Laser:
     noise: float = 0.005
 
     def light(self, place: Array) -> Array:
-        """The share of a Gaussian beam that passes a stem at these places along x [m], shape (n,)."""
+        """Return the share of a Gaussian beam that passes a stem at these places along x [m], shape (n,)."""
         scale, aside = math.sqrt(2) / self.waist_m, place - self.offset_m
         blocked = error_function(scale * (aside + self.stem_radius_m)) - error_function(
             scale * (aside - self.stem_radius_m)
         )
         return np.asarray(1.0 - 0.5 * blocked)
 
-    def steady(self, times: Array, seed: int) -> Array:
+    def voltage_at_rest(self, times: Array, seed: int) -> Array:
         """The voltage behind a stem at rest on the axis [V], shape (n,)."""
         return self._amplified(np.broadcast_to(self.light(np.zeros(1)), times.shape), times, seed, moving=False)
 
@@ -220,11 +220,11 @@ class Laser:
 
         Args:
             times: shape (n,) [s].
-            stem: its displacement along x [m] at times [s], and whether it is there at all.
+            stem: times [s] → displacement along x [m], and whether a stem is there.
             seed: of the noise.
 
-        The light is known every GRID_S from absolute zero on and taken as straight between; both filters are exact for
-        that.  They begin so long before that what they were before is 2e-9 of it.
+        The light is computed on a grid of GRID_S from time 0 and taken as straight in between, for which both filters
+        are exact.  The filters begin 20 time constants early, so that their initial state has decayed to 2e-9.
         """
         slowest = 2 * math.pi * min(self.coupling_hz or math.inf, self.bandwidth_hz)
         first = math.floor((float(times[0]) - 20 / slowest) / GRID_S) - 1
@@ -244,32 +244,33 @@ class Laser:
 
 
 def low_pass(signal: Array, step: float, bandwidth_hz: float) -> Array:
-    """A signal behind one pole, shape (n,), straight between its samples, a step apart [s]; at rest before the first.
+    """Return a signal behind one pole, shape (n,).
 
-    Exact for such a signal: y ← a y + b₀ x + b₁ x₋, a = e^(−r), b₁ = (1−a)/r − a, b₀ = 1 − (1−a)/r, r = step/τ.
+    The signal's samples are a step apart [s]; it is straight between them, and constant before the first.  The filter
+    is exact for such a signal: y ← a y + b₀ x + b₁ x₋, a = e^(−r), b₁ = (1−a)/r − a, b₀ = 1 − (1−a)/r, r = step/τ.
     """
     from scipy.signal import lfilter  # takes a moment to load
 
     ratio = 2 * math.pi * bandwidth_hz * step
     decay = math.exp(-ratio)
     new, old = 1 - (1 - decay) / ratio, (1 - decay) / ratio - decay
-    # the state from which a constant signal goes on as it is
+    # the initial state of a signal that was constant
     filtered, _ = lfilter([new, old], [1.0, -decay], signal, zi=[signal[0] * (1 - new)])
     return np.asarray(filtered)
 
 
 def error_function(x: Array) -> Array:
-    """erf, to 1.2e-7 (Press et al., Numerical Recipes in C, § 6.2, erfcc), for numpy has none."""
+    """Return erf(x) to 1.2e-7 (Press et al., Numerical Recipes in C, § 6.2, erfcc); numpy has none."""
     t = 1 / (1 + 0.5 * np.abs(x))
     beyond = t * np.exp(np.polynomial.polynomial.polyval(t, _ERFC) - x * x)
     return np.asarray(np.copysign(1 - beyond, x))
 
 
 def noise(times: Array, seed: tuple[int, int]) -> Array:
-    """White noise up to about 100 kHz, mean 0 and variance 1, as a function of time [s], shape (n,).
+    """Return white noise up to about 100 kHz, mean 0 and variance 1, as a function of time [s], shape (n,).
 
-    It is drawn for each NOISE_S by a hash of their number (Steele, Lea & Flood, OOPSLA 2014, SplitMix64) and
-    interpolated between, with the variance kept: so it is the same however a record is cut.
+    A hash of the number of each NOISE_S (Steele, Lea & Flood, OOPSLA 2014, SplitMix64) gives a normal number; between
+    them the noise is interpolated with its variance kept.  So it is the same however a record is cut.
     """
     place = times / NOISE_S
     whole = np.floor(place)
@@ -277,26 +278,26 @@ def noise(times: Array, seed: tuple[int, int]) -> Array:
     number = whole.astype(np.int64)
     first, last = (int(number.min()), int(number.max())) if number.size else (0, 0)
     if last - first < number.size:  # a dense record: several samples share a number
-        drawn = _normal_at(np.arange(first, last + 2), seed)
-        here, there = drawn[number - first], drawn[number - first + 1]
+        normal = _normal_at(np.arange(first, last + 2), seed)
+        here, there = normal[number - first], normal[number - first + 1]
     else:
         here, there = _normal_at(number, seed), _normal_at(number + 1, seed)
     return np.asarray((here * (1 - share) + there * share) / np.sqrt((1 - share) ** 2 + share**2))
 
 
 def _normal_at(numbers: NDArray[np.int64], seed: tuple[int, int]) -> Array:
-    """A normal number for each whole number."""
-    return _normal()[_hash(numbers.view(np.uint64) + _start_of(seed))]
+    """Return a normal number for each whole number."""
+    return _normal()[_hash(numbers.view(np.uint64) + _first_number(seed))]
 
 
 @functools.cache
-def _start_of(seed: tuple[int, int]) -> np.uint64:
-    """Where the numbers of a seed begin."""
+def _first_number(seed: tuple[int, int]) -> np.uint64:
+    """Return the whole number at which a seed begins to count."""
     return np.uint64(int(np.random.SeedSequence(seed).generate_state(1, np.uint64)[0]))
 
 
 def _hash(numbers: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """Sixteen bits of a hash of each number."""
+    """Return sixteen bits of a hash of each number."""
     z = numbers * np.uint64(0x9E3779B97F4A7C15)
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
@@ -305,6 +306,6 @@ def _hash(numbers: NDArray[np.uint64]) -> NDArray[np.uint64]:
 
 @functools.cache
 def _normal() -> Array:
-    """So many normal numbers as a hash has values, with mean 0 and variance 1."""
+    """Return a normal number for each value of a hash; their mean is 0, their variance 1."""
     numbers = np.random.default_rng(0).standard_normal(1 << 16)
     return np.asarray((numbers - numbers.mean()) / numbers.std())

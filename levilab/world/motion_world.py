@@ -1,8 +1,8 @@
-"""A world in full motion: the top of a scene, simulated as far as an instrument looks, under the drive of the bench.
+"""A world in full motion: the top of a scene under the bench's drive, simulated as far as an instrument needs it.
 
-The light is that of a tape which passes a fixed spot on the top's rim.  So the wobble of the top is seen in it: where
-it stands 1 mm aside, its tape comes a hundredth of a turn early or late.  The laser's beam beside the stem is cut as
-the stem goes round.
+The phototransistor sees a fixed spot beside the rim, past which the tape goes.  So the light shows the wobble of the
+top: a top that stands 1 mm aside shifts the pulse of its tape by a hundredth of a turn.  The stem, as it goes round,
+cuts the laser's beam.
 """
 
 from __future__ import annotations
@@ -32,17 +32,19 @@ Array = NDArray[np.float64]
 #: Where the magnetometer's probe stands at first: about where a top floats [m above the base].
 PROBE_M = 0.072
 
-#: A drive that is faster than this moves no top, but would make the steps short [Hz].
+#: A faster drive [Hz] counts as off: it moves no top, but would make the steps short.
 _FASTEST_HZ = 1000.0
 
-#: Waveforms that the simulator has; of all others it takes the first harmonic.
+#: The generator's waveforms that the simulator has, too; any other is replaced by its first harmonic.
 _SHAPES = {"SIN": "sine", "SQU": "square", "TRI": "triangle"}
 
 
 def prepare(scene: Scene) -> None:
-    """Have all code compiled, which takes some seconds the first time on a machine.
+    """Compile all code for a scene, which takes some seconds the first time on a machine.
 
-    Raises SceneError for a scene without motion, SimulationError for one that cannot be simulated.
+    Raises:
+        SceneError: the scene has no motion.
+        SimulationError: it cannot be simulated.
     """
     Flight(scene).prepare()
 
@@ -53,13 +55,13 @@ class MotionWorld:
     The generator takes the place of the scene's drive, whose direction is the coil's; its offset moves nothing.
 
     Args:
-        scene: what is to move.
+        scene: with the top that moves.
         clock: of the bench.
-        tape: how the lamp is set up.
-        laser: how the beam is set up.
+        tape: the tape and its lamp.
+        laser: the beam and its amplifier.
         put_back_after_s: see Flight.
-        seed: of the light's noise, and of the place of the tape on the rim (0: where the transverse part of the moment
-            points); a drive that is switched on after a pulse meets the moment there.
+        seed: of the light's noise, and of the tape's place on the rim; with 0 the tape is where the transverse part of
+            the moment points, so a drive that is switched on at a pulse finds the moment there.
 
     Raises:
         SceneError: the scene has no motion.
@@ -85,38 +87,38 @@ class MotionWorld:
         self.clock = clock
         self._tape, self._laser, self._seed = tape or Tape(), laser or Laser(), seed
         self._coil, self._flight = Coil(), Flight(scene, put_back_after_s, stem_height_m=self._laser.height_m)
-        self._tape_at = float(np.random.default_rng(seed).uniform()) if seed else 0.0
-        self._told = 0.0  # the last time that a change was told for [s]
-        self._aim_m = self._flight.first_lift()  # where the lens looks
+        self._tape_place = float(np.random.default_rng(seed).uniform()) if seed else 0.0
+        self._last_change = 0.0  # the time of the last change of the drive [s]
+        self._lens_height_m = self._flight.first_lift()  # where the lens looks
         self._base = base_field(scene)
         self.place_probe(PROBE_M)
 
     def drive(self, time: float, output: Output) -> None:
-        """From this time on the coil's field is this; see World."""
-        self._forget()
+        """Set the coil's field from a time on; see World."""
+        self._drop_history()
         time = max(time, 0.0)
         self._coil.change(time, output)
-        drive = self._drive(time, output)
-        if drive["waveform"] != "off" or self._flight.driven or time < self._told:
+        drive = self._drive_keys(time, output)
+        if drive["waveform"] != "off" or self._flight.driven or time < self._last_change:
             self._flight.change(time, drive)
-            self._told = time
+            self._last_change = time
 
     def float_top(self, number: int) -> None:
         """Put the top back to where the scene starts; see World."""
         self._flight.put_back(self.clock.now())
 
     def catch_up(self) -> None:
-        """Simulate up to the present time, so that no question has to wait for hours of it."""
-        self._forget()
-        self._flight.look(self.clock.now())
+        """Simulate up to the present time; see World.  Else one query might have to wait for hours of motion."""
+        self._drop_history()
+        self._flight.simulate_until(self.clock.now())
 
-    def _forget(self) -> None:
+    def _drop_history(self) -> None:
         horizon = self.clock.now() - KEPT_S
         self._coil.history.forget(horizon)
         self._flight.forget(horizon)
 
-    def _drive(self, time: float, output: Output) -> dict[str, str | float]:
-        """The keys of a scene's drive that make this output."""
+    def _drive_keys(self, time: float, output: Output) -> dict[str, str | float]:
+        """Return the keys of a scene's drive that make this output."""
         shape = "TRI" if (output.waveform, output.symmetry) == ("RAMP", 0.5) else output.waveform
         whole = shape in _SHAPES and output.duty == 0.5 and output.burst is None
         amplitude = output.amplitude if whole else fundamental(output)
@@ -132,36 +134,38 @@ class MotionWorld:
 
     def light(self, start: float, step: float, n: int) -> Array:
         """The phototransistor's voltage; see World."""
-        self._forget()
+        self._drop_history()
         times = start + step * np.arange(n, dtype=np.float64)
-        return self._clean(times) + self._tape.noise_at(times, self._seed)
+        return self._mean_voltage(times) + self._tape.noise_at(times, self._seed)
 
-    def _clean(self, times: Array) -> Array:
+    def _mean_voltage(self, times: Array) -> Array:
         turns, rate, lift = self._flight.tape(times)
-        return self._tape.clean(turns + self._tape_at, rate, times, self._tape.height(lift - self._aim_m))
+        return self._tape.mean_voltage(
+            turns + self._tape_place, rate, times, self._tape.height(lift - self._lens_height_m)
+        )
 
     def crossings(self, start: float, stop: float, triggers: Thresholds) -> Array | None:
-        """See World: the pieces of the motion are asked when the tape has the place at which the trigger fires."""
-        self._forget()
-        around = 2e-4  # noise, and a pulse of another height, move a crossing by less
-        passed = self._flight.passages(lambda _: (0.5 - self._tape_at) % 1.0, start, stop)
-        least = float(self._tape.height(self._flight.tape(passed)[2] - self._aim_m).min(initial=1.0))
+        """Return when a trigger fires; see World.  It is when the tape is at a certain place in its turn."""
+        self._drop_history()
+        margin = 2e-4  # [s]; noise, and a pulse of another height, move a crossing by less
+        passed = self._flight.passages(lambda _: (0.5 - self._tape_place) % 1.0, start, stop)
+        least = float(self._tape.height(self._flight.tape(passed)[2] - self._lens_height_m).min(initial=1.0))
 
         def place(rate: float) -> float:
             offset = self._tape.offset(triggers, rate, least)
-            unknown.append(offset is None)
-            return (0.5 + (offset or 0.0) - self._tape_at) % 1.0
+            without_place.append(offset is None)
+            return (0.5 + (offset or 0.0) - self._tape_place) % 1.0
 
-        unknown: list[bool] = []
-        near = self._flight.passages(place, start - around, stop + around)
-        if any(unknown):
+        without_place: list[bool] = []
+        near = self._flight.passages(place, start - margin, stop + margin)
+        if any(without_place):
             return None
-        found = self._tape.crossing(near, self._clean, triggers.fire, self._seed)
+        found = self._tape.crossing_times(near, self._mean_voltage, triggers.fire, self._seed)
         return np.asarray(found[(found >= start) & (found < stop)])
 
     def laser(self, start: float, step: float, n: int) -> Array:
         """The voltage of the laser's phototransistor; see World."""
-        self._forget()
+        self._drop_history()
         return self._laser.voltage(start + step * np.arange(n, dtype=np.float64), self._flight.stem, self._seed)
 
     def coil_field(self, start: float, step: float, n: int) -> Array:
@@ -169,10 +173,10 @@ class MotionWorld:
         return self._coil.field(start + step * np.arange(n, dtype=np.float64))
 
     def flux_density(self, time: float) -> float:
-        """The base's field where the probe stands; the coil's lies across it, and the top's is left out."""
+        """The base's field at the probe; the coil's lies across it, and the top's is left out."""
         return self._probe_t
 
     def place_probe(self, height_m: float | None) -> None:
-        """Put the probe there, exactly; see World."""
+        """Put the probe at a height, exactly; see World."""
         place = np.array([[0.0, 0.0, height_m or 0.0]])
         self._probe_t = 0.0 if height_m is None else float(flux_density(self._base, place)[0, 2])

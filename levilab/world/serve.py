@@ -1,4 +1,4 @@
-"""`levilab bench serve`: the virtual bench for programs that are not ours, until somebody asks for the end."""
+"""`levilab bench serve`: offer the virtual bench to other programs until a signal ends it."""
 
 from __future__ import annotations
 
@@ -25,17 +25,18 @@ if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
     from levilab.world.spin_world import World
 
-#: A top in full motion is simulated some 700 times faster than it moves; half of the time and more is for the clients.
+#: A top in full motion is simulated some 700 times faster than it moves; more than half of the time is left for the
+#: clients.
 FASTEST_MOTION = 200.0
 
-#: How often the world's motion is brought up to the clock [s], as the clock on the wall tells.
+#: Time on the wall clock between two updates of the world's motion [s].
 _KEEP_UP_S = 0.2
 
-#: The greatest port there is.
+#: The highest number of a port.
 _LAST_PORT = 0xFFFF
 
 
-#: How a program that is not privileged may listen at any port, by the system.
+#: Operating system → how to let a program without privileges listen at any port.
 _PORTS_FOR_ALL = {
     "linux": (
         "`sudo sysctl net.ipv4.ip_unprivileged_port_start={port}` lets all use it until the next start, "
@@ -44,21 +45,25 @@ _PORTS_FOR_ALL = {
     "darwin": "start it with sudo",
 }
 
-#: How a loopback address is added where there is one alone.
+#: How to add a loopback address on a system that has only one.
 _ADD_ADDRESS = "`sudo ifconfig lo0 alias 127.0.0.2 up`, and so on for 127.0.0.3 and 127.0.0.4"
 
 
 class CannotServe(LevilabError):
-    """The bench cannot be offered there."""
+    """The bench cannot be offered at this address or port."""
 
 
 @dataclass(frozen=True)
 class Service:
-    """How the bench is to be offered.
+    """How to offer the bench.
 
-    host: an address of this machine; port_base: the first port, None: free ones; speed: seconds of the bench per
-    second; models: by kind of instrument, where it is not the first one; scene: of the top's full motion, None: it
-    only spins; port_mapper: the port of each instrument's port mapper, None: there is none.
+    Attributes:
+        host: an address of this machine.
+        port_base: the first port; None: any free ports.
+        speed: seconds of the bench per second.
+        models: kind of instrument → model, where it is not the default.
+        scene: of the top's full motion; None: the top only spins.
+        port_mapper: the port of each instrument's port mapper; None: there is none.
     """
 
     host: str = LOOPBACK
@@ -71,7 +76,13 @@ class Service:
 
 @dataclass(frozen=True)
 class Served:
-    """An instrument that can be reached.  resources: the names to copy, by the way that they go."""
+    """An instrument that can be reached.
+
+    Attributes:
+        kind: of the instrument.
+        model: its name.
+        resources: protocol → resource name to copy.
+    """
 
     kind: str
     model: str
@@ -79,7 +90,7 @@ class Served:
 
 
 def chosen_models(words: list[str]) -> dict[str, str]:
-    """What ``counter=CNT-91`` and its like say, by kind.  Raises UsageError."""
+    """Read settings such as ``counter=CNT-91``.  Returns kind → model; raises UsageError."""
     chosen = {}
     for word in words:
         kind, _, model = word.partition("=")
@@ -97,10 +108,20 @@ def chosen_models(words: list[str]) -> dict[str, str]:
 def serve(
     service: Service, ready: Callable[[tuple[Served, ...]], None], tell: Callable[[str], None] = lambda _: None
 ) -> str:
-    """Offer the bench until a signal asks for the end; its name.
+    """Offer the bench until a signal ends it.
 
-    ready: called once, when all can be reached; tell: is told what takes long before.  Raises CannotServe,
-    UsageError, SceneError.
+    Args:
+        service: how to offer it.
+        ready: called once, when all instruments can be reached.
+        tell: called with a message before anything that takes long.
+
+    Returns:
+        The name of the signal.
+
+    Raises:
+        CannotServe: the address or a port is not free.
+        UsageError: a value of the service makes no sense.
+        SceneError: the scene has no motion.
     """
     with watching_for_end() as end:
         world = _world(service, tell)
@@ -112,7 +133,7 @@ def serve(
 
 async def _serve(service: Service, world: World, ready: Callable[[tuple[Served, ...]], None], end: End) -> None:
     bus = virtual_bus(world, service.models)
-    # the top spins down from the first message on, not while no program is there
+    # time begins with the first message: the top does not spin down before a program uses the bench
     assert isinstance(world.clock, WallClock)
     bus.heard = world.clock.begin
     place = _place(service, len(bus.instruments))
@@ -120,13 +141,13 @@ async def _serve(service: Service, world: World, ready: Callable[[tuple[Served, 
         try:
             offers = await opened.enter_async_context(offered(bus, place))
         except OSError as error:
-            raise _not_served(service, error) from error
+            raise _cannot_serve(service, error) from error
         ready(tuple(_served(service, offer) for offer in offers))
-        await first_of(_comes(end), _kept_up(bus, world))
+        await first_of(_wait_for(end), _keep_up(bus, world))
 
 
-def _not_served(service: Service, error: OSError) -> CannotServe:
-    """What to do where an address or a port cannot be had."""
+def _cannot_serve(service: Service, error: OSError) -> CannotServe:
+    """Return the error for an address or port that is not free, with what to do."""
     if service.port_mapper is None:
         why = f"the bench cannot be offered at {service.host} ({error})"
         return CannotServe(f"{why}: try another `host` or `port_base`")
@@ -143,8 +164,8 @@ def _not_served(service: Service, error: OSError) -> CannotServe:
     return CannotServe(f"the port mapper cannot be offered ({error}): {what}")
 
 
-async def _kept_up(bus: Bus, world: World) -> None:
-    """Let the motion follow the clock while nobody looks: the first who asks need not wait for hours of it."""
+async def _keep_up(bus: Bus, world: World) -> None:
+    """Let the motion follow the clock between messages, so that the next one need not wait for hours of it."""
     while True:
         await asyncio.sleep(_KEEP_UP_S)
         with bus.lock:
@@ -188,8 +209,8 @@ def _served(service: Service, offer: Offer) -> Served:
     return Served(kind, service.models.get(kind, VIRTUAL[kind].model), offer.resources)
 
 
-async def _comes(end: End) -> None:
-    """Wait for a signal."""
+async def _wait_for(end: End) -> None:
+    """Wait until a signal asks for the end."""
     event, loop = asyncio.Event(), asyncio.get_running_loop()
     end.wake = lambda: loop.call_soon_threadsafe(event.set)
     if end.by is None:

@@ -1,7 +1,7 @@
-"""The world that the virtual bench measures: one clock, one top, and the light it makes.
+"""The world that the virtual bench measures: one clock, one top, and the light that it reflects.
 
-Here the world is the spin alone: closed form between events, exact at any time asked, nothing integrated.
-What the instruments need of a world is the little protocol `World`; `motion_world` has the whole motion.
+`World` lists what the instruments need of a world.  `SpinWorld` has the spin alone, in closed form between events: it
+is exact at any time, and nothing is integrated.  `motion_world` has the whole motion.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from instruments.virtual.generator.voltage import fundamental
 from levilab.simulator.spin import DECAYS
-from levilab.world.base import Base, Stand, drawn_base
+from levilab.world.base import Base, Stand, random_base
 from levilab.world.coil import Coil
 from levilab.world.light import Laser, Tape
 from levilab.world.timeline import Timeline
@@ -28,13 +28,12 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: History that is kept [s]: the counters look 12 000 s ahead and leave 2500 s out, the scopes look 600 s
-#: back.
+#: How long history is kept [s]: counters look 12 000 s ahead and skip 2500 s, oscilloscopes look 600 s back.
 KEPT_S = 15_000.0
 
-#: When the turn number is looked at to find pulses [s], and how far beyond the times that are asked for: noise and the
-#: jitter may move a pulse across their ends.
-_LOOK_S, _AROUND_S = 0.01, 0.02
+#: To find pulses the turn number is computed in such steps [s], and so far beyond both ends of the wanted times: noise
+#: and jitter may move a pulse across an end.
+_SCAN_STEP_S, _MARGIN_S = 0.01, 0.02
 
 
 class World(Protocol):
@@ -53,50 +52,55 @@ class World(Protocol):
         """The phototransistor's voltage at start + step·k, shape (n,) [V]."""
 
     def crossings(self, start: float, stop: float, triggers: Thresholds) -> Array | None:
-        """When a trigger fires in the light from start to stop [s], shape (m,); None: only the light itself can say."""
+        """Return when a trigger fires from start to stop, shape (m,) [s]; None where only a trace can show it."""
 
     def laser(self, start: float, step: float, n: int) -> Array:
         """The voltage of the phototransistor behind the stem at start + step·k, shape (n,) [V]."""
 
     def drive(self, time: float, output: Output) -> None:
-        """From this time on the coil's field is this: a generator's output, amplitude and offset in T."""
-
-    def float_top(self, number: int) -> None:
-        """Spin the top by hand and let it float, if it is down.
+        """Set the coil's field from a time on.
 
         Args:
-            number: how many tops came before.
+            time: [s].
+            output: the generator's, with amplitude and offset in T.
+        """
+
+    def float_top(self, number: int) -> None:
+        """Spin the top by hand and let it float, if it has fallen.
+
+        Args:
+            number: of tops before it.
         """
 
     def coil_field(self, start: float, step: float, n: int) -> Array:
         """The coil's field at start + step·k, shape (n,) [T]."""
 
     def flux_density(self, time: float) -> float:
-        """What a magnetometer's probe sees, along the base's axis [T]."""
+        """The flux density at the magnetometer's probe, along the base's axis [T]."""
 
     def place_probe(self, height_m: float | None) -> None:
-        """Put the magnetometer's probe on the axis, so high above the base, or (None) into its zero-gauss chamber."""
+        """Put the magnetometer's probe on the axis, at a height above the base [m]; None: into its chamber."""
 
 
 @dataclass(frozen=True)
 class SpinScene:
-    """A top that only spins.  Defaults: the thesis's device and what its spin-downs showed.
+    """A top that only spins.  The defaults are the thesis's device and the results of its spin-downs.
 
     Attributes:
-        start_hz: the spin at time 0, given by hand.
+        start_hz: the spin at time 0, as a hand gives it.
         drag: a name in DECAYS.
-        constants: of the drag (SI).
-        fall_hz: spin at which the top falls.
-        later_falls_hz: the same of tops that are floated later, by their number from 1 on, and again from the first of
-            them; none: as the first top.
-        lock_torque: the greatest angular acceleration per tesla of drive [rad s⁻² T⁻¹], the dipole's transverse part
-            over I₃, half of it because half of a field along one line turns with the top.
+        constants: of the drag law (SI).
+        fall_hz: the spin at which the first top falls.
+        later_falls_hz: those at which tops 1, 2, … fall, repeated from its first when all are used; empty: all fall at
+            fall_hz.
+        lock_torque: the greatest angular acceleration per tesla of drive [rad s⁻² T⁻¹]: the moment's transverse part
+            over I₃, halved because only half of a field along one line turns with the top.
         tape: what the phototransistor sees.
         laser: the beam beside the stem.
-        jitter: scatter of a pulse's place, in turns, 1σ (0.0212 makes 0.03 Hz of a reading over 1 s).
+        jitter: scatter of a pulse's place, 1σ [turns]; 0.0212 scatters a reading over 1 s by 0.03 Hz.
         base: the magnet below it.
         stand: where the probe is at first, about where a top floats.
-        put_back_after_s: so long after a fall the top is put back [s]; None: it is not.
+        put_back_after_s: time from a fall until the top floats again [s]; None: it stays down.
         seed: of noise and jitter.
     """
 
@@ -115,24 +119,28 @@ class SpinScene:
     seed: int = 0
 
     def fall_of(self, number: int) -> float:
-        """The spin at which a top falls [Hz].
+        """Return the spin at which a top falls [Hz].
 
         Args:
-            number: how many tops came before.
+            number: of tops before it.
         """
         later = self.later_falls_hz
         return later[(number - 1) % len(later)] if number and later else self.fall_hz
 
 
-#: Tops of one series whose falls are drawn.
+#: So many later tops have a spin of their own at which they fall; then these repeat.
 _SERIES = 100
 
 
-def drawn(seed: int, scene: SpinScene | None = None) -> SpinScene:
-    """The scene of one run: constants and fall scattered as between the thesis's runs, by the seed.
+def random_scene(seed: int, scene: SpinScene | None = None) -> SpinScene:
+    """Return the scene of one run: the constants and the falls scatter as between the thesis's runs.
 
-    The four published constants scatter by 2 %, the ten published lower limits by 0.25 Hz, whether they are of several
-    runs or of one; the base is `drawn_base`'s, and a probe is put in its place to 0.2 mm.
+    The four published constants scatter by 2 %; the ten published lower limits scatter by 0.25 Hz, here alike
+    within a run and between runs.  The base is `random_base`'s, and the probe is placed to 0.2 mm.
+
+    Args:
+        seed: of the random numbers.
+        scene: what is common to all runs; by default the thesis's.
     """
     scene = scene or SpinScene()
     scatter = np.random.default_rng(seed).standard_normal(1 + _SERIES)
@@ -141,14 +149,14 @@ def drawn(seed: int, scene: SpinScene | None = None) -> SpinScene:
         constants=tuple(c * (1 + 0.02 * float(scatter[0])) for c in scene.constants),
         fall_hz=scene.fall_hz + 0.25 * float(scatter[1]),
         later_falls_hz=tuple((scene.fall_hz + 0.25 * scatter[2:]).tolist()),
-        base=drawn_base(seed),
+        base=random_base(seed),
         stand=replace(scene.stand, scatter_m=2e-4, seed=seed),
         seed=seed,
     )
 
 
 class Phase(enum.Enum):
-    """What a top does: it coasts by the law of drag, is pulled to the drive's frequency, is locked to it, or fell."""
+    """What a top does: coast under drag alone, be pulled to the drive's frequency, be locked to it, or lie fallen."""
 
     COASTING = enum.auto()
     PULLED = enum.auto()
@@ -158,10 +166,15 @@ class Phase(enum.Enum):
 
 @dataclass(frozen=True)
 class _Stretch:
-    """A piece of the top's life in one phase.
+    """A stretch of time in which a top stays in one phase.
 
-    start [s]; spin [rad/s] and angle [rad] at its start; acceleration: constant, of a top that is pulled [rad/s²];
-    number: of the top.
+    Attributes:
+        start: [s].
+        spin: at the start [rad/s].
+        angle: at the start [rad].
+        phase: of the top.
+        acceleration: of a top that is pulled, constant [rad/s²].
+        number: of tops before this one.
     """
 
     start: float
@@ -175,18 +188,18 @@ class _Stretch:
 class SpinWorld:
     """A spinning top, its drive and its light, as functions of time.
 
-    The drive's hold is idealised: within the capture range of a pendulum, |ω − ω_d| < 2√α, the top is
-    pulled straight to the drive's frequency with the acceleration α that drag leaves over, and then stays;
-    there is no hunting about it.
+    The lock is idealised.  Within the capture range of a pendulum, |ω − ω_d| < 2√α with α the greatest acceleration by
+    the drive, the top is pulled to the drive's frequency at a constant rate, α less drag or with it, and then stays
+    there: it does not swing about the drive.
     """
 
     def __init__(self, scene: SpinScene, clock: Clock) -> None:
         self.scene, self.clock = scene, clock
         self._decay = DECAYS[scene.drag]
         self._jitter = np.random.default_rng((scene.seed, 1)).standard_normal(1 << 16) * scene.jitter
-        self._coil, self._stand, self._probe_t = Coil(), scene.stand, scene.stand.sees(scene.base)
+        self._coil, self._stand, self._probe_t = Coil(), scene.stand, scene.stand.flux_density(scene.base)
         self._drive_spin, self._hold = 0.0, 0.0  # [rad/s], [rad/s²]
-        self._told = 0.0  # the last time that a change was told for [s]
+        self._last_change = 0.0  # the time of the last change of the drive [s]
         first = _Stretch(0.0, 2 * math.pi * scene.start_hz, 0.0, Phase.COASTING)
         self._stretches = Timeline(0.0, first)
         self._stretches.cut(0.0)
@@ -195,21 +208,21 @@ class SpinWorld:
     # --- the drive ---
 
     def drive(self, time: float, output: Output) -> None:
-        """From this time on the coil's field is this; see :class:`World`.
+        """Set the coil's field from a time on; see :class:`World`.
 
         Only the first harmonic holds the top: an offset has no torque that turns with it.
         """
-        self._forget()
+        self._drop_history()
         self._coil.change(time, output)
         hold = fundamental(output) * self.scene.lock_torque
-        if hold == self._hold == 0 and time >= self._told:
-            return  # nothing that the top could feel
+        if hold == self._hold == 0 and time >= self._last_change:
+            return  # the top notices no difference
         self._put_back_until(time)
-        now = self._state(time)
+        now = self._stretch_at(time)
         fallen = now.phase is Phase.FALLEN
-        # what would have come without this change; a fall at this moment stays
+        # drop the future as it was before this change; a fall at this moment stays
         self._stretches.cut(math.nextafter(time, math.inf) if fallen else time)
-        self._told, self._drive_spin, self._hold = time, 2 * math.pi * output.frequency, hold
+        self._last_change, self._drive_spin, self._hold = time, 2 * math.pi * output.frequency, hold
         if not fallen:
             self._plan_future(now)
 
@@ -224,38 +237,38 @@ class SpinWorld:
             self._plan_future(_Stretch(time, spin, now.angle, Phase.COASTING, number=number))
 
     def catch_up(self) -> None:
-        """Nothing takes long here; see :class:`World`."""
-        self._forget()
+        """Drop old history; a closed form needs no simulation.  See :class:`World`."""
+        self._drop_history()
 
-    def _forget(self) -> None:
+    def _drop_history(self) -> None:
         horizon = self.clock.now() - KEPT_S
         self._coil.history.forget(horizon)
         self._stretches.forget(horizon)
 
     def _put_back_until(self, time: float) -> None:
-        """Lay down the life of every top that follows on one that falls."""
+        """Plan, up to this time, the stretches of each top that is put back after a fall."""
         while self.scene.put_back_after_s is not None and self._stretches.last.phase is Phase.FALLEN:
             fallen = self._stretches.last
             begin = fallen.start + self.scene.put_back_after_s
             if begin > time:
                 return
-            self._forget()
+            self._drop_history()
             spin = 2 * math.pi * self.scene.start_hz
             self._plan_future(_Stretch(begin, spin, fallen.angle, Phase.COASTING, number=fallen.number + 1))
 
-    def _state(self, time: float) -> _Stretch:
-        """The stretch that would begin now, before a phase is chosen for it."""
+    def _stretch_at(self, time: float) -> _Stretch:
+        """Return the state at this time as a stretch that begins there; its phase is still the former one."""
         here = self._stretches.at(time)
         spin, angle = self._motion(here, np.array([time]))
         return replace(here, start=time, spin=float(spin[0]), angle=float(angle[0]), acceleration=0.0)
 
     def _plan_future(self, now: _Stretch) -> None:
-        """Lay down the future from this state on, as it is without a further change."""
+        """Append the stretches that follow from this state, as long as nothing changes."""
         fall, hold, drive_spin = 2 * math.pi * self.scene.fall_of(now.number), self._hold, self._drive_spin
         if now.spin <= fall:
             self._append(replace(now, phase=Phase.FALLEN, spin=0.0))
             return
-        # deceleration by drag at this spin: its change over a time that is short against 1/C ~ 300 s
+        # deceleration by drag: the change of spin over 1 ms, which is short against 1/C ~ 300 s
         drag = (now.spin - float(self._decay.after(now.spin, 1e-3, *self.scene.constants))) / 1e-3
         captured = hold > drag and abs(now.spin - drive_spin) < 2 * math.sqrt(hold) and drive_spin > fall
         if captured:
@@ -297,56 +310,57 @@ class SpinWorld:
             spin[part], angle[part] = self._motion(stretch, times[part])
         return spin, angle
 
-    # --- what is seen ---
+    # --- what the instruments measure ---
 
     def light(self, start: float, step: float, n: int) -> Array:
         """The phototransistor's voltage; see :class:`World`."""
         times = start + step * np.arange(n, dtype=np.float64)
-        return self._clean(times) + self.scene.tape.noise_at(times, self.scene.seed)
+        return self._mean_voltage(times) + self.scene.tape.noise_at(times, self.scene.seed)
 
-    def _clean(self, times: Array) -> Array:
+    def _mean_voltage(self, times: Array) -> Array:
         spin, angle = self.motion(times)
         turns = angle / (2 * math.pi)
-        return self.scene.tape.clean(turns - self._late(np.floor(turns)), spin / (2 * math.pi), times)
+        return self.scene.tape.mean_voltage(turns - self._delay_of_turn(np.floor(turns)), spin / (2 * math.pi), times)
 
-    def _late(self, turn: Array) -> Array:
-        """How late the pulse of each turn comes [turns]."""
+    def _delay_of_turn(self, turn: Array) -> Array:
+        """Return how late the pulse of each turn comes [turns]."""
         return np.asarray(self._jitter[turn.astype(np.int64) % self._jitter.size])
 
     def crossings(self, start: float, stop: float, triggers: Thresholds) -> Array | None:
-        """See :class:`World`: the motion is asked when the turn number has the place at which the trigger fires.
+        """Return when a trigger fires; see :class:`World`.
 
-        That needs a look each 10 ms, some for each pulse, and no trace.
+        Each turn has one place at which the trigger fires.  The times at which the turn number reaches these places are
+        interpolated in steps of 10 ms, and then refined: no trace is needed.
         """
-        times = np.arange(start - _AROUND_S, stop + _AROUND_S + _LOOK_S, _LOOK_S)
+        times = np.arange(start - _MARGIN_S, stop + _MARGIN_S + _SCAN_STEP_S, _SCAN_STEP_S)
         spin, angle = self.motion(times)
         turns, rate = angle / (2 * math.pi), float(spin.max()) / (2 * math.pi)
         offset = self.scene.tape.offset(triggers, rate)
         if offset is None:
             return None
         whole = np.arange(math.floor(turns[0]) - 1.0, math.ceil(turns[-1]) + 1.0)
-        place = whole + 0.5 + self._late(whole) + offset
+        place = whole + 0.5 + self._delay_of_turn(whole) + offset
         found = np.interp(place, turns, times)[(place > turns[0]) & (place < turns[-1])]
-        found = self.scene.tape.crossing(found, self._clean, triggers.fire, self.scene.seed)
+        found = self.scene.tape.crossing_times(found, self._mean_voltage, triggers.fire, self.scene.seed)
         spin, _ = self.motion(found)
         return np.asarray(found[(found >= start) & (found < stop) & (spin > 0)])
 
     def laser(self, start: float, step: float, n: int) -> Array:
         """The voltage of the laser's phototransistor; see :class:`World`.
 
-        A top that only spins has its stem at rest on the axis: the beam is steady, and nothing is to be counted.
+        A top that only spins has its stem at rest on the axis: the beam is steady, and a counter counts nothing.
         """
-        return self.scene.laser.steady(start + step * np.arange(n, dtype=np.float64), self.scene.seed)
+        return self.scene.laser.voltage_at_rest(start + step * np.arange(n, dtype=np.float64), self.scene.seed)
 
     def coil_field(self, start: float, step: float, n: int) -> Array:
         """The coil's field; see :class:`World`."""
         return self._coil.field(start + step * np.arange(n, dtype=np.float64))
 
     def flux_density(self, time: float) -> float:
-        """The base's field; the coil's lies across the axis, and the probe does not see it."""
+        """The base's field along the axis; the coil's lies across it, so the probe does not measure that."""
         return self._probe_t
 
     def place_probe(self, height_m: float | None) -> None:
-        """Put the probe there; see :class:`World`."""
+        """Put the probe at a height; see :class:`World`."""
         self._stand = self._stand.at(height_m)
-        self._probe_t = self._stand.sees(self.scene.base)
+        self._probe_t = self._stand.flux_density(self.scene.base)

@@ -23,7 +23,7 @@ def handlers():
 @pytest.mark.parametrize("number", SIGNALS)
 def test_the_first_signal_is_only_noted_and_raised_where_it_is_looked_for(number):
     with watching_for_interruption() as stop:
-        stop.check()  # nobody asked yet
+        stop.check()  # no signal has come yet
         signal.raise_signal(number)
         assert stop.by == number.name
         with pytest.raises(Interrupted) as interruption:
@@ -58,7 +58,7 @@ def test_nothing_breaks_through_the_shield(before):
         stop.shield()
         for _ in range(3):
             signal.raise_signal(signal.SIGINT)
-        assert stop.by == "SIGINT"  # noted all the same
+        assert stop.by == "SIGINT"  # noted nevertheless
 
 
 def test_the_handlers_are_those_from_before_after_any_end():

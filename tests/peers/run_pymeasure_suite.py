@@ -126,8 +126,8 @@ def main() -> int:
         outcomes, excused = run(wanted.source.resolve(), address), excuses()
     wrong = complaints(outcomes, excused)
     passed = sum(how == "passed" for how in outcomes.values())
-    told = [f"{passed} of {len(outcomes)} cases pass, {len(excused)} are excused", *wrong]
-    sys.stdout.write("\n".join(told) + "\n")
+    lines = [f"{passed} of {len(outcomes)} cases pass, {len(excused)} are excused", *wrong]
+    sys.stdout.write("\n".join(lines) + "\n")
     return 1 if wrong else 0
 
 

@@ -54,9 +54,9 @@ class LimitSettings(DriveSettings):
     drive_frequency_hz: PositiveFloat = Field(default=30.0, description="each is driven to this first,")
     creep_hz_per_s: PositiveFloat = Field(default=0.1, description="upper: from there so fast,")
     highest_hz: PositiveFloat = Field(default=100.0, description="and no higher than this")
-    float_s: PositiveFloat = Field(default=600.0, description="so long a person has to float the top")
+    float_s: PositiveFloat = Field(default=600.0, description="time that a person has to float the top")
     interval_s: PositiveFloat = Field(default=2.0, description="looked at so often,")
-    gate_s: PositiveFloat = Field(default=0.5, description="counting for so long")
+    gate_s: PositiveFloat = Field(default=0.5, description="length of a count")
     longest_s: PositiveFloat = Field(default=6 * 3600.0, description="an end if it takes longer")
 
     def check(self, table: str, limits: Limits) -> None:

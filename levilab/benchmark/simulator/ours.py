@@ -45,8 +45,8 @@ def scalar(quick: bool) -> Iterator[Point]:  # noqa: FBT001
         ready = problem(name)
         for count in counts[:: 2 if quick else 1]:
             stops = stops_between(0.0, motion.DURATION, motion.DURATION / count, ready.scene.drive)
-            states, _ = ready.advanced(ready.start, stops, ready.escape)
-            seconds = best_time(partial(ready.advanced, ready.start, stops, ready.escape))
+            states, _ = ready.advance_to_stops(ready.start, stops, ready.escape)
+            seconds = best_time(partial(ready.advance_to_stops, ready.start, stops, ready.escape))
             yield Point(name, f"{count} steps", error_of(states[-1, :3]), motion.DURATION / seconds)
 
 

@@ -12,7 +12,7 @@ from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.field.device import FieldOptions
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import Scene
-from levilab.world.base import drawn_base
+from levilab.world.base import random_base
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,7 +27,7 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     The truths of heights, masses, and spins are the simulator's, whose field is another formula.
     """
     run = acquired("field", seed, folder, lambda request: request)
-    base, by = drawn_base(seed), np.random.default_rng((seed, 4)).standard_normal(3)
+    base, by = random_base(seed), np.random.default_rng((seed, 4)).standard_normal(3)
     scene = Scene().changed(
         {
             "base.field": "exact",

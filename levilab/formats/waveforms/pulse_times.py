@@ -68,8 +68,8 @@ def read_column(head: Head, dialect: Dialect, rate: float | None, *, guess: bool
         )
     if len(times) < FEWEST_PULSES:
         raise NoWaveform(path, f"holds {len(times)} numbers, at least {FEWEST_PULSES} pulse times are needed")
-    told = [f"{path.name}, {block.torn}" for block in found if block.torn]
-    return PulseTimes(path, "list of pulse times", times, tuple(told))
+    warnings = [f"{path.name}, {block.torn}" for block in found if block.torn]
+    return PulseTimes(path, "list of pulse times", times, tuple(warnings))
 
 
 def _refuse_another_quantity(path: Path, titles: list[str]) -> None:
@@ -106,5 +106,5 @@ def _samples(head: Head, rate: float, blocks: Callable[[], Iterator[Block]]) -> 
     def read(_: int) -> Iterator[NDArray[np.float64]]:
         return (block.numbers[:, 0] for block in blocks() if block.numbers.size)
 
-    told = (f"{shorten(path.name)}, {torn}",) if torn else ()
-    return Waveform(path, "one column of samples", 0.0, 1 / rate, count, (Signal("CH1"),), read, told)
+    warnings = (f"{shorten(path.name)}, {torn}",) if torn else ()
+    return Waveform(path, "one column of samples", 0.0, 1 / rate, count, (Signal("CH1"),), read, warnings)

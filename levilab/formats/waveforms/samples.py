@@ -234,8 +234,8 @@ def _fitted(path: Path, clock: _Clock, unit: float, *, first: float, mean: float
     u = resolution * alike**0.5 / clock.count**1.5  # of n rounded times, each ± resolution/√12
     if u < _FINE * step or clock.longest[0] - clock.shortest[0] < 1e-6 * clock.resolution:  # all differences alike
         return _Times(first, step)
-    told = f"its printed times have lost digits (one unit of the last is {resolution:g} s, a step {step:.4g} s): the "
-    known = f"{path.name}: {told}sampling rate, and so any frequency, is known to {u / step:.1g} of it"
+    lost = f"its printed times have lost digits (one unit of the last is {resolution:g} s, a step {step:.4g} s): the "
+    known = f"{path.name}: {lost}sampling rate, and so any frequency, is known to {u / step:.1g} of it"
     return _Times(first, step, (known,), u)
 
 
@@ -260,5 +260,6 @@ def _contradiction(path: Path, header: Header, first: float, mean: float) -> _Ti
             f"its header says a sampling interval of {step:.6g} s, its printed times {mean:.6g} s: say which holds, "
             f"`rate` = {1 / step:.6g} or {1 / mean:.6g}",
         )
-    told = f"its printed times are {mean:.6g} s apart where its header says {step:.6g} s: the times are taken to be in "
-    return _Times(first / factor, step, (f"{shorten(path.name, 200)}: {told}units of {1 / factor:g} s",))
+    apart = f"its printed times are {mean:.6g} s apart where its header says {step:.6g} s"
+    text = f"{shorten(path.name, 200)}: {apart}: the times are taken to be in units of {1 / factor:g} s"
+    return _Times(first / factor, step, (text,))

@@ -70,8 +70,8 @@ def read_scope_binary(path: Path) -> Waveform:
         yield samples[signal]
 
     signals = tuple(Signal(f"CH{c.channel_number}") for c, _ in channels)
-    told = [*_about_times(path, times, step), *_about_volts(path, f"{record.parser_name} {record.header_name}")]
-    return Waveform(path, "scope's binary file", start, step, len(volts), signals, read, tuple(told))
+    remarks = [*_about_times(path, times, step), *_about_volts(path, f"{record.parser_name} {record.header_name}")]
+    return Waveform(path, "scope's binary file", start, step, len(volts), signals, read, tuple(remarks))
 
 
 def _about_times(path: Path, times: Array, step: float) -> list[str]:
@@ -79,8 +79,8 @@ def _about_times(path: Path, times: Array, step: float) -> list[str]:
     mean = float(times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else step
     if abs(mean / step - 1) <= _EVEN:
         return []
-    told = f"RigolWFM says a sampling interval of {step:g} s and gives times {mean:g} s apart: compare with CSV"
-    return [f"{path.name}: {told}"]
+    text = f"RigolWFM says a sampling interval of {step:g} s and gives times {mean:g} s apart: compare with CSV"
+    return [f"{path.name}: {text}"]
 
 
 def _about_volts(path: Path, model: str) -> list[str]:
@@ -88,5 +88,5 @@ def _about_volts(path: Path, model: str) -> list[str]:
     if not any(name in model.casefold() for name in ("1000z", "1054z", "1074z", "1104z")):
         return []
     wrong = "a level of 0.02 V came as -0.40 V, with a gain 11 % off"
-    told = f"RigolWFM's volts of a DS1000Z are wrong ({wrong}); times hold, for heights export CSV"
-    return [f"{path.name}: {told}"]
+    text = f"RigolWFM's volts of a DS1000Z are wrong ({wrong}); times hold, for heights export CSV"
+    return [f"{path.name}: {text}"]

@@ -56,11 +56,11 @@ def known_of(source: Source[FieldReadings], device: Device | None) -> Known:
             f"{source.path}: the radii of the base are not known: write [base] with inner_radius_m and outer_radius_m "
             "into a file, as sample_data/device.toml, and give it to levilab analyze field with `device`"
         )
-    told = device.magnetometer if device else None
-    gain = told.gain_u if told and told.gain_u is not None else _number(of_run, "gain_u", 0.0)
+    magnetometer = device.magnetometer if device else None
+    gain = magnetometer.gain_u if magnetometer and magnetometer.gain_u is not None else _number(of_run, "gain_u", 0.0)
     background = (
-        told.background_u_t
-        if told and told.background_u_t is not None
+        magnetometer.background_u_t
+        if magnetometer and magnetometer.background_u_t is not None
         else _number(of_run, "background_u_t", Known.background.u)
     )
     return Known(

@@ -258,6 +258,6 @@ def in_a_sentence(run: SpinRun) -> str:
     if len(series) == 1:
         return f"The spin is {at}, its slope {with_uncertainty(spin.chirp)}."
     ends = f"{series.frequency[0]:.3f} Hz at {series.time[0]:.1f} s to {series.frequency[-1]:.3f} Hz"
-    told = ", ".join(f"{kind} {start:.1f} to {end:.1f} s" for kind, start, end in series.phases[:6])
-    phases_told = f"; {told}" if told else ""
-    return f"The spin goes from {ends} at {series.time[-1]:.1f} s ({len(series)} {series.of}s{phases_told}); {at}."
+    phases = ", ".join(f"{kind} {start:.1f} to {end:.1f} s" for kind, start, end in series.phases[:6])
+    in_phases = f"; {phases}" if phases else ""
+    return f"The spin goes from {ends} at {series.time[-1]:.1f} s ({len(series)} {series.of}s{in_phases}); {at}."

@@ -121,12 +121,12 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
         raise DoesNotSuit(f"{path}: {seen}, {expected}")
     notes = [f"{path.name}: {note.text}" for note in track.notes]
     what = f"{path.name}: a {'list of pulse times' if times is not None else 'record'} of {digits(duration, 3)} s: "
-    told = [f"{what}each reading is the frequency in a window of {WINDOW_S:g} s"]
+    how_read = [f"{what}each reading is the frequency in a window of {WINDOW_S:g} s"]
     if last - first < len(track.time):
         span = f"{track.time[first]:.1f} s to {track.time[last - 1]:.1f} s"
-        told.append(f"{path.name}: the top coasts from {span}; the windows before and after are left out")
+        how_read.append(f"{path.name}: the top coasts from {span}; the windows before and after are left out")
     part = slice(first, last)
-    return Readings(track.time[part], track.frequency[part], track.u[part], (*record.warnings, *told, *notes))
+    return Readings(track.time[part], track.frequency[part], track.u[part], (*record.warnings, *how_read, *notes))
 
 
 def _coasting(track: "Track") -> tuple[int, int]:
@@ -159,20 +159,23 @@ def spin_readings(table: Table, *, fewest: int = FEWEST) -> Readings:
         checked(time, frequency, u)
     except AnalysisError as error:
         raise _in_the_file(table, error) from error
-    return Readings(time, frequency, u, (*table.warnings, *_doubts(table, frequency)))
+    return Readings(time, frequency, u, (*table.warnings, *_doubts(table, time, frequency)))
 
 
 #: A Levitron spins at 20 to 60 Hz, driven to about 60 Hz; far above that the unit is in doubt [Hz].
 FASTEST_HZ = 200.0
 
 
-def _doubts(table: Table, frequency: "NDArray[np.float64]") -> list[str]:
-    """A spin that no such top has: most likely turns per minute."""
-    middle = float(np.median(frequency))
-    if middle <= FASTEST_HZ:
-        return []
-    doubt = f"{table.path.name}: the spin is about {middle:.4g} Hz, a Levitron spins at 20 to 60 Hz"
-    return [f"{doubt}; if these are turns per minute, say so with their column, as f=NAME [rpm]"]
+def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> list[str]:
+    """A spin that no such top has, as in turns per minute; readings closer than a turn, as of seconds named ms."""
+    middle, step = float(np.median(frequency)), float(np.median(np.diff(time)))
+    if middle > FASTEST_HZ:
+        doubt = f"{table.path.name}: the spin is about {middle:.4g} Hz, a Levitron spins at 20 to 60 Hz"
+        return [f"{doubt}; if these are turns per minute, say so with their column, as f=NAME [rpm]"]
+    if step * middle < 1:  # nor does a counter give a reading in less
+        doubt = f"{table.path.name}: the readings lie {1e3 * step:.3g} ms apart, the top needs {1e3 / middle:.3g} ms"
+        return [f"{doubt} for a turn; if the times are in seconds, say so with their column, as t=NAME [s]"]
+    return []
 
 
 #: Beyond these a number is no measurement, and its powers would leave the range of floating point.

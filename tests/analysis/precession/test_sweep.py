@@ -10,7 +10,7 @@ from analysis.errors import NotPositive, ShapesDiffer
 from analysis.precession.gates import Gates
 from analysis.precession.line import fit_line
 from analysis.precession.miscounts import robust_line
-from analysis.precession.power import probability_of_telling, what_it_takes
+from analysis.precession.power import detection_probability, power_of
 from analysis.precession.sweep import Sweep, fit_sweep
 
 DRIVE = np.arange(26.0, 46.0, 2.0)
@@ -93,28 +93,28 @@ def test_the_power_is_that_of_the_noncentral_t_distribution(dof):
     limit = stats.t(dof).ppf(0.975)
     for shift in (0.5, 2.0, 5.0):
         expected = stats.nct(dof, shift).sf(limit) + stats.nct(dof, shift).cdf(-limit)
-        assert probability_of_telling(shift, 1.0, dof) == pytest.approx(expected, abs=2e-6)
+        assert detection_probability(shift, 1.0, dof) == pytest.approx(expected, abs=2e-6)
 
 
 @pytest.mark.parametrize("known", [True, False])
-def test_what_it_takes_tells_a_slope_of_105_nine_times_in_ten(known):
+def test_the_power_needed_detects_a_slope_of_105_nine_times_in_ten(known):
     drive = np.linspace(30, 32, 6)
     random = np.random.default_rng(3)
     line = fit_line(drive, drive + 0.1 * random.standard_normal(6), np.full(6, 0.1) if known else None)
     scatter = 0.1 if known else line.scale
-    power = what_it_takes(line, 2.0, scatter)
+    power = power_of(line, 2.0, scatter)
     cases = {
         "points": (np.tile(drive, -(-power.points_needed // 6))[: power.points_needed], scatter),
         "range": (30 + (drive - 30) * power.range_needed_hz / 2, scatter),
         "u": (drive, power.u_needed_hz),
     }
     for x, sigma in cases.values():
-        told = 0
+        detected = 0
         for _ in range(300):
             y = 1.05 * x + sigma * random.standard_normal(x.size)
             found = fit_line(x, y, np.full(x.size, sigma) if known else None)
-            told += abs(found.slope - 1) > found.u_slope * (1.959964 if known else stats.t(x.size - 2).ppf(0.975))
-        assert told / 300 == pytest.approx(0.9, abs=0.06)  # 3 standard errors of a share from 300
+            detected += abs(found.slope - 1) > found.u_slope * (1.959964 if known else stats.t(x.size - 2).ppf(0.975))
+        assert detected / 300 == pytest.approx(0.9, abs=0.06)  # 3 standard errors of a share from 300
 
 
 # --- the whole ---

@@ -150,8 +150,8 @@ def test_the_pulses_own_harmonics_are_no_hum(spin, reflection, method):
     assert "hum" not in names(found)
     assert abs(found.frequency.value - spin) < 5 * found.frequency.u
     hum = spin_of_trace(samples + 0.3 * np.sin(2 * np.pi * 100 * TIME + 1), RATE, method=method)
-    told = next(note.text for note in hum.notes if note.name == "hum")
-    assert float(told.split("at ")[1].split()[0]) == pytest.approx(100, abs=0.1)
+    text = next(note.text for note in hum.notes if note.name == "hum")
+    assert float(text.split("at ")[1].split()[0]) == pytest.approx(100, abs=0.1)
     assert abs(hum.frequency.value - spin) < 5 * hum.frequency.u
 
 

@@ -463,7 +463,7 @@ def test_every_law_stands_in_exactly_one_list():
         assert sorted(listed) == sorted(LAWS)
 
 
-def test_an_uncertainty_stated_far_too_small_or_too_large_is_told_and_changes_no_order():
+def test_an_uncertainty_stated_far_too_small_or_too_large_is_reported_and_changes_no_order():
     """The order of the laws is that of their misfit, in whatever unit the readings' u was written down."""
     y = readings()
     true, small, large = (fit_spin_down(T, y, u) for u in (SIGMA, 1e-11, 1.0))

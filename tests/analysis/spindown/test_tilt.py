@@ -205,19 +205,19 @@ def test_the_correlation_of_noise_is_found_behind_a_fit():
         found = [correlation((rest(e), slopes)) for e in noise]
         # 0.06: four standard errors of a median of 300 with a scatter of 0.26, and 0.05 of bias at 0.7
         assert np.median([each.value for each in found]) == pytest.approx(rho, abs=0.11)
-        told = np.mean([each.p < 0.07 for each in found])
-        assert (told > 0.75) if rho else (told < 0.12)
+        share = np.mean([each.p < 0.07 for each in found])
+        assert (share > 0.75) if rho else (share < 0.12)
         assert np.mean([each.p_shape < 0.005 for each in found]) <= 0.01
 
 
-def test_correlated_noise_is_told_enlarges_u_and_excludes_nothing():
+def test_correlated_noise_is_reported_enlarges_u_and_excludes_nothing():
     rng, truth = np.random.default_rng(7), spin("disc", np.arange(0, 200, 10.0), 40.0, 2.34e-4)
     runs = [fit_spin_down(np.arange(0, 200, 10.0), truth + 0.03 * ar1(0.7, 20, rng)) for _ in range(25)]
-    told = [run for run in runs if run.is_correlated]
-    assert len(told) >= 15  # 83 % of 500
+    correlated = [run for run in runs if run.is_correlated]
+    assert len(correlated) >= 15  # 83 % of 500
     assert sum("disc" in dict(run.verdict.excluded) for run in runs) <= 2
-    assert all(any("resemble each other" in text for text in run.warnings) for run in told)
-    assert all(run.fit("disc").statistics.n_effective < 20 for run in told)
+    assert all(any("resemble each other" in text for text in run.warnings) for run in correlated)
+    assert all(run.fit("disc").statistics.n_effective < 20 for run in correlated)
     pulls = [(run.fit("disc").parameters["c32"].value - 2.34e-4) / run.fit("disc").parameters["c32"].u for run in runs]
     assert np.mean(np.abs(pulls) < 1) > 0.45  # 69 % of 500; independent noise assumed: 28 %
 
@@ -242,11 +242,11 @@ def test_no_law_describes_a_top_that_something_happened_to(kind, u):
     rng = np.random.default_rng(9)
     runs = [fit_spin_down(np.arange(0, 200, 10.0), odd(kind) + rng.normal(0, 0.03, 20), u) for _ in range(3)]
     assert sum(run.verdict.describes for run in runs) <= 1  # 95 % and more are found, see docs/decisions/0011
-    told = next(run for run in runs if not run.verdict.describes)
-    assert told.verdict.text.startswith("No law describes these readings")
-    assert not told.verdict.decided
-    assert kind != "jump" or "they jump" in told.verdict.text
-    assert "none describes the runs" in combine([told, told]).verdict.text
+    run = next(run for run in runs if not run.verdict.describes)
+    assert run.verdict.text.startswith("No law describes these readings")
+    assert not run.verdict.decided
+    assert kind != "jump" or "they jump" in run.verdict.text
+    assert "none describes the runs" in combine([run, run]).verdict.text
 
 
 def test_a_jump_is_found_where_it_is_and_none_in_noise():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import signal
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -16,6 +17,7 @@ from levilab.acquisition.driving import DriveSettings, FailedPoint, NotHeld, _ho
 from levilab.acquisition.experiment import Experiment
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.table import EXPERIMENTS, Configuration, with_settings
+from levilab.interruption import Interrupted, Stop
 from levilab.runs.channel import Channel
 from levilab.world.bench import virtual_wiring
 from levilab.world.spin_world import Phase, SpinScene, SpinWorld
@@ -164,7 +166,24 @@ def test_a_top_lost_while_it_is_held_is_not_compared_with_its_drive(monkeypatch:
         progress=lambda *_: None,
         event=lambda *texts, **_: said.append(texts[1]),
         warn=said.append,
+        stop=Stop(),
     )
     with pytest.raises(NotHeld, match=r"a spin of 29.20 Hz under a drive of 30.00 Hz"):
         _hold(session, 30.0)
     assert said == []
+
+
+def test_ctrl_c_ends_a_hold_after_the_count_under_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not after all of its counts, 20 s later, with the drive on."""
+    stop, counts = Stop(), []
+
+    def count(*_: Any) -> float:
+        counts.append(30.0)
+        stop(signal.SIGINT, None)
+        return 30.0
+
+    monkeypatch.setattr("levilab.acquisition.driving.held_spin", count)
+    session: Any = SimpleNamespace(settings=DriveSettings(hold_s=20.0), progress=lambda *_: None, stop=stop)
+    with pytest.raises(Interrupted):
+        _hold(session, 30.0)
+    assert len(counts) == 1

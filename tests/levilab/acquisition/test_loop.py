@@ -28,7 +28,7 @@ from levilab.files import CannotWrite
 from levilab.runs.run import Run
 from levilab.runs.writer import RunWriter
 from levilab.world.bench import VIRTUAL, virtual_bus
-from levilab.world.spin_world import Phase, SpinScene, SpinWorld, drawn
+from levilab.world.spin_world import Phase, SpinScene, SpinWorld, random_scene
 from support.acquisitions import BEFORE, Impatient, Silent, in_world, mock, of_scene
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def test_the_readings_follow_the_law_of_the_world_within_their_uncertainty(tmp_p
     chi_square, n = 0.0, 0
     for seed in range(15):
         frame = acquire(mock(tmp_path, seed), Silent()).readings().frame
-        scene = drawn(seed)
+        scene = random_scene(seed)
         c = scene.constants[0]
         # free of the start: ν^(−1/2) of the law is a straight line of known slope
         y, t = frame["spin_frequency_hz"].to_numpy() ** -0.5, frame["time_s"].to_numpy()
@@ -155,7 +155,7 @@ def test_a_signal_ends_the_run_with_outputs_off_and_all_readings(
     assert run.events()[-1]["text"] == f"interrupted by {number.name}, outputs are off"
 
 
-def test_ctrl_c_twice_breaks_through_an_exchange_and_outputs_are_off_all_the_same(
+def test_ctrl_c_twice_breaks_through_an_exchange_and_outputs_go_off(
     tmp_path: Path, outputs: list[bool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     count = itertools.count()
@@ -279,7 +279,7 @@ def test_the_time_of_a_reading_is_the_middle_of_its_gate(tmp_path: Path) -> None
     """At 40 Hz and 0.1 Hz/s a time stamp that is half a gate off would be 0.05 Hz off; the mean of 15 runs tells."""
     off = []
     for seed in range(15):
-        world = SpinWorld(drawn(seed), VirtualClock())
+        world = SpinWorld(random_scene(seed), VirtualClock())
         frame = acquire(in_world(mock(tmp_path, seed), world), Silent()).readings().frame
         released = [stretch for stretch in world._stretches if stretch.phase is Phase.COASTING][-1].start
         spin, _ = world.motion(released + frame["time_s"].to_numpy()[:8])
@@ -302,7 +302,7 @@ def test_errors_that_an_earlier_program_left_are_not_ours(tmp_path: Path, monkey
     assert acquire(mock(tmp_path), Silent()).status == "finished"
 
 
-def test_a_generator_that_no_longer_answers_is_told_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_generator_that_no_longer_answers_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def mute(self: Keysight33500B) -> None:
         raise NoAnswer("generator", "OUTP1 OFF", 2.0)
 

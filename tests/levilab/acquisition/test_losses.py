@@ -1,4 +1,4 @@
-"""An instrument that fails in the middle of a run: told, reached again, set up anew; a gap, and no made-up value."""
+"""An instrument that fails in the middle of a run: events, reached again, set up anew; a gap, and no made-up value."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ OFTEN = [(what, times) for what in COSTS for times in (1, 2, 3) if what != "9.91
 
 
 @pytest.mark.parametrize(("what", "times"), OFTEN)
-def test_a_fault_of_a_reading_is_told_and_the_run_goes_on(
+def test_a_fault_of_a_reading_is_reported_and_the_run_goes_on(
     what: str, times: int, whole: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # two readings come before the drive is off
@@ -103,7 +103,7 @@ def test_an_instrument_that_is_gone_for_a_while_is_tried_until_it_is_back(
     assert gaps.max() == pytest.approx(20.0, abs=1.0)  # one reading of every 10 s is missing
 
 
-def test_an_instrument_that_another_program_keeps_ends_the_run_with_what_there_is(
+def test_an_instrument_that_another_program_keeps_ends_the_run_and_keeps_its_readings(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from levilab.runs.run import Run
@@ -127,7 +127,7 @@ def test_an_instrument_that_is_lost_again_and_again_is_given_up(
     assert kinds(run).count("instrument lost") == MOST_LOSSES + 1
 
 
-def test_settings_that_somebody_changed_are_told_by_name_and_set_again(
+def test_settings_changed_by_hand_are_reported_by_name_and_set_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = acquired(tmp_path, monkeypatch, Fault("reset", question=r"READ\?", after=BEFORE + 6))
@@ -171,10 +171,10 @@ def test_a_generator_that_fails_on_the_way_up_is_off_and_the_way_is_gone_again(
     # at the generator's address only the ramp asks for its error queue so often
     cut = Fault("disconnected", question=r"SYST:ERR\?", after=45)
     run = acquired(tmp_path, monkeypatch, cut)
-    told = kinds(run)
+    order = kinds(run)
     assert run.status == "finished"
-    assert told.count("drive on") == 2
-    assert told.index("drive on") < told.index("instrument lost") < told.index("found again") < told.index("locked")
+    assert order.count("drive on") == 2
+    assert order.index("drive on") < order.index("instrument lost") < order.index("found again") < order.index("locked")
     assert 35 < run.readings().frame["spin_frequency_hz"].iloc[0] < 41
 
 

@@ -19,7 +19,7 @@ from levilab.bench.config import (
 from levilab.bench.wiring import described_wiring
 from levilab.errors import LevilabError
 from levilab.interruption import Interrupted
-from levilab.world.bench import VIRTUAL, VIRTUAL_MODELS, at_the_coil, virtual_wiring
+from levilab.world.bench import VIRTUAL, VIRTUAL_MODELS, connect_generator, virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld
 from support.waiting import HANG_GUARD_S
 
@@ -68,7 +68,7 @@ def faulty(monkeypatch):
     """The virtual bench with a generator whose faults a test can switch on."""
     monkeypatch.setattr(Faulty, "silent", 0)
     monkeypatch.setattr(Faulty, "stuck", False)
-    monkeypatch.setitem(VIRTUAL_MODELS["generator"], "33500B", at_the_coil(Faulty))
+    monkeypatch.setitem(VIRTUAL_MODELS["generator"], "33500B", connect_generator(Faulty))
     return Faulty
 
 
@@ -116,13 +116,13 @@ def test_after_a_normal_end_the_drive_is_off_and_all_is_closed(world):
 @pytest.mark.parametrize(
     "error", [ZeroDivisionError("physics"), Interrupted("SIGINT"), KeyboardInterrupt(), SystemExit()], ids=repr
 )
-def test_after_any_error_the_drive_is_off_and_the_error_is_told(world, error):
+def test_after_any_error_the_drive_is_off_and_the_error_is_reported(world, error):
     def end():
         raise error
 
-    with pytest.raises(type(error)) as told:
+    with pytest.raises(type(error)) as raised:
         drive_and(world, end)
-    assert told.value is error
+    assert raised.value is error
     assert world.field == 0
     assert_closed(world.bench)
 
@@ -150,7 +150,7 @@ def test_an_error_of_any_kind_in_the_first_try_does_not_keep_the_drive_on(world,
     assert world.field == 0
 
 
-def test_a_generator_that_stays_silent_is_told_by_name_and_all_is_closed(world, faulty):
+def test_a_generator_that_stays_silent_is_reported_by_name_and_all_is_closed(world, faulty):
     with pytest.raises(OutputMayBeOn) as alarm:
         drive_and(world, lambda: setattr(faulty, "silent", 1000))
     assert alarm.value.address == VIRTUAL["generator"].address
@@ -173,7 +173,7 @@ def test_the_alarm_keeps_what_went_wrong_before_it(world, faulty):
     assert any(isinstance(error, ZeroDivisionError) for error in chain)
 
 
-def test_an_output_that_does_not_go_off_is_told(world, faulty):
+def test_an_output_that_does_not_go_off_is_reported(world, faulty):
     with pytest.raises(OutputMayBeOn, match="still on"):
         drive_and(world, lambda: setattr(faulty, "stuck", True))
     assert world.field > 0  # it was no false alarm
@@ -212,7 +212,7 @@ def test_the_second_output_is_off_as_soon_as_the_bench_is_open_and_when_it_is_le
             self.settings |= {"1:output": True, "2:output": True}
             made.append(self)
 
-    monkeypatch.setitem(VIRTUAL_MODELS["generator"], "33500B", at_the_coil(LeftOn))
+    monkeypatch.setitem(VIRTUAL_MODELS["generator"], "33500B", connect_generator(LeftOn))
     with open_bench(virtual_wiring(world), KINDS):
         assert (made[0].settings["1:output"], made[0].settings["2:output"]) == (False, False)
         made[0].settings["2:output"] = True
@@ -317,7 +317,7 @@ def test_while_it_is_open_no_other_program_gets_in_not_even_after_a_link_was_mad
     assert "53230A" in another_program.query("*IDN?")
 
 
-def test_the_generator_stays_open_to_whoever_must_switch_it_off():
+def test_the_generator_stays_open_until_it_is_switched_off():
     with (
         open_bench(described(**VIRTUAL), KINDS),
         pyvisa.ResourceManager("realtime@levilab").open_resource(
@@ -328,7 +328,7 @@ def test_the_generator_stays_open_to_whoever_must_switch_it_off():
         assert other.query("OUTP1?").strip() == "0"
 
 
-def test_an_instrument_that_another_program_has_locked_is_told_and_left_alone(another_program):
+def test_an_instrument_that_another_program_has_locked_is_reported_and_left_alone(another_program):
     another_program.lock_excl()
     with pytest.raises(Occupied, match="locked"), open_bench(described(**VIRTUAL), KINDS):
         pass
@@ -343,7 +343,7 @@ def test_an_instrument_that_is_not_described_is_asked_for_by_name():
         pass
 
 
-def test_an_unknown_model_is_told_with_its_key_and_the_known_ones():
+def test_an_unknown_model_is_reported_with_its_key_and_the_known_ones():
     config = described(counter=InstrumentSettings(model="SR620", address="GPIB0::10::INSTR"))
     with (
         pytest.raises(ConfigError, match=r"counter\.model = 'SR620' is unknown, known are 53230A, 53220A, CNT-91"),
@@ -352,7 +352,7 @@ def test_an_unknown_model_is_told_with_its_key_and_the_known_ones():
         pass
 
 
-def test_an_address_that_leads_to_another_instrument_is_told_and_that_one_left_alone():
+def test_an_address_that_leads_to_another_instrument_is_reported_and_that_one_left_alone():
     swapped = InstrumentSettings(model="33500B", address=VIRTUAL["counter"].address)
     with (
         pytest.raises(WrongInstrument, match="check the address"),
@@ -361,11 +361,11 @@ def test_an_address_that_leads_to_another_instrument_is_told_and_that_one_left_a
         pass
 
 
-def test_an_address_where_nothing_is_is_told_after_the_drive_was_switched_off():
+def test_an_address_where_nothing_is_is_reported_after_the_drive_was_switched_off():
     traffic = []
-    nowhere = InstrumentSettings(model="53230A", address="TCPIP0::nobody::inst0::INSTR")
+    nowhere = InstrumentSettings(model="53230A", address="TCPIP0::absent::inst0::INSTR")
     with (
-        pytest.raises(NotConnected, match="nobody"),
+        pytest.raises(NotConnected, match="absent"),
         open_bench(
             described(counter=nowhere, generator=VIRTUAL["generator"]),
             ("generator", "counter"),
@@ -429,7 +429,7 @@ def test_an_empty_description_is_a_bench_without_instruments(tmp_path):
         ("[spin]\ngate_s = 1 s", "; write the number without its unit"),
     ],
 )
-def test_what_is_wrong_with_a_description_is_told_in_one_line_with_its_path(tmp_path, text, says):
+def test_what_is_wrong_with_a_description_is_reported_in_one_line_with_its_path(tmp_path, text, says):
     path = written(tmp_path, text)
     with pytest.raises(ConfigError) as wrong:
         read_bench(path, Configuration)
@@ -440,14 +440,14 @@ def test_what_is_wrong_with_a_description_is_told_in_one_line_with_its_path(tmp_
     assert isinstance(wrong.value, LevilabError)
 
 
-def test_a_description_that_is_no_text_is_told(tmp_path):
+def test_a_description_that_is_no_text_is_reported(tmp_path):
     path = tmp_path / "bench.toml"
     path.write_bytes(b"\xff\xfe[\x00s\x00")  # UTF-16, as an editor may save it
     with pytest.raises(ConfigError, match="not readable as TOML"):
         read_bench(path, Configuration)
 
 
-def test_a_description_that_is_missing_is_told_with_what_to_do(tmp_path):
+def test_a_description_that_is_missing_is_reported_with_what_to_do(tmp_path):
     with pytest.raises(ConfigError, match=r"no such file.*`mock`"):
         read_bench(tmp_path / "bench.toml", Configuration)
 

@@ -45,10 +45,10 @@ def test_the_answer_to_idn_names_the_driver_of_an_instrument(identity):
 
 
 def test_instruments_that_are_listed_or_named_are_asked_who_they_are():
-    told = []
-    found = search("@levilab", ["TCPIP0::nobody::inst0::INSTR"], told.append)
-    assert [one.address for one in found] == ["TCPIP0::nobody::inst0::INSTR", *(s.address for s in VIRTUAL.values())]
-    assert len(told) == 5
+    messages = []
+    found = search("@levilab", ["TCPIP0::absent::inst0::INSTR"], messages.append)
+    assert [one.address for one in found] == ["TCPIP0::absent::inst0::INSTR", *(s.address for s in VIRTUAL.values())]
+    assert len(messages) == 5
     assert "cannot be opened" in found[0].trouble
     assert {(one.kind, one.model) for one in found[1:]} == {(kind, s.model) for kind, s in VIRTUAL.items()}
 
@@ -87,7 +87,7 @@ def test_kinds_that_were_not_found_stand_there_as_comments_and_others_are_told(t
     assert config.counter == InstrumentSettings(model="53230A", address="A::1")
     assert config.generator is config.magnetometer is config.oscilloscope is None
     assert '# also found: model = "53220A", address = "A::2"' in text
-    assert f"# somebody without a driver here: A::3  {odd}" in text
+    assert f"# levilab has no driver for: A::3  {odd}" in text
     for kind in ("generator", "oscilloscope", "magnetometer"):
         assert f"# [{kind}]" in text
     assert max(map(len, text.splitlines())) <= 125
@@ -111,16 +111,16 @@ def test_the_commands_find_write_and_check(levilab, tmp_path):
     checked = levilab("bench", "check")
     assert re.search(r"\b(29|30)\.\d{4} Hz", checked.stdout)
     path = tmp_path / "bench.toml"
-    path.write_text(path.read_text(encoding="utf-8").replace("counter.levilab", "nobody"), encoding="utf-8")
+    path.write_text(path.read_text(encoding="utf-8").replace("counter.levilab", "absent"), encoding="utf-8")
     failed = levilab("bench", "check", "--json", check=3)
     by_kind = {one["kind"]: one for one in json.loads(failed.stdout)["instruments"]}
     assert "check the address" in by_kind["counter"]["trouble"]
     assert not by_kind["magnetometer"]["trouble"]
 
 
-def test_where_nobody_answers_no_file_is_written_but_one_to_fill_in_when_asked_for(monkeypatch, tmp_path, capsys):
-    nobody = [Found("A::1", trouble="A::1: no answer")]
-    monkeypatch.setattr("levilab.bench.discover.search", lambda *_: nobody)
+def test_where_no_instrument_answers_only_force_writes_a_file(monkeypatch, tmp_path, capsys):
+    silent = [Found("A::1", trouble="A::1: no answer")]
+    monkeypatch.setattr("levilab.bench.discover.search", lambda *_: silent)
     path = tmp_path / "bench.toml"
     with pytest.raises(NoInstrument, match="`addresses`"):
         bench_init([], "@py", path, force=False, as_json=False)
@@ -139,7 +139,7 @@ drive_amplitude_vpp = 10.0
 drive_waveform = "SIN"          # SIN, SQU or TRI
 hold_s = 20.0                   # hold it there, and compare its spin with the drive
 interval_s = 10.0               # then read every so often,
-gate_s = 1.0                    # counting for so long
+gate_s = 1.0                    # length of a count
 trigger_level_v = 0.6           # half way between dark and the pulse of the tape
 # reading_u_hz = 0.03           # standard uncertainty of a reading, if you know it
 longest_s = 1800.0              # an end if the top never falls
@@ -171,7 +171,7 @@ def test_signs_that_no_file_can_hold_are_no_part_of_a_name(tmp_path):
     assert read_bench(path, Configuration).counter is None
 
 
-def test_a_wrong_key_is_told_before_the_one_that_it_was_to_be(tmp_path):
+def test_a_wrong_key_is_reported_before_the_one_that_it_was_to_be(tmp_path):
     path = tmp_path / "bench.toml"
     path.write_text('[counter]\nmodell = "53230A"\naddress = "A::1"\n', encoding="utf-8")
     with pytest.raises(ConfigError, match=r"counter\.modell is no key known here: did you mean model\?"):
@@ -186,7 +186,7 @@ def test_a_wrong_key_is_told_before_the_one_that_it_was_to_be(tmp_path):
         ("[limits]\nxyz = 3\n", "limits.xyz is no key known here: known are drive_amplitude_vpp, "),
     ],
 )
-def test_a_key_that_is_nearly_right_is_told_with_the_right_one(tmp_path, text, says):
+def test_a_key_that_is_nearly_right_is_reported_with_the_right_one(tmp_path, text, says):
     path = tmp_path / "bench.toml"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(ConfigError) as error:

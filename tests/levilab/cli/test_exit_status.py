@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import pytest
 
@@ -13,6 +14,7 @@ from levilab.cli.quantities import in_options, option_names
 from levilab.errors import LevilabError, UsageError
 from support.commands import command
 from support.paths import ROOT, SAMPLE_DATA
+from support.spin_downs import spin_down_csv
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -184,6 +186,24 @@ def test_a_number_written_otherwise_is_shown_with_how_to_write_it(place: Path, w
 @pytest.mark.parametrize("words", NOT_UNDERSTOOD)
 def test_what_is_not_understood_is_wrong_usage(place: Path, words: str) -> None:
     assert command(*words.split(), cwd=place).status == exit_codes.WRONG_USAGE
+
+
+@pytest.mark.parametrize("words", ["runs", "analyze", "analyze spindown"])
+def test_what_may_not_be_read_is_said_in_one_line(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, words: str) -> None:
+    """Typer would refuse it as wrong usage of `levilab analyze each`, with no advice."""
+    monkeypatch.setattr("os.access", lambda *_, **__: False)
+    file = spin_down_csv(tmp_path / "closed.csv")
+
+    def refuse(*_: Any, **__: Any) -> NoReturn:
+        raise PermissionError(errno.EACCES, "Permission denied", str(file))
+
+    monkeypatch.setattr("pathlib.Path.open", refuse)
+    closed = tmp_path if words == "runs" else file
+    ended = command(*words.split(), closed, cwd=tmp_path)
+    assert ended.status == exit_codes.FAILED
+    assert re.fullmatch(
+        rf"levilab: {re.escape(str(closed))}: may not be (read|searched) by you; change .*\n", ended.err
+    )
 
 
 def test_an_interrupted_command_ends_with_130(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

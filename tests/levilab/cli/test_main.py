@@ -325,7 +325,7 @@ def test_a_finished_run_is_not_resumed(levilab: Command) -> None:
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_a_result_that_cannot_be_written_is_shown_all_the_same(levilab: Command, tmp_path: Path) -> None:
+def test_a_result_that_cannot_be_written_is_shown(levilab: Command, tmp_path: Path) -> None:
     path = spin_down_csv(tmp_path / "my.csv")
     done = levilab("analyze", "spindown", path, "--out", path / "below", check=1)
     assert "What the data say" in done.stdout

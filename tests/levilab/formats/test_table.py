@@ -87,7 +87,7 @@ TABLES = {
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_a_table_reads_the_same_whoever_wrote_it(name, table_file):
+def test_a_table_reads_the_same_in_every_dialect(name, table_file):
     text, expected = TABLES[name]
     table = read_table(table_file(text))
     assert set(table.frame.columns) == set(expected)
@@ -233,7 +233,7 @@ def test_an_error_is_one_line_that_names_file_and_place(name, table_file):
         assert f"line {caught.value.line}" in words
 
 
-def test_what_is_no_file_is_told(tmp_path):
+def test_what_is_no_file_is_reported(tmp_path):
     for path, words in ((tmp_path / "none.csv", "no such file"), (tmp_path, "is a folder")):
         with pytest.raises(TableError, match=words):
             read_table(path)
@@ -250,7 +250,7 @@ def test_a_pipe_is_refused_at_once(tmp_path):
 @pytest.mark.parametrize(
     ("error", "words"), [(PermissionError(13, "denied"), "may not be read"), (OSError(5, "I/O error"), "I/O error")]
 )
-def test_an_unreadable_file_is_told(error, words, table_file, monkeypatch):
+def test_an_unreadable_file_is_reported(error, words, table_file, monkeypatch):
     path = table_file(GOOD)
 
     def refuse(*_, **__):
@@ -276,7 +276,7 @@ def test_an_unreadable_file_is_told(error, words, table_file, monkeypatch):
         ("t,f\n0,0:10\n1,61.2\n2,61\n", {}, "'0:10' stands in column 'f'"),
     ],
 )
-def test_what_is_nearly_a_reading_is_told_with_what_to_do(text, columns, says, table_file):
+def test_what_is_nearly_a_reading_is_reported_with_what_to_do(text, columns, says, table_file):
     with pytest.raises(TableError) as error:
         read_table(table_file(text), columns=columns, needed=[F])
     assert says in str(error.value)
@@ -320,7 +320,7 @@ def test_the_uncertainty_of_a_time_stays_that_of_the_time(header, column, table_
     assert table.column(column).tolist() == [0.1, 0.1, 0.1]
 
 
-def test_a_missing_column_is_told_with_those_there_are(table_file):
+def test_a_missing_column_is_reported_with_those_there_are(table_file):
     with pytest.raises(TableError, match=r"height_m; it has 't', 'f': say `columns` = z=NAME"):
         read_table(table_file(GOOD)).column("height_m")
 
@@ -498,7 +498,7 @@ def test_a_line_far_down_is_named(table_file):
         read_table(table_file(f"t,f\n{rows}# pause\n30001,x\n30002,61\n"))
 
 
-def test_columns_that_nobody_asked_for_cost_no_reading(table_file):
+def test_columns_beside_the_wanted_ones_cost_no_reading(table_file):
     rows = "".join(f"{t},{60 - t},{'' if t % 5 else 0.07},ok\n" for t in range(20))
     path = table_file("time_s,spin_frequency_hz,height_m,drive\n" + rows)
     table = read_table(path, quantities=(T, F, U))

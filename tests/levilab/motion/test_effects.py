@@ -90,7 +90,7 @@ def only(monkeypatch, *names):
     monkeypatch.setattr("levilab.motion.effects.KINDS", tuple(kind for kind in KINDS if kind.name in names))
 
 
-def test_what_is_in_is_told_by_what_its_absence_changes(monkeypatch):
+def test_what_is_in_is_reported_by_what_its_absence_changes(monkeypatch):
     only(monkeypatch, "tilt of the moment", "drive")
     effects = {e.name: e for e in explain(preset("driven"), 2.0)}
     assert effects["tilt of the moment"].included
@@ -107,7 +107,7 @@ def test_the_table_names_every_effect(capsys):
     assert "out" in shown
 
 
-def test_a_series_is_told_by_what_it_has_and_by_what_it_lacks(monkeypatch):
+def test_a_series_is_reported_by_what_it_has_and_by_what_it_lacks(monkeypatch):
     only(monkeypatch)
     has, lacks = explain(preset("undriven").changed({"base.field": "paraxial-4"}), 5.0)
     assert (has.name, has.included) == ("field from r⁴ to r^4", True)

@@ -1,4 +1,4 @@
-"""`levilab simulate` as a user runs it: what it tells, what it writes, what it refuses."""
+"""`levilab simulate` as a user runs it: what it prints, what it writes, what it refuses."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def test_runs_lists_a_simulation_with_its_states_and_analyze_says_that_it_is_non
     assert "1 simulate run" in refused.stderr
 
 
-# --- what is told ---
+# --- what it prints ---
 
 
 def test_json_has_units_in_its_names_and_the_folder(levilab: Command, tmp_path: Path) -> None:
@@ -109,21 +109,21 @@ def test_json_has_units_in_its_names_and_the_folder(levilab: Command, tmp_path: 
 
 
 def test_a_top_too_slow_to_float_is_said_to_have_fallen_and_when(levilab: Command) -> None:
-    told = levilab("simulate", "undriven", "--set", "start.spin_hz=15").stdout
-    assert "the top fell after 0.18" in told
-    assert "came down to 0 cm" in told
+    printed = levilab("simulate", "undriven", "--set", "start.spin_hz=15").stdout
+    assert "the top fell after 0.18" in printed
+    assert "came down to 0 cm" in printed
     drifted = json.loads(levilab("simulate", "undriven", "--set", "escape.radius_m=0.002", "--json", check=0).stdout)
     assert drifted["fell"]["how"] == "radius"
     assert drifted["fell"]["text"] == "drifted out to 0.2 cm from the axis"
     assert drifted["fell"]["time_s"] == drifted["end_s"] < 30
 
 
-def test_a_chaotic_motion_is_told_to_be_one() -> None:
+def test_a_chaotic_motion_is_reported_to_be_one() -> None:
     motion = simulate(preset("undriven"), 1.0)
     chaotic = replace(motion, accuracy=replace(motion.accuracy, position=np.inf))
-    told = summarise(chaotic, 1.0, 100.0, 0.01)
-    assert any("chaotic" in note for note in told.notes)
-    assert as_document(told)["position_error_m"] is None
+    found = summarise(chaotic, 1.0, 100.0, 0.01)
+    assert any("chaotic" in note for note in found.notes)
+    assert as_document(found)["position_error_m"] is None
     magnified = replace(motion, accuracy=replace(motion.accuracy, position=5e-7))
     (note,) = summarise(magnified, 1.0, 100.0, 0.01).notes[:1]
     assert "1e-07" in note
@@ -133,9 +133,9 @@ def test_a_chaotic_motion_is_told_to_be_one() -> None:
     assert "nodes it is averaged over leave an error of 4e-07" in note
 
 
-def test_too_low_a_rate_for_the_lines_is_told(levilab: Command) -> None:
-    told = json.loads(levilab("simulate", "undriven", "--duration", "5", "--rate", "50", "--json").stdout)
-    assert any("take a rate of 1" in note for note in told["notes"])  # three times the 42 to 43 Hz of the nutation
+def test_too_low_a_rate_for_the_lines_is_reported(levilab: Command) -> None:
+    document = json.loads(levilab("simulate", "undriven", "--duration", "5", "--rate", "50", "--json").stdout)
+    assert any("take a rate of 1" in note for note in document["notes"])  # three times the 42 to 43 Hz of the nutation
 
 
 def test_a_fall_and_a_drift_are_told_as_what_they_are() -> None:
@@ -148,7 +148,7 @@ def test_a_fall_and_a_drift_are_told_as_what_they_are() -> None:
     assert "was lost after" in texts(drifted)
 
 
-def test_the_spin_is_told_with_its_range_where_it_swings_and_as_constant_where_it_is() -> None:
+def test_the_spin_is_reported_with_its_range_where_it_swings_and_as_constant_where_it_is() -> None:
     driven, friction, free = (summary(preset(name), 5.0) for name in ("driven", "friction", "undriven"))
     low, high, mean = (f(driven.motion.spin_hz) for f in (np.min, np.max, np.mean))
     assert driven.spin.endswith(f"at the end; {low:.3f} to {high:.3f} Hz, mean {mean:.3f} Hz")
@@ -159,9 +159,9 @@ def test_the_spin_is_told_with_its_range_where_it_swings_and_as_constant_where_i
 
 
 def test_the_table_says_what_its_numbers_are(capsys: pytest.CaptureFixture[str]) -> None:
-    told = summary(preset("undriven"), 5.0)
-    unknown = replace(told.lines, lines=(replace(told.lines.lines[0], name=""),))
-    print_motion(replace(told, lines=unknown, energy_change=0.0))
+    found = summary(preset("undriven"), 5.0)
+    unknown = replace(found.lines, lines=(replace(found.lines.lines[0], name=""),))
+    print_motion(replace(found, lines=unknown, energy_change=0.0))
     shown = capsys.readouterr().out
     for words in ("steps of at most 3.75 ms", "exactly constant", "not identified", "resolution 0.4 Hz", "mrad, 2"):
         assert words in shown
@@ -229,16 +229,16 @@ def test_a_spin_the_other_way_round_mirrors_the_lines() -> None:
 
 
 def test_a_falling_spin_gives_the_lines_of_its_first_seconds() -> None:
-    told = summary(preset("friction"), 20.0)
-    assert told.lines.until < 5
-    assert any("first" in note for note in told.notes)
-    (precession,) = [line for line in told.lines.lines if line.name == "precession"]
+    found = summary(preset("friction"), 20.0)
+    assert found.lines.until < 5
+    assert any("first" in note for note in found.notes)
+    (precession,) = [line for line in found.lines.lines if line.name == "precession"]
     assert precession.frequency == pytest.approx(7.5, abs=0.1)
 
 
 def test_an_unlocked_top_has_the_wobble_once_a_turn_beside_the_drive() -> None:
-    told = summary(preset("driven").changed({"drive.frequency_hz": 35.0}), 20.0)
-    place = {line.name: line.frequency for line in told.lines.lines}
+    found = summary(preset("driven").changed({"drive.frequency_hz": 35.0}), 20.0)
+    place = {line.name: line.frequency for line in found.lines.lines}
     assert place["drive"] == pytest.approx(35.0, abs=0.01)
     assert place["wobble, once a turn"] == pytest.approx(30.0, abs=0.2)
 
@@ -251,8 +251,8 @@ def test_what_does_not_last_or_does_not_move_has_no_lines() -> None:
 # --- the figure ---
 
 
-def texts(told: Summary) -> str:
-    figure = motion_figure(told)
+def texts(found: Summary) -> str:
+    figure = motion_figure(found)
     titles = [panel.get_title(loc="left") for panel in figure.axes]
     return "\n".join([*titles, *(text.get_text() for text in figure.texts)])
 
@@ -268,16 +268,16 @@ def test_the_figure_calls_a_change_of_the_energy_an_error_only_where_nothing_cha
 
 
 def test_the_figure_shows_the_path_to_scale_and_that_it_is_synthetic() -> None:
-    told = summary(preset("undriven"), 2.0)
-    assert motion_figure(told).axes[0].get_aspect() == 1.0
-    assert "SYNTHETIC" in texts(told)
+    found = summary(preset("undriven"), 2.0)
+    assert motion_figure(found).axes[0].get_aspect() == 1.0
+    assert "SYNTHETIC" in texts(found)
 
 
 def test_a_scene_without_motion_has_the_spin_drawn_alone() -> None:
-    told = summary(preset("friction").changed({"observed": "spin"}), 5.0)
-    assert len(motion_figure(told).axes) == 1
-    assert "friction, the spin alone, 5 s" in texts(told)
-    assert "stayed up" not in texts(told)
+    found = summary(preset("friction").changed({"observed": "spin"}), 5.0)
+    assert len(motion_figure(found).axes) == 1
+    assert "friction, the spin alone, 5 s" in texts(found)
+    assert "stayed up" not in texts(found)
 
 
 def test_a_motion_too_short_for_a_spectrum_has_a_shorter_figure() -> None:
@@ -288,18 +288,18 @@ def test_a_motion_too_short_for_a_spectrum_has_a_shorter_figure() -> None:
 
 
 def test_both_views_of_the_path_share_their_x_and_show_all_of_it() -> None:
-    told = summary(preset("driven"), 5.0)
-    side, above = motion_figure(told).axes[:2]
+    found = summary(preset("driven"), 5.0)
+    side, above = motion_figure(found).axes[:2]
     assert side.get_xlim() == above.get_xlim()
-    place = 100 * told.motion.position
+    place = 100 * found.motion.position
     for panel, up in ((side, 2), (above, 1)):
         assert panel.get_xlim()[0] < place[:, 0].min() < place[:, 0].max() < panel.get_xlim()[1]
         assert panel.get_ylim()[0] < place[:, up].min() < place[:, up].max() < panel.get_ylim()[1]
 
 
 def test_a_name_leaves_room_for_the_next_line() -> None:
-    told = summary(preset("driven").changed({"drive.frequency_hz": 35.0}), 10.0)
-    shown = [text.get_text().partition(" ")[2] for text in motion_figure(told).axes[-1].texts]
+    found = summary(preset("driven").changed({"drive.frequency_hz": 35.0}), 10.0)
+    shown = [text.get_text().partition(" ")[2] for text in motion_figure(found).axes[-1].texts]
     assert {"drive", "wobble, once a turn", "nutation", "precession", "swing sideways"} <= set(shown)
 
 

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import pytest
 
-from levilab.errors import DataError
+from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines import catalogue
 from levilab.pipelines.catalogue import ANALYSES, Analysis, analyze_suiting, recall_suiting
 from levilab.pipelines.catalogue import save as save_found
@@ -152,9 +152,28 @@ def test_what_one_analysis_cannot_use_keeps_no_other_from_its_own(tmp_path: Path
         readings = shutil.copytree(sample_data / name, root / name) / "readings.csv"
         lines = readings.read_text(encoding="utf-8").splitlines(keepends=True)
         readings.write_text("".join(lines[: 1 + rows]), encoding="utf-8")
-    told: list[str] = []
-    assert [row.name for row, _ in analyze_suiting([root], {}, told.append)] == ["limit"]
-    assert [text.split(": no ")[1].split(" to analyze")[0] for text in told] == ["spin run", "field run"]
+    messages: list[str] = []
+    assert [row.name for row, _ in analyze_suiting([root], {}, messages.append)] == ["limit"]
+    assert [text.split(": no ")[1].split(" to analyze")[0] for text in messages] == ["spin run", "field run"]
+
+
+def test_of_several_paths_each_analysis_takes_those_that_suit_it(tmp_path: Path, sample_data: Path) -> None:
+    """Named one by one as in a folder of mixed runs; a path that suits none is refused, and named."""
+    paths = [sample_data / name for name in ("lower-limits", "spin-down-1", "spin-down-2")]
+    for found in (analyze_suiting(paths, {}), recall_suiting(paths, {})):
+        taken = {row.name: [source.name for source in result.sources] for row, result in found}
+        assert taken == {"spindown": ["spin-down-1", "spin-down-2"], "limit": ["lower-limits"]}
+    other = tmp_path / "names.csv"
+    other.write_text("a,b\n1,2\n2,3\n3,4\n4,5\n", encoding="utf-8")
+    with pytest.raises(DoesNotSuit, match=r"names\.csv"):
+        analyze_suiting([sample_data / "lower-limits", sample_data / "spin-down-1", other], {})
+
+
+def test_a_result_beside_a_run_of_another_kind_is_reported(tmp_path: Path, sample_data: Path) -> None:
+    limit = ANALYSES["limit"]
+    save_found(limit, limit.analyze([sample_data / "lower-limits"], limit.options_from({})), tmp_path)
+    found = recall_suiting([sample_data / "spin-down-1", tmp_path], {})
+    assert [row.name for row, _ in found] == ["spindown", "limit"]
 
 
 def test_the_analysis_made_for_an_experiment_goes_before_one_that_takes_its_records(sample_data: Path) -> None:

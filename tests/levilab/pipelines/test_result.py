@@ -44,7 +44,7 @@ NAMES = st.lists(WORDS, min_size=1, max_size=4).map(".".join).filter(lambda name
 @example(names={"a.log", "a.prn", "a"})
 @example(names={"x.csv", "x.txt", "x.csv.dat", "x"})
 @example(names={"result", "result.json", "x.result"})
-def test_no_two_files_share_a_result_whoever_lies_beside_them(names: set[str]) -> None:
+def test_no_two_files_share_a_result(names: set[str]) -> None:
     with TemporaryDirectory() as folder:
         paths = [Path(folder) / name for name in sorted(names)]
         before = [beside(path) for path in paths]

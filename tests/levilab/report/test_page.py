@@ -303,16 +303,16 @@ def headings(page: Path) -> list[str]:
 def test_all_analyses_of_a_folder_are_on_the_page_in_their_order(tmp_path: Path, sample_data: Path) -> None:
     for name in ("upper-limits", "spin-down-1"):
         shutil.copytree(sample_data / name, tmp_path / "runs" / name)
-    told: list[str] = []
-    page = write_report([tmp_path / "runs"], tmp_path / "page.html", tell=told.append)
+    messages: list[str] = []
+    page = write_report([tmp_path / "runs"], tmp_path / "page.html", tell=messages.append)
     assert headings(page) == [
         "Report of 2 runs",
         "Spin-down of a levitated top",
         "Limits of the spin of a levitated top",
         "What was measured, and with what",
     ]
-    assert len(told) == 1  # no run is passed over by all analyses
-    assert "no result lies beside spin-down-1, upper-limits" in told[0]
+    assert len(messages) == 1  # no run is passed over by all analyses
+    assert "no result lies beside spin-down-1, upper-limits" in messages[0]
 
 
 @pytest.mark.usefixtures("undrawn_figures")
@@ -336,10 +336,10 @@ def test_a_result_that_lies_elsewhere_is_found_by_its_own_path(tmp_path: Path, r
     elsewhere = tmp_path / "elsewhere"
     spindown = ANALYSES["spindown"]
     save(spindown, analyze_spindowns([run], SpinDownOptions(reading_u=0.07)), elsewhere)
-    told: list[str] = []
-    text = reported(run, output=tmp_path / "page.html", tell=told.append)
+    messages: list[str] = []
+    text = reported(run, output=tmp_path / "page.html", tell=messages.append)
     assert "as levilab analyze found it" not in text
-    assert "(`out`), give that folder or file" in told[0]
+    assert "(`out`), give that folder or file" in messages[0]
     for path in (elsewhere, elsewhere / "result.json"):
         text = reported(path, output=tmp_path / "page.html", tell=pytest.fail)
         assert f"as levilab analyze found it: {elsewhere / 'result.json'}" in text
@@ -350,7 +350,7 @@ def test_a_result_that_lies_elsewhere_is_found_by_its_own_path(tmp_path: Path, r
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_a_report_that_cannot_be_written_is_told_in_one_line(tmp_path: Path, sample_data: Path) -> None:
+def test_a_report_that_cannot_be_written_is_reported_in_one_line(tmp_path: Path, sample_data: Path) -> None:
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     with pytest.raises(LevilabError, match="`output`"):
         write_report([sample_data / "spin-down-1"], tmp_path / "file" / "report.html")

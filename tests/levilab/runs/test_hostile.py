@@ -84,7 +84,7 @@ def test_an_odd_event_is_left_out(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize(
     "words", [["bench", "check", "--bench", "odd.toml"], ["simulate", "odd.toml"], ["stability", "odd.toml"]]
 )
-def test_an_odd_bench_or_scene_is_told_in_one_line(tmp_path: Path, words: list[str], name: str) -> None:
+def test_an_odd_bench_or_scene_is_reported_in_one_line(tmp_path: Path, words: list[str], name: str) -> None:
     (tmp_path / "odd.toml").write_text(f"x = {ODD[name]}", encoding="utf-8")
     ended = command(*words, cwd=tmp_path)
     assert ended.status == 1
@@ -269,7 +269,7 @@ def test_a_ramp_of_days_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("text", "says"), [("noon", "time_zero_utc"), ("9999-12-31T23:59:59", "set back")])
-def test_a_time_zero_that_makes_no_sense_is_told(tmp_path: Path, text: str, says: str) -> None:
+def test_a_time_zero_that_makes_no_sense_is_reported(tmp_path: Path, text: str, says: str) -> None:
     with pytest.raises(DataError, match=says):
         Run.load(run_with(tmp_path / "run", time_zero_utc=json.dumps(text))).elapsed()
 

@@ -86,9 +86,9 @@ def loses_nothing(out: Path, shown: list[tuple[str, str]], *, finished: bool = F
 def test_a_killed_process_loses_no_reading_that_it_had_shown(tmp_path: Path, n: int, before: bool) -> None:
     """Killed before or after the n-th sync: one of the record, or of a reading, or of an event."""
     process = start(tmp_path, before=AT_THE_NTH.format(n=n, before=before, act=KILL))
-    _, told = process.communicate(timeout=HANG_GUARD_S)
+    _, output = process.communicate(timeout=HANG_GUARD_S)
     assert process.returncode
-    loses_nothing(tmp_path, shown_in(told))
+    loses_nothing(tmp_path, shown_in(output))
 
 
 def test_at_no_moment_would_a_kill_lose_a_reading_that_was_shown(

@@ -25,9 +25,9 @@ CHANNELS = [
 posix_only = pytest.mark.skipif(os.name != "posix", reason="Windows removes no file that is open")
 
 
-def create(out: Path, told: list[str]) -> RunWriter:
+def create(out: Path, messages: list[str]) -> RunWriter:
     record = RunRecord(experiment="spin", status="running", started_utc="2026-11-20T10:15:00Z", channels=CHANNELS)
-    return RunWriter.create(out, record, tell=told.append)
+    return RunWriter.create(out, record, tell=messages.append)
 
 
 def row(k: int) -> dict[str, float | None]:
@@ -72,8 +72,8 @@ LOSSES: dict[str, Callable[[Path], object]] = {
 @posix_only
 @pytest.mark.parametrize("name", LOSSES)
 def test_a_loss_is_noticed_at_the_next_reading_and_rescued(tmp_path: Path, name: str) -> None:
-    told: list[str] = []
-    with create(tmp_path / "runs", told) as writer:
+    messages: list[str] = []
+    with create(tmp_path / "runs", messages) as writer:
         before = writer.folder
         writer.event(None, "drive off", "drive off")
         for k in range(3):
@@ -90,7 +90,7 @@ def test_a_loss_is_noticed_at_the_next_reading_and_rescued(tmp_path: Path, name:
     assert run.status == "finished"
     assert [event["kind"] for event in run.events()] == ["drive off", "rescued"]
     assert (run.record.model_extra or {})["rescued_from"] == str(before)
-    (text,) = told
+    (text,) = messages
     assert str(before) in text
     assert str(writer.folder) in text
     assert "all 4 readings" in text
@@ -104,26 +104,26 @@ def test_a_loss_is_noticed_by_whatever_is_written_next(tmp_path: Path, step: str
         "update": lambda writer: writer.update(time_zero_utc="2026-11-20T10:16:00Z"),
         "finish": lambda writer: writer.finish("finished"),
     }
-    told: list[str] = []
-    with create(tmp_path, told) as writer:
+    messages: list[str] = []
+    with create(tmp_path, messages) as writer:
         writer.reading(row(0))
         shutil.rmtree(writer.folder)
         steps[step](writer)
     assert times(writer.folder) == [0]
-    assert len(told) == 1
+    assert len(messages) == 1
 
 
 @posix_only
 def test_a_run_that_is_lost_twice_is_rescued_twice(tmp_path: Path) -> None:
-    told: list[str] = []
-    with create(tmp_path, told) as writer:
+    messages: list[str] = []
+    with create(tmp_path, messages) as writer:
         first = writer.folder
         for k in range(3):
             writer.reading(row(k))
             (writer.folder / "readings.csv").unlink()
         writer.reading(row(3))
     assert times(writer.folder) == [0, 10, 20, 30]
-    assert len(told) == 3
+    assert len(messages) == 3
     assert writer.folder.name == f"{first.name}-rescued-3"
 
 
@@ -185,22 +185,22 @@ def test_what_else_lies_in_the_folder_is_rescued_with_it(tmp_path: Path) -> None
 
 @posix_only
 def test_a_record_that_is_removed_is_written_again(tmp_path: Path) -> None:
-    told: list[str] = []
-    with create(tmp_path, told) as writer:
+    messages: list[str] = []
+    with create(tmp_path, messages) as writer:
         (writer.folder / "run.json").unlink()
         writer.reading(row(0))
         assert Run.load(writer.folder).status == "running"
-    assert told == []
+    assert messages == []
 
 
 def test_a_run_without_a_loss_is_not_rescued(tmp_path: Path) -> None:
-    told: list[str] = []
-    with create(tmp_path, told) as writer:
+    messages: list[str] = []
+    with create(tmp_path, messages) as writer:
         for k in range(5):
             writer.reading(row(k))
             writer.event(10.0 * k, "kept", "kept")
         writer.finish("finished")
-    assert told == []
+    assert messages == []
     assert [path.name for path in tmp_path.iterdir()] == [writer.folder.name]
 
 

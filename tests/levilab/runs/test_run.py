@@ -158,7 +158,7 @@ def test_when_the_disk_is_full_every_earlier_reading_is_kept(
     assert run.readings().frame["time_s"].tolist()[:rows_until_full] == list(range(rows_until_full))
 
 
-def test_a_folder_that_cannot_be_made_is_told_in_one_line(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_made_is_reported_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "runs").write_text("a file in the way", encoding="utf-8")
     with pytest.raises(CannotWrite, match="`out`"):
         RunWriter.create(tmp_path / "runs", record())

@@ -10,7 +10,7 @@ from levilab.simulator.ensemble import simulate_many
 from levilab.simulator.field import field_of, flux_density, flux_gradient
 from levilab.simulator.kernels.loads import Disc
 from levilab.simulator.model import model_of
-from levilab.simulator.problem import Problem, end_at, scheme_for
+from levilab.simulator.problem import Problem, integrate_to_end, scheme_for
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
 from levilab.simulator.start import start_of
@@ -43,7 +43,7 @@ def true_end(scene, duration, step=1 / 600):
     model, top = model_of(scene), scene.top
     whole = Disc(model.magnet.axial, model.magnet.transverse, volume(top.magnet_radius_m, top.magnet_height_m))
     problem = Problem(scene, model._replace(magnet=whole), start_of(scene), scheme_for("kahan-li-8", model))
-    return end_at(problem, stops_between(0.0, duration, step, scene.drive))
+    return integrate_to_end(problem, stops_between(0.0, duration, step, scene.drive))
 
 
 def errors(motion, end):

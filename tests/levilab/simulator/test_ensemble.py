@@ -86,7 +86,7 @@ DRIVES = {
 
 
 @pytest.mark.parametrize("drive", DRIVES)
-def test_a_drive_without_a_kink_in_the_run_has_its_shape_all_the_same(drive):
+def test_a_drive_without_a_kink_in_the_run_keeps_its_shape(drive):
     scene = preset("driven").changed({"drive.amplitude_t": 1e-3} | DRIVES[drive])
     many = simulate_many(scene, {"start.spin_hz": [30.03]}, 1.0)
     alone = simulate(scene.changed({"start.spin_hz": 30.03}), 1.0, rate=None)
@@ -113,9 +113,9 @@ def test_the_spin_is_that_of_each_tops_own_washers():
 
 
 def test_no_tops_at_all_are_no_error():
-    nobody = simulate_many(UNDRIVEN, {"start.spin_hz": []}, 1.0)
-    assert nobody.survived.shape == (0,)
-    assert nobody.states.shape == (0, 18)
+    empty = simulate_many(UNDRIVEN, {"start.spin_hz": []}, 1.0)
+    assert empty.survived.shape == (0,)
+    assert empty.states.shape == (0, 18)
 
 
 def test_values_that_do_not_fit_together_are_named():

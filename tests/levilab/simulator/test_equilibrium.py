@@ -47,7 +47,7 @@ def test_a_steady_precession_keeps_its_tilt():
     assert np.ptp(steady.tilt) < 2e-5
 
 
-def test_a_mass_that_cannot_float_is_told_the_nearest_that_can():
+def test_a_mass_that_cannot_float_is_reported_the_nearest_that_can():
     heavy = UNDRIVEN.changed({"top.mass_kg": 0.0255, "start.place": "equilibrium"})
     with pytest.raises(SceneError, match=r"does not float over this base; the nearest that does has 25\.48 g"):
         floating_height(heavy)

@@ -126,10 +126,10 @@ def test_a_copied_preset_is_the_preset(tmp_path):
         assert read_scene(tmp_path / f"{name}.toml") == preset(name)
 
 
-def test_an_unknown_name_is_told_the_nearest_all_presets_and_that_a_path_goes():
+def test_the_error_of_an_unknown_name_lists_the_nearest_and_all_presets():
     with pytest.raises(LevilabError) as refused:
         read_scene("drivne")
-    for word in ("'drivne'", "did you mean driven?", *presets(), "path to a TOML file"):
+    for word in ("'drivne'", "did you mean driven?", *presets(), "path of a TOML file"):
         assert word in str(refused.value)
 
 
@@ -143,7 +143,7 @@ def test_any_unknown_name_is_refused_in_one_line(name):
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (None, "there is no such file; scenes that ship are driven, friction"),
+        (None, "there is no such file; scenes that come with levilab are driven, friction"),
         (b"top = ", "not readable as TOML"),
         (b"\xff", "not readable as TOML"),
         (b"[top]\nmas_kg = 1", "there is no key top.mas_kg; did you mean top.mass_kg?"),
@@ -216,7 +216,7 @@ def test_never_takes_back_when_the_drive_is_switched_off():
 
 
 @pytest.mark.parametrize("word", ["foo", "=3", "top.mass_kg", ""])
-def test_a_setting_without_key_or_value_is_told_what_one_looks_like(word):
+def test_a_setting_without_key_or_value_is_reported_what_one_looks_like(word):
     assert "KEY=VALUE is expected" in refusal(word)
 
 
@@ -436,10 +436,10 @@ def test_a_drive_without_amplitude_and_a_constant_without_a_law_are_remarked_upo
         ("loose-washers", ["washers.drag_share=0.5"], []),
     ],
 )
-def test_what_is_set_of_a_part_that_is_off_is_told_with_what_switches_it_on(name, words, said):
-    told = remarks(with_settings(preset(name), words))
-    assert len(told) == len(said)
-    assert all(text in one for text, one in zip(said, told, strict=True))
+def test_what_is_set_of_a_part_that_is_off_is_reported_with_what_switches_it_on(name, words, said):
+    found = remarks(with_settings(preset(name), words))
+    assert len(found) == len(said)
+    assert all(text in one for text, one in zip(said, found, strict=True))
 
 
 # --- there and back ---

@@ -1,4 +1,4 @@
-"""One top: closed forms, constants of the motion, hard cases, and an error estimate that tells the truth."""
+"""One top: closed forms, constants of the motion, hard cases, and an error estimate that is true."""
 
 import math
 
@@ -134,7 +134,7 @@ def test_an_hour_keeps_energy_and_spin_to_the_rounding_of_a_random_walk():
     assert spread(motion.energies) < 3 * walk  # 4e-12; measured 4e-13
     assert spread(spin_momentum(motion)) < 3 * walk
     halves = np.abs(motion.energies - motion.energies[0]).reshape(-1)[1:].reshape(2, -1).max(axis=1)
-    assert halves[1] < 8 * halves[0] + EPS  # a steady drift would be told by its growth with the time over many runs
+    assert halves[1] < 8 * halves[0] + EPS  # a steady drift would show in its growth with the time over many runs
 
 
 def test_thirty_seconds_there_and_back_lead_to_the_start():
@@ -260,18 +260,18 @@ def test_close_to_the_base_the_exact_field_is_followed():
     assert spread(motion.energies) < 1e-6
 
 
-def test_a_chaotic_start_is_told_instead_of_a_result_that_only_looks_exact():
+def test_a_chaotic_start_is_reported_instead_of_a_result_that_only_looks_exact():
     # at the edge of the upper limit neighbours part by a factor of ten a second, until the top is lost at 14.75 s
     chaotic = at(UNDRIVEN.changed({"top.mass_kg": 0.02527}), spin_hz=70.75)
-    told = []
+    errors = []
     for duration in (10.0, 12.0, 14.0):
         coarse = simulate(chaotic, duration, step=1.3e-3, rate=None)
         fine = simulate(chaotic, duration, step=0.9e-3, rate=None)
         assert coarse.survived
         assert fine.survived
         assert np.linalg.norm(coarse.position[-1] - fine.position[-1]) < coarse.accuracy.position
-        told.append(coarse.accuracy.position)
-    assert told[2] > 100 * told[1] > 1000 * told[0]
+        errors.append(coarse.accuracy.position)
+    assert errors[2] > 100 * errors[1] > 1000 * errors[0]
     assert not simulate(chaotic, 30.0, step=1.3e-3, rate=None).accuracy.reached
 
 
@@ -290,9 +290,9 @@ def test_the_estimate_bounds_the_true_error_on_every_kind_of_scene(kind):
         )
         rough, fine = (simulate(scene, 0.7, tolerance=tolerance, rate=None) for tolerance in (1e-6, 1e-11))
         assert rough.survived == fine.survived
-        for what, told in (("position", "position"), ("axis", "axis")):
+        for what in ("position", "axis"):
             true = np.linalg.norm(getattr(rough, what)[-1] - getattr(fine, what)[-1])
-            bounded.append(true <= getattr(rough.accuracy, told) + getattr(fine.accuracy, told))
+            bounded.append(true <= getattr(rough.accuracy, what) + getattr(fine.accuracy, what))
     assert np.mean(bounded) >= 0.9  # 95 % of 16, to within one
 
 

@@ -59,7 +59,7 @@ def test_a_map_of_spins_the_other_way_round_has_its_edges_there():
     assert set(-found.slowest) <= set(drawn)
 
 
-def test_spans_are_read_and_what_is_none_is_told():
+def test_spans_are_read_and_what_is_none_is_reported():
     assert span_of("spins", "20:23:0.5") == (20.0, 23.0, 7)
     assert span_of("spins", "-30:-20:4") == (-30.0, -22.0, 3)
     low, high, count = span_of("masses", "0.0245:0.0256:0.0001")

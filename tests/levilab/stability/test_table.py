@@ -35,7 +35,7 @@ def test_the_document_has_no_number_that_json_has_not():
         json.dumps(as_document(stability_of(scene)), allow_nan=False)
 
 
-def test_what_the_theory_leaves_out_of_a_scene_is_told():
+def test_what_the_theory_leaves_out_of_a_scene_is_reported():
     assert remarks(stability_of(UNDRIVEN)) == []
     (drag,) = remarks(stability_of(preset("friction")))
     assert "drag is left out" in drag

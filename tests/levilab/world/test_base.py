@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from levilab.simulator.field import field_of, flux_density
-from levilab.world.base import Base, Stand, drawn_base
+from levilab.world.base import Base, Stand, random_base
 
 
-@pytest.mark.parametrize("base", [Base(), drawn_base(3)])
+@pytest.mark.parametrize("base", [Base(), random_base(3)])
 def test_its_field_is_that_of_the_simulator(base):
     exact = field_of(
         base.inner_radius_m,
@@ -23,7 +23,7 @@ def test_its_field_is_that_of_the_simulator(base):
 
 
 def test_bases_differ_by_what_a_calliper_leaves_open():
-    bases = [drawn_base(seed) for seed in range(300)]
+    bases = [random_base(seed) for seed in range(300)]
     for name, scatter in (("strength_t_m", 2.8e-5), ("origin_m", 1e-3), ("thickness_m", 2e-4), ("background_t", 4e-5)):
         seen = np.std([getattr(base, name) for base in bases])
         assert seen == pytest.approx(scatter, rel=0.13), name  # three standard errors of one from 300
@@ -36,5 +36,5 @@ def test_a_probe_misses_a_height_by_the_same_each_time():
     assert once != 0.05
     assert other is not None
     assert abs(other - 0.06) < 1e-3
-    assert stand.at(None).sees(Base(background_t=1e-4)) == 0.0
+    assert stand.at(None).flux_density(Base(background_t=1e-4)) == 0.0
     assert Stand().at(0.05).height_m == 0.05

@@ -50,7 +50,7 @@ def test_the_bench_given_is_the_one_that_pyserial_finds_however_often_it_is_plug
     assert bus.instruments[VIRTUAL["magnetometer"].address].clock.now() > before
 
 
-def test_what_there_is_not_is_told_with_what_there_is():
+def test_the_error_of_an_unknown_model_lists_the_known_ones():
     with pytest.raises(ConfigError, match="no virtual counter 'DVM': known are 53230A, 53220A, CNT-91"):
         virtual_bus(models={"counter": "DVM"})
     with pytest.raises(ConfigError, match="no virtual 'piano': known are counter"):

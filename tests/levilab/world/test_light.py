@@ -68,9 +68,9 @@ def test_the_voltage_saturates_and_has_the_lamps_ripple():
     turns = np.full(2001, 0.5)
     times = np.linspace(0.0, 0.1, 2001)
     at_rest = {"bandwidth_hz": 1e9, "noise": 0.0}
-    bright = Tape(saturation=1.0, **at_rest).clean(turns, np.ones(2001), times)
+    bright = Tape(saturation=1.0, **at_rest).mean_voltage(turns, np.ones(2001), times)
     np.testing.assert_allclose(bright, 1.0)
-    rippled = Tape(ripple=0.2, **at_rest).clean(turns, np.ones(2001), times)
+    rippled = Tape(ripple=0.2, **at_rest).mean_voltage(turns, np.ones(2001), times)
     np.testing.assert_allclose(rippled, 1.2 * (1 + 0.2 * np.sin(TURN * 100.0 * times)), rtol=1e-6)
 
 

@@ -96,7 +96,7 @@ def test_a_drive_that_goes_off_is_the_simulators_drive_that_goes_off():
             "phase_rad": drive.phase_rad,
         },
     )
-    flight.turns(np.array([2.6]))  # somebody has looked farther already
+    flight.turns(np.array([2.6]))  # an instrument has looked farther already
     flight.change(1.37, OFF)
     motion = simulate(scene.changed({"drive.off_s": 1.37}), 3.0, tolerance=1e-9, rate=311.0)
     turns, up = flight.turns(motion.time)
@@ -141,7 +141,7 @@ def test_a_top_that_is_put_back_begins_anew_whatever_the_drive_does_meanwhile():
     assert flight.turns(np.array([3 * begins + 0.1, 50 * begins + 0.1]))[1].all()
 
 
-def test_before_the_beginning_nobody_is_there():
+def test_before_time_zero_there_is_no_top():
     turns, up = Flight(TILTED).turns(np.array([-1.0, -1e-9, 0.0]))
     assert up.tolist() == [False, False, True]
     assert turns[0] == 0.0
@@ -154,13 +154,13 @@ def test_a_scene_without_motion_is_refused():
 
 def test_the_step_that_a_fast_drive_needs_goes_with_it():
     flight = Flight(TILTED)
-    flight.look(2.0)
+    flight.simulate_until(2.0)
     usual = flight._step
     flight.change(3.0, SINE | {"frequency_hz": 900.0})
-    flight.look(5.0)
+    flight.simulate_until(5.0)
     assert flight._step < usual / 2
     flight.change(5.0, OFF)
-    flight.look(8.0)
+    flight.simulate_until(8.0)
     assert flight._step == pytest.approx(usual, rel=0.3)
 
 
@@ -218,7 +218,7 @@ def test_the_top_feels_the_field_that_the_scope_shows(output):
     ids=["ramp", "pulse", "burst"],
 )
 def test_of_other_waveforms_the_top_feels_the_first_harmonic(output):
-    drive = world()._drive(0.0, output)
+    drive = world()._drive_keys(0.0, output)
     assert (drive["waveform"], drive["frequency_hz"]) == ("sine", 30.0)
     assert drive["amplitude_t"] == pytest.approx(fundamental(output))
 
@@ -319,7 +319,7 @@ def test_the_probe_sees_the_field_of_the_scenes_base():
 @pytest.mark.parametrize(
     "look", [lambda top: top.light(top.clock.now(), 1e-3, 10), lambda top: top.catch_up()], ids=["light", "keep up"]
 )
-def test_a_bench_that_runs_for_hours_lets_go_what_nobody_asks_for(look):
+def test_a_bench_that_runs_for_hours_drops_old_history(look):
     top = world(FALLING, put_back_after_s=60.0)
     for _ in range(24):
         top.clock.sleep(3600.0)

@@ -105,7 +105,7 @@ def test_ctrl_c_ends_it_in_the_middle_of_an_answer():
 
 
 def interrupt_when(said, name="SIGTERM"):
-    """A `ready` that keeps what is told and asks for the end."""
+    """A `ready` that keeps its argument and asks for the end."""
 
     def ready(instruments):
         said.extend(instruments)
@@ -156,12 +156,12 @@ def test_a_model_that_there_is_not_is_wrong_usage(words, says):
     ],
     ids=["0", "nan", "inf", "ports", "host", "IPv6"],
 )
-def test_what_cannot_be_served_is_told(service, says):
+def test_what_cannot_be_served_is_reported(service, says):
     with pytest.raises(Exception, match=says):
         serve(service, lambda _: pytest.fail("it was served"))
 
 
-def test_a_port_that_is_taken_is_told_with_what_to_do():
+def test_a_port_that_is_taken_is_reported_with_what_to_do():
     with socket.create_server((LOOPBACK, 0)) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(Exception, match=rf"{port}.*try another `host` or `port_base`"):
@@ -255,9 +255,9 @@ def test_a_port_mapper_that_cannot_be_had_says_what_to_do(monkeypatch, error, pl
 
     monkeypatch.setattr("levilab.world.serve.offered", refused)
     monkeypatch.setattr("levilab.world.serve.sys.platform", platform)
-    with pytest.raises(CannotServe, match=words) as told:
+    with pytest.raises(CannotServe, match=words) as refused:
         serve(Service(port_mapper=111), lambda _: None)
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(refused.value)
 
 
 def test_a_host_that_cannot_be_one_is_wrong_usage():

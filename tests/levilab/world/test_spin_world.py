@@ -20,7 +20,7 @@ from instruments.virtual.generator.voltage import fundamental, voltage
 from levilab.simulator.spin import DECAYS
 from levilab.world import bench as virtual_bench
 from levilab.world.light import Tape
-from levilab.world.spin_world import KEPT_S, Phase, SpinScene, SpinWorld, drawn
+from levilab.world.spin_world import KEPT_S, Phase, SpinScene, SpinWorld, random_scene
 from support.wire import ask, received, send
 
 TURN = 2 * math.pi
@@ -261,7 +261,7 @@ def test_light_depends_on_what_is_asked_and_on_nothing_else():
 @pytest.mark.parametrize(("tape", "close"), [(Tape(noise=0.0), 2e-6), (Tape(), 6e-5)], ids=["quiet", "noisy"])
 @pytest.mark.parametrize("triggers", [Thresholds(0.6, 0.56), Thresholds(0.3, 0.34, -1.0)], ids=["rising", "falling"])
 def test_the_times_of_the_pulses_are_those_that_the_light_shows(tape, close, triggers):
-    top = world(replace(drawn(3), tape=tape, put_back_after_s=5.0))
+    top = world(replace(random_scene(3), tape=tape, put_back_after_s=5.0))
     drive(top, 10.0, "SIN", 30.5, FIELD)  # coasts, is pulled and held, and coasts again
     off(top, 12.0)
     fall = next(t for t in np.arange(12.0, 300.0, 0.5) if spin_hz(top, t) == 0.0)
@@ -277,7 +277,7 @@ def test_the_times_of_the_pulses_are_those_that_the_light_shows(tape, close, tri
 
 
 def test_the_same_seed_makes_the_same_light_and_another_seed_another():
-    lights = [world(drawn(seed)).light(5.0, 5e-5, 2_000) for seed in (7, 7, 8)]
+    lights = [world(random_scene(seed)).light(5.0, 5e-5, 2_000) for seed in (7, 7, 8)]
     np.testing.assert_array_equal(lights[0], lights[1])
     assert np.any(lights[0] != lights[2])
 
@@ -303,7 +303,7 @@ def test_the_noise_of_the_light_is_as_large_as_asked_for():
 
 
 def test_runs_scatter_as_the_published_ones_do():
-    scenes = [drawn(seed) for seed in range(2000)]
+    scenes = [random_scene(seed) for seed in range(2000)]
     constants = np.array([scene.constants[0] for scene in scenes]) / SpinScene().constants[0] - 1
     falls = np.array([scene.fall_hz for scene in scenes]) - SpinScene().fall_hz
     for scatter, size in ((constants, 0.02), (falls, 0.25)):
@@ -315,10 +315,10 @@ def test_runs_scatter_as_the_published_ones_do():
 
 def test_what_is_drawn_leaves_the_rest_of_the_scene_as_it_was():
     scene = SpinScene(drag="mixed", constants=(1e-3, 1e-5), start_hz=33.0)
-    once = drawn(5, scene)
+    once = random_scene(5, scene)
     assert (once.start_hz, once.drag, once.seed) == (33.0, "mixed", 5)
     assert once.constants[0] / 1e-3 == pytest.approx(once.constants[1] / 1e-5, rel=1e-14)
-    assert once == drawn(5, scene)
+    assert once == random_scene(5, scene)
 
 
 # --- through the counter ---
@@ -399,7 +399,7 @@ def test_bursts_keep_their_rhythm_when_their_size_changes_and_begin_anew_with_an
 
 
 @pytest.mark.parametrize("waveform", ["NOIS", "PRBS"])
-def test_what_is_random_is_the_same_for_everybody_who_looks(waveform):
+def test_what_is_random_is_the_same_for_every_instrument(waveform):
     top, other = world(), world()
     for one in (top, other):
         drive(one, 0.0, waveform, 1e3, 2.0, offset=0.5)
@@ -492,7 +492,7 @@ def second_channel(top, at):
         (SQUARE + "BURS:MODE GAT;GATE:POL INV;:BURS:STAT ON;:OUTP ON", [0.1, 0.6], [2, -2]),
     ],
 )  # fmt: skip
-def test_the_oscilloscope_sees_what_the_generator_was_told(model, commands, at, volts):
+def test_the_oscilloscope_sees_what_the_generator_was_reported(model, commands, at, volts):
     top = world()
     device = virtual_bench.VIRTUAL_MODELS["generator"][model](top)
     send(device, f"OUTP:LOAD INF;:{commands}\n".encode())
@@ -587,12 +587,12 @@ def test_a_change_at_the_time_of_a_fall_or_of_a_burst_that_was_to_end_changes_no
     drive(top, fallen, "SIN", 30.0, FIELD)
     assert spin_hz(top, fallen - 0.1) > 21.8
     assert spin_hz(top, fallen + 10.0) == 0
-    told = world()
-    drive(told, 1.0, "SIN", 30.0, FIELD)
-    drive(told, 60.0, "SIN", 30.0, 0.0)  # the end of a burst, told beforehand
-    drive(told, 2.0, "SIN", 30.0, 0.0)  # but it is switched off
-    assert spin_hz(told, 50.0) < 27.0
-    assert coil_at(told, [1.5, 3.0, 59.0]).tolist() == [pytest.approx(0, abs=1), 0, 0]
+    top = world()
+    drive(top, 1.0, "SIN", 30.0, FIELD)
+    drive(top, 60.0, "SIN", 30.0, 0.0)  # the end of a burst, known beforehand
+    drive(top, 2.0, "SIN", 30.0, 0.0)  # but it is switched off
+    assert spin_hz(top, 50.0) < 27.0
+    assert coil_at(top, [1.5, 3.0, 59.0]).tolist() == [pytest.approx(0, abs=1), 0, 0]
 
 
 def test_the_magnetometer_sees_the_base_as_the_simulator_has_it():
@@ -603,7 +603,7 @@ def test_the_magnetometer_sees_the_base_as_the_simulator_has_it():
     assert world(SpinScene()).flux_density(3.0) == pytest.approx(there, rel=1e-8)
 
 
-def test_a_top_that_falls_is_put_back_where_somebody_does_so():
+def test_a_top_that_falls_is_put_back_if_the_scene_says_so():
     top = world(SpinScene(put_back_after_s=10.0))
     fallen = next(s.start for s in top._stretches if s.phase is Phase.FALLEN)
     spin, angle = top.motion(np.array([fallen - 1, fallen + 9, fallen + 10.001, fallen + 11 + fallen]))

@@ -17,7 +17,7 @@ from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import Configuration, with_settings
 from levilab.bench.config import ConfigError, Limits
 from levilab.bench.person import PlaceProbe, ShieldProbe
-from levilab.world.base import Base, Stand, drawn_base
+from levilab.world.base import Base, Stand, random_base
 from levilab.world.bench import virtual_bus, virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld
 from support.acquisitions import Impatient, Silent
@@ -114,8 +114,8 @@ def test_an_interrupted_scan_goes_on_at_the_next_height(tmp_path: Path) -> None:
     again = acquire(request_for("field", AcquisitionOptions(resume=run.folder)), Silent())
     assert again.status == "finished"
     assert again.readings().column("height_m").tolist() == [0.04, 0.05, 0.06, 0.07, 0.08]
-    base, stand = drawn_base(5), Stand(scatter_m=2e-4, seed=5)
-    truth = [stand.at(height).sees(base) for height in (0.04, 0.05, 0.06, 0.07, 0.08)]
+    base, stand = random_base(5), Stand(scatter_m=2e-4, seed=5)
+    truth = [stand.at(height).flux_density(base) for height in (0.04, 0.05, 0.06, 0.07, 0.08)]
     assert again.readings().column("flux_density_t") == pytest.approx(truth, abs=3e-6)
     assert f"strength {base.strength_t_m:.6e} T m" in (again.record.synthetic_how or "")
 

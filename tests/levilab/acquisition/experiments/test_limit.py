@@ -23,7 +23,7 @@ from levilab.bench.config import ConfigError
 from levilab.errors import UsageError
 from levilab.pipelines.limit.analysis import LimitOptions, analyze_limits
 from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
-from levilab.world.spin_world import SpinScene, SpinWorld, drawn
+from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
 from support.acquisitions import Impatient, Silent, in_world
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def kinds(run: Run) -> list[str]:
 
 def test_the_lower_limits_are_those_of_the_world_within_their_uncertainty(tmp_path: Path) -> None:
     run = acquire(mock(tmp_path, *QUICK, "limit.repetitions=14"), Silent())
-    frame, scene = run.readings().frame, drawn(1)
+    frame, scene = run.readings().frame, random_scene(1)
     truth = np.array([scene.fall_of(number) for number in range(14)])
     pulls = (frame["spin_frequency_hz"] - truth) / frame["spin_frequency_u_hz"]
     assert abs(pulls.mean()) < 0.8  # 3 standard errors of 14
@@ -68,7 +68,7 @@ def test_the_upper_limit_is_where_drag_takes_all_that_the_drive_can_give(tmp_pat
     """In the idealised world the drive gives α, the disc takes C ω^1.5, the creep the rest."""
     run = acquire(mock(tmp_path, *WEAK, "limit.repetitions=1"), Silent())
     (limit,) = run.readings().frame["spin_frequency_hz"]
-    most, c = 0.03 * 0.714 / 2 / 1.731314e-6 * 2e-4, drawn(1).constants[0]
+    most, c = 0.03 * 0.714 / 2 / 1.731314e-6 * 2e-4, random_scene(1).constants[0]
     ends = [((most - left) / c) ** (2 / 3) / 2 / math.pi for left in (2 * math.pi * 0.05, 0.0)]
     # lost is a top that is 1 Hz beside: at 0.05 Hz/s, of which most is made up for, that takes less than 2 Hz of creep
     assert ends[0] - 0.5 < limit < ends[1]
@@ -237,7 +237,7 @@ def test_an_interrupted_series_goes_on_with_the_next_top(tmp_path: Path) -> None
     run = acquire(mock(tmp_path, seed=None, resume=half.folder), Silent())
     limits = run.readings().frame["spin_frequency_hz"].tolist()
     assert limits[:2] == before
-    truth = [drawn(1).fall_of(number) for number in range(4)]
+    truth = [random_scene(1).fall_of(number) for number in range(4)]
     assert np.allclose(limits, truth, rtol=0, atol=0.25)  # 4 standard uncertainties
 
 

@@ -21,7 +21,7 @@ from levilab.runs.listing import list_runs
 from levilab.runs.run import Run
 from levilab.runs.writer import RunWriter
 from levilab.world.bench import VIRTUAL, virtual_wiring
-from levilab.world.spin_world import SpinScene, SpinWorld, drawn
+from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
 from support.acquisitions import Impatient, Silent
 from support.commands import command
 
@@ -72,7 +72,7 @@ def test_the_tape_is_recorded_raw_with_what_reads_it(tmp_path: Path) -> None:
     assert all(t.trace.codes.dtype == np.uint8 for t in traces)
     assert traces[0].trace.codes.size >= 6000
     # 30 Hz, and 0.1 Hz/s less; jitter of the tape is 2 % of a turn in the 14 of a record
-    expected = [float(SpinWorld(drawn(1), VirtualClock()).motion(np.array([t.time_s]))[0][0]) for t in traces]
+    expected = [float(SpinWorld(random_scene(1), VirtualClock()).motion(np.array([t.time_s]))[0][0]) for t in traces]
     assert [frequency(run, k) for k in range(3)] == pytest.approx(np.array(expected) / (2 * np.pi), abs=0.15)
     readings = run.readings()
     assert readings.column("record").tolist() == [1, 2, 3]
@@ -141,7 +141,7 @@ def test_a_channel_that_the_scope_does_not_have_is_refused(tmp_path: Path) -> No
         mock_trace(tmp_path, "channels = [1, 1]")
 
 
-def test_a_channel_that_shows_nothing_or_too_much_is_told(tmp_path: Path) -> None:
+def test_a_channel_that_shows_nothing_or_too_much_is_reported(tmp_path: Path) -> None:
     settings = "records = 1\nchannels = [1, 4]\nvolts_per_division = 0.1\npoints = 1000"
     run = acquire(mock_trace(tmp_path, settings, seed=1), Silent())
     texts = [event["text"] for event in run.events()]
@@ -166,7 +166,7 @@ def test_a_record_without_a_single_sample_is_kept_and_told(tmp_path: Path, monke
 
 def test_a_channel_that_another_program_turns_off_is_turned_on_again(tmp_path: Path) -> None:
     request = mock_trace(tmp_path, "records = 2\ninterval_s = 2.0", seed=1)
-    wiring = virtual_wiring(SpinWorld(drawn(1), VirtualClock()))
+    wiring = virtual_wiring(SpinWorld(random_scene(1), VirtualClock()))
 
     class Meddler(Silent):
         def reading(self, text: str, elapsed: float, remaining: float) -> None:
@@ -199,8 +199,8 @@ def watched(tmp_path: Path, message: str, scene: SpinScene | None = None) -> Run
 def test_a_drive_that_is_changed_by_hand_is_seen_after_the_record(tmp_path: Path, message: str) -> None:
     run = watched(tmp_path, message)
     assert run.count() == 3
-    told = [event["kind"] for event in run.events()]
-    assert told == ["drive on", "warning", "instrument lost", "drive on", "found again"]
+    kinds = [event["kind"] for event in run.events()]
+    assert kinds == ["drive on", "warning", "instrument lost", "drive on", "found again"]
     (warning,) = run.warnings()
     assert warning.startswith("record 1 may be of another drive: the generator was changed")
     settings = run.record.instruments["generator"]["settings_end"]
@@ -270,8 +270,8 @@ def test_what_had_come_of_a_record_when_killed_is_found_again(tmp_path: Path, mo
         (3, 12_000, None),
     ]
     np.testing.assert_array_equal(again.traces()[1].trace.codes, codes[:10_000])
-    told = [event["text"] for event in again.events() if event["kind"] == "cut short"]
-    assert told[0] == "traces.jsonl: record 2 (tape) was cut short: 10000 of its 12000 points are kept"
+    kinds = [event["text"] for event in again.events() if event["kind"] == "cut short"]
+    assert kinds[0] == "traces.jsonl: record 2 (tape) was cut short: 10000 of its 12000 points are kept"
 
 
 def test_the_generator_is_needed_only_by_a_drive(tmp_path: Path) -> None:

@@ -80,7 +80,7 @@ def test_the_table_and_the_document_tell_what_is_missing(capsys):
 
 def test_a_peer_knows_whether_its_package_is_there():
     assert all(peer.installed for peer in PEERS if peer.package == "scipy")
-    assert not Peer("nobody", "no_such_package_at_all", lambda _: iter(())).installed
+    assert not Peer("absent", "no_such_package_at_all", lambda _: iter(())).installed
 
 
 def test_the_points_of_a_peer_are_measured():
@@ -92,6 +92,6 @@ def test_the_points_of_a_peer_are_measured():
 
 
 def test_the_help_of_the_benchmark_names_the_extra(levilab):
-    told = " ".join(levilab("benchmark", "simulator", "--help").stdout.split())
-    assert "pip install 'levilab[peers]'" in told
-    assert "pip install -e '.[peers]'" in told
+    help_text = " ".join(levilab("benchmark", "simulator", "--help").stdout.split())
+    assert "pip install 'levilab[peers]'" in help_text
+    assert "pip install -e '.[peers]'" in help_text

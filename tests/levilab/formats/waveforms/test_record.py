@@ -65,7 +65,7 @@ SCOPE_FILES = {
 
 
 @pytest.mark.parametrize("name", SCOPE_FILES)
-def test_a_record_reads_the_same_whoever_wrote_it(name: str, sample_data: Path) -> None:
+def test_a_record_reads_the_same_from_every_makers_scope(name: str, sample_data: Path) -> None:
     written = np.load(sample_data / "scope-files" / "samples-4000hz.npy").astype(np.float64)
     record = waveform(sample_data / "scope-files" / name, rate=4000.0 if name.endswith(".npy") else None)
     origin, start, channel, unit = SCOPE_FILES[name]
@@ -153,7 +153,7 @@ def test_a_header_that_its_times_contradict_is_refused_with_both(write: Write) -
     assert waveform(path, rate=25000.0).step == 4e-5
 
 
-def test_a_record_shorter_than_announced_is_told(write: Write) -> None:
+def test_a_record_shorter_than_announced_is_reported(write: Write) -> None:
     assert waveform(write(siglent("1e-3", 1e-3, count=99))).warnings == (
         "data.csv: its header announces 99 samples, it holds 20",
     )
@@ -315,13 +315,13 @@ def test_a_file_larger_than_memory_is_read_in_pieces(
 
 def read_or_refused(path: Path, rate: float | None) -> Waveform | PulseTimes | None:
     """What is read, or None for a known failure of one line that names the file."""
-    told = ""
+    message = ""
     try:
         return read_record(path, rate=rate)
     except DataError as error:
-        told = str(error)
-    assert "\n" not in told
-    assert told.startswith(str(path))
+        message = str(error)
+    assert "\n" not in message
+    assert message.startswith(str(path))
     return None
 
 

@@ -136,6 +136,12 @@ def test_the_traces_of_a_run_are_read_in_volts_on_its_clock(traced: Path) -> Non
     assert save_found(ANALYSES["spin"], analysis)[0] == traced / "result.json"
 
 
+def test_a_run_that_was_killed_before_its_first_record_has_nothing_to_analyze(traced: Path) -> None:
+    (traced / "traces.jsonl").unlink()
+    with pytest.raises(DataError, match=r"holds no traces\.jsonl, so nothing was recorded; analyze another run"):
+        analyze_spins([traced], SpinOptions())
+
+
 def test_records_of_a_run_that_are_left_out_are_counted_in_a_note(traced: Path) -> None:
     channels = [{"name": "time_s", "unit": "s", "source": "a test"}]
     record = RunRecord(experiment="trace", status="running", started_utc=utc_now(), channels=channels)

@@ -218,7 +218,7 @@ def test_a_folder_without_runs_says_what_it_found(sample_data: Path, tmp_path: P
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_a_folder_that_cannot_be_written_is_told_in_one_line(sample_data: Path, tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_is_reported_in_one_line(sample_data: Path, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     analysis = analyze_spindowns([sample_data], SpinDownOptions())
     with pytest.raises(CannotWrite, match="`out`") as caught:

@@ -1,4 +1,4 @@
-"""The figure: what its axes say, that nothing hides what one is told to look for, and that it is the same each time."""
+"""The figure: what its axes say, that nothing hides what the text points at, and that it is the same each time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a spin-down's table must fulfil, and how it is told if it does not."""
+"""What a spin-down's table must fulfil, and the error if it does not."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def test_uncertainties_may_be_absent(tmp_path):
         ("0,61,.1\n1,60,.1\n2,59,-.1\n", 4, ["the uncertainty is -0.1 Hz"]),
     ],
 )
-def test_what_cannot_be_a_spin_down_is_told_with_its_line(rows, line, words, tmp_path):
+def test_what_cannot_be_a_spin_down_is_reported_with_its_line(rows, line, words, tmp_path):
     with pytest.raises(TableError) as caught:
         spin_readings(table_of(tmp_path, HEADER + rows))
     assert caught.value.line == line
@@ -48,13 +48,21 @@ def test_what_cannot_be_a_spin_down_is_told_with_its_line(rows, line, words, tmp
     assert all(word in str(caught.value) for word in words), str(caught.value)
 
 
-def test_a_missing_column_is_told_with_those_there_are(tmp_path):
+def test_a_missing_column_is_reported_with_those_there_are(tmp_path):
     with pytest.raises(TableError, match=r"spin_frequency_hz; it has 't', 'z': say `columns` = f=NAME"):
         spin_readings(table_of(tmp_path, "t,z\n0,1\n1,2\n2,3\n"))
 
 
-def test_a_run_with_too_few_readings_is_told(tmp_path):
+def test_a_run_with_too_few_readings_is_reported(tmp_path):
     path = tmp_path / "readings.csv"
     path.write_text(HEADER + "0,61,.1\n")
     with pytest.raises(TableError, match="holds 1 readings, at least 3"):
         spin_readings(read_run_readings(path))
+
+
+def test_readings_closer_than_a_turn_are_doubted(tmp_path):
+    """T [ms] above seconds; in seconds there is no doubt."""
+    rows = "0,40\n10,39\n20,38.1\n30,37.2\n"
+    for unit, said in (("ms", ["the readings lie 10 ms apart, the top needs 25.9 ms for a turn"]), ("s", [])):
+        warnings = spin_readings(table_of(tmp_path, f"T [{unit}],f [Hz]\n{rows}")).warnings
+        assert [text.partition(";")[0].partition(": ")[2] for text in warnings] == said
