@@ -268,7 +268,7 @@ def _about_power(power: Power) -> str:
     aim = f"a slope of {power.slope:g} from 1"
     if power.enough:
         return (
-            f"These points tell {aim} with a probability of {at_most(power.now)}; the smallest aim that they "
+            f"These points tell {aim} with a probability of {at_most(power.now)}; the smallest difference that they "
             f"tell in nine cases of ten is {plain(power.smallest_difference, 2)}. A range of "
             f"{plain(power.range_needed_hz, 2)} Hz, or a u of {plain(power.u_needed_hz, 2)} Hz a point, would do."
         )

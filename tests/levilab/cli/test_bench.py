@@ -15,7 +15,7 @@ from levilab.bench.config import ConfigError, InstrumentSettings, Limits, read_b
 from levilab.bench.discover import Found, driver_for_identity, identify, search
 from levilab.bench.template import bench_text
 from levilab.bench.wiring import described_wiring
-from levilab.cli.bench import _tell, bench_init
+from levilab.cli.bench import _print_served, bench_init
 from levilab.errors import NoInstrument
 from levilab.world.bench import VIRTUAL, practice_world, virtual_wiring
 from levilab.world.serve import Served
@@ -203,7 +203,7 @@ def test_no_library_and_no_bench_are_told(levilab, tmp_path):
 
 def test_beside_the_name_of_a_served_instrument_stands_what_its_link_needs(capsys):
     names = {"hislip": "TCPIP::localhost::hislip0,4881::INSTR", "socket": "TCPIP::localhost::5025::SOCKET"}
-    _tell((Served("counter", "53230A", names),))
+    _print_served((Served("counter", "53230A", names),))
     shown = capsys.readouterr().out.splitlines()
     assert shown == [
         "counter 53230A",
