@@ -111,7 +111,7 @@ def reached(way: str | None, address: str):
 
     os.environ["PYVISA_LIBRARY"] = "@py"
     with BenchServer(virtual_bus()) as server:
-        (offer,) = (offer for offer in server.offers if offer.address == OURS)
+        (offer,) = (offer for offer in server.endpoints if offer.address == OURS)
         yield offer.resources[way]
 
 

@@ -11,7 +11,7 @@ from instruments.drivers.generator.agilent_33220a import Agilent33220A
 from instruments.drivers.generator.keysight_33500b import Keysight33500B
 from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange, WrongInstrument
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.generator.agilent_33220a import Virtual33220A
 from instruments.virtual.generator.keysight_33500b import Virtual33500B
@@ -236,7 +236,7 @@ def test_each_driver_knows_its_own_model_and_not_the_others(driver, answer):
 def test_both_families_put_the_same_signal_on_the_coil(driver, device, waveform):
     address = "TCPIP0::generator.levilab::inst0::INSTR"
     virtual = device(VirtualClock())
-    transport = VisaTransport(address, library=library_for(Bus({address: virtual})))
+    transport = VisaTransport(address, library=library_for(VirtualBench({address: virtual})))
     generator = driver(transport)
     generator.identity()
     generator.prepare(waveform=waveform, frequency_hz=30.5, amplitude_vpp=12.0)

@@ -14,7 +14,7 @@ from instruments.drivers.oscilloscope.keysight_dsox import KeysightDSOX
 from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.errors import BadAnswer, SettingsLost
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.faults import Fault
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.oscilloscope.keysight_dsox import VirtualDSOX1000
@@ -27,7 +27,7 @@ def bench(make, signal):
     clock = VirtualClock()
     name = "TCPIP0::scope.levilab::inst0::INSTR"
     device = make(clock, signals={1: signal})
-    library = library_for(Bus({name: device}))
+    library = library_for(VirtualBench({name: device}))
     return device, VisaTransport(name, library=library), clock
 
 
@@ -114,7 +114,7 @@ def test_24_million_points_stream_through_the_memory_of_a_few_pieces():
 def test_pyvisa_reads_the_block_as_of_any_scope():
     device, transport, _ = bench(VirtualDSOX1000, constant(0.2))
     transport.close()
-    manager = pyvisa.ResourceManager(library_for(Bus({"GPIB0::7::INSTR": device})))
+    manager = pyvisa.ResourceManager(library_for(VirtualBench({"GPIB0::7::INSTR": device})))
     scope = manager.open_resource("GPIB0::7::INSTR")
     scope.write(":WAV:FORM WORD;UNS 1;POIN 1000")
     codes = scope.query_binary_values(":WAV:DATA?", datatype="H", is_big_endian=True, container=np.array)
@@ -130,7 +130,7 @@ def prepared(driver, make, address="TCPIP0::scope.levilab::inst0::INSTR"):
     """A scope that waits for pulses at 0.65 V, its driver, and the bus for faults."""
     clock = VirtualClock()
     device = make(clock, signals={1: pulses})
-    bus = Bus({address: device})
+    bus = VirtualBench({address: device})
     scope = driver(VisaTransport(address, library=library_for(bus)), clock=clock)
     scope.prepare(**PULSES, trigger_level_v=0.65)
     yield device, scope, bus

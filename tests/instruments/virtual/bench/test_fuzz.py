@@ -15,7 +15,7 @@ from fuzz_targets import TARGETS
 from instruments.errors import BadAnswer, InstrumentError
 from instruments.links.serial_port import SerialTransport
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.faults import FAULTS, LATE, Fault
 from instruments.virtual.bench.serial_line import benches
 from instruments.virtual.bench.session import MOST_ANSWERS
@@ -282,7 +282,7 @@ class Pair:
         self.room = hostile.Room()
         self.liar = Liar(hostile.instrument(name, self.room))
         address = ADDRESSES["serial" if way == "pyserial" else way]
-        self.bus = Bus({address: self.liar})
+        self.bus = VirtualBench({address: self.liar})
         kind = ROWS[name].driver
         line = dict(getattr(kind, "SERIAL", {})) | {"pause": 0.0}
         if way == "pyserial":
@@ -418,8 +418,8 @@ class Pairing(RuleBasedStateMachine):
 
     def come_back(self):
         """What a program does when it has lost an instrument, or another one has taken it."""
-        for hold in self.pair.bus._holds.values():
-            hold.holders.clear()
+        for client_lock in self.pair.bus._client_locks.values():
+            client_lock.holders.clear()
         self.driver.transport.reopen()
 
     @rule(

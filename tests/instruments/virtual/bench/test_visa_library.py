@@ -10,7 +10,7 @@ import pyvisa
 from pyvisa.constants import StatusCode
 
 from instruments.clock import VirtualClock
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.faults import Fault
 from instruments.virtual.bench.visa_library import LevilabVisaLibrary, library_for
 from instruments.virtual.core.device import VirtualInstrument
@@ -44,7 +44,7 @@ def manager():
 @pytest.fixture
 def blocks():
     clock = VirtualClock()
-    manager = pyvisa.ResourceManager(library_for(Bus({BLOCKS: Blocks(clock)})))
+    manager = pyvisa.ResourceManager(library_for(VirtualBench({BLOCKS: Blocks(clock)})))
     resource = manager.open_resource(BLOCKS)
     resource.clock = clock
     yield resource
@@ -73,7 +73,7 @@ def test_a_resource_opens_in_any_case(manager, address):
     ],
 )
 def test_a_resource_opens_by_every_spelling_of_its_name(plugged_in, asked_for):
-    manager = pyvisa.ResourceManager(library_for(Bus({plugged_in: Blocks(VirtualClock())})))
+    manager = pyvisa.ResourceManager(library_for(VirtualBench({plugged_in: Blocks(VirtualClock())})))
     assert manager.open_resource(asked_for).query("*OPC?").strip() == "1"
 
 
@@ -129,7 +129,7 @@ def test_a_line_end_that_is_sent_twice_or_not_at_all_makes_no_difference(manager
 
 
 def test_benches_of_their_own_know_nothing_of_each_other():
-    first, second = (library_for(Bus({BLOCKS: Blocks(VirtualClock())})) for _ in range(2))
+    first, second = (library_for(VirtualBench({BLOCKS: Blocks(VirtualClock())})) for _ in range(2))
     assert first is not second
     assert isinstance(first, LevilabVisaLibrary)
     resources = [pyvisa.ResourceManager(library).open_resource(BLOCKS) for library in (first, second)]
@@ -241,7 +241,7 @@ def test_a_resource_that_is_opened_for_oneself_alone_is_locked(blocks):
 
 
 def test_a_link_that_is_lost_is_told_in_visas_words_by_whatever_is_tried(blocks):
-    blocks.visalib.bus.faults.append(Fault("disconnected", question=r"DATA\?"))
+    blocks.visalib.bench.faults.append(Fault("disconnected", question=r"DATA\?"))
     blocks.write("DATA?")
     for act in (blocks.read_raw, blocks.read_stb, lambda: blocks.write("*CLS")):
         with pytest.raises(pyvisa.VisaIOError) as lost:

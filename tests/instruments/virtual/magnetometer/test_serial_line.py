@@ -4,7 +4,7 @@ import pytest
 import pyvisa
 from pyvisa.constants import Parity, StatusCode, StopBits
 
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.magnetometer.lakeshore_475 import Virtual475
 from support.gaussmeters import PORT, meter
@@ -12,7 +12,7 @@ from support.gaussmeters import PORT, meter
 
 def resource(device, **settings):
     line = {"baud_rate": 57600, "data_bits": 7, "parity": Parity.odd, "stop_bits": StopBits.one} | settings
-    manager = pyvisa.ResourceManager(library_for(Bus({PORT: device})))
+    manager = pyvisa.ResourceManager(library_for(VirtualBench({PORT: device})))
     return manager.open_resource(PORT, read_termination="\r\n", write_termination="\n", **line)
 
 

@@ -11,7 +11,7 @@ from pyvisa.constants import StatusCode
 from pyvisa_py.protocols import vxi11 as pyvisa_vxi11
 from pyvisa_py.tcpip import Vxi11CoreClient
 
-from instruments.virtual.servers import station
+from instruments.virtual.servers import clients
 from instruments.virtual.servers.rpc import read_record
 from support.served import AT_MOST, rpc, until
 
@@ -125,7 +125,7 @@ def test_a_record_without_end_is_cut_off(served):
 
 def test_links_are_destroyed_with_their_connection(served):
     client = served.vxi11()
-    for _ in range(station.MOST_CLIENTS):
+    for _ in range(clients.MOST_CLIENTS):
         created(client)
     assert client.create_link(1, False, 0, "inst0")[0] == 9
     client.close()
