@@ -41,7 +41,7 @@ class Box(ScpiInstrument):
     level = Setting("LEV", float, unit="V", low=-5.0, high=5.0)
 
     def reading(self):
-        return self.measured("READ?")
+        return self.read_number("READ?")
 
     def data(self):
         return self.transport.query_block("DATA?")

@@ -23,7 +23,7 @@ from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.faults import FAULTS, Fault
 from instruments.virtual.bench.serial_line import benches
 from instruments.virtual.core.device import VirtualInstrument
-from instruments.virtual.core.line import LineSettings, carried
+from instruments.virtual.core.line import LineSettings, received_as
 from instruments.virtual.core.rows import Ask
 from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
 from support.waiting import HANG_GUARD_S as AT_MOST
@@ -289,7 +289,7 @@ LINES = st.builds(
 @given(st.binary(max_size=64), LINES)
 def test_between_ends_set_alike_bytes_arrive_as_they_were_sent(data, line):
     mask = (1 << line.data_bits) - 1
-    assert carried(data, line, line) == bytes(byte & mask for byte in data)
+    assert received_as(data, line, line) == bytes(byte & mask for byte in data)
 
 
 @given(st.binary(max_size=64), LINES)
@@ -297,16 +297,16 @@ def test_more_stop_bits_than_needed_change_nothing(data, line):
     # the samples of a receiver at twice the rate would fall elsewhere: this goes through the bits
     twice = LineSettings(line.baud_rate, line.data_bits, line.parity, 2.0)
     other = "O" if line.parity == "E" else "E"
-    assert carried(data, twice, line) == carried(data, line, line)
+    assert received_as(data, twice, line) == received_as(data, line, line)
     if line.parity != "N":
         unchecked = LineSettings(line.baud_rate, line.data_bits, other, 1.0)
-        assert carried(data, line, unchecked, checked=False) == carried(data, line, line)
+        assert received_as(data, line, unchecked, checked=False) == received_as(data, line, line)
 
 
 @given(st.binary(max_size=64), LINES, LINES)
 def test_garbage_is_the_same_each_time_and_no_longer_than_time_allows(data, sender, receiver):
-    heard = carried(data, sender, receiver)
-    assert heard == carried(data, sender, receiver)
+    heard = received_as(data, sender, receiver)
+    assert heard == received_as(data, sender, receiver)
     shortest = (1 + receiver.data_bits + (receiver.parity != "N") + 0.5) / receiver.baud_rate
     assert len(heard) <= sender.duration(len(data)) / shortest + 1
     assert all(byte < 1 << receiver.data_bits for byte in heard)
@@ -314,7 +314,7 @@ def test_garbage_is_the_same_each_time_and_no_longer_than_time_allows(data, send
 
 def test_what_a_program_set_to_8n1_hears_of_a_425():
     # as seen by many who forgot the parity: every other letter has its highest bit set
-    heard = carried(b"LSCI,MODEL425", LineSettings(57600, 7, "O"), LineSettings(57600, 8, "N"))
+    heard = received_as(b"LSCI,MODEL425", LineSettings(57600, 7, "O"), LineSettings(57600, 8, "N"))
     assert heard == b"L\xd3CI,\xcdO\xc4EL42\xb5"
 
 
@@ -407,7 +407,12 @@ def failing(monkeypatch, error):
         ("win32", serial.SerialException("PermissionError(13, 'Access is denied.')"), Occupied, "another program"),
         ("win32", serial.SerialException("FileNotFoundError(2, ...)"), NotConnected, "serial ports of this computer"),
         ("linux", ValueError("no such\nbaud rate"), NotConnected, "no such baud rate"),
-        ("linux", serial.SerialException(errno.EACCES, "denied"), NotConnected, "ask whoever runs this computer"),
+        (
+            "linux",
+            serial.SerialException(errno.EACCES, "denied"),
+            NotConnected,
+            "ask the administrator of this computer",
+        ),
     ],
 )
 def test_a_port_that_does_not_open_is_told_with_what_to_try(monkeypatch, platform, error, told, words):

@@ -207,7 +207,7 @@ def test_a_key_of_the_front_panel_is_told_instead_of_a_trace_or_of_a_dark_signal
         def start_and_be_changed():
             start()
             device.settings[setting] = value
-            device.changed(setting)  # what was begun begins anew
+            device.on_change(setting)  # what was begun begins anew
 
         scope._start = start_and_be_changed
         with pytest.raises(SettingsLost) as lost:
