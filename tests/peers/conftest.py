@@ -25,7 +25,7 @@ ADDRESS, LINE = "TCPIP0::there.levilab::inst0::INSTR", "ASRLthere::INSTR"
 #: ("socket", too), and pyserial's URL.
 WAYS = ["@levilab", "socket", "hislip", "vxi11"]
 
-#: A bare socket has no ends: both sides must be told.
+#: A bare socket does not mark ends of messages: both sides need the terminator.
 _ENDS = {"read_termination": "\n", "write_termination": "\n"}
 
 
@@ -41,7 +41,7 @@ def way(request):
 
 @pytest.fixture
 def opened(way):
-    """Plugs an instrument in and opens somebody's driver for it; unplugs it after the test."""
+    """Plugs an instrument in and opens a foreign driver for it; unplugs it after the test."""
     with contextlib.ExitStack() as stack:
 
         def open_driver(driver, device, **options):
@@ -56,7 +56,7 @@ def opened(way):
 
 @contextlib.contextmanager
 def _reached(bench, way):
-    """The resource name of the one instrument of a bus, and what else PyMeasure must be told."""
+    """The resource name of the one instrument of a bench, and the other arguments that PyMeasure needs."""
     (address,) = bench.instruments
     if way == "@levilab":
         library = library_for(bench)

@@ -116,7 +116,7 @@ def reached(way: str | None, address: str):
 
 
 def main() -> int:
-    """Run, compare, tell."""
+    """Run the suite, compare, and print the result."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("source", type=Path, help="PyMeasure's unpacked source distribution")
     parser.add_argument("--device-address", default=OURS)
@@ -126,8 +126,8 @@ def main() -> int:
         outcomes, excused = run(wanted.source.resolve(), address), excuses()
     wrong = complaints(outcomes, excused)
     passed = sum(how == "passed" for how in outcomes.values())
-    told = [f"{passed} of {len(outcomes)} cases pass, {len(excused)} are excused", *wrong]
-    sys.stdout.write("\n".join(told) + "\n")
+    summary = [f"{passed} of {len(outcomes)} cases pass, {len(excused)} are excused", *wrong]
+    sys.stdout.write("\n".join(summary) + "\n")
     return 1 if wrong else 0
 
 

@@ -105,7 +105,7 @@ class ReciprocalCounter(ScpiInstrument):
                 self.command(command)
             yield
         except BaseException:  # Ctrl-C as well
-            with contextlib.suppress(InstrumentError):  # the first error tells more
+            with contextlib.suppress(InstrumentError):  # the first error says more
                 self._give_up()
                 self._end_series()
             raise
@@ -122,7 +122,7 @@ class ReciprocalCounter(ScpiInstrument):
             self._end_series()
 
     def _give_up(self) -> None:
-        """Stop a measurement that does not end, and let the link tell if it is dead."""
+        """Stop a measurement that does not end, and raise the link's error where it is dead."""
         self.transport.clear()
         self.forget_errors()  # a query cut off leaves −410 behind
         self.command("ABOR")

@@ -64,7 +64,7 @@ _MEASUREMENTS = {
     "NEDGes": "NEDGES",
     "COUNter": "FREQUENCY",
 }
-#: Told as percentages.
+#: Measurements whose answers are percentages.
 _PERCENT = {"PDUTY", "NDUTY", "OVERSHOOT", "PRESHOOT"}
 #: Words before the source that say over what is measured.
 _INTERVALS = ("CYCLe", "DISPlay", "AC", "DC")

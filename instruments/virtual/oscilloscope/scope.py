@@ -1,4 +1,4 @@
-"""What the virtual oscilloscopes have in common: their setup, and what they tell of their record.
+"""The base of the virtual oscilloscopes: their setup, and the answers about their record.
 
 Acquiring is a matter of its own, see acquisition.py; the record is in record.py.
 """

@@ -1,4 +1,4 @@
-"""Faults of links and instruments: each is told as what it is, and the next question gets its own answer."""
+"""Faults of links and instruments: each raises the error that names it, and the next question gets its own answer."""
 
 import contextlib
 
@@ -82,12 +82,12 @@ def test_every_fault_is_tried():
 
 
 @pytest.mark.parametrize("what", FAULTS)
-def test_a_fault_is_told_as_what_it_is_and_the_next_question_gets_its_own_answer(box, what):
+def test_a_fault_raises_its_error_and_the_next_question_gets_its_answer(box, what):
     box.bench.faults.append(Fault(what, question=r"READ\?"))
     expected = READING[what]
     if isinstance(expected, tuple):
-        error, told = expected
-        with pytest.raises(error, match=told) as caught:
+        error, message = expected
+        with pytest.raises(error, match=message) as caught:
             box.reading()
         assert caught.value.address == box.transport.address
         assert "\n" not in str(caught.value)
@@ -112,7 +112,7 @@ def release(box):
 
 
 @pytest.mark.parametrize(
-    ("what", "error", "told"),
+    ("what", "error", "message"),
     [
         ("no answer", NoAnswer, "no answer"),
         ("late answer", NoAnswer, "no answer"),
@@ -124,9 +124,9 @@ def release(box):
         ("9.91E37", BadAnswer, "expected a definite-length block"),
     ],
 )
-def test_a_broken_block_is_refused_and_what_is_left_of_it_forgotten(box, what, error, told):
+def test_a_broken_block_is_refused_and_what_is_left_of_it_forgotten(box, what, error, message):
     box.bench.faults.append(Fault(what, question=r"DATA\?"))
-    with pytest.raises(error, match=told):
+    with pytest.raises(error, match=message):
         box.data()
     box.clock.sleep(2 * LATE)
     if what == "disconnected":
@@ -278,9 +278,9 @@ def test_over_a_server_a_fault_is_told_as_what_it_is_and_the_next_question_gets_
         box.bench.faults.append(Fault(what, question=r"READ\?"))
         expected = SERVED.get((way, what), READING[what])
         if isinstance(expected, tuple):
-            error, told = expected
+            error, message = expected
             box.transport.in_vain = error is NoAnswer
-            with pytest.raises(error, match=told.partition(" within")[0]) as caught:
+            with pytest.raises(error, match=message.partition(" within")[0]) as caught:
                 box.reading()
             assert caught.value.address == box.transport.address
         else:

@@ -398,7 +398,7 @@ def failing(monkeypatch, error):
 
 
 @pytest.mark.parametrize(
-    ("platform", "error", "told", "words"),
+    ("platform", "error", "expected", "words"),
     [
         ("linux", serial.SerialException(errno.EBUSY, "busy"), Occupied, "another program"),
         ("linux", serial.SerialException(errno.EAGAIN, "exclusively"), Occupied, "another program"),
@@ -415,10 +415,10 @@ def failing(monkeypatch, error):
         ),
     ],
 )
-def test_a_port_that_does_not_open_is_told_with_what_to_try(monkeypatch, platform, error, told, words):
+def test_the_error_of_a_port_that_does_not_open_has_advice(monkeypatch, platform, error, expected, words):
     failing(monkeypatch, error)
     monkeypatch.setattr(sys, "platform", platform)
-    with pytest.raises(told, match=words) as missing:
+    with pytest.raises(expected, match=words) as missing:
         SerialTransport("/dev/ttyUSB7")
     assert missing.value.address == "/dev/ttyUSB7"
     assert "\n" not in str(missing.value)

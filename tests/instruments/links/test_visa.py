@@ -315,7 +315,7 @@ def test_a_link_without_locks_is_no_trouble_and_one_that_breaks_is(bench, monkey
     if error is None:
         transport.lock()
     else:
-        with pytest.raises(error) as told:
+        with pytest.raises(error) as caught:
             transport.lock()
-        assert type(told.value) is error
+        assert type(caught.value) is error
     transport.close()

@@ -32,7 +32,7 @@ def test_an_offset_is_set_once_there_is_room_for_it():
 
 # --- off ---
 
-#: What is sent before anything is asked, and the question who it is, where nobody has asked it before.
+#: The messages before the first question, and the identity question, where it was not asked before.
 OFF = (("*CLS", None), ("OUTP1 OFF", None))
 ONE, TWO = (("*IDN?", f"Agilent Technologies,{model},MY52812345,3.05") for model in ("33521A", "33522B"))
 
@@ -54,10 +54,10 @@ def test_an_output_that_stays_on_is_an_error(answers):
     seen = [(f"OUTP{k}?", answer) for k, answer in enumerate(answers, start=1) if answer]
     with (
         conversation(Keysight33500B, *OFF, TWO, ("OUTP2 OFF", None), *seen) as generator,
-        pytest.raises(CommandRefused, match="still on") as told,
+        pytest.raises(CommandRefused, match="still on") as caught,
     ):
         generator.off()
-    assert told.value.command == f"OUTP{len(seen)} OFF"
+    assert caught.value.command == f"OUTP{len(seen)} OFF"
 
 
 def test_an_answer_that_makes_no_sense_is_not_taken_for_off():
@@ -100,7 +100,7 @@ FORBIDDEN = [
     ("frequency", float("nan"), "drive_frequency_hz"),
     ("load", 50.0, "drive_amplitude_vpp"),  # twice the voltage that is displayed would be there
     ("load", float("nan"), "drive_amplitude_vpp"),
-    ("output", True, "drive_amplitude_vpp"),  # nobody knows what stands there
+    ("output", True, "drive_amplitude_vpp"),  # its value is not known
 ]
 
 

@@ -320,7 +320,7 @@ def test_a_driver_whose_instrument_answers_anything_gives_a_value_or_an_instrume
                     value = act(pair.driver)
                     assert is_right(value), (call, value)
             pair.liar.replies.clear()
-            pair.room.clock.sleep(MOST_LATE)  # what is late has come, and nobody may take it for an answer
+            pair.room.clock.sleep(MOST_LATE)  # late answers have come, and must not count as answers
             measure(name, pair.driver)
         finally:
             pair.close()

@@ -2,7 +2,7 @@
 
 import pytest
 
-from support.scopes import KEYSIGHT_READY, keysight, pulses, told
+from support.scopes import KEYSIGHT_READY, keysight, pulses, configure
 from support.wire import ask, cable, errors, received, send
 
 
@@ -33,7 +33,7 @@ def test_the_operation_register_tells_running_and_waiting():
     device.clock.sleep(1.0)
     assert ask(device, ":OPER:COND?") == "+40"
     assert [ask(device, ":AER?"), ask(device, ":AER?")] == ["+1", "+0"]
-    told(device, ":STOP")
+    configure(device, ":STOP")
     assert ask(device, ":OPER:COND?") == "+0"
 
 
