@@ -69,7 +69,7 @@ class Fit:
         return _polynomial(slopes, (times - self.centre) / self.half)
 
     def frequency_and_chirp(self) -> tuple[Estimate, Estimate, float]:
-        """Frequency and slope where they are independent, and that time."""
+        """Frequency and slope where they are independent, and that time; with a bend, where slope and bend are."""
         frequency, chirp, away = _independent(self.coefficients, self.covariance, self.half)
         return frequency, chirp, self.centre + away
 
@@ -166,15 +166,14 @@ def median(values: Array) -> float:
 
 
 def _independent(coefficients: Array, covariance: Array, half: float) -> tuple[Estimate, Estimate, float]:
-    u, size = 0.0, coefficients.size
-    for _ in range(5):  # with a third degree the slope at the time changes with the time
-        d1, d2 = _derivatives(u, size)
+    if coefficients.size < 4:
+        d1, d2 = _derivatives(0.0, coefficients.size)
         against = covariance @ d2
-        together, slope = float(d1 @ against), float(d2 @ against)
-        step = together / slope if slope > 0 else 0.0
-        u = min(max(u - step, -1.0), 1.0)
-        if abs(step) < 1e-12 or size < 4:
-            break
+        slope = float(d2 @ against)
+        u = -float(d1 @ against) / slope if slope > 0 else 0.0
+    else:  # where the slope and its bend are independent: frequency and slope are so at three times, far apart
+        u = -float(covariance[2, 3] / covariance[3, 3]) / 3 if covariance[3, 3] > 0 else 0.0
+    u = min(max(u, -1.0), 1.0)
     return *_at(coefficients, covariance, half, u), u * half
 
 

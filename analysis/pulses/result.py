@@ -35,7 +35,7 @@ class SpinFrequency:
 
     Attributes:
         frequency: at the reference time [Hz].
-        chirp: its slope there [Hz/s]; independent of the frequency, nearly so where there is a bend.
+        chirp: its slope there [Hz/s]; independent of the frequency, or of the bend where there is one.
         phase: there [turns], from 0 to 1; the middle of a pulse passes at 0.
         reference_time: [s]; the middle of the record, moved a little where pulses are missing on one side.
         method: that found it.
@@ -85,15 +85,33 @@ class SpinFrequency:
     def under_drag(self) -> SpinFrequency:
         """The same for a top whose slope may change as air drag or an even ramp has it.
 
-        A parabola of turns through times over a span T, where the slope changes by ν″ a second, gives a frequency in
-        the middle that is ν″T²/40 too high.  That change is expected from the slope, ν″ = (1.5 ± 0.5) ν′²/ν for a top
-        that gets slower, and is taken off; where a third degree was fitted nothing is left to be done.
+        Under ν′ = −cνⁿ the slope changes by ν″ = nν′²/ν a second, and ν″ by ν‴ = n(2n − 1)ν′³/ν².  A parabola of turns
+        through times over a span T gives a frequency in the middle that is ν″T²/40 too high; with a third degree
+        nothing of that is left.  Either of them gives a slope that is ν‴T²/56 too high.  Both are taken off, with
+        n = 1.5 ± 0.5 for a top that gets slower, or with the bend that was fitted where it is one of a drag.
         """
         frequency, chirp = self.frequency, self.chirp
-        if self.bend or not frequency.value or not chirp.value:
+        if not frequency.value or not chirp.value:
             return self
-        span = (self.pulses + self.missing - 1) / frequency.value
-        most = chirp.value**2 / frequency.value * span**2 / 40
-        change, u_change = (UNDER_DRAG, UNDER_DRAG_U) if chirp.value < 0 else (UNDER_DRIVE, UNDER_DRIVE_U)
-        u = None if frequency.u is None else math.hypot(frequency.u, u_change * most)
-        return replace(self, frequency=Estimate(frequency.value - change * most, u, frequency.unit))
+        span2 = ((self.pulses + self.missing - 1) / frequency.value) ** 2
+        second, third = chirp.value**2 / frequency.value, chirp.value**3 / frequency.value**2
+        n, u_n = (UNDER_DRAG, UNDER_DRAG_U) if chirp.value < 0 else (UNDER_DRIVE, UNDER_DRIVE_U)
+        if self.bend is None:
+            frequency = _less(frequency, n * second * span2 / 40, u_n * second * span2 / 40)
+        else:
+            assert self.bend.value is not None
+            fitted, u_fitted = self.bend.value / second, (self.bend.u or 0.0) / second
+            if abs(fitted - n) > 3 * math.hypot(u_n, u_fitted):
+                return self
+            share = u_n**2 / (u_n**2 + u_fitted**2)
+            n, u_n = n + share * (fitted - n), math.sqrt(1 - share) * u_n
+        most = third * span2 / 56
+        chirp = _less(chirp, n * (2 * n - 1) * most, abs(4 * n - 1) * u_n * most)
+        return replace(self, frequency=frequency, chirp=chirp)
+
+
+def _less(estimate: Estimate, bias: float, u_bias: float) -> Estimate:
+    """An estimate with a bias taken off, and its uncertainty added."""
+    assert estimate.value is not None
+    u = None if estimate.u is None else math.hypot(estimate.u, u_bias)
+    return Estimate(estimate.value - bias, u, estimate.unit)

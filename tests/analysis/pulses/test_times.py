@@ -138,3 +138,22 @@ def test_a_slope_that_changes_as_under_drag_is_allowed_for(power):
     assert found.frequency.u == pytest.approx(0.5 * slope**2 / spin * 16 / 40, rel=0.05)  # 0.5 ν′²/ν T²/40
     assert abs(found.frequency.value - truth) < 2 * found.frequency.u
     assert abs(plain.frequency.value - truth) == pytest.approx(change * 16 / 40, abs=2e-6)
+
+
+@pytest.mark.parametrize(("power", "degree"), [(1.25, 2), (1.25, 3), (1.5, 2), (1.5, 3), (1.75, 3)])
+def test_the_chirp_under_drag_allows_for_how_the_bend_changes(power, degree):
+    """Pulses under ν′ = −cνⁿ in closed form: dφ/dν = −ν^(1 − n)/c.  A fit alone gives the slope ν‴T²/56 too high."""
+    first, slope = 30.0, -0.3
+    c = -slope / first**power
+    turns = np.arange(300)
+    spins = (first ** (2 - power) - c * (2 - power) * turns) ** (1 / (2 - power))
+    times = (spins ** (1 - power) - first ** (1 - power)) / (c * (power - 1))
+    plain = spin_of_times(times + np.random.default_rng(2).normal(0, 1e-8, times.size), degree=degree)
+    found = plain.under_drag()
+    spin = (first ** (1 - power) + c * (power - 1) * found.reference_time) ** (1 / (1 - power))
+    truth = -c * spin**power
+    bias = power * (2 * power - 1) * truth**3 / spin**2 * times[-1] ** 2 / 56
+    if degree == 3:  # with a parabola the bend, too, moves the slope a little, as the pulses are not even in time
+        assert plain.chirp.value - truth == pytest.approx(bias, rel=0.1)
+        assert found.chirp.value == pytest.approx(truth, abs=0.1 * abs(bias))
+    assert abs(found.chirp.value - truth) < 3 * found.chirp.u

@@ -39,5 +39,5 @@ def test_a_misspelt_command_below_a_stand_in_gets_its_suggestion(tmp_path: Path)
 
 def test_a_wrong_value_is_refused_in_plain_words(tmp_path: Path) -> None:
     said = command("bench", "serve", "--speed", "fast", cwd=tmp_path).err
-    assert "'--speed': a number is expected" in said
+    assert "'--speed': 'fast': a number is expected" in said
     assert "Input should" not in said
