@@ -1,4 +1,4 @@
-"""What the readings say about the laws, in words.
+"""The verdict of the readings about the laws, in words.
 
 A law is excluded by a fit that is worse, never by the number of its constants: a law that fits as well with more of
 them is only more than is needed.
@@ -23,7 +23,7 @@ _SIMPLE = ("stokes", "newton", "disc")
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the readings say; every law stands in one of the four lists.
+    """The verdict; every law is in one of the four lists.
 
     Attributes:
         best: name of the law with the smallest criterion.
@@ -171,7 +171,7 @@ def _about_needless(needless: Sequence[str], best: str, exponent: Estimate | Non
 
 
 def _in_words(exponent: Estimate | None) -> str:
-    """As n = 1.507 ± 0.006."""
+    """An exponent as n = 1.507 ± 0.006."""
     if exponent is None or exponent.value is None or not exponent.u:
         return "of whatever exponent"
     return f"n = {_value(exponent)}"

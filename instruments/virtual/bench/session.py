@@ -37,7 +37,7 @@ class LinkLost(Exception):
 class ClientLock:
     """A lock on an instrument, held by one client alone or by all that know its key.
 
-    >>> hold = Hold()
+    >>> client_lock = ClientLock()
     >>> client_lock.acquire("me", None), client_lock.acquire("you", None)
     (True, False)
     >>> client_lock.release("me")

@@ -5,7 +5,7 @@ import struct
 import numpy as np
 import pytest
 
-from support.scopes import block, constant, keysight, noisy, pulses, rigol, rigol_stopped, rigol_volts, configure
+from support.scopes import block, configure, constant, keysight, noisy, pulses, rigol, rigol_stopped, rigol_volts
 from support.wire import ask, errors, received, send
 
 

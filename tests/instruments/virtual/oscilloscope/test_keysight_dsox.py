@@ -2,7 +2,7 @@
 
 import pytest
 
-from support.scopes import KEYSIGHT_READY, keysight, pulses, configure
+from support.scopes import KEYSIGHT_READY, configure, keysight, pulses
 from support.wire import ask, cable, errors, received, send
 
 

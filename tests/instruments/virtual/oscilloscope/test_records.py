@@ -7,13 +7,13 @@ from support.scopes import (
     KEYSIGHT_READY,
     RIGOL_READY,
     block,
+    configure,
     keysight,
     once,
     pulses,
     rigol,
     rigol_stopped,
     rigol_volts,
-    configure,
 )
 from support.wire import ask, errors
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from support.scopes import KEYSIGHT_READY, block, keysight, pulses, rigol, configure
+from support.scopes import KEYSIGHT_READY, block, configure, keysight, pulses, rigol
 from support.wire import ask, errors, send
 
 
