@@ -147,7 +147,7 @@ def test_a_block_is_read_whole_however_it_comes(box, what):
     assert box.data() == DATA
 
 
-def test_an_error_queue_that_overflowed_is_told_with_its_first_entries_and_is_empty_afterwards(box):
+def test_a_full_error_queue_raises_its_first_entries_and_is_emptied(box):
     box.bench.faults.append(Fault("error queue overflow", question=r"READ\?"))
     assert box.reading() == 25.0
     with pytest.raises(CommandRefused, match=r"Undefined header.* and 16 more") as refused:
@@ -158,7 +158,7 @@ def test_an_error_queue_that_overflowed_is_told_with_its_first_entries_and_is_em
     assert box.level == 2.0
 
 
-def test_an_error_that_stood_in_the_queue_before_a_reading_is_told_with_it(box):
+def test_an_error_that_stood_in_the_queue_is_raised_with_a_reading(box):
     box.transport.write("NONSENSE")
     with pytest.raises(CommandRefused, match=r"READ.*Undefined header"):
         box.reading()
@@ -267,7 +267,7 @@ def served_box(way):
 
 @pytest.mark.parametrize("what", FAULTS)
 @pytest.mark.parametrize("way", ["socket", "hislip", "vxi11"])
-def test_over_a_server_a_fault_is_told_as_what_it_is_and_the_next_question_gets_its_own_answer(way, what, monkeypatch):
+def test_a_fault_over_a_server_raises_and_the_next_answer_is_right(way, what, monkeypatch):
     monkeypatch.setattr("instruments.virtual.servers.hislip.FIRST_WORDS", AT_MOST)  # a busy machine delays the client
     monkeypatch.setattr("instruments.virtual.servers.hislip.SECOND_CHANNEL", AT_MOST)
     if what in LOST:  # pyvisa-py looks until its time-out for more on a connection that has ended, and at its farewell

@@ -93,7 +93,7 @@ def test_the_driver_reads_the_field_through_the_port(bench):
     magnetometer.close()
 
 
-def test_silence_is_told_with_what_to_try_and_costs_virtual_time_only(slow, clock):
+def test_silence_raises_with_advice_and_costs_virtual_time_only(slow, clock):
     slow.timeout = 3600.0
     with pytest.raises(NoAnswer, match="parity") as silence:
         slow.query("FOO?")
@@ -161,7 +161,7 @@ def test_an_interrupted_wait_leaves_no_answer_for_the_next_question(slow, clock,
     assert slow.query("LIST?") == "1,2,1,1,1"
 
 
-def test_an_answer_that_is_no_text_is_told_and_forgotten(slow):
+def test_an_answer_that_is_no_text_raises_and_is_forgotten(slow):
     with pytest.raises(BadAnswer, match="plain text") as bad:
         slow.query("BIN?")
     assert bad.value.question == "BIN?"
@@ -174,7 +174,7 @@ def test_a_block_of_any_bytes_comes_whole(slow):
 
 
 @pytest.mark.parametrize(("question", "error"), [("LIST?", BadAnswer), ("CUT?", BadAnswer), ("FOO?", NoAnswer)])
-def test_what_is_no_block_is_told_and_forgotten(slow, question, error):
+def test_what_is_no_block_raises_and_is_forgotten(slow, question, error):
     with pytest.raises(error) as bad:
         slow.query_block(question)
     assert bad.value.question == question
@@ -259,7 +259,7 @@ def test_a_port_that_another_program_has_taken_is_occupied(bench):
         ({"baud_rate": 115200}, NoAnswer),
     ],
 )
-def test_wrong_settings_are_told_each_time_with_a_hint(bench, wrong, error):
+def test_wrong_settings_raise_each_time_with_a_hint(bench, wrong, error):
     with contextlib.closing(SerialTransport(METER, **(LINE | wrong))) as transport:
         for _ in range(2):
             with pytest.raises(error, match="parity"):
@@ -272,7 +272,7 @@ def test_a_parity_that_does_not_exist_is_refused():
 
 
 @pytest.mark.parametrize("wrong", [{"data_bits": 9}, {"stop_bits": 3}, {"baud_rate": -1}])
-def test_settings_that_no_port_has_are_told(bench, wrong):
+def test_settings_that_no_port_has_raise(bench, wrong):
     with pytest.raises(NotConnected, match="cannot be opened"):
         SerialTransport(METER, **(LINE | wrong))
 
@@ -425,7 +425,7 @@ def test_the_error_of_a_port_that_does_not_open_has_advice(monkeypatch, platform
 
 
 @pytest.mark.skipif(os.name != "posix", reason="groups")
-def test_who_may_not_use_a_port_is_told_its_group(monkeypatch, tmp_path):
+def test_the_error_of_a_forbidden_port_names_its_group(monkeypatch, tmp_path):
     import grp
 
     port = tmp_path / "ttyUSB0"
@@ -486,7 +486,7 @@ def test_a_program_with_nothing_but_pyserial(bench):
     assert not port.is_open
 
 
-def test_a_program_that_would_wait_for_ever_is_told_so(bench):
+def test_a_read_that_would_wait_for_ever_raises(bench):
     with serial.serial_for_url(SLOW) as port:
         port.write(b"SLOW?\n")
         assert port.read(5) == b"slow\n"

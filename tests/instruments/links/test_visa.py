@@ -54,7 +54,7 @@ def test_a_question_is_answered_without_its_line_end(bench):
     assert VisaTransport(ADDRESS, library=library_for(bench)).query("*IDN?") == IDENTITY
 
 
-def test_silence_is_told_with_question_and_timeout_and_costs_virtual_time_only(bench, clock):
+def test_silence_raises_with_its_question_and_costs_virtual_time_only(bench, clock):
     transport = VisaTransport(ADDRESS, library=library_for(bench), timeout=3600.0)
     with pytest.raises(NoAnswer) as silence:
         transport.query("FOO?")
@@ -102,7 +102,7 @@ def test_an_interrupted_wait_leaves_no_answer_for_the_next_question(bench, clock
     assert transport.query("*IDN?") == IDENTITY
 
 
-def test_an_answer_that_is_no_text_is_told_and_forgotten(bench):
+def test_an_answer_that_is_no_text_raises_and_is_forgotten(bench):
     transport = VisaTransport(ADDRESS, library=library_for(bench))
     with pytest.raises(BadAnswer, match="expected plain text") as bad:
         transport.query("BIN?")
@@ -111,7 +111,7 @@ def test_an_answer_that_is_no_text_is_told_and_forgotten(bench):
 
 
 @pytest.mark.parametrize("address", ["TCPIP0::nobody.levilab::inst0::INSTR", "no resource name at all", ""])
-def test_an_address_where_nothing_is_is_told_in_one_line(bench, address):
+def test_an_address_where_nothing_is_raises_in_one_line(bench, address):
     with pytest.raises(NotConnected) as missing:
         VisaTransport(address, library=library_for(bench))
     assert missing.value.address == address
@@ -119,12 +119,12 @@ def test_an_address_where_nothing_is_is_told_in_one_line(bench, address):
     assert "check the address" in str(missing.value)
 
 
-def test_an_unknown_library_is_told_as_ours():
+def test_an_unknown_library_raises_our_error():
     with pytest.raises(NotConnected, match="nolibrary"):
         VisaTransport(ADDRESS, library="@nolibrary")
 
 
-def test_whatever_a_library_raises_on_opening_is_told_as_ours(bench):
+def test_whatever_a_library_raises_on_opening_becomes_our_error(bench):
     # pyvisa-py raises plain Exception for a host that cannot be reached
     def unreachable(*_, **__):
         raise Exception("could not connect:\nno route")  # noqa: TRY002
@@ -133,7 +133,7 @@ def test_whatever_a_library_raises_on_opening_is_told_as_ours(bench):
         VisaTransport(ADDRESS, library=library_with(bench, open=unreachable))
 
 
-def test_a_link_that_breaks_is_told_with_the_question(bench):
+def test_a_link_that_breaks_raises_with_the_question(bench):
     def broken(self, session, data):
         return 0, self.handle_return_value(session, StatusCode.error_connection_lost)
 

@@ -119,7 +119,7 @@ def test_a_refused_step_of_the_preparation_ends_it():
         counter.prepare(gate_s=1.0, trigger_level_v=0.6)
 
 
-def test_an_error_that_waits_is_told_before_a_number_is_believed():
+def test_an_error_that_waits_is_raised_before_a_number_is_believed():
     waiting = [("SYST:ERR?", '-222,"Data out of range"'), NO_ERROR]
     with conversation(Keysight53230A, *waiting) as counter, pytest.raises(CommandRefused, match=r"READ\?.*-222"):
         counter.frequency()

@@ -156,7 +156,7 @@ def test_without_new_limits_what_was_prepared_goes_on():
         generator.output = True
 
 
-def test_what_the_generator_itself_finds_wrong_is_told():
+def test_what_the_generator_itself_finds_wrong_raises():
     refused = [("VOLT 10.0", None), ("SYST:ERR?", '-222,"Data out of range;value clipped to upper limit"'), NO_ERROR]
     with conversation(Keysight33500B, *refused) as generator, pytest.raises(CommandRefused, match="clipped"):
         generator.amplitude = 10.0
@@ -196,7 +196,7 @@ def test_a_setting_of_the_older_generator_is_sent_and_asked_for(name, value, sen
         assert getattr(generator, name) == value
 
 
-def test_the_older_generators_settings_are_all_told_with_their_units():
+def test_the_older_generators_settings_all_have_their_units():
     with conversation(
         Agilent33220A, *((sent.split()[0] + "?", answer) for _, _, sent, answer in WIRE_33220A)
     ) as generator:

@@ -17,7 +17,7 @@ DRIVERS = [(LakeShore425, Virtual425, "425"), (LakeShore475, Virtual475, "475"),
 
 
 @pytest.mark.parametrize(("driver", "kind", "model"), DRIVERS)
-def test_the_drivers_measure_zero_and_tell_an_overload(driver, kind, model):
+def test_the_drivers_measure_zero_and_notice_an_overload(driver, kind, model):
     field = [0.0]
     options = {} if kind is Virtual425 else {"identity": f"LSCI,MODEL{model},VIRTUAL,01012020"}
     device = kind(VirtualClock(), flux_density=lambda _: field[0], zero_error=5e-6, **options)

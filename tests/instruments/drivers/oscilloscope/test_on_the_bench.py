@@ -82,7 +82,7 @@ def test_with_sweep_auto_the_driver_shows_what_there_is(driver, make):
 
 
 @BOTH
-def test_the_settings_are_told_with_their_units(driver, make):
+def test_the_settings_have_their_units(driver, make):
     _, transport, clock = bench(make, pulses)
     scope = driver(transport, clock=clock)
     scope.prepare(**PULSES, trigger_level_v=0.65)
@@ -174,7 +174,7 @@ def test_a_reset_at_any_time_gives_no_trace(driver, make, how, question, after):
 
 
 @BOTH
-def test_a_reset_during_the_preparation_is_told_by_it(driver, make):
+def test_a_reset_during_the_preparation_is_raised_by_it(driver, make):
     with prepared(driver, make) as (_, scope, bus):
         bus.faults.append(Fault("reset", question=r"SYST:ERR\?", after=10))
         with pytest.raises(SettingsLost):
@@ -200,7 +200,7 @@ def test_a_reset_during_the_preparation_is_told_by_it(driver, make):
         ("trigger_sweep", "AUTO", "sweep"),
     ],
 )
-def test_a_key_of_the_front_panel_is_told_instead_of_a_trace_or_of_a_dark_signal(driver, make, setting, value, name):
+def test_a_key_of_the_front_panel_raises_instead_of_giving_a_trace(driver, make, setting, value, name):
     with prepared(driver, make) as (device, scope, _):
         start = scope._start
 

@@ -182,7 +182,7 @@ def test_a_bench_in_real_time_keeps_to_the_wall_clock():
 # --- what VISA offers beside reading and writing ---
 
 
-def test_a_status_byte_tells_of_an_answer_and_of_errors(blocks):
+def test_a_status_byte_shows_an_answer_and_errors(blocks):
     assert blocks.read_stb() == 0
     blocks.write("*OPC?")
     blocks.clock.sleep(1.0)
@@ -198,7 +198,7 @@ def test_a_question_before_the_last_answer_was_read_interrupts_it(blocks):
     assert blocks.query("SYST:ERR?").startswith("-410")
 
 
-def test_waiting_for_what_nobody_asked_is_told_in_the_queue(blocks):
+def test_a_read_without_a_question_queues_an_error(blocks):
     with pytest.raises(pyvisa.VisaIOError):
         blocks.read()
     assert blocks.query("SYST:ERR?").startswith("-420")
@@ -240,7 +240,7 @@ def test_a_resource_that_is_opened_for_oneself_alone_is_locked(blocks):
     assert blocks.query("*OPC?").strip() == "1"
 
 
-def test_a_link_that_is_lost_is_told_in_visas_words_by_whatever_is_tried(blocks):
+def test_each_call_over_a_lost_link_returns_visas_status(blocks):
     blocks.visalib.bench.faults.append(Fault("disconnected", question=r"DATA\?"))
     blocks.write("DATA?")
     for act in (blocks.read_raw, blocks.read_stb, lambda: blocks.write("*CLS")):

@@ -46,7 +46,7 @@ def test_after_whatever_noise_and_a_clear_a_message_is_a_message(pieces):
     assert framer.feed(b"*IDN?\n") == ["*IDN?"]
 
 
-def test_a_line_without_end_is_dropped_and_told_once():
+def test_a_line_without_end_is_dropped_with_one_overrun():
     framer, results = Framer(), []
     for _ in range(8):
         results += framer.feed(b"x" * (LONGEST_LINE // 2))

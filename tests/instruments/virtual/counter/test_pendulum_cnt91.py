@@ -52,7 +52,7 @@ def ready():
     return counter(pulses(40.0), FIXED_LEVEL, "ACQ:APER 0.1")
 
 
-def test_it_tells_its_name_and_an_empty_queue_without_a_sign(ready):
+def test_it_answers_its_name_and_an_empty_queue_without_a_sign(ready):
     assert ask(ready, "*IDN?").split(",")[1].strip() == "CNT-91"
     assert ask(ready, "SYST:ERR?") == '0,"No error"'
 

@@ -57,7 +57,7 @@ def test_the_output_is_off_after_reset(generator, changes):
     assert generator.signal().amplitude == 0.0
 
 
-def test_nobody_need_listen():
+def test_a_generator_works_without_a_listener():
     send(Virtual33500B(VirtualClock()), b"OUTP ON\n")
 
 
@@ -68,7 +68,7 @@ def test_the_coil_hangs_on_channel_one(generator, changes):
     assert (ask(generator, "OUTP1?"), number(generator, "SOUR1:FREQ?")) == ("0", 1e3)
 
 
-def test_what_else_shapes_the_signal_is_told_too(generator):
+def test_the_listener_gets_all_that_shapes_the_signal(generator):
     send(generator, b"FUNC SQU;FUNC:SQU:DCYC 30;:PHAS 90;:OUTP:POL INV;:OUTP ON\n")
     output = generator.signal()
     assert (output.duty, output.phase, output.inverted) == (0.3, 90.0, True)

@@ -41,7 +41,7 @@ def test_an_endless_burst_is_never_complete_until_it_is_aborted(generator):
     assert ask(generator, "*OPC?") == "1"
 
 
-def test_a_trigger_that_nothing_waits_for_is_ignored_and_told(either):
+def test_a_trigger_that_nothing_waits_for_queues_an_error(either):
     send(either, b"*TRG\n")
     assert errors(either) == [-211]
 

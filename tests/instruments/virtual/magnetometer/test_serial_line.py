@@ -53,7 +53,7 @@ def test_settings_may_be_put_right_while_the_port_is_open():
     assert line.query("*IDN?") == "LSCI,MODEL425,VIRTUAL,1.0"
 
 
-def test_the_475_changes_its_baud_rate_when_told():
+def test_a_command_changes_the_baud_rate_of_the_475():
     device = meter(Virtual475)
     line = resource(device, baud_rate=9600)
     line.write("BAUD 3")

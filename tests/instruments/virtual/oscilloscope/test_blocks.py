@@ -72,10 +72,10 @@ def test_the_keysight_gives_as_many_points_as_it_was_asked_for(mode, points):
 
 
 @pytest.mark.parametrize(
-    ("set_", "told_"), [("MAX", "24000000"), ("min", "12000"), ("1.2e6", "1200000"), ("auto", "AUTO")]
+    ("set_", "answer"), [("MAX", "24000000"), ("min", "12000"), ("1.2e6", "1200000"), ("auto", "AUTO")]
 )
-def test_the_memory_depth_is_told_as_a_whole_number(set_, told_):
-    assert ask(rigol(pulses, f":ACQ:MDEP {set_}"), ":ACQ:MDEP?") == told_
+def test_the_memory_depth_is_answered_as_a_whole_number(set_, answer):
+    assert ask(rigol(pulses, f":ACQ:MDEP {set_}"), ":ACQ:MDEP?") == answer
 
 
 @pytest.mark.parametrize(("form", "most"), [("BYTE", 250_000), ("WORD", 125_000), ("ASC", 15_625)])

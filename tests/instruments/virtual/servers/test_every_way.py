@@ -81,7 +81,7 @@ def test_device_clear_ends_a_slow_answer(served, way):
 
 
 @pytest.mark.parametrize("way", MARKED)
-def test_the_status_byte_tells_of_an_error_and_of_an_answer(served, way):
+def test_the_status_byte_shows_an_error_and_an_answer(served, way):
     client = served.open(way)
     assert client.read_stb() == 0
     client.write("FOO")

@@ -13,7 +13,7 @@ from instruments.virtual.servers.hislip_messages import HEADER, LONGEST, Channel
 from support.served import NETWORK, NO_ERROR, Thing, channels, header, send, until
 
 
-def test_more_sessions_than_there_may_be_are_told_so(served, monkeypatch):
+def test_one_session_too_many_gets_a_fatal_error(served, monkeypatch):
     monkeypatch.setattr("instruments.virtual.servers.hislip.MOST_CLIENTS", 1)
     channels(served)
     one_more = served.bare("hislip")
@@ -127,7 +127,7 @@ def test_an_unknown_message_is_refused_on_either_channel(served):
         ((Type.ASYNC_INITIALIZE, 0, 4711), 3),
     ],
 )
-def test_a_wrong_beginning_is_told_and_ends(served, first, code):
+def test_a_wrong_beginning_gets_a_fatal_error_and_ends(served, first, code):
     bare = served.bare("hislip")
     send(bare, *first)
     assert header(bare)[:2] == (Type.FATAL_ERROR, code)
@@ -223,7 +223,7 @@ class ClearedMeanwhile(FullWriter):
             self.client.clear(self.client.asynchronous, None)
 
 
-def test_a_message_is_dropped_by_a_clear_while_the_interruption_is_told():
+def test_a_clear_drops_a_message_while_the_interruption_is_sent():
     thing = Thing(WallClock())
 
     async def clear_meanwhile():

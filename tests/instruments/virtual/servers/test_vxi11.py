@@ -57,7 +57,7 @@ def test_a_read_ends_by_count_character_or_end_and_says_so(served):
     assert client.device_read(link, 100, int(1000 * AT_MOST), 0, 0, 0) == (0, 4, b"thing,7,1.0\n")
 
 
-def test_reading_what_was_not_asked_for_times_out_and_is_told(served):
+def test_a_read_without_a_question_times_out_and_queues_an_error(served):
     client = served.vxi11()
     link, *_ = created(client)
     assert client.device_read(link, 10, 1, 0, 0, 0) == (15, 0, b"")
