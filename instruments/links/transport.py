@@ -329,14 +329,15 @@ class MessageLink:
     def reopen(self) -> None:
         """Open the link again; see :class:`Transport`."""
         self._check_open()
-        asks = self.port.resynchronising is Resynchronising.QUESTION
-        self._out_of_step, self._lost = True, asks  # if it cannot be opened now, then perhaps at the next message
+        self._lost = True  # if it cannot be opened, or locked again, now, then perhaps at the next message
         with contextlib.suppress(Exception):  # the link may be lost
             self.port.close()
         self.port.open()
-        self._lost, self._out_of_step = False, asks  # at a serial line the instrument may still be answering
         if self._locked:
             self.lock()
+        self._lost = False
+        # at a serial line the instrument may still be answering
+        self._out_of_step = self.port.resynchronising is Resynchronising.QUESTION
 
     def lock(self) -> None:
         """Lock the instrument until close(); reopen() locks it again; see :class:`Transport`."""

@@ -133,7 +133,7 @@ def choose_columns(
             raise TableError(
                 path,
                 f"column '{shorten(header[index])}' is to be {name} and has the unit {other}, which is none of "
-                f"{dimension(name)}: {how_else(header[index])}",
+                f"{dimension(name)}: {how_else(header[index], name)}",
             )
         factor = unit_factor(unit, dimension(name)) if unit else 1
         columns.append(Column(name, index, header[index], factor or 1))
@@ -145,9 +145,18 @@ def _with_periods(header: Sequence[str]) -> list[Title]:
     titles = [read_title(text) for text in header]
     if sum(title.column == "time_s" for title in titles) > 1:
         titles = [as_a_period(text) or title for text, title in zip(header, titles, strict=True)]
+        if any(title.inverse for title in titles):
+            titles = [_of_the_period(text, title) for text, title in zip(header, titles, strict=True)]
     if any(title.column == "spin_frequency_hz" and not title.inverse for title in titles):
         titles = [Title(None, title.unit) if title.inverse else title for title in titles]
     return titles
+
+
+def _of_the_period(text: str, title: Title) -> Title:
+    """An uncertainty of a T, as u_T, is that of the period, where T is one."""
+    if title.column == companion("time_s") and re.search(r"T(?![A-Za-z])", text):
+        return Title(companion("spin_frequency_hz"), title.unit)
+    return title
 
 
 def _is_of_a_period(title: Title, titles: Sequence[Title]) -> bool:
@@ -156,12 +165,16 @@ def _is_of_a_period(title: Title, titles: Sequence[Title]) -> bool:
     return times and title.column == companion("spin_frequency_hz") and any(one.inverse for one in titles)
 
 
-def how_else(title: str) -> str:
-    """What to do with a column that is not what is wanted."""
+def how_else(title: str, name: str) -> str:
+    """What to do with a column that is not the quantity of this canonical name."""
+    kind = dimension(name)
+    own = f"say which unit it is, as NAME [{next(iter(UNITS[kind]))}]"
+    if kind != "frequency":
+        return own
     unit = read_title(title).unit
     if unit and unit_factor(unit, "time"):
         return f"correct it, or if these are the times of a turn call the column period [{shorten(unit)}]"
-    return nearly_a_frequency(title) or "say which unit it is, as NAME [Hz]"
+    return nearly_a_frequency(title) or own
 
 
 def _wanted_columns(

@@ -197,9 +197,10 @@ def _no_column(path: Path, name: str, header: Sequence[str]) -> NoSuchColumn:
     foreign = next((title for title in header if read_title(title).column == name), None)
     if foreign:
         unit = shorten(read_title(foreign).unit or "")
-        text = f"column '{shorten(foreign)}' is in {unit}, which is no unit of {dimension(name)}: {how_else(foreign)}"
+        what = f"column '{shorten(foreign)}' is in {unit}, which is no unit of {dimension(name)}"
+        text = f"{what}: {how_else(foreign, name)}"
     elif nearly:
-        text = f"no column is known to be {name}; '{shorten(nearly)}' could become one: {how_else(nearly)}"
+        text = f"no column is known to be {name}; '{shorten(nearly)}' could become one: {how_else(nearly, name)}"
     return NoSuchColumn(path, text)
 
 

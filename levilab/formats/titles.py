@@ -276,6 +276,8 @@ def foreign_unit(text: str, kind: str) -> str | None:
     text = without_runs_of_blanks(text)
     if len(text) > LONGEST_TITLE:
         return None
+    if _plain_name(text) in NAMES:  # u_t has no unit, though there is one called t
+        return None
     form = re.fullmatch(r".*?[\[(]([^\[\]()]*)[\])]", text)
     unit = form[1] if form else text.rpartition("_")[2] if "_" in text else ""
     return unit if unit and is_unit(unit) and unit_factor(unit, kind) is None else None

@@ -125,26 +125,26 @@ def _glance(run: Run) -> _Rows | None:
     except OSError:
         return None
     titles = head.decode("ascii", errors="replace").rstrip("\n").split(",")
-    body = body[: body.rfind(b"\n") + 1]  # a torn last line is left out
-    lines = body.count(b"\n")
+    lines = body.split(b"\n")[:-1]  # a torn last line is left out
+    commas = len(titles) - 1
     if (
         len(head) + len(body) >= _GLANCED_BYTES
         or titles[0] != "time_s"
         or len(set(titles)) < len(titles)
         or not lines
         or body.translate(None, _PLAIN)
-        or body.count(b",") != lines * (len(titles) - 1)
+        or any(line.count(b",") != commas for line in lines)
     ):
         return None
     try:
-        numbers = np.array(body[:-1].replace(b"\n", b",").split(b","), dtype=np.float64)
+        numbers = np.array(b",".join(lines).split(b","), dtype=np.float64)
     except ValueError:  # an empty field, which is a missed reading, or a damaged line
         return None
     if not np.all(np.abs(numbers) < NO_READING):
         return None
     times = numbers[:: len(titles)]
     return _Rows(
-        lines, _length(run, float(times[0]), float(times[-1])), "record" in titles and "record" in _declared(run)
+        len(lines), _length(run, float(times[0]), float(times[-1])), "record" in titles and "record" in _declared(run)
     )
 
 

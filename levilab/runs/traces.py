@@ -164,6 +164,8 @@ def arrived(folder: Path) -> StoredTrace | None:
         if whole.is_file():  # killed between codes and line
             return _stored(head.model_copy(update={"announced": None}), np.load(whole, allow_pickle=False))
         content = codes.read_bytes() if codes.is_file() else b""
+    except FileNotFoundError:  # the process that writes it has kept it meanwhile
+        return None
     except OSError as error:
         raise DataError(f"{about}: cannot be read ({error.strerror})") from error
     except ValueError as error:
@@ -234,9 +236,11 @@ def load_traces(folder: Path) -> list[StoredTrace]:
     its way has left what had come: it is the last one, and shorter than announced.  Raises DataError for codes that are
     missing or are not those that were written.
     """
+    cut_short = arrived(folder)  # first, so that a record which is kept meanwhile is among the others
     whole = [_load(folder, _line(folder / INDEX, line)) for line in _lines(folder)]
-    cut_short = arrived(folder)
-    return whole if cut_short is None else [*whole, cut_short]
+    if cut_short is None or any(one.number == cut_short.number for one in whole):
+        return whole
+    return [*whole, cut_short]
 
 
 def _lines(folder: Path) -> list[str]:

@@ -5,6 +5,7 @@ Some answers take long to compute, so an instrument works on a message in steps;
 
 from __future__ import annotations
 
+import contextlib
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from instruments.virtual.core.parameters import (
@@ -13,13 +14,13 @@ from instruments.virtual.core.parameters import (
     number,
     parameter,
 )
-from instruments.virtual.core.parser import Parser, Table
+from instruments.virtual.core.parser import Parser, ScpiError, Table
 from instruments.virtual.core.rows import Ask, Do, Own
 from instruments.virtual.core.status import OPERATION_COMPLETE, Status
 from instruments.virtual.core.steps import run_to_end
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from instruments.clock import Clock
     from instruments.virtual.core.parser import Row, Value
@@ -193,6 +194,16 @@ class VirtualInstrument:
 
     def on_change(self, name: str) -> None:
         """Called after a setting has changed."""
+
+    @contextlib.contextmanager
+    def all_or_none(self) -> Iterator[None]:
+        """Leave the settings as they were where a command that sets several of them is refused in the end."""
+        before = dict(self.settings)
+        try:
+            yield
+        except ScpiError:
+            self.settings |= before
+            raise
 
     def reset(self) -> None:
         """Go to the state after ``*RST``."""

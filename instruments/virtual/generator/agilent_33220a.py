@@ -9,10 +9,9 @@ from instruments.virtual.core.parameters import optional_parameter, parameter
 from instruments.virtual.core.parser import Row, ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Own, Switch, Word
 from instruments.virtual.generator.arbitrary import DeviceError, plain_name
-from instruments.virtual.generator.channel import Channel
 from instruments.virtual.generator.family import Family, Waveform
 from instruments.virtual.generator.generator import VirtualGenerator
-from instruments.virtual.generator.rows import CHANNEL, SHARED, Quantity
+from instruments.virtual.generator.rows import CHANNEL, SHARED, Quantity, burst_cycles, pulses, waveforms
 
 #: The waveforms that it is made with; 64 K points in each of the others.
 _BUILT_IN = ("EXP_RISE", "EXP_FALL", "NEG_RAMP", "SINC", "CARDIAC")
@@ -48,28 +47,14 @@ _FAMILY = Family(
     room=65_536,
 )
 
-_DATA, _EDGE = "[SOURce[n]:]DATA", "[SOURce[n]:][FUNCtion:]PULSe:TRANsition"
+_DATA = "[SOURce[n]:]DATA"
 _CHANNEL: tuple[Row, ...] = (
-    Word("[SOURce[n]:]FUNCtion[:SHAPe]", "{n}:waveform", " ".join(waveform.word for waveform in _FAMILY.waveforms)),
-    Quantity(
-        *("[SOURce[n]:][FUNCtion:]PULSe:PERiod", "{n}:frequency", 1e-3, (1 / 5e6, 2000), "S"),
-        get=Channel.period,
-        put=Channel.set_period,
-        alias=True,
-    ),
-    Quantity(f"{_EDGE}:LEADing", "{n}:pulse_leading", 5e-9, _EDGES, "S"),
-    Quantity(f"{_EDGE}:TRAiling", "{n}:pulse_trailing", 5e-9, _EDGES, "S"),
-    Quantity(f"{_EDGE}[:BOTH]", "{n}:pulse_leading", 5e-9, _EDGES, "S", put=Channel.set_edges, alias=True),
-    Quantity(
-        *("[SOURce[n]:]BURSt:NCYCles", "{n}:burst_cycles", 1.0, (1, 50e3)), put=Channel.set_burst_cycles, endless=True
-    ),
+    *waveforms(_FAMILY),
+    *pulses((1 / 5e6, 2000), _EDGES, 5e-9),
+    burst_cycles(50e3),
     Quantity("[SOURce[n]:]SWEep:TIME", "{n}:sweep_time", 1.0, (1e-3, 500), "S"),
     Word("TRIGger[n]:SOURce", "{n}:trigger_source", "IMMediate EXTernal BUS"),
     Quantity("TRIGger[n]:DELay", "{n}:trigger_delay", 0.0, (0, 85), "S"),
-    *(
-        Both(f"[SOURce[n]:]APPLy:{w.word}", lambda s, n, p, short=w.short: s.apply(n, short, p))
-        for w in _FAMILY.waveforms
-    ),
     # arbitrary waveforms
     Own(
         "[SOURce[n]:]FUNCtion:USER",

@@ -182,17 +182,18 @@ class VirtualGenerator(VirtualInstrument):
             raise ScpiError(-108)
         channel = self.channel(n)
         wanted = dict(zip(("frequency", "amplitude", "offset"), parameters, strict=False))
-        for mode in MODES:
-            if channel.prefix + mode in self.settings:
-                channel[mode] = False
-        channel["trigger_source"], channel["waveform"] = "IMM", waveform
-        frequency = channel.read(wanted.get("frequency", "DEF"), *channel.frequency_limits(), 1e3, "HZ")
-        if waveform == "PRBS":
-            channel["prbs_rate"] = frequency
-        else:
-            channel.set_frequency(frequency)
-        channel["amplitude_vpp"] = self._amplitude(channel, wanted.get("amplitude", "DEF"))
-        channel["offset"] = channel.read(wanted.get("offset", "DEF"), *channel.offset_limits(), 0.0, "V")
+        with self.all_or_none():
+            for mode in MODES:
+                if channel.prefix + mode in self.settings:
+                    channel[mode] = False
+            channel["trigger_source"], channel["waveform"] = "IMM", waveform
+            frequency = channel.read(wanted.get("frequency", "DEF"), *channel.frequency_limits(), 1e3, "HZ")
+            if waveform == "PRBS":
+                channel["prbs_rate"] = frequency
+            else:
+                channel.set_frequency(frequency)
+            channel["amplitude_vpp"] = self._amplitude(channel, wanted.get("amplitude", "DEF"))
+            channel["offset"] = channel.read(wanted.get("offset", "DEF"), *channel.offset_limits(), 0.0, "V")
         channel["output"] = True
         self.on_change(channel.prefix + "output")
 

@@ -12,7 +12,7 @@ from instruments.virtual.generator.arbitrary import DeviceError, plain_name
 from instruments.virtual.generator.channel import Channel
 from instruments.virtual.generator.family import Family, Waveform
 from instruments.virtual.generator.generator import VirtualGenerator
-from instruments.virtual.generator.rows import CHANNEL, INNER, SHARED, Quantity
+from instruments.virtual.generator.rows import CHANNEL, INNER, SHARED, Quantity, burst_cycles, pulses, waveforms
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -63,31 +63,17 @@ def _rates(channel: Channel) -> tuple[float, float]:
     return 1e-6, 62.5e6 if channel["arb_filter"] == "OFF" else _FASTEST
 
 
-_ARB, _EDGE = "[SOURce[n]:]FUNCtion:ARBitrary", "[SOURce[n]:][FUNCtion:]PULSe:TRANsition"
+_ARB = "[SOURce[n]:]FUNCtion:ARBitrary"
 _CHANNEL: tuple[Row, ...] = (
-    Word("[SOURce[n]:]FUNCtion[:SHAPe]", "{n}:waveform", " ".join(waveform.word for waveform in _FAMILY.waveforms)),
-    Quantity(
-        *("[SOURce[n]:][FUNCtion:]PULSe:PERiod", "{n}:frequency", 1e-3, (1 / 30e6, 1e6), "S"),
-        get=Channel.period,
-        put=Channel.set_period,
-        alias=True,
-    ),
-    Quantity(f"{_EDGE}:LEADing", "{n}:pulse_leading", 10e-9, _EDGES, "S"),
-    Quantity(f"{_EDGE}:TRAiling", "{n}:pulse_trailing", 10e-9, _EDGES, "S"),
-    Quantity(f"{_EDGE}[:BOTH]", "{n}:pulse_leading", 10e-9, _EDGES, "S", put=Channel.set_edges, alias=True),
-    Quantity(
-        *("[SOURce[n]:]BURSt:NCYCles", "{n}:burst_cycles", 1.0, (1, 100e6)), put=Channel.set_burst_cycles, endless=True
-    ),
+    *waveforms(_FAMILY),
+    *pulses((1 / 30e6, 1e6), _EDGES, 10e-9),
+    burst_cycles(100e6),
     Quantity("[SOURce[n]:]SWEep:TIME", "{n}:sweep_time", 1.0, (1e-3, 250e3), "S"),
     Word("TRIGger[n]:SOURce", "{n}:trigger_source", "IMMediate EXTernal TIMer BUS"),
     Quantity("TRIGger[n]:DELay", "{n}:trigger_delay", 0.0, (0, 1000), "S"),
     Quantity("TRIGger[n]:COUNt", "{n}:trigger_count", 1.0, (1, 1e6)),
     Quantity("TRIGger[n]:TIMer", "{n}:trigger_timer", 1.0, (1e-6, 8000), "S"),
     Quantity("TRIGger[n]:LEVel", "{n}:trigger_level", 3.3, (0.9, 3.8), "V"),
-    *(
-        Both(f"[SOURce[n]:]APPLy:{w.word}", lambda s, n, p, short=w.short: s.apply(n, short, p))
-        for w in _FAMILY.waveforms
-    ),
     # arbitrary waveforms
     Own(_ARB, lambda s, n, p: s.select(n, p), lambda s, n: f'"{s.channel(n)["arb"]}"', keeps=("{n}:arb", _FIRST_ARB)),
     Quantity(f"{_ARB}:SRATe", "{n}:arb_rate", 40e3, _rates, "SA/S"),

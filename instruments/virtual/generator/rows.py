@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from instruments.virtual.core.parser import Value
+    from instruments.virtual.generator.family import Family
     from instruments.virtual.generator.generator import VirtualGenerator
 
 
@@ -253,3 +254,37 @@ SHARED: tuple[Row, ...] = (
     Ask("STATus:QUEStionable[:EVENt|:CONDition]", lambda _s: "+0"),
     Ask("STATus:OPERation[:EVENt|:CONDition]", lambda _s: "+0"),
 )
+
+
+def waveforms(family: Family) -> tuple[Row, ...]:
+    """The rows that know the waveforms of a family."""
+    return (
+        Word("[SOURce[n]:]FUNCtion[:SHAPe]", "{n}:waveform", " ".join(waveform.word for waveform in family.waveforms)),
+        *(
+            Both(f"[SOURce[n]:]APPLy:{waveform.word}", lambda s, n, p, short=waveform.short: s.apply(n, short, p))
+            for waveform in family.waveforms
+        ),
+    )
+
+
+def pulses(periods: tuple[float, float], edges: tuple[float, float], edge: float) -> tuple[Row, ...]:
+    """The rows of the times of pulses.  periods, edges: their limits [s]; edge: after ``*RST`` [s]."""
+    edge_of = f"{_PULSE}TRANsition"
+    return (
+        Quantity(
+            *(f"{_PULSE}PERiod", "{n}:frequency", 1e-3, periods, "S"),
+            get=Channel.period,
+            put=Channel.set_period,
+            alias=True,
+        ),
+        Quantity(f"{edge_of}:LEADing", "{n}:pulse_leading", edge, edges, "S"),
+        Quantity(f"{edge_of}:TRAiling", "{n}:pulse_trailing", edge, edges, "S"),
+        Quantity(f"{edge_of}[:BOTH]", "{n}:pulse_leading", edge, edges, "S", put=Channel.set_edges, alias=True),
+    )
+
+
+def burst_cycles(most: float) -> Row:
+    """The row of the cycles of a burst."""
+    return Quantity(
+        *("[SOURce[n]:]BURSt:NCYCles", "{n}:burst_cycles", 1.0, (1, most)), put=Channel.set_burst_cycles, endless=True
+    )

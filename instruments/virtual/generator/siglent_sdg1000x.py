@@ -5,7 +5,7 @@ SDG1032X (state after ``*RST``, forms of the answers, amplitudes that are clippe
 what the authors of a public driver measured on an SDG2042X (the answer to ``C1:BSWV?`` after a reset; six digits of a
 number, ten of a frequency; volts r.m.s. of a sine are 0.3535 of its peak to peak, of a ramp 1/3.464; the fraction of a
 load is cut off).  Inferred: which field gives way where amplitude and offset together go beyond 10 V (the one that is
-set), that a message has no path memory, limits of the ramp.
+set), that a message has no path memory and changes nothing where one of its fields is unknown, limits of the ramp.
 Modulation, sweep, burst and arbitrary waveforms are missing.
 """
 
@@ -138,16 +138,17 @@ class VirtualSDG1000X(VirtualInstrument):
 
     def set_wave(self, n: int, parameters: list[str]) -> None:
         """BSWV: the fields that are named; a number beyond its limits becomes the limit.  Raises ScpiError."""
-        for key, text in _pairs(parameters):
-            if key == "WVTP":
-                self.settings[_key(n, "waveform")] = choice(text, tuple(_WAVEFORMS))
-                self._set_number(n, _FIELDS["FRQ"], self._number(n, "frequency"))
-            elif key in _FIELDS:
-                field = _FIELDS[key]
-                sent = number(text, low=-1e99, high=1e99, default=field.default, unit=field.unit)
-                self._set_number(n, field, sent / self._load_factor(n) if field.shown else sent)
-            else:
-                raise ScpiError(-224, key[:20])
+        with self.all_or_none():
+            for key, text in _pairs(parameters):
+                if key == "WVTP":
+                    self.settings[_key(n, "waveform")] = choice(text, tuple(_WAVEFORMS))
+                    self._set_number(n, _FIELDS["FRQ"], self._number(n, "frequency"))
+                elif key in _FIELDS:
+                    field = _FIELDS[key]
+                    sent = number(text, low=-1e99, high=1e99, default=field.default, unit=field.unit)
+                    self._set_number(n, field, sent / self._load_factor(n) if field.shown else sent)
+                else:
+                    raise ScpiError(-224, key[:20])
         self.on_change(_key(n, "waveform"))
 
     def _set_number(self, n: int, field: Field, value: float) -> None:

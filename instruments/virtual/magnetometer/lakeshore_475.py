@@ -91,6 +91,14 @@ class Virtual475(VirtualGaussmeter):
         elif name in {"event_enable", "request_enable"}:
             setattr(self.status, name, int(self.value(name)))
 
+    def reset(self) -> None:
+        """*RST; the masks of the status stay as they are (IEEE 488.2, 10.32)."""
+        masks = {name: self.settings[name] for name in ("event_enable", "request_enable")}
+        super().reset()
+        self.settings |= masks
+        for name in masks:
+            self.on_change(name)
+
     def _time_constant(self) -> float:
         return self._TIME_CONSTANTS[int(self.value("resolution")) - 1]
 

@@ -104,6 +104,16 @@ def test_a_field_of_each_channel_is_set_asked_and_reset(waveform, name, values, 
         assert f",{name},{default}" in ask(device, f"C{n}:BSWV WVTP,{waveform};C{n}:BSWV?")
 
 
+@pytest.mark.parametrize("wrong", ["FRQ,30,XYZ,1", "WVTP,RAMP,FRQ,30,AMP,x"])
+def test_what_is_shown_is_put_out_where_a_field_is_wrong(wrong):
+    put_out = []
+    device = VirtualSDG1000X(VirtualClock(), listener=lambda _, output: put_out.append(output))
+    send(device, f"C1:OUTP ON\nC1:BSWV {wrong}\n".encode())
+    assert len(errors(device)) == 1
+    assert "WVTP,SINE,FRQ,1000HZ," in ask(device, "C1:BSWV?")
+    assert (put_out[-1].waveform, put_out[-1].frequency) == ("SIN", 1000.0)
+
+
 @pytest.mark.parametrize("question", ["C1:BSWV? FRQ", "C1:OUTP? (@1)"])
 def test_a_generator_is_asked_without_parameters(question):
     device = VirtualSDG1000X(VirtualClock())

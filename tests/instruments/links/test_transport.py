@@ -3,7 +3,7 @@
 import pytest
 
 from instruments.clock import VirtualClock
-from instruments.errors import BadAnswer, NoAnswer, NotConnected, SilentLine
+from instruments.errors import BadAnswer, NoAnswer, NotConnected, Occupied, SilentLine
 from instruments.links.transport import LONGEST_ANSWER, Failure, MessageLink, Resynchronising
 
 IDENTITY = b"levilab,port,0,0\r\n"
@@ -129,3 +129,21 @@ def test_a_link_that_was_locked_is_locked_again_when_it_is_made_anew(port):
     one.lock()
     one.reopen()
     assert locked == [1, 2]
+
+
+def test_nothing_is_sent_over_a_new_link_that_could_not_be_locked(port):
+    one = link(port)
+    one.lock()
+
+    def refuse(_):
+        raise Occupied("port")
+
+    port.lock = refuse
+    sent = list(port.sent)
+    with pytest.raises(Occupied):
+        one.reopen()
+    with pytest.raises(Occupied):
+        one.query("READ?")
+    assert port.sent == sent
+    port.lock = lambda _: None
+    assert one.query("READ?") == "+1.0"

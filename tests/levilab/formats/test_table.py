@@ -270,6 +270,7 @@ def test_an_unreadable_file_is_told(error, words, table_file, monkeypatch):
         ("t,turns\n0,400\n1,390\n2,380\n", {}, "say in which time in the title, as in turns in 10 s"),
         ("t,spin (ms)\n0,25\n1,26\n2,27\n", {}, "column 'spin (ms)' is in ms, which is no unit of frequency: correct"),
         ("t,spin (ms)\n0,25\n1,26\n2,27\n", {"f": "2"}, "times of a turn call the column period [ms]"),
+        ("t [V],f\n0,25\n1,26\n2,27\n", {"t": "1"}, "V, which is none of time: say which unit it is, as NAME [s]"),
         ("t,f\n0,61.5 ± 0.1\n1,61.2 ± 0.1\n2,61\n", {}, "into a column of its own, with the title u"),
         ("t,f\n0:00,61.5\n0:99,61.2\n0:10,61\n", {}, "line 3: '0:99' stands in column 't'"),
         ("t,f\n0,0:10\n1,61.2\n2,61\n", {}, "'0:10' stands in column 'f'"),
@@ -307,10 +308,16 @@ def test_periods_and_turns_in_a_time_are_read_as_frequencies(title, values, tabl
 HZ = (1.0, 2.0, math.nan, 4.0)
 
 
-@pytest.mark.parametrize("title", ["u [ms]", "u"])
+@pytest.mark.parametrize("title", ["u [ms]", "u", "u_T [ms]", "T_err [ms]", "u_T"])
 def test_the_uncertainty_of_a_period_becomes_that_of_the_frequency(title, table_file):
     table = read_table(table_file(f"t,T [ms],{title}\n0,25,0.1\n1,20,0.1\n2,40,0.1\n"))
     assert table.column(U).tolist() == pytest.approx([1e-4 * f**2 for f in (40.0, 50.0, 25.0)])
+
+
+@pytest.mark.parametrize(("header", "column"), [("t,u_t,T [ms]", "time_u_s"), ("T,u_T,f", "time_u_s")])
+def test_the_uncertainty_of_a_time_stays_that_of_the_time(header, column, table_file):
+    table = read_table(table_file(f"{header}\n0,0.1,40\n1,0.1,50\n2,0.1,25\n"))
+    assert table.column(column).tolist() == [0.1, 0.1, 0.1]
 
 
 def test_a_missing_column_is_told_with_those_there_are(table_file):

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from levilab.errors import DataError
@@ -257,6 +257,8 @@ ENDS = st.sampled_from(["\n", "\n", "\n", "\r\n", "\n\n", "\n# note\n", ""])
 
 
 @given(st.lists(st.tuples(st.lists(FIELDS, min_size=2, max_size=4), ENDS), max_size=5), st.booleans())
+#: A line lacks a field, and the next one has one too many.
+@example(lines=[(["0.0", "10.5"], "\n"), (["0.0", "10.5", "1", "2"], "\n")], three=False)
 @settings(max_examples=60)
 def test_a_glance_at_readings_says_what_reading_them_does(lines: list[tuple[list[str], str]], three: bool) -> None:
     channels = CHANNELS if three else [*CHANNELS[:2], {"name": "record"}]
@@ -278,6 +280,17 @@ def test_a_sound_run_is_listed_by_a_glance_at_its_readings(tmp_path: Path, monke
         writer.finish("finished")
     monkeypatch.delattr(Run, "readings")
     assert [(run.readings, run.length_s) for run in list_runs(tmp_path)] == [(3, 30.0)]
+
+
+def test_a_long_run_is_listed_with_all_its_readings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with RunWriter.create(tmp_path, record(channels=CHANNELS[:2])) as writer:
+        for k in range(40):
+            writer.reading({"time_s": 10 * k + 1 / 7, "spin_frequency_hz": 40 - k / 7})
+        writer.finish("finished")
+        line = len((writer.folder / "readings.csv").read_bytes().splitlines()[-1])
+    for bytes_read in range(600, 601 + line):  # a glance ends at each place of a line
+        monkeypatch.setattr("levilab.runs.listing._GLANCED_BYTES", bytes_read)
+        assert [run.readings for run in list_runs(tmp_path)] == [40]
 
 
 def test_a_list_of_many_runs_looks_like_one_of_a_few(capsys: pytest.CaptureFixture[str]) -> None:

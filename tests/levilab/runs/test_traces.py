@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import shutil
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,11 +12,8 @@ import pytest
 from instruments.drivers.oscilloscope import Trace
 from levilab.errors import DataError
 from levilab.runs.run import Run, RunRecord, utc_now
-from levilab.runs.traces import undescribed_codes
+from levilab.runs.traces import load_traces, undescribed_codes
 from levilab.runs.writer import RunWriter
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 def record_of(first: int) -> Trace:
@@ -43,6 +41,28 @@ def test_records_come_back_as_they_were(writer: RunWriter) -> None:
     assert [one.time_s for one in stored] == [0.0, 0.1, 0.2]
     assert [one.trace.codes[0] for one in stored] == [0, 1, 2]
     assert np.array_equal(stored[2].trace.volts, record_of(2).volts)
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_a_record_on_its_way_may_be_kept_while_another_process_reads(
+    writer: RunWriter, monkeypatch: pytest.MonkeyPatch, late: bool
+) -> None:
+    part = replace(record_of(0), codes=record_of(0).codes[:40])
+    with writer:
+        writer.arriving(0.0, part, "light", 100)
+        (there,) = Run.load(writer.folder).traces()
+        assert there.trace.codes.size == 40
+        read_text = Path.read_text
+
+        def read_late(path: Path, *args: str, **named: str) -> str:
+            monkeypatch.undo()
+            text = "" if late else read_text(path, *args, **named)
+            writer.trace(0.0, record_of(0), "light")
+            return read_text(path, *args, **named) if late else text
+
+        monkeypatch.setattr(Path, "read_text", read_late)
+        traces = load_traces(writer.folder)
+    assert [one.trace.codes.size for one in traces] == [100]
 
 
 @pytest.mark.parametrize("name", ["light\u2028left", "light\u0085", "light\x0cright", "Licht µ"])

@@ -3,6 +3,8 @@
 Source: Agilent/Keysight 33500 Series Operating and Service Guide, unless a test names another.
 """
 
+import pytest
+
 from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from support.generators import number
 from support.wire import ask, errors, send
@@ -26,6 +28,16 @@ def test_what_apply_leaves_out_is_the_default(either):
     assert number(either, "VOLT:OFFS?") == 2.0
     assert ask(either, "APPL:SIN 1,2,3,4") is None
     assert errors(either) == [-108]
+
+
+@pytest.mark.parametrize("wrong", ["APPL:SQU 2000,x", "APPL:RAMP 5,1,1 HZ", "APPL:SQU 1,2,3,4"])
+def test_apply_with_a_parameter_that_is_wrong_changes_nothing(either, wrong):
+    send(either, b"FREQ 40;VOLT 3;:BURS:STAT ON\n")
+    errors(either)
+    before = dict(either.settings)
+    send(either, f"{wrong}\n".encode())
+    assert len(errors(either)) == 1
+    assert either.settings == before
 
 
 def test_apply_keeps_within_the_limits(either):

@@ -28,6 +28,12 @@ def test_the_475_latches_operation_events_for_a_service_request():
     assert ask(device, "*STB?") == "000"
 
 
+def test_a_reset_of_the_475_leaves_the_masks_of_the_status():
+    device = meter(Virtual475)
+    send(device, b"*ESE 48;*SRE 16;FOO;*RST\n")
+    assert ask(device, "*ESE?;*SRE?;*STB?") == "48;16;032"
+
+
 def test_the_475_keeps_what_other_programs_set():
     # InstrumentKit's Lakeshore475 uses these
     device = meter(Virtual475)

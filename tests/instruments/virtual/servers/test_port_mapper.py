@@ -28,11 +28,13 @@ CORE, ABORT, MAPPER = 0x0607AF, 0x0607B0, 100000
 TCP, UDP = 6, 17
 
 
-def port_of(listen_at):
+def port_of(host):
     """A port that is free for TCP and UDP."""
-    with socket.socket() as probe:
-        probe.bind((listen_at, 0))
-        return probe.getsockname()[1]
+    with socket.socket() as stream, socket.socket(type=socket.SOCK_DGRAM) as datagrams:
+        stream.bind((host, 0))
+        port = stream.getsockname()[1]
+        datagrams.bind((host, port))
+        return port
 
 
 @pytest.fixture(scope="module")
