@@ -36,7 +36,7 @@ import pyvisa
 from instruments.clock import VirtualClock
 from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from instruments.virtual.oscilloscope.rigol_ds1000z import VirtualDS1000Z
@@ -124,7 +124,7 @@ resources:
 def in_process(rounds: int, duration: float) -> dict[str, Any]:
     """Round trips per second by question and contender."""
     device = generator()
-    ours = library_for(Bus({ADDRESS: device}))
+    ours = library_for(VirtualBench({ADDRESS: device}))
     with tempfile.TemporaryDirectory() as folder:
         described = Path(folder) / "generator.yaml"
         described.write_text(_SIMULATED.format(identity=device.identity, address=ADDRESS), encoding="utf-8")
@@ -164,8 +164,8 @@ def in_another_process(serve: Callable[..., None], *given: object) -> Iterator[C
 
 def serve_bench(parent: Connection) -> None:
     """The virtual generator by every protocol."""
-    with BenchServer(Bus({ADDRESS: generator()})) as server:
-        parent.send(server.offers[0].resources)
+    with BenchServer(VirtualBench({ADDRESS: generator()})) as server:
+        parent.send(server.endpoints[0].resources)
         parent.recv()
 
 
@@ -245,18 +245,18 @@ class Stopwatch:
             self.calls += 1
 
 
-def scope_bench() -> tuple[Bus, Stopwatch]:
+def scope_bench() -> tuple[VirtualBench, Stopwatch]:
     """A virtual DS1000Z that looks at a spinning top, and the watch on the top's light."""
     clock = VirtualClock()
     light = Stopwatch(SpinWorld(SpinScene(), clock).light)
-    return Bus({ADDRESS: VirtualDS1000Z(clock, signals={1: light})}), light
+    return VirtualBench({ADDRESS: VirtualDS1000Z(clock, signals={1: light})}), light
 
 
 def serve_scope(parent: Connection) -> None:
     """The virtual oscilloscope; it answers each message with the time that its light has taken."""
     bus, light = scope_bench()
     with BenchServer(bus) as server:
-        parent.send(server.offers[0].resources["socket"])
+        parent.send(server.endpoints[0].resources["socket"])
         while parent.recv() != "end":
             parent.send(light.seconds)
 

@@ -19,13 +19,13 @@ from typing import TYPE_CHECKING
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
 from instruments.ieee488 import BrokenBlock, block_of, read_block
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.session import LinkLost
 from instruments.virtual.core.message import Framer, Overrun
 from instruments.virtual.servers import hislip, vxi11
+from instruments.virtual.servers.clients import Disconnected, ServedInstrument
 from instruments.virtual.servers.hislip_messages import Message, Type
-from instruments.virtual.servers.station import Disconnected, Station
-from instruments.virtual.servers.xdr import packed
+from instruments.virtual.servers.xdr import pack
 from support import hostile
 
 if TYPE_CHECKING:
@@ -160,10 +160,10 @@ _BEHIND = "33500B"
 def _server(converse) -> Callable[[bytes], None]:
     def run(data: bytes) -> None:
         bench = hostile.Bench(_BEHIND)
-        bus = Bus({"TCPIP0::box.levilab::inst0::INSTR": bench.device})
-        _loop().run_until_complete(converse(Station(bus, bench.device), io.BytesIO(data)))
-        for hold in bus._holds.values():
-            assert not hold.holders, "a lock that its client has left"
+        bus = VirtualBench({"TCPIP0::box.levilab::inst0::INSTR": bench.device})
+        _loop().run_until_complete(converse(ServedInstrument(bus, bench.device), io.BytesIO(data)))
+        for client_lock in bus._client_locks.values():
+            assert not client_lock.holders, "a lock that its client has left"
         bench.recover()
 
     return run
@@ -188,15 +188,15 @@ def _pieces(stream: io.BytesIO):
         yield head[0], stream.read(head[1])
 
 
-async def _hislip(station: Station, stream: io.BytesIO) -> None:
+async def _hislip(instrument: ServedInstrument, stream: io.BytesIO) -> None:
     """Two clients with both channels; each piece is a message of one of them, or bare bytes."""
-    server = hislip.HislipServer(station)
+    server = hislip.HislipServer(instrument)
     clients = []
     for number in (1, 2):
         main, aside = Client(server._talk), Client(server._talk)
         clients += [main, aside]
-        await main.send(Message(Type.INITIALIZE, 0, 0x01000000, b"hislip0").packed())
-        await aside.send(Message(Type.ASYNC_INITIALIZE, 0, number).packed())
+        await main.send(Message(Type.INITIALIZE, 0, 0x01000000, b"hislip0").pack())
+        await aside.send(Message(Type.ASYNC_INITIALIZE, 0, number).pack())
     for what, data in _pieces(stream):
         client = clients[what & 3]
         if what & 4:
@@ -205,17 +205,17 @@ async def _hislip(station: Station, stream: io.BytesIO) -> None:
             kind, control, parameter = struct.unpack("!BBI", data[:6].ljust(6, b"\0"))
             # the high bits choose among the types that there are
             kind = kind if what & 8 else [*Type][kind % len(Type)]
-            await client.send(Message(kind, control, parameter, data[6:]).packed())
+            await client.send(Message(kind, control, parameter, data[6:]).pack())
     await _ended(clients)
     assert not server._clients
 
 
-async def _vxi11(station: Station, stream: io.BytesIO) -> None:
+async def _vxi11(instrument: ServedInstrument, stream: io.BytesIO) -> None:
     """Two clients of the core channel and one of the abort channel; each piece is a call, or bare bytes."""
-    server = vxi11.Vxi11Server(station)
+    server = vxi11.Vxi11Server(instrument)
     clients = [Client(server._talk), Client(server._talk), Client(server._talk_abort)]
     for number, client in enumerate(clients[:2]):
-        await client.send(_call(number, vxi11.CORE, 10, packed(0, 0, 0, b"inst0")))
+        await client.send(_call(number, vxi11.CORE, 10, pack(0, 0, 0, b"inst0")))
     serial = itertools.count()
     for what, data in _pieces(stream):
         client = clients[(what & 3) % 3]
@@ -229,7 +229,7 @@ async def _vxi11(station: Station, stream: io.BytesIO) -> None:
 
 
 def _call(number: int, program: int, procedure: int, parameters: bytes) -> bytes:
-    record = packed(number, 0, 2, program, vxi11.PROGRAM_VERSION, procedure, 0, b"", 0, b"") + parameters
+    record = pack(number, 0, 2, program, vxi11.PROGRAM_VERSION, procedure, 0, b"", 0, b"") + parameters
     return struct.pack("!I", 1 << 31 | len(record)) + record
 
 
@@ -252,10 +252,10 @@ _HISLIP_SEEDS = (
     _piece(1, struct.pack("!BBI", 15, 0, 0) + (64).to_bytes(8)) + _piece(0, struct.pack("!BBI", 7, 0, 0) + b"APPL?\n"),
 )
 _VXI11_SEEDS = (
-    _piece(0, b"\x0b" + packed(1, 100, 0, 8, b"*IDN?\n")) + _piece(0, b"\x0c" + packed(1, 99, 100, 0, 0, 0)),
-    _piece(0, b"\x12" + packed(1, 0, 0)) + _piece(1, b"\x0b" + packed(2, 9, 9, 9, b"*RST\n")),
-    _piece(0, b"\x0d" + packed(1, 0, 0, 0)) + _piece(2, b"\x01" + packed(1)) + _piece(0, b"\x17\0\0\0\1"),
-    *(_piece(0, bytes([procedure]) + packed(1, 0, 0, 0, 0, 0)) for procedure in (14, 15, 16, 19, 20, 22, 25, 26)),
+    _piece(0, b"\x0b" + pack(1, 100, 0, 8, b"*IDN?\n")) + _piece(0, b"\x0c" + pack(1, 99, 100, 0, 0, 0)),
+    _piece(0, b"\x12" + pack(1, 0, 0)) + _piece(1, b"\x0b" + pack(2, 9, 9, 9, b"*RST\n")),
+    _piece(0, b"\x0d" + pack(1, 0, 0, 0)) + _piece(2, b"\x01" + pack(1)) + _piece(0, b"\x17\0\0\0\1"),
+    *(_piece(0, bytes([procedure]) + pack(1, 0, 0, 0, 0, 0)) for procedure in (14, 15, 16, 19, 20, 22, 25, 26)),
 )
 
 TARGETS: dict[str, Callable[[], Target]] = {
@@ -263,5 +263,5 @@ TARGETS: dict[str, Callable[[], Target]] = {
     "framer": lambda: Target(framer, (b"#13abc", b"#", b'"', b"'", b"\n", b",#216"), (b"\0DATA #12\n\n\nFR",)),
     "blocks": lambda: Target(blocks, (b"#13", b"#800000003", b"\r\n"), (b"#13a\nb\n", b"#800000003abc\r\n")),
     "hislip": lambda: Target(_server(_hislip), (b"HS", b"*IDN?\n"), _HISLIP_SEEDS),
-    "vxi11": lambda: Target(_server(_vxi11), (b"*IDN?\n", b"inst0", packed(1)), _VXI11_SEEDS),
+    "vxi11": lambda: Target(_server(_vxi11), (b"*IDN?\n", b"inst0", pack(1)), _VXI11_SEEDS),
 }

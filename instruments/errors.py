@@ -71,12 +71,14 @@ class CommandRefused(InstrumentError):
 
 
 class SettingsLost(InstrumentError):
-    """Somebody, or a reset, has changed the instrument's settings.  changed: name → (as set, now)."""
+    """A person, a program or a reset has changed the instrument's settings.  changed: name → (as set, now)."""
 
     def __init__(self, address: str, changed: dict[str, tuple[object, object]]) -> None:
         self.changed = changed
-        told = ", ".join(f"{name} = {now} instead of {then}" for name, (then, now) in list(changed.items())[:3])
-        super().__init__(address, f"its settings were changed meanwhile ({told}): leave its keys alone during a run")
+        differences = ", ".join(f"{name} = {now} instead of {then}" for name, (then, now) in list(changed.items())[:3])
+        super().__init__(
+            address, f"its settings were changed meanwhile ({differences}): leave its keys alone during a run"
+        )
 
 
 class WrongInstrument(InstrumentError):

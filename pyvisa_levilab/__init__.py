@@ -16,7 +16,7 @@ from levilab.bench.config import ConfigError
 from levilab.world.bench import practice_world, virtual_bus
 
 if TYPE_CHECKING:
-    from instruments.virtual.bench.bus import Bus
+    from instruments.virtual.bench.bench import VirtualBench
 
 #: What stands before the @ for a bench that is never faster than the wall clock, for programs that sleep between
 #: their questions.
@@ -26,7 +26,7 @@ REALTIME = "realtime"
 class PracticeBench(LevilabVisaLibrary):
     """The library that PyVISA makes of a name such as ``"@levilab"``: a fresh bench with a top of its own."""
 
-    def default_bench(self) -> Bus:
+    def default_bench(self) -> VirtualBench:
         """A top to practise with behind all four instruments.  Raises ConfigError for a word that is no model."""
         words = [word.strip() for word in str(self.library_path).split(",")]
         clock = WallClock() if REALTIME in words else None

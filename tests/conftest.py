@@ -67,4 +67,4 @@ def practice_bench_is_fresh():
         import pyvisa
 
         for name in ("@levilab", "realtime@levilab"):
-            pyvisa.ResourceManager(name).visalib.bus = None
+            pyvisa.ResourceManager(name).visalib.bench = None

@@ -1,4 +1,4 @@
-"""What is no pulse is taken off a trace: hum of the mains, a baseline that wanders, times without a signal."""
+"""Clean a trace: remove hum of the mains and a wandering baseline, and find times without a signal."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Lines = tuple[tuple[float, float], ...]
 
 #: Mains and its multiples [Hz], and how far from nominal a grid strays [Hz].
 MAINS, STRAYS = (50.0, 60.0), 0.25
-#: Lines are looked for below this, and need a record of so long.
+#: The search for lines ends at this frequency [Hz], and needs a record of this length [s].
 HIGHEST, SHORTEST = 210.0, 1.0
 #: The spectrum of a trace without noise counts as this part of the trace's range at least.
 FAINTEST = 3e-4
@@ -57,7 +57,7 @@ class Clean:
 
 
 def clean(samples: Array, rate: float, bins: Array, bad: Mask | None, *, own: Lines = ()) -> Clean:
-    """Take off what is there; a trace without any of it comes back as it is.
+    """Remove hum and a wandering baseline; a trace without them comes back unchanged.
 
     samples: shape (n,); rate: of them [1/s]; bins: means of n // len(bins) samples; bad: which samples are no numbers;
     own: lines that are no hum but the pulses' own.

@@ -1,4 +1,4 @@
-"""Edges: each turn's pulse is placed by what lies to the right of its middle less what lies to the left."""
+"""Edges: place each turn's pulse by the signal right of its middle minus the signal left of it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ GROSS = 4.5
 
 @dataclass(frozen=True)
 class Edges:
-    """What the edges say.
+    """The places of the pulses by their edges.
 
     fit: phase against time; turns: used; noise: of a sample; height: of the pulse; bound [Hz]; missing, wrong: turns.
     """

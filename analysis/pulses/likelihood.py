@@ -1,4 +1,4 @@
-"""Frequency and slope of greatest likelihood, searched for over all that a top can have: for weak and hard traces.
+"""Search all frequencies and slopes of a top for those of greatest likelihood: for weak and difficult traces.
 
 Noise that is white makes the likelihood of a periodic signal of unknown shape a sum of powers over its harmonics (Wise,
 Caprio & Parks, IEEE Trans. Acoust. Speech Signal Process. 24, 418 (1976)). First it is summed over pieces of the record

@@ -1,4 +1,4 @@
-"""Turn number against time: a polynomial of degree two or three, and what its residuals say of its uncertainty."""
+"""Turn number against time: a polynomial of degree two or three, with its uncertainty from the residuals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a pulse analysis finds."""
+"""The result of a pulse analysis."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Method = Literal["edges", "matched", "likelihood"]
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that a user has to know: a short name that stays, and a sentence.
+    """A remark for the user: a short name, the same in all versions, and a sentence.
 
     Names: fell-back, missing, doubled, wrong, half, double, mains, hum, clipped, gap, not-finite, spikes, wander,
     curved, correlated, scattered, few-pulses, unsteady; no-pulses of a run with several records.

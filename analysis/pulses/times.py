@@ -136,7 +136,7 @@ def _one_a_turn(numbering: Numbering, away: Array | None = None) -> NDArray[np.i
 
 
 def findings_of(train: Train) -> tuple[Finding, ...]:
-    """What is to be said of a train."""
+    """The findings about a train."""
     notes = []
     if train.missing:
         notes.append(Finding("missing", f"{train.missing} turn{'s have' if train.missing > 1 else ' has'} no pulse"))
@@ -149,7 +149,7 @@ def findings_of(train: Train) -> tuple[Finding, ...]:
 
 
 def correlated(fit: Fit, what: str) -> tuple[Finding, ...]:
-    """What is to be said where neighbouring turns or pulses are not independent."""
+    """The finding where neighbouring turns or pulses are not independent."""
     if fit.inflation > 1:
         text = f"neighbouring {what} resemble each other: variance x {digits(fit.inflation)}"
     elif fit.inflation < NOTED:

@@ -111,7 +111,7 @@ class Trace:
 
     @cached_property
     def events(self) -> Events:
-        """What stands out."""
+        """The pulses that stand out of the noise."""
         return find_events(self.bins, self.bin_rate)
 
     @property
@@ -173,7 +173,7 @@ def _found(trace: Trace, method: Choice, degree: int | None, *, near: Fit | None
 
 
 def _one_by_one(trace: Trace, train: Train) -> Found:
-    """What the pulses say that were placed each by itself."""
+    """The result by pulses that were placed one by one."""
     edges = Edges(train.fit, train.used.size, math.nan, math.nan, math.nan, train.missing, 0)
     return Found(edges, train.doubled, "edges", 0.0, (_scatters(train, "each was placed by itself"), *trace.notes))
 
@@ -183,7 +183,7 @@ def _scatters(train: Train, text: str) -> Finding:
 
 
 def _events(trace: Trace, degree: int | None = None) -> tuple[Events, Train]:
-    """What stands out, numbered.  Raises TooFewPulses."""
+    """The pulses that stand out of the noise, numbered.  Raises TooFewPulses."""
     events = trace.events
     if events.times.size < FEWEST:
         raise trace.too_few(events.times.size)
@@ -193,7 +193,7 @@ def _events(trace: Trace, degree: int | None = None) -> tuple[Events, Train]:
 
 
 def _scattered(trace: Trace, left: float, degree: int | None) -> Train | None:
-    """The pulses numbered, if they stand out but not at their places: no mean pulse tells how far they are off.
+    """The pulses numbered, if they stand out but not at their places: a mean pulse cannot show how far they are off.
 
     left: how far a match leaves them from their places, as a standard deviation [turns].
     None where the match is to be trusted: at noise, at gaps, and where every second pulse is off by the same, which is
@@ -219,12 +219,12 @@ def _scattered(trace: Trace, left: float, degree: int | None) -> Train | None:
 
 
 def _scatter(train: Train) -> float:
-    """Of the pulses about their fit [turns]."""
+    """Standard deviation of the pulses about their fit [turns]."""
     return float(np.sqrt(train.fit.variance))
 
 
 def _frequency(fit: Fit) -> float:
-    """In the middle [Hz]."""
+    """The frequency in the middle of the record [Hz]."""
     return float(fit.coefficients[1]) / fit.half
 
 
@@ -300,7 +300,7 @@ def _likelier(one: Match | None, other: Match | None) -> Match | None:
 
 
 def _doubt(found: Match) -> str:
-    """Why a match is not to be trusted; empty if it is."""
+    """The reason to distrust a match; empty where there is none."""
     turns = found.heights.size
     sweep = abs(found.fit.frequency_and_chirp()[1].value or 0.0) * found.fit.half
     if sweep > 0.5 * found.fit.coefficients[1] / found.fit.half:
@@ -313,7 +313,7 @@ def _doubt(found: Match) -> str:
 
 
 def _without_trap(trace: Trace, found: Match, degree: int | None) -> tuple[Match, tuple[Finding, ...]]:
-    """The match at half or twice the frequency if that is the top's, and what is to be said of it."""
+    """The match at half or twice the frequency where that is the top's, and the findings about it."""
     if traps.repeats(found):
         twice = trace.match(found.fit.times(2.0), degree)
         if twice is not None and not traps.alternates(twice):
@@ -396,7 +396,7 @@ def _result(pulses: Found, start: float) -> SpinFrequency:
 
 
 def _wider(found: Estimate, own: Estimate) -> Estimate:
-    """What a method found, with an uncertainty that holds the pulses' own places, and how far it is from those."""
+    """The estimate of a method, with the scatter of the pulses' own places, and the distance to them, in its u."""
     assert found.value is not None
     assert found.u is not None
     assert own.value is not None

@@ -79,7 +79,7 @@ def elsewhere(bins: Array, phase: Array) -> str:
 
 
 def mains(frequency: Estimate, chirp: Estimate) -> tuple[Finding, ...]:
-    """What is to be said where the frequency is that of the mains or twice that, and stays."""
+    """The finding where the frequency is that of the mains or twice that, and stays."""
     assert frequency.value is not None
     assert chirp.value is not None
     for nominal in [multiple * line for line in MAINS for multiple in (0.5, 1, 2)]:

@@ -1,4 +1,4 @@
-"""Which turn does each pulse belong to?  Missing, doubled and wrong pulses allowed for.
+"""Number the turns of pulses, some of which may be missing, doubled or wrong.
 
 Clean lists are numbered from their intervals. Where that does not fit, the period of each short window is the one that
 most pairs of pulses share, its phase is where most pulses lie, and windows are joined by counting turns between them.

@@ -1,7 +1,7 @@
 """Several spin-downs of one top: the drag law is common, each run has a start and a constant of its own.
 
-The constants of one top differ from run to run by much more than one run's readings tell (the thesis's by 2 %, each
-good to 0.1 %; PHYSICS.md §5). So a mean over runs has its uncertainty from their scatter, and is not weighted.
+The constants of one top differ from run to run by much more than their u by one run's readings (the thesis's by 2 %,
+each good to 0.1 %; PHYSICS.md §5). So the u of a mean over runs comes from their scatter, and the mean is unweighted.
 """
 
 from collections.abc import Mapping, Sequence
@@ -197,7 +197,7 @@ def _about_number(runs: Sequence[SpinDown]) -> list[str]:
 
         width = float(stdtrit(n - 1, 0.5 + 0.5 * 0.6827))
         said.append(
-            f"{n} runs tell their own scatter, and so u of the means, to {100 / np.sqrt(2 * (n - 1)):.0f} % only: a "
+            f"{n} runs give their scatter, and so u of the means, to {100 / np.sqrt(2 * (n - 1)):.0f} % only: a "
             f"68 % interval is {digits(width)} u to each side (Student's t)"
         )
     return said

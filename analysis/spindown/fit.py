@@ -58,7 +58,7 @@ class SpinDown:
         u: their standard uncertainties [Hz], shape (n,); None where not given.
         outliers: indices, among the readings given, of those that do not belong.
         correlation: of neighbouring readings' noise, by what the simplest law not far from the best leaves over.
-        tilt_gain: ΔAICc in favour of a count that has the tilt; None where too few readings tell.
+        tilt_gain: ΔAICc in favour of a count that has the tilt; None where there are too few readings.
         start_time: time of the first reading [s].
         warnings: what to know before using the numbers.
     """
@@ -480,7 +480,7 @@ def correlation_warnings(found: Correlation | None, n: int) -> list[str]:
         return []
     said = (
         f"neighbouring residuals resemble each other more than independent readings would (p = {digits(found.p)}): "
-        f"their correlation is {found.value:.2f} ± {found.u:.2f}, so {n} readings tell as much as "
+        f"their correlation is {found.value:.2f} ± {found.u:.2f}, so {n} readings are worth as much as "
         f"{digits(n / found.factor())} independent ones, and all uncertainties are enlarged accordingly"
     )
     return [said]

@@ -3,7 +3,7 @@
 Noise hides the tilt of a top's moment (`analysis.spindown.tilt`), and the laws take it up: with a moment 0.03 rad off
 the axis and readings good to 0.03 Hz the exponent is 0.05 too large.  Whether there is a tilt is then a matter of what
 is known beforehand.  To first order a count with a tilt differs from one without by A b₁ + K b₂, so all is linear: A
-and K are known beforehand as normal, the readings add what they tell, and the ratio of the two evidences says how
+and K are known beforehand as normal, the readings add their information, and the ratio of the two evidences says how
 probable a tilt is after all.  The variance is that of an average over two models, about the one that is shown
 (K. P. Burnham & D. R. Anderson, Model Selection (2002), §4.3), with the weight from the evidence.
 """
@@ -98,7 +98,7 @@ def hidden_tilt(plain: Solution, noise: float, wobble: Wobble = UNKNOWN_ORIGIN) 
         return None
     beforehand, u = np.array([A * nearer, wobble.value]), np.array([A_U * nearer, wobble.u])
     q, _ = np.linalg.qr(plain.slopes.T)
-    # in units of what is known beforehand; what the law's own parameters can follow tells nothing
+    # in units of what is known beforehand; what the law's own parameters can follow is no evidence
     own = (bends - (bends @ q) @ q.T) * u[:, None]
     noise = max(noise, 1e-5 * float(np.abs(own).max()))  # readings without noise: as good as these
     own, mean = own / noise, beforehand / u

@@ -22,7 +22,7 @@ Uncertainty = Literal["covariance", "profile", "bootstrap"]
 Intervals = Sequence[tuple[float, float] | None]
 
 MOST_WITH_TILT = 60  # a law that the readings suit needs 5 to 15
-FACTOR_TOLD = 3.0  # u(ln c) above which "known to a factor" says nothing
+MAX_STATED_FACTOR = 3.0  # u(ln c) above which "known to a factor" says nothing
 ROUNDING = 64 * float(np.finfo(float).eps)  # relative: residuals below it are the computer's, not the top's
 
 
@@ -455,7 +455,7 @@ def _warnings(
         said.append(f"{name}: the search for the best fit did not end, the numbers are those of the best point found")
     if not found.readings.sigma_known and found.degrees_of_freedom == 0:
         said.append(
-            f"{name}: {found.n_parameters} parameters pass through {found.n_parameters} readings, so nothing tells "
+            f"{name}: {found.n_parameters} parameters pass through {found.n_parameters} readings, so nothing shows "
             "their uncertainty: record more readings, or state the uncertainty of each"
         )
     elif found.curvature.covariance is None:
@@ -482,7 +482,7 @@ def _constant_warnings(law: str, constant: str, estimate: Estimate) -> list[str]
     said = []
     if value < -2 * u and constant != "exponent":
         said.append(f"{law}: {constant} is negative by {-value / u:.1f} standard uncertainties, which no drag can be")
-    if constant == "c" and u > FACTOR_TOLD * abs(value):
+    if constant == "c" and u > MAX_STATED_FACTOR * abs(value):
         said.append(f"{law}: c is not determined, as it depends exponentially on the exponent")
     elif constant == "c" and u > 0.5 * abs(value):
         said.append(

@@ -30,7 +30,7 @@ class Statistics:
         weight: Akaike weight among the laws fitted.
         durbin_watson: near 2 for noise.
         runs_test_p: small when the signs of the residuals are in no random order.
-        n_effective: how many independent readings tell as much, where the noise of neighbours is correlated.
+        n_effective: how many independent readings are worth as much, where the noise of neighbours is correlated.
     """
 
     n: int

@@ -1,4 +1,4 @@
-"""What the readings say about the laws, in words.
+"""The verdict of the readings about the laws, in words.
 
 A law is excluded by a fit that is worse, never by the number of its constants: a law that fits as well with more of
 them is only more than is needed.
@@ -23,7 +23,7 @@ _SIMPLE = ("stokes", "newton", "disc")
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the readings say; every law stands in one of the four lists.
+    """The verdict; every law is in one of the four lists.
 
     Attributes:
         best: name of the law with the smallest criterion.
@@ -144,20 +144,22 @@ def _about_best(tied: Sequence[str], exponent: Estimate | None) -> str:
     if best == "power":
         best = f"power law, {_in_words(exponent)},"
         return (
-            f"The {best} fits best." if not others else f"The {best} fits best; {_list(others)} cannot be told from it."
+            f"The {best} fits best."
+            if not others
+            else f"The {best} fits best; {_list(others)} cannot be distinguished from it."
         )
     if not others:
         return f"The {best} law fits best."
     named = [f"power, {_in_words(exponent)}," if name == "power" else name for name in others]
     contains = [name for name in others if best in SPECIAL_CASES.get(name, ())]
     expected = " which contains it," if contains == others == ["power"] else ""
-    return f"The {best} law fits best; {_list(named)}{expected} cannot be told from it.".replace(",,", ",")
+    return f"The {best} law fits best; {_list(named)}{expected} cannot be distinguished from it.".replace(",,", ",")
 
 
 def _undecided(n: int, fall: float, names: Sequence[str]) -> str:
     laws = _list(names) if len(names) > 1 else "the laws"
     return (
-        f"These {n} readings cannot tell {laws} apart: over a fall of the spin by {digits(100 * fall)} % they differ "
+        f"These {n} readings cannot distinguish {laws}: over a fall of the spin by {digits(100 * fall)} % they differ "
         "too little for readings of this number and precision. Let the top fall further, or read it more often."
     )
 
@@ -171,7 +173,7 @@ def _about_needless(needless: Sequence[str], best: str, exponent: Estimate | Non
 
 
 def _in_words(exponent: Estimate | None) -> str:
-    """As n = 1.507 ± 0.006."""
+    """An exponent as n = 1.507 ± 0.006."""
     if exponent is None or exponent.value is None or not exponent.u:
         return "of whatever exponent"
     return f"n = {_value(exponent)}"

@@ -1,4 +1,4 @@
-"""IEEE 488.2 and SCPI: what the drivers have in common, and how they declare a quantity in one line.
+"""IEEE 488.2 and SCPI: the base of the drivers, and the declaration of a quantity in one line.
 
 Source: IEEE 488.2-1992; SCPI-1999 volumes 1 and 2.
 """
@@ -25,45 +25,53 @@ if TYPE_CHECKING:
     from instruments.links.transport import TrafficLog, Transport
 
 T = TypeVar("T", bound=bool | float | str)
-#: Error queues hold 20 to 32 entries; more questions than that mean that the instrument never says "none".
+#: Error queues hold 20 to 32 entries: an instrument that still has one after so many never answers "No error".
 _LONGEST_ERROR_QUEUE = 64
 #: An entry of the error queue (SCPI-1999, vol. 2, 21.8): a number and a text in quotes.
 _QUEUE_ENTRY = re.compile(r"([+-]?\d{1,5}), ?(\"[ -~]*\")", re.ASCII)
 #: How instruments print a switch (SCPI-1999, vol. 1, 7.3).
 _SWITCH = {"0": False, "1": True}
-#: Instruments round what they are set to by this fraction of it at most; where their resolution is known and the digits
-#: of their answers are not, these have four at least.
+#: Instruments round a setting by this fraction of it at most.  Where their resolution is known, and the number of
+#: digits in their answers is not, these digits are four at least.
 _ROUNDING, _PRINTED = 0.01, 1e-4
 
 
 class ScpiInstrument:
     """An instrument that speaks SCPI over a transport.
 
-    MODELS: what the model field of ``*IDN?`` must match, whole (regular expression); NUMBER: the form in which it
-    prints numbers, where a setting or a question has none of its own.
+    A driver is a context manager that closes the link at the end.  It has no lock: use it from one thread.
 
-    It is a context manager: it is closed at the end.  One program, one thread: there is no lock within a driver.
+    Attributes:
+        MODELS: regular expression that the whole model field of ``*IDN?`` must match.
+        SERIAL: the factory settings of its serial line; empty where it has none.
+        NUMBER: the form in which it prints numbers, where a setting or a question has none of its own.
+        transport: the link.
+        clock: of the bench.
+        last_set: the last value set of each declared setting, since the last reset.
 
     ``Keysight53230A.connect("TCPIP0::192.168.1.20::5025::SOCKET")`` shows itself as
     ``<Keysight53230A 53230A MY58120113 at TCPIP0::192.168.1.20::5025::SOCKET>``.
     """
 
     MODELS: ClassVar[str] = ".*"
-    #: How its serial line is set when it leaves the factory; empty: it has none.
     SERIAL: ClassVar[Mapping[str, Any]] = {}
     NUMBER: ClassVar[Form] = NUMERIC
 
     transport: Transport
     clock: Clock
-    #: What was set last of each declared setting, since the last reset.
-    set_to: dict[str, bool | float | str]
+    last_set: dict[str, bool | float | str]
     _fields: tuple[str, ...] = ()
 
     def __init__(self, transport: Transport, *, clock: Clock | None = None) -> None:
-        """Drive the instrument at this link.  clock: of the bench, for what is waited for; by default the wall's."""
+        """Drive the instrument at this link.
+
+        Args:
+            transport: the link.
+            clock: of the bench, for the driver's waits; by default the wall clock.
+        """
         self.transport = transport
         self.clock = clock or WallClock()
-        self.set_to = {}
+        self.last_set = {}
 
     @classmethod
     def connect(
@@ -76,20 +84,20 @@ class ScpiInstrument:
         log: TrafficLog | None = None,
         **line: Any,
     ) -> Self:
-        """The driver of the instrument at this address, which must answer as one of its models.
+        """Connect to the instrument at this address, which must be one of the driver's models.
 
         Args:
             address: a port (``COM3``), or the name of a VISA resource.
             library: PyVISA's, by its name or itself: ``"@py"``, ``"@levilab"``, ``""`` for the vendor's.
             timeout: of one answer [s].
-            clock: of a virtual bench, the wall's by default.
-            log: is given all bytes.
+            clock: of a virtual bench; by default the wall clock.
+            log: called with all bytes.
             line: baud_rate, data_bits, parity, stop_bits of a serial line, where they are not the instrument's own.
 
         Raises:
-            NotConnected: nothing could be opened there.
+            NotConnected: the address cannot be opened.
             NoAnswer: no instrument answers.
-            WrongInstrument: another one does.
+            WrongInstrument: another model answers.
         """
         link = open_link(address, line={**cls.SERIAL, **line}, library=library, timeout=timeout, clock=clock, log=log)
         try:
@@ -107,12 +115,12 @@ class ScpiInstrument:
         self.close()
 
     def __repr__(self) -> str:
-        """Model, serial number and address; the former two where the instrument was asked for them."""
+        """Model, serial number and address; the first two after identity() only."""
         known = " ".join(field for field in self._fields[1:3] if field)
         return f"<{type(self).__name__}{' ' * bool(known)}{known} at {self.transport.address}>"
 
     def __setattr__(self, name: str, value: object) -> None:
-        """Set an attribute that there is.  Raises AttributeError: a misspelt setting would be set nowhere."""
+        """Set an attribute.  Raises AttributeError for an unknown name, as a misspelt setting would have no effect."""
         if not name.startswith("_") and name not in _attributes(cast("Any", type(self))):
             near = difflib.get_close_matches(name, sorted(row.name for row in self.declared()), n=1)
             hint = f": did you mean {near[0]!r}?" if near else ""
@@ -120,10 +128,14 @@ class ScpiInstrument:
         super().__setattr__(name, value)
 
     def identity(self) -> str:
-        """The answer to ``*IDN?``.
+        """Ask ``*IDN?``.
 
-        Raises WrongInstrument when another model answers, BadAnswer when the answer has not the four fields of an
-        identity.
+        Returns:
+            The answer.
+
+        Raises:
+            WrongInstrument: another model answers.
+            BadAnswer: the answer does not have the four fields of an identity.
         """
         answer = self.transport.query("*IDN?")
         try:
@@ -137,17 +149,17 @@ class ScpiInstrument:
 
     @classmethod
     def kind_of_instrument(cls) -> str:
-        """What it drives, in words: the first line of its documentation."""
+        """The instruments that it drives, in words: the first line of its documentation."""
         return (cls.__doc__ or cls.__name__).splitlines()[0].rstrip(".")
 
     def forget_errors(self) -> None:
-        """Empty the error queue: what an earlier program left there is not ours."""
+        """Empty the error queue, which may have errors of an earlier program."""
         self.transport.write("*CLS")
 
     def command(self, message: str) -> None:
         """Send a command and read the error queue.  Raises CommandRefused with the queue's texts."""
         if message.upper().startswith("*RST"):
-            self.set_to.clear()
+            self.last_set.clear()
         self.transport.write(message)
         self.raise_errors(message)
 
@@ -168,25 +180,36 @@ class ScpiInstrument:
         if entries:
             raise CommandRefused(self.transport.address, after, tuple(entries))
 
-    def measured(self, question: str, *, patience: float = 0.0) -> float | None:
-        """A measured number, None where there was nothing to measure.
+    def read_number(self, question: str, *, patience: float = 0.0) -> float | None:
+        """Ask for a measured number.
 
-        The error queue is read first: after an earlier error no number can be trusted.
-        patience: how long the measurement takes [s].  Raises CommandRefused, NoAnswer, BadAnswer.
+        It reads the error queue first: after an earlier error no number can be trusted.
+
+        Args:
+            question: to send.
+            patience: how long the measurement takes [s].
+
+        Returns:
+            The number, None where there was nothing to measure.
+
+        Raises:
+            CommandRefused: the error queue was not empty.
+            NoAnswer: nothing came in time.
+            BadAnswer: the answer is no number of the instrument's form.
         """
         self.raise_errors(question)
         answer = self.transport.query(question, patience=patience)
-        with self.resynchronised():
+        with self.clearing_on_bad_answer():
             return parse_reading(self.transport.address, question, answer, self.NUMBER)
 
     def reject(self, question: str, answer: str, expected: str) -> NoReturn:
         """Raise BadAnswer, and clear the link: the answer may have been another question's."""
-        with self.resynchronised():
+        with self.clearing_on_bad_answer():
             raise BadAnswer(self.transport.address, question, answer, expected)
 
     @contextlib.contextmanager
-    def resynchronised(self) -> Iterator[None]:
-        """After an answer that makes no sense the link is cleared: it may have been another question's."""
+    def clearing_on_bad_answer(self) -> Iterator[None]:
+        """Clear the link where the block raises BadAnswer: the answer may have been another question's."""
         try:
             yield
         except BadAnswer:
@@ -194,8 +217,8 @@ class ScpiInstrument:
             raise
 
     def settings(self) -> dict[str, bool | float | str]:
-        """Every declared setting as it stands in the instrument, unit at the end of the name."""
-        return {setting.full_name: getattr(self, setting.name) for setting in self.declared()}
+        """Ask the instrument for all declared settings, with the unit at the end of each name."""
+        return {setting.name_with_unit: getattr(self, setting.name) for setting in self.declared()}
 
     def changed_settings(
         self,
@@ -203,18 +226,23 @@ class ScpiInstrument:
         *,
         since: Mapping[str, bool | float | str] | None = None,
     ) -> dict[str, tuple[object, object]]:
-        """Settings that are no longer as they were: name → (then, now).
+        """Find the settings that have changed.
 
-        now: what `settings` has returned; by default the instrument is asked.  since: what `settings` returned before;
-        an instrument answers the same setting in the same way each time, so that any other answer is a change.  By
-        default `now` is compared with what was set, which the instrument rounds; see :meth:`Setting.differs`.
+        Args:
+            now: what `settings` has returned; by default it asks the instrument.
+            since: what `settings` returned before.  An instrument answers the same setting in the same way each time,
+                so any other answer is a change.  By default `now` is compared with the values that were set, which the
+                instrument rounds; see :meth:`Setting.differs`.
+
+        Returns:
+            name → (then, now).
         """
         if since is not None:
             now = now or self.settings()
             return {name: (then, now[name]) for name, then in since.items() if now[name] != then}
         found: dict[str, tuple[object, object]] = {}
-        rows = {row.full_name: row for row in self.declared()}
-        for name, asked in self.set_to.items():
+        rows = {row.name_with_unit: row for row in self.declared()}
+        for name, asked in self.last_set.items():
             row = rows[name]
             stands = getattr(self, row.name) if now is None else now[name]
             if row.differs(asked, stands, rounding=self.rounding(row)):
@@ -222,7 +250,7 @@ class ScpiInstrument:
         return found
 
     def rounding(self, row: Setting[Any]) -> float:
-        """How far this instrument may set a number from what it was given, beside what all do [its unit]."""
+        """How much more than other instruments this one rounds a setting [its unit]."""
         return 0.0
 
     @classmethod
@@ -232,20 +260,22 @@ class ScpiInstrument:
         return [row for row in rows if isinstance(row, Setting)]
 
     def field_of(self, answer: str, header: str, key: str) -> str:
-        """What an answer says of one setting: all of it, where it has neither header nor fields.
+        """The part of an answer that is one setting; all of it, where it has neither header nor fields.
 
-        Raises ValueError where it says nothing of it.
+        Raises ValueError where the answer does not have the setting.
         """
         return answer
 
     def confirm(self, setting: Setting[Any], value: bool | float | str) -> None:  # noqa: FBT001
-        """Called when a setting was sent: an instrument without an error queue is asked for it.
+        """Called after a setting was sent, so that an instrument without an error queue can be asked for it.
 
-        Raises OutOfRange for a number that it sets otherwise, CommandRefused for anything else.
+        Raises:
+            OutOfRange: it has set another number.
+            CommandRefused: it has not taken the setting.
         """
 
     def ask_back(self, setting: Setting[Any], value: bool | float | str) -> None:  # noqa: FBT001
-        """See that a setting was taken, for `confirm`."""
+        """Check that the instrument has taken a setting, for `confirm`."""
         now = getattr(self, setting.name)
         if not setting.differs(value, now, rounding=self.rounding(setting)):
             return
@@ -260,31 +290,40 @@ class ScpiInstrument:
         return header
 
     def close(self) -> None:
-        """Give the instrument back."""
+        """Close the link."""
         self.transport.close()
 
 
 @functools.cache
 def _attributes(driver: Any) -> frozenset[str]:
-    """The names that can be set on a driver: its settings, properties, and what its classes annotate."""
+    """The names that can be set on a driver: its settings, properties, and annotated attributes."""
     annotated = (name for owner in driver.__mro__ for name in getattr(owner, "__annotations__", {}))
     return frozenset({*dir(driver), *annotated})
 
 
 @dataclass(eq=False)
 class Setting(Generic[T]):
-    """A quantity of an instrument that can be set and asked for, declared in one line.
+    """A quantity of an instrument to set and to query, declared in one line.
 
-    What the instrument answers is checked: a number must have the instrument's form, a switch is 0 or 1, a word is one
-    of the choices, in its short or long form.  Anything else is BadAnswer, and the link is cleared.
+    It checks each answer: a number must have the instrument's form, a switch is 0 or 1, a word is one of the choices,
+    in its short or long form.  For any other answer it raises BadAnswer and clears the link.
 
-    header: the SCPI header; kind: float, bool or str; unit: of the number on the wire;
-    low, high: what the instrument takes; choices: the words it takes, long form with the short form in capitals
-    (SINusoid); answers: words that it may answer beside the choices; form: the form of its answer, where that is not
-    the instrument's NUMBER, or of a text without choices; resolution: the step in which the instrument sets it [unit];
-    digits: how many significant ones of a number it keeps and prints, where that is known;
-    key: the name of the field where the header has several, ``C1:BSWV WVTP,SINE,FRQ,1000HZ,…``; suffix: the unit that
-    is sent with a number; values: the only numbers that the instrument has; about: what it is, for `help`.
+    Attributes:
+        header: the SCPI header.
+        kind: float, bool or str.
+        unit: of the number on the wire.
+        low: the lowest number that the instrument takes.
+        high: the highest one.
+        choices: the words that it takes, in their long form with the short form in capitals (SINusoid).
+        answers: words that it may answer beside the choices.
+        form: of its answer, where that is not the instrument's NUMBER, or of a text without choices.
+        resolution: the step in which the instrument sets it [unit].
+        digits: how many significant digits of a number it keeps and prints, where that is known.
+        key: the name of the field where the header has several, ``C1:BSWV WVTP,SINE,FRQ,1000HZ,…``.
+        suffix: the unit to send with a number.
+        values: the only numbers that the instrument has.
+        about: what it is, for `help`.
+        name: of the attribute; Python sets it.
     """
 
     header: str
@@ -312,12 +351,12 @@ class Setting(Generic[T]):
         self.__doc__ = self.description()
 
     def description(self) -> str:
-        """What `help` shows: what it is, the header on the wire, range and unit."""
+        """The text of `help`: what it is, the header on the wire, range and unit."""
         about = f"{self.about}: " if self.about else ""
         return f"{about}{self.header}{f' {self.key}' if self.key else ''}, {self._allowed()}."
 
     def _allowed(self) -> str:
-        """What can be set, in words."""
+        """The allowed values, in words."""
         unit = f" {self.unit}" if self.unit else ""
         if self.kind is bool:
             return "True or False"
@@ -328,8 +367,8 @@ class Setting(Generic[T]):
         return "one of " + ", ".join(self.choices) if self.choices else f"a text, as {self.form and self.form.example}"
 
     @property
-    def full_name(self) -> str:
-        """The name with its unit, as it leaves the program: gate_s."""
+    def name_with_unit(self) -> str:
+        """The name with its unit, as in files: gate_s."""
         return f"{self.name}_{self.unit.lower()}" if self.unit else self.name
 
     @overload
@@ -354,12 +393,15 @@ class Setting(Generic[T]):
         key = f"{self.key}," if self.key else ""
         instrument.command(f"{instrument.header_in_use(self.header)} {key}{self._spell(value)}{self.suffix}")
         instrument.confirm(self, value)
-        instrument.set_to[self.full_name] = self._canonical(value)
+        instrument.last_set[self.name_with_unit] = self._canonical(value)
 
     def differs(self, asked: T, answered: T, *, rounding: float = 0.0) -> bool:
-        """Whether an answer is another value than the one that was set, rounding and the setting's resolution aside.
+        """Whether an answer is another value than the one set, apart from rounding.
 
-        rounding: a further one, in the setting's unit.
+        Args:
+            asked: the value set.
+            answered: the value in the answer.
+            rounding: of this instrument, in addition to that of the setting [unit].
         """
         if self.kind is float:
             aside = self._last_digit(abs(float(asked))) + self.resolution + rounding
@@ -367,7 +409,7 @@ class Setting(Generic[T]):
         return self._canonical(asked) != self._canonical(answered)
 
     def _last_digit(self, value: float) -> float:
-        """What one unit in the last digit that the instrument keeps of a number is worth [unit]."""
+        """One unit in the last digit of a number that the instrument keeps [unit]."""
         if self.digits and value:
             return 10.0 ** (math.floor(math.log10(value)) + 1 - self.digits)
         return (_PRINTED if self.resolution else _ROUNDING) * value
@@ -384,13 +426,13 @@ class Setting(Generic[T]):
                 raise ValueError(answer)
             return number
         if self.choices:
-            return _short_form(_without_quotes(answer), (*self.choices, *self.answers))
+            return _short_form(_strip_quotes(answer), (*self.choices, *self.answers))
         if not form.matches(answer):
             raise ValueError(answer)
         return answer
 
     def _expected(self, form: Form) -> str:
-        """What an answer is expected to be, in words."""
+        """The expected answer, in words."""
         if self.kind is bool:
             return "0 or 1"
         if self.kind is float:
@@ -439,16 +481,16 @@ def _short_form(word: str, choices: tuple[str, ...]) -> str:
     raise ValueError(word)
 
 
-def _without_quotes(answer: str) -> str:
-    """Some instruments quote some words."""
+def _strip_quotes(answer: str) -> str:
+    """A word without the quotes that some instruments put around it."""
     quoted = re.fullmatch(r'"([^"]*)"', answer)
     return quoted[1] if quoted else answer
 
 
 def parse_reading(address: str, question: str, answer: str, form: Form = NUMERIC) -> float | None:
-    """A measured number, or None where the instrument says that there was nothing to measure: 9.91E37, 9.9E37, -9.9E37.
+    """Read a measured number; None where the instrument had nothing to measure: 9.91E37, 9.9E37, -9.9E37.
 
-    Raises BadAnswer if it is no number of this form.
+    Raises BadAnswer where the answer is no number of this form.
     """
     try:
         number = form.number(answer)

@@ -1,10 +1,10 @@
-"""What to try when an instrument cannot be reached: from the words of the error."""
+"""Advice for an instrument that cannot be reached, by the words of the error."""
 
 from __future__ import annotations
 
 import re
 
-#: What an error's text tells, and what to try.
+#: What to try, by the words of an error (regular expressions).
 _ADVICE = {
     r"could not locate a visa|wrapper.*not found|no module named 'pyvisa_": (
         'no such VISA library is installed: take visa_library = "@py", which comes with this program'
@@ -17,7 +17,7 @@ _ADVICE = {
     r"name or service not known|getaddrinfo|nodename": "this computer does not know that name: try the number",
     r"refused": "the host is there, but not at this port: check port and protocol",
 }
-#: What a link says that its own program has closed.
+#: The reason in the error of a link that its own program has closed.
 CLOSED = "this session was closed: open another one"
 _ALWAYS = "check the address, the cable and that it is on"
 
@@ -25,7 +25,10 @@ _ALWAYS = "check the address, the cable and that it is on"
 def advice(error: BaseException, address: str = "", library: object = "@py") -> str:
     """What to try, as the end of a sentence.
 
-    address: what was to be opened; library: by which PyVISA library.
+    Args:
+        error: that was raised.
+        address: that was to be opened.
+        library: PyVISA's, by its name or itself.
 
     >>> advice(OSError("[Errno 111] Connection refused"))
     ': the host is there, but not at this port: check port and protocol'

@@ -23,15 +23,15 @@ def open_link(
     clock: Clock | None = None,
     log: TrafficLog | None = None,
 ) -> Transport:
-    """An open link: pyserial's where the address is a port or its URL, else PyVISA's.
+    """Open a link: pyserial's where the address is a port or its URL, else PyVISA's.
 
     Args:
         address: a port (``COM3``), a URL (``socket://host:port``) or the name of a VISA resource.
-        line: how a serial line is set, and the pause that the instrument wants between messages.
+        line: settings of a serial line, and the pause that the instrument needs between messages.
         library: PyVISA's, by its name or itself.
         timeout: of one answer [s].
-        clock: by which the pauses between messages are kept, the wall's by default.
-        log: is given all bytes.
+        clock: for the pauses between messages; by default the wall clock.
+        log: called with all bytes.
 
     Raises:
         NotConnected: nothing could be opened there.

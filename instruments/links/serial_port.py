@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 #: pyserial's letters for what bench.toml says in words.
 PARITIES = {"none": "N", "odd": "O", "even": "E", "mark": "M", "space": "S"}
 
-#: Bytes read at a stretch.
+#: Bytes of one read, at most.
 _CHUNK = 4096
 
 _IN_USE = {errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK}
@@ -48,11 +48,22 @@ class SerialTransport(MessageLink):
     ) -> None:
         """Open the port.
 
-        address: a port (``COM3``, ``/dev/ttyUSB0``), the same as a VISA resource (``ASRLCOM3::INSTR``, ``ASRL3::INSTR``
-        for the third port), or a URL of pyserial's (``socket://host:port``).
-        parity: none, odd, even, mark or space; timeout: of one answer [s]; pause: how long the instrument is left
-        alone after each exchange [s]; clock: by which, the wall's by default.
-        Raises NotConnected, Occupied, OutOfRange.
+        Args:
+            address: a port (``COM3``, ``/dev/ttyUSB0``), the same as a VISA resource (``ASRLCOM3::INSTR``,
+                ``ASRL3::INSTR`` for the third port), or a URL of pyserial's (``socket://host:port``).
+            baud_rate: of the line [bit/s].
+            data_bits: 5 to 8.
+            parity: none, odd, even, mark or space.
+            stop_bits: 1, 1.5 or 2.
+            timeout: of one answer [s].
+            pause: after each message and each answer, before the next message [s].
+            clock: for the pause; by default the wall clock.
+            log: called with all bytes.
+
+        Raises:
+            NotConnected: the port cannot be opened.
+            Occupied: another program has it.
+            OutOfRange: no such parity.
         """
         if parity not in PARITIES:
             raise OutOfRange(address, "parity", parity, "one of " + ", ".join(PARITIES))
@@ -69,9 +80,11 @@ class SerialTransport(MessageLink):
 
 
 class SerialPort:
-    """A port of pyserial's; see :class:`instruments.links.transport.Port`.
+    """A pyserial port; see :class:`instruments.links.transport.Port`.
 
-    device: pyserial's own, once it is open; received: bytes that came behind the last line.
+    Attributes:
+        device: pyserial's own object, None until it is open.
+        received: bytes that came behind the last line.
     """
 
     resynchronising = Resynchronising.QUESTION
@@ -114,7 +127,7 @@ class SerialPort:
     def close(self) -> None:
         """See :class:`instruments.links.transport.Port`."""
         link = self.connection()
-        with contextlib.suppress(Exception):  # it may be gone for good
+        with contextlib.suppress(Exception):  # the device may be unplugged
             self.device.close()
         if link is not None:  # pyserial leaves it open if the other side has hung up
             link.close()
@@ -155,7 +168,7 @@ class SerialPort:
         return bytes(seen)
 
     def message(self, within: float) -> bytes:
-        """A line marks no ends of messages.  Raises NotImplementedError."""
+        """A serial line does not mark the ends of messages.  Raises NotImplementedError."""
         raise NotImplementedError
 
     def discard(self) -> None:
@@ -169,7 +182,7 @@ class SerialPort:
         self.discard()
 
     def lock(self, within: float) -> None:
-        """Keep other programs that ask for it from the port (POSIX); on Windows a port has one user at any time."""
+        """Lock the port against other programs that lock it, too (POSIX); on Windows a port always has one user."""
         import serial
 
         try:
@@ -187,7 +200,7 @@ class SerialPort:
 
 
 def port_name(address: str) -> str:
-    """What pyserial calls this port.
+    """The name by which pyserial knows this port.
 
     A number alone is VISA's: the third port is COM3, or /dev/ttyS2 elsewhere than on Windows.
 
@@ -202,18 +215,18 @@ def port_name(address: str) -> str:
 
 
 def _permission_hint(port: str) -> str:
-    """Which group uses this port, where there are groups."""
+    """How to get the right to use this port: its group, on systems with groups."""
     try:
         import grp
 
         group = grp.getgrgid(Path(port).stat().st_gid).gr_name
     except (ImportError, OSError, KeyError):
-        return "ask whoever runs this computer for the right to use serial ports"
+        return "ask the administrator of this computer for the right to use serial ports"
     return f"its group is {group}; join it with `sudo usermod -aG {group} $USER`, then log in again"
 
 
 def _ports_hint(port: str) -> str:
-    """Which ports there are, for a name that is none of them."""
+    """Advice for a name that is no port of this computer: the ports that it has."""
     if "://" in port:
         return "check the address, and that it is on"
     if re.fullmatch(r"[\d.]+|[\w-]+(\.[\w-]+)+", port):

@@ -1,4 +1,4 @@
-"""What a driver needs of a link, and the one link that there is: messages over a port of bytes."""
+"""Links: what a driver needs of one, and the one implementation, messages over a port of bytes."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 #: Called with the address, ">" or "<", and the bytes that were sent or received.
 TrafficLog = Callable[[str, str, bytes], None]
 
-#: The longest answer that is text [bytes]; of a block that is longer than the other the traffic log has so many bytes.
+#: The longest answer that is text, and how many bytes of a block the traffic log has at most [bytes].
 LONGEST_ANSWER, _LONGEST_LOGGED = 1 << 22, 64
 
-#: What text on a wire consists of.
+#: The bytes of text on a wire.
 _PLAIN = re.compile(rb"[\t\r\n -~]*")
 
 #: The question that every instrument knows, and its answer: four fields, the first no number.
@@ -34,7 +34,12 @@ _WHO, _IDENTITY = "*IDN?", re.compile(rb"[A-Za-z][^,]*,[^,]*,[^,]*,[^,]*")
 
 
 class Transport(Protocol):
-    """Messages to and from one instrument.  timeout: how long an answer is waited for [s]."""
+    """Messages to and from one instrument.
+
+    Attributes:
+        address: of the instrument.
+        timeout: how long to wait for an answer [s].
+    """
 
     address: str
     timeout: float
@@ -45,37 +50,50 @@ class Transport(Protocol):
     def query(self, message: str, *, patience: float = 0.0) -> str:
         """Send a question and return the answer without its line end.
 
-        patience: how long the instrument works on this answer before it can send it [s]; added to the
-        timeout.  Raises NoAnswer when nothing came in time.
+        Args:
+            message: the question.
+            patience: how long the instrument works on its answer [s], in addition to the timeout.
+
+        Raises:
+            NoAnswer: nothing came in time.
         """
 
     def query_block(self, message: str, *, patience: float = 0.0, form: BlockForm = PLAIN_BLOCK) -> bytes:
         """Send a question and return the bytes of the definite-length block that answers it (IEEE 488.2, 8.7.9).
 
-        form: what stands around the block.  A block may take longer than the time-out, but not be silent for so long.
+        A block may take longer than the time-out, but no pause within it may.
 
-        Raises NoAnswer as query does, BadAnswer when it is no block or one that breaks off.
+        Args:
+            message: the question.
+            patience: as in `query` [s].
+            form: what surrounds the block.
+
+        Raises:
+            NoAnswer: nothing came in time.
+            BadAnswer: the answer is no block, or one that breaks off.
         """
 
     def clear(self) -> None:
-        """Drop whatever is under way in either direction."""
+        """Drop what is under way in either direction."""
 
     def reopen(self) -> None:
-        """Give the link up and make it anew.  Raises NotConnected, also after close()."""
+        """Close the link and open it again.  Raises NotConnected, also after close()."""
 
     def lock(self) -> None:
-        """Keep other programs from the instrument, where the interface can.  Raises Occupied if one has it."""
+        """Lock the instrument against other programs, where the interface can.  Raises Occupied where one has it."""
 
     def close(self) -> None:
-        """Give the instrument back, for good.  Afterwards all else raises NotConnected; closing twice does no harm."""
+        """Close the link for good.  Then all other methods raise NotConnected; closing twice does no harm."""
 
 
 class Resynchronising(Enum):
-    """What removes the late answers to old questions from the way to an instrument.
+    """How a link gets rid of late answers to old questions.
 
-    DEVICE_CLEAR: the interface's own command (GPIB, USB, VXI-11, HiSLIP).  NEW_LINK: a bare socket, where late answers
-    are lost with their connection.  QUESTION: a serial line loses nothing, but instruments answer in the order in which
-    they were asked: ``*IDN?`` is asked, and all is dropped that comes before its answer.
+    Attributes:
+        DEVICE_CLEAR: by the interface's own command (GPIB, USB, VXI-11, HiSLIP).
+        NEW_LINK: by a new connection, as late answers are lost with the old one (bare sockets).
+        QUESTION: by asking ``*IDN?`` and dropping all that comes before its answer, as instruments answer in the order
+            of the questions (serial lines).
     """
 
     DEVICE_CLEAR = auto()
@@ -84,7 +102,7 @@ class Resynchronising(Enum):
 
 
 class Failure(Enum):
-    """What an error of a port's library means."""
+    """The meaning of an error of a port's library."""
 
     SILENCE = auto()
     OCCUPIED = auto()
@@ -92,10 +110,12 @@ class Failure(Enum):
 
 
 class Port(Protocol):
-    """Bytes to and from one instrument, by some library.  What that raises, `failure` explains.
+    """Bytes to and from one instrument, by some library.  `failure` gives the meaning of the library's errors.
 
-    resynchronising: see there; text: what an answer is expected to be, in words; silence: the error of a question
-    without an answer.
+    Attributes:
+        resynchronising: how to get rid of late answers.
+        text: what an answer is expected to be, in words.
+        silence: the error of a question without an answer.
     """
 
     resynchronising: Resynchronising
@@ -103,42 +123,42 @@ class Port(Protocol):
     silence: type[NoAnswer]
 
     def open(self) -> None:
-        """Make the link.  Raises NotConnected, Occupied."""
+        """Open the link.  Raises NotConnected, Occupied."""
 
     def close(self) -> None:
-        """Give the link up."""
+        """Close the link."""
 
     def send(self, data: bytes, within: float) -> None:
         """Send one message with its line end, in this time [s]."""
 
     def line(self, within: float) -> bytes:
-        """The next answer with its line end, at most LONGEST_ANSWER bytes; less, or an error, if time is up [s]."""
+        """Read an answer with its line end, up to LONGEST_ANSWER bytes; less, or an error, after this time [s]."""
 
     def exactly(self, count: int, within: float) -> bytes:
-        """So many bytes; fewer, or an error, if none come for so long [s]."""
+        """Read `count` bytes; fewer, or an error, where none come within this time [s]."""
 
     def message(self, within: float) -> bytes:
-        """The next answer, of any bytes, where the interface marks its end."""
+        """Read an answer of any bytes, where the interface marks its end."""
 
     def discard(self) -> None:
-        """Drop, without waiting, what has come."""
+        """Drop what has come, without waiting."""
 
     def clear(self, within: float) -> None:
-        """Clear the device, or else drop what is under way.  Raises NotImplementedError where there is no such way."""
+        """Clear the device, or else drop what is under way.  Raises NotImplementedError where neither is possible."""
 
     def lock(self, within: float) -> None:
-        """Keep other programs away, where that is possible.  Raises Occupied, NotConnected."""
+        """Lock the instrument against other programs, where that is possible.  Raises Occupied, NotConnected."""
 
     def failure(self, error: Exception) -> Failure:
-        """What an error of the library means."""
+        """The meaning of an error of the library."""
 
 
 class MessageLink:
     """Messages to and from one instrument over a port: they end with LF, answers with LF or CR LF.
 
-    After a time-out, an answer that makes no sense or an interruption the link is resynchronised before the next
-    message, so that no late answer is taken for that of the next question; see :class:`Resynchronising`.  A link that
-    is lost is made anew before the next message: a plug may be in again.
+    After a time-out, an answer that makes no sense or an interruption the link resynchronises before the next message,
+    so that it takes no late answer for that to the next question; see :class:`Resynchronising`.  A lost link is opened
+    again before the next message, as the plug may be in again.
     """
 
     def __init__(
@@ -153,14 +173,23 @@ class MessageLink:
     ) -> None:
         """Open the port.
 
-        timeout: of one answer [s]; pause: how long the instrument is left alone after each message and each answer [s];
-        clock: by which, the wall's by default.  Raises NotConnected, Occupied.
+        Args:
+            port: to open.
+            address: of the instrument, for messages.
+            timeout: of one answer [s].
+            pause: after each message and each answer, before the next message [s].
+            clock: for the pause; by default the wall clock.
+            log: called with all bytes.
+
+        Raises:
+            NotConnected: the port cannot be opened.
+            Occupied: another program has it.
         """
         self.port, self.address, self.timeout, self.pause = port, address, timeout, pause
         self._clock: Clock = clock or WallClock()
         self._log = log
         self._out_of_step = self._lost = self._locked = self._closed = False
-        self._identities_due = 0  # answers to *IDN? that were not received, and may still come
+        self._identities_due = 0  # answers to *IDN? that may still come
         self._rested_at = -math.inf
         self._streams = port.resynchronising is not Resynchronising.DEVICE_CLEAR
         port.open()
@@ -170,14 +199,14 @@ class MessageLink:
     def write(self, message: str) -> None:
         """Send one message; see :class:`Transport`."""
         self._begin(message)
-        with self._translated_errors(message, self.timeout):
+        with self._translating_errors(message, self.timeout):
             self._send(message)
 
     def query(self, message: str, *, patience: float = 0.0) -> str:
         """Ask; see :class:`Transport`."""
         self._begin(message)
         within = self.timeout + patience
-        with self._translated_errors(message, within):
+        with self._translating_errors(message, within):
             self._send(message)
             return self._line(message, within).decode("ascii").strip()
 
@@ -185,7 +214,7 @@ class MessageLink:
         """Ask for a block; see :class:`Transport`."""
         self._begin(message)
         within = self.timeout + patience
-        with self._translated_errors(message, within):
+        with self._translating_errors(message, within):
             self._send(message)
             block = self._block(message, within, form)
             self._rest()
@@ -198,14 +227,14 @@ class MessageLink:
         if self._lost:
             self.reopen()
         if self._out_of_step:
-            with self._translated_errors(message, self.timeout):
+            with self._translating_errors(message, self.timeout):
                 self._resynchronise()
 
     def _send(self, message: str) -> None:
-        """Send one message, within the link's own time-out: patience is for an answer."""
+        """Send one message, within the link's own time-out: patience is for answers only."""
         if self.pause and (rest := self._rested_at - self._clock.now()) > 0:
             self._clock.sleep(rest)
-        if self._streams:  # an answer that came unasked is no answer to this
+        if self._streams:  # what came before is no answer to this
             self.port.discard()
         line = message.encode("ascii", errors="replace") + b"\n"
         self._record(">", line)
@@ -213,7 +242,7 @@ class MessageLink:
         self._rest()
 
     def _line(self, question: str, within: float) -> bytes:
-        """The next line without its end.  Raises NoAnswer, or _Garbled when it is no text."""
+        """Read a line, without its end.  Raises NoAnswer, or _Garbled when it is no text."""
         line = self.port.line(within)
         self._rest()
         if line:
@@ -248,13 +277,13 @@ class MessageLink:
             self._resynchronise()
             return
         self._out_of_step = True
-        with self._translated_errors("a clear", self.timeout):
+        with self._translating_errors("a clear", self.timeout):
             self.port.clear(self.timeout)
 
     def _resynchronise(self) -> None:
         """Remove the late answers; see :class:`Resynchronising`.  Raises NotConnected, NoAnswer."""
         if self.port.resynchronising is Resynchronising.QUESTION:
-            self._ask_who_is_there()
+            self._ask_identity()
         elif self.port.resynchronising is Resynchronising.NEW_LINK:
             self._record(">", b"(a new link)")
             self.reopen()
@@ -268,9 +297,9 @@ class MessageLink:
                 self.reopen()
         self._out_of_step, self._identities_due = False, 0
 
-    def _ask_who_is_there(self) -> None:
-        """Ask until the last answer to that has come; all before it is old.  Raises NoAnswer, _Garbled."""
-        self._send("")  # ends what may have been sent in part
+    def _ask_identity(self) -> None:
+        """Ask ``*IDN?``, and read until its last answer has come; all before it is old.  Raises NoAnswer, _Garbled."""
+        self._send("")  # ends a message that may have been sent in part
         self._identities_due += 1
         self._send(_WHO)
         deadline = self._clock.now() + self.timeout
@@ -284,10 +313,10 @@ class MessageLink:
             except Exception as error:
                 if not self._is_silence(error):
                     raise
-                if seen:  # the others were never sent
+                if seen:  # the other answers were never sent
                     return
                 raise missing or error from None
-            if self._clock.now() > deadline:  # it talks on and on
+            if self._clock.now() > deadline:  # the instrument does not stop talking
                 if not seen:
                     raise missing or self.port.silence(self.address, _WHO, self.timeout)
                 return
@@ -298,10 +327,10 @@ class MessageLink:
     # --- the link ---
 
     def reopen(self) -> None:
-        """Make the link anew; see :class:`Transport`."""
+        """Open the link again; see :class:`Transport`."""
         self._check_open()
         self._lost = True  # if it cannot be opened, or locked again, now, then perhaps at the next message
-        with contextlib.suppress(Exception):  # it may be gone for good
+        with contextlib.suppress(Exception):  # the link may be lost
             self.port.close()
         self.port.open()
         if self._locked:
@@ -311,15 +340,15 @@ class MessageLink:
         self._out_of_step = self.port.resynchronising is Resynchronising.QUESTION
 
     def lock(self) -> None:
-        """Keep other programs away until it is closed, over a link made anew, too; see :class:`Transport`."""
+        """Lock the instrument until close(); reopen() locks it again; see :class:`Transport`."""
         self._check_open()
         self.port.lock(self.timeout)
         self._locked = True
 
     def close(self) -> None:
-        """Give the instrument back; see :class:`Transport`."""
+        """Close the link; see :class:`Transport`."""
         self._closed = True
-        with contextlib.suppress(Exception):  # it may be gone for good
+        with contextlib.suppress(Exception):  # the link may be lost
             self.port.close()
 
     def _check_open(self) -> None:
@@ -335,19 +364,19 @@ class MessageLink:
             self._log(self.address, direction, data if data.endswith(b"\n") else data + b"\n")
 
     @contextlib.contextmanager
-    def _translated_errors(self, question: str, within: float) -> Iterator[None]:
-        """What the port's library raises, as ours; afterwards the next exchange starts from a clean link."""
+    def _translating_errors(self, question: str, within: float) -> Iterator[None]:
+        """Translate what the port's library raises into our errors, and resynchronise before the next message."""
         try:
             yield
         except BaseException as error:
-            # whatever it was, an interruption included: the answer may still come
+            # after any error, an interruption included, the answer may still come
             self._out_of_step = True
             self._identities_due += question == _WHO
             if isinstance(error, InstrumentError) or not isinstance(error, Exception):
                 raise
-            raise self._translated(error, question, within) from error
+            raise self._translate(error, question, within) from error
 
-    def _translated(self, error: Exception, question: str, within: float) -> InstrumentError:
+    def _translate(self, error: Exception, question: str, within: float) -> InstrumentError:
         if isinstance(error, _Garbled):
             return BadAnswer(self.address, question, repr(error.seen[:40]), self.port.text)
         if isinstance(error, BrokenBlock):
@@ -357,14 +386,14 @@ class MessageLink:
             return self.port.silence(self.address, question, within)
         if failure is Failure.OCCUPIED:
             return Occupied(self.address)
-        # a device clear, or a new link, finds out by itself whether the old one is lost
+        # a device clear or a new link notices by itself that the old link is lost
         self._lost = self.port.resynchronising is Resynchronising.QUESTION
         what = f"no link at {question!r} ({one_line(error)})"
         return NotConnected(self.address, f"{what}: check the address and the cable, and that it is on")
 
 
 class _Garbled(Exception):
-    """What came is no text."""
+    """The bytes of an answer are no text."""
 
     def __init__(self, seen: bytes) -> None:
         self.seen = seen

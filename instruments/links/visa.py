@@ -1,6 +1,6 @@
 """The way to an instrument by PyVISA: a resource as a port of bytes.
 
-A driver sees a :class:`instruments.links.transport.Transport` and cannot tell a real instrument from a virtual one.
+A driver sees a :class:`instruments.links.transport.Transport`: for it real and virtual instruments are alike.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 #: How the names of bare TCP connections end, and those of serial lines begin.
 _BARE_SOCKET, _LINE = "::SOCKET", "ASRL"
 
-#: Bytes of a block and of a text read at a stretch: pyvisa-py's HiSLIP clears so much memory for each answer.
+#: Bytes of one read of a block and of a text: pyvisa-py's HiSLIP clears as much memory for each answer.
 _CHUNK, _TEXT_CHUNK = 1 << 20, 1 << 16
 
 #: VISA's numbers for: locked, busy; and for: no such operation, not implemented.
@@ -50,10 +50,17 @@ class VisaTransport(MessageLink):
     ) -> None:
         """Open the resource.
 
-        library: a PyVISA library, ``"@py"`` needs nothing installed, ``""`` is the vendor's; timeout: of one answer
-        [s]; line: of a serial resource, ``baud_rate``, ``data_bits``, ``parity`` (none, odd, …), ``stop_bits``;
-        pause: how long the instrument is left alone after each message and each answer [s]; clock: by which, the
-        wall's unless the instrument lives on another.  Raises NotConnected.
+        Args:
+            address: a VISA resource name.
+            library: a PyVISA library; ``"@py"`` needs nothing installed, ``""`` is the vendor's.
+            timeout: of one answer [s].
+            line: settings of a serial resource: ``baud_rate``, ``data_bits``, ``parity`` (none, odd, …), ``stop_bits``.
+            pause: after each message and each answer, before the next message [s].
+            clock: for the pause; by default the wall clock.
+            log: called with all bytes.
+
+        Raises:
+            NotConnected: the resource cannot be opened.
         """
         port = VisaPort(address, library, line or {})
         super().__init__(port, address, timeout=timeout, pause=pause, clock=clock, log=log)
@@ -85,7 +92,7 @@ class VisaPort:
         except Exception as error:  # pyvisa-py raises plain Exception when a host is unknown or unreachable
             hint = advice(error, self._address, self._library)
             raise NotConnected(self._address, f"cannot be opened ({one_line(error)}){hint}") from error
-        # the resource's time-out [s], and whether a line feed ends what is read, as far as they were set
+        # the resource's time-out [s], and whether a line feed ends a read; None until they are set
         self._allowed: float | None = None
         self._by_line: bool | None = None
         if self.resynchronising is Resynchronising.NEW_LINK:
@@ -141,8 +148,8 @@ class VisaPort:
     def discard(self) -> None:
         """Empty the pipe without waiting.
 
-        pyvisa-py's own way waits 0.1 s at a bare socket, and for ever if the other side is gone: so its socket is
-        looked at here.  Other libraries know how.
+        At a bare socket pyvisa-py's own flush waits 0.1 s, and for ever where the other side has left, so this reads
+        its socket directly.  Other libraries flush well.
         """
         import pyvisa
 
@@ -195,7 +202,7 @@ class VisaPort:
             self._allowed = within
 
     def _end_at_line_feed(self, *, yes: bool) -> None:
-        """Let a line feed end what is read, or, in a block, be a byte like any other."""
+        """Set whether a line feed ends a read; in a block it is a byte like any other."""
         if self._by_line != yes:
             self.resource.read_termination = "\n" if yes else None
             self._by_line = yes

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from instruments.catalogue import CATALOGUE
 from instruments.clock import VirtualClock
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.protocol_levilab import plug_in
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.core.device import VirtualInstrument
@@ -100,7 +100,7 @@ VIRTUAL_MODELS: dict[str, dict[str, Maker]] = {
 }
 
 
-def virtual_bus(world: World | None = None, models: Mapping[str, str] | None = None) -> Bus:
+def virtual_bus(world: World | None = None, models: Mapping[str, str] | None = None) -> VirtualBench:
     """Return a virtual bench.
 
     Args:
@@ -113,7 +113,7 @@ def virtual_bus(world: World | None = None, models: Mapping[str, str] | None = N
     world = world or practice_world()
     chosen = {kind: settings.model for kind, settings in VIRTUAL.items()} | dict(models or {})
     instruments = {kind: _maker(kind, model)(world) for kind, model in chosen.items()}
-    return Bus({VIRTUAL[kind].address: instrument for kind, instrument in instruments.items()})
+    return VirtualBench({VIRTUAL[kind].address: instrument for kind, instrument in instruments.items()})
 
 
 def virtual_wiring(world: World, limits: Limits | None = None) -> Wiring:
@@ -126,7 +126,7 @@ def virtual_wiring(world: World, limits: Limits | None = None) -> Wiring:
     return Wiring(VIRTUAL, limits or Limits(), library_for(virtual_bus(world)), world.clock, VirtualPerson(world))
 
 
-def plug_in_serial(bus: Bus | None = None) -> Bus:
+def plug_in_serial(bus: VirtualBench | None = None) -> VirtualBench:
     """Let pyserial find a virtual bench, and return the bench.
 
     From then on ``serial.serial_for_url("levilab://magnetometer")`` is its magnetometer, and for pyvisa-py

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from instruments.clock import WallClock
-from instruments.virtual.servers.server import LOOPBACK, PORTS_PER_INSTRUMENT, Place, offered
-from instruments.virtual.servers.station import first_of
+from instruments.virtual.servers.clients import first_of
+from instruments.virtual.servers.server import LOOPBACK, PORTS_PER_INSTRUMENT, ListenAt, serve_bench
 from levilab.errors import LevilabError, UsageError
 from levilab.interruption import watching_for_end
 from levilab.world.bench import PUT_BACK_AFTER_S, VIRTUAL, VIRTUAL_MODELS, practice_world, scene_world, virtual_bus
@@ -19,8 +19,8 @@ from levilab.world.bench import PUT_BACK_AFTER_S, VIRTUAL, VIRTUAL_MODELS, pract
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from instruments.virtual.bench.bus import Bus
-    from instruments.virtual.servers.server import Offer
+    from instruments.virtual.bench.bench import VirtualBench
+    from instruments.virtual.servers.server import Endpoints
     from levilab.interruption import End
     from levilab.simulator.scene import Scene
     from levilab.world.spin_world import World
@@ -135,11 +135,11 @@ async def _serve(service: Service, world: World, ready: Callable[[tuple[Served, 
     bus = virtual_bus(world, service.models)
     # time begins with the first message: the top does not spin down before a program uses the bench
     assert isinstance(world.clock, WallClock)
-    bus.heard = world.clock.begin
+    bus.on_message = world.clock.begin
     place = _place(service, len(bus.instruments))
     async with contextlib.AsyncExitStack() as opened:
         try:
-            offers = await opened.enter_async_context(offered(bus, place))
+            offers = await opened.enter_async_context(serve_bench(bus, place))
         except OSError as error:
             raise _cannot_serve(service, error) from error
         ready(tuple(_served(service, offer) for offer in offers))
@@ -164,7 +164,7 @@ def _cannot_serve(service: Service, error: OSError) -> CannotServe:
     return CannotServe(f"the port mapper cannot be offered ({error}): {what}")
 
 
-async def _keep_up(bus: Bus, world: World) -> None:
+async def _keep_up(bus: VirtualBench, world: World) -> None:
     """Let the motion follow the clock between messages, so that the next one need not wait for hours of it."""
     while True:
         await asyncio.sleep(_KEEP_UP_S)
@@ -188,7 +188,7 @@ def _clock(service: Service) -> WallClock:
         raise UsageError("speed", "a number above 0 is expected", value=service.speed) from error
 
 
-def _place(service: Service, instruments: int) -> Place:
+def _place(service: Service, instruments: int) -> ListenAt:
     if ":" in service.host:  # a resource name is cut at its colons
         raise UsageError("host", "IPv6 has no place in VISA resource names, give an IPv4 address", value=service.host)
     if service.port_mapper is not None and service.host != LOOPBACK:
@@ -201,10 +201,10 @@ def _place(service: Service, instruments: int) -> Place:
     last = (service.port_base or 0) + PORTS_PER_INSTRUMENT * instruments - 1
     if last > _LAST_PORT:
         raise UsageError("port_base", f"the ports end at {_LAST_PORT}, {last} would be needed", value=service.port_base)
-    return Place(service.host, service.port_base, service.port_mapper)
+    return ListenAt(service.host, service.port_base, service.port_mapper)
 
 
-def _served(service: Service, offer: Offer) -> Served:
+def _served(service: Service, offer: Endpoints) -> Served:
     kind = next(kind for kind, settings in VIRTUAL.items() if settings.address == offer.address)
     return Served(kind, service.models.get(kind, VIRTUAL[kind].model), offer.resources)
 

@@ -10,7 +10,7 @@ import pytest
 from instruments.catalogue import CATALOGUE
 from instruments.ieee488 import identity_fields
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from levilab.bench.discover import driver_for_identity
 from levilab.world.bench import practice_world, virtual_bus
@@ -29,7 +29,7 @@ class Opened:
         self.twin = hostile.instrument(name, self.room)
         address = "ASRLbox::INSTR" if ROWS[name].driver.SERIAL else "TCPIP0::box::inst0::INSTR"
         line = {key: value for key, value in ROWS[name].driver.SERIAL.items() if key != "pause"}
-        transport = VisaTransport(address, library=library_for(Bus({address: self.twin})), line=line)
+        transport = VisaTransport(address, library=library_for(VirtualBench({address: self.twin})), line=line)
         self.driver = ROWS[name].driver(transport, clock=self.room.clock)
 
 
@@ -72,6 +72,6 @@ def test_settings_survive_a_round_trip(name):
 @pytest.mark.parametrize("kind", CATALOGUE)
 def test_a_model_is_chosen_in_any_case_of_its_letters(kind):
     for model in CATALOGUE[kind]:
-        bus = virtual_bus(practice_world(), {kind: model.name.lower()})
-        found = [twin.identity for twin in bus.instruments.values() if re.search(model.driver.MODELS, twin.identity)]
+        bench = virtual_bus(practice_world(), {kind: model.name.lower()})
+        found = [twin.identity for twin in bench.instruments.values() if re.search(model.driver.MODELS, twin.identity)]
         assert driver_for_identity(found[0]) == (kind, model.name)

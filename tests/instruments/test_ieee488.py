@@ -46,7 +46,7 @@ def test_a_block_that_breaks_off_is_named(data, cut):
         (b"#9999999999", "announces 999999999 bytes"),
     ],
 )
-def test_what_is_no_block_is_told_as_it_was_seen(message, seen):
+def test_the_error_of_a_broken_block_quotes_what_was_seen(message, seen):
     for read in (block_of, lambda bytes_: read_block(io.BytesIO(bytes_).read)):
         with pytest.raises(BrokenBlock, match=seen):
             read(message)

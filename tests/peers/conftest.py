@@ -10,7 +10,7 @@ from importlib.util import find_spec
 import pytest
 import pyvisa
 
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.servers.server import BenchServer
 from levilab.world.bench import plug_in_serial
@@ -25,7 +25,7 @@ ADDRESS, LINE = "TCPIP0::there.levilab::inst0::INSTR", "ASRLthere::INSTR"
 #: ("socket", too), and pyserial's URL.
 WAYS = ["@levilab", "socket", "hislip", "vxi11"]
 
-#: A bare socket has no ends: both sides must set them.
+#: A bare socket does not mark ends of messages: both sides need the terminator.
 _ENDS = {"read_termination": "\n", "write_termination": "\n"}
 
 
@@ -41,12 +41,12 @@ def way(request):
 
 @pytest.fixture
 def opened(way):
-    """Plugs an instrument in and opens another project's driver for it; unplugs it after the test."""
+    """Plugs an instrument in and opens a foreign driver for it; unplugs it after the test."""
     with contextlib.ExitStack() as stack:
 
         def open_driver(driver, device, **options):
             address = LINE if hasattr(device, "serial_settings") else ADDRESS
-            name, how = stack.enter_context(_reached(Bus({address: device}), way))
+            name, how = stack.enter_context(_reached(VirtualBench({address: device}), way))
             there = driver(name, **how, **options)
             stack.callback(there.adapter.close)
             return there
@@ -55,17 +55,17 @@ def opened(way):
 
 
 @contextlib.contextmanager
-def _reached(bus, way):
-    """The resource name of the one instrument of a bus, and what else PyMeasure must know."""
-    (address,) = bus.instruments
+def _reached(bench, way):
+    """The resource name of the one instrument of a bench, and the other arguments that PyMeasure needs."""
+    (address,) = bench.instruments
     if way == "@levilab":
-        library = library_for(bus)
+        library = library_for(bench)
         yield address, {"visa_library": library}
         pyvisa.ResourceManager(library).close()
     elif way == "pyserial":
-        plug_in_serial(bus)
+        plug_in_serial(bench)
         yield "ASRLlevilab://there::INSTR", {"visa_library": "@py"}
     else:
-        with BenchServer(bus) as server:
+        with BenchServer(bench) as server:
             bare = way == "socket" and not address.startswith("ASRL")
-            yield server.offers[0].resources[way], {"visa_library": "@py"} | (_ENDS if bare else {})
+            yield server.endpoints[0].resources[way], {"visa_library": "@py"} | (_ENDS if bare else {})

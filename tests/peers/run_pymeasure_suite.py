@@ -111,12 +111,12 @@ def reached(way: str | None, address: str):
 
     os.environ["PYVISA_LIBRARY"] = "@py"
     with BenchServer(virtual_bus()) as server:
-        (offer,) = (offer for offer in server.offers if offer.address == OURS)
+        (offer,) = (offer for offer in server.endpoints if offer.address == OURS)
         yield offer.resources[way]
 
 
 def main() -> int:
-    """Run, compare, tell."""
+    """Run the suite, compare, and print the result."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("source", type=Path, help="PyMeasure's unpacked source distribution")
     parser.add_argument("--device-address", default=OURS)
@@ -126,8 +126,8 @@ def main() -> int:
         outcomes, excused = run(wanted.source.resolve(), address), excuses()
     wrong = complaints(outcomes, excused)
     passed = sum(how == "passed" for how in outcomes.values())
-    lines = [f"{passed} of {len(outcomes)} cases pass, {len(excused)} are excused", *wrong]
-    sys.stdout.write("\n".join(lines) + "\n")
+    summary = [f"{passed} of {len(outcomes)} cases pass, {len(excused)} are excused", *wrong]
+    sys.stdout.write("\n".join(summary) + "\n")
     return 1 if wrong else 0
 
 

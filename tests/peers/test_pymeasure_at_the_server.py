@@ -56,7 +56,7 @@ def first_models(tmp_path_factory):
 
 @contextlib.contextmanager
 def opened(driver, names, way):
-    """Another project's driver at one of these names."""
+    """A foreign driver at one of these names."""
     bare = names[way].endswith("::SOCKET")
     there = driver(names[way], visa_library="@py", **(ENDS if bare else {}))
     with contextlib.closing(there.adapter):

@@ -4,7 +4,7 @@ from levilab.simulator.scene import preset
 
 UNDRIVEN, DRIVEN = preset("undriven"), preset("driven")
 
-#: Drags far stronger than a real one, so that their error can be told from the rounding.
+#: Drags far stronger than a real one, so that their error stands out of the rounding.
 KINDS = {
     "aligned": UNDRIVEN,
     "exact field": UNDRIVEN.changed({"base.field": "exact"}),

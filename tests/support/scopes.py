@@ -56,14 +56,14 @@ def cheap(start, step, n):
 
 
 def rigol(signal=pulses, *messages, **more):
-    return send_all(VirtualDS1000Z(VirtualClock(), signals={1: signal} | more), *messages)
+    return configure(VirtualDS1000Z(VirtualClock(), signals={1: signal} | more), *messages)
 
 
 def keysight(signal=pulses, *messages, **more):
-    return send_all(VirtualDSOX1000(VirtualClock(), signals={1: signal} | more), *messages)
+    return configure(VirtualDSOX1000(VirtualClock(), signals={1: signal} | more), *messages)
 
 
-def send_all(device, *messages):
+def configure(device, *messages):
     for message in messages:
         send(device, message.encode() + b"\n")
     assert errors(device) == []
@@ -101,12 +101,12 @@ def rigol_stopped(signal=pulses, *messages):
 
 def rigol_volts(device, mode="RAW"):
     """The whole record, as a program reads it: times from the trigger, volts."""
-    send_all(device, ":WAV:SOUR CHAN1", ":WAV:FORM BYTE", f":WAV:MODE {mode}")
+    configure(device, ":WAV:SOUR CHAN1", ":WAV:FORM BYTE", f":WAV:MODE {mode}")
     fields = ask(device, ":WAV:PRE?").split(",")
     points, dt, t0, per_code, origin, reference = (float(fields[k]) for k in (2, 4, 5, 7, 8, 9))
     codes = b""
     for first in range(1, int(points) + 1, 250_000):
-        send_all(device, f":WAV:STAR {first}", f":WAV:STOP {min(int(points), first + 249_999)}")
+        configure(device, f":WAV:STAR {first}", f":WAV:STOP {min(int(points), first + 249_999)}")
         codes += block(device, ":WAV:DATA?")[1]
     codes = np.frombuffer(codes, np.uint8).astype(float)
     return t0 + dt * np.arange(int(points)), (codes - origin - reference) * per_code

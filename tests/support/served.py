@@ -16,12 +16,12 @@ from pyvisa_py.protocols import hislip as pyvisa_hislip
 from pyvisa_py.tcpip import Vxi11CoreClient
 
 from instruments.clock import WallClock
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.rows import Ask, Number, Own
 from instruments.virtual.servers.hislip_messages import HEADER, Type
 from instruments.virtual.servers.serial_port import HAS_PSEUDO_TERMINALS
-from instruments.virtual.servers.server import BenchServer, Place
+from instruments.virtual.servers.server import BenchServer, ListenAt
 from support.waiting import HANG_GUARD_S
 
 #: What a client waits for at most [s]; a time-out that is meant to be reached [ms].
@@ -77,15 +77,15 @@ class Thing(VirtualInstrument):
 class Served:
     """A server with a thing on the network and one on a serial line, and clients to it."""
 
-    def __init__(self, clock=None, place=None):
+    def __init__(self, clock=None, listen_at=None):
         clock = clock or WallClock()
         self.thing, self.serial = Thing(clock), Thing(clock)
-        self.server = BenchServer(Bus({NETWORK: self.thing, SERIAL: self.serial}), place or Place())
+        self.server = BenchServer(VirtualBench({NETWORK: self.thing, SERIAL: self.serial}), listen_at or ListenAt())
         self.manager = pyvisa.ResourceManager("@py")
         self.opened = contextlib.ExitStack()
 
     def names(self):
-        network, serial = (offer.resources for offer in self.server.offers)
+        network, serial = (offer.resources for offer in self.server.endpoints)
         return network | {"serial": serial["socket"], "pty": serial.get("pty")}
 
     def open(self, way, timeout=1000 * AT_MOST):

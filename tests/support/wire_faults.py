@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.faults import LATE
 
 
@@ -189,7 +189,7 @@ class Wire:
 # --- within the process ---
 
 
-class FaultyBus(Bus):
+class FaultyBench(VirtualBench):
     """A bench whose links have the faults of a wire.
 
     Time is the bench's: a late answer comes after `LATE` seconds; on a stream one that comes twice comes again with the

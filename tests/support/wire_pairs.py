@@ -24,7 +24,7 @@ from instruments.errors import CommandRefused, InstrumentError, NotConnected
 from instruments.ieee488 import PLAIN_BLOCK, BlockForm, block_of
 from instruments.links.serial_port import SerialTransport
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.serial_line import benches
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.core.parser import ScpiError
@@ -34,7 +34,7 @@ from support import hostile
 from support.models import FAMILIES, KIND_OF, ROWS
 from support.proxy import LOOPBACK, Proxy
 from support.waiting import HANG_GUARD_S
-from support.wire_faults import FaultyBus, Tapped, Wire
+from support.wire_faults import FaultyBench, Tapped, Wire
 
 #: A time-out that a fault may make a program wait for, and one that only a failure reaches [s].
 SHORT, AT_MOST = 0.03, HANG_GUARD_S
@@ -131,7 +131,7 @@ def _queue(driver):
 
 
 def _report_one(pair):
-    with pair.bus.lock:
+    with pair.bench.lock:
         pair.tap.device.parser.report(ScpiError(-222))
     pair.waiting = True
 
@@ -180,7 +180,7 @@ def _prepare_counter(driver):
 
 
 def _switch_on(pair):
-    with pair.bus.lock:
+    with pair.bench.lock:
         pair.tap.device.execute(f"{pair.driver.OUTPUT} ON")
 
 
@@ -411,9 +411,9 @@ class Pair:
         self._opened = contextlib.ExitStack()
         self.waiting = False
         device = hostile.instrument(name, self.room)
-        self.bus, transport = self._link(device)
+        self.bench, transport = self._link(device)
         clock = {"clock": self.room.clock} if name in SCOPES else {}
-        side = Bus({NETWORK: device}, lock=self.bus.lock)
+        side = VirtualBench({NETWORK: device}, lock=self.bench.lock)
         self.side = self.kind.driver(VisaTransport(NETWORK, library=library_for(side)), **clock)
         self.driver = self.kind.driver(transport, **clock)
         self._opened.callback(self.side.close)
@@ -433,30 +433,30 @@ class Pair:
     def _within(self, device):
         address = {"messages": NETWORK, "stream": SOCKET}.get(self.way, SERIAL)
         self.tap = Tapped(device, self.wire.heard)
-        bus = FaultyBus({address: self.tap}, self.wire)
+        bench = FaultyBench({address: self.tap}, self.wire)
         line = {key: value for key, value in self.kind.driver.SERIAL.items() if key != "pause"}
         if self.way == "levilab":
             name = f"wire{next(_bench_numbers)}"
-            benches[name] = lambda: bus
+            benches[name] = lambda: bench
             self._opened.callback(benches.pop, name)
-            return bus, SerialTransport(f"levilab://box?bench={name}", **line)
-        return bus, VisaTransport(address, library=library_for(bus), line=line)
+            return bench, SerialTransport(f"levilab://box?bench={name}", **line)
+        return bench, VisaTransport(address, library=library_for(bench), line=line)
 
     def _proxied(self, device):
         serial = self.way in {"serial", "pty"}
         self.tap = Tapped(device, self.wire.heard)
-        bus = Bus({SERIAL if serial else NETWORK: self.tap})
-        server = self._opened.enter_context(BenchServer(bus))
-        offer = server.offers[0].resources["socket" if serial else self.way]
+        bench = VirtualBench({SERIAL if serial else NETWORK: self.tap})
+        server = self._opened.enter_context(BenchServer(bench))
+        offer = server.endpoints[0].resources["socket" if serial else self.way]
         port = int(re.findall(r"(?<=[:,])\d+", offer)[-1])
         framing = "socket" if serial else self.way
         proxy = self._opened.enter_context(Proxy(port, self.wire, framing, terminal=self.way == "pty"))
         if self.way == "pty":
-            return bus, _HastySerial(proxy.name, timeout=AT_MOST)
+            return bench, _HastySerial(proxy.name, timeout=AT_MOST)
         near = offer.replace(str(port), str(proxy.port))
         if serial:
-            return bus, _HastySerial(f"socket://{LOOPBACK}:{proxy.port}", timeout=AT_MOST)
-        return bus, _Hasty(near, library="@py", timeout=AT_MOST)
+            return bench, _HastySerial(f"socket://{LOOPBACK}:{proxy.port}", timeout=AT_MOST)
+        return bench, _Hasty(near, library="@py", timeout=AT_MOST)
 
     # --- what the far end knows ---
 
@@ -467,7 +467,7 @@ class Pair:
 
     def has_new_record(self):
         """Whether a scope has stopped with a record that it took in this attempt."""
-        with self.bus.lock:
+        with self.bench.lock:
             scope = self.tap.device
             latest = None if scope.running() else scope.acquisition.latest
         return latest is not None and latest.trigger >= self._since
@@ -514,7 +514,7 @@ class Pair:
         """
         self.calm()
         self.room.clock.sleep(60.0)
-        with self.bus.lock:
+        with self.bench.lock:
             self.tap.device.parser.errors.clear()
             if reset:
                 self.tap.device.reset()

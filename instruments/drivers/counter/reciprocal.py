@@ -53,7 +53,7 @@ class ReciprocalCounter(ScpiInstrument):
         if channel not in CHANNELS:
             raise OutOfRange(self.transport.address, "channel", channel, " or ".join(map(str, CHANNELS)))
         if channel != self.channel:
-            self.set_to.clear()  # what was set is the other input's
+            self.last_set.clear()  # what was set is the other input's
         self.channel = channel
         self.command(f"CONF:FREQ (@{channel})")
 
@@ -61,7 +61,7 @@ class ReciprocalCounter(ScpiInstrument):
         """One reading [Hz], or None; see :class:`Counter`.  Raises CommandRefused if an error was waiting."""
         self._end_old_series()
         answer = self._ask("READ?", self._patience)
-        with self.resynchronised():
+        with self.clearing_on_bad_answer():
             return None if answer is None else self._reading("READ?", answer)
 
     def _reading(self, question: str, answer: str) -> float | None:
@@ -105,7 +105,7 @@ class ReciprocalCounter(ScpiInstrument):
                 self.command(command)
             yield
         except BaseException:  # Ctrl-C as well
-            with contextlib.suppress(InstrumentError):  # the first error tells more
+            with contextlib.suppress(InstrumentError):  # the first error says more
                 self._give_up()
                 self._end_series()
             raise
@@ -122,7 +122,7 @@ class ReciprocalCounter(ScpiInstrument):
             self._end_series()
 
     def _give_up(self) -> None:
-        """Stop a measurement that does not end, and let the link tell if it is dead."""
+        """Stop a measurement that does not end, and raise the link's error where it is dead."""
         self.transport.clear()
         self.forget_errors()  # a query cut off leaves −410 behind
         self.command("ABOR")

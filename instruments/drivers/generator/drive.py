@@ -29,8 +29,8 @@ class LimitedSetting(Setting[float]):
         address = instrument.transport.address
         cast("DriveGenerator", instrument).limits.check(address, **{self.quantity: value})
         self._check(address, value)
-        if self.partner in instrument.set_to:
-            both = {self.quantity: value, self.partner: cast("float", instrument.set_to[self.partner])}
+        if self.partner in instrument.last_set:
+            both = {self.quantity: value, self.partner: cast("float", instrument.last_set[self.partner])}
             check_peak(address, **both)
         super().__set__(instrument, value)
 

@@ -144,7 +144,7 @@ class LakeShoreGaussmeter(ScpiInstrument):
         """
         for _ in range(self._MOST_UNITS):
             answer = self.transport.query(_READING)
-            with self.resynchronised():
+            with self.clearing_on_bad_answer():
                 before, field, after, status = self._parts(answer)
                 if before == after:
                     return self._field_t(answer, field, _UNITS_T[before], status)

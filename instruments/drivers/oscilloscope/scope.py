@@ -101,7 +101,7 @@ class Scope(ScpiInstrument):
         super().command(message)
         if message.upper().startswith("*RST") and self._inputs:
             for channel in self.channel.values():
-                channel.set_to.clear()
+                channel.last_set.clear()
 
     @staticmethod
     def _number_of_inputs(model: str) -> int:
@@ -155,7 +155,7 @@ class Scope(ScpiInstrument):
         self._setup = setup
         self._prepared = (*(self.channel[n] for n in setup.shown), self)
         for part in self._prepared:
-            part.set_to.clear()
+            part.last_set.clear()
         self.forget_errors()
         self.command(self.WHILE_SETTING_UP)
         for n in range(1, inputs + 1):  # first, for the trigger's level depends on their scales
@@ -362,7 +362,7 @@ class Scope(ScpiInstrument):
         """The next block, which must hold so many codes.  Raises BadAnswer, CommandRefused."""
         self.raise_errors(question)
         try:
-            with self.resynchronised():
+            with self.clearing_on_bad_answer():
                 block = self.transport.query_block(question, patience=_BLOCK_PATIENCE, form=form)
         except NoAnswer:
             self.raise_errors(question)  # the reason stands in the queue, if there is one

@@ -216,7 +216,7 @@ class SiglentSDS1000XE(Scope):
         # the delay is 0: the trigger is in the middle
         preamble = Preamble(points, step, -points * step / 2, per_code, -_MIDDLE * per_code - offset)
         if not descriptor.startswith(b"WAVEDESC") or not preamble.plausible or per_code <= 0:
-            with self.resynchronised():
+            with self.clearing_on_bad_answer():
                 raise BadAnswer(self.transport.address, question, repr(descriptor[:20]), "a WAVEDESC of a record")
         return preamble
 

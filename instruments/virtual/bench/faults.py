@@ -1,6 +1,6 @@
-"""What goes wrong on a bench, to be tried without one: faults of a link, of an instrument, of its neighbours.
+"""Faults of a link, of an instrument, of its neighbours, to try on the virtual bench what goes wrong on a real one.
 
-A fault strikes answers (see :class:`Fault`); `FAULTS` is the table of them.  They act where an instrument's answer goes
+A fault changes answers (see :class:`Fault`); `FAULTS` is the table of them.  They act where an instrument's answer goes
 onto the wire, so they are the same for the PyVISA backend, for a serial line and for the servers.
 """
 
@@ -28,8 +28,12 @@ if TYPE_CHECKING:
 class Fault:
     """One fault and when it strikes.
 
-    what: a name in FAULTS; question: regular expression of the messages whose answers it strikes; after: so many of
-    them go well first; times: so many are struck then.
+    Attributes:
+        what: a name in FAULTS.
+        question: regular expression of the messages whose answers it may strike.
+        after: how many of these answers it spares first.
+        times: how many it strikes then.
+        seen: how many messages have matched so far.
     """
 
     what: str
@@ -39,46 +43,46 @@ class Fault:
     seen: int = field(default=0, init=False)
 
     def strikes(self, message: str) -> bool:
-        """Whether it strikes the answer to this message, which is counted."""
+        """Count this message.  Returns whether the fault strikes its answer."""
         if not re.fullmatch(self.question, message, re.DOTALL | re.IGNORECASE):
             return False
         self.seen += 1
         return self.after < self.seen <= self.after + self.times
 
     def act(self, session: Session, answer: Answer) -> Answer | None:
-        """What becomes of the answer."""
+        """The answer as the fault leaves it, None where it is lost."""
         return FAULTS[self.what](session, answer)
 
 
-#: How late a late answer is, and how long a lost instrument cannot be reached [s].
+#: How late a late answer is, and how long an instrument that is away cannot be reached [s].
 LATE, AWAY = 10.0, 5.0
 
 
-def _data(change: Callable[[bytes], bytes]) -> Act:
-    """A fault that changes nothing but the bytes."""
+def _change_bytes(change: Callable[[bytes], bytes]) -> Act:
+    """A fault that changes only the bytes."""
     return lambda _, answer: answer._replace(data=change(answer.data))
 
 
-def _in_single_bytes(session: Session, answer: Answer) -> Answer:
+def _send_single_bytes(session: Session, answer: Answer) -> Answer:
     session.chunk = 1
     return answer
 
 
-def _cut(_: Session, answer: Answer) -> Answer:
+def _cut_in_half(_: Session, answer: Answer) -> Answer:
     return answer._replace(data=answer.data[: len(answer.data) // 2], complete=False)
 
 
-def _disconnected(session: Session, answer: Answer) -> Answer:
+def _disconnect(session: Session, answer: Answer) -> Answer:
     session.lost_after = len(answer.data) // 2
     return answer
 
 
-def _away(session: Session, answer: Answer) -> Answer:
-    session.away[id(session.device)] = session.device.clock.now() + AWAY
-    return _disconnected(session, answer)
+def _make_unreachable(session: Session, answer: Answer) -> Answer:
+    session.unreachable_until[id(session.device)] = session.device.clock.now() + AWAY
+    return _disconnect(session, answer)
 
 
-def _overflow(session: Session, answer: Answer) -> Answer:
+def _overflow_errors(session: Session, answer: Answer) -> Answer:
     for _ in range(session.device.queue_size + 5):
         session.device.parser.report(ScpiError(-113))
     return answer
@@ -90,21 +94,21 @@ def _reset(session: Session, answer: Answer) -> Answer:
     return answer
 
 
-def _taken(session: Session, answer: Answer) -> Answer:
-    session.hold.holders[:] = ["another program"]
+def _lock_by_another(session: Session, answer: Answer) -> Answer:
+    session.client_lock.holders[:] = ["another program"]
     return answer
 
 
-def _longer(data: bytes) -> bytes:
-    """The head of a block says ten more bytes than there are."""
-    return _relabelled(data, 10)
+def _head_says_more(data: bytes) -> bytes:
+    return _change_head(data, 10)
 
 
-def _shorter(data: bytes) -> bytes:
-    return _relabelled(data, -10)
+def _head_says_less(data: bytes) -> bytes:
+    return _change_head(data, -10)
 
 
-def _relabelled(data: bytes, more: int) -> bytes:
+def _change_head(data: bytes, more: int) -> bytes:
+    """Let the head of a block state a length that is off by so many bytes; bytes that are no block stay."""
     head = re.match(rb"#([1-9])", data)
     if not head:
         return data
@@ -113,22 +117,22 @@ def _relabelled(data: bytes, more: int) -> bytes:
     return b"#%d%0*d" % (digits, digits, max(0, size + more)) + data[2 + digits :]
 
 
-#: What becomes of an answer, by the name of the fault.
+#: How each fault changes an answer, by the name of the fault.
 FAULTS: dict[str, Act] = {
     "no answer": lambda *_: None,
     "late answer": lambda _, answer: answer._replace(ready=answer.ready + LATE),
-    "single bytes": _in_single_bytes,
-    "two answers at once": _data(lambda data: data * 2),
-    "garbage before": _data(lambda data: b"\x7f~#!" + data),
-    "bytes that are no text before": _data(lambda data: b"\xff\xfe" + data),
-    "garbage after": _data(lambda data: data + b"~#!\n"),
-    "block longer than it says": _data(_shorter),
-    "block shorter than it says": _data(_longer),
-    "cut in the middle": _cut,
-    "disconnected": _disconnected,
-    "away for 5 s": _away,
-    "error queue overflow": _overflow,
+    "single bytes": _send_single_bytes,
+    "two answers at once": _change_bytes(lambda data: data * 2),
+    "garbage before": _change_bytes(lambda data: b"\x7f~#!" + data),
+    "bytes that are no text before": _change_bytes(lambda data: b"\xff\xfe" + data),
+    "garbage after": _change_bytes(lambda data: data + b"~#!\n"),
+    "block longer than it says": _change_bytes(_head_says_less),
+    "block shorter than it says": _change_bytes(_head_says_more),
+    "cut in the middle": _cut_in_half,
+    "disconnected": _disconnect,
+    "away for 5 s": _make_unreachable,
+    "error queue overflow": _overflow_errors,
     "reset": _reset,
-    "taken by another": _taken,
-    "9.91E37": _data(lambda _: nr3(NOT_A_NUMBER).encode() + b"\n"),
+    "taken by another": _lock_by_another,
+    "9.91E37": _change_bytes(lambda _: nr3(NOT_A_NUMBER).encode() + b"\n"),
 }

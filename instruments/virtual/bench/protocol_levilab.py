@@ -1,7 +1,7 @@
-"""pyserial finds the virtual instruments here: ``serial.serial_for_url("levilab://magnetometer")``.
+"""The virtual instruments for pyserial: ``serial.serial_for_url("levilab://magnetometer")``.
 
-For that, :func:`plug_in` names this package to pyserial, and the bench that the URL means, which then stands in
-:data:`instruments.virtual.bench.serial_line.benches`.  pyvisa-py takes the same URL as
+pyserial imports this module by its name; :func:`plug_in` registers this package with pyserial, and in
+:data:`instruments.virtual.bench.serial_line.benches` the bench that the URL means.  pyvisa-py takes the same URL as
 ``ASRLlevilab://magnetometer::INSTR``.
 """
 
@@ -23,14 +23,14 @@ from instruments.virtual.core.line import LineSettings
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from instruments.virtual.bench.bus import Bus
+    from instruments.virtual.bench.bench import VirtualBench
     from instruments.virtual.bench.session import Session
 
 #: Where pyserial looks for the module of a URL's scheme: the package that this one is in.
 _PACKAGE = __name__.rpartition(".")[0]
 
 
-def plug_in(bench: Callable[[], Bus], name: str = "") -> None:
+def plug_in(bench: Callable[[], VirtualBench], name: str = "") -> None:
     """Let pyserial find this bench from now on, as ``levilab://instrument?bench=name`` (no name: without the query)."""
     if _PACKAGE not in serial.protocol_handler_packages:
         serial.protocol_handler_packages.append(_PACKAGE)
@@ -38,18 +38,18 @@ def plug_in(bench: Callable[[], Bus], name: str = "") -> None:
 
 
 class Serial(SerialBase):
-    """A port of pyserial's whose other end is a virtual instrument; waiting costs the bench's time."""
+    """A pyserial port whose other end is a virtual instrument; a wait takes time of the bench's clock."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
         self._line: SerialLine | None = None
         super().__init__(*args, **options)
 
     def open(self) -> None:
-        """Plug in.  Raises SerialException if there is no such instrument, or if another program keeps it."""
+        """Open the port.  Raises SerialException where there is no such instrument, or another program locks it."""
         if self.is_open:
             raise SerialException("the port is already open")
-        line = SerialLine(_session(str(self.port)))
-        if line.hold.keeps_out(line):
+        line = SerialLine(_open_session(str(self.port)))
+        if line.client_lock.excludes(line):
             raise SerialException(errno.EBUSY, f"could not open port {self.port}: another program has it")
         self._line = line
         try:
@@ -60,7 +60,7 @@ class Serial(SerialBase):
         self.is_open = True
 
     def close(self) -> None:
-        """Unplug; closing twice does no harm."""
+        """Close the port; closing twice does no harm."""
         if self._line:
             self._line.close()
         self._line, self.is_open = None, False
@@ -69,8 +69,8 @@ class Serial(SerialBase):
         line = self._open_line()
         line.settings = LineSettings(int(self.baudrate), int(self.bytesize), str(self.parity), float(self.stopbits))
         if not self.exclusive:
-            line.hold.let_go(line)
-        elif not line.hold.take(line, None):
+            line.client_lock.release(line)
+        elif not line.client_lock.acquire(line, None):
             raise SerialException(errno.EAGAIN, f"could not exclusively lock port {self.port}")
 
     def _open_line(self) -> SerialLine:
@@ -80,16 +80,16 @@ class Serial(SerialBase):
 
     @property
     def in_waiting(self) -> int:
-        """Bytes that have come."""
-        with _link_of(self._open_line()) as line:
+        """How many received bytes wait to be read."""
+        with _use(self._open_line()) as line:
             return line.waiting()
 
     def read(self, size: int = 1, /) -> bytes:
-        """So many bytes, or fewer when the time-out is over.  None for a time-out: for ever, if something is to come.
+        """Read so many bytes, or fewer when the time-out is over; without one (None) wait for an answer under way.
 
         Raises SerialException where a real port would wait for ever.
         """
-        with _link_of(self._open_line()) as line:
+        with _use(self._open_line()) as line:
             got = line.receive(size, math.inf if self.timeout is None else float(self.timeout))
         if not got and size and self.timeout is None:
             raise SerialException("nothing is under way and there is no time-out: this would wait for ever")
@@ -98,21 +98,21 @@ class Serial(SerialBase):
     def write(self, data: Any, /) -> int:
         """Send bytes."""
         sent = bytes(data)
-        with _link_of(self._open_line()) as line:
+        with _use(self._open_line()) as line:
             line.write(sent)
         return len(sent)
 
     def flush(self) -> None:
-        """Everything has left already."""
+        """Nothing to do: `write` returns when all bytes have left."""
         self._open_line()
 
     def reset_input_buffer(self) -> None:
-        """Drop what has come."""
-        with _link_of(self._open_line()) as line:
+        """Drop the received bytes."""
+        with _use(self._open_line()) as line:
             line.discard()
 
     def reset_output_buffer(self) -> None:
-        """Everything has left already."""
+        """Nothing to do: `write` returns when all bytes have left."""
         self._open_line()
 
     # --- the other wires: three-wire lines have none ---
@@ -143,9 +143,9 @@ class Serial(SerialBase):
 
 
 @contextlib.contextmanager
-def _link_of(line: SerialLine) -> Iterator[SerialLine]:
-    """The line; raises SerialException when another program has taken it, or when the link is lost."""
-    if line.hold.keeps_out(line):
+def _use(line: SerialLine) -> Iterator[SerialLine]:
+    """Give the line to the block.  Raises SerialException when another program has locked it, or the link is lost."""
+    if line.client_lock.excludes(line):
         raise SerialException(errno.EBUSY, "another program has taken the port")
     try:
         yield line
@@ -153,17 +153,17 @@ def _link_of(line: SerialLine) -> Iterator[SerialLine]:
         raise SerialException(errno.EIO, "the device has been disconnected") from None
 
 
-def _session(url: str) -> Session:
-    """A session with the instrument that the URL names.  Raises SerialException."""
+def _open_session(url: str) -> Session:
+    """Open a session with the instrument that the URL names.  Raises SerialException."""
     parts = urlsplit(url)
     wanted = parse_qs(parts.query).get("bench", [""])[0]
     if wanted not in benches:
         raise SerialException(errno.ENOENT, f"no virtual bench is named {wanted!r}: known are {sorted(benches)}")
-    bus = benches[wanted]()
+    bench = benches[wanted]()
     name = parts.netloc
     plain = name.upper().removeprefix("ASRL")
     for address in (f"ASRLlevilab://{name}::INSTR", f"ASRL{plain}.levilab::INSTR", f"ASRL{plain}::INSTR"):
-        if session := bus.open(address):
+        if session := bench.open(address):
             return session
-    lines = [address for address in bus.instruments if address.upper().startswith("ASRL")]
+    lines = [address for address in bench.instruments if address.upper().startswith("ASRL")]
     raise SerialException(errno.ENOENT, f"the bench has no {name!r} on a serial line: it has {', '.join(lines) or '-'}")

@@ -1,7 +1,7 @@
 """A serial line between a program and a virtual instrument: bits, not bytes.
 
 When both ends are set alike the bytes arrive as they were sent; when baud rate, data bits or parity differ, the
-receiver samples the sender's bits at the wrong places, as a UART does, and hears garbage: the same each time.
+receiver samples the sender's bits at the wrong places, as a UART does, and gets garbage, the same each time.
 """
 
 from __future__ import annotations
@@ -9,95 +9,107 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from instruments.virtual.core.line import LineSettings, carried
+from instruments.virtual.core.line import LineSettings, received_as
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from instruments.virtual.bench.bus import Bus
-    from instruments.virtual.bench.session import Hold, Session
+    from instruments.virtual.bench.bench import VirtualBench
+    from instruments.virtual.bench.session import ClientLock, Session
 
 #: Where the URL handler finds the benches: by the name in ``levilab://instrument?bench=name``, "" when there is none.
-benches: dict[str, Callable[[], Bus]] = {}
+benches: dict[str, Callable[[], VirtualBench]] = {}
 
-#: What looking whether something has come costs [s]: a program that waits by looking gets ahead on a virtual clock too.
+#: What one look for received bytes costs [s], so that a program that waits by polling advances on a virtual clock, too.
 _LOOK = 1e-3
 _ALL = 1 << 30
 
 
 class SerialLine:
-    """The program's end of a line to an instrument; stands where a Session stands.
+    """The program's end of a line to an instrument; it has the methods of a Session.
 
-    settings: of this end, may change at any time.  The instrument's end is set as its ``serial_settings`` say; one
-    that has none follows the program.
+    The instrument's end has its ``serial_settings``; an instrument without them follows the program's.
+
+    Attributes:
+        session: with the instrument.
+        settings: of this end; they may change at any time.
     """
 
     def __init__(self, session: Session, settings: LineSettings | None = None) -> None:
         self.session, self.settings = session, settings or LineSettings()
-        self._heard = b""
+        self._received = b""
 
     @property
-    def hold(self) -> Hold:
-        """Who has the instrument."""
-        return self.session.hold
+    def client_lock(self) -> ClientLock:
+        """The lock on the instrument."""
+        return self.session.client_lock
 
     def _far_end(self) -> LineSettings:
         far_end: LineSettings | None = getattr(self.session.device, "serial_settings", None)
         return far_end or self.settings
 
     def write(self, data: bytes, *, end: bool = True) -> None:
-        """Send bytes; returns when the last one has left.  end: there are no marks on a serial line."""
+        """Send bytes, and return when the last one has left.  end: ignored, as a serial line has no marks."""
         self.session.device.clock.sleep(self.settings.duration(len(data)))
-        # assumed: the instrument does not check parity, or a wrong one would mean silence and no hint
-        self.session.write(carried(data, self.settings, self._far_end(), checked=False))
+        # assumed: the instrument does not check parity; if it did, a wrong one would mean silence without a hint
+        self.session.write(received_as(data, self.settings, self._far_end(), checked=False))
 
     def receive(self, count: int, timeout: float, *, until: bytes = b"") -> bytes:
-        """So many bytes, or fewer: up to one of these, or what has come when the time is over [s]."""
+        """Wait for bytes.
+
+        Args:
+            count: how many at most.
+            timeout: how long to wait [s].
+            until: the byte after which to stop, if any.
+
+        Returns:
+            The bytes received: fewer than `count` up to `until`, or when the time is over.
+        """
         clock = self.session.device.clock
         deadline = clock.now() + timeout
-        while not (size := self._enough(count, until)):
+        while not (size := self._size_to_return(count, until)):
             ready = self.session.ready()
             if ready is None or ready > deadline:
-                if math.isfinite(deadline):  # for ever is no time to jump to
+                if math.isfinite(deadline):  # a clock cannot jump to infinity
                     clock.sleep(max(0.0, deadline - clock.now()))
-                size = len(self._heard)
+                size = len(self._received)
                 break
             clock.sleep(max(0.0, ready - clock.now()))
-            self._hear()
-        chunk, self._heard = self._heard[:size], self._heard[size:]
+            self._receive_ready()
+        chunk, self._received = self._received[:size], self._received[size:]
         return chunk
 
-    def _enough(self, count: int, until: bytes) -> int:
-        found = self._heard.find(until, 0, count) + 1 if until else 0
-        return found or (count if len(self._heard) >= count else 0)
+    def _size_to_return(self, count: int, until: bytes) -> int:
+        found = self._received.find(until, 0, count) + 1 if until else 0
+        return found or (count if len(self._received) >= count else 0)
 
-    def _hear(self) -> None:
+    def _receive_ready(self) -> None:
         far_end = self._far_end()
         data, _ = self.session.take(_ALL)
         self.session.device.clock.sleep(far_end.duration(len(data)))
-        self._heard += carried(data, far_end, self.settings)
+        self._received += received_as(data, far_end, self.settings)
 
     def read(self, count: int, timeout: float, *, until: bytes = b"") -> tuple[bytes, bool] | None:
-        """As Session.read.  A line has no ends: less than was waited for is a time-out, and is lost."""
+        """As Session.read.  Fewer bytes than `count`, without `until`, are a time-out (None), and are lost."""
         got = self.receive(count, timeout, until=until)
         return (got, False) if got and (len(got) == count or got[-1:] == until) else None
 
     def waiting(self) -> int:
-        """How many bytes have come and were not read."""
+        """How many received bytes the program has not read."""
         clock = self.session.device.clock
         while (ready := self.session.ready()) is not None and ready <= clock.now():
-            self._hear()
-        if not self._heard:
+            self._receive_ready()
+        if not self._received:
             clock.sleep(_LOOK)
-        return len(self._heard)
+        return len(self._received)
 
     def discard(self) -> None:
-        """Drop what has come and was not read."""
+        """Drop the received bytes that the program has not read."""
         self.session.discard()
-        self._heard = b""
+        self._received = b""
 
     def clear(self) -> None:
-        """Empty the buffers of this end; the instrument hears nothing of it, and a late answer still comes."""
+        """Empty the buffers of this end.  The instrument does not notice, and a late answer still comes."""
         self.discard()
 
     def status_byte(self) -> int:
@@ -109,6 +121,6 @@ class SerialLine:
         self.session.trigger()
 
     def close(self) -> None:
-        """The program is gone."""
-        self.hold.let_go(self)
+        """End the session, and release its lock."""
+        self.client_lock.release(self)
         self.session.close()

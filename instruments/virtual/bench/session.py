@@ -21,58 +21,66 @@ if TYPE_CHECKING:
     from instruments.virtual.core.steps import Steps
 
 _NOTHING, _WALL = memoryview(b""), WallClock()
-#: Answers that wait to be read, at most.
+#: Answers that may wait for the program to read them, at most.
 MOST_ANSWERS = 1000
-#: How long an instrument works in one slice [s], as the clock on the wall tells.
+#: How long an instrument works in one slice [s], by the wall clock.
 SLICE = 0.01
-#: Bytes that are searched for the ends of messages in one slice.
+#: Bytes in which the session looks for the ends of messages in one slice.
 _PIECE = 1 << 12
 
 
 class LinkLost(Exception):
-    """The connection is gone; only opening another one helps."""
+    """The connection is lost; the program must open another one."""
 
 
 @dataclass
-class Hold:
-    """Who keeps the others from an instrument: one, or all that know the key.
+class ClientLock:
+    """A lock on an instrument, held by one client alone or by all that know its key.
 
-    >>> hold = Hold()
-    >>> hold.take("me", None), hold.take("you", None)
+    >>> client_lock = ClientLock()
+    >>> client_lock.acquire("me", None), client_lock.acquire("you", None)
     (True, False)
-    >>> hold.let_go("me")
-    >>> hold.take("you", "key"), hold.take("me", "key")
+    >>> client_lock.release("me")
+    >>> client_lock.acquire("you", "key"), client_lock.acquire("me", "key")
     (True, True)
     """
 
     holders: list[object] = field(default_factory=list)
     key: str | None = None
 
-    def take(self, who: object, key: str | None) -> bool:
-        """Whether it is theirs now.  key: to share it with, None to share it with nobody."""
+    def acquire(self, who: object, key: str | None) -> bool:
+        """Take the lock if it is free, or shared with this key.
+
+        Args:
+            who: takes it.
+            key: of a shared lock; None: an exclusive lock.
+
+        Returns:
+            Whether `who` holds the lock now.
+        """
         others = [holder for holder in self.holders if holder is not who]
         if others and (key is None or key != self.key):
             return False
         self.holders, self.key = [*others, who], key
         return True
 
-    def let_go(self, who: object) -> None:
-        """Give it up; it is no error not to have it."""
+    def release(self, who: object) -> None:
+        """Release the lock; does nothing where `who` does not hold it."""
         self.holders = [holder for holder in self.holders if holder is not who]
 
-    def keeps_out(self, who: object) -> bool:
-        """Whether somebody else has it."""
+    def excludes(self, who: object) -> bool:
+        """Whether others hold the lock, and `who` does not."""
         return bool(self.holders) and all(holder is not who for holder in self.holders)
 
 
 class AnswerFault(Protocol):
-    """What goes wrong with an answer on its way, as `faults.Fault`."""
+    """A fault that changes answers on their way; see `faults.Fault`."""
 
     def strikes(self, message: str) -> bool:
-        """Whether it strikes the answer to this message."""
+        """Whether the fault changes the answer to this message."""
 
     def act(self, session: Session, answer: Answer) -> Answer | None:
-        """What becomes of the answer."""
+        """The answer as the fault leaves it, None where it is lost."""
 
 
 @dataclass(eq=False)
@@ -80,32 +88,37 @@ class Session:
     """One program's link to one instrument.
 
     stream: bytes without ends, as over a serial line or a bare socket: a line feed ends a message, and answers follow
-    each other.  Else the interface marks the end of a message (GPIB, USBTMC, VXI-11, HiSLIP), and a question that is
-    sent before the last answer was read interrupts that one (IEEE 488.2, 6.3.2.3).  Every method raises LinkLost when
-    the link is gone.
+    each other.  Otherwise the interface marks the end of a message (GPIB, USBTMC, VXI-11, HiSLIP), and a question sent
+    before the last answer was read discards that answer (IEEE 488.2, 6.3.2.3).  Every method raises LinkLost when the
+    link is lost.
 
-    lock, hold, faults, away: what all links of a bench share, see `bus.Bus`.
+    lock, client_lock, faults, unreachable_until: all sessions of a bench share them, see `bench.VirtualBench`.
     """
 
     device: VirtualInstrument
     stream: bool = False
     lock: threading.RLock = field(default_factory=threading.RLock)
-    hold: Hold = field(default_factory=Hold)
+    client_lock: ClientLock = field(default_factory=ClientLock)
     faults: Sequence[AnswerFault] = ()
-    away: dict[int, float] = field(default_factory=dict)
-    chunk: int = 1 << 30  # bytes that are given at once, at most
-    lost_after: int | None = None  # bytes until the link is lost
+    unreachable_until: dict[int, float] = field(default_factory=dict)
+    chunk: int = 1 << 30  # bytes of an answer handed over in one piece, at most
+    lost_after: int | None = None  # bytes that still arrive before the link is lost
     _framer: Framer = field(init=False)
     _answers: deque[Answer] = field(default_factory=deque)
     _rest: memoryview = _NOTHING
     _complete: bool = True
-    _asked: bool = False  # something was sent since the last answer was read
+    _asked: bool = False  # whether the program has sent a message since it read the last answer
 
     def __post_init__(self) -> None:
         self._framer = Framer(blocks=self.device.takes_blocks)
 
     def write(self, data: bytes, *, end: bool = True) -> None:
-        """Bytes for the instrument; it works on every message that they complete.  end: marked by the interface."""
+        """Send bytes to the instrument, which works on every message that they complete.
+
+        Args:
+            data: the bytes.
+            end: whether the interface marks the end of a message behind them; ignored on a stream.
+        """
         with self.lock:
             for message in self.messages(data, end=end):
                 if message:
@@ -114,7 +127,7 @@ class Session:
     def messages(self, data: bytes, *, end: bool) -> Iterator[str]:
         """The messages that these bytes complete, for begin().
 
-        Some are empty, where the work may be interrupted: a million line feeds take a second to be cut apart.
+        Empty ones among them are pauses for other work: to split a million line feeds takes a second.
         """
         self._check_link()
         for start in range(0, max(1, len(data)), _PIECE):
@@ -130,18 +143,18 @@ class Session:
                     yield message
 
     def begin(self, message: str) -> Work[None]:
-        """Let the instrument take a message, to work on it with go_on(); the one that it works on still comes first."""
+        """Give the instrument a message; go_on() works on it, after the one that the instrument already works on."""
         with self.lock:
             self._check_link()
             work = self.device.work = Work(self._run(message, self.device.work))
             return work
 
     def catch_up(self) -> Work[None]:
-        """What has gone on in the instrument since the last message, to be worked out with go_on()."""
+        """Begin to work out what has happened in the instrument since the last message; go_on() does the work."""
         return Work(self.device.catch_up())
 
     def go_on(self, work: Work[None]) -> bool:
-        """Work for a slice; whether there is more to do.  The bus is locked meanwhile, and free between slices."""
+        """Work for a slice, with the bench locked.  Returns whether there is more to do."""
         with self.lock:
             end = _WALL.now() + SLICE
             while work.step() and _WALL.now() < end:
@@ -151,7 +164,7 @@ class Session:
         return not work.done
 
     def cancel(self, work: Work[None]) -> None:
-        """No more of this work."""
+        """End this work before its end."""
         with self.lock:
             work.cancel()
 
@@ -161,7 +174,7 @@ class Session:
                 before.cancel()
             while before.step():
                 yield
-        self._drop_what_is_abandoned()
+        self._drop_abandoned_answers()
         if not self.stream and (self._answers or self._rest):
             self.device.parser.report(ScpiError(-410))
             self._answers.clear()
@@ -171,22 +184,22 @@ class Session:
         for fault in self.faults:
             if answer is not None and fault.strikes(message):
                 answer = fault.act(self, answer)
-        self._drop_what_is_abandoned()
+        self._drop_abandoned_answers()
         if answer is not None:
             self._answers.append(answer)
-            self._keep_within_bounds()
+            self._drop_unread_answers()
 
     def is_abort(self, message: str) -> bool:
-        """Whether this message ends what the instrument works on."""
+        """Whether this message aborts what the instrument works on."""
         return self.device.is_abort(message)
 
     def bytes_are_abort(self, data: bytes, *, end: bool = True) -> bool:
-        """Whether these bytes are such a message, whole and by itself."""
+        """Whether these bytes are one whole message that aborts what the instrument works on."""
         whole = not self._framer.begun and ((end and not self.stream) or data.endswith(b"\n"))
         return whole and self.is_abort(data.decode("latin-1"))
 
-    def _keep_within_bounds(self) -> None:
-        """Who asks on and on and never reads gets nothing of it (IEEE 488.2, 6.3.1.7)."""
+    def _drop_unread_answers(self) -> None:
+        """Drop all answers, and queue error −430, when the program asks and never reads (IEEE 488.2, 6.3.1.7)."""
         if len(self._answers) < 2:
             return
         if len(self._answers) > MOST_ANSWERS or sum(len(answer.data) for answer in self._answers) > LONGEST_ANSWER:
@@ -198,36 +211,42 @@ class Session:
         if self.lost_after is not None and self.lost_after <= 0:
             raise LinkLost
 
-    def _drop_what_is_abandoned(self) -> None:
+    def _drop_abandoned_answers(self) -> None:
         while self._answers and self._answers[0].epoch != self.device.epoch:
             self._answers.popleft()
 
     def ready(self) -> float | None:
-        """When the next bytes are there [s], or None if none are under way."""
+        """When the next bytes of an answer are ready [s], None where no answer is under way."""
         with self.lock:
             self._check_link()
-            self._drop_what_is_abandoned()
+            self._drop_abandoned_answers()
             if self._rest:
                 return self.device.clock.now()
             return self._answers[0].ready if self._answers else None
 
     def read(self, count: int, timeout: float, *, until: bytes = b"") -> tuple[bytes, bool] | None:
-        """At most count bytes of the answer and whether that was its end; None after the timeout [s].
+        """Wait for bytes of an answer.
 
-        until: the byte after which to stop, if any.
+        Args:
+            count: how many at most.
+            timeout: how long to wait [s].
+            until: the byte after which to stop, if any.
+
+        Returns:
+            The bytes, and whether the answer ends with them; None after the timeout.
         """
         clock = self.device.clock
         ready = self.ready()
         if ready is None or ready > clock.now() + timeout or ready >= INFINITY:
-            self._note_silence(ready)
-            if math.isfinite(timeout):  # for ever is no time to jump to
+            self._report_unterminated(ready)
+            if math.isfinite(timeout):  # a clock cannot jump to infinity
                 clock.sleep(timeout)
             return None
         clock.sleep(ready - clock.now())
         return self.take(count, until=until)
 
     def take(self, count: int, *, until: bytes = b"") -> tuple[bytes, bool]:
-        """At most count bytes of what is ready, and whether the answer ends with them."""
+        """Take at most `count` bytes of what is ready.  Returns them, and whether the answer ends with them."""
         with self.lock:
             self._check_link()
             if not self._rest and self._answers:
@@ -247,30 +266,30 @@ class Session:
         """Drop what is ready and was not read."""
         with self.lock:
             self._rest = _NOTHING
-            self._drop_what_is_abandoned()
+            self._drop_abandoned_answers()
             while self._answers and self._answers[0].ready <= self.device.clock.now():
                 self._answers.popleft()
 
     def trigger(self) -> None:
-        """The interface's trigger message."""
+        """Send the interface's trigger message."""
         with self.lock:
             try:
                 self.device.trigger()
-            except ScpiError as error:  # as in answer to *TRG: told in the error queue
+            except ScpiError as error:  # as after *TRG: it goes into the error queue
                 self.device.parser.report(error)
 
     def close(self) -> None:
-        """The program is gone."""
-        self.hold.let_go(self)
+        """End the session, and release its lock."""
+        self.client_lock.release(self)
 
-    def _note_silence(self, ready: float | None) -> None:
-        """A reader who waits for what nobody asked: IEEE 488.2, 6.3.2.2."""
+    def _report_unterminated(self, ready: float | None) -> None:
+        """Queue error −420 where a program reads and has asked nothing (IEEE 488.2, 6.3.2.2)."""
         with self.lock:
             if ready is None and not self.stream and not self._asked:
                 self.device.parser.report(ScpiError(-420))
 
     def clear(self) -> None:
-        """Device clear: what is under way in either direction is dropped, settings stay."""
+        """Device clear: drop what is under way in either direction, keep the settings."""
         with self.lock:
             self._framer.clear()
             self._answers.clear()
@@ -278,7 +297,7 @@ class Session:
             self.device.abandon()
 
     def status_byte(self) -> int:
-        """What a serial poll gives."""
+        """The status byte, as a serial poll reads it."""
         with self.lock:
             ready = self.ready()
             there = ready is not None and ready <= self.device.clock.now()

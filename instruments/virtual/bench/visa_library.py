@@ -1,4 +1,4 @@
-"""The virtual bench as a PyVISA library: the lines between PyVISA's calls and a session."""
+"""The virtual bench as a PyVISA library: it translates PyVISA's calls into those of a session."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     from pyvisa.highlevel import ResourceInfo
     from pyvisa.typing import VISARMSession, VISASession
 
-    from instruments.virtual.bench.bus import Bus
+    from instruments.virtual.bench.bench import VirtualBench
 
 
 T = TypeVar("T")
 Link = Session | SerialLine
 Attributes = dict[int, Any]
 _numbers = itertools.count(1)
-#: What a VISA session says of itself before anything was set (VPP-4.3, 3.2 and 5.1).
+#: The attributes of a VISA session when it is opened (VPP-4.3, 3.2 and 5.1).
 _DEFAULT_ATTRIBUTES: dict[int, Any] = {
     ResourceAttribute.timeout_value: 2000,
     ResourceAttribute.termchar: ord("\n"),
@@ -52,7 +52,7 @@ _SERIAL_ATTRIBUTES: dict[int, Any] = {
 class LevilabVisaLibrary(VisaLibraryBase):
     """A PyVISA library whose only resources are the instruments of one virtual bench."""
 
-    bus: Bus | None
+    bench: VirtualBench | None
     _sessions: dict[int, tuple[Link, Attributes]]
 
     @staticmethod
@@ -61,17 +61,17 @@ class LevilabVisaLibrary(VisaLibraryBase):
         return (LibraryPath("levilab"),)
 
     def _init(self) -> None:
-        self.bus = None
+        self.bench = None
         self._sessions = {}
 
-    def _bench(self) -> Bus:
-        """The bench that was given, or the default one from the first use on."""
-        if self.bus is None:
-            self.bus = self.default_bench()
-        return self.bus
+    def _bench(self) -> VirtualBench:
+        """The bench of this library; the default one, made at the first use, where none was given."""
+        if self.bench is None:
+            self.bench = self.default_bench()
+        return self.bench
 
-    def default_bench(self) -> Bus:
-        """The bench of a library that was asked for by its name alone; ``pyvisa_levilab`` has one."""
+    def default_bench(self) -> VirtualBench:
+        """Make the bench of a library that was opened by its name alone; ``pyvisa_levilab`` does."""
         raise NotImplementedError
 
     def open_default_resource_manager(self) -> tuple[VISARMSession, StatusCode]:
@@ -95,8 +95,8 @@ class LevilabVisaLibrary(VisaLibraryBase):
         open_timeout: int | None = constants.VI_TMO_IMMEDIATE,
     ) -> tuple[VISASession, StatusCode]:
         """ViOpen."""
-        session_with_it = self._bench().open(self._as_plugged_in(resource_name))
-        if session_with_it is None:
+        opened = self._bench().open(self._name_on_bench(resource_name))
+        if opened is None:
             return cast("VISASession", 0), self.handle_return_value(None, StatusCode.error_resource_not_found)
         parsed = rname.parse_resource_name(resource_name.upper())
         serial = parsed.interface_type_const == constants.InterfaceType.asrl
@@ -109,15 +109,15 @@ class LevilabVisaLibrary(VisaLibraryBase):
                 ResourceAttribute.interface_type: parsed.interface_type_const,
             }
         )
-        link = SerialLine(session_with_it, _line_settings(attributes)) if serial else session_with_it
-        if access_mode == constants.AccessModes.exclusive_lock and not link.hold.take(link, None):
+        link = SerialLine(opened, _line_settings(attributes)) if serial else opened
+        if access_mode == constants.AccessModes.exclusive_lock and not link.client_lock.acquire(link, None):
             return cast("VISASession", 0), self.handle_return_value(None, StatusCode.error_resource_locked)
         attributes[ResourceAttribute.resource_lock_state] = access_mode
         number = cast("VISASession", next(_numbers))
         self._sessions[number] = (link, attributes)
         return number, self.handle_return_value(number, StatusCode.success)
 
-    def _as_plugged_in(self, resource_name: str) -> str:
+    def _name_on_bench(self, resource_name: str) -> str:
         """The bench's own spelling of a name: PyVISA fills in what is left out (USB's interface, boards)."""
         wanted = _canonical(resource_name)
         return next((name for name in self._bench().instruments if _canonical(name) == wanted), resource_name)
@@ -129,13 +129,19 @@ class LevilabVisaLibrary(VisaLibraryBase):
             link.close()
         return self.handle_return_value(session, StatusCode.success)
 
-    def _let(
+    def _use(
         self, session: VISASession, act: Callable[[Link, Attributes], tuple[T, StatusCode]], otherwise: T
     ) -> tuple[T, StatusCode]:
-        """What an act on a session's link gives; otherwise where another program holds it, or the link is lost."""
+        """Do something with the link of a session.
+
+        Args:
+            session: its number.
+            act: takes the link and its attributes, and returns a result and a status.
+            otherwise: the result where another program has locked the instrument, or the link is lost.
+        """
         link, attributes = self._sessions[session]
         try:
-            if link.hold.keeps_out(link):
+            if link.client_lock.excludes(link):
                 result, status = otherwise, StatusCode.error_resource_locked
             else:
                 result, status = act(link, attributes)
@@ -150,32 +156,32 @@ class LevilabVisaLibrary(VisaLibraryBase):
             link.write(bytes(data), end=bool(attributes[ResourceAttribute.send_end_enabled]))
             return len(data), StatusCode.success
 
-        return self._let(session, act, 0)
+        return self._use(session, act, 0)
 
     def read(self, session: VISASession, count: int) -> tuple[bytes, StatusCode]:
-        """ViRead: up to the end of the answer, the termination character if that is on, or so many bytes."""
+        """ViRead: read up to the end of the answer, to the termination character if that is on, or so many bytes."""
 
         def act(link: Link, attributes: Attributes) -> tuple[bytes, StatusCode]:
             timeout = _seconds(attributes[ResourceAttribute.timeout_value])
             return _read(link, count, timeout, _termchar(attributes))
 
-        return self._let(session, act, b"")
+        return self._use(session, act, b"")
 
     def clear(self, session: VISASession) -> StatusCode:
         """ViClear."""
-        return self._let(session, lambda link, _: (link.clear(), StatusCode.success), None)[1]
+        return self._use(session, lambda link, _: (link.clear(), StatusCode.success), None)[1]
 
     def flush(self, session: VISASession, mask: constants.BufferOperation) -> StatusCode:
-        """ViFlush: what was received and not read is dropped."""
-        return self._let(session, lambda link, _: (link.discard(), StatusCode.success), None)[1]
+        """ViFlush: drop what was received and not read."""
+        return self._use(session, lambda link, _: (link.discard(), StatusCode.success), None)[1]
 
     def read_stb(self, session: VISASession) -> tuple[int, StatusCode]:
         """ViReadSTB."""
-        return self._let(session, lambda link, _: (link.status_byte(), StatusCode.success), 0)
+        return self._use(session, lambda link, _: (link.status_byte(), StatusCode.success), 0)
 
     def assert_trigger(self, session: VISASession, protocol: constants.TriggerProtocol) -> StatusCode:
         """ViAssertTrigger."""
-        return self._let(session, lambda link, _: (link.trigger(), StatusCode.success), None)[1]
+        return self._use(session, lambda link, _: (link.trigger(), StatusCode.success), None)[1]
 
     # --- locks ---
 
@@ -185,7 +191,7 @@ class LevilabVisaLibrary(VisaLibraryBase):
         """ViLock; a shared lock with the same key lets its holders through."""
         link, attributes = self._sessions[session]
         key = requested_key or f"levilab-{next(_numbers)}"
-        if not link.hold.take(link, key if lock_type == constants.Lock.shared else None):
+        if not link.client_lock.acquire(link, key if lock_type == constants.Lock.shared else None):
             return "", self.handle_return_value(session, StatusCode.error_resource_locked)
         shared = lock_type == constants.Lock.shared
         attributes[ResourceAttribute.resource_lock_state] = (
@@ -196,7 +202,7 @@ class LevilabVisaLibrary(VisaLibraryBase):
     def unlock(self, session: VISASession) -> StatusCode:
         """ViUnlock."""
         link, attributes = self._sessions[session]
-        link.hold.let_go(link)
+        link.client_lock.release(link)
         attributes[ResourceAttribute.resource_lock_state] = constants.AccessModes.no_lock
         return self.handle_return_value(session, StatusCode.success)
 
@@ -232,7 +238,7 @@ def _canonical(resource_name: str) -> str:
 
 
 def _read(link: Link, count: int, timeout: float, termchar: bytes) -> tuple[bytes, StatusCode]:
-    """Bytes as they come, until there is enough of them, the answer ends, or nothing more comes in time."""
+    """Read until there are `count` bytes, the answer ends, or nothing more comes in time."""
     data = b""
     while len(data) < count:
         got = link.read(count - len(data), timeout, until=termchar)
@@ -247,7 +253,7 @@ def _read(link: Link, count: int, timeout: float, termchar: bytes) -> tuple[byte
 
 
 def _seconds(timeout: int) -> float:
-    """VISA's milliseconds; its largest number stands for ever."""
+    """VISA's milliseconds in seconds; its largest number means without end."""
     return math.inf if timeout == constants.VI_TMO_INFINITE else timeout / 1000
 
 
@@ -262,14 +268,14 @@ def _line_settings(attributes: Attributes) -> LineSettings:
 
 
 def _termchar(attributes: Attributes) -> bytes:
-    """What ends a read, or nothing.  A serial line ends one there by itself (VPP-4.3, VI_ATTR_ASRL_END_IN)."""
+    """The character that ends a read, or none; a serial line has one by default (VPP-4.3, VI_ATTR_ASRL_END_IN)."""
     serial = attributes.get(ResourceAttribute.asrl_end_in) == constants.SerialTermination.termination_char
     wanted = attributes[ResourceAttribute.termchar_enabled] or serial
     return bytes([attributes[ResourceAttribute.termchar]]) if wanted else b""
 
 
-def library_for(bus: Bus) -> LevilabVisaLibrary:
-    """A library of its own for this bench, to hand to ``pyvisa.ResourceManager``."""
+def library_for(bench: VirtualBench) -> LevilabVisaLibrary:
+    """Make a library for this bench alone, to pass to ``pyvisa.ResourceManager``."""
     library = LevilabVisaLibrary(f"levilab-{next(_numbers)}")
-    library.bus = bus
+    library.bench = bench
     return library

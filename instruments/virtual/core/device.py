@@ -1,6 +1,6 @@
-"""What every virtual instrument is: bytes in, bytes out after the time that the real one would take.
+"""The base of all virtual instruments: bytes in, bytes out after the time that the real one would take.
 
-An answer may take long to be worked out, so an instrument works on a message in steps; see `steps`.
+Some answers take long to compute, so an instrument works on a message in steps; see `steps`.
 """
 
 from __future__ import annotations
@@ -28,9 +28,13 @@ if TYPE_CHECKING:
 
 
 class Answer(NamedTuple):
-    """What an instrument says: the bytes, and when they are ready [s].
+    """An answer of an instrument.
 
-    epoch: of the measurement they come from; complete: whether its end is among them.
+    Attributes:
+        data: its bytes.
+        ready: when they are ready [s].
+        epoch: of the measurement that they come from; the device counts it up when it drops a measurement.
+        complete: whether the end of the answer is among the bytes.
     """
 
     data: bytes
@@ -62,7 +66,7 @@ COMMON: tuple[Row, ...] = (
 )
 
 
-#: By class and channels.
+#: The tables of all models so far, by class and channels.
 _TABLES: dict[tuple[type[VirtualInstrument], tuple[int, ...]], Table] = {}
 
 
@@ -78,10 +82,13 @@ def _table(model: type[VirtualInstrument], numbered: tuple[int, ...]) -> Table:
 class VirtualInstrument:
     """A wire-level model: messages in, answers out, an error queue, and the time everything takes.
 
-    A subclass gives its identity and its rows and, where it reacts to settings, `changed()`.
+    A subclass gives its identity and its rows and, where it reacts to settings, `on_change()`.
 
-    clock: of the bench; identity: the answer to ``*IDN?`` of another model of the family; pace: time for one
-    message [s].
+    Args:
+        clock: of the bench.
+        identity: the answer to ``*IDN?`` of another model of the family.
+        pace: time for one message [s].
+        numbered: the numbers of the channels, where they are not those of the class.
     """
 
     identity = "levilab,virtual,0,0"
@@ -125,20 +132,20 @@ class VirtualInstrument:
         )
 
     def execute(self, message: str) -> Answer | None:
-        """Run one message, a line without its end; the answers of its queries, if it has any."""
+        """Run one message, a line without its end.  Returns the answers of its queries, None where it has none."""
         return run_to_end(self.steps(message))
 
     def steps(self, message: str) -> Steps[Answer | None]:
-        """Do what execute() does, in steps."""
+        """As execute(), in steps."""
         self._begin_message()
         return self._answer((yield from self.parser.steps(message)))
 
     def is_abort(self, message: str) -> bool:
-        """Whether this message ends the work on the one before it."""
+        """Whether this message aborts the work on the one before it."""
         return False
 
     def catch_up(self) -> Steps[None]:
-        """Work out what has happened in the instrument since the last message, where anything happens in between."""
+        """Work out what has happened in the instrument since the last message; by default nothing happens."""
         yield from ()
 
     def _begin_message(self) -> None:
@@ -150,14 +157,14 @@ class VirtualInstrument:
         return Answer((text + self.line_end).encode("latin-1"), self._ready, self.epoch)
 
     def abandon(self) -> None:
-        """What is under way is given up, and what has not been read yet is lost."""
+        """Cancel the work under way, and drop the answers that were not read."""
         if self.work:
             self.work.cancel()
         self.epoch += 1
         self._ready = self.clock.now()
 
     def busy_until(self, instant: float) -> None:
-        """The answer to the message under way is ready at this time [s] and not before."""
+        """Let the answer to the message under way be ready at this time [s], not before."""
         self._ready = max(self._ready, instant)
 
     def trigger(self) -> None:
@@ -170,7 +177,7 @@ class VirtualInstrument:
         return float(self.settings[name])
 
     def read_boolean(self, text: str) -> bool:
-        """A switch as it is sent.  Raises ScpiError."""
+        """The value of a switch, from its text on the wire.  Raises ScpiError."""
         return boolean(text)
 
     def spell(self, value: float) -> str:
@@ -178,14 +185,14 @@ class VirtualInstrument:
         return nr3(value)
 
     def reply(self, header: str, text: str, unit: str = "") -> str:
-        """What is answered to the question of a row: the text alone."""
+        """An answer to the query of a row: the text alone."""
         return text
 
-    def adjusted(self, name: str, before: float) -> None:
-        """A number has changed from what it was before."""
-        self.changed(name)
+    def on_number_change(self, name: str, before: float) -> None:
+        """Called after a setting has changed.  before: its former value, 0 where that was no number."""
+        self.on_change(name)
 
-    def changed(self, name: str) -> None:
+    def on_change(self, name: str) -> None:
         """Called after a setting has changed."""
 
     @contextlib.contextmanager
@@ -199,10 +206,10 @@ class VirtualInstrument:
             raise
 
     def reset(self) -> None:
-        """The state after ``*RST``."""
+        """Go to the state after ``*RST``."""
         self.settings |= self.commands.defaults
         for name in self.commands.defaults:
-            self.changed(name)
+            self.on_change(name)
 
     # --- status ---
 
@@ -211,21 +218,21 @@ class VirtualInstrument:
         return self.status.byte(errors_waiting=bool(self.parser.errors), message_available=message_available)
 
     def clear_status(self) -> None:
-        """``*CLS``: no errors, no events."""
+        """``*CLS``: drop all errors and events."""
         self.parser.errors.clear()
         self.status.events = 0
 
     def note_completion(self) -> None:
-        """``*OPC``: bit 0 of the events when all is done that was begun; here it is."""
+        """``*OPC``: set bit 0 of the events when all operations are complete; here they are."""
         self.status.events |= OPERATION_COMPLETE
 
     def completion(self) -> Steps[str] | str:
-        """``*OPC?``: answered when all is done that was begun."""
+        """``*OPC?``: answer when all operations are complete."""
         return "1"
 
     def wait(self) -> Steps[None] | None:
-        """``*WAI``: what comes next waits until all is done that was begun."""
+        """``*WAI``: let the next command wait until all operations are complete."""
 
     def set_mask(self, name: str, parameters: list[str]) -> None:
-        """A mask of the status.  Raises ScpiError."""
+        """Set a mask of the status registers.  Raises ScpiError."""
         setattr(self.status, name, int(number(parameter(parameters), low=0, high=255, default=0)))

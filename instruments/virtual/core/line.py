@@ -1,4 +1,4 @@
-"""A serial line: its settings, and what a receiver with other settings hears."""
+"""A serial line: its settings, and the bytes that a receiver with other settings gets."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _PARITY_BITS = {"E": (0, 1), "O": (1, 0), "M": (1, 1), "S": (0, 0)}
 
 @dataclass(frozen=True)
 class LineSettings:
-    """How one end of a line is set.  parity: N, E, O, M or S; stop_bits: 1, 1.5 or 2."""
+    """The settings of one end of a line.  parity: N, E, O, M or S; stop_bits: 1, 1.5 or 2."""
 
     baud_rate: int = 9600
     data_bits: int = 8
@@ -23,20 +23,25 @@ class LineSettings:
         return 1 + self.data_bits + (self.parity != "N") + self.stop_bits
 
     def duration(self, count: int) -> float:
-        """How long so many bytes take [s]."""
+        """How long so many bytes take on the line [s]."""
         return count * self.bits / self.baud_rate
 
 
-def carried(data: bytes, sender: LineSettings, receiver: LineSettings, *, checked: bool = True) -> bytes:
-    r"""What the receiver hears of these bytes, sent one after the other on a line that was quiet.
+def received_as(data: bytes, sender: LineSettings, receiver: LineSettings, *, checked: bool = True) -> bytes:
+    r"""The bytes that a receiver gets of those sent one after the other, on a line that was idle before.
 
-    checked: a byte with a wrong parity bit becomes a NUL, as VISA has it (VPP-4.3, VI_ATTR_ASRL_REPLACE_CHAR).  A
-    missing stop bit stops no byte.
+    A missing stop bit stops no byte.
+
+    Args:
+        data: the bytes sent.
+        sender: settings of their sender.
+        receiver: settings of the receiver.
+        checked: whether a byte with a wrong parity bit becomes a NUL, as in VISA (VPP-4.3, VI_ATTR_ASRL_REPLACE_CHAR).
 
     >>> line = LineSettings(57600, 7, "O")
-    >>> carried(b"LSCI", line, line)
+    >>> received_as(b"LSCI", line, line)
     b'LSCI'
-    >>> carried(b"LSCI", line, LineSettings(57600, 8, "N"))
+    >>> received_as(b"LSCI", line, LineSettings(57600, 8, "N"))
     b'L\xd3CI'
     """
     if (sender.baud_rate, sender.data_bits, sender.parity) == (
@@ -47,7 +52,7 @@ def carried(data: bytes, sender: LineSettings, receiver: LineSettings, *, checke
         mask = (1 << sender.data_bits) - 1
         return data if mask == 0xFF else bytes(byte & mask for byte in data)
     parity = _PARITY_BITS.get(receiver.parity) if checked else None
-    return _sampled(_half_bits(data, sender), sender.baud_rate, receiver, parity)
+    return _sample_bits(_half_bits(data, sender), sender.baud_rate, receiver, parity)
 
 
 def _half_bits(data: bytes, sender: LineSettings) -> list[int]:
@@ -63,8 +68,8 @@ def _half_bits(data: bytes, sender: LineSettings) -> list[int]:
     return levels
 
 
-def _sampled(levels: list[int], sent_at: int, receiver: LineSettings, parity_bits: tuple[int, int] | None) -> bytes:
-    """The bytes of a receiver that looks at the middle of each of its own bits.
+def _sample_bits(levels: list[int], sent_at: int, receiver: LineSettings, parity_bits: tuple[int, int] | None) -> bytes:
+    """The bytes of a receiver that samples the line in the middle of each of its own bits.
 
     Time is counted in units that make half a bit of the sender and half a bit of the receiver whole numbers.
     """

@@ -1,4 +1,4 @@
-"""Where messages end in a stream of bytes, and what they are made of: units, headers with their path, parameters.
+"""Messages in a stream of bytes: where they end, and their units, headers with their path, and parameters.
 
 Source: SCPI-1999, volume 1, 6.2.4 (compound messages with path memory); IEEE 488.2, 7.5 (where a message ends), 7.7.6
 (blocks).
@@ -13,21 +13,24 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-#: White space is every control character and the space (IEEE 488.2, 7.4.1.2), and no other sign of Latin-1.
+#: White space is every control character and the space (IEEE 488.2, 7.4.1.2), and no other character of Latin-1.
 _BLANK, _DIGITS = "".join(map(chr, range(0x21))), re.compile("[0-9]+")
 _UNIT = re.compile(r"([^\x00-\x20]+)[\x00-\x20]*(.*)", re.DOTALL)
 _SPECIAL = re.compile(r"[\"'();,]|(?<![^\x00-\x20,])#[1-9]")
 
 
-#: Signs that are looked at, or units that hold nothing, between two places where the work may be interrupted.
+#: Special characters, or empty units, between two places where the work may be interrupted.
 _AT_A_STRETCH = 1000
 
 
 def read_units(message: str, *, path_memory: bool = True) -> Iterator[tuple[str, list[str]] | None]:
     """The units of a compound message: the full header of each, and its parameters.
 
-    path_memory: whether a header goes on from the one before it, as SCPI has it, or stands for itself.
-    Yields None where the work may be interrupted: between units, and now and then in one of many signs.
+    Yields None where the work may be interrupted: between units, and now and then within a long one.
+
+    Args:
+        message: without its line end.
+        path_memory: whether a header continues the path of the one before it, as in SCPI, or begins at the root.
 
     >>> list(read_units("SOUR:FREQ 40;*OPC?;VOLT 1,2"))
     [('SOUR:FREQ', ['40']), None, ('*OPC?', []), None, ('SOUR:VOLT', ['1', '2'])]
@@ -52,7 +55,7 @@ def read_units(message: str, *, path_memory: bool = True) -> Iterator[tuple[str,
 def split_units(message: str) -> Iterator[str | None]:
     """The units of a compound message: split at semicolons outside of quotes and blocks.
 
-    Yields None now and then in a message of many signs, where the work may be interrupted; an empty unit is "".
+    Yields None now and then in a long message, where the work may be interrupted; an empty unit is "".
 
     >>> list(split_units('FREQ 40; DISP:TEXT "a;b"'))
     ['FREQ 40', 'DISP:TEXT "a;b"']
@@ -89,9 +92,9 @@ def split_parameters(text: str) -> Iterator[str | None]:
 
 
 def _split(text: str, separator: str) -> Iterator[str | None]:
-    """The pieces between separators, blanks taken away, but not those that are the bytes of a block.
+    """The pieces between separators, without blanks around them, but with blanks that are bytes of a block.
 
-    Yields None after every so many signs, where the work may be interrupted.
+    Yields None after every _AT_A_STRETCH special characters, where the work may be interrupted.
     """
     start = looked = block_end = depth = seen = 0
     while found := _SPECIAL.search(text, looked):
@@ -120,15 +123,15 @@ def _piece(text: str, start: int, end: int, block_end: int) -> str:
 
 
 def _end_of_block(text: str, head: int) -> int:
-    """Where a definite-length block ends whose # stands at head; just behind the # if it is none."""
+    """Where the definite-length block ends whose # is at `head`; just behind the # where it is no block."""
     data = head + 2 + int(text[head + 1])
     length = text[head + 2 : data]
     return min(len(text), data + int(length)) if _DIGITS.fullmatch(length) else head + 1
 
 
-#: A line longer than this is dropped, and a block that says that it is longer is no block [bytes].
+#: The framer drops a longer line, and takes the head of a longer block for text [bytes].
 LONGEST_LINE, LONGEST_BLOCK = 1 << 22, 1 << 26
-#: What decides: the end of a line, a quote, or a block's head where a parameter can begin.
+#: What decides where a message ends: a line end, a quote, or a block's head where a parameter can begin.
 _SPECIAL_BYTE = re.compile(rb"[\n\"']|(?<=[\x00-\x20,])#[1-9]")
 _LINE_END = re.compile(rb"\n")
 #: White space (IEEE 488.2, 7.4.1.2).
@@ -136,14 +139,15 @@ _BLANK_BYTES = bytes(range(0x21))
 
 
 class Overrun(Exception):
-    """More came than an instrument can keep; it was dropped up to the next line end."""
+    """A message was longer than the input buffer; it is dropped up to the next line end."""
 
 
 @dataclass
 class Framer:
-    r"""Takes bytes as they come and gives whole messages, decoded as Latin-1 (each byte a character).
+    r"""Collects bytes and returns whole messages, decoded as Latin-1 (each byte a character).
 
-    blocks: whether the instrument knows blocks; to others # is a sign like any other.
+    Attributes:
+        blocks: whether the instrument knows blocks; for others # is a character like any other.
 
     >>> Framer().feed(b"*IDN?\nDATA #12\n\n\nFR")
     ['*IDN?', 'DATA #12\n\n']
@@ -151,16 +155,21 @@ class Framer:
 
     blocks: bool = True
     _buffer: bytearray = field(default_factory=bytearray)
-    _looked: int = 0  # so far nothing ends the message
-    _block_end: int = 0  # up to here are the bytes of blocks
+    _looked: int = 0  # up to here nothing ends the message
+    _block_end: int = 0  # up to here the bytes belong to blocks
     _quote: bytes = b""
     _dropping: bool = False
 
     def feed(self, data: bytes, *, marked: bool = False) -> list[str | Overrun]:
-        """The messages that these bytes complete; Overrun in the place of one that was too long.
+        """Add bytes.
 
-        marked: the interface says that a message ends with them; that takes the place of a line feed if there is none
-        (IEEE 488.2, 7.5).
+        Args:
+            data: the bytes.
+            marked: whether the interface marks the end of a message behind them, which stands for a missing line feed
+                (IEEE 488.2, 7.5).
+
+        Returns:
+            The messages that these bytes complete, with an Overrun in the place of one that was too long.
         """
         self._buffer += data if not marked or data.endswith(b"\n") else data + b"\n"
         messages: list[str | Overrun] = []
@@ -180,11 +189,11 @@ class Framer:
 
     @property
     def begun(self) -> bool:
-        """Whether a message has begun that has not ended yet."""
+        """Whether a message has begun and not ended yet."""
         return bool(self._buffer) or self._dropping
 
     def clear(self) -> None:
-        """Drop what has not become a message yet."""
+        """Drop the bytes of an unfinished message."""
         self._forget(len(self._buffer))
 
     def _forget(self, count: int) -> None:
@@ -192,7 +201,7 @@ class Framer:
         self._looked, self._block_end, self._quote, self._dropping = 0, 0, b"", False
 
     def _end_of_message(self) -> int | None:
-        """Where the line feed stands that ends the first message, or None if it is not there yet."""
+        """Where the line feed is that ends the first message, None where it has not come yet."""
         special = _SPECIAL_BYTE if self.blocks else _LINE_END
         while found := special.search(self._buffer, self._looked):
             what = found[0]
@@ -213,7 +222,7 @@ class Framer:
         return None
 
     def _end_of_block(self, head: int) -> int | None:
-        """Where the block ends that begins here; just behind its head if it is none; None: not known yet."""
+        """Where the block ends whose head is here; just behind the head where it is no block; None: not known yet."""
         digits = self._buffer[head + 2 : head + 2 + self._buffer[head + 1] - ord("0")]
         length = bytes(digits)
         if not length.isdigit() and length:
@@ -221,5 +230,5 @@ class Framer:
         if len(length) < self._buffer[head + 1] - ord("0"):
             return None
         size = int(length)
-        # of all the blocks of a message together no more is kept than of the longest one
+        # all blocks of a message together may be as long as one block at most
         return head + 2 + len(length) + (size if head + size <= LONGEST_BLOCK else 0)

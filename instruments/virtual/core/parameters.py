@@ -9,8 +9,8 @@ from instruments.ieee488 import BrokenBlock, block, block_of
 from instruments.virtual.core.parser import ScpiError
 
 _MULTIPLIERS = {"": 1.0, "N": 1e-9, "U": 1e-6, "M": 1e-3, "K": 1e3, "MA": 1e6, "G": 1e9}
-#: A mantissa and an exponent, then a unit.  No digit can be matched in two ways (\d+\.?\d* could): a long line of them
-#: that is no number in the end takes a time proportional to its length, not to its square.
+#: A mantissa and an exponent, then a unit.  No digit can match in two ways (with \d+\.?\d* it could), so the time for a
+#: long line of digits that is no number grows with its length, not with its square.
 _NUMBER = re.compile(r"([+-]?(?:\d+(?:\.\d*)?|\.\d+))([eE][+-]?\d{1,3})?\s*([a-zA-Z/]*)")
 _CHANNEL_LIST = re.compile(r"\(@[\d,: !]*\)")
 #: Digits of a mantissa, leading zeros not counted (IEEE 488.2, 7.7.2.4.1).
@@ -26,7 +26,7 @@ def optional_parameter(parameters: list[str]) -> str:
 
 
 def parameter(parameters: list[str]) -> str:
-    """The only parameter, a channel list aside.  Raises ScpiError if there is none or another."""
+    """The only parameter, a channel list aside.  Raises ScpiError if there is none, or more than one."""
     only = optional_parameter(parameters)
     if not only:
         raise ScpiError(-109)
@@ -34,7 +34,7 @@ def parameter(parameters: list[str]) -> str:
 
 
 def no_parameters(parameters: list[str]) -> None:
-    """Nothing but a channel list.  Raises ScpiError."""
+    """Check that there are no parameters, a channel list aside.  Raises ScpiError."""
     if optional_parameter(parameters):
         raise ScpiError(-108)
 
@@ -44,7 +44,7 @@ def _limits(low: float, high: float, default: float) -> dict[str, float]:
 
 
 def limit(text: str, *, low: float, high: float, default: float) -> float:
-    """What a query may ask beside the setting itself: ``MIN``, ``MAX`` or ``DEF``.  Raises ScpiError.
+    """The limit or default that a query asks for by ``MIN``, ``MAX`` or ``DEF``.  Raises ScpiError.
 
     >>> limit("max", low=0, high=1e6, default=0)
     1000000.0
@@ -74,7 +74,7 @@ def number(text: str, *, low: float, high: float, default: float, unit: str = ""
 
 
 def one_of(value: float, values: tuple[float, ...]) -> float:
-    """A number of an input that has these values and no other, any where there are none.  Raises ScpiError.
+    """Check that a number is one of these values; without values any number is allowed.  Raises ScpiError.
 
     >>> one_of(50.0, (50.0, 1e6))
     50.0
@@ -85,12 +85,12 @@ def one_of(value: float, values: tuple[float, ...]) -> float:
 
 
 def block_text(data: bytes, digits: int = 0) -> str:
-    """A definite-length block as an answer has it, a character for each byte; see `instruments.ieee488.block`."""
+    """A definite-length block as text, a character for each byte; see `instruments.ieee488.block`."""
     return block(data, digits).decode("latin-1")
 
 
 def block_content(text: str, error: int = -104) -> bytes:
-    """The bytes of a block that was sent as a parameter.  error: what is reported for anything else, raises ScpiError.
+    """The bytes of a block that is a parameter.  Raises ScpiError with the number `error` where it is no block.
 
     >>> block_content("#13abc")
     b'abc'
@@ -120,7 +120,7 @@ def _multiplier(suffix: str, unit: str) -> float:
 
 
 def choice(text: str, words: tuple[str, ...]) -> str:
-    """One of the words, given in short or long form; the short form of it.  Raises ScpiError.
+    """The short form of one of the words, given in its short or long form.  Raises ScpiError.
 
     >>> choice("square", ("SINusoid", "SQUare"))
     'SQU'
@@ -133,9 +133,11 @@ def choice(text: str, words: tuple[str, ...]) -> str:
 
 
 def boolean(text: str, *, rounded: bool = False) -> bool:
-    """ON, OFF, 1 or 0, however the number is written.  Raises ScpiError.
+    """The value of ON, OFF, 1 or 0, in any form of the number.  Raises ScpiError.
 
-    rounded: any number, OFF if it rounds to nought.
+    Args:
+        text: on the wire.
+        rounded: whether any number is allowed, OFF where it rounds to 0.
 
     >>> boolean("on"), boolean("1.0"), boolean("0"), boolean("2", rounded=True)
     (True, True, False, True)

@@ -2,8 +2,8 @@
 
 Source: SCPI-1999, volume 1: short and long forms in any case (6.2), optional nodes and numeric suffixes,
 compound messages with path memory (6.2.4), unit suffixes (7.1), MINimum, MAXimum and DEFault (7.2.1);
-volume 2, chapter 21: the error numbers.  A message that is not understood gets no reply, only an entry in
-the error queue: that is what makes the other side time out, as on the bench.
+volume 2, chapter 21: the error numbers.  The answer to a message with an error is an entry in the error queue and
+nothing else, so the program at the other side runs into its time-out, as on the bench.
 """
 
 from __future__ import annotations
@@ -44,25 +44,25 @@ ERRORS = {
     -430: "Query DEADLOCKED",
 }
 
-#: More than this in answer to one message fits into no output buffer (IEEE 488.2, 6.3.1.7) [bytes].
+#: The output buffer: the longest answer to one message (IEEE 488.2, 6.3.1.7) [bytes].
 LONGEST_ANSWER = 1 << 26
 
 
 class ScpiError(Exception):
-    """An entry for the error queue.  number: as in the table above."""
+    """An entry for the error queue.  number: one of the table above."""
 
     def __init__(self, number: int, detail: str = "") -> None:
         self.number = number
-        # what the other side sent goes back as a string of IEEE 488.2 (8.7.8): ASCII, quotes doubled
+        # the program's own text goes back as a string of IEEE 488.2 (8.7.8): ASCII, quotes doubled
         shown = "".join(c if " " <= c <= "~" else "?" for c in detail).replace('"', '""')
         text = ERRORS[number] + (f";{shown}" if detail else "")
         self.entry = f'{number:+d},"{text}"'
         super().__init__(self.entry)
 
 
-#: A setting.
+#: The value of a setting.
 Value = float | str | bool
-#: What a command or a query does, given the device and the parameters: at once or in steps.
+#: The function of a command or a query: takes the device and the parameters, returns its result or steps to it.
 Action = Callable[[Any, list[str]], "Steps[str] | Steps[None] | str | None"]
 
 
@@ -77,16 +77,16 @@ class Row:
 
     @property
     def settable(self) -> bool:
-        """Whether there is the command."""
+        """Whether the row has a command."""
         return True
 
     @property
     def askable(self) -> bool:
-        """Whether there is the query."""
+        """Whether the row has a query."""
         return True
 
     def set(self, device: Any, parameters: list[str]) -> Steps[None] | None:
-        """Do what the command does.  Raises ScpiError."""
+        """Execute the command.  Raises ScpiError."""
         raise NotImplementedError
 
     def ask(self, device: Any, parameters: list[str]) -> Steps[str] | str:
@@ -117,9 +117,14 @@ def _of_channel(text: str, n: int) -> str:
 
 
 class Table:
-    """The rows of a model, and its settings.  Of rows that fit a header the first one has it.
+    """The rows of a model, and its settings.  Where several rows fit a header, the first one counts.
 
-    others: settings that no row has.  defaults: all settings, with their values after ``*RST``.
+    Args:
+        rows: of the model.
+        others: settings that no row has.
+
+    Attributes:
+        defaults: all settings, with their values after ``*RST``.
     """
 
     def __init__(self, rows: Iterable[Row], others: Mapping[str, Value]) -> None:
@@ -128,10 +133,10 @@ class Table:
         self._actions: dict[str, Action] = {}
 
     def find(self, header: str) -> Action:
-        """What stands behind a header, with a question mark behind the one of a query.  Raises ScpiError."""
+        """The function of a header; that of a query ends with a question mark.  Raises ScpiError."""
         name = header.upper()
         action = self._actions.get(name)
-        if action is None:  # unknown headers are not remembered: they could be any number
+        if action is None:  # only known headers are kept: there could be any number of unknown ones
             action = self._actions[name] = self._search(header)
         return action
 
@@ -172,10 +177,16 @@ def _expression(pattern: str) -> str:
 
 @dataclass
 class Parser:
-    """Takes messages apart and runs them on a table of commands.
+    """Reads messages and executes them by a table of commands.
 
-    device, commands: whose table it is; queue_size: entries of the error queue before it overflows; no_error: what an
-    empty one answers; on_error: called with the number of each error; path_memory: see `message`.
+    Attributes:
+        device: that the commands act on.
+        commands: its table.
+        queue_size: how many entries the error queue has.
+        no_error: the answer of an empty queue.
+        on_error: called with the number of each error.
+        path_memory: see `message.read_units`.
+        errors: the error queue.
     """
 
     device: Any
@@ -187,11 +198,11 @@ class Parser:
     errors: deque[str] = field(default_factory=deque)
 
     def run(self, message: str) -> str | None:
-        """Execute one message (a line without its end); the answers of its queries joined with ``;``, or None."""
+        """Execute one message, a line without its end.  Returns the answers joined with ``;``, or None."""
         return run_to_end(self.steps(message))
 
     def steps(self, message: str) -> Steps[str | None]:
-        """Do what run() does, in steps: a message may be interrupted after each of its units."""
+        """As run(), in steps: other work may come between two units of the message."""
         answers: list[str] = []
         length = 0
         for unit in read_units(message, path_memory=self.path_memory):
@@ -216,7 +227,7 @@ class Parser:
         return ";".join(answers) if answers else None
 
     def report(self, error: ScpiError) -> None:
-        """Put an entry into the error queue; when it is full its last entry says so."""
+        """Queue an error; where the queue is full, its last entry becomes “Error queue overflow”."""
         self.on_error(error.number)
         if len(self.errors) < self.queue_size:
             self.errors.append(error.entry)
@@ -224,5 +235,5 @@ class Parser:
             self.errors[-1] = ScpiError(-350).entry
 
     def next_error(self) -> str:
-        """The oldest entry, removed, or that there is none."""
+        """Remove and return the oldest entry; where there is none, the text for no error."""
         return self.errors.popleft() if self.errors else self.no_error

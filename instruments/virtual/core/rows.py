@@ -1,8 +1,8 @@
-"""What a virtual instrument understands, one row a command: a table that says what, not how.
+"""The commands of a virtual instrument as data, one row each: a table that says what, not how.
 
-A row is data, made once a module, and knows no device: what it sets and asks is given to it.  ``{n}`` in a header or a
-name is the number of a channel (and ``[n]`` in a header one that may be left out for the first); what depends on the
-channel is given its number, too.
+A row is made once, with its module, and belongs to no device: its methods take the device that they act on.  ``{n}``
+in a header or a name is the number of a channel (and ``[n]`` in a header one that may be left out for the first); a
+function that depends on the channel takes its number as well.
 
 >>> Number("CHANnel{n}:SCALe", "chan{n}_scale", 1.0, (1e-3, 10.0), "V").of_channel(2).header
 'CHANnel2:SCALe'
@@ -32,44 +32,50 @@ if TYPE_CHECKING:
     from instruments.virtual.core.steps import Steps
 
 _BOUNDS = {"MIN", "MAX", "DEF", "MINIMUM", "MAXIMUM", "DEFAULT"}
-#: What would end a string or a message.
+#: The characters that would end a string or a message.
 _NOT_IN_TEXTS = dict.fromkeys(map(ord, "\"';\n"))
 
 
 class Device(Protocol):
-    """What a row needs of the device that is asked."""
+    """What a row needs of a device."""
 
     settings: dict[str, Value]
     lenient: bool
 
-    def adjusted(self, name: str, before: float) -> None:
-        """Called after a setting has changed; before: what it was, 0 where that was no number."""
+    def on_number_change(self, name: str, before: float) -> None:
+        """Called after a setting has changed.  before: its former value, 0 where that was no number."""
 
     def read_boolean(self, text: str) -> bool:
-        """A switch as it is sent."""
+        """The value of a switch, from its text on the wire."""
 
     def spell(self, value: float) -> str:
         """A number as the device prints it."""
 
     def reply(self, header: str, text: str, unit: str = "") -> str:
-        """What is answered: the text alone, or with its header and unit."""
+        """An answer: the text alone, or with its header and unit."""
 
 
 def _put(device: Device, name: str, value: Value) -> None:
     before = device.settings[name]
     device.settings[name] = value
-    device.adjusted(name, before if isinstance(before, float) else 0.0)
+    device.on_number_change(name, before if isinstance(before, float) else 0.0)
 
 
 @dataclass(frozen=True)
 class Number(Row):
-    """A number that can be set and asked for, MIN, MAX and DEF included.
+    """A number to set and to query, with MIN, MAX and DEF.
 
-    default: after ``*RST``; limits: lowest and highest, or how they follow from the device (and the channel);
-    unit: that may be sent with it; rounded: to what the instrument can do; spell: how it is printed, if not as all
-    numbers; factor: the number on the wire is so many times the setting; clips: a number beyond a limit becomes the
-    limit instead of an error; values: the only ones that there are; alias: another row has the setting, too, and gives
-    its default.
+    Attributes:
+        name: of the setting.
+        default: its value after ``*RST``.
+        limits: lowest and highest number, or a function of the device (and the channel) that returns them.
+        unit: that a program may send with the number.
+        rounded: rounds it to what the instrument can do.
+        spell: prints it, where this number has a form of its own.
+        factor: the number on the wire over the setting.
+        clips: whether a number beyond a limit becomes the limit instead of an error.
+        values: the only ones allowed, where the limits do not suffice.
+        alias: whether another row has the same setting, and gives its default.
     """
 
     name: str
@@ -93,7 +99,7 @@ class Number(Row):
         return replace(row, limits=lambda device: find(device, n)) if callable(find) else row
 
     def range(self, device: Device) -> tuple[float, float]:
-        """The lowest and the highest number that can be sent now."""
+        """The lowest and the highest number allowed now."""
         return self.limits(device) if callable(self.limits) else self.limits
 
     def set(self, device: Device, parameters: list[str]) -> None:
@@ -105,7 +111,7 @@ class Number(Row):
         _put(device, self.name, self.rounded(self.read(device, parameter(parameters)) / self.factor))
 
     def read(self, device: Device, text: str) -> float:
-        """The number as it is sent, within its limits.  Raises ScpiError."""
+        """Read the number that a program has sent, within its limits.  Raises ScpiError."""
         low, high = self.range(device)
         default = self.factor * self.default
         if self.clips and text.upper() not in _BOUNDS:
@@ -124,7 +130,7 @@ class Number(Row):
         return device.reply(self.header, self.printed(device, value), self.unit)
 
     def printed(self, device: Device, value: float) -> str:
-        """The number as it is answered, without header and unit."""
+        """The number as the answer has it, without header and unit."""
         return (self.spell or device.spell)(value)
 
 
@@ -137,8 +143,10 @@ def whole(header: str, name: str, default: float, limits: tuple[float, float], *
 class Word(Row):
     """One word of several, in its long form with the short form in capitals; the answer is the short form.
 
-    words: with blanks between them, or how they follow from the device; default: in its short form, if it is neither
-    the word behind an asterisk nor the first.
+    Attributes:
+        name: of the setting.
+        words: separated by blanks, or a function of the device that returns them.
+        default: in its short form, where it is neither the word behind an asterisk nor the first.
     """
 
     name: str
@@ -172,7 +180,13 @@ def _split(words: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Switch(Row):
-    """ON or OFF.  default: or how it follows from the channel; words: what is answered for off and for on."""
+    """ON or OFF.
+
+    Attributes:
+        name: of the setting.
+        default: its value after ``*RST``, or a function of the channel that returns it.
+        words: the answers for off and for on.
+    """
 
     name: str
     default: bool | Callable[[int], bool] = False
@@ -225,7 +239,7 @@ class Text(Row):
 
 @dataclass(frozen=True)
 class Do(Row):
-    """A command without parameters.  act: what the device does, nothing by default."""
+    """A command without parameters.  act: does it, given the device; by default it does nothing."""
 
     act: Callable[..., Steps[None] | None] = field(default=lambda _device: None, repr=False)
 
@@ -235,7 +249,7 @@ class Do(Row):
         return False
 
     def of_channel(self, n: int) -> Self:
-        """See the base: act is given the channel's number behind the device."""
+        """See the base: act takes the channel's number behind the device."""
         act = self.act
         return replace(super().of_channel(n), act=lambda device: act(device, n))
 
@@ -247,9 +261,9 @@ class Do(Row):
 
 @dataclass(frozen=True)
 class Ask(Row):
-    """A question without parameters."""
+    """A query without parameters.  answer: the text of the answer, given the device."""
 
-    tell: Callable[..., Steps[str] | str] = field(default=lambda _device: "0", repr=False)
+    answer: Callable[..., Steps[str] | str] = field(default=lambda _device: "0", repr=False)
 
     @property
     def settable(self) -> bool:
@@ -257,25 +271,28 @@ class Ask(Row):
         return False
 
     def of_channel(self, n: int) -> Self:
-        """See the base: tell is given the channel's number behind the device."""
-        tell = self.tell
-        return replace(super().of_channel(n), tell=lambda device: tell(device, n))
+        """See the base: answer takes the channel's number behind the device."""
+        answer = self.answer
+        return replace(super().of_channel(n), answer=lambda device: answer(device, n))
 
     def ask(self, device: Any, parameters: list[str]) -> Steps[str] | str:
         """See the base."""
         no_parameters(parameters)
-        return self.tell(device)
+        return self.answer(device)
 
 
 @dataclass(frozen=True)
 class Both(Row):
-    """What takes its parameters apart by itself.  act, tell: given the device and the parameters; None: there is none.
+    """A command, a query or both, whose functions read the parameters themselves.
 
-    keeps: the setting behind it, where it has one, with its default.
+    Attributes:
+        act: the command, given the device and the parameters; None: there is no command.
+        answer: the same for the query.
+        keeps: the setting behind it, where it has one, with its default.
     """
 
     act: Callable[..., Steps[None] | None] | None = field(default=None, repr=False)
-    tell: Callable[..., Steps[str] | str] | None = field(default=None, repr=False)
+    answer: Callable[..., Steps[str] | str] | None = field(default=None, repr=False)
     keeps: tuple[str, Value] | None = None
 
     @property
@@ -286,19 +303,19 @@ class Both(Row):
     @property
     def askable(self) -> bool:
         """See the base."""
-        return self.tell is not None
+        return self.answer is not None
 
     def defaults(self) -> dict[str, Value]:
         """See the base."""
         return dict((self.keeps,)) if self.keeps else {}
 
     def of_channel(self, n: int) -> Self:
-        """See the base: act and tell are given the channel's number behind the device."""
-        act, tell, keeps = self.act, self.tell, self.keeps
+        """See the base: act and answer take the channel's number behind the device."""
+        act, answer, keeps = self.act, self.answer, self.keeps
         return replace(
             super().of_channel(n),
             act=act and (lambda device, parameters: act(device, n, parameters)),
-            tell=tell and (lambda device, parameters: tell(device, n, parameters)),
+            answer=answer and (lambda device, parameters: answer(device, n, parameters)),
             keeps=keeps and (keeps[0].format(n=n), keeps[1]),
         )
 
@@ -309,24 +326,24 @@ class Both(Row):
 
     def ask(self, device: Any, parameters: list[str]) -> Steps[str] | str:
         """See the base."""
-        assert self.tell
-        return self.tell(device, parameters)
+        assert self.answer
+        return self.answer(device, parameters)
 
 
 @dataclass(frozen=True)
 class Own(Both):
-    """As Both, but the question takes no parameters: tell is given the device alone."""
+    """As Both, but the query has no parameters: answer takes the device alone."""
 
     def of_channel(self, n: int) -> Self:
         """See the base."""
-        row, tell = super().of_channel(n), self.tell
-        return replace(row, tell=tell and (lambda device: tell(device, n)))
+        row, answer = super().of_channel(n), self.answer
+        return replace(row, answer=answer and (lambda device: answer(device, n)))
 
     def ask(self, device: Any, parameters: list[str]) -> Steps[str] | str:
         """See the base."""
-        assert self.tell
+        assert self.answer
         no_parameters(parameters)
-        return self.tell(device)
+        return self.answer(device)
 
 
 def short_header(pattern: str) -> str:

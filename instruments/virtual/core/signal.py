@@ -1,4 +1,4 @@
-"""What stands at the input of a counter or an oscilloscope: a voltage as a function of time."""
+"""The signal at the input of a counter or an oscilloscope: a voltage as a function of time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The status registers of IEEE 488.2, chapter 11: what an instrument says of itself in bits."""
+"""The status registers of IEEE 488.2, chapter 11: the state of an instrument in bits."""
 
 from __future__ import annotations
 
@@ -15,23 +15,29 @@ _BITS = {1: COMMAND_ERROR, 2: EXECUTION_ERROR, 3: DEVICE_ERROR, 4: QUERY_ERROR}
 
 @dataclass
 class Status:
-    """events: the standard event status register; event_enable, request_enable: their masks."""
+    """The status registers.
+
+    Attributes:
+        events: the standard event status register.
+        event_enable: the mask of events that set the event summary bit of the status byte.
+        request_enable: the mask of bits of the status byte that request service.
+    """
 
     events: int = POWER_ON
     event_enable: int = 0
     request_enable: int = 0
 
     def note_error(self, number: int) -> None:
-        """An error was reported."""
+        """Set the event bit of an error, by its number."""
         self.events |= _BITS.get(abs(number) // 100, DEVICE_ERROR)
 
     def take_events(self) -> int:
-        """What ``*ESR?`` answers; reading it empties it."""
+        """The events, as ``*ESR?`` answers them; the register is empty afterwards."""
         events, self.events = self.events, 0
         return events
 
     def byte(self, *, errors_waiting: bool, message_available: bool) -> int:
-        """The status byte, as ``*STB?`` and a serial poll give it."""
+        """The status byte, as ``*STB?`` and a serial poll read it."""
         bits = ERRORS_WAITING * errors_waiting + MESSAGE_AVAILABLE * message_available
         bits += EVENT_SUMMARY * bool(self.events & self.event_enable)
         return bits + SERVICE_REQUEST * bool(bits & self.request_enable)

@@ -1,7 +1,8 @@
-"""Work in steps: what takes long to be worked out, with places between where others may have their turn.
+"""Work in steps: a long computation that pauses so that other work can have its turn.
 
-A question such as READ? makes a model look at hours of light.  It is a generator that yields now and then: in process
-it is driven to its end at once, a server drives it in slices and serves its other clients meanwhile.
+A query such as READ? makes a model look at hours of light.  Its answer is computed by a generator that yields now and
+then: a program in the same process runs it to its end, a server runs it in slices, and serves its other clients in
+between.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ Steps = Generator[None, None, T]
 
 
 def run_to_end(steps: Steps[T]) -> T:
-    """The result, without interruption."""
+    """Run the steps without a pause.  Returns their result."""
     while True:
         try:
             next(steps)
@@ -27,9 +28,12 @@ def run_to_end(steps: Steps[T]) -> T:
 
 
 class Work(Generic[T]):
-    """Steps that are driven on one by one, until they are done or cancelled.
+    """Steps to run one by one, until they are done or cancelled.
 
-    result: None until then, and if it was cancelled; error: that ended it.
+    Attributes:
+        done: whether they have ended.
+        result: of the steps; None until they are done, and after cancel().
+        error: the exception that ended them, None where none did.
     """
 
     def __init__(self, steps: Steps[T]) -> None:
@@ -39,18 +43,18 @@ class Work(Generic[T]):
         self.error: Exception | None = None
 
     def step(self) -> bool:
-        """One step; whether there is more to do."""
+        """Run one step.  Returns whether there is more to do."""
         if not self.done:
             try:
                 next(self._steps)
             except StopIteration as end:
                 self.result, self.done = end.value, True
-            except Exception as error:  # noqa: BLE001 - raised where the work was asked for
+            except Exception as error:  # noqa: BLE001 - raised where the result is needed
                 self.error, self.done = error, True
         return not self.done
 
     def cancel(self) -> None:
-        """No more of it; what gives itself up (ABORt) goes on to its own end."""
+        """End the steps early; steps that cancel themselves (ABORt) go on to their own end."""
         if inspect.getgeneratorstate(self._steps) != inspect.GEN_RUNNING:
             self._steps.close()
             self.done = True

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from instruments.virtual.counter.edges import TriggerInput
     from instruments.virtual.counter.run import Run
 
-#: An answer that never comes is ready then [s].
+#: When an answer is ready that never comes [s].
 NEVER = INFINITY
 #: Without a time-out a model looks ahead for this time and ten gates to find an edge [s].
 DARK = 60.0
@@ -46,8 +46,10 @@ _ABORT = re.compile(r"[\x00-\x20]*:?ABORT?[\x00-\x20]*", re.IGNORECASE)
 class Function:
     """A function of a counter.
 
-    header: as the manual prints it behind CONFigure and MEASure; inputs: how many; kind: what is measured, if not what
-    its name says.
+    Attributes:
+        header: as the manual prints it behind CONFigure and MEASure.
+        inputs: how many it uses.
+        kind: of the measurement, where that is not the name of the function.
     """
 
     header: str
@@ -57,7 +59,7 @@ class Function:
 
 @dataclass(frozen=True)
 class Count(Number):
-    """A whole number, which may stand in brackets.  endless: it may be infinite."""
+    """A whole number, which may stand in brackets.  endless: whether it may be infinite."""
 
     rounded: Callable[[float], float] = field(default=lambda value: float(round(value)), repr=False)
     endless: bool = False
@@ -76,12 +78,16 @@ class Count(Number):
 
 
 class VirtualCounter(VirtualInstrument):
-    """What both counters are: two inputs, one run at a time, and a memory for its readings.
+    """A counter: two inputs, one run at a time, and a memory for its readings.
 
-    signal, second: the voltages at the inputs 1 and 2.
+    Args:
+        clock: of the bench.
+        signal: the voltage at input 1.
+        second: the voltage at input 2.
+        identity: the answer to ``*IDN?`` of another model of the family.
     """
 
-    #: What CONFigure, MEASure and FUNCtion know, by the short name that they answer.
+    #: The functions for CONFigure, MEASure and FUNCtion, by the short name in the answer.
     functions: ClassVar[dict[str, Function]]
     numbered = (1, 2)
 
@@ -97,14 +103,14 @@ class VirtualCounter(VirtualInstrument):
         self._completion_awaited = False
         super().__init__(clock, identity=identity)
 
-    # --- what goes on between messages ---
+    # --- what happens between messages ---
 
     def is_abort(self, message: str) -> bool:
         """See the base: ABORt does."""
         return bool(_ABORT.fullmatch(message))
 
     def steps(self, message: str) -> Steps[Answer | None]:
-        """Run one message, after what has gone on until it came."""
+        """Run one message, after what has happened up to now."""
         yield from self.catch_up()
         return (yield from super().steps(message))
 
@@ -114,33 +120,33 @@ class VirtualCounter(VirtualInstrument):
         return super().status_byte(message_available=message_available)
 
     def abandon(self) -> None:
-        """ABORt, and device clear: the measurement ends, what it brought so far stays."""
+        """ABORt, and device clear: end the measurement, and keep its readings so far."""
         super().abandon()
         self._stop()
 
     def reset(self) -> None:
-        """*RST: idle, and nothing in the memory."""
+        """*RST: go idle, with an empty memory."""
         self.choose("FREQ", (1,))
         self._counted_from = 0
         super().reset()
 
     def trigger(self) -> None:
-        """*TRG: the next readings of a run that waits for it.  Raises ScpiError if none does."""
+        """*TRG: trigger the run that waits for it.  Raises ScpiError where none does."""
         if self._run is None or not self._run.waiting:
             raise ScpiError(-211)
         self.arm()
 
     def arm(self) -> None:
-        """As *TRG, where a run waits for it."""
+        """Trigger the run where one waits for it; else do nothing."""
         if self._run and self._run.waiting:
             self._run.trigger(self._ready)
 
     def catch_up(self) -> Steps[None]:
-        """See the base: a measurement under way goes on."""
+        """See the base: go on with the measurement under way."""
         now = self.clock.now()
         if self._run:
             yield from self._run.advance(now)
-        if self._completion_awaited and self.idle(now):
+        if self._completion_awaited and self.is_idle(now):
             self._completion_awaited = False
             self.status.events |= OPERATION_COMPLETE
 
@@ -150,20 +156,21 @@ class VirtualCounter(VirtualInstrument):
         self._run = None
         self._completion_awaited = False
 
-    def idle(self, now: float) -> bool:
-        """Whether nothing is being measured at this time [s]."""
+    def is_idle(self, now: float) -> bool:
+        """Whether no measurement is under way at this time [s]."""
         return self._run is None or (self._run.complete and self._memory.available(now) == self._memory.size)
 
     def available(self) -> int:
-        """Readings in the memory by now."""
+        """How many readings are in the memory by now."""
         if self._run and self._ready < NEVER:
             run_to_end(self._run.advance(self._ready))
         return self._memory.available(self._ready)
 
     def wait_for(self, count: float = math.inf) -> Steps[bool]:
-        """The answer to the message under way is ready when so many readings have been taken since INITiate.
+        """Let the answer to the message under way be ready when there are `count` readings since INITiate.
 
-        Returns whether that will be; if not, the answer never comes.
+        Returns:
+            Whether that will be; if not, the answer never comes.
         """
         if self._run is None:
             return True
@@ -176,8 +183,8 @@ class VirtualCounter(VirtualInstrument):
         return False
 
     def begin(self, run: Run) -> None:
-        """INITiate: the memory is emptied.  Raises ScpiError if a measurement is under way."""
-        if not self.idle(self._ready):
+        """INITiate: begin a run, with an empty memory.  Raises ScpiError where a measurement is under way."""
+        if not self.is_idle(self._ready):
             raise ScpiError(-213)
         self._run, self._memory, self._counted_from = run, run.memory, 0
 
@@ -196,40 +203,47 @@ class VirtualCounter(VirtualInstrument):
         )
 
     def trigger_input(self, channel: int, *, falling: bool) -> TriggerInput:
-        """How an input looks at its signal with these settings."""
+        """The trigger of an input, with the settings that it has now."""
         raise NotImplementedError
 
     def measure(self, inputs: Inputs, gate: GateTime) -> Measurement:
-        """One measurement of the function that is set."""
+        """Begin one measurement of the selected function."""
         falling = self.settings[f"slope{self._channels[0]}"] == "NEG"
         return measurement(self.kind, inputs, self._channels, gate, falling=falling)
 
     @property
     def kind(self) -> str:
-        """What is measured, as the table of measurements calls it."""
+        """The kind of measurement, as the table of measurements names it."""
         return self.functions[self._function].kind or self._function
 
     def choose(self, name: str, channels: tuple[int, ...]) -> None:
-        """Another function: it is idle, and nothing is in the memory."""
+        """Select another function: go idle, with an empty memory."""
         self._stop()
         self._memory = Memory()
         self._function, self._channels = name, channels
 
     def select_function(self, words: list[str]) -> None:
-        """FUNCtion "FREQ 1": a function and its channels; settings stay.  words: of the string.  Raises ScpiError."""
+        """FUNCtion "FREQ 1": select a function and its channels, keep the settings.
+
+        Args:
+            words: of the string.
+
+        Raises:
+            ScpiError: the counter does not have this function or channel.
+        """
         headers = ((name, "[:][SENSe[1]:]" + function.header) for name, function in self.functions.items())
         found = next((name for name, header in headers if words and header_pattern(header).fullmatch(words[0])), None)
         if found is None or not all(word in {"1", "2"} for word in words[1:]):
             raise ScpiError(-224, words[0][:20] if words else "")
         self.choose(found, tuple(map(int, words[1:])) or self._channels[:1])
-        self.changed("function")
+        self.on_change("function")
 
     def greatest_level(self, channel: int) -> float:
         """The greatest absolute trigger level [V]."""
         raise NotImplementedError
 
-    def found_level(self, channel: int) -> float:
-        """Where the trigger fires now, if it is found automatically [V]."""
+    def find_level(self, channel: int) -> float:
+        """Find the automatic level: where the trigger would fire now [V]."""
         falling = self.settings[f"slope{channel}"] == "NEG"
         entry = self.trigger_input(channel, falling=falling)
         self.busy_until(self._ready + entry.window)
@@ -238,7 +252,7 @@ class VirtualCounter(VirtualInstrument):
     # --- what the rows set and ask ---
 
     def read_boolean(self, text: str) -> bool:
-        """Any number will do: OFF is what rounds to nought (SCPI-1999, volume 1, 7.3).  Raises ScpiError."""
+        """See the base; any number is allowed, OFF where it rounds to 0 (SCPI-1999, volume 1, 7.3)."""
         return boolean(text, rounded=True)
 
     def spell_whole(self, value: float) -> str:
@@ -260,30 +274,30 @@ class VirtualCounter(VirtualInstrument):
         yield from self.wait_for()
 
     def set_level(self, channel: int, parameters: list[str]) -> None:
-        """An absolute trigger level; setting it fixes it.  Raises ScpiError."""
+        """Set an absolute trigger level, and turn the automatic level off.  Raises ScpiError."""
         text, reach = parameter(parameters), self.greatest_level(channel)
         self.settings[f"level{channel}"] = number(text, low=-reach, high=reach, default=0.0, unit="V")
         self.settings[f"automatic{channel}"] = False
-        self.changed(f"level{channel}")
+        self.on_change(f"level{channel}")
 
     def level(self, channel: int, parameters: list[str]) -> str:
-        """The trigger level as it is set, or as it is found now.  Raises ScpiError."""
+        """Answer with the trigger level: the one set, or the automatic one.  Raises ScpiError."""
         if asked := optional_parameter(parameters):
             reach = self.greatest_level(channel)
             return self.spell(limit(asked, low=-reach, high=reach, default=0.0))
         automatic = self.settings[f"automatic{channel}"]
-        return self.spell(self.found_level(channel) if automatic else self.value(f"level{channel}"))
+        return self.spell(self.find_level(channel) if automatic else self.value(f"level{channel}"))
 
     def set_automatic(self, channel: int, parameters: list[str]) -> None:
-        """The automatic level: ON, OFF, or ONCE, which finds it and then leaves it.  Raises ScpiError."""
+        """Set the automatic level ON, OFF, or ONCE, which finds it and then keeps it.  Raises ScpiError."""
         name, text = f"automatic{channel}", parameter(parameters)
         if text.upper() == "ONCE":
             self.settings[name] = True
-            self.settings[f"level{channel}"] = self.found_level(channel)
+            self.settings[f"level{channel}"] = self.find_level(channel)
             self.settings[name] = False
         else:
             self.settings[name] = self.read_boolean(text)
-        self.changed(name)
+        self.on_change(name)
 
     def automatic(self, channel: int) -> str:
         """Whether the level is found automatically."""
@@ -295,6 +309,6 @@ class VirtualCounter(VirtualInstrument):
         return f'"{self._function} {where}"'
 
     def statistics(self) -> dict[str, float]:
-        """Of the readings since INITiate, or since they were cleared; "not a number" while that is off."""
+        """The statistics of the readings since INITiate or since the last clear; "not a number" while they are off."""
         values, _ = self._memory.slice(self._counted_from, self.available())
         return statistics(values if self.settings["averaging"] else np.empty(0))

@@ -1,8 +1,8 @@
-"""Edges of a sampled voltage: where a Schmitt trigger fires, looked for piece by piece.
+"""Edges of a sampled voltage: a search, piece by piece, for the places where a Schmitt trigger fires.
 
-A signal may be looked at for hours: only a piece of it is in memory at a time.  One may have a method `crossings`
-beside, which gives the times at which a trigger fires: (start [s], stop [s], thresholds) → shape (m,) [s], or None if
-only the voltage shows them.
+A search may go through hours of a signal, of which only a piece is in memory at a time.  A signal may have a method
+`crossings`, (start [s], stop [s], thresholds) → shape (m,) [s]: the times at which a trigger fires, or None where only
+the voltage shows them.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from instruments.virtual.core.trigger import fires
+from instruments.virtual.core.trigger import find_firings
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,15 +23,15 @@ if TYPE_CHECKING:
 #: Samples per second with which the models look at the light.  A pulse of 3 % of a turn at 60 Hz lasts
 #: 0.5 ms: ten samples; the crossing is interpolated between two of them.
 RATE = 20_000.0
-#: Samples at a look: a megabyte each for the voltage and for whatever the world needs to make it.
+#: Samples in one piece: a megabyte each for the voltage and for what the world needs to make it.
 _SHORTEST, _LONGEST = 1 << 10, 1 << 17
-#: What the mean is taken over that a.c. coupling removes, and how long a level that was found is good for [s].
+#: The time over which a.c. coupling takes the mean, and how long an automatic level stays valid [s].
 _SETTLING, _LEVEL_AGE = 1.0, 1.0
 
 
 @dataclass(frozen=True)
 class Thresholds:
-    """A Schmitt trigger: it fires at one voltage and is armed beyond another one [V].
+    """A Schmitt trigger: it fires at one voltage and arms beyond another one [V].
 
     sign: 1 for rising edges, −1 for falling ones.
     """
@@ -43,11 +43,16 @@ class Thresholds:
 
 @dataclass(frozen=True)
 class TriggerInput:
-    """How an input looks at its signal.
+    """The settings of an input: how its trigger sees the signal.
 
-    level: fixed [V], or None to find it; upper, lower: where the trigger fires and is armed, in parts of peak to
-    peak, when it is found; both the same: then the hysteresis [V] lies below.  window: how long the signal is
-    looked at for that [s]; alternating: the mean is taken away (a.c. coupling); falling: the slope.
+    Attributes:
+        level: fixed [V], or None for the automatic level.
+        hysteresis: between firing and arming [V], for a fixed level, or where upper and lower are equal.
+        window: how long the automatic level looks at the signal [s].
+        upper: where an automatic trigger fires, in parts of peak to peak.
+        lower: where it arms.
+        alternating: whether the input is a.c. coupled, so that the mean counts as 0 V.
+        falling: whether the trigger fires on falling edges.
     """
 
     level: float | None
@@ -64,10 +69,10 @@ class TriggerInput:
         return self.level is None or self.alternating
 
     def thresholds(self, signal: Signal, instant: float) -> Thresholds:
-        """The trigger's voltages as the signal lets choose them at this time [s].
+        """The trigger's voltages for the signal at this time [s].
 
-        A found level is right if the window holds at least a period of the signal.  A pulse of a slower one may
-        fall outside: the level then stands in the dark noise.
+        An automatic level is right where the window holds at least a period of the signal.  The pulse of a slower
+        signal may fall outside the window; then the level lies in the noise of the dark.
         """
         sign = -1.0 if self.falling else 1.0
         if self.level is None:
@@ -86,14 +91,14 @@ class TriggerInput:
 
 @dataclass(frozen=True)
 class Edge:
-    """count: edges of the signal before this one, from where the look began; time [s]."""
+    """An edge.  count: edges before it since the search began; time [s]."""
 
     count: int
     time: float
 
 
 class EdgeFinder:
-    """The edges of one input from some time on.  They are asked for in order; those passed are forgotten."""
+    """Finds the edges of one input from a time on.  Questions must come in order of time: earlier edges are dropped."""
 
     def __init__(self, signal: Signal, entry: TriggerInput, start: float) -> None:
         self._signal, self._entry, self._start = signal, entry, start
@@ -108,28 +113,29 @@ class EdgeFinder:
 
     @property
     def reached(self) -> float:
-        """Up to here every edge is known [s]."""
+        """The time up to which all edges are known [s]."""
         return self._start + (self._samples - 1) / RATE
 
     def find(self, instant: float) -> Edge | None:
-        """The first edge at this time or later, if it is known."""
+        """The first known edge at this time or later, None where there is none."""
         count = int(np.searchsorted(self._times, instant))
         self._times, self._passed = self._times[count:], self._passed + count
         return Edge(self._passed, float(self._times[0])) if self._times.size else None
 
     def count_before(self, instant: float) -> int:
-        """How many of the edges that are known lie before this time."""
+        """How many known edges lie before this time [s]."""
         return self._passed + int(np.searchsorted(self._times, instant))
 
     def refresh(self, instant: float) -> None:
-        """A measurement begins: a level that follows the signal is found anew, if it is old."""
+        """Find a level that follows the signal anew, where it is too old, at the beginning of a measurement [s]."""
         if self._entry.ages and instant > self._found_at + _LEVEL_AGE:
             self._triggers, self._found_at = self._entry.thresholds(self._signal, instant), instant
 
     def look(self, wanted: float, until: float) -> bool:
-        """Look on at the signal: as far as wanted, or a little further, but not beyond until.
+        """Search the next piece of the signal: up to `wanted` or a little further, but not beyond `until` [s].
 
-        Returns False if there was nothing left to look at.
+        Returns:
+            Whether there was anything left to search.
         """
         wish = math.ceil((wanted - self._start) * RATE) + 1 - self._samples
         left = math.floor((until - self._start) * RATE) + 1 - self._samples
@@ -139,14 +145,14 @@ class EdgeFinder:
         times = self._crossings(count)
         if times is None:
             times = self._crossings_seen(count)
-        # darkness is looked through in ever longer pieces
+        # the search goes through the dark in ever longer pieces
         self._stride = _SHORTEST if times.size else min(2 * self._stride, _LONGEST)
         self._times = np.concatenate((self._times, times))
         self._samples += count
         return True
 
     def _crossings(self, count: int) -> Array | None:
-        """What a signal itself says of its edges in so many samples, None if it cannot."""
+        """The edges in the next `count` samples as the signal itself gives them, None where it cannot."""
         if self._ask is None:
             return None
         begin = self._start + max(self._samples - 1, 0) / RATE
@@ -156,11 +162,13 @@ class EdgeFinder:
         return times
 
     def _crossings_seen(self, count: int) -> Array:
-        """The edges in so many samples of the voltage."""
+        """The edges in the next `count` samples of the voltage."""
         voltage = self._signal(self._start + self._samples / RATE, 1 / RATE, count)
         joined = self._triggers.sign * np.concatenate((self._last, voltage))
         sign = self._triggers.sign
-        places, self._armed = fires(joined, sign * self._triggers.fire, sign * self._triggers.arm, armed=self._armed)
+        places, self._armed = find_firings(
+            joined, sign * self._triggers.fire, sign * self._triggers.arm, armed=self._armed
+        )
         times = self._start + (self._samples - self._last.size + places) / RATE
         self._last = voltage[-1:]
         return times

@@ -47,7 +47,7 @@ _MEASURING: tuple[Row, ...] = (
         Own("CONFigure" + header, lambda d, p, f=name: d.configure(f, p), lambda d: d.configuration())
         for name, header in _HEADERS.items()
     ),
-    *(Both("MEASure" + header, tell=lambda d, p, f=name: d.measure_once(f, p)) for name, header in _HEADERS.items()),
+    *(Both("MEASure" + header, answer=lambda d, p, f=name: d.measure_once(f, p)) for name, header in _HEADERS.items()),
     Ask("CONFigure", lambda d: d.configuration()),
     Own("[SENSe[1]:]FUNCtion[:ON]", lambda d, p: d.set_function(p), lambda d: d.function()),
     Do("INITiate[:IMMediate]", lambda d: d.initiate()),
@@ -90,8 +90,8 @@ _TRIGGERING: tuple[Row, ...] = (
     Number("TRIGger:DELay", "trigger_delay", 0.0, (0, 3600), "S"),
 )
 _MEMORY: tuple[Row, ...] = (
-    Both("R", tell=lambda d, p: d.remove_what_is_there(p)),
-    Both("DATA:REMove", tell=lambda d, p: d.remove(p)),
+    Both("R", answer=lambda d, p: d.remove_available(p)),
+    Both("DATA:REMove", answer=lambda d, p: d.remove(p)),
     Ask("DATA:POINts", lambda d: f"{d.points():+d}"),
     Ask("DATA:LAST", lambda d: d.last()),
     Own("FORMat[:DATA]", lambda d, p: d.set_format(p), lambda d: d.format(), keeps=("format", "ASC")),
@@ -221,10 +221,10 @@ class Virtual53230A(VirtualCounter):
                 measure=measure,
                 samples=self.value("samples"),
                 triggers=triggers,
-                dead=0.0 if gapless else _DEAD,
+                dead_time=0.0 if gapless else _DEAD,
                 delay=self.value("trigger_delay"),
-                least=gate if gated else 0.0,
-                quiet=timeout if timeout < INFINITY else 10 * gate + DARK,
+                shortest=gate if gated else 0.0,
+                patience=timeout if timeout < INFINITY else 10 * gate + DARK,
                 immediate=self.settings["trigger_source"] == "IMM",
             )
         )
@@ -239,13 +239,13 @@ class Virtual53230A(VirtualCounter):
 
     def operation(self) -> str:
         """STATus:OPERation:CONDition?, bit 4: measuring; bit 5: waiting for a trigger."""
-        if self.idle(self._ready):
+        if self.is_idle(self._ready):
             return "+0"
         return "+32" if self._run and self._run.waiting else "+16"
 
     def questionable(self) -> str:
         """STATus:QUEStionable?, bit 14: readings were lost."""
-        return f"{16384 * self._memory.lost:+d}"
+        return f"{16384 * self._memory.overflowed:+d}"
 
     def set_timeout(self, parameters: list[str]) -> None:
         """SYSTem:TIMeout: up to 2000 s, or infinite.  Raises ScpiError."""
@@ -304,17 +304,17 @@ class Virtual53230A(VirtualCounter):
             raise ScpiError(-230)
         if not (yield from self.wait_for()):
             return ""
-        values, _ = self._memory.slice(self._memory.fetched, self._memory.size)
+        values, _ = self._memory.slice(self._memory.n_fetched, self._memory.size)
         return self._spell(values, head="#0")
 
-    def remove_what_is_there(self, parameters: list[str]) -> str:
+    def remove_available(self, parameters: list[str]) -> str:
         """R? [n]: at most n of the readings that are there, as a block, taken out of the memory."""
         text = optional_parameter(parameters)
         most = number(text, low=1, high=1e6, default=1e6) if text else math.inf
         there = self.available()
-        if there == self._memory.fetched and self.idle(self._ready):
+        if there == self._memory.n_fetched and self.is_idle(self._ready):
             raise ScpiError(-230)
-        return self._take(int(min(most, there - self._memory.fetched)), as_block=True)
+        return self._take(int(min(most, there - self._memory.n_fetched)), as_block=True)
 
     def remove(self, parameters: list[str]) -> Steps[str]:
         """DATA:REMove? n[,WAIT]: n readings, taken out of the memory, waited for if they are still to come."""
@@ -325,9 +325,9 @@ class Virtual53230A(VirtualCounter):
             raise ScpiError(-224)
         count = int(number(words[0], low=1, high=1e6, default=1))
         there = self.available()
-        if there - self._memory.fetched < count:
-            gone = self._run.taken - self._memory.size if self._run else 0
-            wanted = gone + self._memory.fetched + count
+        if there - self._memory.n_fetched < count:
+            gone = self._run.n_taken - self._memory.size if self._run else 0
+            wanted = gone + self._memory.n_fetched + count
             if len(words) == 1 or self._run is None or wanted > self._run.wanted:
                 raise ScpiError(-230)
             if not (yield from self.wait_for(wanted)):
@@ -335,8 +335,8 @@ class Virtual53230A(VirtualCounter):
         return self._take(count, as_block=False)
 
     def _take(self, count: int, *, as_block: bool) -> str:
-        start = self._memory.fetched
-        self._memory.fetched += count
+        start = self._memory.n_fetched
+        self._memory.n_fetched += count
         values, _ = self._memory.slice(start, start + count)
         if as_block and self.settings["format"] == "ASC":
             return block_text(",".join(map(self.spell, values)).encode())
@@ -344,7 +344,7 @@ class Virtual53230A(VirtualCounter):
 
     def points(self) -> int:
         """DATA:POINts?: readings that are there and have not been removed."""
-        return self.available() - self._memory.fetched
+        return self.available() - self._memory.n_fetched
 
     def last(self) -> str:
         """DATA:LAST?: the latest reading."""

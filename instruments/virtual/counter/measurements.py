@@ -1,6 +1,7 @@
-"""What the virtual counters measure: from edges to a frequency, a period, an interval, a duty cycle, a total.
+"""The measurements of the virtual counters: from edges to a frequency, a period, an interval, a duty cycle, a total.
 
-A measurement takes its time, and is a generator: it asks for edges, and waits where it may not look any further.
+A measurement is a Python generator: it yields the input and the time up to which it needs edges, and goes on when the
+run has looked that far.
 """
 
 from __future__ import annotations
@@ -19,27 +20,27 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Reading:
-    """A result, when its measurement began (its time stamp), and when it was in memory [s]."""
+    """A result, its time stamp, which is the beginning of the measurement, and when it is in the memory [s]."""
 
     value: float
     stamp: float
     done: float
 
 
-#: A measurement asks: let me look at this input at least up to this time [s].
+#: What a measurement yields: the input whose edges it needs, at least up to this time [s].
 Wanted = tuple[EdgeFinder, float]
 Measurement = Generator[Wanted, None, Reading]
 
 
 @dataclass
 class Inputs:
-    """The edges of the inputs, for one run.  inputs: signal and setting by channel."""
+    """The edges of the inputs, for one run.  inputs: by channel, signal and settings for its slope and the other."""
 
     inputs: dict[int, tuple[Signal, TriggerInput, TriggerInput]]
     _finders: dict[tuple[int, bool], EdgeFinder] = field(default_factory=dict)
 
     def finder(self, channel: int, instant: float, *, other_slope: bool = False) -> EdgeFinder:
-        """The edges of a channel with its own slope or the other one, known from this time on."""
+        """The edge finder of a channel, for its own slope or the other one; a new one begins at this time [s]."""
         key = channel, other_slope
         if key not in self._finders:
             signal, own, other = self.inputs[channel]
@@ -47,12 +48,12 @@ class Inputs:
         return self._finders[key]
 
     def forget(self) -> None:
-        """Begin anew, wherever it is asked for next."""
+        """Drop all edge finders, so that the next ones begin anew."""
         self._finders.clear()
 
 
 def first_edge(finder: EdgeFinder, instant: float, before: float) -> Generator[Wanted, None, Edge | None]:
-    """The first edge at this time or later; None if there is none before the deadline."""
+    """Wait for the first edge at this time or later; None where there is none before the deadline."""
     while (edge := finder.find(instant)) is None:
         if finder.reached >= before:
             return None
@@ -62,28 +63,28 @@ def first_edge(finder: EdgeFinder, instant: float, before: float) -> Generator[W
 
 @dataclass(frozen=True)
 class GateTime:
-    """One measurement's time: when it begins, how long its gate is, and when it is given up (all s)."""
+    """The times of one measurement: when it begins, how long its gate is, and its deadline (all s)."""
 
     begin: float
     length: float
     deadline: float
 
-    def given_up(self) -> Reading:
-        """No result."""
+    def without_result(self) -> Reading:
+        """The reading of a measurement without a result."""
         return Reading(NOT_A_NUMBER, self.begin, self.deadline)
 
 
 def frequency(inputs: Inputs, channel: int, gate: GateTime) -> Measurement:
-    """Whole periods between the first edge and the first one after the gate, over their time [Hz]."""
+    """Count the periods from the first edge to the first one after the gate, and divide by their time [Hz]."""
     finder = inputs.finder(channel, gate.begin)
     finder.refresh(gate.begin)
     opened = yield from first_edge(finder, gate.begin, gate.deadline)
     if opened is None:
-        return gate.given_up()
+        return gate.without_result()
     due = max(opened.time + gate.length, math.nextafter(opened.time, math.inf))
     closed = yield from first_edge(finder, due, gate.deadline)
     if closed is None:
-        return gate.given_up()
+        return gate.without_result()
     return Reading((closed.count - opened.count) / (closed.time - opened.time), opened.time, closed.time)
 
 
@@ -99,9 +100,14 @@ def single_period(inputs: Inputs, channel: int, gate: GateTime) -> Measurement:
 
 
 def interval(inputs: Inputs, start: int, stop: int, gate: GateTime, *, slopes: tuple[bool, bool]) -> Measurement:
-    """From an edge of one input to the next of another, or of the same one [s].
+    """The time from an edge of one input to the next edge of another, or of the same one [s].
 
-    slopes: for each whether it is the slope that is not set.
+    Args:
+        inputs: of the run.
+        start: channel of the first edge.
+        stop: channel of the second.
+        gate: when to begin, and the deadline.
+        slopes: for each edge, whether it has the other slope than the one set.
     """
     finders = [
         inputs.finder(channel, gate.begin, other_slope=other)
@@ -111,26 +117,26 @@ def interval(inputs: Inputs, start: int, stop: int, gate: GateTime, *, slopes: t
         finder.refresh(gate.begin)
     opened = yield from first_edge(finders[0], gate.begin, gate.deadline)
     if opened is None:
-        return gate.given_up()
+        return gate.without_result()
     closed = yield from first_edge(finders[1], math.nextafter(opened.time, math.inf), gate.deadline)
     if closed is None:
-        return gate.given_up()
+        return gate.without_result()
     return Reading(closed.time - opened.time, opened.time, closed.time)
 
 
 def duty(inputs: Inputs, channel: int, gate: GateTime, *, slopes: tuple[bool, bool]) -> Measurement:
-    """The part of a period that lies between an edge of one slope and the next of the other one."""
+    """The duty cycle: the part of a period between an edge of one slope and the next edge of the other."""
     width = yield from interval(inputs, channel, channel, gate, slopes=slopes)
     if width.value == NOT_A_NUMBER:
         return width
     again = yield from first_edge(inputs.finder(channel, gate.begin, other_slope=slopes[0]), width.done, gate.deadline)
     if again is None:
-        return gate.given_up()
+        return gate.without_result()
     return Reading(width.value / (again.time - width.stamp), width.stamp, again.time)
 
 
 def total(inputs: Inputs, channel: int, gate: GateTime) -> Measurement:
-    """Edges while the gate is open."""
+    """Count the edges while the gate is open."""
     finder = inputs.finder(channel, gate.begin)
     finder.refresh(gate.begin)
     finder.find(gate.begin)
@@ -140,7 +146,7 @@ def total(inputs: Inputs, channel: int, gate: GateTime) -> Measurement:
     return Reading(float(finder.count_before(end) - before), gate.begin, end)
 
 
-#: By function: inputs, channels, gate, and whether falling edges are the ones that are set.
+#: By function; the arguments are inputs, channels, gate, and whether the first channel counts falling edges.
 _FUNCTIONS: dict[str, Callable[[Inputs, tuple[int, ...], GateTime, bool], Measurement]] = {
     "FREQ": lambda inputs, channels, gate, _: frequency(inputs, channels[0], gate),
     "PER": lambda inputs, channels, gate, _: period(inputs, channels[0], gate),
@@ -161,5 +167,5 @@ _FUNCTIONS: dict[str, Callable[[Inputs, tuple[int, ...], GateTime, bool], Measur
 def measurement(
     function: str, inputs: Inputs, channels: tuple[int, ...], gate: GateTime, *, falling: bool
 ) -> Measurement:
-    """One measurement of this function.  falling: whether the first channel is set to falling edges."""
+    """Begin one measurement of this function.  falling: whether the first channel counts falling edges."""
     return _FUNCTIONS[function](inputs, channels, gate, falling)

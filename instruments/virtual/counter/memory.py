@@ -14,64 +14,69 @@ if TYPE_CHECKING:
     from instruments.virtual.core.signal import Array
     from instruments.virtual.counter.measurements import Reading
 
-#: Readings that are kept; then the oldest is lost (53220A/53230A User's Guide: 1 000 000).
+#: How many readings the memory keeps; then it drops the oldest (53220A/53230A User's Guide: 1 000 000).
 CAPACITY = 1_000_000
 
 
 class Memory:
-    """Readings in the order in which they came; the oldest are lost when there are too many."""
+    """Readings in the order in which they came; a full memory drops the oldest.
+
+    Attributes:
+        overflowed: whether it has dropped any.
+        n_fetched: how many of those it holds were fetched.
+    """
 
     def __init__(self) -> None:
-        self.lost = False
-        self.fetched = 0
+        self.overflowed = False
+        self.n_fetched = 0
         self._values, self._stamps, self._done = array("d"), array("d"), array("d")
 
     def add(self, reading: Reading) -> None:
-        """One more."""
+        """Append a reading."""
         for column, number in zip(self._columns, (reading.value, reading.stamp, reading.done), strict=True):
             column.append(number)
         if len(self._done) >= CAPACITY + CAPACITY // 8:
             self.drop_oldest(len(self._done) - CAPACITY)
-            self.lost = True
+            self.overflowed = True
 
     @property
     def _columns(self) -> tuple[array[float], array[float], array[float]]:
         return self._values, self._stamps, self._done
 
     def drop_oldest(self, count: int) -> None:
-        """Take the oldest away."""
+        """Drop the `count` oldest readings."""
         for column in self._columns:
             del column[:count]
-        self.fetched = max(0, self.fetched - count)
+        self.n_fetched = max(0, self.n_fetched - count)
 
     def available(self, now: float) -> int:
-        """How many there are by this time [s]."""
+        """How many readings there are by this time [s]."""
         return int(np.searchsorted(np.frombuffer(self._done), now, "right")) if self._done else 0
 
     def truncate(self, now: float) -> None:
-        """What would have come later does not come."""
+        """Drop the readings that would come after this time [s]."""
         keep = self.available(now)
         for column in self._columns:
             del column[keep:]
 
     @property
     def size(self) -> int:
-        """How many there are, those included that come later."""
+        """How many readings there are, with those whose time is still to come."""
         return len(self._done)
 
     def done(self, back: int) -> float:
-        """When the last reading was there, or the one so many before it [s]; long ago if it is lost."""
+        """When the last reading was complete, or the one `back` before it [s]; −∞ where that one is dropped."""
         return self._done[-1 - back] if back < len(self._done) else -math.inf
 
     def slice(self, start: int, stop: int) -> tuple[Array, Array]:
-        """Values and time stamps of some of them."""
+        """Values and time stamps of the readings from start to stop."""
         return np.array(self._values[start:stop]), np.array(self._stamps[start:stop])
 
 
 def statistics(values: Array) -> dict[str, float]:
-    """Mean, standard deviation, extremes and Allan deviation of what was measured.
+    """Mean, standard deviation, extremes and Allan deviation of readings.
 
-    Without a reading everything is "not a number", as the instruments say it; one reading has no deviation.
+    Without a reading each is the instruments' "not a number"; of one reading the deviations are 0.
 
     >>> statistics(np.array([1.0, 3.0]))["sdev"]
     1.4142135623730951

@@ -1,4 +1,4 @@
-"""What the commands of the virtual counters are given and answer: channel lists, numbers in brackets."""
+"""Parameters of the virtual counters' commands: channel lists, numbers in brackets."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import re
 
 from instruments.virtual.core.parser import ScpiError
 
-# blanks are matched in one place only: \s* before a set that holds them takes a time proportional to their square
+# blanks match in one place only: \s* before a set that has them, too, takes a time that grows with their square
 _CHANNELS = re.compile(r"\(@([\d,\s]+)\)")
 _BRACKETED = re.compile(r"\(([^@()]*)\)")
 
 
 def channels_of(parameters: list[str]) -> tuple[int, ...]:
-    """The channels in channel lists, in their order.  Raises ScpiError for one that is not there.
+    """The channels in channel lists, in their order.  Raises ScpiError for one that the counter does not have.
 
     >>> channels_of(["10", "(@2)", "(@1)"])
     (2, 1)
@@ -25,7 +25,7 @@ def channels_of(parameters: list[str]) -> tuple[int, ...]:
 
 
 def without_channels(parameters: list[str]) -> list[str]:
-    """The other parameters; a number may stand in brackets, as the CNT-91's handbook prints it.
+    """The parameters without channel lists; a number may stand in brackets, as in the CNT-91's handbook.
 
     >>> without_channels(["(100)", "(@1)"])
     ['100']

@@ -70,7 +70,7 @@ _WAYS = tuple(
 _MEASURING: tuple[Row, ...] = (
     *(Both("CONFigure" + way, lambda d, p, f=name, a=array: d.configure(f, p, array=a)) for way, name, array in _WAYS),
     *(
-        Both("MEASure" + way, tell=lambda d, p, f=name, a=array: d.measure_once(f, p, array=a))
+        Both("MEASure" + way, answer=lambda d, p, f=name, a=array: d.measure_once(f, p, array=a))
         for way, name, array in _WAYS
     ),
     Ask("CONFigure", lambda d: d.configuration()),
@@ -84,9 +84,9 @@ _MEASURING: tuple[Row, ...] = (
 )
 _FETCHING: tuple[Row, ...] = (
     Ask("FETCh[:SCALar]", lambda d: d.fetch(1)),
-    Both("FETCh:ARRay", tell=lambda d, p: d.fetch_array(p)),
+    Both("FETCh:ARRay", answer=lambda d, p: d.fetch_array(p)),
     Ask("READ[:SCALar]", lambda d: d.read()),
-    Both("READ:ARRay", tell=lambda d, p: d.read_array(p)),
+    Both("READ:ARRay", answer=lambda d, p: d.read_array(p)),
     Ask("CALCulate:DATA", lambda d: d.fetch(-1)),
 )
 _INPUT: tuple[Row, ...] = (
@@ -185,7 +185,7 @@ class VirtualCNT91(VirtualCounter):
         if self.settings["continuous"]:
             self.initiate(endless=True)
 
-    def changed(self, name: str) -> None:
+    def on_change(self, name: str) -> None:
         """A free-running counter begins anew with the new setting."""
         if name == "continuous" and not self.settings[name]:
             self._stop()
@@ -263,10 +263,10 @@ class VirtualCNT91(VirtualCounter):
                 inputs=self.inputs(),
                 measure=measure,
                 samples=math.inf if endless else self._wanted(),
-                dead=dead,
+                dead_time=dead,
                 delay=self.value("arming_delay"),
-                least=aperture if self.kind in {"FREQ", "PER"} else 0.0,
-                quiet=timeout if timeout < math.inf else 10 * aperture + DARK,
+                shortest=aperture if self.kind in {"FREQ", "PER"} else 0.0,
+                patience=timeout if timeout < math.inf else 10 * aperture + DARK,
                 immediate=arming not in {"BUS", "EXT4"} and self.settings["bus_arming"] == "IMM",
             )
         )
@@ -279,7 +279,7 @@ class VirtualCNT91(VirtualCounter):
 
     def operation(self) -> str:
         """STATus:OPERation:CONDition?, bit 4: measuring."""
-        return "0" if self.idle(self._ready) else "16"
+        return "0" if self.is_idle(self._ready) else "16"
 
     # --- how numbers are printed ---
 
@@ -358,11 +358,11 @@ class VirtualCNT91(VirtualCounter):
         if math.isfinite(count):
             return (yield from self.fetch(int(count)))
         there = self.available()
-        fresh = there - self._memory.fetched
-        if not fresh and not self.idle(self._ready):
+        fresh = there - self._memory.n_fetched
+        if not fresh and not self.is_idle(self._ready):
             raise ScpiError(-230)
         if not fresh:  # all were fetched: it begins again with the first one
-            self._memory.fetched, fresh = 0, there
+            self._memory.n_fetched, fresh = 0, there
         return (yield from self.fetch(int(min(fresh, self.value("most"))), size_known=False))
 
     def fetch(self, count: int, *, size_known: bool = True) -> Steps[str]:
@@ -377,17 +377,17 @@ class VirtualCNT91(VirtualCounter):
                 return ""
             there = self.available()
             return self._spell(*self._memory.slice(there + count, there))
-        if self._memory.fetched >= self._memory.size and self.idle(self._ready):
-            self._memory.fetched = 0
-        start = self._memory.fetched
+        if self._memory.n_fetched >= self._memory.size and self.is_idle(self._ready):
+            self._memory.n_fetched = 0
+        start = self._memory.n_fetched
         if not (yield from self._wait_until(start + count)):
             return ""
-        self._memory.fetched = start + count
+        self._memory.n_fetched = start + count
         return self._spell(*self._memory.slice(start, start + count), size_known=size_known)
 
     def _wait_until(self, held: int) -> Steps[bool]:
         """Wait until the memory holds so many.  Raises ScpiError if it never will."""
-        gone = self._run.taken - self._memory.size if self._run else 0
+        gone = self._run.n_taken - self._memory.size if self._run else 0
         if held > self._memory.size and (self._run is None or gone + held > self._run.wanted):
             raise ScpiError(-230)
         return (yield from self.wait_for(gone + held))

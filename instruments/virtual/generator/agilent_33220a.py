@@ -97,7 +97,7 @@ class Virtual33220A(VirtualGenerator):
         if plain_name(parameters[0]) != "VOLATILE":
             raise ScpiError(-224, parameters[0][:20])
         self.store(n, "VOLATILE", parameters[1:], full_scale=full_scale)
-        self.changed(f"{n}:arb")
+        self.on_change(f"{n}:arb")
 
     def catalogue(self, n: int) -> str:
         """DATA:CATalog?: what is held, then what is built in."""

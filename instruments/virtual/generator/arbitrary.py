@@ -27,7 +27,7 @@ _NAME = re.compile(r"[A-Z0-9_.\-:\\/]{1,255}")
 
 
 class DeviceError(ScpiError):
-    """An error that only this kind of instrument knows: its number and its text."""
+    """An error that only generators have, by its number and its text."""
 
     def __init__(self, number: int, text: str) -> None:
         self.number, self.entry = number, f'{number:+d},"{text}"'
@@ -102,18 +102,23 @@ def _from_block(text: str, kind: str) -> Samples:
 
 @dataclass
 class Memory:
-    """Waveforms by name, and how many samples there is room for."""
+    """The memory for waveforms.
+
+    Attributes:
+        room: for so many samples in all.
+        held: the waveforms, by name.
+    """
 
     room: int
     held: dict[str, Samples] = field(default_factory=dict)
 
     @property
     def free(self) -> int:
-        """Samples for which there is room left."""
+        """How many more samples the memory can hold."""
         return self.room - sum(values.size for values in self.held.values())
 
     def names(self) -> str:
-        """The catalogue as it is answered.
+        """The catalogue, as the answer has it.
 
         >>> Memory(1000, {"A": np.zeros(8), "B": np.zeros(8)}).names()
         '"A","B"'
@@ -122,7 +127,7 @@ class Memory:
 
 
 def attribute(values: Samples, which: str) -> float:
-    """What ``DATA:ATTRibute`` tells of a waveform: AVERage, CFACtor, POINts or PTPeak.
+    """The property of a waveform that ``DATA:ATTRibute`` answers: AVERage, CFACtor, POINts or PTPeak.
 
     >>> attribute(np.array([-1.0, 1.0]), "CFAC")
     1.0

@@ -2,8 +2,8 @@
 
 Sources: Agilent/Keysight 33500 Series Operating and Service Guide (limits, couplings); Agilent 33220A User's Guide;
 the state after ``*RST`` as a public driver of the family lists it.  The real instrument does not refuse a number
-beyond its limits: it takes the limit and says so, −222 "value clipped to upper limit" (seen by the device tests of
-a public driver).  When a setting makes another one impossible the other one gives way, with −221.
+beyond its limits: it takes the limit and queues error −222, "value clipped to upper limit" (seen by the device tests
+of a public driver).  When a setting makes another one impossible, it changes the other one and queues error −221.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _WORDS = {"MIN", "MINIMUM", "MAX", "MAXIMUM", "DEF", "DEFAULT"}
 
 
 def quantity_of(text: str, units: tuple[str, ...]) -> tuple[float, str]:
-    """A number of any size and which of the units it was sent with.  Raises ScpiError.
+    """Read a number of any size and the unit, one of these, that it has.  Raises ScpiError.
 
     >>> quantity_of("2 mVrms", ("", "VPP", "VRMS"))
     (0.002, 'VRMS')
@@ -48,7 +48,12 @@ def quantity_of(text: str, units: tuple[str, ...]) -> tuple[float, str]:
 
 @dataclass(frozen=True)
 class Burst:
-    """So many cycles at each trigger.  cycles: inf for no end; period: between immediate triggers [s], else None."""
+    """A burst of cycles at each trigger.
+
+    Attributes:
+        cycles: how many; inf for no end.
+        period: between immediate triggers [s], None for other triggers.
+    """
 
     cycles: float
     period: float | None
@@ -56,15 +61,22 @@ class Burst:
 
 @dataclass(frozen=True)
 class Output:
-    """What stands at the open terminals from some time on.
+    """The signal at the open terminals from a time on.
 
-    waveform: short form; frequency [Hz]; amplitude: half of peak to peak [V], 0 when off; offset [V]; phase [°], of
-    bursts that at which they start;
-    duty: part of a period that a SQU or PULS is high; symmetry: part of a period that a RAMP rises; inverted: by
-    OUTPut:POLarity; burst: None when it runs on; samples: of an arbitrary waveform, −1 to 1, shape (n,).
+    The load is a coil that takes almost no current: where ``OUTPut:LOAD`` is 50 Ω, the voltage is twice that on the
+    display, as on the bench.
 
-    The voltage is that of a coil that takes no current worth the name: where ``OUTPut:LOAD`` is 50 Ω it is twice
-    what the display says, as on the bench.
+    Attributes:
+        waveform: in its short form.
+        frequency: of the waveform [Hz].
+        amplitude: half of peak to peak [V]; 0 when the output is off.
+        offset: mean voltage [V].
+        phase: at the start [°]; of bursts, at the start of each.
+        duty: part of a period in which a SQU or PULS is high.
+        symmetry: part of a period in which a RAMP rises.
+        inverted: by OUTPut:POLarity.
+        burst: None where the waveform runs on.
+        samples: of an arbitrary waveform, −1 to 1, shape (n,).
     """
 
     waveform: str
@@ -79,15 +91,19 @@ class Output:
     samples: NDArray[np.float64] | None = field(default=None, compare=False, repr=False)
 
     def times(self, factor: float) -> Output:
-        """The same in another unit: what it makes of something, where it makes so much per volt."""
+        """The output in another unit, of a quantity that is `factor` per volt."""
         return replace(self, amplitude=factor * self.amplitude, offset=factor * self.offset)
 
 
 class Channel:
     """One output.
 
-    settings: of the whole instrument, this channel's under their names with a prefix; report: puts an entry into
-    the error queue; now: the time [s].
+    Args:
+        family: of the instrument.
+        settings: of the whole instrument; those of this channel have a prefix to their names.
+        index: the number of the channel.
+        report: puts an entry into the error queue.
+        now: returns the time [s].
     """
 
     def __init__(
@@ -105,7 +121,7 @@ class Channel:
         self.memory = Memory(family.room)
         self.library = {name: values for name, values in built_in().items() if name in family.library}
         self._now = now
-        #: From when to when a triggered burst or sweep lasts [s].
+        #: Begin and end of the last triggered burst or sweep [s].
         self.under_way = (-math.inf, -math.inf)
 
     def __getitem__(self, name: str) -> Value:
@@ -123,7 +139,7 @@ class Channel:
         return bool(self._settings.get(self.prefix + mode))
 
     def conflict(self, text: str) -> None:
-        """Another setting had to give way; the command goes on."""
+        """Queue error −221: another setting had to change; the command goes on."""
         self._report(ScpiError(-221, text))
 
     def clip(self, value: float, low: float, high: float) -> float:

@@ -1,4 +1,4 @@
-"""What the settings of one output of a generator do to each other: when they do not fit, the other one gives way.
+"""Conflicts between the settings of one output of a generator: the command wins, the other setting changes.
 
 Sources: see channel.py.
 """
@@ -24,7 +24,7 @@ _LONG = {
 
 
 def resolve(channel: Channel, cause: str) -> None:
-    """Make the settings fit each other after one of them, the cause, has changed."""
+    """Change the other settings where they do not fit the one, the cause, that has changed."""
     _turn_off_other_modes(channel, cause)
     _drop_impossible_modes(channel)
     _limit_frequency(channel)
@@ -84,7 +84,7 @@ def _limit_square_duty(channel: Channel) -> None:
 
 
 def _fit_pulse(channel: Channel, cause: str) -> None:
-    """Width and edges have to fit into the period, while pulses are what comes out."""
+    """Fit width and edges of pulses into the period, where the waveform is a pulse."""
     frequency = channel.number("frequency")
     if cause not in {"pulse_width", "pulse_duty"}:
         if channel["pulse_hold"] == "DCYC":

@@ -14,7 +14,13 @@ if TYPE_CHECKING:
 class Waveform:
     """A waveform that a family can make.
 
-    word: as the manual prints it; top, bottom: of its frequency [Hz]; crest: peak to peak over r.m.s.
+    Attributes:
+        word: as the manual prints it.
+        top: its highest frequency [Hz].
+        bottom: its lowest frequency [Hz].
+        crest: peak to peak over r.m.s.
+        bursts: whether it can come in bursts.
+        sweeps: whether its frequency can be swept.
     """
 
     word: str
@@ -26,7 +32,7 @@ class Waveform:
 
     @cached_property
     def short(self) -> str:
-        """What a query answers."""
+        """The word in an answer."""
         return "".join(c for c in self.word if not c.islower())
 
 
@@ -34,10 +40,19 @@ class Waveform:
 class Family:
     """What the models of a family have in common, beside their rows.
 
-    least_vpp: smallest amplitude into 50 Ω [V]; shortest_pulse, shortest_edge [s]; edge_part: an edge is no longer than
-    this part of the shorter half of a pulse; square: the limits of the duty cycle [%] at a frequency [Hz];
-    longest_burst [s], burst_rest [s]: of bursts; arb: the word for arbitrary waveforms; library: those that it is made
-    with; points: how many an arbitrary waveform may have; room: of the memory for them.
+    Attributes:
+        waveforms: that it can make.
+        square: the limits of the duty cycle of a square wave [%] at a frequency [Hz].
+        arb: the word for arbitrary waveforms.
+        library: names of the arbitrary waveforms that it is made with.
+        least_vpp: smallest amplitude into 50 Ω [V].
+        shortest_pulse: width of it [s].
+        shortest_edge: of a pulse [s].
+        longest_burst: period of bursts, at most [s].
+        burst_rest: the pause between two bursts, at least [s].
+        points: fewest and most samples of an arbitrary waveform.
+        room: samples in the memory for them.
+        edge_part: an edge is no longer than this part of the shorter half of a pulse.
     """
 
     waveforms: tuple[Waveform, ...]

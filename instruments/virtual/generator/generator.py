@@ -1,4 +1,4 @@
-"""Virtual function generators: a listener gets what they put out.  Both families share this."""
+"""Virtual function generators: what both families share.  A listener gets their output."""
 
 from __future__ import annotations
 
@@ -18,15 +18,17 @@ if TYPE_CHECKING:
     from instruments.clock import Clock
     from instruments.virtual.generator.family import Family
 
-#: Signs of a text that the display shows.
+#: How many characters of a text the display shows.
 _LONGEST_TEXT = 64
 
 
 class VirtualGenerator(VirtualInstrument):
-    """Bytes in, a signal out; what the commands do that both families have.
+    """A generator: bytes in, a signal out.
 
-    listener: called with the time [s] and the new Output of channel 1 at each change, and beforehand with the end of
-    a burst that is under way: a later change replaces what was announced for the time after it.
+    Args:
+        clock: of the bench.
+        listener: called at each change with its time [s] and the new Output of channel 1.  The end of a triggered burst
+            is announced when the burst begins; a later change replaces what was announced for the time after it.
     """
 
     family: ClassVar[Family]
@@ -49,7 +51,7 @@ class VirtualGenerator(VirtualInstrument):
 
     # --- what happens ---
 
-    def changed(self, name: str) -> None:
+    def on_change(self, name: str) -> None:
         """Make the other settings fit, and pass what stands at the terminals now to the listener."""
         number, _, plain = name.rpartition(":")
         channel = self.channel(int(number or 1))
@@ -76,7 +78,7 @@ class VirtualGenerator(VirtualInstrument):
             channel.stop()
         self.settings |= self.commands.defaults
         for channel in self.channels:
-            self.changed(channel.prefix + "output")
+            self.on_change(channel.prefix + "output")
 
     def trigger(self) -> None:
         """``*TRG``: starts what waits for it."""
@@ -135,13 +137,13 @@ class VirtualGenerator(VirtualInstrument):
             channel.conflict("amplitude units changed to Vpp due to high-Z load")
             unit = "VPP"
         channel["voltage_unit"] = unit
-        self.changed(channel.prefix + "voltage_unit")
+        self.on_change(channel.prefix + "voltage_unit")
 
     def set_amplitude(self, n: int, parameters: list[str]) -> None:
         """VOLTage: with a unit or in the one that is set.  Raises ScpiError."""
         channel = self.channel(n)
         channel["amplitude_vpp"] = self._amplitude(channel, parameter(parameters))
-        self.changed(channel.prefix + "amplitude_vpp")
+        self.on_change(channel.prefix + "amplitude_vpp")
 
     @staticmethod
     def _amplitude(channel: Channel, text: str) -> float:
@@ -193,7 +195,7 @@ class VirtualGenerator(VirtualInstrument):
             channel["amplitude_vpp"] = self._amplitude(channel, wanted.get("amplitude", "DEF"))
             channel["offset"] = channel.read(wanted.get("offset", "DEF"), *channel.offset_limits(), 0.0, "V")
         channel["output"] = True
-        self.changed(channel.prefix + "output")
+        self.on_change(channel.prefix + "output")
 
     def applied(self, n: int) -> str:
         """APPLy?: waveform, frequency, amplitude, offset."""
@@ -223,7 +225,7 @@ class VirtualGenerator(VirtualInstrument):
         if name not in channel.memory.held and name not in self.BUILT_IN:
             raise DeviceError(785, "Specified arb waveform does not exist")
         channel["arb"] = name
-        self.changed(channel.prefix + "arb")
+        self.on_change(channel.prefix + "arb")
 
     def attribute(self, n: int, which: str, parameters: list[str]) -> str:
         """DATA:ATTRibute: a property of a waveform, by default of the one that is selected.  Raises ScpiError."""

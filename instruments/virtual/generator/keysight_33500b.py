@@ -174,7 +174,7 @@ class Virtual33500B(VirtualGenerator):
         channel = self.channel(n)
         channel["arb"] = _FIRST_ARB
         _empty(channel)
-        self.changed(channel.prefix + "arb")
+        self.on_change(channel.prefix + "arb")
 
     def load(self, n: int, parameters: list[str]) -> None:
         """MMEMory:LOAD:DATA: a built-in waveform from its file.  Raises ScpiError."""

@@ -1,4 +1,4 @@
-"""The rows that the generators of both families have, and what a number of theirs is: clipped, and told in its unit.
+"""The rows that both families of generators share, and their numbers, which are clipped and answered in their unit.
 
 Sources: Keysight 33500 Series Operating and Service Guide; Agilent 33220A User's Guide, chapter 4.
 """
@@ -26,9 +26,16 @@ if TYPE_CHECKING:
 class Quantity(Row):
     """A number of a channel that is clipped at its limits, with an entry in the error queue.
 
-    default: after ``*RST``, and what DEF means; limits: lowest and highest, or how they follow from the channel; unit:
-    that may be sent with it; get, put: where the number is not kept as it is sent; endless: it may be infinite; alias:
-    another row has the setting, too, and gives its value after ``*RST``.
+    Attributes:
+        name: of the setting.
+        default: its value after ``*RST``, and by DEF.
+        limits: lowest and highest, or a function of the channel that returns them.
+        unit: that a program may send with the number.
+        get: returns the number, where it is not kept as sent.
+        put: keeps it, in the same case.
+        endless: whether it may be infinite.
+        alias: whether another row has the same setting, and gives its value after ``*RST``.
+        channel: the number of the channel.
     """
 
     name: str
@@ -50,7 +57,7 @@ class Quantity(Row):
         return {} if self.alias else {self.name: self.default}
 
     def range(self, channel: Channel) -> tuple[float, float]:
-        """The lowest and the highest number that can be sent now."""
+        """The lowest and the highest number allowed now."""
         return self.limits(channel) if callable(self.limits) else self.limits
 
     def _is_infinite(self, text: str) -> bool:
@@ -61,7 +68,7 @@ class Quantity(Row):
         return quantity_of(text, (self.unit,))[0] >= INFINITE
 
     def read(self, channel: Channel, text: str) -> float:
-        """The number as it is sent, within its limits.  Raises ScpiError."""
+        """Read the number that a program has sent, within its limits.  Raises ScpiError."""
         if self._is_infinite(text):
             return INFINITE
         return channel.read(text, *self.range(channel), self.default, self.unit)
@@ -74,14 +81,14 @@ class Quantity(Row):
             self.put(channel, value)
         else:
             device.settings[self.name] = value
-        device.changed(self.name)
+        device.on_change(self.name)
 
     def ask(self, device: VirtualGenerator, parameters: list[str]) -> str:
         """See the base."""
-        return device.spell(self.asked(device.channel(self.channel), parameters))
+        return device.spell(self.value_or_limit(device.channel(self.channel), parameters))
 
-    def asked(self, channel: Channel, parameters: list[str]) -> float:
-        """The number, or the limit that is asked for.  Raises ScpiError."""
+    def value_or_limit(self, channel: Channel, parameters: list[str]) -> float:
+        """The number, or the limit that the query asks for.  Raises ScpiError."""
         if text := optional_parameter(parameters):
             low, high = self.range(channel)
             return limit(text, low=low, high=high, default=self.default)
@@ -90,7 +97,7 @@ class Quantity(Row):
 
 @dataclass(frozen=True)
 class Angle(Quantity):
-    """A phase, kept in degrees; what is sent without a unit, and what is answered, is in that of UNIT:ANGLe."""
+    """A phase, kept in degrees; a number without a unit, and the answer, are in the unit of UNIT:ANGLe."""
 
     def read(self, channel: Channel, text: str) -> float:
         """See the base."""
@@ -103,7 +110,7 @@ class Angle(Quantity):
     def ask(self, device: VirtualGenerator, parameters: list[str]) -> str:
         """See the base."""
         channel = device.channel(self.channel)
-        return device.spell(self.asked(channel, parameters) / channel.degrees_per_unit())
+        return device.spell(self.value_or_limit(channel, parameters) / channel.degrees_per_unit())
 
 
 _PULSE = "[SOURce[n]:][FUNCtion:]PULSe:"

@@ -116,7 +116,7 @@ class VirtualSDG1000X(VirtualInstrument):
         """Six digits, and none that is zero at the end: 1000, 0.001."""
         return f"{value:.6g}"
 
-    def changed(self, name: str) -> None:
+    def on_change(self, name: str) -> None:
         """Pass the voltage at the terminals of channel 1 to the listener."""
         if self._listener and name.startswith("1:"):
             self._listener(self.clock.now(), self.signal())
@@ -124,7 +124,7 @@ class VirtualSDG1000X(VirtualInstrument):
     def reset(self) -> None:
         """The state after ``*RST``: all outputs off."""
         self.settings |= self.commands.defaults
-        self.changed("1:output")
+        self.on_change("1:output")
 
     def _number(self, n: int, name: str) -> float:
         return float(self.settings[_key(n, name)])
@@ -149,7 +149,7 @@ class VirtualSDG1000X(VirtualInstrument):
                     self._set_number(n, field, sent / self._load_factor(n) if field.shown else sent)
                 else:
                     raise ScpiError(-224, key[:20])
-        self.changed(_key(n, "waveform"))
+        self.on_change(_key(n, "waveform"))
 
     def _set_number(self, n: int, field: Field, value: float) -> None:
         if field.key == "PERI":
@@ -210,7 +210,7 @@ class VirtualSDG1000X(VirtualInstrument):
             else:
                 raise ScpiError(-224, key[:20])
         self.settings |= {_key(n, name): value for name, value in wanted.items()}
-        self.changed(_key(n, "output"))
+        self.on_change(_key(n, "output"))
 
     def output(self, n: int, parameters: list[str]) -> str:
         """OUTP?: state, load, polarity; as with BSWV?.  Raises ScpiError."""

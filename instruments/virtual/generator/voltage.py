@@ -1,7 +1,7 @@
-"""What an Output is in volts: the waveform in time, and the one harmonic that can turn a top.
+"""The voltage of an Output in time, and its first harmonic, which alone can turn a top.
 
-The phase of a waveform is counted in turns, from where it starts: there sine, square and ramp cross their middle
-upwards (33220A User's Guide, BURSt:PHASe), pulses begin, and an arbitrary waveform has its first sample.
+The phase of a waveform is counted in turns from its start: there sine, square and ramp cross their middle upwards
+(33220A User's Guide, BURSt:PHASe), pulses begin, and an arbitrary waveform has its first sample.
 """
 
 from __future__ import annotations
@@ -27,7 +27,12 @@ _NOISE_PEAK = 3.3
 
 
 def voltage(output: Output, turns: Array, times: Array) -> Array:
-    """Volts at the terminals where the waveform has made so many turns, shape (n,); times [s]: of noise.
+    """The voltage at the terminals, shape (n,) [V].
+
+    Args:
+        output: at the terminals.
+        turns: phase of the waveform, shape (n,) [turns].
+        times: of the same points [s], for noise.
 
     >>> from instruments.virtual.generator.channel import Output
     >>> voltage(Output("SQU", 1.0, 2.0, 0.5, duty=0.25), np.array([0.2, 0.3]), np.zeros(2)).tolist()
@@ -41,13 +46,13 @@ def voltage(output: Output, turns: Array, times: Array) -> Array:
 
 
 def fundamental(output: Output) -> float:
-    """Amplitude of the first harmonic [V].  Of bursts with pauses between them the mean over their period."""
+    """Amplitude of the first harmonic [V]; of bursts with pauses its mean over their period."""
     one = _FUNDAMENTALS.get(output.waveform, _none)(output) if output.amplitude else 0.0
     return output.amplitude * one * _busy(output)
 
 
 def _busy(output: Output) -> float:
-    """Part of the time in which there is something."""
+    """The part of the time in which bursts are on."""
     burst = output.burst
     if burst is None or burst.period is None or not output.frequency:
         return 1.0
@@ -92,7 +97,7 @@ def _samples(output: Output) -> Array:
 
 
 def _noise(_: Array, times: Array, _output: Output) -> Array:
-    """The same at the same time, whoever looks: a table, entered at a hash of the time (splitmix64)."""
+    """Noise, always the same at the same time: a table whose index is a hash of the time (splitmix64)."""
     # 0.38: no round time lies between two cells, where rounding would choose
     cell = np.floor(times / _NOISE_CELL + 0.38).astype(np.int64).astype(np.uint64)
     cell = (cell ^ (cell >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)

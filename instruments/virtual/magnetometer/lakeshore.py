@@ -90,7 +90,7 @@ class Fields(Row):
             raise ScpiError(-109 if not parameters else -108)
         given = zip(self.fields, parameters, strict=False)
         device.settings |= {field.name: field.read(text) for field, text in given}  # all of them or none
-        device.changed(self.fields[0].name)
+        device.on_change(self.fields[0].name)
 
     def ask(self, device: Any, parameters: list[str]) -> str:
         """See the base."""

@@ -82,7 +82,7 @@ class Virtual475(VirtualGaussmeter):
     ROWS: ClassVar = (*FAMILY, *_OWN)
     _events = 0
 
-    def changed(self, name: str) -> None:
+    def on_change(self, name: str) -> None:
         """REL with source 2 takes the present field; BAUD sets this end of the line."""
         if name == "relative" and self.value("relative_source") == 2 and self.probe:
             self.relative_to = self.shown()
@@ -97,7 +97,7 @@ class Virtual475(VirtualGaussmeter):
         super().reset()
         self.settings |= masks
         for name in masks:
-            self.changed(name)
+            self.on_change(name)
 
     def _time_constant(self) -> float:
         return self._TIME_CONSTANTS[int(self.value("resolution")) - 1]

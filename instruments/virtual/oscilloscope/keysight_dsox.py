@@ -64,7 +64,7 @@ _MEASUREMENTS = {
     "NEDGes": "NEDGES",
     "COUNter": "FREQUENCY",
 }
-#: Told as percentages.
+#: Measurements whose answers are percentages.
 _PERCENT = {"PDUTY", "NDUTY", "OVERSHOOT", "PRESHOOT"}
 #: Words before the source that say over what is measured.
 _INTERVALS = ("CYCLe", "DISPlay", "AC", "DC")
@@ -137,7 +137,7 @@ _TIME: tuple[Row, ...] = (
     whole("ACQuire:COMPlete", "complete", 100.0, (100, 100), sign="+"),
     whole("ACQuire:SEGMented:COUNt", "segments", 2.0, (2, 50), sign="+"),
     Ask("ACQuire:POINts[:ANALog]", lambda s: f"{s.full_scale()[1]:+d}"),
-    Both("ACQuire:SRATe[:ANALog]", tell=lambda s, _p: s.spell(s.full_scale()[0])),
+    Both("ACQuire:SRATe[:ANALog]", answer=lambda s, _p: s.spell(s.full_scale()[0])),
 )
 _TRIGGER: tuple[Row, ...] = (
     Word("TRIGger:MODE", "trigger_mode", "EDGE GLITch PATTern TV SHOLd TRANsition SBUS1"),
@@ -177,7 +177,7 @@ _REST: tuple[Row, ...] = (
         Both(f"MEASure:{word}", lambda s, p, m=name: s.install(m, p), lambda s, p, m=name: s.measurement(m, p))
         for word, name in _MEASUREMENTS.items()
     ),
-    Both("DISPlay:DATA", tell=lambda s, p: s.picture(p)),
+    Both("DISPlay:DATA", answer=lambda s, p: s.picture(p)),
     # what only changes the picture
     *(Both(header, lambda _s, _p: None) for header in ("DISPlay:CLEar", "SYSTem:DSP", "SYSTem:LOCK")),
     Switch("HARDcopy:INKSaver", "ink_saver", default=True),
@@ -218,13 +218,13 @@ class VirtualDSOX1000(VirtualOscilloscope):
 
     # --- acquiring ---
 
-    def adjusted(self, name: str, before: float) -> None:
+    def on_number_change(self, name: str, before: float) -> None:
         """An offset beyond what the range allows is set to the nearest that it does."""
         if name.startswith("chan") and name.endswith("_offset"):
             n = int(name[4])
             reach = (2.0 if self.value(f"chan{n}_scale") / self.probe(n) < 0.2 else 50.0) * self.probe(n)
             self.settings[name] = min(max(self.value(name), -reach), reach)
-        super().adjusted(name, before)
+        super().on_number_change(name, before)
 
     def digitize_sources(self, parameters: list[str]) -> None:
         """Raises ScpiError in roll and XY mode, where there is no record."""

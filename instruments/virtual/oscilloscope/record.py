@@ -1,6 +1,6 @@
 """A record of a virtual oscilloscope, the inputs it was taken from, and the search for its trigger.
 
-A record keeps the time of its trigger and the settings it was taken with, not its samples: whoever reads a piece of it
+A record keeps the time of its trigger and the settings it was taken with, not its samples: a read of a piece of it
 samples the signal for that piece again.  So 24 million points need the memory of one piece, and the signals must be
 functions of time.
 """

@@ -204,10 +204,10 @@ class VirtualDS1000Z(VirtualOscilloscope):
         self.settings["trigger_sweep"] = "SING"
         self.single()
 
-    def adjusted(self, name: str, before: float) -> None:
+    def on_number_change(self, name: str, before: float) -> None:
         """A sweep of SINGle waits for one record, the others go on."""
         self._keep_zoom_within()
-        super().adjusted(name, before)
+        super().on_number_change(name, before)
         if name == "trigger_sweep" and self.acquisition.armed is not None:
             self.acquisition.arm(self.now, once=self.settings[name] == "SING")
 
@@ -263,7 +263,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
                 raise ScpiError(-222)
             text = str(points)
         self.settings["depth"] = text
-        self.changed("depth")
+        self.on_change("depth")
 
     def depth(self, parameters: list[str]) -> str:
         """ACQuire:MDEPth?: what is set, or its limits.  Raises ScpiError."""

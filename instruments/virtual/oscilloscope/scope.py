@@ -1,4 +1,4 @@
-"""What the virtual oscilloscopes have in common: their setup, and what they tell of their record.
+"""The base of the virtual oscilloscopes: their setup, and the answers about their record.
 
 Acquiring is a matter of its own, see acquisition.py; the record is in record.py.
 """
@@ -149,11 +149,11 @@ class VirtualOscilloscope(VirtualInstrument):
 
     # --- when a setting changes ---
 
-    def changed(self, name: str) -> None:
+    def on_change(self, name: str) -> None:
         """A setting has changed: what runs begins anew."""
-        self.adjusted(name, 0.0)
+        self.on_number_change(name, 0.0)
 
-    def adjusted(self, name: str, before: float) -> None:
+    def on_number_change(self, name: str, before: float) -> None:
         """A number has changed from what it was before."""
         if name.endswith("_probe") and before:
             self._follow_probe(name.removesuffix("_probe"), float(self.settings[name]) / before)
@@ -365,7 +365,7 @@ class VirtualOscilloscope(VirtualInstrument):
         if channel is not None:
             trace, name = self.on_screen(channel), self.level_name(channel)
             self.settings[name] = float(trace.volts.max() + trace.volts.min()) / 2
-            self.changed(name)
+            self.on_change(name)
 
     def autoscale(self) -> None:
         """Scale, offset, time base and level to fit what stands at the inputs."""

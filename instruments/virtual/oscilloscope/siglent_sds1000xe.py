@@ -79,8 +79,8 @@ _CHANNEL: tuple[Row, ...] = (
     Switch("C{n}:(TRA|TRACE)", "chan{n}_display", lambda n: n == 1, words=("OFF", "ON")),
     Switch("C{n}:(INVS|INVERTSET)", "chan{n}_invert", words=("OFF", "ON")),
     Switch("C{n}:(BWL|BANDWIDTH_LIMIT)", "chan{n}_bandwidth", words=("OFF", "ON")),
-    Both("C{n}:(WF|WAVEFORM)", tell=lambda s, n, p: s.waveform(n, p)),
-    Both("C{n}:(PAVA|PARAMETER_VALUE)", tell=lambda s, n, p: s.parameter_value(n, p)),
+    Both("C{n}:(WF|WAVEFORM)", answer=lambda s, n, p: s.waveform(n, p)),
+    Both("C{n}:(PAVA|PARAMETER_VALUE)", answer=lambda s, n, p: s.parameter_value(n, p)),
 )
 _REST: tuple[Row, ...] = (
     Word("(CHDR|COMM_HEADER)", "header", "*SHORT LONG OFF"),
@@ -96,7 +96,7 @@ _REST: tuple[Row, ...] = (
     Both("(MSIZ|MEMORY_SIZE)", lambda s, p: s.set_depth(p), lambda s, _p: s.depth(), keeps=("depth", "14M")),
     Both("(WFSU|WAVEFORM_SETUP)", lambda s, p: s.set_waveform(p), lambda s, _p: s.waveform_setup()),
     Ask("(SARA|SAMPLE_RATE)", lambda s: s.reply("SARA", s.spell(s.full_scale()[0]), "Sa/s")),
-    Both("(SANU|SAMPLE_NUM)", tell=lambda s, p: s.sample_number(p)),
+    Both("(SANU|SAMPLE_NUM)", answer=lambda s, p: s.sample_number(p)),
     Ask("(SAST|SAMPLE_STATUS)", lambda s: s.reply("SAST", s.state())),
     Ask("INR", lambda s: s.reply("INR", str(s.internal_state()))),
     Ask("(SCDP|SCREEN_DUMP)", lambda s: s.picture()),
@@ -168,15 +168,15 @@ class VirtualSDS1000XE(VirtualOscilloscope):
         if "SR" in pairs:
             words = (*(f"C{n}" for n in self.channels), "EX", "EX5", "LINE")
             self.settings["trigger_source"] = choice(pairs["SR"], words)
-            self.changed("trigger_source")
+            self.on_change("trigger_source")
 
     def trigger_selection(self) -> str:
         """TRSE?: type, source, hold-off."""
         return self.reply("TRSE", f"EDGE,SR,{self.settings['trigger_source']},HT,OFF")
 
-    def adjusted(self, name: str, before: float) -> None:
+    def on_number_change(self, name: str, before: float) -> None:
         """TRMD begins and ends to acquire, as the keys do."""
-        super().adjusted(name, before)
+        super().on_number_change(name, before)
         if name == "trigger_sweep":
             if self.settings[name] == "STOP":
                 self.stop()

@@ -2,7 +2,7 @@
 
 Source: IVI-6.1, revisions 1.0 and 2.0; section numbers are revision 2.0's.  Synchronized mode only, no secure
 connections (both may be left out by a server), no service requests.  A client has two connections: on the synchronous
-one go messages and answers, on the asynchronous one what must get through meanwhile.
+one go messages and answers, on the asynchronous one what must not wait behind them.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import itertools
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from instruments.virtual.servers.clients import FIRST_WORDS, MOST_CLIENTS, Disconnected, Link, Listener, first_of
 from instruments.virtual.servers.hislip_messages import (
     HEADER,
     LONGEST,
@@ -22,146 +23,148 @@ from instruments.virtual.servers.hislip_messages import (
     Problem,
     Type,
 )
-from instruments.virtual.servers.station import FIRST_WORDS, MOST_CLIENTS, Disconnected, Link, Listener, first_of
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
 
-    from instruments.virtual.servers.station import Station
+    from instruments.virtual.servers.clients import ServedInstrument
 
-#: The newest revision spoken here, and the longest payload sent before the client has said what it takes [bytes].
-VERSION, UNASKED = 0x0200, 1 << 18
+#: The newest revision spoken here, and the longest payload sent until the client states its own limit [bytes].
+VERSION, DEFAULT_PAYLOAD = 0x0200, 1 << 18
 
-#: How long a client may take for its second channel [s], as the clock on the wall tells.
+#: How long a client may take for its second channel [s], by the wall clock.
 SECOND_CHANNEL = FIRST_WORDS
 
-#: The MessageID that a client begins with (3.1), and what one message differs from the next.
+#: The MessageID that a client begins with (3.1), the step from one message to the next, and where it wraps.
 _FIRST_ID, _STEP, _IDS = 0xFFFFFF00, 2, 1 << 32
 
 
 @dataclass(eq=False)
 class Client:
-    """One client: its link, its two channels, and where they stand with each other."""
+    """One client: its link, its two channels, and the state of each."""
 
     link: Link
-    sync: Channel
-    other: Channel | None = None  # the asynchronous one, once it is there
-    joined: asyncio.Event = field(default_factory=asyncio.Event)
-    heard_out: asyncio.Event = field(default_factory=asyncio.Event)  # nothing more comes on the synchronous one
+    synchronous: Channel
+    asynchronous: Channel | None = None  # None until the client has opened it
+    both_connected: asyncio.Event = field(default_factory=asyncio.Event)
+    synchronous_ended: asyncio.Event = field(default_factory=asyncio.Event)  # no more messages come there
     gone: asyncio.Event = field(default_factory=asyncio.Event)
-    longest: int = UNASKED
+    max_payload: int = DEFAULT_PAYLOAD
     clearing: bool = False
-    received: int = _FIRST_ID - _STEP  # MessageID of the last message that came
-    answering: int = 0  # and of the one that the answers under way belong to
-    rmt_expected: bool = False  # an answer was sent to its end, and the client has not said that it has read it
-    locking: asyncio.Task[None] | None = None
-    shared: bool = False  # the lock it has
+    received: int = _FIRST_ID - _STEP  # MessageID of the last message received
+    answering: int = 0  # MessageID that the answers under way belong to
+    rmt_expected: bool = False  # an answer was sent whole, and the client has not confirmed that it has read it
+    lock_request: asyncio.Task[None] | None = None
+    shared: bool = False  # whether its lock is a shared one
 
     # --- the synchronous channel ---
 
     async def listen(self) -> None:
-        """Messages for the instrument.  Ends by an error, when the client is gone and they have been worked on."""
+        """Take messages for the instrument.  Ends by an error, when the client has left and all are worked on."""
         try:
-            await self._take_all()
+            await self._receive_all()
         except EOFError:
-            await self.link.linger(self.link.finished)
+            await self.link.linger(self.link.wait_until_done)
             raise
         finally:
-            self.heard_out.set()
+            self.synchronous_ended.set()
 
-    async def _take_all(self) -> None:
+    async def _receive_all(self) -> None:
         while True:
-            message = await _next(self.sync)
+            message = await _next(self.synchronous)
             if message.type == Type.DEVICE_CLEAR_COMPLETE:
-                self._cleared()
+                self._acknowledge_clear()
             elif message.type in {Type.DATA, Type.DATA_END, Type.TRIGGER}:
-                await self._take(message)
+                await self._handle(message)
             elif message.type in {Type.FATAL_ERROR, Type.ERROR}:
                 if message.type == Type.FATAL_ERROR:
                     raise Disconnected
             else:
-                self.refuse(self.sync, message)
+                self.refuse(self.synchronous, message)
 
-    async def _take(self, message: Message) -> None:
-        if self.other is None:
-            await self.sync.fatal(Fatal.NOT_BOTH_CHANNELS, "the asynchronous channel is missing")
-        if not await self._let_in(message):
+    async def _handle(self, message: Message) -> None:
+        if self.asynchronous is None:
+            await self.synchronous.fail(Fatal.NOT_BOTH_CHANNELS, "the asynchronous channel is missing")
+        if not await self._wait_for_turn(message):
             return
         self.received = message.parameter
-        if self.rmt_expected and not message.control & 1:  # 3.1.1, rule 2: the client is not told
-            self.link.interrupted()
+        if self.rmt_expected and not message.control & 1:  # 3.1.1, rule 2: no message to the client
+            self.link.report_interrupted()
         self.rmt_expected = False
         if message.type == Type.TRIGGER:
             self.link.trigger()
             return
         end = message.type == Type.DATA_END
         if end:
-            if self.link.due() is not None:  # rule 1; the session drops the answer
-                await self._interrupt(message.parameter)
-                if self.clearing:  # the client has begun a device clear meanwhile
+            if self.link.seconds_until_ready() is not None:  # rule 1: the session drops the answer
+                await self._send_interrupted(message.parameter)
+                if self.clearing:  # the client has begun a device clear during the send
                     return
             self.answering = message.parameter
         await self.link.write(message.payload, end=end)
 
-    async def _let_in(self, message: Message) -> bool:
-        """Wait until the instrument may take a message; whether it may: a device clear ends the wait."""
-        await self.link.turn(given_up=lambda: self.clearing)
+    async def _wait_for_turn(self, message: Message) -> bool:
+        """Wait until the instrument may take a message.  Returns False where a device clear ends the wait."""
+        await self.link.wait_unlocked(give_up=lambda: self.clearing)
         if not self.link.is_abort(message.payload, end=message.type == Type.DATA_END):
-            await self.link.finished(given_up=lambda: self.clearing)
+            await self.link.wait_until_done(give_up=lambda: self.clearing)
         return not self.clearing
 
-    async def _interrupt(self, number: int) -> None:
-        """Both are told, the asynchronous channel first (6.11, table 30)."""
-        assert self.other
-        self.other.send(Message(Type.ASYNC_INTERRUPTED, parameter=number))
-        self.sync.send(Message(Type.INTERRUPTED, parameter=number))
-        await self.other.drain()
+    async def _send_interrupted(self, number: int) -> None:
+        """Send Interrupted on both channels, the asynchronous one first (6.11, table 30)."""
+        assert self.asynchronous
+        self.asynchronous.send(Message(Type.ASYNC_INTERRUPTED, parameter=number))
+        self.synchronous.send(Message(Type.INTERRUPTED, parameter=number))
+        await self.asynchronous.drain()
 
-    def _cleared(self) -> None:
-        """Both sides have dropped what was under way (6.12); synchronized mode, whatever the client would like."""
+    def _acknowledge_clear(self) -> None:
+        """End a device clear: both sides have dropped what was under way (6.12).
+
+        The answer says synchronized mode, whichever mode the client prefers.
+        """
         self.clearing, self.rmt_expected, self.received = False, False, _FIRST_ID - _STEP
-        self.sync.send(Message(Type.DEVICE_CLEAR_ACKNOWLEDGE))
+        self.synchronous.send(Message(Type.DEVICE_CLEAR_ACKNOWLEDGE))
 
     async def answer(self) -> None:
-        """Send answers when they are ready.  Ends by an error, when the client is gone."""
-        while await self.link.answered():
-            data, end = self.link.take(self.longest)
-            self.sync.send(Message(Type.DATA_END if end else Type.DATA, parameter=self.answering, payload=data))
+        """Send answers when they are ready.  Ends by an error, when the client has left."""
+        while await self.link.wait_for_answer():
+            data, end = self.link.take(self.max_payload)
+            self.synchronous.send(Message(Type.DATA_END if end else Type.DATA, parameter=self.answering, payload=data))
             self.rmt_expected = end
-            await self.sync.drain()
+            await self.synchronous.drain()
 
     # --- the asynchronous channel ---
 
-    async def listen_aside(self) -> None:
-        """What must get through meanwhile.  Ends by an error, when the client is gone."""
-        assert self.other
+    async def listen_asynchronous(self) -> None:
+        """Handle the messages that must not wait behind others.  Ends by an error, when the client has left."""
+        assert self.asynchronous
         try:
             while True:
-                message = await _next(self.other)
+                message = await _next(self.asynchronous)
                 if message.type == Type.ASYNC_STATUS_QUERY:
-                    await self.link.caught_up()
-                _ASIDE.get(message.type, Client.refuse)(self, self.other, message)
+                    await self.link.catch_up()
+                _ASYNC_HANDLERS.get(message.type, Client.refuse)(self, self.asynchronous, message)
         finally:
-            if self.locking:
-                self.locking.cancel()
+            if self.lock_request:
+                self.lock_request.cancel()
 
-    def negotiate(self, channel: Channel, message: Message) -> None:
-        """AsyncMaximumMessageSize: what the client takes, and what is taken here (6.10)."""
+    def negotiate_size(self, channel: Channel, message: Message) -> None:
+        """AsyncMaximumMessageSize: note the client's limit and answer with ours (6.10)."""
         wanted = int.from_bytes(message.payload)
-        # a real VISA counts the header to the size, or not: with it, either is content
-        self.longest = min(max(wanted - HEADER.size, 1), LONGEST)
+        # some VISA libraries count the header as part of the size, some do not; the smaller limit suits both
+        self.max_payload = min(max(wanted - HEADER.size, 1), LONGEST)
         channel.send(Message(Type.ASYNC_MAXIMUM_MESSAGE_SIZE_RESPONSE, payload=LONGEST.to_bytes(8)))
 
     def clear(self, channel: Channel, message: Message) -> None:
-        """AsyncDeviceClear: from now to its end on the other channel what comes there is dropped (6.12)."""
+        """AsyncDeviceClear: drop what comes on the synchronous channel until the clear ends there (6.12)."""
         self.clearing = True
         self.link.clear()
         channel.send(Message(Type.ASYNC_DEVICE_CLEAR_ACKNOWLEDGE))
 
-    def tell_status(self, channel: Channel, message: Message) -> None:
-        """AsyncStatusQuery: the status byte; what makes its bit MAV is in 6.14.1.
+    def send_status(self, channel: Channel, message: Message) -> None:
+        """AsyncStatusQuery: send the status byte; 6.14.1 says when its bit MAV is set.
 
-        A query with a MessageID other than the last one's asks too early; pyvisa-py 0.8 sends the next one's.
+        A query whose MessageID is not the last message's comes too early; pyvisa-py 0.8 sends the next message's.
         """
         if message.control & 1:
             self.rmt_expected = False
@@ -169,77 +172,82 @@ class Client:
         channel.send(Message(Type.ASYNC_STATUS_RESPONSE, self.link.status_byte(unread=self.rmt_expected and known)))
 
     def lock(self, channel: Channel, message: Message) -> None:
-        """AsyncLock: a request, or a release (6.5)."""
+        """AsyncLock: request or release the lock (6.5)."""
         if message.control > 1:
             channel.send(Message(Type.ERROR, Problem.UNRECOGNIZED_CONTROL))
         elif message.control == 0:
             channel.send(Message(Type.ASYNC_LOCK_RESPONSE, self._release()))
-        elif self.link.holds() or (self.locking and not self.locking.done()):
+        elif self.link.has_lock() or (self.lock_request and not self.lock_request.done()):
             channel.send(Message(Type.ASYNC_LOCK_RESPONSE, LockAnswer.ERROR))
         else:
             key = message.payload.decode("latin-1")[:256] or None
-            self.locking = asyncio.ensure_future(self._request(channel, key, message.parameter / 1000))
+            self.lock_request = asyncio.ensure_future(self._request(channel, key, message.parameter / 1000))
 
-    async def _request(self, channel: Channel, key: str | None, within: float) -> None:
-        granted = await self.link.lock(key, within)
+    async def _request(self, channel: Channel, key: str | None, timeout: float) -> None:
+        granted = await self.link.lock(key, timeout)
         self.shared = granted and key is not None
         channel.send(Message(Type.ASYNC_LOCK_RESPONSE, LockAnswer.SUCCESS if granted else LockAnswer.FAILURE))
 
     def _release(self) -> LockAnswer:
-        if not self.link.holds():
+        if not self.link.has_lock():
             return LockAnswer.ERROR
         self.link.unlock()
         return LockAnswer.SHARED_RELEASED if self.shared else LockAnswer.SUCCESS
 
-    def tell_locks(self, channel: Channel, message: Message) -> None:
-        """AsyncLockInfo: whether somebody has it alone, and how many have it (6.6)."""
-        hold = self.link.session.hold
-        alone = bool(hold.holders) and hold.key is None
-        channel.send(Message(Type.ASYNC_LOCK_INFO_RESPONSE, int(alone), len(hold.holders)))
+    def send_lock_info(self, channel: Channel, message: Message) -> None:
+        """AsyncLockInfo: whether the lock is exclusive, and how many clients have it (6.6)."""
+        client_lock = self.link.session.client_lock
+        alone = bool(client_lock.holders) and client_lock.key is None
+        channel.send(Message(Type.ASYNC_LOCK_INFO_RESPONSE, int(alone), len(client_lock.holders)))
 
     def refuse(self, channel: Channel, message: Message) -> None:
-        """A type that is not known, or not on this channel (6.2)."""
+        """Answer a type that is unknown, or unknown on this channel, with Error (6.2)."""
         channel.send(Message(Type.ERROR, Problem.UNRECOGNIZED_TYPE, payload=b"message type %d" % message.type))
 
     def ignore(self, channel: Channel, message: Message) -> None:
-        """Error: what the client did not like would not be said in another way."""
+        """Error: nothing to do, as no message of ours could be sent in another way."""
 
-    def hang_up(self, channel: Channel, message: Message) -> None:
-        """FatalError: the client is gone.  Raises Disconnected."""
+    def disconnect(self, channel: Channel, message: Message) -> None:
+        """FatalError: the client has ended the session.  Raises Disconnected."""
         raise Disconnected
 
     def go_remote(self, channel: Channel, message: Message) -> None:
-        """AsyncRemoteLocalControl: there is no front panel to lock (6.9)."""
+        """AsyncRemoteLocalControl: confirm; there is no front panel to lock (6.9)."""
         channel.send(Message(Type.ASYNC_REMOTE_LOCAL_RESPONSE))
 
 
 async def _next(channel: Channel) -> Message:
-    """The next message, once the client has read its replies: a flood that is never read piles up none of them."""
+    """The next message, once the client has read its replies, so that unread replies do not pile up."""
     await channel.drain()
-    await asyncio.sleep(0)  # many messages may have come at once: the other clients' turn
+    await asyncio.sleep(0)  # many messages may have come at once: let the other clients have their turn
     return await channel.receive()
 
 
-_ASIDE: dict[int, Callable[[Client, Channel, Message], None]] = {
-    Type.FATAL_ERROR: Client.hang_up,
+_ASYNC_HANDLERS: dict[int, Callable[[Client, Channel, Message], None]] = {
+    Type.FATAL_ERROR: Client.disconnect,
     Type.ERROR: Client.ignore,
     Type.ASYNC_LOCK: Client.lock,
     Type.ASYNC_REMOTE_LOCAL_CONTROL: Client.go_remote,
-    Type.ASYNC_MAXIMUM_MESSAGE_SIZE: Client.negotiate,
+    Type.ASYNC_MAXIMUM_MESSAGE_SIZE: Client.negotiate_size,
     Type.ASYNC_DEVICE_CLEAR: Client.clear,
-    Type.ASYNC_STATUS_QUERY: Client.tell_status,
-    Type.ASYNC_LOCK_INFO: Client.tell_locks,
+    Type.ASYNC_STATUS_QUERY: Client.send_status,
+    Type.ASYNC_LOCK_INFO: Client.send_lock_info,
 }
 
 
 class HislipServer:
-    """Both channels of all clients of one instrument, on one port.  subaddress: the only one it knows."""
+    """Both channels of all clients of one instrument, on one port.
 
-    def __init__(self, station: Station, *, subaddress: str = "hislip0") -> None:
-        self._station, self._subaddress = station, subaddress
+    Args:
+        instrument: to serve.
+        subaddress: the only one that it accepts.
+    """
+
+    def __init__(self, instrument: ServedInstrument, *, subaddress: str = "hislip0") -> None:
+        self._instrument, self._subaddress = instrument, subaddress
         self._clients: dict[int, Client] = {}
         self._numbers = itertools.count(1)
-        self.listener = Listener(station, self._talk, most=2 * MOST_CLIENTS)
+        self.listener = Listener(instrument, self._talk, most=2 * MOST_CLIENTS)
 
     async def _talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         channel = Channel(reader, writer)
@@ -249,54 +257,55 @@ class HislipServer:
         except TimeoutError:
             return
         begin: dict[int, Callable[[Channel, Message], Awaitable[None]]] = {
-            Type.INITIALIZE: self._serve,
-            Type.ASYNC_INITIALIZE: self._serve_aside,
+            Type.INITIALIZE: self._serve_synchronous,
+            Type.ASYNC_INITIALIZE: self._serve_asynchronous,
         }
         if first.type not in begin:
-            await channel.fatal(Fatal.BAD_INITIALIZATION, "a connection begins with Initialize or AsyncInitialize")
+            await channel.fail(Fatal.BAD_INITIALIZATION, "a connection begins with Initialize or AsyncInitialize")
         await begin[first.type](channel, first)
 
-    async def _serve(self, channel: Channel, first: Message) -> None:
-        """The synchronous channel, from Initialize (6.1) on."""
+    async def _serve_synchronous(self, channel: Channel, first: Message) -> None:
+        """Serve a synchronous channel, from Initialize (6.1) on."""
         asked = first.payload.decode("latin-1").lower()
         if asked not in {"", self._subaddress}:
-            await channel.fatal(Fatal.BAD_INITIALIZATION, f"the only subaddress here is {self._subaddress}")
+            await channel.fail(Fatal.BAD_INITIALIZATION, f"the only subaddress here is {self._subaddress}")
         if len(self._clients) >= MOST_CLIENTS:
-            await channel.fatal(Fatal.TOO_MANY_CLIENTS, f"at most {MOST_CLIENTS} clients")
+            await channel.fail(Fatal.TOO_MANY_CLIENTS, f"at most {MOST_CLIENTS} clients")
         number = next(number for number in (n % 0xFFFF for n in self._numbers) if number not in self._clients)
-        client = self._clients[number] = Client(Link(self._station), channel)
+        client = self._clients[number] = Client(Link(self._instrument), channel)
         version = min(first.parameter >> 16, VERSION)
         channel.send(Message(Type.INITIALIZE_RESPONSE, parameter=version << 16 | number))
         try:
-            await first_of(client.listen(), client.answer(), client.gone.wait(), _both_channels(client))
+            await first_of(client.listen(), client.answer(), client.gone.wait(), _wait_for_second_channel(client))
         finally:
             client.gone.set()
             client.link.close()
             del self._clients[number]
 
-    async def _serve_aside(self, channel: Channel, first: Message) -> None:
-        """The asynchronous channel, from AsyncInitialize on."""
+    async def _serve_asynchronous(self, channel: Channel, first: Message) -> None:
+        """Serve an asynchronous channel, from AsyncInitialize on."""
         client = self._clients.get(first.parameter & 0xFFFF)
-        if client is None or client.other is not None:
-            await channel.fatal(Fatal.BAD_INITIALIZATION, "no session with this number waits for its second channel")
+        if client is None or client.asynchronous is not None:
+            await channel.fail(Fatal.BAD_INITIALIZATION, "no session with this number waits for its second channel")
             return
-        client.other = channel
-        client.joined.set()
+        client.asynchronous = channel
+        client.both_connected.set()
         channel.send(Message(Type.ASYNC_INITIALIZE_RESPONSE))
         try:
-            await first_of(client.listen_aside(), client.gone.wait())
+            await first_of(client.listen_asynchronous(), client.gone.wait())
         except (EOFError, OSError):
-            await client.link.linger(client.heard_out.wait)  # its last commands may wait in the other channel
+            # its last commands may wait in the synchronous channel
+            await client.link.linger(client.synchronous_ended.wait)
             raise
         finally:
             client.gone.set()
 
 
-async def _both_channels(client: Client) -> None:
-    """Ends when the second channel does not come in time."""
+async def _wait_for_second_channel(client: Client) -> None:
+    """Return when the second channel does not come in time, else when the client has left."""
     try:
         async with asyncio.timeout(SECOND_CHANNEL):
-            await client.joined.wait()
+            await client.both_connected.wait()
     except TimeoutError:
         return
     await client.gone.wait()

@@ -1,4 +1,4 @@
-"""HiSLIP's messages: what stands in them, and the connections that they go over.
+"""HiSLIP's messages: their content, and the connections that carry them.
 
 Source: IVI-6.1; section numbers are revision 2.0's.
 """
@@ -9,7 +9,7 @@ import struct
 from enum import IntEnum
 from typing import TYPE_CHECKING, NamedTuple
 
-from instruments.virtual.servers.station import Disconnected
+from instruments.virtual.servers.clients import Disconnected
 
 if TYPE_CHECKING:
     import asyncio
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 #: Prologue, message type, control code, message parameter, length of the payload (2.4).
 HEADER = struct.Struct("!2sBBIQ")
 
-#: The longest payload taken [bytes].
+#: The longest payload accepted [bytes].
 LONGEST = 1 << 20
 
 
@@ -62,7 +62,7 @@ class Fatal(IntEnum):
 
 
 class Problem(IntEnum):
-    """What was not done, after which both go on (6.2, table 16)."""
+    """Why a message was not obeyed; the connection goes on (6.2, table 16)."""
 
     UNRECOGNIZED_TYPE = 1
     UNRECOGNIZED_CONTROL = 2
@@ -70,7 +70,7 @@ class Problem(IntEnum):
 
 
 class LockAnswer(IntEnum):
-    """What became of a lock (6.5, tables 19 and 20)."""
+    """Answers to a request or release of the lock (6.5, tables 19 and 20)."""
 
     FAILURE = 0
     SUCCESS = 1
@@ -79,30 +79,30 @@ class LockAnswer(IntEnum):
 
 
 class Message(NamedTuple):
-    """What stands in a header, and the payload."""
+    """The fields of a header, and the payload."""
 
     type: int
     control: int = 0
     parameter: int = 0
     payload: bytes = b""
 
-    def packed(self) -> bytes:
-        """As it goes over the wire."""
+    def pack(self) -> bytes:
+        """The bytes on the wire."""
         return HEADER.pack(b"HS", self.type, self.control, self.parameter, len(self.payload)) + self.payload
 
 
 class Channel:
-    """One of the two connections."""
+    """One of a client's two connections."""
 
     def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._reader, self._writer = reader, writer
 
     async def receive(self) -> Message:
-        """The next message; one whose payload is too long is refused and skipped.  Raises Disconnected."""
+        """Receive the next message; refuse and skip one whose payload is too long.  Raises Disconnected."""
         while True:
             prologue, kind, control, parameter, length = HEADER.unpack(await self._reader.readexactly(HEADER.size))
             if prologue != b"HS":
-                await self.fatal(Fatal.BAD_HEADER, "a header begins with HS")
+                await self.fail(Fatal.BAD_HEADER, "a header begins with HS")
             if length <= LONGEST:
                 return Message(kind, control, parameter, await self._reader.readexactly(length))
             self.send(Message(Type.ERROR, Problem.TOO_LARGE, payload=b"at most %d bytes" % LONGEST))
@@ -117,14 +117,14 @@ class Channel:
             length -= len(piece)
 
     def send(self, message: Message) -> None:
-        """Send without waiting: for what is short."""
-        self._writer.write(message.packed())
+        """Send a short message, without waiting."""
+        self._writer.write(message.pack())
 
     async def drain(self) -> None:
-        """Wait while the client takes nothing."""
+        """Wait until the client has taken what was sent."""
         await self._writer.drain()
 
-    async def fatal(self, code: Fatal, why: str) -> None:
-        """Tell why, and end the connection.  Raises Disconnected."""
+    async def fail(self, code: Fatal, why: str) -> None:
+        """Send FatalError with a reason, and end the connection.  Raises Disconnected."""
         self.send(Message(Type.FATAL_ERROR, code, payload=why.encode()))
         raise Disconnected

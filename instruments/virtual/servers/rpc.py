@@ -9,18 +9,18 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import TYPE_CHECKING, NamedTuple
 
-from instruments.virtual.servers.station import Disconnected, first_of
-from instruments.virtual.servers.xdr import Garbage, Reader, packed
+from instruments.virtual.servers.clients import Disconnected, first_of
+from instruments.virtual.servers.xdr import Garbage, Reader, pack
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-#: How many calls may wait for the one that is worked on.
+#: How many calls of a connection may wait while one is carried out.
 MOST_CALLS = 4
 
 
-class Refused(IntEnum):
-    """A call that was understood, but not carried out (RFC 5531, accept_stat)."""
+class AcceptStatus(IntEnum):
+    """Why a call that was understood is not carried out (RFC 5531, accept_stat)."""
 
     PROGRAM_UNAVAILABLE = 1
     PROGRAM_MISMATCH = 2
@@ -39,7 +39,7 @@ class Call(NamedTuple):
 
 
 def read_call(record: bytes) -> Call:
-    """The call in a record.  Raises Garbage."""
+    """Parse the call in a record.  Raises Garbage."""
     reader = Reader(record)
     number, kind, rpc_version, program, version, procedure = reader.numbers(6)
     if kind != 0 or rpc_version != 2:
@@ -51,13 +51,13 @@ def read_call(record: bytes) -> Call:
 
 
 def reply(call: Call, results: bytes) -> bytes:
-    """The record that answers a call: accepted, no verifier, success."""
-    return packed(call.number, 1, 0, 0, b"", 0) + results
+    """The record that answers a call with its results: accepted, no verifier, success."""
+    return pack(call.number, 1, 0, 0, b"", 0) + results
 
 
-def refusal(call: Call, why: Refused, *versions: int) -> bytes:
-    """The record that refuses one; a mismatch tells which versions there are, from the first to the last."""
-    return packed(call.number, 1, 0, 0, b"", why, *versions)
+def refusal(call: Call, why: AcceptStatus, *versions: int) -> bytes:
+    """The record that refuses a call.  versions: the first and the last that the program has, for a mismatch."""
+    return pack(call.number, 1, 0, 0, b"", why, *versions)
 
 
 #: The results of a procedure, given its parameters.
@@ -66,7 +66,14 @@ Procedure = Callable[[Reader], Awaitable[bytes]]
 
 @dataclass(frozen=True)
 class Program:
-    """What can be called.  number, version: its own; procedures: by number; longest: a record may be [bytes]."""
+    """A program that can be called.
+
+    Attributes:
+        number: of the program.
+        version: of the program.
+        procedures: by their number.
+        longest: bytes of a record, at most.
+    """
 
     number: int
     version: int
@@ -85,15 +92,15 @@ async def read_record(reader: asyncio.StreamReader, longest: int) -> bytes:
         record += await reader.readexactly(length)
         if head >> 31:
             return bytes(record)
-        await asyncio.sleep(0)  # the other clients' turn
+        await asyncio.sleep(0)  # let the other clients have their turn
 
 
 async def serve(program: Program, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    """Carry out the calls of a connection one after the other, until the client goes away."""
+    """Carry out the calls of a connection one after the other, until the client leaves."""
     calls: asyncio.Queue[bytes] = asyncio.Queue(MOST_CALLS)
 
     async def receive() -> None:
-        while True:  # while a call is carried out, too: the client may go away
+        while True:  # also while a call is carried out: the client may leave
             record = await read_record(reader, program.longest)
             if calls.full():
                 raise Disconnected
@@ -109,20 +116,20 @@ async def serve(program: Program, reader: asyncio.StreamReader, writer: asyncio.
 
 
 async def answer(program: Program, record: bytes) -> bytes:
-    """Carry out the call in a record; the record that answers it.  Raises Disconnected when it is no call."""
+    """Carry out the call in a record.  Returns the record that answers it.  Raises Disconnected when it is no call."""
     try:
         call = read_call(record)
     except Garbage:
         raise Disconnected from None
     if call.program != program.number:
-        return refusal(call, Refused.PROGRAM_UNAVAILABLE)
+        return refusal(call, AcceptStatus.PROGRAM_UNAVAILABLE)
     if call.version != program.version:
-        return refusal(call, Refused.PROGRAM_MISMATCH, program.version, program.version)
-    if call.procedure == 0:  # by convention: is anybody there?
+        return refusal(call, AcceptStatus.PROGRAM_MISMATCH, program.version, program.version)
+    if call.procedure == 0:  # by convention a ping
         return reply(call, b"")
     if call.procedure not in program.procedures:
-        return refusal(call, Refused.PROCEDURE_UNAVAILABLE)
+        return refusal(call, AcceptStatus.PROCEDURE_UNAVAILABLE)
     try:
         return reply(call, await program.procedures[call.procedure](call.parameters))
     except Garbage:
-        return refusal(call, Refused.GARBAGE_ARGUMENTS)
+        return refusal(call, AcceptStatus.GARBAGE_ARGUMENTS)

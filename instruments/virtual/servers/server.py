@@ -1,4 +1,4 @@
-"""Offers all instruments of a bus to other programs, and ends cleanly."""
+"""Serves all instruments of a virtual bench to other programs, and ends cleanly."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Self
 
 from instruments.virtual.servers import serial_port
+from instruments.virtual.servers.clients import Listener, ServedInstrument
 from instruments.virtual.servers.hislip import HislipServer
 from instruments.virtual.servers.port_mapper import PORT, TCP, PortMapper
 from instruments.virtual.servers.socket_server import socket_listener
-from instruments.virtual.servers.station import Listener, Station
 from instruments.virtual.servers.vxi11 import ABORT, CORE, PROGRAM_VERSION, Vxi11Server
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Iterator
     from types import TracebackType
 
-    from instruments.virtual.bench.bus import Bus
+    from instruments.virtual.bench.bench import VirtualBench
 
 LOOPBACK = "127.0.0.1"
 
@@ -29,10 +29,12 @@ PORTS_PER_INSTRUMENT = 4
 
 
 @dataclass(frozen=True)
-class Offer:
+class Endpoints:
     """Where other programs find an instrument.
 
-    address: its resource name on the bus; resources: the names to use, by the way that they go.
+    Attributes:
+        address: its resource name on the bench.
+        resources: the resource names for other programs, by protocol: socket, hislip, vxi11, pty.
     """
 
     address: str
@@ -40,82 +42,87 @@ class Offer:
 
 
 @dataclass(frozen=True)
-class Place:
+class ListenAt:
     """Where to listen.
 
-    host: an address of this machine; port_base: the first of the ports, None: any free ones; port_mapper: the port at
-    which each instrument with VXI-11 has a port mapper, and so a loopback address of its own, from 127.0.0.2 on; None:
-    there is none.
+    Attributes:
+        host: an address of this machine.
+        port_base: the first of the ports; None: any free ones.
+        port_mapper: the port of a port mapper, which each instrument with VXI-11 then has, and so a loopback address of
+            its own, from 127.0.0.2 on; None: no port mapper.
     """
 
     host: str = LOOPBACK
     port_base: int | None = None
     port_mapper: int | None = None
 
-    def shown(self) -> str:
-        """The host as it stands in resource names."""
+    def name_in_resources(self) -> str:
+        """The host as resource names have it: a name of this machine where it listens at all addresses."""
         return socket.gethostname() if self.host in {"", "0.0.0.0"} else self.host  # noqa: S104 - only asked for
 
-    def own_host(self, index: int) -> Place:
-        """Where the instrument of this index listens that has a port mapper."""
+    def of_instrument(self, index: int) -> ListenAt:
+        """Where the instrument of this index listens: at an address of its own where it has a port mapper."""
         return self if self.port_mapper is None else replace(self, host=f"127.0.0.{2 + index}")
 
     def ports(self, index: int) -> Iterator[int]:
-        """The ports of one instrument."""
+        """The ports of the instrument of this index, 0 for any free one."""
         first = self.port_base
-        for place in range(PORTS_PER_INSTRUMENT):
-            yield 0 if first is None else first + PORTS_PER_INSTRUMENT * index + place
+        for listen_at in range(PORTS_PER_INSTRUMENT):
+            yield 0 if first is None else first + PORTS_PER_INSTRUMENT * index + listen_at
 
 
 @contextlib.asynccontextmanager
-async def offered(bus: Bus, place: Place | None = None) -> AsyncIterator[tuple[Offer, ...]]:
-    """All instruments of the bus, for as long as this lasts.  Raises OSError when a port is taken.
+async def serve_bench(bench: VirtualBench, listen_at: ListenAt | None = None) -> AsyncIterator[tuple[Endpoints, ...]]:
+    """Serve all instruments of a bench while the context lasts; gives their endpoints.
 
-    The clock of the bench should run by itself; one that jumps is made to jump to each answer.
+    The clock of the bench should run by itself; the servers make one that jumps go to each answer.
+
+    Raises:
+        OSError: a port is in use, or the machine does not have the address.
     """
-    place = place or Place()
+    listen_at = listen_at or ListenAt()
     async with contextlib.AsyncExitStack() as opened:
         yield tuple(
             [
-                Offer(address, await _offer(Station(bus, device), address, place, index, opened))
-                for index, (address, device) in enumerate(bus.instruments.items())
+                Endpoints(address, await _listen(ServedInstrument(bench, device), address, listen_at, index, opened))
+                for index, (address, device) in enumerate(bench.instruments.items())
             ]
         )
 
 
-async def _offer(
-    station: Station, address: str, place: Place, index: int, opened: contextlib.AsyncExitStack
+async def _listen(
+    instrument: ServedInstrument, address: str, listen_at: ListenAt, index: int, opened: contextlib.AsyncExitStack
 ) -> dict[str, str]:
-    """Begin to listen; the resource names by the way that they go."""
+    """Begin to listen for one instrument.  Returns its resource names, by protocol."""
     if not address.upper().startswith("ASRL"):
-        place = place.own_host(index)
-    ports, host = place.ports(index), place.shown()
+        listen_at = listen_at.of_instrument(index)
+    ports, host = listen_at.ports(index), listen_at.name_in_resources()
 
     async def listen(listener: Listener) -> int:
-        opened.push_async_callback(listener.close)  # first: opening may be given up half way
-        await listener.open(place.host, next(ports))
+        opened.push_async_callback(listener.close)  # first: opening may be cancelled half way
+        await listener.open(listen_at.host, next(ports))
         return listener.port
 
     if address.upper().startswith("ASRL"):
-        resources = {"socket": f"ASRLsocket://{host}:{await listen(socket_listener(station))}::INSTR"}
+        resources = {"socket": f"ASRLsocket://{host}:{await listen(socket_listener(instrument))}::INSTR"}
         if serial_port.HAS_PSEUDO_TERMINALS:
-            line = serial_port.PseudoTerminal(station)
+            line = serial_port.PseudoTerminal(instrument)
             opened.push_async_callback(line.close)
             line.open()
             resources["pty"] = f"ASRL{line.name}::INSTR"
         return resources
-    hislip, vxi11 = HislipServer(station), Vxi11Server(station)
+    hislip, vxi11 = HislipServer(instrument), Vxi11Server(instrument)
     resources = {
-        "socket": f"TCPIP0::{host}::{await listen(socket_listener(station))}::SOCKET",
+        "socket": f"TCPIP0::{host}::{await listen(socket_listener(instrument))}::SOCKET",
         "hislip": f"TCPIP0::{host}::hislip0,{await listen(hislip.listener)}::INSTR",
         "vxi11": f"TCPIP0::{host},{await listen(vxi11.core)}::inst0::INSTR",
     }
     await listen(vxi11.abort)
-    if place.port_mapper is not None:
+    if listen_at.port_mapper is not None:
         programs = {(CORE, PROGRAM_VERSION, TCP): vxi11.core.port, (ABORT, PROGRAM_VERSION, TCP): vxi11.abort.port}
-        mapper = PortMapper(station, programs)
+        mapper = PortMapper(instrument, programs)
         opened.push_async_callback(mapper.close)
-        await mapper.open(place.host, place.port_mapper)
+        await mapper.open(listen_at.host, listen_at.port_mapper)
         if mapper.port == PORT:
             resources["vxi11"] = f"TCPIP0::{host}::inst0::INSTR"
     return resources
@@ -123,25 +130,31 @@ async def _offer(
 
 @dataclass
 class BenchServer:
-    """Offers a bus from a thread of its own, between ``with`` and its end; it may be entered again afterwards.
+    """Serves a bench from a thread of its own while its ``with`` block runs; a second block may follow.
 
-    offers: where the instruments are, once it runs.  Raises OSError when a port is taken.
+    Attributes:
+        bench: to serve.
+        listen_at: where.
+        endpoints: where the instruments are, once it runs.
 
-    So the first instrument's address over HiSLIP, such as TCPIP0::127.0.0.1::hislip0,40213::INSTR, is printed by::
+    Raises:
+        OSError: on entering, where a port is in use.
 
-        with BenchServer(bus) as server:
-            print(server.offers[0].resources["hislip"])
+    This prints the first instrument's address over HiSLIP, such as TCPIP0::127.0.0.1::hislip0,40213::INSTR::
+
+        with BenchServer(bench) as server:
+            print(server.endpoints[0].resources["hislip"])
     """
 
-    bus: Bus
-    place: Place = field(default_factory=Place)
-    offers: tuple[Offer, ...] = ()
+    bench: VirtualBench
+    listen_at: ListenAt = field(default_factory=ListenAt)
+    endpoints: tuple[Endpoints, ...] = ()
     _loop: asyncio.AbstractEventLoop | None = field(init=False, default=None)
     _end: asyncio.Event = field(init=False)
     _failed: Exception | None = field(init=False, default=None)
 
     def __enter__(self) -> Self:
-        """Returns when every instrument can be reached."""
+        """Start the thread, and return when every instrument can be reached."""
         self._end = asyncio.Event()
         begun = threading.Event()
         self._thread = threading.Thread(target=self._run, args=(begun,), name="virtual bench")
@@ -156,7 +169,7 @@ class BenchServer:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """All connections are closed and the thread has ended."""
+        """Close all connections, and wait for the end of the thread."""
         assert self._loop
         self._loop.call_soon_threadsafe(self._end.set)
         self._thread.join()
@@ -167,9 +180,9 @@ class BenchServer:
     async def _serve(self, begun: threading.Event) -> None:
         self._loop = asyncio.get_running_loop()
         try:
-            async with offered(self.bus, self.place) as self.offers:
+            async with serve_bench(self.bench, self.listen_at) as self.endpoints:
                 begun.set()
                 await self._end.wait()
-        except Exception as error:  # noqa: BLE001 - told by the thread that waits for us
+        except Exception as error:  # noqa: BLE001 - raised by the thread that waits for this one
             self._failed = error
             begun.set()

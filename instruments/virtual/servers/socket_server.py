@@ -5,20 +5,20 @@ from __future__ import annotations
 import asyncio
 from typing import TYPE_CHECKING, Protocol
 
-from instruments.virtual.servers.station import CHUNK, Link, Listener, first_of
+from instruments.virtual.servers.clients import CHUNK, Link, Listener, first_of
 
 if TYPE_CHECKING:
-    from instruments.virtual.servers.station import Station
+    from instruments.virtual.servers.clients import ServedInstrument
 
 
 class Wire(Protocol):
     """A two-way stream of bytes."""
 
     async def read(self) -> bytes:
-        """What has come, at least a byte; nothing: it was the end."""
+        """Wait for bytes, and return them, at least one; none: the stream has ended."""
 
     async def write(self, data: bytes) -> None:
-        """Send; waits while the other side takes nothing."""
+        """Send bytes; wait while the other side takes none."""
 
 
 class TcpWire:
@@ -37,22 +37,22 @@ class TcpWire:
         await self._writer.drain()
 
 
-def socket_listener(station: Station) -> Listener:
-    """Offers an instrument over bare TCP."""
+def socket_listener(instrument: ServedInstrument) -> Listener:
+    """A listener that serves an instrument over bare TCP."""
 
     async def talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        await converse(station, TcpWire(reader, writer))
+        await converse(instrument, TcpWire(reader, writer))
 
-    return Listener(station, talk)
+    return Listener(instrument, talk)
 
 
-async def converse(station: Station, wire: Wire) -> None:
+async def converse(instrument: ServedInstrument, wire: Wire) -> None:
     """Let a client talk to an instrument until it goes away.
 
-    A message waits until the answers to those before it have been sent: so no flood of questions piles up answers.
-    An instrument that a client of HiSLIP or VXI-11 has locked waits with everything that comes here.
+    A message waits until the answers to those before it have been sent, so a flood of questions piles up no answers.
+    While a client of HiSLIP or VXI-11 has the instrument locked, all messages that come here wait.
     """
-    link = Link(station, stream=True)
+    link = Link(instrument, stream=True)
     received: asyncio.Queue[bytes] = asyncio.Queue(1)
 
     async def receive() -> None:
@@ -63,7 +63,7 @@ async def converse(station: Station, wire: Wire) -> None:
     async def work() -> None:
         while True:
             await link.write(await received.get())
-            while await link.answered(given_up=link.quiet):
+            while await link.wait_for_answer(give_up=link.is_idle):
                 await wire.write(link.take(CHUNK)[0])
             received.task_done()
 

@@ -1,4 +1,4 @@
-"""XDR, how remote procedure calls write numbers and strings of bytes (RFC 4506)."""
+"""XDR: the form in which remote procedure calls write numbers and strings of bytes (RFC 4506)."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import struct
 
 
 class Garbage(Exception):
-    """The bytes are not what they should be."""
+    """The bytes are not the values that were expected."""
 
 
 class Reader:
-    """XDR: whole numbers and strings of bytes, each filled up to four bytes."""
+    """Reads whole numbers and strings of bytes, each padded to a multiple of four bytes."""
 
     def __init__(self, data: bytes) -> None:
         self._data, self._place = data, 0
@@ -20,11 +20,11 @@ class Reader:
         return int.from_bytes(self._bytes(4))
 
     def numbers(self, count: int) -> tuple[int, ...]:
-        """So many of them."""
+        """The next `count` numbers.  Raises Garbage."""
         return tuple(self.number() for _ in range(count))
 
     def opaque(self) -> bytes:
-        """A string of bytes."""
+        """A string of bytes.  Raises Garbage."""
         length = self.number()
         data = self._bytes(length)
         self._place += -length % 4
@@ -38,10 +38,10 @@ class Reader:
         return data
 
 
-def packed(*values: int | bytes) -> bytes:
-    r"""The other way round.
+def pack(*values: int | bytes) -> bytes:
+    r"""Pack whole numbers and strings of bytes, the inverse of `Reader`.
 
-    >>> packed(1, b"abc")
+    >>> pack(1, b"abc")
     b'\x00\x00\x00\x01\x00\x00\x00\x03abc\x00'
     """
     return b"".join(

@@ -88,7 +88,7 @@ def test_a_word_is_read_in_its_short_and_long_form_in_any_case(row):
 
 
 @pytest.mark.parametrize("row", WORDS)
-def test_a_refused_word_is_told_with_the_choices(row):
+def test_the_error_of_a_refused_word_has_the_choices(row):
     expected = refused(row, "BANANA").expected
     assert expected.startswith(("one of ", "a number from "))
 

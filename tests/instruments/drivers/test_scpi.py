@@ -91,7 +91,7 @@ def test_choices_are_taken_in_any_case_and_sent_in_capitals():
 
 
 @pytest.mark.parametrize("answer", ["", "twelve", "1,2"])
-def test_an_answer_that_is_no_number_is_told_with_its_question(answer):
+def test_the_error_of_an_answer_that_is_no_number_has_the_question(answer):
     with conversation(Keysight33500B, ("FREQ?", answer), (CLEAR, None)) as generator, pytest.raises(BadAnswer) as bad:
         _ = generator.frequency
     assert (bad.value.question, bad.value.answer) == ("FREQ?", answer)
@@ -118,7 +118,7 @@ def test_the_whole_queue_is_read_oldest_first():
     assert refusal.value.entries == ('-113 "Undefined header"', '-222 "Data out of range"')
 
 
-def test_a_queue_that_never_ends_is_given_up_and_told_in_a_short_line():
+def test_a_queue_that_never_ends_raises_with_a_short_line():
     endless = [("SYST:ERR?", '-310,"System error"')] * 64
     with conversation(ScpiInstrument, ("FOO", None), *endless) as instrument, pytest.raises(CommandRefused) as refusal:
         instrument.command("FOO")
@@ -165,7 +165,7 @@ def test_the_expected_instrument_is_welcome(driver, identity):
         (Keysight33500B, "Agilent Technologies,33220A,MY44000001,2.02-2.02-22-2"),
     ],
 )
-def test_another_instrument_is_told_with_what_it_says(driver, identity):
+def test_another_instrument_raises_with_its_identity(driver, identity):
     with conversation(driver, ("*IDN?", identity)) as instrument, pytest.raises(WrongInstrument) as wrong:
         instrument.identity()
     assert wrong.value.identity == identity
@@ -266,7 +266,7 @@ def test_a_gate_that_another_program_changed_is_named():
     lines = [*accepted("SENS:FREQ:GATE:TIME 0.001")]
     with conversation(Keysight53230A, *lines) as counter:
         counter.gate = 1e-3
-        now = {row.full_name: 0.0 for row in counter.declared()} | {"gate_s": 5e-3}
+        now = {row.name_with_unit: 0.0 for row in counter.declared()} | {"gate_s": 5e-3}
         assert counter.changed_settings(now) == {"gate_s": (1e-3, 5e-3)}
 
 

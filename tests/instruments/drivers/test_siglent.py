@@ -15,7 +15,7 @@ from instruments.drivers.oscilloscope.siglent_sds1000xe import SiglentSDS1000XE
 from instruments.errors import BadAnswer, CommandRefused, OutOfRange
 from instruments.ieee488 import BlockForm, BrokenBlock, block_of
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.generator.siglent_sdg1000x import VirtualSDG1000X
 from instruments.virtual.oscilloscope.siglent_sds1000xe import VirtualSDS1000XE
@@ -181,7 +181,9 @@ def test_a_scope_that_keeps_its_memory_gives_all_its_points():
     device = KeepsItsMemory(VirtualClock(), signals={1: pulses, 2: pulses})
     device.settings["depth"] = "140K"
     address = "TCPIP0::scope::inst0::INSTR"
-    driver = SiglentSDS1000XE(VisaTransport(address, library=library_for(Bus({address: device}))), clock=device.clock)
+    driver = SiglentSDS1000XE(
+        VisaTransport(address, library=library_for(VirtualBench({address: device}))), clock=device.clock
+    )
     wanted = {"duration_s": 0.1, "points": 1000, "volts_per_division": 0.2, "offset_v": 0.65, "trigger_level_v": 0.65}
     driver.prepare(channels=(1, 2), **wanted)
     driver.acquire(timeout_s=1.0)
@@ -196,7 +198,9 @@ def test_a_scope_that_keeps_its_memory_gives_all_its_points():
 def test_a_trigger_that_never_comes_is_waited_for_as_long_as_a_record_and_the_time_given():
     device = scope(signal=lambda _start, _step, n: np.full(n, 0.4))
     address = "TCPIP0::scope::inst0::INSTR"
-    driver = SiglentSDS1000XE(VisaTransport(address, library=library_for(Bus({address: device}))), clock=device.clock)
+    driver = SiglentSDS1000XE(
+        VisaTransport(address, library=library_for(VirtualBench({address: device}))), clock=device.clock
+    )
     driver.prepare(duration_s=0.1, points=1000, volts_per_division=0.2, trigger_level_v=0.65)
     before = device.clock.now()
     with pytest.raises(NeverTriggered, match=r"0\.65 V"):
@@ -207,7 +211,9 @@ def test_a_trigger_that_never_comes_is_waited_for_as_long_as_a_record_and_the_ti
 def test_a_record_without_a_trigger_is_forced_where_auto_is_asked_for():
     device = scope(signal=lambda _start, _step, n: np.full(n, 0.4))
     address = "TCPIP0::scope::inst0::INSTR"
-    driver = SiglentSDS1000XE(VisaTransport(address, library=library_for(Bus({address: device}))), clock=device.clock)
+    driver = SiglentSDS1000XE(
+        VisaTransport(address, library=library_for(VirtualBench({address: device}))), clock=device.clock
+    )
     driver.prepare(duration_s=0.1, points=1000, volts_per_division=0.2, trigger_level_v=0.65, sweep="auto")
     driver.acquire(timeout_s=1.0)
     assert driver.trace(1).volts == pytest.approx(0.4, abs=0.01)

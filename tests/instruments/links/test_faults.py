@@ -1,4 +1,4 @@
-"""Faults of links and instruments: each is told as what it is, and the next question gets its own answer."""
+"""Faults of links and instruments: each raises the error that names it, and the next question gets its own answer."""
 
 import contextlib
 
@@ -9,7 +9,7 @@ from instruments.clock import VirtualClock
 from instruments.drivers.scpi import ScpiInstrument, Setting
 from instruments.errors import BadAnswer, CommandRefused, InstrumentError, NoAnswer, NotConnected
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.faults import AWAY, FAULTS, LATE, Fault
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.core.device import VirtualInstrument
@@ -37,11 +37,11 @@ class Box(ScpiInstrument):
     """Its driver."""
 
     MODELS = "box"
-    bus: object
+    bench: object
     level = Setting("LEV", float, unit="V", low=-5.0, high=5.0)
 
     def reading(self):
-        return self.measured("READ?")
+        return self.read_number("READ?")
 
     def data(self):
         return self.transport.query_block("DATA?")
@@ -50,9 +50,9 @@ class Box(ScpiInstrument):
 @pytest.fixture(params=[MESSAGES, STREAM], ids=["messages", "stream"])
 def box(request):
     clock = VirtualClock()
-    bus = Bus({request.param: VirtualBox(clock)})
-    box = Box(VisaTransport(request.param, library=library_for(bus)))
-    box.bus, box.clock = bus, clock
+    bench = VirtualBench({request.param: VirtualBox(clock)})
+    box = Box(VisaTransport(request.param, library=library_for(bench)))
+    box.bench, box.clock = bench, clock
     return box
 
 
@@ -82,12 +82,12 @@ def test_every_fault_is_tried():
 
 
 @pytest.mark.parametrize("what", FAULTS)
-def test_a_fault_is_told_as_what_it_is_and_the_next_question_gets_its_own_answer(box, what):
-    box.bus.faults.append(Fault(what, question=r"READ\?"))
+def test_a_fault_raises_its_error_and_the_next_question_gets_its_answer(box, what):
+    box.bench.faults.append(Fault(what, question=r"READ\?"))
     expected = READING[what]
     if isinstance(expected, tuple):
-        error, told = expected
-        with pytest.raises(error, match=told) as caught:
+        error, message = expected
+        with pytest.raises(error, match=message) as caught:
             box.reading()
         assert caught.value.address == box.transport.address
         assert "\n" not in str(caught.value)
@@ -107,12 +107,12 @@ def test_a_fault_is_told_as_what_it_is_and_the_next_question_gets_its_own_answer
 
 
 def release(box):
-    (hold,) = box.bus._holds.values()
-    hold.holders.clear()
+    (client_lock,) = box.bench._client_locks.values()
+    client_lock.holders.clear()
 
 
 @pytest.mark.parametrize(
-    ("what", "error", "told"),
+    ("what", "error", "message"),
     [
         ("no answer", NoAnswer, "no answer"),
         ("late answer", NoAnswer, "no answer"),
@@ -124,9 +124,9 @@ def release(box):
         ("9.91E37", BadAnswer, "expected a definite-length block"),
     ],
 )
-def test_a_broken_block_is_refused_and_what_is_left_of_it_forgotten(box, what, error, told):
-    box.bus.faults.append(Fault(what, question=r"DATA\?"))
-    with pytest.raises(error, match=told):
+def test_a_broken_block_is_refused_and_what_is_left_of_it_forgotten(box, what, error, message):
+    box.bench.faults.append(Fault(what, question=r"DATA\?"))
+    with pytest.raises(error, match=message):
         box.data()
     box.clock.sleep(2 * LATE)
     if what == "disconnected":
@@ -138,7 +138,7 @@ def test_a_broken_block_is_refused_and_what_is_left_of_it_forgotten(box, what, e
 
 @pytest.mark.parametrize("what", ["single bytes", "two answers at once", "garbage after"])
 def test_a_block_is_read_whole_however_it_comes(box, what):
-    box.bus.faults.append(Fault(what, question=r"DATA\?"))
+    box.bench.faults.append(Fault(what, question=r"DATA\?"))
     if what == "single bytes" or box.transport.address == STREAM:
         assert box.data() == DATA
     else:  # the interface marks the end of a message: more behind the block is seen, and refused
@@ -147,8 +147,8 @@ def test_a_block_is_read_whole_however_it_comes(box, what):
     assert box.data() == DATA
 
 
-def test_an_error_queue_that_overflowed_is_told_with_its_first_entries_and_is_empty_afterwards(box):
-    box.bus.faults.append(Fault("error queue overflow", question=r"READ\?"))
+def test_a_full_error_queue_raises_its_first_entries_and_is_emptied(box):
+    box.bench.faults.append(Fault("error queue overflow", question=r"READ\?"))
     assert box.reading() == 25.0
     with pytest.raises(CommandRefused, match=r"Undefined header.* and 16 more") as refused:
         box.level = 2.0
@@ -158,7 +158,7 @@ def test_an_error_queue_that_overflowed_is_told_with_its_first_entries_and_is_em
     assert box.level == 2.0
 
 
-def test_an_error_that_stood_in_the_queue_before_a_reading_is_told_with_it(box):
+def test_an_error_that_stood_in_the_queue_is_raised_with_a_reading(box):
     box.transport.write("NONSENSE")
     with pytest.raises(CommandRefused, match=r"READ.*Undefined header"):
         box.reading()
@@ -166,7 +166,7 @@ def test_an_error_that_stood_in_the_queue_before_a_reading_is_told_with_it(box):
 
 
 def test_an_instrument_that_is_away_is_refused_until_it_is_back(box):
-    box.bus.faults.append(Fault("away for 5 s", question=r"READ\?"))
+    box.bench.faults.append(Fault("away for 5 s", question=r"READ\?"))
     with pytest.raises(NotConnected):
         box.reading()
     with pytest.raises(NotConnected, match="cannot be opened"):
@@ -177,7 +177,7 @@ def test_an_instrument_that_is_away_is_refused_until_it_is_back(box):
 
 
 def test_a_lock_keeps_another_program_out_and_is_gone_with_its_link(box):
-    other = Box(VisaTransport(box.transport.address, library=library_for(box.bus)))
+    other = Box(VisaTransport(box.transport.address, library=library_for(box.bench)))
     other.transport.lock()
     for act in (box.transport.lock, box.reading):
         with pytest.raises(NotConnected, match=r"locked|another program"):
@@ -189,7 +189,7 @@ def test_a_lock_keeps_another_program_out_and_is_gone_with_its_link(box):
 
 @pytest.mark.parametrize("what", [what for what in FAULTS if what != "taken by another"])
 def test_faults_one_after_the_other_never_give_a_wrong_number(box, what):
-    box.bus.faults.append(Fault(what, times=7, after=1))
+    box.bench.faults.append(Fault(what, times=7, after=1))
     seen = []
     for _ in range(30):
         try:
@@ -255,10 +255,10 @@ def served_box(way):
     clock = StandingClock()
     box = VirtualBox(clock)
     box.pace = 0.0
-    bus = Bus({MESSAGES: box})
-    with BenchServer(bus) as server:
-        box = Box(PatientLink(server.offers[0].resources[way], library="@py", timeout=AT_MOST))
-        box.bus, box.clock = bus, clock
+    bench = VirtualBench({MESSAGES: box})
+    with BenchServer(bench) as server:
+        box = Box(PatientLink(server.endpoints[0].resources[way], library="@py", timeout=AT_MOST))
+        box.bench, box.clock = bench, clock
         try:
             yield box
         finally:
@@ -267,7 +267,7 @@ def served_box(way):
 
 @pytest.mark.parametrize("what", FAULTS)
 @pytest.mark.parametrize("way", ["socket", "hislip", "vxi11"])
-def test_over_a_server_a_fault_is_told_as_what_it_is_and_the_next_question_gets_its_own_answer(way, what, monkeypatch):
+def test_a_fault_over_a_server_raises_and_the_next_answer_is_right(way, what, monkeypatch):
     monkeypatch.setattr("instruments.virtual.servers.hislip.FIRST_WORDS", AT_MOST)  # a busy machine delays the client
     monkeypatch.setattr("instruments.virtual.servers.hislip.SECOND_CHANNEL", AT_MOST)
     if what in LOST:  # pyvisa-py looks until its time-out for more on a connection that has ended, and at its farewell
@@ -275,12 +275,12 @@ def test_over_a_server_a_fault_is_told_as_what_it_is_and_the_next_question_gets_
         monkeypatch.setattr("pyvisa_py.tcpip.Vxi11CoreClient.destroy_link", lambda *_: 0)
     with served_box(way) as box:
         box.identity()
-        box.bus.faults.append(Fault(what, question=r"READ\?"))
+        box.bench.faults.append(Fault(what, question=r"READ\?"))
         expected = SERVED.get((way, what), READING[what])
         if isinstance(expected, tuple):
-            error, told = expected
+            error, message = expected
             box.transport.in_vain = error is NoAnswer
-            with pytest.raises(error, match=told.partition(" within")[0]) as caught:
+            with pytest.raises(error, match=message.partition(" within")[0]) as caught:
                 box.reading()
             assert caught.value.address == box.transport.address
         else:

@@ -19,11 +19,11 @@ from instruments.clock import VirtualClock
 from instruments.drivers.magnetometer.lakeshore_425 import LakeShore425
 from instruments.errors import BadAnswer, InstrumentError, NoAnswer, NotConnected, Occupied, OutOfRange
 from instruments.links.serial_port import SerialTransport, port_name
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.faults import FAULTS, Fault
 from instruments.virtual.bench.serial_line import benches
 from instruments.virtual.core.device import VirtualInstrument
-from instruments.virtual.core.line import LineSettings, carried
+from instruments.virtual.core.line import LineSettings, received_as
 from instruments.virtual.core.rows import Ask
 from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
 from support.waiting import HANG_GUARD_S as AT_MOST
@@ -61,8 +61,8 @@ def clock():
 
 
 @pytest.fixture
-def bus(clock, monkeypatch):
-    bus = Bus(
+def bench(clock, monkeypatch):
+    bench = VirtualBench(
         {
             "ASRLlevilab://magnetometer::INSTR": Virtual425(clock, flux_density=lambda _: 0.0123, zero_error=0.0),
             "ASRLslow::INSTR": Slow(clock),
@@ -72,12 +72,12 @@ def bus(clock, monkeypatch):
     monkeypatch.setattr(
         serial, "protocol_handler_packages", [*serial.protocol_handler_packages, "instruments.virtual.bench"]
     )
-    monkeypatch.setitem(benches, "", lambda: bus)
-    return bus
+    monkeypatch.setitem(benches, "", lambda: bench)
+    return bench
 
 
 @pytest.fixture
-def slow(bus):
+def slow(bench):
     with contextlib.closing(SerialTransport(SLOW)) as transport:
         yield transport
 
@@ -85,7 +85,7 @@ def slow(bus):
 # --- messages ---
 
 
-def test_the_driver_reads_the_field_through_the_port(bus):
+def test_the_driver_reads_the_field_through_the_port(bench):
     magnetometer = LakeShore425(SerialTransport(METER, **LINE))
     assert magnetometer.identity() == "LSCI,MODEL425,VIRTUAL,1.0"
     magnetometer.prepare(range_t=0.02)
@@ -93,7 +93,7 @@ def test_the_driver_reads_the_field_through_the_port(bus):
     magnetometer.close()
 
 
-def test_silence_is_told_with_what_to_try_and_costs_virtual_time_only(slow, clock):
+def test_silence_raises_with_advice_and_costs_virtual_time_only(slow, clock):
     slow.timeout = 3600.0
     with pytest.raises(NoAnswer, match="parity") as silence:
         slow.query("FOO?")
@@ -120,8 +120,8 @@ def test_a_late_answer_never_reaches_the_next_question(slow, clock, late, later)
     assert slow.query("LIST?") == "1,2,1,1,1"
 
 
-def test_a_late_identity_is_not_taken_for_the_one_that_was_asked_for_to_resynchronise(bus, clock):
-    device = bus.instruments["ASRLslow::INSTR"]
+def test_a_late_identity_is_not_taken_for_the_one_that_was_asked_for_to_resynchronise(bench, clock):
+    device = bench.instruments["ASRLslow::INSTR"]
     with contextlib.closing(SerialTransport(SLOW)) as transport:
         device.busy_until(clock.now() + 3.0)
         with pytest.raises(NoAnswer):
@@ -129,8 +129,8 @@ def test_a_late_identity_is_not_taken_for_the_one_that_was_asked_for_to_resynchr
         assert transport.query("LIST?") == "1,2,1,1,1"
 
 
-def test_an_instrument_that_was_off_is_found_when_it_is_on(bus, clock):
-    device = bus.instruments["ASRLslow::INSTR"]
+def test_an_instrument_that_was_off_is_found_when_it_is_on(bench, clock):
+    device = bench.instruments["ASRLslow::INSTR"]
     steps, device.steps = device.steps, lambda _: iter(())
     with contextlib.closing(SerialTransport(SLOW)) as transport:
         for _ in range(3):
@@ -161,7 +161,7 @@ def test_an_interrupted_wait_leaves_no_answer_for_the_next_question(slow, clock,
     assert slow.query("LIST?") == "1,2,1,1,1"
 
 
-def test_an_answer_that_is_no_text_is_told_and_forgotten(slow):
+def test_an_answer_that_is_no_text_raises_and_is_forgotten(slow):
     with pytest.raises(BadAnswer, match="plain text") as bad:
         slow.query("BIN?")
     assert bad.value.question == "BIN?"
@@ -174,7 +174,7 @@ def test_a_block_of_any_bytes_comes_whole(slow):
 
 
 @pytest.mark.parametrize(("question", "error"), [("LIST?", BadAnswer), ("CUT?", BadAnswer), ("FOO?", NoAnswer)])
-def test_what_is_no_block_is_told_and_forgotten(slow, question, error):
+def test_what_is_no_block_raises_and_is_forgotten(slow, question, error):
     with pytest.raises(error) as bad:
         slow.query_block(question)
     assert bad.value.question == question
@@ -188,7 +188,7 @@ def test_clearing_drops_what_is_under_way(slow, clock):
     assert slow.query("LIST?") == "1,2,1,1,1"
 
 
-def test_the_log_gets_the_bytes_of_both_directions(bus):
+def test_the_log_gets_the_bytes_of_both_directions(bench):
     traffic = []
     with contextlib.closing(SerialTransport(SLOW, log=lambda *line: traffic.append(line))) as transport:
         transport.write("*CLS")
@@ -203,7 +203,7 @@ def test_the_log_gets_the_bytes_of_both_directions(bus):
     ]
 
 
-def test_the_instrument_is_left_alone_between_two_exchanges(bus, monkeypatch):
+def test_the_instrument_is_left_alone_between_two_exchanges(bench, monkeypatch):
     now, slept = [100.0], []
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
     monkeypatch.setattr(time, "sleep", slept.append)
@@ -219,10 +219,10 @@ def test_the_instrument_is_left_alone_between_two_exchanges(bus, monkeypatch):
 
 
 @pytest.mark.parametrize("what", FAULTS)
-def test_after_each_fault_there_is_an_error_or_the_right_reading_and_soon_right_ones_again(bus, clock, what):
+def test_after_each_fault_there_is_an_error_or_the_right_reading_and_soon_right_ones_again(bench, clock, what):
     magnetometer = LakeShore425(SerialTransport(METER, **LINE))
     magnetometer.prepare(range_t=0.02)
-    bus.faults.append(Fault(what, question=r"RDGFIELD\?", after=1))
+    bench.faults.append(Fault(what, question=r"RDGFIELD\?", after=1))
     readings = []
     for _ in range(20):
         clock.sleep(1.0)
@@ -231,8 +231,8 @@ def test_after_each_fault_there_is_an_error_or_the_right_reading_and_soon_right_
         except (NoAnswer, BadAnswer):
             pass
         except NotConnected:
-            for hold in bus._holds.values():  # the other program has ended
-                hold.holders.clear()
+            for client_lock in bench._client_locks.values():  # the other program has ended
+                client_lock.holders.clear()
             with contextlib.suppress(NotConnected):
                 magnetometer.transport.reopen()
     assert readings == pytest.approx([0.0123] * len(readings), rel=3e-4)
@@ -240,9 +240,9 @@ def test_after_each_fault_there_is_an_error_or_the_right_reading_and_soon_right_
     magnetometer.close()
 
 
-def test_a_port_that_another_program_has_taken_is_occupied(bus):
+def test_a_port_that_another_program_has_taken_is_occupied(bench):
     with contextlib.closing(SerialTransport(SLOW)) as transport:
-        next(iter(bus._holds.values())).holders[:] = ["another program"]
+        next(iter(bench._client_locks.values())).holders[:] = ["another program"]
         with pytest.raises(Occupied):
             transport.query("*IDN?")
 
@@ -259,7 +259,7 @@ def test_a_port_that_another_program_has_taken_is_occupied(bus):
         ({"baud_rate": 115200}, NoAnswer),
     ],
 )
-def test_wrong_settings_are_told_each_time_with_a_hint(bus, wrong, error):
+def test_wrong_settings_raise_each_time_with_a_hint(bench, wrong, error):
     with contextlib.closing(SerialTransport(METER, **(LINE | wrong))) as transport:
         for _ in range(2):
             with pytest.raises(error, match="parity"):
@@ -272,7 +272,7 @@ def test_a_parity_that_does_not_exist_is_refused():
 
 
 @pytest.mark.parametrize("wrong", [{"data_bits": 9}, {"stop_bits": 3}, {"baud_rate": -1}])
-def test_settings_that_no_port_has_are_told(bus, wrong):
+def test_settings_that_no_port_has_raise(bench, wrong):
     with pytest.raises(NotConnected, match="cannot be opened"):
         SerialTransport(METER, **(LINE | wrong))
 
@@ -289,7 +289,7 @@ LINES = st.builds(
 @given(st.binary(max_size=64), LINES)
 def test_between_ends_set_alike_bytes_arrive_as_they_were_sent(data, line):
     mask = (1 << line.data_bits) - 1
-    assert carried(data, line, line) == bytes(byte & mask for byte in data)
+    assert received_as(data, line, line) == bytes(byte & mask for byte in data)
 
 
 @given(st.binary(max_size=64), LINES)
@@ -297,16 +297,16 @@ def test_more_stop_bits_than_needed_change_nothing(data, line):
     # the samples of a receiver at twice the rate would fall elsewhere: this goes through the bits
     twice = LineSettings(line.baud_rate, line.data_bits, line.parity, 2.0)
     other = "O" if line.parity == "E" else "E"
-    assert carried(data, twice, line) == carried(data, line, line)
+    assert received_as(data, twice, line) == received_as(data, line, line)
     if line.parity != "N":
         unchecked = LineSettings(line.baud_rate, line.data_bits, other, 1.0)
-        assert carried(data, line, unchecked, checked=False) == carried(data, line, line)
+        assert received_as(data, line, unchecked, checked=False) == received_as(data, line, line)
 
 
 @given(st.binary(max_size=64), LINES, LINES)
 def test_garbage_is_the_same_each_time_and_no_longer_than_time_allows(data, sender, receiver):
-    heard = carried(data, sender, receiver)
-    assert heard == carried(data, sender, receiver)
+    heard = received_as(data, sender, receiver)
+    assert heard == received_as(data, sender, receiver)
     shortest = (1 + receiver.data_bits + (receiver.parity != "N") + 0.5) / receiver.baud_rate
     assert len(heard) <= sender.duration(len(data)) / shortest + 1
     assert all(byte < 1 << receiver.data_bits for byte in heard)
@@ -314,7 +314,7 @@ def test_garbage_is_the_same_each_time_and_no_longer_than_time_allows(data, send
 
 def test_what_a_program_set_to_8n1_hears_of_a_425():
     # as seen by many who forgot the parity: every other letter has its highest bit set
-    heard = carried(b"LSCI,MODEL425", LineSettings(57600, 7, "O"), LineSettings(57600, 8, "N"))
+    heard = received_as(b"LSCI,MODEL425", LineSettings(57600, 7, "O"), LineSettings(57600, 8, "N"))
     assert heard == b"L\xd3CI,\xcdO\xc4EL42\xb5"
 
 
@@ -398,7 +398,7 @@ def failing(monkeypatch, error):
 
 
 @pytest.mark.parametrize(
-    ("platform", "error", "told", "words"),
+    ("platform", "error", "expected", "words"),
     [
         ("linux", serial.SerialException(errno.EBUSY, "busy"), Occupied, "another program"),
         ("linux", serial.SerialException(errno.EAGAIN, "exclusively"), Occupied, "another program"),
@@ -407,20 +407,25 @@ def failing(monkeypatch, error):
         ("win32", serial.SerialException("PermissionError(13, 'Access is denied.')"), Occupied, "another program"),
         ("win32", serial.SerialException("FileNotFoundError(2, ...)"), NotConnected, "serial ports of this computer"),
         ("linux", ValueError("no such\nbaud rate"), NotConnected, "no such baud rate"),
-        ("linux", serial.SerialException(errno.EACCES, "denied"), NotConnected, "ask whoever runs this computer"),
+        (
+            "linux",
+            serial.SerialException(errno.EACCES, "denied"),
+            NotConnected,
+            "ask the administrator of this computer",
+        ),
     ],
 )
-def test_a_port_that_does_not_open_is_told_with_what_to_try(monkeypatch, platform, error, told, words):
+def test_the_error_of_a_port_that_does_not_open_has_advice(monkeypatch, platform, error, expected, words):
     failing(monkeypatch, error)
     monkeypatch.setattr(sys, "platform", platform)
-    with pytest.raises(told, match=words) as missing:
+    with pytest.raises(expected, match=words) as missing:
         SerialTransport("/dev/ttyUSB7")
     assert missing.value.address == "/dev/ttyUSB7"
     assert "\n" not in str(missing.value)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="groups")
-def test_who_may_not_use_a_port_is_told_its_group(monkeypatch, tmp_path):
+def test_the_error_of_a_forbidden_port_names_its_group(monkeypatch, tmp_path):
     import grp
 
     port = tmp_path / "ttyUSB0"
@@ -437,7 +442,7 @@ def test_a_port_that_is_not_there():
         SerialTransport("/dev/no-such-port")
 
 
-def test_a_locked_port_is_occupied_until_it_is_given_back(bus):
+def test_a_locked_port_is_occupied_until_it_is_given_back(bench):
     first, second = SerialTransport(SLOW), SerialTransport(SLOW)
     first.lock()
     with pytest.raises(Occupied):
@@ -453,7 +458,7 @@ def test_a_locked_port_is_occupied_until_it_is_given_back(bus):
 
 
 @pytest.mark.parametrize("act", ["query", "write", "query_block", "clear", "reopen", "lock"])
-def test_a_closed_link_says_that_it_was_closed_whatever_it_is_used_for(bus, act):
+def test_a_closed_link_says_that_it_was_closed_whatever_it_is_used_for(bench, act):
     transport = SerialTransport(SLOW)
     transport.close()
     transport.close()
@@ -464,7 +469,7 @@ def test_a_closed_link_says_that_it_was_closed_whatever_it_is_used_for(bus, act)
 # --- the URL handler ---
 
 
-def test_a_program_with_nothing_but_pyserial(bus):
+def test_a_program_with_nothing_but_pyserial(bench):
     with serial.serial_for_url(METER, baudrate=57600, bytesize=7, parity="O", timeout=1) as port:
         assert port.write(b"*IDN?\n") == 6
         assert port.readline() == b"LSCI,MODEL425,VIRTUAL,1.0\r\n"
@@ -481,7 +486,7 @@ def test_a_program_with_nothing_but_pyserial(bus):
     assert not port.is_open
 
 
-def test_a_program_that_would_wait_for_ever_is_told_so(bus):
+def test_a_read_that_would_wait_for_ever_raises(bench):
     with serial.serial_for_url(SLOW) as port:
         port.write(b"SLOW?\n")
         assert port.read(5) == b"slow\n"
@@ -492,23 +497,23 @@ def test_a_program_that_would_wait_for_ever_is_told_so(bus):
 @pytest.mark.parametrize(
     ("url", "words"),
     [
-        ("levilab://nobody", "no 'nobody' on a serial line: it has ASRLlevilab"),
+        ("levilab://absent", "no 'absent' on a serial line: it has ASRLlevilab"),
         ("levilab://gpib0::1", "no 'gpib0::1'"),
         ("levilab://slow?bench=other", "no virtual bench is named 'other'"),
     ],
 )
-def test_a_url_that_leads_nowhere(bus, url, words):
+def test_a_url_that_leads_nowhere(bench, url, words):
     with pytest.raises(serial.SerialException, match=words):
         serial.serial_for_url(url)
 
 
-def test_benches_have_names(bus, monkeypatch, clock):
-    monkeypatch.setitem(benches, "mine", lambda: Bus({"ASRLslow::INSTR": Virtual425(clock, flux_density=abs)}))
+def test_benches_have_names(bench, monkeypatch, clock):
+    monkeypatch.setitem(benches, "mine", lambda: VirtualBench({"ASRLslow::INSTR": Virtual425(clock, flux_density=abs)}))
     with contextlib.closing(SerialTransport("levilab://slow?bench=mine", **LINE)) as transport:
         assert "MODEL425" in transport.query("*IDN?")
 
 
-def test_a_port_that_is_closed_does_nothing(bus):
+def test_a_port_that_is_closed_does_nothing(bench):
     port = serial.serial_for_url(SLOW, do_not_open=True)
     for use in (lambda: port.read(1), lambda: port.write(b"x"), lambda: port.in_waiting, port.flush):
         with pytest.raises(serial.SerialException, match="not open"):
@@ -519,7 +524,7 @@ def test_a_port_that_is_closed_does_nothing(bus):
     port.close()
 
 
-def test_pyvisa_py_takes_the_url_too(bus):
+def test_pyvisa_py_takes_the_url_too(bench):
     if sys.platform == "win32":
         pytest.skip("pyvisa-py writes COM before every port there")
     manager = pyvisa.ResourceManager("@py")

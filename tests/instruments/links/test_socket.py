@@ -93,7 +93,7 @@ def test_patience_lets_a_slow_answer_come():
         assert transport.query("LATE?", patience=AT_MOST) == "late"
 
 
-def test_a_server_that_is_gone_is_told_and_found_again_when_it_is_back():
+def test_a_server_that_is_gone_raises_and_is_found_again_when_back():
     with serving() as server:
         port = server.server_address[1]
         transport = VisaTransport(server.address, timeout=SHORT)
@@ -110,7 +110,7 @@ def test_a_server_that_is_gone_is_told_and_found_again_when_it_is_back():
             transport.close()
 
 
-def test_a_port_where_nobody_listens_is_told():
+def test_a_port_where_no_program_listens_raises():
     with serving() as server:
         address = server.address
     with pytest.raises(NotConnected), contextlib.closing(VisaTransport(address)) as transport:

@@ -9,7 +9,7 @@ from pyvisa.constants import ResourceAttribute, StatusCode
 from instruments.clock import VirtualClock
 from instruments.errors import BadAnswer, NoAnswer, NotConnected, Occupied
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import LevilabVisaLibrary, library_for
 from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.rows import Ask
@@ -39,23 +39,23 @@ def clock():
 
 
 @pytest.fixture
-def bus(clock):
-    return Bus({ADDRESS: Slow(clock), SOCKET: Slow(clock)})
+def bench(clock):
+    return VirtualBench({ADDRESS: Slow(clock), SOCKET: Slow(clock)})
 
 
-def library_with(bus, **methods):
+def library_with(bench, **methods):
     """A library for this bench with some of its functions replaced."""
     library = type("Broken", (LevilabVisaLibrary,), methods)(f"broken-{next(_unique)}")
-    library.bus = bus
+    library.bench = bench
     return library
 
 
-def test_a_question_is_answered_without_its_line_end(bus):
-    assert VisaTransport(ADDRESS, library=library_for(bus)).query("*IDN?") == IDENTITY
+def test_a_question_is_answered_without_its_line_end(bench):
+    assert VisaTransport(ADDRESS, library=library_for(bench)).query("*IDN?") == IDENTITY
 
 
-def test_silence_is_told_with_question_and_timeout_and_costs_virtual_time_only(bus, clock):
-    transport = VisaTransport(ADDRESS, library=library_for(bus), timeout=3600.0)
+def test_silence_raises_with_its_question_and_costs_virtual_time_only(bench, clock):
+    transport = VisaTransport(ADDRESS, library=library_for(bench), timeout=3600.0)
     with pytest.raises(NoAnswer) as silence:
         transport.query("FOO?")
     assert (silence.value.question, silence.value.timeout) == ("FOO?", 3600.0)
@@ -64,8 +64,8 @@ def test_silence_is_told_with_question_and_timeout_and_costs_virtual_time_only(b
     assert clock.now() == pytest.approx(3600.0, abs=1e-9)
 
 
-def test_an_answer_that_takes_its_time_needs_patience(bus, clock):
-    transport = VisaTransport(ADDRESS, library=library_for(bus), timeout=2.0)
+def test_an_answer_that_takes_its_time_needs_patience(bench, clock):
+    transport = VisaTransport(ADDRESS, library=library_for(bench), timeout=2.0)
     assert transport.query("SLOW?", patience=4.0) == "slow"
     assert clock.now() == pytest.approx(5.0, abs=1e-9)  # not the six seconds that it might have taken
     with pytest.raises(NoAnswer) as silence:
@@ -73,23 +73,23 @@ def test_an_answer_that_takes_its_time_needs_patience(bus, clock):
     assert silence.value.timeout == 4.5
 
 
-def test_patience_is_for_one_answer_only(bus):
-    transport = VisaTransport(ADDRESS, library=library_for(bus), timeout=2.0)
+def test_patience_is_for_one_answer_only(bench):
+    transport = VisaTransport(ADDRESS, library=library_for(bench), timeout=2.0)
     transport.query("SLOW?", patience=4.0)
     with pytest.raises(NoAnswer):
         transport.query("SLOW?")
 
 
-def test_a_late_answer_never_reaches_the_next_question(bus, clock):
-    transport = VisaTransport(ADDRESS, library=library_for(bus), timeout=2.0)
+def test_a_late_answer_never_reaches_the_next_question(bench, clock):
+    transport = VisaTransport(ADDRESS, library=library_for(bench), timeout=2.0)
     with pytest.raises(NoAnswer):
         transport.query("SLOW?")
     clock.sleep(10.0)
     assert transport.query("*IDN?") == IDENTITY
 
 
-def test_an_interrupted_wait_leaves_no_answer_for_the_next_question(bus, clock, monkeypatch):
-    transport = VisaTransport(ADDRESS, library=library_for(bus), timeout=2.0)
+def test_an_interrupted_wait_leaves_no_answer_for_the_next_question(bench, clock, monkeypatch):
+    transport = VisaTransport(ADDRESS, library=library_for(bench), timeout=2.0)
 
     def interrupted(duration):
         raise KeyboardInterrupt
@@ -102,61 +102,61 @@ def test_an_interrupted_wait_leaves_no_answer_for_the_next_question(bus, clock, 
     assert transport.query("*IDN?") == IDENTITY
 
 
-def test_an_answer_that_is_no_text_is_told_and_forgotten(bus):
-    transport = VisaTransport(ADDRESS, library=library_for(bus))
+def test_an_answer_that_is_no_text_raises_and_is_forgotten(bench):
+    transport = VisaTransport(ADDRESS, library=library_for(bench))
     with pytest.raises(BadAnswer, match="expected plain text") as bad:
         transport.query("BIN?")
     assert bad.value.question == "BIN?"
     assert transport.query("*IDN?") == IDENTITY
 
 
-@pytest.mark.parametrize("address", ["TCPIP0::nobody.levilab::inst0::INSTR", "no resource name at all", ""])
-def test_an_address_where_nothing_is_is_told_in_one_line(bus, address):
+@pytest.mark.parametrize("address", ["TCPIP0::absent.levilab::inst0::INSTR", "no resource name at all", ""])
+def test_an_address_where_nothing_is_raises_in_one_line(bench, address):
     with pytest.raises(NotConnected) as missing:
-        VisaTransport(address, library=library_for(bus))
+        VisaTransport(address, library=library_for(bench))
     assert missing.value.address == address
     assert "\n" not in str(missing.value)
     assert "check the address" in str(missing.value)
 
 
-def test_an_unknown_library_is_told_as_ours():
+def test_an_unknown_library_raises_our_error():
     with pytest.raises(NotConnected, match="nolibrary"):
         VisaTransport(ADDRESS, library="@nolibrary")
 
 
-def test_whatever_a_library_raises_on_opening_is_told_as_ours(bus):
+def test_whatever_a_library_raises_on_opening_becomes_our_error(bench):
     # pyvisa-py raises plain Exception for a host that cannot be reached
     def unreachable(*_, **__):
         raise Exception("could not connect:\nno route")  # noqa: TRY002
 
     with pytest.raises(NotConnected, match="could not connect: no route"):
-        VisaTransport(ADDRESS, library=library_with(bus, open=unreachable))
+        VisaTransport(ADDRESS, library=library_with(bench, open=unreachable))
 
 
-def test_a_link_that_breaks_is_told_with_the_question(bus):
+def test_a_link_that_breaks_raises_with_the_question(bench):
     def broken(self, session, data):
         return 0, self.handle_return_value(session, StatusCode.error_connection_lost)
 
-    transport = VisaTransport(ADDRESS, library=library_with(bus, write=broken))
+    transport = VisaTransport(ADDRESS, library=library_with(bench, write=broken))
     with pytest.raises(NotConnected, match=r"no link at '\*IDN\?'.*check the address"):
         transport.query("*IDN?")
 
 
-def test_a_bare_connection_is_opened_anew_until_the_instrument_is_back(bus):
-    transport = VisaTransport(SOCKET, library=library_for(bus), timeout=2.0)
+def test_a_bare_connection_is_opened_anew_until_the_instrument_is_back(bench):
+    transport = VisaTransport(SOCKET, library=library_for(bench), timeout=2.0)
     with pytest.raises(NoAnswer):
         transport.query("FOO?")
-    instruments, bus.instruments = bus.instruments, {}
+    instruments, bench.instruments = bench.instruments, {}
     for _ in range(3):
         with pytest.raises(NotConnected, match="cannot be opened"):
             transport.query("*IDN?")
-    bus.instruments = instruments
+    bench.instruments = instruments
     assert transport.query("*IDN?") == IDENTITY
 
 
-def test_the_log_gets_the_bytes_of_both_directions(bus):
+def test_the_log_gets_the_bytes_of_both_directions(bench):
     traffic = []
-    transport = VisaTransport(ADDRESS, library=library_for(bus), log=lambda *line: traffic.append(line))
+    transport = VisaTransport(ADDRESS, library=library_for(bench), log=lambda *line: traffic.append(line))
     transport.write("*CLS")
     transport.query("*IDN?")
     with pytest.raises(NoAnswer):
@@ -171,8 +171,8 @@ def test_the_log_gets_the_bytes_of_both_directions(bus):
 
 @pytest.mark.parametrize("address", [ADDRESS, SOCKET])
 @pytest.mark.parametrize("act", ["query", "write", "query_block", "clear", "reopen", "lock"])
-def test_a_closed_link_says_that_it_was_closed_whatever_it_is_used_for(bus, address, act):
-    transport = VisaTransport(address, library=library_for(bus))
+def test_a_closed_link_says_that_it_was_closed_whatever_it_is_used_for(bench, address, act):
+    transport = VisaTransport(address, library=library_for(bench))
     transport.close()
     transport.close()
     with pytest.raises(NotConnected, match="this session was closed: open another one"):
@@ -182,7 +182,7 @@ def test_a_closed_link_says_that_it_was_closed_whatever_it_is_used_for(bus, addr
 # --- how long things may take ---
 
 
-def test_patience_is_for_an_answer_and_not_for_the_messages_after_it(bus):
+def test_patience_is_for_an_answer_and_not_for_the_messages_after_it(bench):
     """A dead link must not hold the next command as long as the last question: up to 30 days for a counter's series."""
     allowed = []
 
@@ -193,7 +193,7 @@ def test_patience_is_for_an_answer_and_not_for_the_messages_after_it(bus):
 
         return call
 
-    transport = VisaTransport(ADDRESS, library=library_with(bus, write=noted("write"), clear=noted("clear")))
+    transport = VisaTransport(ADDRESS, library=library_with(bench, write=noted("write"), clear=noted("clear")))
     transport.query("*IDN?", patience=3000.0)
     transport.write("*CLS")
     transport.query("*IDN?", patience=3000.0)
@@ -213,7 +213,7 @@ def test_between_two_messages_the_instrument_is_left_alone(clock, address):
     def log(_, direction, __):
         (sent if direction == ">" else answered).append(clock.now())
 
-    library = library_for(Bus({address: Slow(clock)}))
+    library = library_for(VirtualBench({address: Slow(clock)}))
     transport = VisaTransport(address, library=library, pause=0.05, clock=clock, log=log)
     for _ in range(3):
         transport.query("*IDN?")
@@ -229,8 +229,8 @@ def test_between_two_messages_the_instrument_is_left_alone(clock, address):
     transport.close()
 
 
-def test_without_a_pause_no_time_is_lost(bus, clock):
-    transport = VisaTransport(ADDRESS, library=library_for(bus), clock=clock)
+def test_without_a_pause_no_time_is_lost(bench, clock):
+    transport = VisaTransport(ADDRESS, library=library_for(bench), clock=clock)
     for _ in range(3):
         transport.query("*IDN?")
     assert clock.now() < 0.05
@@ -264,7 +264,7 @@ class SlowOnce(Slow):
 @pytest.mark.parametrize("questions", [["LIST?"], ["*IDN?"], ["LIST?", "*IDN?"], ["*IDN?", "*IDN?"], ["SLOW?"]])
 def test_on_a_serial_line_no_late_answer_is_taken_for_another(clock, questions):
     device = SlowOnce(clock)
-    transport = VisaTransport(LINE, library=library_for(Bus({LINE: device})))
+    transport = VisaTransport(LINE, library=library_for(VirtualBench({LINE: device})))
     device.slow = len(questions)
     right = {"*OPC?": "1", "LIST?": "1,2,1,1,1", "*IDN?": IDENTITY, "SLOW?": "slow"}
     silent = 0
@@ -277,9 +277,9 @@ def test_on_a_serial_line_no_late_answer_is_taken_for_another(clock, questions):
     assert transport.query("LIST?") == "1,2,1,1,1"
 
 
-def test_the_log_has_what_could_not_be_read_either(bus):
+def test_the_log_has_what_could_not_be_read_either(bench):
     traffic = []
-    transport = VisaTransport(ADDRESS, library=library_for(bus), log=lambda *line: traffic.append(line[1:]))
+    transport = VisaTransport(ADDRESS, library=library_for(bench), log=lambda *line: traffic.append(line[1:]))
     with pytest.raises(BadAnswer):
         transport.query("BIN?")
     transport.query("*IDN?")
@@ -305,8 +305,8 @@ def test_the_log_has_what_could_not_be_read_either(bus):
     ],
     ids=lambda one: getattr(one, "abbreviation", None) or (one.__name__ if isinstance(one, type) else repr(one)),
 )
-def test_a_link_without_locks_is_no_trouble_and_one_that_breaks_is(bus, monkeypatch, trouble, error):
-    transport = VisaTransport(ADDRESS, library=library_for(bus))
+def test_a_link_without_locks_is_no_trouble_and_one_that_breaks_is(bench, monkeypatch, trouble, error):
+    transport = VisaTransport(ADDRESS, library=library_for(bench))
 
     def broken(**_):
         raise trouble
@@ -315,7 +315,7 @@ def test_a_link_without_locks_is_no_trouble_and_one_that_breaks_is(bus, monkeypa
     if error is None:
         transport.lock()
     else:
-        with pytest.raises(error) as told:
+        with pytest.raises(error) as caught:
             transport.lock()
-        assert type(told.value) is error
+        assert type(caught.value) is error
     transport.close()

@@ -20,12 +20,12 @@ from support.acquisitions import BEFORE, Silent, mock
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from instruments.virtual.bench.bus import Bus
+    from instruments.virtual.bench.bench import VirtualBench
     from levilab.runs.run import Run
 
 
 def acquired(folder: Path, monkeypatch: pytest.MonkeyPatch, *faults: Fault) -> Run:
-    def with_faults(*given: object) -> Bus:
+    def with_faults(*given: object) -> VirtualBench:
         bus = virtual_bus(*given)  # type: ignore[arg-type]
         bus.faults.extend(faults)
         return bus
@@ -182,7 +182,7 @@ def test_what_was_missed_is_not_caught_up_with(tmp_path: Path, monkeypatch: pyte
     order = mock(tmp_path)
     often = settings_of(order.config, "spin").model_copy(update={"interval_s": 2.0})
 
-    def with_faults(*given: object) -> Bus:
+    def with_faults(*given: object) -> VirtualBench:
         bus = virtual_bus(*given)  # type: ignore[arg-type]
         bus.faults.append(Fault("away for 5 s", question=r"READ\?", after=BEFORE + 6))
         return bus
@@ -197,13 +197,13 @@ def test_what_was_missed_is_not_caught_up_with(tmp_path: Path, monkeypatch: pyte
 def test_a_drive_that_was_left_on_goes_off_even_if_the_counter_is_not_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    left: list[Bus] = []
+    left: list[VirtualBench] = []
 
-    def left_on(*given: object) -> Bus:
+    def left_on(*given: object) -> VirtualBench:
         bus = virtual_bus(*given)  # type: ignore[arg-type]
         generator, counter = (bus.instruments[VIRTUAL[kind].address] for kind in ("generator", "counter"))
         generator.execute("OUTP1 ON")
-        bus.away[id(counter)] = 1e9
+        bus.unreachable_until[id(counter)] = 1e9
         left.append(bus)
         return bus
 

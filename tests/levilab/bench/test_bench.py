@@ -464,7 +464,7 @@ def test_a_described_virtual_bench_keeps_to_the_wall_clock(monkeypatch):
         wall[0] += duration
 
     # one library serves all programs of a process: a top of its own for this test, whatever others have spun down
-    monkeypatch.setattr(pyvisa.ResourceManager("realtime@levilab").visalib, "bus", None)
+    monkeypatch.setattr(pyvisa.ResourceManager("realtime@levilab").visalib, "bench", None)
     monkeypatch.setattr("instruments.clock.time.monotonic", lambda: wall[0])
     monkeypatch.setattr("instruments.clock.time.sleep", sleep)
     with open_bench(described(**VIRTUAL), ("counter",)) as bench:

@@ -73,11 +73,11 @@ def test_the_line_names_every_instrument_each_answers_and_sigterm_ends_it():
 
 def test_a_served_top_begins_to_spin_down_with_the_first_message():
     world = practice_world(WallClock(waits=True))
-    bus = virtual_bus(world)
-    bus.heard = world.clock.begin
-    with BenchServer(bus) as server:
+    bench = virtual_bus(world)
+    bench.on_message = world.clock.begin
+    with BenchServer(bench) as server:
         assert world.clock.now() == 0.0
-        (counter,) = (offer for offer in server.offers if "counter" in offer.address)
+        (counter,) = (offer for offer in server.endpoints if "counter" in offer.address)
         assert "53230A" in ask(counter.resources["socket"], "*IDN?")
         assert world.clock.now() > 0.0
 
@@ -253,7 +253,7 @@ def test_a_port_mapper_that_cannot_be_had_says_what_to_do(monkeypatch, error, pl
         raise error
         yield
 
-    monkeypatch.setattr("levilab.world.serve.offered", refused)
+    monkeypatch.setattr("levilab.world.serve.serve_bench", refused)
     monkeypatch.setattr("levilab.world.serve.sys.platform", platform)
     with pytest.raises(CannotServe, match=words) as refused:
         serve(Service(port_mapper=111), lambda _: None)

@@ -16,7 +16,7 @@ from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
 from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange
 from instruments.ieee488 import NOT_A_NUMBER
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
@@ -119,7 +119,7 @@ def test_a_refused_step_of_the_preparation_ends_it():
         counter.prepare(gate_s=1.0, trigger_level_v=0.6)
 
 
-def test_an_error_that_waits_is_told_before_a_number_is_believed():
+def test_an_error_that_waits_is_raised_before_a_number_is_believed():
     waiting = [("SYST:ERR?", '-222,"Data out of range"'), NO_ERROR]
     with conversation(Keysight53230A, *waiting) as counter, pytest.raises(CommandRefused, match=r"READ\?.*-222"):
         counter.frequency()
@@ -277,7 +277,7 @@ def bench(request):
     """A driver, and the clock of its virtual instrument."""
     driver, virtual = request.param
     clock = VirtualClock()
-    library = library_for(Bus({ADDRESS: virtual(clock, signal=light, second=faster_light)}))
+    library = library_for(VirtualBench({ADDRESS: virtual(clock, signal=light, second=faster_light)}))
     counter = driver(VisaTransport(ADDRESS, library=library))
     yield counter, clock
     counter.close()
@@ -391,7 +391,7 @@ def test_a_series_whose_end_could_not_be_sent_is_ended_before_the_next_reading()
 def test_time_stamps_are_the_gates_openings():
     clock = VirtualClock()
     counter = PendulumCNT91(
-        VisaTransport(ADDRESS, library=library_for(Bus({ADDRESS: VirtualCNT91(clock, signal=light)})))
+        VisaTransport(ADDRESS, library=library_for(VirtualBench({ADDRESS: VirtualCNT91(clock, signal=light)})))
     )
     counter.prepare(gate_s=0.09, trigger_level_v=0.6)
     values, times = counter.timed_readings(5).T

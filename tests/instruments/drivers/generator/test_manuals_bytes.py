@@ -11,7 +11,7 @@ from instruments.drivers.generator.agilent_33220a import Agilent33220A
 from instruments.drivers.generator.keysight_33500b import Keysight33500B
 from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange, WrongInstrument
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.generator.agilent_33220a import Virtual33220A
 from instruments.virtual.generator.keysight_33500b import Virtual33500B
@@ -32,7 +32,7 @@ def test_an_offset_is_set_once_there_is_room_for_it():
 
 # --- off ---
 
-#: What is sent before anything is asked, and the question who it is, where nobody has asked it before.
+#: The messages before the first question, and the identity question, where it was not asked before.
 OFF = (("*CLS", None), ("OUTP1 OFF", None))
 ONE, TWO = (("*IDN?", f"Agilent Technologies,{model},MY52812345,3.05") for model in ("33521A", "33522B"))
 
@@ -54,10 +54,10 @@ def test_an_output_that_stays_on_is_an_error(answers):
     seen = [(f"OUTP{k}?", answer) for k, answer in enumerate(answers, start=1) if answer]
     with (
         conversation(Keysight33500B, *OFF, TWO, ("OUTP2 OFF", None), *seen) as generator,
-        pytest.raises(CommandRefused, match="still on") as told,
+        pytest.raises(CommandRefused, match="still on") as caught,
     ):
         generator.off()
-    assert told.value.command == f"OUTP{len(seen)} OFF"
+    assert caught.value.command == f"OUTP{len(seen)} OFF"
 
 
 def test_an_answer_that_makes_no_sense_is_not_taken_for_off():
@@ -100,7 +100,7 @@ FORBIDDEN = [
     ("frequency", float("nan"), "drive_frequency_hz"),
     ("load", 50.0, "drive_amplitude_vpp"),  # twice the voltage that is displayed would be there
     ("load", float("nan"), "drive_amplitude_vpp"),
-    ("output", True, "drive_amplitude_vpp"),  # nobody knows what stands there
+    ("output", True, "drive_amplitude_vpp"),  # its value is not known
 ]
 
 
@@ -156,7 +156,7 @@ def test_without_new_limits_what_was_prepared_goes_on():
         generator.output = True
 
 
-def test_what_the_generator_itself_finds_wrong_is_told():
+def test_what_the_generator_itself_finds_wrong_raises():
     refused = [("VOLT 10.0", None), ("SYST:ERR?", '-222,"Data out of range;value clipped to upper limit"'), NO_ERROR]
     with conversation(Keysight33500B, *refused) as generator, pytest.raises(CommandRefused, match="clipped"):
         generator.amplitude = 10.0
@@ -196,7 +196,7 @@ def test_a_setting_of_the_older_generator_is_sent_and_asked_for(name, value, sen
         assert getattr(generator, name) == value
 
 
-def test_the_older_generators_settings_are_all_told_with_their_units():
+def test_the_older_generators_settings_all_have_their_units():
     with conversation(
         Agilent33220A, *((sent.split()[0] + "?", answer) for _, _, sent, answer in WIRE_33220A)
     ) as generator:
@@ -236,7 +236,7 @@ def test_each_driver_knows_its_own_model_and_not_the_others(driver, answer):
 def test_both_families_put_the_same_signal_on_the_coil(driver, device, waveform):
     address = "TCPIP0::generator.levilab::inst0::INSTR"
     virtual = device(VirtualClock())
-    transport = VisaTransport(address, library=library_for(Bus({address: virtual})))
+    transport = VisaTransport(address, library=library_for(VirtualBench({address: virtual})))
     generator = driver(transport)
     generator.identity()
     generator.prepare(waveform=waveform, frequency_hz=30.5, amplitude_vpp=12.0)

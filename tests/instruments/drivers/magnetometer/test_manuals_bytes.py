@@ -55,7 +55,7 @@ def test_the_models_know_themselves(driver, identity):
 @pytest.mark.parametrize(
     ("driver", "identity"), [(LakeShore425, "LSCI,MODEL475,1,1"), (LakeShore475, "LSCI,MODEL425,VIRTUAL,1.0")]
 )
-def test_another_model_is_told(driver, identity):
+def test_another_model_raises(driver, identity):
     with conversation(driver, ("*IDN?", identity)) as magnetometer, pytest.raises(WrongInstrument, match="MODEL4"):
         magnetometer.identity()
 
@@ -92,7 +92,7 @@ def test_a_field_that_the_probe_does_not_measure_is_refused_and_nothing_is_set_f
 
 
 @pytest.mark.parametrize("answer", ["1", "02,1", "", "OL"])
-def test_a_setting_that_did_not_stay_is_told(answer):
+def test_a_setting_that_did_not_stay_raises(answer):
     lines = [("UNIT 2;UNIT?", answer), CLEARED]
     with conversation(LakeShore425, *lines) as magnetometer, pytest.raises(CommandRefused, match="UNIT 2"):
         magnetometer.prepare(range_t=None)
@@ -134,7 +134,7 @@ def test_a_reading_during_which_the_unit_changed_is_taken_again():
         assert magnetometer.flux_density() == pytest.approx(1e-3, rel=1e-12)
 
 
-def test_a_unit_that_changes_all_the_time_is_told():
+def test_a_unit_that_changes_all_the_time_raises():
     lines = [reading("+100.000E-05", unit=unit, after=after) for unit, after in ("21", "12", "24")]
     with conversation(LakeShore425, *lines) as magnetometer, pytest.raises(BadAnswer, match="a unit that stays"):
         magnetometer.flux_density()
@@ -193,7 +193,7 @@ def test_the_answer_to_another_question_is_never_taken_for_a_field(driver, answe
 
 
 @pytest.mark.parametrize("probe", ["00", "43", "60", "HSE", "4", "2", "040", "4\u0660"])
-def test_an_unknown_probe_is_told(probe):
+def test_an_unknown_probe_raises(probe):
     lines = [*steady(LakeShore425), ("TYPE?", probe), CLEARED]
     with conversation(LakeShore425, *lines) as magnetometer, pytest.raises(BadAnswer, match=r"TYPE\?"):
         magnetometer.prepare(range_t=0.1)
@@ -205,7 +205,7 @@ def test_the_425_says_itself_when_it_is_zeroed():
         magnetometer.zero()
 
 
-def test_a_zero_that_never_comes_is_told():
+def test_a_zero_that_never_comes_raises():
     lines = [("ZPROBE", None), *[("OPST?", "004")] * 600]
     with conversation(LakeShore425, *lines) as magnetometer, pytest.raises(NoAnswer, match="ZPROBE"):
         magnetometer.zero()
@@ -236,12 +236,12 @@ def test_a_range_that_the_probe_does_not_have_is_refused(answer):
         magnetometer.settings()
 
 
-def test_a_475_that_is_silent_after_a_zero_is_told():
+def test_a_475_that_is_silent_after_a_zero_raises():
     with conversation(LakeShore475, ("ZPROBE;*OPC?", SILENCE)) as magnetometer, pytest.raises(NoAnswer):
         magnetometer.zero()
 
 
-def test_the_settings_are_told_with_their_units():
+def test_the_settings_have_their_units():
     lines = [("TYPE?", "40"), ("UNIT?", "2"), ("AUTO?", "0"), ("RDGMODE?", "1,1,1"), ("RANGE?", "2")]
     with conversation(LakeShore425, *lines) as magnetometer:
         assert magnetometer.settings() == {

@@ -7,7 +7,7 @@ from instruments.drivers.magnetometer.lakeshore_425 import LakeShore425
 from instruments.drivers.magnetometer.lakeshore_475 import LakeShore475
 from instruments.errors import NoAnswer
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
 from instruments.virtual.magnetometer.lakeshore_475 import Virtual475
@@ -17,13 +17,13 @@ DRIVERS = [(LakeShore425, Virtual425, "425"), (LakeShore475, Virtual475, "475"),
 
 
 @pytest.mark.parametrize(("driver", "kind", "model"), DRIVERS)
-def test_the_drivers_measure_zero_and_tell_an_overload(driver, kind, model):
+def test_the_drivers_measure_zero_and_notice_an_overload(driver, kind, model):
     field = [0.0]
     options = {} if kind is Virtual425 else {"identity": f"LSCI,MODEL{model},VIRTUAL,01012020"}
     device = kind(VirtualClock(), flux_density=lambda _: field[0], zero_error=5e-6, **options)
     # GPIB has no line settings to get wrong
     address = "GPIB0::12::INSTR"
-    magnetometer = driver(VisaTransport(address, library=library_for(Bus({address: device}))))
+    magnetometer = driver(VisaTransport(address, library=library_for(VirtualBench({address: device}))))
     assert f"MODEL{model}" in magnetometer.identity()
     magnetometer.forget_errors()
     magnetometer.prepare(range_t=None)
@@ -44,7 +44,7 @@ def test_the_drivers_measure_zero_and_tell_an_overload(driver, kind, model):
 def test_a_meter_that_does_not_answer_costs_its_time_out_and_no_more():
     device = meter()
     address = "GPIB0::12::INSTR"
-    transport = VisaTransport(address, library=library_for(Bus({address: device})), timeout=3.0)
+    transport = VisaTransport(address, library=library_for(VirtualBench({address: device})), timeout=3.0)
     with pytest.raises(NoAnswer):
         transport.query("NOSUCH?")
     assert device.clock.now() == pytest.approx(3.0, abs=0.1)

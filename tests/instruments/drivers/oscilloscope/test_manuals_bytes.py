@@ -49,7 +49,7 @@ PULSES = {
     "trigger_level_v": 0.65,
 }
 
-#: What the scope was told, as it tells it itself: numbers in another form, a depth and switches as numbers.
+#: The settings sent to the scope, as it answers them: numbers in another form, a depth and switches as numbers.
 RIGOL_KEPT = [
     ("CHAN1:DISP?", "1"),
     ("CHAN1:PROB?", "1.000000e+00"),

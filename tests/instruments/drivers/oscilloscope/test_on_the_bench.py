@@ -14,7 +14,7 @@ from instruments.drivers.oscilloscope.keysight_dsox import KeysightDSOX
 from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.errors import BadAnswer, SettingsLost
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.faults import Fault
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.oscilloscope.keysight_dsox import VirtualDSOX1000
@@ -27,7 +27,7 @@ def bench(make, signal):
     clock = VirtualClock()
     name = "TCPIP0::scope.levilab::inst0::INSTR"
     device = make(clock, signals={1: signal})
-    library = library_for(Bus({name: device}))
+    library = library_for(VirtualBench({name: device}))
     return device, VisaTransport(name, library=library), clock
 
 
@@ -82,7 +82,7 @@ def test_with_sweep_auto_the_driver_shows_what_there_is(driver, make):
 
 
 @BOTH
-def test_the_settings_are_told_with_their_units(driver, make):
+def test_the_settings_have_their_units(driver, make):
     _, transport, clock = bench(make, pulses)
     scope = driver(transport, clock=clock)
     scope.prepare(**PULSES, trigger_level_v=0.65)
@@ -114,7 +114,7 @@ def test_24_million_points_stream_through_the_memory_of_a_few_pieces():
 def test_pyvisa_reads_the_block_as_of_any_scope():
     device, transport, _ = bench(VirtualDSOX1000, constant(0.2))
     transport.close()
-    manager = pyvisa.ResourceManager(library_for(Bus({"GPIB0::7::INSTR": device})))
+    manager = pyvisa.ResourceManager(library_for(VirtualBench({"GPIB0::7::INSTR": device})))
     scope = manager.open_resource("GPIB0::7::INSTR")
     scope.write(":WAV:FORM WORD;UNS 1;POIN 1000")
     codes = scope.query_binary_values(":WAV:DATA?", datatype="H", is_big_endian=True, container=np.array)
@@ -130,7 +130,7 @@ def prepared(driver, make, address="TCPIP0::scope.levilab::inst0::INSTR"):
     """A scope that waits for pulses at 0.65 V, its driver, and the bus for faults."""
     clock = VirtualClock()
     device = make(clock, signals={1: pulses})
-    bus = Bus({address: device})
+    bus = VirtualBench({address: device})
     scope = driver(VisaTransport(address, library=library_for(bus)), clock=clock)
     scope.prepare(**PULSES, trigger_level_v=0.65)
     yield device, scope, bus
@@ -174,7 +174,7 @@ def test_a_reset_at_any_time_gives_no_trace(driver, make, how, question, after):
 
 
 @BOTH
-def test_a_reset_during_the_preparation_is_told_by_it(driver, make):
+def test_a_reset_during_the_preparation_is_raised_by_it(driver, make):
     with prepared(driver, make) as (_, scope, bus):
         bus.faults.append(Fault("reset", question=r"SYST:ERR\?", after=10))
         with pytest.raises(SettingsLost):
@@ -200,14 +200,14 @@ def test_a_reset_during_the_preparation_is_told_by_it(driver, make):
         ("trigger_sweep", "AUTO", "sweep"),
     ],
 )
-def test_a_key_of_the_front_panel_is_told_instead_of_a_trace_or_of_a_dark_signal(driver, make, setting, value, name):
+def test_a_key_of_the_front_panel_raises_instead_of_giving_a_trace(driver, make, setting, value, name):
     with prepared(driver, make) as (device, scope, _):
         start = scope._start
 
         def start_and_be_changed():
             start()
             device.settings[setting] = value
-            device.changed(setting)  # what was begun begins anew
+            device.on_change(setting)  # what was begun begins anew
 
         scope._start = start_and_be_changed
         with pytest.raises(SettingsLost) as lost:

@@ -15,7 +15,7 @@ from fuzz_targets import TARGETS
 from instruments.errors import BadAnswer, InstrumentError
 from instruments.links.serial_port import SerialTransport
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.faults import FAULTS, LATE, Fault
 from instruments.virtual.bench.serial_line import benches
 from instruments.virtual.bench.session import MOST_ANSWERS
@@ -170,7 +170,7 @@ def test_a_program_that_waits_for_ever_for_nothing_leaves_the_clock_alone(name):
     bench.recover()
 
 
-def test_a_program_that_asks_on_and_never_reads_gets_nothing_and_is_told():
+def test_a_program_that_asks_and_never_reads_gets_an_error_alone():
     bench = hostile.Bench("33500B", stream=True)
     bench.send(b"*IDN?\n" * 10_000)
     assert len(bench.session._answers) <= MOST_ANSWERS
@@ -181,7 +181,7 @@ def test_a_program_that_asks_on_and_never_reads_gets_nothing_and_is_told():
     bench.recover()
 
 
-def test_a_trigger_that_nothing_waits_for_is_told_in_the_error_queue():
+def test_a_trigger_that_nothing_waits_for_is_in_the_error_queue():
     bench = hostile.Bench("33500B")
     bench.session.trigger()
     bench.send(b"SYST:ERR?")
@@ -282,7 +282,7 @@ class Pair:
         self.room = hostile.Room()
         self.liar = Liar(hostile.instrument(name, self.room))
         address = ADDRESSES["serial" if way == "pyserial" else way]
-        self.bus = Bus({address: self.liar})
+        self.bus = VirtualBench({address: self.liar})
         kind = ROWS[name].driver
         line = dict(getattr(kind, "SERIAL", {})) | {"pause": 0.0}
         if way == "pyserial":
@@ -320,7 +320,7 @@ def test_a_driver_whose_instrument_answers_anything_gives_a_value_or_an_instrume
                     value = act(pair.driver)
                     assert is_right(value), (call, value)
             pair.liar.replies.clear()
-            pair.room.clock.sleep(MOST_LATE)  # what is late has come, and nobody may take it for an answer
+            pair.room.clock.sleep(MOST_LATE)  # late answers have come, and must not count as answers
             measure(name, pair.driver)
         finally:
             pair.close()
@@ -418,8 +418,8 @@ class Pairing(RuleBasedStateMachine):
 
     def come_back(self):
         """What a program does when it has lost an instrument, or another one has taken it."""
-        for hold in self.pair.bus._holds.values():
-            hold.holders.clear()
+        for client_lock in self.pair.bus._client_locks.values():
+            client_lock.holders.clear()
         self.driver.transport.reopen()
 
     @rule(

@@ -10,7 +10,7 @@ import pyvisa
 from pyvisa.constants import StatusCode
 
 from instruments.clock import VirtualClock
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.faults import Fault
 from instruments.virtual.bench.visa_library import LevilabVisaLibrary, library_for
 from instruments.virtual.core.device import VirtualInstrument
@@ -44,7 +44,7 @@ def manager():
 @pytest.fixture
 def blocks():
     clock = VirtualClock()
-    manager = pyvisa.ResourceManager(library_for(Bus({BLOCKS: Blocks(clock)})))
+    manager = pyvisa.ResourceManager(library_for(VirtualBench({BLOCKS: Blocks(clock)})))
     resource = manager.open_resource(BLOCKS)
     resource.clock = clock
     yield resource
@@ -73,13 +73,13 @@ def test_a_resource_opens_in_any_case(manager, address):
     ],
 )
 def test_a_resource_opens_by_every_spelling_of_its_name(plugged_in, asked_for):
-    manager = pyvisa.ResourceManager(library_for(Bus({plugged_in: Blocks(VirtualClock())})))
+    manager = pyvisa.ResourceManager(library_for(VirtualBench({plugged_in: Blocks(VirtualClock())})))
     assert manager.open_resource(asked_for).query("*OPC?").strip() == "1"
 
 
 def test_a_resource_that_is_not_there_is_not_found(manager):
     with pytest.raises(pyvisa.VisaIOError) as missing:
-        manager.open_resource("TCPIP0::nobody::inst0::INSTR")
+        manager.open_resource("TCPIP0::absent::inst0::INSTR")
     assert missing.value.error_code == StatusCode.error_resource_not_found
 
 
@@ -129,7 +129,7 @@ def test_a_line_end_that_is_sent_twice_or_not_at_all_makes_no_difference(manager
 
 
 def test_benches_of_their_own_know_nothing_of_each_other():
-    first, second = (library_for(Bus({BLOCKS: Blocks(VirtualClock())})) for _ in range(2))
+    first, second = (library_for(VirtualBench({BLOCKS: Blocks(VirtualClock())})) for _ in range(2))
     assert first is not second
     assert isinstance(first, LevilabVisaLibrary)
     resources = [pyvisa.ResourceManager(library).open_resource(BLOCKS) for library in (first, second)]
@@ -182,7 +182,7 @@ def test_a_bench_in_real_time_keeps_to_the_wall_clock():
 # --- what VISA offers beside reading and writing ---
 
 
-def test_a_status_byte_tells_of_an_answer_and_of_errors(blocks):
+def test_a_status_byte_shows_an_answer_and_errors(blocks):
     assert blocks.read_stb() == 0
     blocks.write("*OPC?")
     blocks.clock.sleep(1.0)
@@ -198,7 +198,7 @@ def test_a_question_before_the_last_answer_was_read_interrupts_it(blocks):
     assert blocks.query("SYST:ERR?").startswith("-410")
 
 
-def test_waiting_for_what_nobody_asked_is_told_in_the_queue(blocks):
+def test_a_read_without_a_question_queues_an_error(blocks):
     with pytest.raises(pyvisa.VisaIOError):
         blocks.read()
     assert blocks.query("SYST:ERR?").startswith("-420")
@@ -240,8 +240,8 @@ def test_a_resource_that_is_opened_for_oneself_alone_is_locked(blocks):
     assert blocks.query("*OPC?").strip() == "1"
 
 
-def test_a_link_that_is_lost_is_told_in_visas_words_by_whatever_is_tried(blocks):
-    blocks.visalib.bus.faults.append(Fault("disconnected", question=r"DATA\?"))
+def test_each_call_over_a_lost_link_returns_visas_status(blocks):
+    blocks.visalib.bench.faults.append(Fault("disconnected", question=r"DATA\?"))
     blocks.write("DATA?")
     for act in (blocks.read_raw, blocks.read_stb, lambda: blocks.write("*CLS")):
         with pytest.raises(pyvisa.VisaIOError) as lost:

@@ -46,12 +46,12 @@ def test_after_whatever_noise_and_a_clear_a_message_is_a_message(pieces):
     assert framer.feed(b"*IDN?\n") == ["*IDN?"]
 
 
-def test_a_line_without_end_is_dropped_and_told_once():
-    framer, told = Framer(), []
+def test_a_line_without_end_is_dropped_with_one_overrun():
+    framer, results = Framer(), []
     for _ in range(8):
-        told += framer.feed(b"x" * (LONGEST_LINE // 2))
+        results += framer.feed(b"x" * (LONGEST_LINE // 2))
         assert len(framer._buffer) <= 2 * LONGEST_LINE
-    assert [type(one) for one in told] == [Overrun]
+    assert [type(one) for one in results] == [Overrun]
     assert framer.feed(b"x\n*IDN?\n") == ["*IDN?"]
 
 

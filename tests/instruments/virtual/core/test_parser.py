@@ -201,7 +201,7 @@ def test_elsewhere_an_m_means_milli(counter):
         ("*CLS 1", -108),
     ],
 )
-def test_a_bad_parameter_changes_nothing_and_is_told_by_its_number(generator, message, number):
+def test_a_bad_parameter_changes_nothing_and_queues_its_number(generator, message, number):
     before = dict(generator.settings)
     assert ask(generator, message) is None
     assert errors(generator) == [number]

@@ -259,7 +259,7 @@ def test_nothing_measured_is_nothing_to_fetch():
     assert errors(device) == [-230, -230]
 
 
-def test_the_memory_fills_while_nobody_asks(five):
+def test_the_memory_fills_while_no_program_asks(five):
     send(five, b"INIT\n")
     five.clock.sleep(0.3)
     assert ask(five, "DATA:POIN?") == "+2"
@@ -281,7 +281,7 @@ def test_r_takes_what_is_there_as_a_block(five):
     assert ask(five, "DATA:POIN?") == "+1"
 
 
-def test_data_remove_takes_so_many_and_waits_if_told(five):
+def test_data_remove_takes_so_many_and_waits_with_the_word_wait(five):
     # opronningen/53230A-Toolkit reads so
     send(five, b"INIT\n")
     assert ask(five, "DATA:REM? 2", 0.0) is None

@@ -15,7 +15,7 @@ from instruments.clock import VirtualClock
 from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
 from instruments.errors import OutOfRange
 from instruments.links.visa import VisaTransport
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
 from support.wire import ask, cable, errors, received, send
@@ -52,7 +52,7 @@ def ready():
     return counter(pulses(40.0), FIXED_LEVEL, "ACQ:APER 0.1")
 
 
-def test_it_tells_its_name_and_an_empty_queue_without_a_sign(ready):
+def test_it_answers_its_name_and_an_empty_queue_without_a_sign(ready):
     assert ask(ready, "*IDN?").split(",")[1].strip() == "CNT-91"
     assert ask(ready, "SYST:ERR?") == '0,"No error"'
 
@@ -300,9 +300,9 @@ def test_what_is_out_of_reach_is_not_worked_out(ready):
 
 def test_readings_that_could_take_longer_than_visa_waits_are_refused_before_anything_is_sent():
     address = "GPIB0::10::INSTR"
-    bus = Bus({address: VirtualCNT91(VirtualClock(), signal=pulses(25.0))})
+    bench = VirtualBench({address: VirtualCNT91(VirtualClock(), signal=pulses(25.0))})
     sent = []
-    transport = VisaTransport(address, library=library_for(bus), log=lambda *what: sent.append(what))
+    transport = VisaTransport(address, library=library_for(bench), log=lambda *what: sent.append(what))
     driver = PendulumCNT91(transport)
     driver.prepare(gate_s=100.0, trigger_level_v=0.6)
     sent.clear()

@@ -8,13 +8,13 @@ from instruments.virtual.generator.keysight_33500b import Virtual33500B
 
 
 @pytest.fixture
-def told():
+def changes():
     return []
 
 
 @pytest.fixture
-def generator(told):
-    return Virtual33500B(VirtualClock(), listener=lambda time, output: told.append((time, output)))
+def generator(changes):
+    return Virtual33500B(VirtualClock(), listener=lambda time, output: changes.append((time, output)))
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ def test_apply_sets_the_signal_and_switches_it_on(either):
     assert errors(either) == []
 
 
-def test_what_apply_is_not_told_is_the_default(either):
+def test_what_apply_leaves_out_is_the_default(either):
     send(either, b"FREQ 40;VOLT 3\nAPPL:SIN\n")
     assert (number(either, "FREQ?"), number(either, "VOLT?")) == (1e3, 0.1)
     send(either, b"APPL:DC DEF,DEF,2\n")

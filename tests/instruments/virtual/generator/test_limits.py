@@ -30,7 +30,7 @@ from support.wire import ask, errors, send
         ("BURS:NCYC 0", "BURS:NCYC?", 1.0, "lower"),
     ],
 )
-def test_a_number_beyond_its_limits_is_clipped_and_told(generator, message, asked, value, entry):
+def test_a_number_beyond_its_limits_is_clipped_with_an_error(generator, message, asked, value, entry):
     assert ask(generator, message) is None
     assert entries(generator) == [f'-222,"Data out of range;value clipped to {entry} limit"']
     assert number(generator, asked) == pytest.approx(value, rel=1e-12)
@@ -51,7 +51,7 @@ def test_each_waveform_has_its_highest_frequency(device, waveform, top):
     assert number(device, "FREQ? MAX") == top
 
 
-def test_a_waveform_that_cannot_be_so_fast_is_made_slower_and_that_is_told(either):
+def test_a_waveform_that_cannot_be_so_fast_is_slowed_with_an_error(either):
     send(either, b"FREQ 19 MHZ\nFUNC RAMP\n")
     assert number(either, "FREQ?") == 200e3
     assert entries(either) == ['-221,"Settings conflict;frequency reduced for ramp function"']

@@ -12,16 +12,16 @@ from support.generators import number
 from support.wire import ask, received, send
 
 
-def test_the_output_is_off_at_power_on(generator, told):
+def test_the_output_is_off_at_power_on(generator, changes):
     send(generator, b"OUTP?\n")
     assert received(generator, 1.0) == b"0\n"
     assert generator.signal() == Output("SIN", 1000.0, 0.0, 0.0)
-    assert told == []
+    assert changes == []
 
 
-def test_the_listener_is_told_at_each_change_and_when(generator, told):
+def test_the_listener_gets_each_change_and_its_time(generator, changes):
     send(generator, b"OUTP:LOAD INF\n")
-    del told[:]
+    del changes[:]
     send(generator, b"FUNC SQU;FREQ 40;VOLT 10;VOLT:OFFS 0.5\n")
     generator.clock.sleep(2.5)
     send(generator, b"OUTP ON\n")
@@ -29,8 +29,8 @@ def test_the_listener_is_told_at_each_change_and_when(generator, told):
     send(generator, b"FREQ 41\n")
     send(generator, b"OUTP OFF\n")
     off = Output("SQU", 40.0, 0.0, 0.0)
-    assert [output for _, output in told[:3]] == [Output("SQU", 1e3, 0.0, 0.0), off, off]
-    assert told[-3:] == [
+    assert [output for _, output in changes[:3]] == [Output("SQU", 1e3, 0.0, 0.0), off, off]
+    assert changes[-3:] == [
         (2.5, Output("SQU", 40.0, 5.0, 0.5)),  # 10 V from peak to peak are an amplitude of 5 V
         (3.5, Output("SQU", 41.0, 5.0, 0.5)),
         (3.5, Output("SQU", 41.0, 0.0, 0.0)),
@@ -46,29 +46,29 @@ def test_a_coil_takes_twice_the_voltage_that_a_matched_load_would(generator):
     assert (number(generator, "VOLT?"), number(generator, "VOLT:OFFS?")) == (8.0, 2.0)
 
 
-def test_a_refused_change_is_no_change(generator, told):
+def test_a_refused_change_is_no_change(generator, changes):
     send(generator, b"OUTP MAYBE\nFREQ 31 FURLONG\nFOO\nFREQ?\n")
-    assert told == []
+    assert changes == []
 
 
-def test_the_output_is_off_after_reset(generator, told):
+def test_the_output_is_off_after_reset(generator, changes):
     send(generator, b"FREQ 40\nVOLT 10\nOUTP ON\n*RST\n")
-    assert told[-1][1] == Output("SIN", 1000.0, 0.0, 0.0)
+    assert changes[-1][1] == Output("SIN", 1000.0, 0.0, 0.0)
     assert generator.signal().amplitude == 0.0
 
 
-def test_nobody_need_listen():
+def test_a_generator_works_without_a_listener():
     send(Virtual33500B(VirtualClock()), b"OUTP ON\n")
 
 
-def test_the_coil_hangs_on_channel_one(generator, told):
+def test_the_coil_hangs_on_channel_one(generator, changes):
     send(generator, b"SOUR2:FREQ 40;VOLT 3;:OUTP2 ON;:OUTP2:LOAD INF\n")
-    assert told == []
+    assert changes == []
     assert generator.signal(2) == Output("SIN", 40.0, 3.0, 0.0)
     assert (ask(generator, "OUTP1?"), number(generator, "SOUR1:FREQ?")) == ("0", 1e3)
 
 
-def test_what_else_shapes_the_signal_is_told_too(generator):
+def test_the_listener_gets_all_that_shapes_the_signal(generator):
     send(generator, b"FUNC SQU;FUNC:SQU:DCYC 30;:PHAS 90;:OUTP:POL INV;:OUTP ON\n")
     output = generator.signal()
     assert (output.duty, output.phase, output.inverted) == (0.3, 90.0, True)

@@ -10,26 +10,26 @@ from support.generators import entries, number
 from support.wire import ask, cable, errors, send
 
 
-def test_a_burst_waits_for_its_trigger_and_then_lasts(generator, told):
+def test_a_burst_waits_for_its_trigger_and_then_lasts(generator, changes):
     send(generator, b"OUTP:LOAD INF;:FREQ 100;VOLT 4;BURS:NCYC 50;:TRIG:SOUR BUS;:BURS:STAT ON;:OUTP ON\n")
     assert generator.signal().amplitude == 0.0
     generator.clock.sleep(1.0)
-    del told[:]
+    del changes[:]
     assert ask(generator, "*TRG;*OPC?") == "1"
     assert generator.clock.now() == pytest.approx(1.5)  # 50 cycles of 100 Hz
-    assert [(time, output.amplitude) for time, output in told] == [(1.0, 2.0), (1.5, 0.0)]
-    assert told[0][1].burst == Burst(50, None)
+    assert [(time, output.amplitude) for time, output in changes] == [(1.0, 2.0), (1.5, 0.0)]
+    assert changes[0][1].burst == Burst(50, None)
 
 
-def test_a_change_within_a_burst_tells_its_end_anew(generator, told):
+def test_a_change_within_a_burst_announces_its_end_anew(generator, changes):
     send(generator, b"OUTP:LOAD INF;:FREQ 100;BURS:NCYC 50;:TRIG:SOUR BUS;:BURS:STAT ON;:OUTP ON\n*TRG\n")
     generator.clock.sleep(0.2)
-    del told[:]
+    del changes[:]
     send(generator, b"VOLT 6\n")
-    assert [(time, output.amplitude) for time, output in told] == [(0.2, 3.0), (0.5, 0.0)]
+    assert [(time, output.amplitude) for time, output in changes] == [(0.2, 3.0), (0.5, 0.0)]
     send(generator, b"ABOR\n")
-    assert told[-1] == (0.2, told[-1][1])
-    assert told[-1][1].amplitude == 0.0
+    assert changes[-1] == (0.2, changes[-1][1])
+    assert changes[-1][1].amplitude == 0.0
 
 
 def test_an_endless_burst_is_never_complete_until_it_is_aborted(generator):
@@ -41,7 +41,7 @@ def test_an_endless_burst_is_never_complete_until_it_is_aborted(generator):
     assert ask(generator, "*OPC?") == "1"
 
 
-def test_a_trigger_that_nothing_waits_for_is_ignored_and_told(either):
+def test_a_trigger_that_nothing_waits_for_queues_an_error(either):
     send(either, b"*TRG\n")
     assert errors(either) == [-211]
 

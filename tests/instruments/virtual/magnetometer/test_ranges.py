@@ -102,7 +102,7 @@ def test_there_are_so_many_readings_a_second_and_asking_more_often_gives_the_sam
     assert len(set(answers)) == pytest.approx(rate * (device.clock.now() - start), abs=2)
 
 
-def test_a_new_reading_is_told_once():
+def test_a_new_reading_sets_its_bit_of_the_operation_status():
     device = meter()
     device.clock.sleep(1.0)
     assert int(ask(device, "OPST?")) & 4

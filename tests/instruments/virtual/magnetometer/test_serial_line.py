@@ -4,7 +4,7 @@ import pytest
 import pyvisa
 from pyvisa.constants import Parity, StatusCode, StopBits
 
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.magnetometer.lakeshore_475 import Virtual475
 from support.gaussmeters import PORT, meter
@@ -12,7 +12,7 @@ from support.gaussmeters import PORT, meter
 
 def resource(device, **settings):
     line = {"baud_rate": 57600, "data_bits": 7, "parity": Parity.odd, "stop_bits": StopBits.one} | settings
-    manager = pyvisa.ResourceManager(library_for(Bus({PORT: device})))
+    manager = pyvisa.ResourceManager(library_for(VirtualBench({PORT: device})))
     return manager.open_resource(PORT, read_termination="\r\n", write_termination="\n", **line)
 
 
@@ -53,7 +53,7 @@ def test_settings_may_be_put_right_while_the_port_is_open():
     assert line.query("*IDN?") == "LSCI,MODEL425,VIRTUAL,1.0"
 
 
-def test_the_475_changes_its_baud_rate_when_told():
+def test_a_command_changes_the_baud_rate_of_the_475():
     device = meter(Virtual475)
     line = resource(device, baud_rate=9600)
     line.write("BAUD 3")

@@ -10,7 +10,7 @@ def test_the_425_has_no_status_registers():
     assert [ask(device, question, 1.0) for question in ("*ESR?", "*STB?", "*OPC?", "*TST?")] == [None] * 4
 
 
-def test_the_475_tells_what_it_did_not_understand_in_its_event_register():
+def test_the_475_sets_event_bits_for_what_it_does_not_understand():
     device = meter(Virtual475)
     assert ask(device, "*ESR?") == "128"
     send(device, b"FOO?\n")

@@ -5,13 +5,13 @@ import struct
 import numpy as np
 import pytest
 
-from support.scopes import block, constant, keysight, noisy, pulses, rigol, rigol_stopped, rigol_volts, told
+from support.scopes import block, configure, constant, keysight, noisy, pulses, rigol, rigol_stopped, rigol_volts
 from support.wire import ask, errors, received, send
 
 
 def test_a_block_of_the_rigol_byte_for_byte():
     device = rigol(constant(-0.936), "CHAN1:PROB 1;SCAL 0.2;OFFS 0")  # code 10: a line feed
-    told(device, ":WAV:STAR 1", ":WAV:STOP 5")
+    configure(device, ":WAV:STAR 1", ":WAV:STOP 5")
     send(device, b":WAV:DATA?\n")
     assert received(device, 1.0) == b"#9000000005\n\n\n\n\n\n"
 
@@ -45,7 +45,7 @@ def test_the_preamble_of_the_keysight_is_the_one_of_a_real_one_after_reset():
 )
 def test_words_of_the_keysight(unsigned, order, expected):
     device = keysight(constant(0.2), "CHAN1:PROB 1;RANG 1.6;OFFS 0", ":WAV:FORM WORD", ":WAV:POIN 100")
-    told(device, f":WAV:UNS {unsigned}", f":WAV:BYT {order}")
+    configure(device, f":WAV:UNS {unsigned}", f":WAV:BYT {order}")
     head, data = block(device, ":WAV:DATA?")
     assert head == b"#800000200"
     assert data == 100 * expected
@@ -72,18 +72,18 @@ def test_the_keysight_gives_as_many_points_as_it_was_asked_for(mode, points):
 
 
 @pytest.mark.parametrize(
-    ("set_", "told_"), [("MAX", "24000000"), ("min", "12000"), ("1.2e6", "1200000"), ("auto", "AUTO")]
+    ("set_", "answer"), [("MAX", "24000000"), ("min", "12000"), ("1.2e6", "1200000"), ("auto", "AUTO")]
 )
-def test_the_memory_depth_is_told_as_a_whole_number(set_, told_):
-    assert ask(rigol(pulses, f":ACQ:MDEP {set_}"), ":ACQ:MDEP?") == told_
+def test_the_memory_depth_is_answered_as_a_whole_number(set_, answer):
+    assert ask(rigol(pulses, f":ACQ:MDEP {set_}"), ":ACQ:MDEP?") == answer
 
 
 @pytest.mark.parametrize(("form", "most"), [("BYTE", 250_000), ("WORD", 125_000), ("ASC", 15_625)])
 def test_a_block_of_the_rigol_has_a_limit(form, most):
     device = rigol_stopped(pulses, ":ACQ:MDEP 1200000")
-    told(device, ":WAV:MODE RAW", f":WAV:FORM {form}", ":WAV:STAR 1", f":WAV:STOP {most}")
+    configure(device, ":WAV:MODE RAW", f":WAV:FORM {form}", ":WAV:STAR 1", f":WAV:STOP {most}")
     assert len(block(device, ":WAV:DATA?")[1]) > most - 1
-    told(device, f":WAV:STOP {most + 1}")
+    configure(device, f":WAV:STOP {most + 1}")
     assert ask(device, ":WAV:DATA?", 1.0) is None
     assert errors(device) == [-222]
 
@@ -92,13 +92,13 @@ def test_the_memory_of_the_rigol_cannot_be_read_while_it_runs():
     device = rigol(pulses, ":WAV:MODE RAW")
     assert ask(device, ":WAV:DATA?", 1.0) is None
     assert errors(device) == [-221]
-    told(device, ":STOP")
+    configure(device, ":STOP")
     assert ask(device, ":WAV:PRE?").split(",")[:3] == ["0", "2", "12000"]
 
 
 def test_normal_reading_always_gives_1200_points():
     device = rigol_stopped(pulses)
-    told(device, ":WAV:MODE NORM")
+    configure(device, ":WAV:MODE NORM")
     assert len(block(device, ":WAV:DATA?")[1]) == 1200
     assert ask(device, ":WAV:PRE?").split(",")[2] == "1200"
 
@@ -106,9 +106,9 @@ def test_normal_reading_always_gives_1200_points():
 def test_a_record_reads_the_same_whichever_way_it_is_cut():
     device = rigol_stopped(noisy, "CHAN1:OFFS 0", ":TRIG:EDGE:LEV 0", ":ACQ:MDEP 1200000")
     whole = rigol_volts(device)[1]
-    told(device, ":WAV:STAR 249990", ":WAV:STOP 250020")
+    configure(device, ":WAV:STAR 249990", ":WAV:STOP 250020")
     _, across = block(device, ":WAV:DATA?")
-    told(device, ":WAV:STAR 1", ":WAV:STOP 10")
+    configure(device, ":WAV:STAR 1", ":WAV:STOP 10")
     _, first = block(device, ":WAV:DATA?")
     per_code = float(ask(device, ":WAV:YINC?"))
     np.testing.assert_allclose((np.frombuffer(across, np.uint8) - 127.0) * per_code, whole[249_989:250_020])

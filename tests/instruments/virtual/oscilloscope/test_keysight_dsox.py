@@ -2,7 +2,7 @@
 
 import pytest
 
-from support.scopes import KEYSIGHT_READY, keysight, pulses, told
+from support.scopes import KEYSIGHT_READY, configure, keysight, pulses
 from support.wire import ask, cable, errors, received, send
 
 
@@ -27,17 +27,17 @@ def test_digitize_without_a_trigger_blocks_until_a_device_clear():
     assert ask(device, ":OPER:COND?") == "+0"
 
 
-def test_the_operation_register_tells_running_and_waiting():
+def test_the_operation_register_shows_running_and_waiting():
     device = keysight(pulses, *KEYSIGHT_READY, ":TRIG:EDGE:LEV 1.3", ":SING")
     assert ask(device, ":OPER:COND?") == "+8"  # it fills the part before the trigger
     device.clock.sleep(1.0)
     assert ask(device, ":OPER:COND?") == "+40"
     assert [ask(device, ":AER?"), ask(device, ":AER?")] == ["+1", "+0"]
-    told(device, ":STOP")
+    configure(device, ":STOP")
     assert ask(device, ":OPER:COND?") == "+0"
 
 
-def test_the_trigger_event_is_told_once():
+def test_the_trigger_event_is_answered_once():
     device = keysight(pulses, *KEYSIGHT_READY, ":SING")
     assert ask(device, ":TER?") == "+0"
     device.clock.sleep(1.0)

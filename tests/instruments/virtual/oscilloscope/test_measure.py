@@ -45,7 +45,7 @@ def test_what_the_keysight_measures_in_pulses_of_25_hz(item, expected, within):
 
 
 @pytest.mark.parametrize(("make", "question"), [(rigol, ":MEAS:ITEM? FREQ,CHAN1"), (keysight, ":MEAS:FREQ? CHAN1")])
-def test_what_a_trace_does_not_show_is_told_as_99e36(make, question):
+def test_what_a_trace_does_not_show_is_answered_as_99e36(make, question):
     assert float(ask(make(constant(0.0)), question)) == 9.9e37
 
 

@@ -7,13 +7,13 @@ from support.scopes import (
     KEYSIGHT_READY,
     RIGOL_READY,
     block,
+    configure,
     keysight,
     once,
     pulses,
     rigol,
     rigol_stopped,
     rigol_volts,
-    told,
 )
 from support.wire import ask, errors
 
@@ -21,14 +21,14 @@ from support.wire import ask, errors
 def test_a_record_stays_as_it_was_when_the_settings_change_after_the_stop():
     device = rigol_stopped(pulses)
     before = rigol_volts(device)
-    told(device, "CHAN1:SCAL 1", ":TIM:SCAL 0.1", ":TRIG:EDGE:LEV 0.2")
+    configure(device, "CHAN1:SCAL 1", ":TIM:SCAL 0.1", ":TRIG:EDGE:LEV 0.2")
     np.testing.assert_array_equal(rigol_volts(device), before)
 
 
 def test_the_rigol_keeps_the_old_record_until_a_new_one_is_complete():
     device = rigol_stopped(pulses)
     old = device.record()
-    told(device, ":TRIG:EDGE:LEV 1.35", ":SING")
+    configure(device, ":TRIG:EDGE:LEV 1.35", ":SING")
     device.clock.sleep(3.0)
     assert device.record() is old
 
@@ -37,7 +37,7 @@ def test_the_keysight_forgets_the_old_record_when_it_is_armed():
     device = keysight(pulses, *KEYSIGHT_READY, ":SING")
     device.clock.sleep(1.0)
     assert len(block(device, ":WAV:DATA?")[1]) > 0
-    told(device, ":TRIG:EDGE:LEV 1.3", ":SING")
+    configure(device, ":TRIG:EDGE:LEV 1.3", ":SING")
     device.clock.sleep(1.0)
     assert ask(device, ":WAV:DATA?", 1.0) is None
     assert errors(device) == [-230]
@@ -59,7 +59,7 @@ def test_a_short_record_does_not_make_the_trigger_look_at_every_nanosecond():
 
     device = rigol(watched, *RIGOL_READY, ":TIM:SCAL 0.0000001")
     for level in (0.65, 1.3):
-        told(device, f":TRIG:EDGE:LEV {level}", ":SING")
+        configure(device, f":TRIG:EDGE:LEV {level}", ":SING")
         device.clock.sleep(20.0)
         assert ask(device, ":TRIG:STAT?") == ("STOP" if level < 1 else "WAIT")
     # twenty seconds at 20 kHz, and some finer looks in the beginning; the first level is met at once

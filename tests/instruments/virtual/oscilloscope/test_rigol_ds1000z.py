@@ -27,8 +27,8 @@ def test_a_public_driver_sets_the_time_base_of_the_rigol_and_reads_it_back():
         "delay_offset": "0.000000e+00",
     }
     wanted = {"main_scale": 0.01, "main_offset": 0.02, "delay_enable": "1", "delay_scale": 0.002, "delay_offset": 0.06}
-    told_ = time_base(device, mode="MAIN", **wanted)
-    assert {name: float(told_[name]) for name in wanted} == {name: float(value) for name, value in wanted.items()}
+    answers = time_base(device, mode="MAIN", **wanted)
+    assert {name: float(answers[name]) for name in wanted} == {name: float(value) for name, value in wanted.items()}
     assert errors(device) == []
 
 
@@ -45,11 +45,11 @@ def test_the_delayed_sweep_stays_within_the_main_one(message, scale, offset):
     device = rigol(pulses, ":TIM:SCAL 0.01", ":TIM:DEL:SCAL 0.005")
     send(device, message.encode() + b"\n")
     assert errors(device) == [-222]
-    told_ = time_base(device)
-    assert (float(told_["delay_scale"]), float(told_["delay_offset"])) == (scale, offset)
+    answers = time_base(device)
+    assert (float(answers["delay_scale"]), float(answers["delay_offset"])) == (scale, offset)
 
 
 def test_the_delayed_sweep_follows_a_shorter_main_one():
     device = rigol(pulses, ":TIM:SCAL 0.01", ":TIM:DEL:SCAL 0.005", ":TIM:DEL:OFFS 0.03", ":TIM:SCAL 0.002")
-    told_ = time_base(device)
-    assert (float(told_["delay_scale"]), float(told_["delay_offset"])) == (0.002, 0.0)
+    answers = time_base(device)
+    assert (float(answers["delay_scale"]), float(answers["delay_offset"])) == (0.002, 0.0)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from support.scopes import KEYSIGHT_READY, block, keysight, pulses, rigol, told
+from support.scopes import KEYSIGHT_READY, block, configure, keysight, pulses, rigol
 from support.wire import ask, errors, send
 
 
@@ -10,9 +10,9 @@ from support.wire import ask, errors, send
 def test_a_setup_comes_back(make):
     device = make(pulses, "CHAN1:PROB 1;SCAL 0.2", ":TIM:SCAL 0.02", ":TRIG:EDGE:LEV 0.3")
     _, setup = block(device, ":SYST:SET?")
-    told(device, "*RST")
+    configure(device, "*RST")
     assert float(ask(device, "CHAN1:SCAL?")) != 0.2
-    told(device, f":SYST:SET #8{len(setup):08d}" + setup.decode())
+    configure(device, f":SYST:SET #8{len(setup):08d}" + setup.decode())
     assert [float(ask(device, q)) for q in ("CHAN1:SCAL?", ":TIM:SCAL?", ":TRIG:EDGE:LEV?")] == [0.2, 0.02, 0.3]
     assert block(device, ":SYST:SET?")[1] == setup
 
@@ -31,7 +31,7 @@ def test_a_setup_that_is_none_is_an_error(make, setup):
 def test_measurements_that_were_installed_can_be_cleared():
     device = keysight(pulses, *KEYSIGHT_READY, ":MEAS:VMAX", ":MEAS:VMIN")
     assert len(ask(device, ":MEAS:RES?").split(",")) == 2
-    told(device, ":MEAS:CLE")
+    configure(device, ":MEAS:CLE")
     assert ask(device, ":MEAS:RES?") == "NONE"
 
 

@@ -8,12 +8,12 @@ import pytest
 import pyvisa
 
 from instruments.clock import VirtualClock, WallClock
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.core.rows import Ask
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
+from instruments.virtual.servers.clients import Link, ServedInstrument
 from instruments.virtual.servers.server import BenchServer
-from instruments.virtual.servers.station import Link, Station
 from support.served import AT_MOST, until
 
 #: Network addresses; a busy counter, and another one.
@@ -50,11 +50,11 @@ class Served:
 
     def __init__(self, counter, clock):
         self.counter = counter
-        self.server = BenchServer(Bus({COUNTER: counter, OTHER: Virtual53230A(clock, signal=pulses)}))
+        self.server = BenchServer(VirtualBench({COUNTER: counter, OTHER: Virtual53230A(clock, signal=pulses)}))
         self.opened = contextlib.ExitStack()
 
     def open(self, way, address=COUNTER):
-        name = next(offer.resources[way] for offer in self.server.offers if offer.address == address)
+        name = next(offer.resources[way] for offer in self.server.endpoints if offer.address == address)
         resource = pyvisa.ResourceManager("@py").open_resource(name, timeout=1000 * AT_MOST)
         self.opened.callback(resource.close)
         resource.read_termination = resource.write_termination = "\n"
@@ -81,7 +81,7 @@ def serving(counter, clock):
 @pytest.fixture
 def served(monkeypatch):
     monkeypatch.setattr("instruments.virtual.bench.session.SLICE", 1e-3)  # a turn more often costs the test less
-    monkeypatch.setattr("instruments.virtual.servers.station.LINGER", 0.05)  # the work here never ends
+    monkeypatch.setattr("instruments.virtual.servers.clients.LINGER", 0.05)  # the work here never ends
     clock = WallClock()
     with serving(BusyCounter(clock), clock) as served:
         yield served  # the end of the server does not wait for the counter: it would wait for ever
@@ -157,15 +157,15 @@ class Bench:
         monkeypatch.setattr("instruments.virtual.bench.session.SLICE", -1.0)  # a slice is one step
         self.clock = VirtualClock()
         self.counter = BusyCounter(self.clock)
-        self.station = Station(Bus({COUNTER: self.counter}), self.counter)
+        self.instrument = ServedInstrument(VirtualBench({COUNTER: self.counter}), self.counter)
 
     def link(self, *, stream=False):
-        return Link(self.station, stream=stream)
+        return Link(self.instrument, stream=stream)
 
     async def ask(self, link, question):
         """When the answer to a question is there [s]."""
         assert await link.write(question)
-        while link.due() != 0.0:
+        while link.seconds_until_ready() != 0.0:
             await asyncio.sleep(0)
         link.take(1 << 20)
         return self.clock.now()
@@ -234,7 +234,7 @@ def test_empty_lines_leave_the_others_their_turn(monkeypatch):
         link = bench.link()
         assert await link.write(b"\n" * (1 << 20))
         turns = 0
-        while link.busy():
+        while link.is_busy():
             await asyncio.sleep(0)
             turns += 1
         return turns
@@ -260,10 +260,10 @@ def test_who_is_kept_out_does_not_abort_the_holders_measurement(monkeypatch, mes
         assert await holder.write(b"ENDL?\n")
         assert await other.write(message)
         await turns()
-        yield bench.station.working
+        yield bench.instrument.working
         holder.unlock()
         await turns()
-        yield bench.station.working
+        yield bench.instrument.working
 
     assert asyncio.run(collected(abort())) == [True, False]
 
@@ -283,7 +283,7 @@ def test_a_command_that_waits_its_turn_waits_for_a_lock_given_meanwhile(monkeypa
         assert await holder.lock(None, 0.0)
         assert await holder.write(b"ABOR\n")
         await turns()
-        assert not bench.station.working
+        assert not bench.instrument.working
         yield bench.counter.resets
         holder.unlock()
         await turns()
@@ -306,7 +306,7 @@ def test_a_command_that_waits_its_turn_waits_for_a_lock_given_meanwhile(monkeypa
 )
 def test_in_slices_the_same_is_measured_as_at_once(way, model, messages, monkeypatch):
     monkeypatch.setattr("instruments.virtual.bench.session.SLICE", -1.0)  # a slice is one step
-    alone = Bus({COUNTER: model(VirtualClock(), signal=pulses)}).open(COUNTER)
+    alone = VirtualBench({COUNTER: model(VirtualClock(), signal=pulses)}).open(COUNTER)
     for message in messages:
         alone.write(message.encode())
     expected, _ = alone.read(1 << 20, 1e9)
@@ -323,7 +323,7 @@ def test_in_slices_the_same_is_measured_as_at_once(way, model, messages, monkeyp
 def test_a_message_that_comes_in_process_waits_for_the_one_before(monkeypatch):
     monkeypatch.setattr("instruments.virtual.bench.session.SLICE", -1.0)  # a slice is one step
     counter = Virtual53230A(VirtualClock(), signal=pulses)
-    bus = Bus({COUNTER: counter})
+    bus = VirtualBench({COUNTER: counter})
     asking, other = bus.open(COUNTER), bus.open(COUNTER)
     work = asking.begin("SAMP:COUN 2000;:READ?")
     assert asking.go_on(work)
@@ -337,7 +337,7 @@ def test_a_counter_that_was_not_asked_for_long_catches_up_in_slices(monkeypatch)
     monkeypatch.setattr("instruments.virtual.bench.session.SLICE", -1.0)  # a slice is one step
     clock = VirtualClock()
     counter = Virtual53230A(clock, signal=pulses)
-    session = Bus({COUNTER: counter}).open(COUNTER)
+    session = VirtualBench({COUNTER: counter}).open(COUNTER)
     session.write(b"INP1:LEV:AUTO OFF;:INP1:LEV1 0.6;:INP1:COUP DC;:SAMP:COUN 1000000;:INIT")
     clock.sleep(1000.0)
     work = session.catch_up()

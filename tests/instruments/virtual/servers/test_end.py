@@ -9,11 +9,11 @@ import threading
 import pytest
 
 from instruments.clock import WallClock
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
+from instruments.virtual.servers.clients import ServedInstrument
 from instruments.virtual.servers.hislip_messages import Type
-from instruments.virtual.servers.server import Place
+from instruments.virtual.servers.server import ListenAt
 from instruments.virtual.servers.socket_server import socket_listener
-from instruments.virtual.servers.station import Station
 from support.served import AT_MOST, NETWORK, Served, Thing, channels, rpc, send
 
 
@@ -52,7 +52,7 @@ def test_the_end_of_the_server_ends_a_client_that_is_just_connecting(turns):
     thing = Thing(WallClock())
 
     async def end_while_connecting():
-        listener = socket_listener(Station(Bus({NETWORK: thing}), thing))
+        listener = socket_listener(ServedInstrument(VirtualBench({NETWORK: thing}), thing))
         await listener.open("127.0.0.1", 0)
         with socket.create_connection(("127.0.0.1", listener.port), timeout=AT_MOST):
             for _ in range(turns):
@@ -73,9 +73,9 @@ def test_a_server_that_has_ended_may_begin_again():
 
 def test_a_server_that_could_not_begin_may_begin_later():
     with socket.create_server(("127.0.0.1", 0)) as taken:
-        served = Served(place=Place(port_base=taken.getsockname()[1]))
+        served = Served(listen_at=ListenAt(port_base=taken.getsockname()[1]))
         with pytest.raises(OSError, match="in use"), served.server:
             pass
-    served.server.place = Place()
+    served.server.listen_at = ListenAt()
     with served.server, served.opened:
         assert served.open("socket").query("*IDN?").strip() == Thing.identity

@@ -10,11 +10,11 @@ import time
 import pytest
 
 from instruments.clock import VirtualClock, WallClock
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.faults import Fault
-from instruments.virtual.servers import station
+from instruments.virtual.servers import clients
 from instruments.virtual.servers.hislip_messages import Type
-from instruments.virtual.servers.server import Place
+from instruments.virtual.servers.server import ListenAt
 from support.served import (
     ALL,
     AT_MOST,
@@ -81,7 +81,7 @@ def test_device_clear_ends_a_slow_answer(served, way):
 
 
 @pytest.mark.parametrize("way", MARKED)
-def test_the_status_byte_tells_of_an_error_and_of_an_answer(served, way):
+def test_the_status_byte_shows_an_error_and_an_answer(served, way):
     client = served.open(way)
     assert client.read_stb() == 0
     client.write("FOO")
@@ -162,16 +162,16 @@ def test_a_connection_that_fails_does_not_keep_others_away(served, monkeypatch, 
             raise error
         return True
 
-    monkeypatch.setattr(served.server.bus, "reachable", reachable)
+    monkeypatch.setattr(served.server.bench, "reachable", reachable)
     served.bare("socket")
     other = served.open("socket")
     assert other.query("*IDN?").strip() == Thing.identity
-    assert "could not be taken" in caplog.text
+    assert "could not be accepted" in caplog.text
 
 
 @pytest.mark.parametrize("way", ["socket", "hislip", "vxi11"])
 def test_one_client_too_many_is_sent_away_until_another_leaves(served, way):
-    crowd = [served.bare(way) for _ in range(station.MOST_CLIENTS * (2 if way == "hislip" else 1))]
+    crowd = [served.bare(way) for _ in range(clients.MOST_CLIENTS * (2 if way == "hislip" else 1))]
     assert not welcome(served, way)
     crowd[0].close()
     until(lambda: welcome(served, way))
@@ -204,7 +204,7 @@ def in_a_row():
 def test_a_port_that_is_taken_leaves_nothing_open():
     first = in_a_row()
     with socket.create_server(("127.0.0.1", first + 2)):
-        with pytest.raises(OSError, match=str(first + 2)), serving(place=Place(port_base=first)):
+        with pytest.raises(OSError, match=str(first + 2)), serving(listen_at=ListenAt(port_base=first)):
             pass
         with socket.create_server(("127.0.0.1", first)):
             pass
@@ -212,7 +212,7 @@ def test_a_port_that_is_taken_leaves_nothing_open():
 
 def test_ports_are_counted_from_the_first_one():
     first = in_a_row()
-    with serving(place=Place(port_base=first)) as served:
+    with serving(listen_at=ListenAt(port_base=first)) as served:
         names = served.names()
     assert names["socket"] == f"TCPIP0::127.0.0.1::{first}::SOCKET"
     assert names["hislip"] == f"TCPIP0::127.0.0.1::hislip0,{first + 1}::INSTR"
@@ -244,15 +244,15 @@ def cut(served, way):
 
 @pytest.mark.parametrize("way", ["socket", "hislip", "vxi11"])
 def test_a_link_that_is_cut_in_an_answer_is_closed(served, way):
-    served.server.bus.faults.append(Fault("disconnected", question=r"\*IDN\?"))
+    served.server.bench.faults.append(Fault("disconnected", question=r"\*IDN\?"))
     assert b"1.0\n" not in cut(served, way)
     assert served.open(way).query("*IDN?").strip() == Thing.identity
 
 
 def test_an_instrument_that_is_away_takes_no_connection(served):
-    served.server.bus.away[id(served.thing)] = served.thing.clock.now() + 3600
+    served.server.bench.unreachable_until[id(served.thing)] = served.thing.clock.now() + 3600
     assert not any(welcome(served, way) for way in ("socket", "hislip", "vxi11"))
-    served.server.bus.away[id(served.thing)] = served.thing.clock.now()
+    served.server.bench.unreachable_until[id(served.thing)] = served.thing.clock.now()
     assert all(welcome(served, way) for way in ("socket", "hislip", "vxi11"))
 
 
@@ -272,8 +272,8 @@ def test_a_lock_is_waited_for_and_ends_with_its_connection(served):
 
 @pytest.mark.parametrize("way", ["hislip", "socket", "serial"])
 def test_who_is_kept_out_waits_and_is_served_then(served, way):
-    holder = Bus.session(served.server.bus, served.serial if way == "serial" else served.thing, stream=False)
-    holder.hold.take(holder, None)
+    holder = VirtualBench.session(served.server.bench, served.serial if way == "serial" else served.thing, stream=False)
+    holder.client_lock.acquire(holder, None)
     client = served.open(way)
     client.write("*OPC?")
     assert times_out(client)

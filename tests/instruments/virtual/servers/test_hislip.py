@@ -6,14 +6,14 @@ import struct
 import pytest
 
 from instruments.clock import WallClock
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
+from instruments.virtual.servers.clients import Link, ServedInstrument
 from instruments.virtual.servers.hislip import Client
 from instruments.virtual.servers.hislip_messages import HEADER, LONGEST, Channel, Message, Type
-from instruments.virtual.servers.station import Link, Station
 from support.served import NETWORK, NO_ERROR, Thing, channels, header, send, until
 
 
-def test_more_sessions_than_there_may_be_are_told_so(served, monkeypatch):
+def test_one_session_too_many_gets_a_fatal_error(served, monkeypatch):
     monkeypatch.setattr("instruments.virtual.servers.hislip.MOST_CLIENTS", 1)
     channels(served)
     one_more = served.bare("hislip")
@@ -127,7 +127,7 @@ def test_an_unknown_message_is_refused_on_either_channel(served):
         ((Type.ASYNC_INITIALIZE, 0, 4711), 3),
     ],
 )
-def test_a_wrong_beginning_is_told_and_ends(served, first, code):
+def test_a_wrong_beginning_gets_a_fatal_error_and_ends(served, first, code):
     bare = served.bare("hislip")
     send(bare, *first)
     assert header(bare)[:2] == (Type.FATAL_ERROR, code)
@@ -161,7 +161,7 @@ def test_a_second_channel_that_does_not_come_ends_the_first(served, monkeypatch)
 
 @pytest.mark.parametrize("which", [0, 1])
 def test_either_channel_takes_the_other_with_it(served, monkeypatch, which):
-    monkeypatch.setattr("instruments.virtual.servers.station.LINGER", 0.01)
+    monkeypatch.setattr("instruments.virtual.servers.clients.LINGER", 0.01)
     both = channels(served)
     both[which].close()
     assert both[1 - which].recv(10) == b""
@@ -190,7 +190,7 @@ class FullWriter:
             await asyncio.Event().wait()
 
 
-@pytest.mark.parametrize("which", ["listen", "listen_aside"])
+@pytest.mark.parametrize("which", ["listen", "listen_asynchronous"])
 @pytest.mark.parametrize(
     ("kind", "control", "payload"),
     [(200, 0, b""), (Type.ASYNC_LOCK, 7, b""), (Type.DATA_END, 0, b"*OPC?"), (Type.DEVICE_CLEAR_COMPLETE, 0, b"")],
@@ -202,8 +202,8 @@ def test_replies_that_are_never_read_do_not_pile_up(which, kind, control, payloa
     async def flood():
         reader, writers = asyncio.StreamReader(), [FullWriter(), FullWriter()]
         reader.feed_data((HEADER.pack(b"HS", kind, control, 2, len(payload)) + payload) * 10_000)
-        client = Client(Link(Station(Bus({NETWORK: thing}), thing)), Channel(reader, writers[0]))
-        client.other = Channel(reader, writers[1])
+        client = Client(Link(ServedInstrument(VirtualBench({NETWORK: thing}), thing)), Channel(reader, writers[0]))
+        client.asynchronous = Channel(reader, writers[1])
         listening = asyncio.ensure_future(getattr(client, which)())
         for _ in range(100_000):
             await asyncio.sleep(0)
@@ -220,21 +220,23 @@ class ClearedMeanwhile(FullWriter):
 
     async def drain(self):
         if self.piled_up:
-            self.client.clear(self.client.other, None)
+            self.client.clear(self.client.asynchronous, None)
 
 
-def test_a_message_is_dropped_by_a_clear_while_the_interruption_is_told():
+def test_a_clear_drops_a_message_while_the_interruption_is_sent():
     thing = Thing(WallClock())
 
     async def clear_meanwhile():
         writer = ClearedMeanwhile()
         reader = asyncio.StreamReader()
-        client = writer.client = Client(Link(Station(Bus({NETWORK: thing}), thing)), Channel(reader, FullWriter()))
-        client.other = Channel(reader, writer)
-        await client._take(Message(Type.DATA_END, parameter=2, payload=b"SLOW?"))
-        await client.link.finished()
-        await client._take(Message(Type.DATA_END, parameter=4, payload=b"LEV 5"))
-        await client.link.finished()
+        client = writer.client = Client(
+            Link(ServedInstrument(VirtualBench({NETWORK: thing}), thing)), Channel(reader, FullWriter())
+        )
+        client.asynchronous = Channel(reader, writer)
+        await client._handle(Message(Type.DATA_END, parameter=2, payload=b"SLOW?"))
+        await client.link.wait_until_done()
+        await client._handle(Message(Type.DATA_END, parameter=4, payload=b"LEV 5"))
+        await client.link.wait_until_done()
         assert client.clearing
 
     asyncio.run(clear_meanwhile())

@@ -11,11 +11,11 @@ import pytest
 
 from instruments.clock import WallClock
 from instruments.ieee488 import INFINITY
-from instruments.virtual.bench.bus import Bus
+from instruments.virtual.bench.bench import VirtualBench
+from instruments.virtual.servers.clients import LINGER, Link, ServedInstrument
 from instruments.virtual.servers.hislip import HislipServer
 from instruments.virtual.servers.hislip_messages import HEADER, Type
 from instruments.virtual.servers.socket_server import TcpWire, converse
-from instruments.virtual.servers.station import LINGER, Link, Station
 from instruments.virtual.servers.vxi11 import Vxi11Server
 from support.served import NETWORK, Thing
 
@@ -50,10 +50,10 @@ def loop(monkeypatch):
 
 
 @pytest.fixture
-def station(loop):
+def instrument(loop):
     thing = Thing(WallClock())
     thing.pace = PACE
-    return Station(Bus({NETWORK: thing}), thing)
+    return ServedInstrument(VirtualBench({NETWORK: thing}), thing)
 
 
 class Leaving:
@@ -81,15 +81,15 @@ class Leaving:
         pass
 
 
-async def over_a_stream(station, messages):
+async def over_a_stream(instrument, messages):
     client = Leaving(b"".join(message + b"\n" for message in messages))
     client.reader.feed_eof()
-    await converse(station, TcpWire(client.reader, client))
+    await converse(instrument, TcpWire(client.reader, client))
     return client.got
 
 
-async def over_hislip(station, messages):
-    server = HislipServer(station)
+async def over_hislip(instrument, messages):
+    server = HislipServer(instrument)
     sent = b"".join(
         HEADER.pack(b"HS", Type.DATA_END, 0, 2 * n, len(message)) + message for n, message in enumerate(messages)
     )
@@ -112,7 +112,7 @@ def call(procedure, parameters):
     return struct.pack("!I", 1 << 31 | len(record)) + record
 
 
-async def over_vxi11(station, messages, *, destroys=True):
+async def over_vxi11(instrument, messages, *, destroys=True):
     writes = (
         struct.pack("!5I", 1, 10_000, 0, 8, len(message)) + message + bytes(-len(message) % 4) for message in messages
     )
@@ -122,11 +122,11 @@ async def over_vxi11(station, messages, *, destroys=True):
         *([call(23, struct.pack("!I", 1))] if destroys else []),
     )
     with contextlib.suppress(EOFError):
-        await Vxi11Server(station)._talk(client.reader, client)
+        await Vxi11Server(instrument)._talk(client.reader, client)
 
 
-async def over_vxi11_without_a_word(station, messages):
-    await over_vxi11(station, messages, destroys=False)
+async def over_vxi11_without_a_word(instrument, messages):
+    await over_vxi11(instrument, messages, destroys=False)
 
 
 WAYS = [over_a_stream, over_hislip, over_vxi11, over_vxi11_without_a_word]
@@ -134,37 +134,37 @@ WAYS = [over_a_stream, over_hislip, over_vxi11, over_vxi11_without_a_word]
 
 @pytest.mark.parametrize("others", [0, 2], ids=["alone", "beside others"])
 @pytest.mark.parametrize("way", WAYS)
-def test_what_a_client_sent_before_it_left_is_worked_on(loop, station, way, others):
+def test_what_a_client_sent_before_it_left_is_worked_on(loop, instrument, way, others):
     async def leave_early():
-        flood = [Link(station) for _ in range(others)]
+        flood = [Link(instrument) for _ in range(others)]
         for link in flood:
             await link.write(b"*CLS\n" * 20)
-        await way(station, COMMANDS)
+        await way(instrument, COMMANDS)
         for link in flood:
             link.close()
 
     loop.run_until_complete(leave_early())
-    assert station.device.settings["level"] == 7
+    assert instrument.device.settings["level"] == 7
 
 
-def test_a_client_of_hislip_that_waits_for_a_lock_in_vain_is_let_go(loop, station):
+def test_a_client_of_hislip_that_waits_for_a_lock_in_vain_is_let_go(loop, instrument):
     async def leave_locked_out():
-        holder = Link(station)
+        holder = Link(instrument)
         await holder.lock(None, 0.0)
-        await over_hislip(station, COMMANDS)
+        await over_hislip(instrument, COMMANDS)
         holder.close()
 
     loop.run_until_complete(leave_locked_out())
-    assert station.device.settings["level"] == 0
+    assert instrument.device.settings["level"] == 0
     assert loop.now == pytest.approx(LINGER, abs=0.01)
 
 
-def test_a_stream_client_that_has_said_all_gets_a_late_answer(loop, station):
-    got = loop.run_until_complete(over_a_stream(station, [b"SLOW?", b"*IDN?"]))
+def test_a_stream_client_that_has_said_all_gets_a_late_answer(loop, instrument):
+    got = loop.run_until_complete(over_a_stream(instrument, [b"SLOW?", b"*IDN?"]))
     assert got.splitlines() == [b"slow", Thing.identity.encode()]
 
 
-def test_a_stream_client_whose_answer_never_comes_is_let_go(loop, station):
-    station.device.busy_until(INFINITY)
-    assert loop.run_until_complete(over_a_stream(station, [b"*IDN?"])) == b""
+def test_a_stream_client_whose_answer_never_comes_is_let_go(loop, instrument):
+    instrument.device.busy_until(INFINITY)
+    assert loop.run_until_complete(over_a_stream(instrument, [b"*IDN?"])) == b""
     assert loop.now < 3 * LINGER

@@ -7,7 +7,7 @@ import struct
 import pytest
 from pyvisa_py.protocols.rpc import TCPPortMapperClient, UDPPortMapperClient
 
-from instruments.virtual.servers.server import Place
+from instruments.virtual.servers.server import ListenAt
 from support.served import AT_MOST, rpc, serving
 
 #: The first instrument's address.  macOS has 127.0.0.1 alone, unless a person adds others.
@@ -28,12 +28,12 @@ CORE, ABORT, MAPPER = 0x0607AF, 0x0607B0, 100000
 TCP, UDP = 6, 17
 
 
-def port_of(place):
+def port_of(host):
     """A port that is free for TCP and UDP."""
     with socket.socket() as stream, socket.socket(type=socket.SOCK_DGRAM) as datagrams:
-        stream.bind((place, 0))
+        stream.bind((host, 0))
         port = stream.getsockname()[1]
-        datagrams.bind((place, port))
+        datagrams.bind((host, port))
         return port
 
 
@@ -41,7 +41,7 @@ def port_of(place):
 def mapped():
     """The port of the first instrument's port mapper, and that of its core channel."""
     port = port_of(HOST)
-    with serving(place=Place(port_mapper=port)) as served:
+    with serving(listen_at=ListenAt(port_mapper=port)) as served:
         name = served.names()[
             "vxi11"
         ]  # TCPIP0::127.0.0.2,40123::inst0::INSTR: with its port, for the mapper is not at 111

@@ -18,7 +18,7 @@ def test_a_pseudo_terminal_outlives_a_failing_instrument(served, caplog):
     assert client.query("*OPC?").strip() == "1"
 
 
-def test_a_pseudo_terminal_loses_what_nobody_fetches(served):
+def test_a_pseudo_terminal_loses_what_no_client_reads(served):
     served.open("pty").write("BLOC?;*OPC?")
     until(lambda: served.serial.blocks == 1)
     client = served.open("pty", timeout=100)

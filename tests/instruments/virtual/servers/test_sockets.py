@@ -23,7 +23,7 @@ def test_bytes_may_come_one_by_one(served):
 
 
 def test_who_has_said_all_still_gets_the_answer(served, monkeypatch):
-    monkeypatch.setattr("instruments.virtual.servers.station.LINGER", AT_MOST)
+    monkeypatch.setattr("instruments.virtual.servers.clients.LINGER", AT_MOST)
     bare = served.bare("socket")
     bare.sendall(b"*IDN?\n")
     bare.shutdown(socket.SHUT_WR)

@@ -11,7 +11,7 @@ from pyvisa.constants import StatusCode
 from pyvisa_py.protocols import vxi11 as pyvisa_vxi11
 from pyvisa_py.tcpip import Vxi11CoreClient
 
-from instruments.virtual.servers import station
+from instruments.virtual.servers import clients
 from instruments.virtual.servers.rpc import read_record
 from support.served import AT_MOST, rpc, until
 
@@ -57,7 +57,7 @@ def test_a_read_ends_by_count_character_or_end_and_says_so(served):
     assert client.device_read(link, 100, int(1000 * AT_MOST), 0, 0, 0) == (0, 4, b"thing,7,1.0\n")
 
 
-def test_reading_what_was_not_asked_for_times_out_and_is_told(served):
+def test_a_read_without_a_question_times_out_and_queues_an_error(served):
     client = served.vxi11()
     link, *_ = created(client)
     assert client.device_read(link, 10, 1, 0, 0, 0) == (15, 0, b"")
@@ -125,7 +125,7 @@ def test_a_record_without_end_is_cut_off(served):
 
 def test_links_are_destroyed_with_their_connection(served):
     client = served.vxi11()
-    for _ in range(station.MOST_CLIENTS):
+    for _ in range(clients.MOST_CLIENTS):
         created(client)
     assert client.create_link(1, False, 0, "inst0")[0] == 9
     client.close()

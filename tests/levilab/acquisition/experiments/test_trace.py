@@ -172,7 +172,7 @@ def test_a_channel_that_another_program_turns_off_is_turned_on_again(tmp_path: P
         def reading(self, text: str, elapsed: float, remaining: float) -> None:
             super().reading(text, elapsed, remaining)
             if len(self.readings) == 1:
-                scope = wiring.library.bus.instruments[VIRTUAL["oscilloscope"].address]
+                scope = wiring.library.bench.instruments[VIRTUAL["oscilloscope"].address]
                 scope.settings["chan1_display"] = False
 
     run = acquire(replace(request, wiring=lambda: wiring), Meddler())
@@ -190,7 +190,7 @@ def watched(tmp_path: Path, message: str, scene: SpinScene | None = None) -> Run
         def reading(self, text: str, elapsed: float, remaining: float) -> None:
             super().reading(text, elapsed, remaining)
             if len(self.readings) == 1:
-                wiring.library.bus.instruments[VIRTUAL["generator"].address].execute(message)
+                wiring.library.bench.instruments[VIRTUAL["generator"].address].execute(message)
 
     return acquire(replace(mock_trace(tmp_path, settings, seed=1), wiring=lambda: wiring), Meddler())
 
