@@ -40,15 +40,15 @@ if TYPE_CHECKING:
 def outputs(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     """What the generator's output was set to, in order."""
     seen: list[bool] = []
-    listener = "instruments.virtual.generator.keysight_33500b.Virtual33500B.changed"
+    listener = "instruments.virtual.generator.keysight_33500b.Virtual33500B.on_change"
     from instruments.virtual.generator.keysight_33500b import Virtual33500B
 
-    changed = Virtual33500B.changed
+    on_change = Virtual33500B.on_change
 
     def watched(self: Virtual33500B, name: str) -> None:
         if name == "1:output":
             seen.append(bool(self.settings["1:output"]))
-        changed(self, name)
+        on_change(self, name)
 
     monkeypatch.setattr(listener, watched)
     return seen
