@@ -6,11 +6,11 @@ import pytest
 from levilab.simulator.ensemble import simulate_many
 from levilab.simulator.kernels.motion import TIME
 from levilab.simulator.model import model_of
-from levilab.simulator.problem import Problem, at_every_step, scheme_for
+from levilab.simulator.problem import Problem, integrate_each_step, scheme_for
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
 from levilab.simulator.start import start_of
-from levilab.simulator.stops import Stops, every_step
+from levilab.simulator.stops import Stops, stop_after_each_step
 
 # far above the base, in its field alone, so that a tilted moment turns the spin back and forth through zero
 SLOW = preset("tilted").changed(
@@ -76,10 +76,10 @@ def test_there_is_a_state_after_each_step():
     model, start = model_of(scene), start_of(scene)
     stops = Stops(np.array([0.0, 0.001, 0.003]), np.array([2, 4]), np.zeros(2), np.zeros(2))
     expected = [0.0, 0.0005, 0.001, 0.0015, 0.002, 0.0025, 0.003]
-    each = every_step(stops)
+    each = stop_after_each_step(stops)
     assert each.times == pytest.approx(expected)
     assert each.counts.tolist() == 6 * [1]
-    states = at_every_step(Problem(scene, model, start, scheme_for(None, model)), stops)
+    states = integrate_each_step(Problem(scene, model, start, scheme_for(None, model)), stops)
     assert states[:, TIME] == pytest.approx(expected)
 
 
