@@ -43,7 +43,7 @@ from instruments.virtual.oscilloscope.rigol_ds1000z import VirtualDS1000Z
 from instruments.virtual.servers.server import BenchServer
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
-from levilab.present.progress import Show
+from levilab.present.progress import Display
 from levilab.world.bench import virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
 
@@ -383,7 +383,7 @@ def _acquired() -> dict[str, float]:
         disk = Stopwatch(os.fsync)
         patched.enter_context(mock.patch("os.fsync", disk))
         start = time.perf_counter()
-        run = acquire(replace(request, wiring=lambda: virtual_wiring(world)), mock.Mock(spec=Show))
+        run = acquire(replace(request, wiring=lambda: virtual_wiring(world)), mock.Mock(spec=Display))
         total, readings = time.perf_counter() - start, run.count()
     rest = total - light.seconds - disk.seconds
     return {
