@@ -185,11 +185,11 @@ def test_a_text_is_displayed(newer):
     driver, device = newer
     driver.display = "coil on"
     settled(driver)
-    assert device.text == "coil on"
+    assert device.text() == '"coil on"'
     driver.clear_display()
     driver.phase_sync()
     settled(driver)
-    assert device.text == ""
+    assert device.text() == '""'
 
 
 @pytest.mark.parametrize("family", [OLDER], ids=["33220A"])
