@@ -7,7 +7,6 @@ imports them once and forks for each trial.  Where a system cannot fork (Windows
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import importlib
 import json
 import os
@@ -36,15 +35,6 @@ HEAVY = """
 FACTOR, EXTRA_S = 5.0, 25.0
 #: … and so many times that by the clock, for tests that wait for ever use no time of a processor.
 CLOCK = 6.0
-
-
-@dataclasses.dataclass(frozen=True)
-class Outcome:
-    """What became of a trial: "passed", "failed" (with the first test that failed) or "time-out"."""
-
-    state: str
-    test: str = ""
-    cpu_s: float = 0.0
 
 
 def copy_tree() -> None:

@@ -58,9 +58,9 @@ def simulate(
     from levilab.motion.summary import as_document
     from levilab.present.progress import ShareBar
 
-    order = SimulationRequest(chosen, duration, tolerance, rate, out)
+    request = SimulationRequest(chosen, duration, tolerance, rate, out)
     with interruptible("nothing was written"), contextlib.closing(ShareBar("simulating")) as share:
-        done = run_simulation(order, message, share)
+        done = run_simulation(request, message, share)
     if done.folder:
         message(f"wrote {done.folder}")
     if not as_json:  # at once: what explains it takes longer

@@ -1,4 +1,4 @@
-"""The one simulation of the command: an order → the motion, its summary, and a run folder."""
+"""The one simulation of the command: an request → the motion, its summary, and a run folder."""
 
 from __future__ import annotations
 
@@ -86,12 +86,12 @@ class Simulation:
 
 
 def run_simulation(
-    order: SimulationRequest, message: Callable[[str], None], progress: Callable[[float], None] | None = None
+    request: SimulationRequest, message: Callable[[str], None], progress: Callable[[float], None] | None = None
 ) -> Simulation:
     """Simulate, look at the motion, and write it down; what does not come to its end leaves nothing behind.
 
     Args:
-        order: what is simulated, and how.
+        request: what is simulated, and how.
         message: called with what takes a moment.
         progress: called with the share that is done.
 
@@ -99,13 +99,16 @@ def run_simulation(
         UsageError, SimulationError: for what cannot be simulated.
         CannotWrite: the run folder cannot be written.
     """
-    factor = _samples_per_state(order)
-    if order.out is None:
-        return Simulation(_simulated(order, factor, message, progress), None, factor)
-    with interruption_postponed() as admit_interruption, RunWriter.create(order.out, _record(order), STATES) as writer:
+    factor = _samples_per_state(request)
+    if request.out is None:
+        return Simulation(_simulated(request, factor, message, progress), None, factor)
+    with (
+        interruption_postponed() as admit_interruption,
+        RunWriter.create(request.out, _record(request), STATES) as writer,
+    ):
         try:
             admit_interruption()  # from here on the folder is taken away again
-            summary = _simulated(order, factor, message, progress)
+            summary = _simulated(request, factor, message, progress)
             _write(summary, factor, writer)
         except BaseException:
             writer.discard()
@@ -113,42 +116,42 @@ def run_simulation(
     return Simulation(summary, writer.folder, factor)
 
 
-def _samples_per_state(order: SimulationRequest) -> int:
+def _samples_per_state(request: SimulationRequest) -> int:
     """Samples for each state that is kept: the spectrum needs more of them than a file does.  Checks the numbers."""
-    for name, value in (("duration", order.duration), ("tolerance", order.tolerance), ("rate", order.rate)):
+    for name, value in (("duration", request.duration), ("tolerance", request.tolerance), ("rate", request.rate)):
         if not 0 < value <= LONGEST_S:
             raise UsageError(name, f"a number above 0 and up to {LONGEST_S:.0e} is expected", value=value)
-    states = order.duration * order.rate
+    states = request.duration * request.rate
     if states > MOST_STATES:
         raise UsageError(
             "duration",
-            f"with `rate` = {order.rate:g} these are {states:.2g} states, at most {MOST_STATES} are kept: "
-            f"take `rate` = {MOST_STATES / order.duration:.2g} or less",
-            value=order.duration,
+            f"with `rate` = {request.rate:g} these are {states:.2g} states, at most {MOST_STATES} are kept: "
+            f"take `rate` = {MOST_STATES / request.duration:.2g} or less",
+            value=request.duration,
         )
-    wanted = math.ceil(rate_for(order.scene) / order.rate)
+    wanted = math.ceil(rate_for(request.scene) / request.rate)
     return max(min(wanted, int(MOST_STATES / states)), 1)
 
 
 def _simulated(
-    order: SimulationRequest,
+    request: SimulationRequest,
     factor: int,
     message: Callable[[str], None],
     progress: Callable[[float], None] | None,
 ) -> Summary:
     with announce_compilation(message), interruption_postponed():
-        simulate(order.scene, min(_FIRST_S, order.duration), rate=None)
+        simulate(request.scene, min(_FIRST_S, request.duration), rate=None)
     begin = time.perf_counter()
     motion = simulate(
-        order.scene, order.duration, tolerance=order.tolerance, rate=factor * order.rate, progress=progress
+        request.scene, request.duration, tolerance=request.tolerance, rate=factor * request.rate, progress=progress
     )
-    return summarise(motion, order.duration, order.rate, time.perf_counter() - begin)
+    return summarise(motion, request.duration, request.rate, time.perf_counter() - begin)
 
 
 # --- the run folder ---
 
 
-def _record(order: SimulationRequest) -> RunRecord:
+def _record(request: SimulationRequest) -> RunRecord:
     return RunRecord(
         experiment="simulate",
         status="running",
@@ -156,15 +159,15 @@ def _record(order: SimulationRequest) -> RunRecord:
         command_line=sys.argv,
         channels=[{"name": name, "unit": unit, "source": source} for name, unit, source, _ in COLUMNS],
         configuration={
-            "scene": order.scene.as_table(),
-            "duration_s": order.duration,
-            "tolerance": order.tolerance,
-            "rate_hz": order.rate,
+            "scene": request.scene.as_table(),
+            "duration_s": request.duration,
+            "tolerance": request.tolerance,
+            "rate_hz": request.rate,
         },
         software=software_versions(),
-        note=order.scene.description,
+        note=request.scene.description,
         synthetic=True,
-        synthetic_how=f"simulated: scene {order.scene.name or 'without a name'}",
+        synthetic_how=f"simulated: scene {request.scene.name or 'without a name'}",
     )
 
 

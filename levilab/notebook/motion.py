@@ -95,8 +95,8 @@ def simulate_motion(
 ) -> SimulatedMotion:
     """Simulate a scene with changes at dotted keys.  Raises SceneError, UsageError, SimulationError, CannotWrite."""
     chosen = (scene if isinstance(scene, Scene) else read_scene(Path(scene))).changed(settings)
-    order = SimulationRequest(chosen, duration, tolerance, rate, None if out is None else Path(out))
-    done = run_simulation(order, lambda _: None)
+    request = SimulationRequest(chosen, duration, tolerance, rate, None if out is None else Path(out))
+    done = run_simulation(request, lambda _: None)
     motion = done.summary.motion
     rows = kept_rows(motion, done.samples_per_state)
     own = {one.name: getattr(motion, one.name) for one in fields(motion)}

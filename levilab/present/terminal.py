@@ -138,14 +138,10 @@ def print_rows(console: Terminal, heads: Sequence[str], rows: Sequence[Sequence[
     numbers: the heads of columns that are aligned to the right.
     """
     table = new_table(None, *heads, numbers=numbers)
-    if len(rows) < _MANY_ROWS:
-        for row in rows:
-            table.add_row(*map(escape, row))
-        console.print(table)
-        return
     texts = [[console.spelled(cell) for cell in row] for row in rows]
     widths = [max(map(cell_len, column)) for column in zip(heads, *texts, strict=True)]
-    if sum(widths) + 2 * len(widths) > console.width:  # a column has to be folded
+    to_be_folded = sum(widths) + 2 * len(widths) > console.width
+    if len(rows) < _MANY_ROWS or to_be_folded:
         for row in rows:
             table.add_row(*map(escape, row))
         console.print(table)

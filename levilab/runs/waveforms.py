@@ -54,5 +54,6 @@ def _waveform(run: Run, stored: StoredTrace) -> Waveform:
         count=count,
         signals=(Signal(stored.channel),),
         read=read,
+        warnings=(f"{run.folder.name}: record {stored.number} {stored.how_short}",) if stored.announced else (),
         start_u=SEEN_LATE_S / math.sqrt(3),  # the root mean square of what lies evenly between 0 and that
     )

@@ -268,15 +268,16 @@ def _about_power(power: Power) -> str:
     aim = f"a slope of {power.slope:g} from 1"
     if power.enough:
         return (
-            f"These points tell {aim} with a probability of {at_most(power.now)}; the smallest difference that they "
-            f"tell in nine cases of ten is {plain(power.smallest_difference, 2)}. A range of "
+            f"These points distinguish {aim} with a probability of {at_most(power.now)}; the smallest difference "
+            f"that they show in nine cases of ten is {plain(power.smallest_difference, 2)}. A range of "
             f"{plain(power.range_needed_hz, 2)} Hz, or a u of {plain(power.u_needed_hz, 2)} Hz a point, would do."
         )
     points = "more than a million points" if power.points_needed is None else f"{power.points_needed} points"
     return (
-        f"These points would tell {aim} in {100 * power.now:.0f} % of cases only. It takes {points} such as these "
-        f"({power.points} now), a range of {plain(power.range_needed_hz, 2)} Hz ({plain(power.range_hz, 2)} Hz now), "
-        f"or a u of {plain(power.u_needed_hz, 2)} Hz a point ({plain(power.u_hz, 2)} Hz now), for nine cases of ten."
+        f"These points would distinguish {aim} in {100 * power.now:.0f} % of cases only. It takes {points} such as "
+        f"these ({power.points} now), a range of {plain(power.range_needed_hz, 2)} Hz ({plain(power.range_hz, 2)} Hz "
+        f"now), or a u of {plain(power.u_needed_hz, 2)} Hz a point ({plain(power.u_hz, 2)} Hz now), for nine cases of "
+        "ten."
     )
 
 

@@ -100,7 +100,7 @@ def read_spin_run(run: Run, options: InputOptions) -> Records:
         f"{run.folder.name}: {path} has no line in {INDEX}, as a process that was killed leaves it: it is left out"
         for path in undescribed_codes(run.folder)
     ]
-    warnings += [f"{run.folder.name}: record {one.number} {one.how_short}" for one in run.traces() if one.announced]
+    warnings += [text for waveform in found for text in waveform.warnings]
     if chosen.casefold() in NO_SPIN:
         warnings.append(f"{run.folder.name}: the frequency of {chosen} is no spin, but {NO_SPIN[chosen.casefold()]}")
     if options.channel is None and len(names) > 1:
