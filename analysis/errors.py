@@ -124,7 +124,7 @@ class NoRange(AnalysisError):
 
 
 class TooFewHeights(AnalysisError):
-    """A scan at too few heights to tell strength, origin and background apart.
+    """A scan at too few heights to distinguish strength, origin and background.
 
     Attributes:
         lowest, highest: of those seen [m].

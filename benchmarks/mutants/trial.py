@@ -202,7 +202,7 @@ class _Chosen:
 
 
 class _Contexts:
-    """Tells coverage which test runs."""
+    """Names the test that runs to coverage."""
 
     def __init__(self, coverage: Any) -> None:
         self._coverage = coverage

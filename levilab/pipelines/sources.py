@@ -95,7 +95,7 @@ class Source(Generic[R]):
         data: the file with the readings.
         sha256: of that file.
         run: None for a data file.
-        name: for people, as short as tells it from the others.
+        name: for people, as short as distinguishes it from the others.
         warnings: about the input.
     """
 

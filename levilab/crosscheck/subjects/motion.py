@@ -73,7 +73,7 @@ def _fall(found: Fitted, run: Run, scene: Scene) -> Pull:
     """When the top falls, by the fitted law in the simulator, beside what was seen of it [s].
 
     It was seen to have fallen between the end of the gate of its last reading and that of the next one, which came to
-    none.  A drive leaves a nutation, and the more of it the earlier a top falls; the counts tell how much.  The
+    none.  A drive leaves a nutation, and the more of it the earlier a top falls; the counts show how much.  The
     prediction is the middle between the least and the most of it that they allow, half their distance a part of its
     uncertainty.
     """

@@ -96,8 +96,8 @@ def test_a_waveform_is_not_overwritten_but_can_be_cleared(generator):
 def test_a_waveform_has_the_attributes_of_its_samples(generator):
     """Root mean square of 1 in 4 samples: a half."""
     send(generator, b"DATA:ARB a,0,0,0,-1,0,0,0,-1\nDATA:ARB none,0,0,0,0,0,0,0,0\nFUNC:ARB none\n")
-    told = {which: number(generator, f"DATA:ATTR:{which}? a") for which in ("AVER", "CFAC", "POIN", "PTP")}
-    assert told == {"AVER": -0.25, "CFAC": 2.0, "POIN": 8.0, "PTP": 0.5}
+    attributes = {which: number(generator, f"DATA:ATTR:{which}? a") for which in ("AVER", "CFAC", "POIN", "PTP")}
+    assert attributes == {"AVER": -0.25, "CFAC": 2.0, "POIN": 8.0, "PTP": 0.5}
     assert number(generator, "DATA:ATTR:CFAC?") == 0.0  # of the selected one, which has no crest
 
 

@@ -51,9 +51,9 @@ def test_a_failure_is_ten_standard_deviations_off():
 def test_a_case_by_name_is_the_only_one_that_is_carried_out(monkeypatch):
     monkeypatch.setattr(study, "_at", lambda *_: pytest.fail("the study of all methods was begun"))
     monkeypatch.setattr(study, "hard_case", lambda name, *_: name)
-    told = []
-    assert study.study(trials=1, cases=["5 pulses only"], tell=told.append).hard == ("5 pulses only",)
-    assert told == ["5 pulses only, 1 traces"]
+    messages = []
+    assert study.study(trials=1, cases=["5 pulses only"], tell=messages.append).hard == ("5 pulses only",)
+    assert messages == ["5 pulses only, 1 traces"]
 
 
 def test_the_document_has_no_nan_and_names_units(small):
