@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from levilab.errors import UsageError
 from levilab.simulator.ensemble import simulate_many
@@ -14,6 +13,8 @@ from levilab.simulator.keys import nearest
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
+
+    from numpy.typing import NDArray
 
     from levilab.sweeps.plan import Plan
 

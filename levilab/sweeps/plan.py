@@ -13,12 +13,13 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from levilab.simulator.scene import Scene, scene_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
+
+    from numpy.typing import NDArray
 
 Scale = Literal["linear", "log", "table"]
 #: The dimension of a plan whose points are the rows of a table.
@@ -130,6 +131,7 @@ class Plan:
         axes: tuple[Axis, ...],
         observables: tuple[str, ...],
         duration_s: float,
+        *,
         tolerance: float = 1e-6,
         seed: int = 0,
     ) -> Plan:

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from levilab.errors import DataError
 from levilab.files import CannotWrite, writing
@@ -22,6 +21,8 @@ from levilab.sweeps.plan import Axis, Chunk, Plan, unit_of
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
     from pathlib import Path
+
+    from numpy.typing import NDArray
 
 SCHEMA = "levilab-sweep/1"
 DONE = "done"
@@ -111,7 +112,7 @@ class Store:
         import zarr
 
         try:
-            group = zarr.open_group(str(path), mode="r+" if writable else "r")
+            group: Any = zarr.open_group(str(path), mode="r+" if writable else "r")
             if group.attrs.get("schema") != SCHEMA:
                 raise DataError(f"{path}: its schema is {group.attrs.get('schema')!r}, {SCHEMA!r} is expected")
             table: Any = group.attrs["plan"]
