@@ -17,10 +17,9 @@ every axis holds a point of the coarse grid, and is sure to be seen.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Generator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +29,22 @@ if TYPE_CHECKING:
 
 Flags = NDArray[np.bool_]
 Points = NDArray[np.intp]
-#: Asks for points (flat indices, increasing), is sent their values in that order, and returns the refined map.
-Refinement = Generator[Points, Flags, "Refined"]
+
+
+class Question(NamedTuple):
+    """Points whose values are wanted.
+
+    Attributes:
+        points: flat indices, increasing.
+        until: roughly the share of the work that is done with them.
+    """
+
+    points: Points
+    until: float
+
+
+#: Asks for points, is sent their values in the same order, and returns the refined map.
+Refinement = Generator[Question, Flags, "Refined"]
 
 #: The coarse grid has every so manieth point of the full one.
 STRIDE = 8
@@ -131,33 +144,43 @@ def refine(
     if stride < 1 or stride & (stride - 1):
         raise ValueError(f"stride = {stride}: a power of 2 is expected, such as 8")
     grids = _grids(shape, stride, apart)
-    values, computed = np.zeros(shape, dtype=np.bool_), np.zeros(shape, dtype=np.bool_)
-    linked = [axis for axis, n in enumerate(shape) if n > 1 and axis not in apart]
-    yield from _compute(_all_of(grids[0], shape), values, computed)
-    for coarse, fine in zip(grids, grids[1:], strict=False):
-        yield from _follow_boundary(coarse, linked, values, computed)
-        inside = _within(_open_cells(values[np.ix_(*coarse)], linked), coarse, fine, linked)
-        _fill(values, computed, coarse, fine, linked)
-        yield from _compute(_select(fine, shape, inside), values, computed)
-    yield from _follow_boundary(grids[-1], linked, values, computed)
+    linked = tuple(axis for axis, n in enumerate(shape) if n > 1 and axis not in apart)
+    state = _State(np.zeros(shape, dtype=np.bool_), np.zeros(shape, dtype=np.bool_), linked)
+    # each level has about twice as many points as the one before: a boundary is a line
+    ends = [0.9 * 2.0 ** (level - len(grids) + 1) for level in range(len(grids))]
+    yield from _compute(state, _select(grids[0], shape), ends[0])
+    for coarse, fine, end in zip(grids, grids[1:], ends[1:], strict=False):
+        yield from _follow_boundary(state, coarse, end)
+        inside = _within(_open_cells(state.values[np.ix_(*coarse)], linked), coarse, fine, linked)
+        _fill(state, coarse, fine)
+        yield from _compute(state, _select(fine, shape, inside), end)
+    yield from _follow_boundary(state, grids[-1], ends[-1])
     audits = []
     for number in range(2):
-        found = yield from _audit(np.random.default_rng([seed, number]), audit, values, computed)
-        audits.append(found[0])
-        if found[1].size:
-            around = _around(found[1], grids[0], shape, linked)
-            yield from _compute(_select(grids[min(1, len(grids) - 1)], shape, None) & around, values, computed)
-            yield from _follow_boundary(grids[-1], linked, values, computed)
+        found, wrong = yield from _audit(state, np.random.default_rng([seed, number]), audit)
+        audits.append(found)
+        if wrong.size:
+            around = _around(wrong, grids[0], shape, linked)
+            yield from _compute(state, _select(grids[min(1, len(grids) - 1)], shape) & around, 1.0)
+            yield from _follow_boundary(state, grids[-1], 1.0)
     strides = tuple(int(grid[1] - grid[0]) if grid.size > 1 else 1 for grid in grids[0])
-    return Refined(values, computed, strides, tuple(audits))
+    return Refined(state.values, state.computed, strides, tuple(audits))
+
+
+class _State(NamedTuple):
+    """What is known: values, filled in or computed; which are computed; the axes with neighbours."""
+
+    values: Flags
+    computed: Flags
+    linked: tuple[int, ...]
 
 
 def run_refinement(refinement: Refinement, values_of: Callable[[Points], Flags]) -> Refined:
     """Answer all questions of a refinement with a function of flat indices, and return its result."""
     try:
-        points = next(refinement)
+        question = next(refinement)
         while True:
-            points = refinement.send(values_of(points))
+            question = refinement.send(values_of(question.points))
     except StopIteration as end:
         result: Refined = end.value
         return result
@@ -188,14 +211,10 @@ def _every(step: int, n: int) -> Points:
     return np.unique(np.append(np.arange(0, n, step), n - 1)).astype(np.intp)
 
 
-def _all_of(grid: Grid, shape: Sequence[int]) -> Flags:
-    return _select(grid, shape, None)
-
-
-def _select(grid: Grid, shape: Sequence[int], chosen: Flags | None) -> Flags:
-    """Return a mask of the full grid with the chosen points of a grid; None: all of them."""
+def _select(grid: Grid, shape: Sequence[int], chosen: Flags | bool = True) -> Flags:
+    """Return a mask of the full grid with the chosen points of a grid."""
     mask = np.zeros(shape, dtype=np.bool_)
-    mask[np.ix_(*grid)] = True if chosen is None else chosen
+    mask[np.ix_(*grid)] = chosen
     return mask
 
 
@@ -248,44 +267,43 @@ def _padded(array: Flags, axis: int, before: int = 1, after: int = 1) -> Flags:
 # --- steps ---
 
 
-def _compute(wanted: Flags, values: Flags, computed: Flags) -> Generator[Points, Flags, None]:
+def _compute(state: _State, wanted: Flags, until: float) -> Generator[Question, Flags, None]:
     """Ask for those of the wanted points that are not computed yet."""
-    points = np.flatnonzero(wanted & ~computed)
+    points = np.flatnonzero(wanted & ~state.computed)
     if points.size:
-        values.flat[points] = yield points
-        computed.flat[points] = True
+        state.values.flat[points] = yield Question(points, until)
+        state.computed.flat[points] = True
 
 
-def _follow_boundary(grid: Grid, linked: Sequence[int], values: Flags, computed: Flags) -> Generator[Points, Flags, None]:
+def _follow_boundary(state: _State, grid: Grid, until: float) -> Generator[Question, Flags, None]:
     """Compute all corners of open cells of a grid, which may open others, to the end."""
+    where = np.ix_(*grid)
     while True:
-        corners = _corners(_open_cells(values[np.ix_(*grid)], linked), linked)
-        if not np.any(corners & ~computed[np.ix_(*grid)]):
+        corners = _corners(_open_cells(state.values[where], state.linked), state.linked)
+        if not np.any(corners & ~state.computed[where]):
             return
-        yield from _compute(_select(grid, values.shape, corners), values, computed)
+        yield from _compute(state, _select(grid, state.values.shape, corners), until)
 
 
-def _fill(values: Flags, computed: Flags, coarse: Grid, fine: Grid, linked: Sequence[int]) -> None:
+def _fill(state: _State, coarse: Grid, fine: Grid) -> None:
     """Fill in points of the fine grid with the value of the coarse point before them; those computed stay."""
     before = [
-        coarse[axis][np.searchsorted(coarse[axis], fine[axis], side="right") - 1] if axis in linked else fine[axis]
-        for axis in range(values.ndim)
+        coarse[axis][np.searchsorted(coarse[axis], fine[axis], side="right") - 1] if axis in state.linked else fine[axis]
+        for axis in range(state.values.ndim)
     ]
     where = np.ix_(*fine)
-    values[where] = np.where(computed[where], values[where], values[np.ix_(*before)])
+    state.values[where] = np.where(state.computed[where], state.values[where], state.values[np.ix_(*before)])
 
 
-def _audit(
-    random: np.random.Generator, most: int, values: Flags, computed: Flags
-) -> Generator[Points, Flags, tuple[Audit, Points]]:
+def _audit(state: _State, random: np.random.Generator, most: int) -> Generator[Question, Flags, tuple[Audit, Points]]:
     """Compute points chosen at random among those filled in; returns the audit and the points that were wrong."""
-    filled = np.flatnonzero(~computed)
+    filled = np.flatnonzero(~state.computed)
     chosen = np.sort(random.choice(filled, min(most, filled.size), replace=False)) if filled.size else filled
-    before = values.flat[chosen].copy()
-    mask = np.zeros(values.size, dtype=np.bool_)
-    mask[chosen] = True
-    yield from _compute(mask.reshape(values.shape), values, computed)
-    wrong = chosen[values.flat[chosen] != before]
+    before = state.values.flat[chosen].copy()
+    mask = np.zeros(state.values.shape, dtype=np.bool_)
+    mask.flat[chosen] = True
+    yield from _compute(state, mask, 1.0)
+    wrong = chosen[state.values.flat[chosen] != before]
     return Audit(filled.size, chosen.size, wrong.size), wrong
 
 
@@ -300,13 +318,3 @@ def _around(points: Points, grid: Grid, shape: Sequence[int], linked: Sequence[i
             box.append(slice(grid[axis][low], grid[axis][high] + 1) if axis in linked else slice(x, x + 1))
         mask[tuple(box)] = True
     return mask
-
-
-def smallest_sure(refined: Refined, steps: Sequence[float]) -> tuple[float, ...]:
-    """Return how far an island reaches along each axis that is sure to be seen, in the axes' units."""
-    return tuple(stride * step for stride, step in zip(refined.strides, steps, strict=True))
-
-
-def points_of_coarse_grid(shape: Sequence[int], stride: int = STRIDE, apart: Sequence[int] = ()) -> int:
-    """Return how many points a refinement computes at least."""
-    return math.prod(grid.size for grid in _grids(shape, stride, apart)[0])
