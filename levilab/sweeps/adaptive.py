@@ -7,25 +7,27 @@ its answers in the store.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import contextlib
+from collections import deque
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from levilab.errors import DataError, UsageError
+from levilab.errors import UsageError
 from levilab.files import writing
 from levilab.sweeps.observables import OBSERVABLES, columns_of, observe
 from levilab.sweeps.refinement import AUDIT, CONFIDENCE, STRIDE, Points, Refined, refine
+from levilab.sweeps.store import DONE
 from levilab.workers import results_of
 
 if TYPE_CHECKING:
-    import contextlib
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from levilab.sweeps.plan import Plan
     from levilab.sweeps.store import Store
-    from levilab.workers import Workers
+    from levilab.workers import Done, Workers
 
 #: The array of marks, and the attributes: what was asked for, and what came of it.
 STATUS, ASKED, FOUND = "status", "adaptive", "refined"
@@ -80,7 +82,7 @@ def begin_adaptive(store: Store, observable: str = "survived", *, stride: int = 
         raise UsageError("stride", "a power of 2 is expected, such as 8", value=stride)
     if audit < 1:
         raise UsageError("audit", "a number of points above 0 is expected", value=audit)
-    with writing(f"{store.path}: cannot be written", "free space, or choose another place with `out`"):
+    with _writing(store):
         store.group.create_array(
             STATUS,
             shape=plan.shape,
@@ -108,53 +110,160 @@ def run_adaptive(store: Store, executor: Workers, progress: Callable[[float], No
         CannotWrite: the store cannot be written.
         WorkersLost, SimulationError: points could not be computed.
     """
-    asked = store.group.attrs[ASKED]
-    run = _Run.of(store, executor, progress)
-    refinement = refine(store.plan.shape, stride=asked["stride"], audit=asked["audit"], seed=store.plan.seed)
-    answers = None
-    while True:
+    asked, plan = store.group.attrs[ASKED], store.plan
+    apart = [k for k, axis in enumerate(plan.axes) if axis.values.dtype.kind != "f"]
+    refinement = refine(plan.shape, stride=asked["stride"], audit=asked["audit"], seed=plan.seed, apart=apart)
+    run, feed, share = _Run.of(store), _Feed(), 0.0
+    with contextlib.closing(results_of(compute_points, feed, executor)) as results:
         try:
-            question = next(refinement) if answers is None else refinement.send(answers)
+            question = next(refinement)
+            while True:
+                missing = run.missing(question.points)
+                feed.tasks.extend(run.tasks_of(missing))
+                done = 0
+                while done < missing.size:
+                    one = next(results)
+                    run.keep(one)
+                    done += one.task.points.size
+                    if progress is not None:
+                        progress(share + (max(question.until, share) - share) * done / missing.size)
+                run.write()
+                share = max(question.until, share)
+                values = run.columns[asked["observable"]].flat[question.points]
+                question = refinement.send(np.asarray(values, dtype=np.bool_))
         except StopIteration as end:
             return run.finish(end.value)
-        answers = run.values_of(question.points, question.until)
+
+
+class _Feed:
+    """Tasks of one round after another, so that all rounds share one pool.
+
+    It runs dry at the end of a round.  `results_of` asks again after the last result of the round was taken, when the
+    next round's tasks are there.
+    """
+
+    def __init__(self) -> None:
+        self.tasks: deque[PointsTask] = deque()
+
+    def __iter__(self) -> _Feed:
+        return self
+
+    def __next__(self) -> PointsTask:
+        if not self.tasks:
+            raise StopIteration
+        return self.tasks.popleft()
 
 
 @dataclass
 class _Run:
-    """Values and marks in memory, and where they go."""
+    """Values and marks in memory, and where they go.
+
+    Attributes:
+        store: where values and marks are kept.
+        columns: column → values, in the shape of the map.
+        status: of each point.
+        unwritten: points that are in memory alone.
+    """
 
     store: Store
-    executor: Workers
-    progress: Callable[[float], None] | None
-    observable: str
     columns: dict[str, NDArray[Any]]
     status: NDArray[np.uint8]
-    share: float = 0.0
+    unwritten: list[Points] = field(default_factory=list)
 
     @classmethod
-    def of(cls, store: Store, executor: Workers, progress: Callable[[float], None] | None) -> _Run:
-        columns = {column.name: np.asarray(store.group[column.name][...]) for column in columns_of(store.plan.observables)}
-        status = np.asarray(store.group[STATUS][...])
-        return cls(store, executor, progress, store.group.attrs[ASKED]["observable"], columns, status)
+    def of(cls, store: Store) -> _Run:
+        names = [column.name for column in columns_of(store.plan.observables)]
+        columns = {name: np.asarray(store.group[name][...]) for name in names}
+        return cls(store, columns, np.asarray(store.group[STATUS][...]))
 
-    def values_of(self, points: Points, until: float) -> NDArray[np.bool_]:
-        """Return the values of points, and compute those that are not known."""
-        missing = points[self.status.flat[points] != COMPUTED]
-        begun, done, unwritten = self.share, 0, []
-        with contextlib.closing(results_of(compute_points, self._tasks(missing), self.executor)) as results:
-            for one in results:
-                if one.error is not None:
-                    raise one.error
-                for name, values in one.result.items():
-                    self.columns[name].flat[one.task.points] = values
-                unwritten.append(one.task.points)
-                done += one.task.points.size
-                if sum(map(len, unwritten)) >= KEPT:
-                    self._write(np.concatenate(unwritten))
-                    unwritten = []
-                self._report(begun + (until - begun) * done / missing.size)
-        if unwritten:
-            self._write(np.concatenate(unwritten))
-        self._report(until)
-        return np.asarray(self.columns[self.observable].flat[points], dtype=np.bool_)
+    def missing(self, points: Points) -> Points:
+        """Return those of the points that are not computed."""
+        return points[self.status.flat[points] != COMPUTED]
+
+    def tasks_of(self, points: Points) -> list[PointsTask]:
+        """Cut points into tasks."""
+        plan = self.store.plan
+        size = min(max(-(-points.size // MANY), FEWEST), MOST)
+        return [_task(plan, points[i : i + size]) for i in range(0, points.size, size)]
+
+    def keep(self, done: Done[PointsTask, dict[str, NDArray[Any]]]) -> None:
+        """Keep the result of a task in memory, and now and then in the store."""
+        if done.error is not None or done.result is None:
+            raise done.error or AssertionError
+        for name, values in done.result.items():
+            self.columns[name].flat[done.task.points] = values
+        self.status.flat[done.task.points] = COMPUTED
+        self.unwritten.append(done.task.points)
+        if sum(map(len, self.unwritten)) >= KEPT:
+            self.write()
+
+    def write(self) -> None:
+        """Write the chunks that hold new points: values first, then marks."""
+        if not self.unwritten:
+            return
+        plan = self.store.plan
+        places = np.unravel_index(np.concatenate(self.unwritten), plan.shape)
+        blocks = tuple(place // size for place, size in zip(places, plan.chunk, strict=True))
+        with _writing(self.store):
+            for number in np.unique(np.ravel_multi_index(blocks, plan.grid)):
+                box = plan.chunk_of(int(number)).box
+                for name, values in self.columns.items():
+                    self.store.group[name][box] = values[box]
+                self.store.group[STATUS][box] = self.status[box]
+        self.unwritten = []
+
+    def finish(self, found: Refined) -> dict[str, Any]:
+        """Fill in what was not computed, and write the report."""
+        store, report = self.store, report_of(found)
+        self.columns[store.group.attrs[ASKED]["observable"]][~found.computed] = found.values[~found.computed]
+        self.status[~found.computed] = FILLED
+        self.unwritten = [np.arange(found.values.size)]
+        self.write()
+        with _writing(store):
+            store.group.attrs[FOUND] = report
+            store.group[DONE][...] = 1
+        store.marks[...] = 1
+        return report
+
+
+def _writing(store: Store) -> contextlib.AbstractContextManager[None]:
+    return writing(f"{store.path}: cannot be written", "free space, then go on with `resume`")
+
+
+def _task(plan: Plan, points: Points) -> PointsTask:
+    places = np.unravel_index(points, plan.shape)
+    values = {axis.key: axis.values[place] for axis, place in zip(plan.axes, places, strict=True)}
+    return PointsTask(plan.without_values(), points, values)
+
+
+def report_of(found: Refined) -> dict[str, Any]:
+    """Return how much a refinement saved, and what it may have missed."""
+    return {
+        "points": found.values.size,
+        "computed": found.values.size - found.filled,
+        "filled": found.filled,
+        "saved": found.saved,
+        "strides": list(found.strides),
+        "audits": [vars(one) for one in found.audits],
+        "confidence": CONFIDENCE,
+        "most_wrong": found.most_wrong,
+        "most_wrong_share": found.most_wrong_share,
+    }
+
+
+def in_words(report: dict[str, Any], plan: Plan) -> list[str]:
+    """Return the report as sentences."""
+    *_, judge = report["audits"]
+    wrong = sum(audit["wrong"] for audit in report["audits"])
+    checked = sum(audit["computed"] for audit in report["audits"])
+    size = " x ".join(
+        f"{stride} points of {axis.key}" for stride, axis in zip(report["strides"], plan.axes, strict=True)
+    )
+    return [
+        f"{report['computed']} of {report['points']} points were computed, {100 * report['saved']:.0f} % were filled in",
+        f"{checked} of those filled in were checked at random, {wrong} were wrong and their surroundings are computed",
+        f"of the {report['filled']} filled in, with {100 * report['confidence']:.0f} % confidence at most "
+        f"{report['most_wrong']} ({100 * report['most_wrong_share']:.2g} %) are wrong "
+        f"({judge['wrong']} of {judge['computed']} in the last check)",
+        f"an island is sure to be seen if it holds a box of {size}; smaller ones only by chance",
+    ]
