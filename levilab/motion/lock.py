@@ -1,9 +1,9 @@
 """Is a top locked to its drive?  By the angle of its body behind the drive, which must not slip by a turn.
 
-The mean of the spin would not do: it is the drive's frequency for a locked top, but near it for a top that slips once in
-a while, too; and a locked top's spin swings about the drive, by some tenths of a hertz.  The angle by which the body
-turns behind the drive is that of a pendulum: while it swings, it stays within less than one turn; when it slips, it does
-not.  The azimuth of the axis will not do either, it is not defined at θ = 0.
+The mean of the spin would not do: it is the drive's frequency for a locked top, but near it for a top that slips once
+in a while, too; and a locked top's spin swings about the drive, by some tenths of a hertz.  The angle by which the body
+turns behind the drive is that of a pendulum: while it swings, it stays within less than one turn; when it slips, it
+does not.  The azimuth of the axis will not do either, it is not defined at θ = 0.
 """
 
 from __future__ import annotations
@@ -54,8 +54,8 @@ def body_angle(states: Array) -> Array:
 def turns_behind(scene: Scene, states: Array) -> Array:
     """Return the angle of the body behind the drive, followed from sample to sample, shape (n,) [turns].
 
-    Positive where the body is ahead.  Between samples the angle changes by what the spin says, give or take half a turn.
-    A drive that swings to and fro turns in either sense; the top goes with the one of its own spin.
+    Positive where the body is ahead.  From sample to sample the angle changes by what the spin says, give or take half
+    a turn.  A drive that swings to and fro turns in either sense; the top goes with the one of its own spin.
     """
     time, sense = states[:, TIME], math.copysign(1.0, scene.start.spin_hz)
     rate = spin_of(scene, states) / (2 * math.pi) - sense * scene.drive.frequency_hz

@@ -13,9 +13,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from levilab.errors import UsageError
+from levilab.errors import UsageError, WorkersLost
 from levilab.files import writing
 from levilab.sweeps.observables import OBSERVABLES, columns_of, observe
 from levilab.sweeps.refinement import AUDIT, CONFIDENCE, STRIDE, Points, Refined, refine
@@ -23,7 +22,9 @@ from levilab.sweeps.store import DONE
 from levilab.workers import results_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Generator
+
+    from numpy.typing import NDArray
 
     from levilab.sweeps.plan import Plan
     from levilab.sweeps.store import Store
@@ -90,7 +91,10 @@ def begin_adaptive(store: Store, observable: str = "survived", *, stride: int = 
             dtype="uint8",
             fill_value=0,
             dimension_names=plan.dimensions,
-            attributes={"unit": "1", "meaning": f"{COMPUTED}: computed; {FILLED}: filled in from points around; 0: neither"},
+            attributes={
+                "unit": "1",
+                "meaning": f"{COMPUTED}: computed; {FILLED}: filled in from points around; 0: neither",
+            },
         )
         store.group.attrs[ASKED] = {"observable": observable, "stride": stride, "audit": audit}
 
@@ -113,22 +117,12 @@ def run_adaptive(store: Store, executor: Workers, progress: Callable[[float], No
     asked, plan = store.group.attrs[ASKED], store.plan
     apart = [k for k, axis in enumerate(plan.axes) if axis.values.dtype.kind != "f"]
     refinement = refine(plan.shape, stride=asked["stride"], audit=asked["audit"], seed=plan.seed, apart=apart)
-    run, feed, share = _Run.of(store), _Feed(), 0.0
+    run, feed = _Run.of(store, progress), _Feed()
     with contextlib.closing(results_of(compute_points, feed, executor)) as results:
         try:
             question = next(refinement)
             while True:
-                missing = run.missing(question.points)
-                feed.tasks.extend(run.tasks_of(missing))
-                done = 0
-                while done < missing.size:
-                    one = next(results)
-                    run.keep(one)
-                    done += one.task.points.size
-                    if progress is not None:
-                        progress(share + (max(question.until, share) - share) * done / missing.size)
-                run.write()
-                share = max(question.until, share)
+                run.compute(run.missing(question.points), question.until, feed, results)
                 values = run.columns[asked["observable"]].flat[question.points]
                 question = refinement.send(np.asarray(values, dtype=np.bool_))
         except StopIteration as end:
@@ -162,23 +156,44 @@ class _Run:
         store: where values and marks are kept.
         columns: column → values, in the shape of the map.
         status: of each point.
+        progress: called with the share of the work that is done.
+        share: of the work.
         unwritten: points that are in memory alone.
     """
 
     store: Store
     columns: dict[str, NDArray[Any]]
     status: NDArray[np.uint8]
+    progress: Callable[[float], None] | None
+    share: float = 0.0
     unwritten: list[Points] = field(default_factory=list)
 
     @classmethod
-    def of(cls, store: Store) -> _Run:
+    def of(cls, store: Store, progress: Callable[[float], None] | None) -> _Run:
         names = [column.name for column in columns_of(store.plan.observables)]
         columns = {name: np.asarray(store.group[name][...]) for name in names}
-        return cls(store, columns, np.asarray(store.group[STATUS][...]))
+        return cls(store, columns, np.asarray(store.group[STATUS][...]), progress)
 
     def missing(self, points: Points) -> Points:
         """Return those of the points that are not computed."""
-        return points[self.status.flat[points] != COMPUTED]
+        return np.asarray(points[self.status.flat[points] != COMPUTED])
+
+    def compute(
+        self, points: Points, until: float, feed: _Feed, results: Generator[Done[PointsTask, dict[str, NDArray[Any]]]]
+    ) -> None:
+        """Compute points, all in one round."""
+        feed.tasks.extend(self.tasks_of(points))
+        begun, done = self.share, 0
+        while done < points.size:
+            one = next(results, None)
+            if one is None:
+                raise WorkersLost("the workers gave fewer results than they had tasks: start them anew, and resume")
+            self.keep(one)
+            done += one.task.points.size
+            self.share = max(begun + (until - begun) * done / points.size, begun)
+            if self.progress is not None:
+                self.progress(self.share)
+        self.write()
 
     def tasks_of(self, points: Points) -> list[PointsTask]:
         """Cut points into tasks."""
@@ -255,15 +270,19 @@ def in_words(report: dict[str, Any], plan: Plan) -> list[str]:
     """Return the report as sentences."""
     *_, judge = report["audits"]
     wrong = sum(audit["wrong"] for audit in report["audits"])
-    checked = sum(audit["computed"] for audit in report["audits"])
+    count = sum(audit["computed"] for audit in report["audits"])
     size = " x ".join(
         f"{stride} points of {axis.key}" for stride, axis in zip(report["strides"], plan.axes, strict=True)
     )
+    share, limit = f"{100 * report['saved']:.0f} %", f"{100 * report['most_wrong_share']:.2g} %"
+    checked = f"{count} of those filled in were checked at random: {wrong} were wrong"
+    sure = (
+        f"with {100 * report['confidence']:.0f} % confidence at most {report['most_wrong']} ({limit}) of the "
+        f"{report['filled']} filled in are wrong: {judge['wrong']} of {judge['computed']} were in the last check"
+    )
     return [
-        f"{report['computed']} of {report['points']} points were computed, {100 * report['saved']:.0f} % were filled in",
-        f"{checked} of those filled in were checked at random, {wrong} were wrong and their surroundings are computed",
-        f"of the {report['filled']} filled in, with {100 * report['confidence']:.0f} % confidence at most "
-        f"{report['most_wrong']} ({100 * report['most_wrong_share']:.2g} %) are wrong "
-        f"({judge['wrong']} of {judge['computed']} in the last check)",
+        f"{report['computed']} of {report['points']} points were computed, {share} were filled in",
+        f"{checked}, and their surroundings were computed",
+        sure,
         f"an island is sure to be seen if it holds a box of {size}; smaller ones only by chance",
     ]

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from levilab.errors import UsageError
 from levilab.motion.lines import AxisLines, lines_of, rate_for
@@ -26,6 +25,8 @@ from levilab.simulator.start import start_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
+
+    from numpy.typing import NDArray
 
     from levilab.simulator.scene import Scene
     from levilab.sweeps.plan import Plan
@@ -76,8 +77,12 @@ OBSERVABLES: dict[str, Observable] = {
     one.name: one
     for one in (
         Observable("survived", "1", "Whether the top is still up at the end.", "bool", "ends"),
-        Observable("lifetime_s", "s", "Time from the start to the fall; NaN of a top that is still up.", "float64", "ends"),
-        Observable("fall_spin_hz", "Hz", "Spin at the moment of the fall; NaN of a top that is still up.", "float64", "ends"),
+        Observable(
+            "lifetime_s", "s", "Time from the start to the fall; NaN of a top that is still up.", "float64", "ends"
+        ),
+        Observable(
+            "fall_spin_hz", "Hz", "Spin at the moment of the fall; NaN of a top that is still up.", "float64", "ends"
+        ),
         Observable(
             "energy_error",
             "1",
@@ -85,8 +90,12 @@ OBSERVABLES: dict[str, Observable] = {
             "float64",
             "ends",
         ),
-        Observable("position_error_m", "m", "Estimated error of the place at the end, or at the fall.", "float64", "errors"),
-        Observable("height_spread_m", "m", "Highest less lowest place up to the end, or to the fall.", "float64", "samples"),
+        Observable(
+            "position_error_m", "m", "Estimated error of the place at the end, or at the fall.", "float64", "errors"
+        ),
+        Observable(
+            "height_spread_m", "m", "Highest less lowest place up to the end, or to the fall.", "float64", "samples"
+        ),
         Observable(
             "locked",
             "1",
@@ -239,4 +248,3 @@ def _line_columns(found: AxisLines) -> dict[str, float]:
         columns[f"{start}_line_hz"] = line.frequency if line else math.nan
         columns[f"{start}_line_rad"] = line.amplitude if line else math.nan
     return columns
-

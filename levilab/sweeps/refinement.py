@@ -211,10 +211,10 @@ def _every(step: int, n: int) -> Points:
     return np.unique(np.append(np.arange(0, n, step), n - 1)).astype(np.intp)
 
 
-def _select(grid: Grid, shape: Sequence[int], chosen: Flags | bool = True) -> Flags:
-    """Return a mask of the full grid with the chosen points of a grid."""
+def _select(grid: Grid, shape: Sequence[int], chosen: Flags | None = None) -> Flags:
+    """Return a mask of the full grid with the chosen points of a grid; None: all of them."""
     mask = np.zeros(shape, dtype=np.bool_)
-    mask[np.ix_(*grid)] = chosen
+    mask[np.ix_(*grid)] = True if chosen is None else chosen
     return mask
 
 
@@ -225,19 +225,17 @@ def _open_cells(values: Flags, linked: Sequence[int]) -> Flags:
     """Return which cells of a grid are open: their corners differ, or those of a neighbour."""
     low, high = values, values
     for axis in linked:
-        low, high = (both(_before(one, axis), _after(one, axis)) for both, one in ((np.minimum, low), (np.maximum, high)))
-    is_open = low != high
+        low, high = _before(low, axis) & _after(low, axis), _before(high, axis) | _after(high, axis)
+    corners = _corners(low ^ high, linked)
     for axis in linked:
-        wide = _padded(is_open, axis)
-        is_open = wide | _padded(_before(wide, axis), axis, after=0) | _padded(_after(wide, axis), axis, before=0)
-        is_open = _after(_before(is_open, axis), axis)
-    return is_open
+        corners = _before(corners, axis) | _after(corners, axis)
+    return corners
 
 
 def _corners(cells: Flags, linked: Sequence[int]) -> Flags:
     """Return which points are corners of these cells."""
     for axis in linked:
-        wide = _padded(cells, axis)
+        wide = np.pad(cells, [(1, 1) if k == axis else (0, 0) for k in range(cells.ndim)])
         cells = _before(wide, axis) | _after(wide, axis)
     return cells
 
@@ -258,10 +256,6 @@ def _before(array: Flags, axis: int) -> Flags:
 
 def _after(array: Flags, axis: int) -> Flags:
     return array[(slice(None),) * axis + (slice(1, None),)]
-
-
-def _padded(array: Flags, axis: int, before: int = 1, after: int = 1) -> Flags:
-    return np.pad(array, [(before, after) if k == axis else (0, 0) for k in range(array.ndim)])
 
 
 # --- steps ---
@@ -288,7 +282,9 @@ def _follow_boundary(state: _State, grid: Grid, until: float) -> Generator[Quest
 def _fill(state: _State, coarse: Grid, fine: Grid) -> None:
     """Fill in points of the fine grid with the value of the coarse point before them; those computed stay."""
     before = [
-        coarse[axis][np.searchsorted(coarse[axis], fine[axis], side="right") - 1] if axis in state.linked else fine[axis]
+        coarse[axis][np.searchsorted(coarse[axis], fine[axis], side="right") - 1]
+        if axis in state.linked
+        else fine[axis]
         for axis in range(state.values.ndim)
     ]
     where = np.ix_(*fine)
