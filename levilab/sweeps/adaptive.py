@@ -115,8 +115,7 @@ def run_adaptive(store: Store, executor: Workers, progress: Callable[[float], No
         WorkersLost, SimulationError: points could not be computed.
     """
     asked, plan = store.group.attrs[ASKED], store.plan
-    apart = [k for k, axis in enumerate(plan.axes) if axis.values.dtype.kind != "f"]
-    refinement = refine(plan.shape, stride=asked["stride"], audit=asked["audit"], seed=plan.seed, apart=apart)
+    refinement = refine(plan.shape, stride=asked["stride"], audit=asked["audit"], seed=plan.seed)
     run, feed = _Run.of(store, progress), _Feed()
     with contextlib.closing(results_of(compute_points, feed, executor)) as results:
         try:
