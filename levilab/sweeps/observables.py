@@ -70,6 +70,8 @@ def observe(plan: Plan, values: Mapping[str, NDArray[Any]]) -> dict[str, NDArray
         plan: its axes are not looked at.
         values: key → values of these points.
     """
-    ends = simulate_many(plan.scene, values, plan.duration_s, tolerance=plan.tolerance, cores=1, errors=False)
+    ends = simulate_many(
+        plan.scene, values, plan.duration_s, tolerance=plan.tolerance, step_share=plan.step_share, cores=1, errors=False
+    )
     found = {"survived": ends.survived, "lifetime_s": ends.time}
     return {column.name: np.asarray(found[column.name], dtype=column.dtype) for column in columns_of(plan.observables)}
