@@ -180,6 +180,11 @@ class Plan:
         stop = tuple(min(a + c, n) for a, c, n in zip(start, self.chunk, self.shape, strict=True))
         return Chunk(number, start, stop)
 
+    def point(self, index: tuple[int, ...]) -> dict[str, Any]:
+        """Return key → value of one point."""
+        places = (index[0],) * len(self.axes) if self.is_table else index
+        return {axis.key: axis.values[k].item() for axis, k in zip(self.axes, places, strict=True)}
+
     def values_of(self, chunk: Chunk) -> dict[str, NDArray[Any]]:
         """Return key → values of a chunk; broadcast against each other they have its shape."""
         if self.is_table:

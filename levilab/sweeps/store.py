@@ -7,20 +7,24 @@ whatever ends the process costs at most the chunks that have no mark.
 
 from __future__ import annotations
 
+import contextlib
+import sys
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from levilab.errors import DataError
 from levilab.files import CannotWrite, writing
+from levilab.runs.run import utc_now
+from levilab.simulator.keys import SceneError, short_text
 from levilab.software import software_versions
 from levilab.sweeps.observables import columns_of
 from levilab.sweeps.plan import Axis, Chunk, Plan, unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
-    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -75,13 +79,22 @@ class Store:
         import zarr
 
         if path is not None and path.exists():
-            raise CannotWrite(f"{path}: is there already; give another place with `out`")
-        with writing(f"{path}: the store cannot be made"):
+            raise CannotWrite(f"{path} is there already: give another place with `out`, or go on with it by `resume`")
+        with writing(f"{path} cannot be made"):
             if path is not None:
                 path.parent.mkdir(parents=True, exist_ok=True)
             group = zarr.create_group(
                 zarr.storage.MemoryStore() if path is None else str(path),
-                attributes={"schema": SCHEMA, "software": software_versions(), "plan": plan.as_table()},
+                attributes={
+                    "schema": SCHEMA,
+                    "plan": plan.as_table(),
+                    "scene_toml": plan.scene.as_toml(),
+                    "synthetic": True,
+                    "software": software_versions(),
+                    "processor": processor(),
+                    "created_utc": utc_now(),
+                    "command_line": sys.argv,
+                },
             )
             for axis in plan.axes:
                 _add_coordinate(group, axis, plan.dimensions[0] if plan.is_table else axis.key)
@@ -114,12 +127,45 @@ class Store:
         try:
             group: Any = zarr.open_group(str(path), mode="r+" if writable else "r")
             if group.attrs.get("schema") != SCHEMA:
-                raise DataError(f"{path}: its schema is {group.attrs.get('schema')!r}, {SCHEMA!r} is expected")
+                raise DataError(f"{path}: its schema is {group.attrs.get('schema')!r}, and {SCHEMA!r} is expected")
             table: Any = group.attrs["plan"]
             plan = Plan.from_table(table, {axis["key"]: _coordinate(group, axis["key"]) for axis in table["axes"]})
             return cls(plan, group, path, np.asarray(group[DONE][:]))
-        except (OSError, KeyError, ValueError, TypeError) as error:
-            raise DataError(f"{path}: no store of a sweep ({error}); give a folder that levilab sweep wrote") from error
+        except (OSError, KeyError, ValueError, TypeError, SceneError) as error:
+            raise DataError(
+                f"{path}: no store of a sweep ({error}); give a folder that `levilab sweep` wrote"
+            ) from error
+
+    @contextlib.contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other processes from writing into the store.  Raises CannotWrite where one does already."""
+        from filelock import FileLock, Timeout
+
+        if self.path is None:
+            yield
+            return
+        lock = FileLock(self.path.with_name(f".{self.path.name}.lock"))
+        try:
+            lock.acquire(blocking=False)
+        except Timeout:
+            raise CannotWrite(f"{self.path}: another process is computing it; wait for its end") from None
+        try:
+            yield
+        finally:
+            lock.release()
+            with contextlib.suppress(OSError):
+                Path(lock.lock_file).unlink(missing_ok=True)
+
+    def notes(self) -> list[str]:
+        """Return what differs here from where the store was begun, if results may differ in their last bits for it."""
+        begun, software = dict(self.group.attrs), software_versions()
+        versions = [(name, begun["software"].get(name), software[name]) for name in ("levilab", "numpy", "numba")]
+        other = [f"{name} {now} instead of {then}" for name, then, now in versions if now != then]
+        if begun["processor"] != processor():
+            other.append(f"the processor {processor()['name']} instead of {begun['processor']['name']}")
+        if not other:
+            return []
+        return [f"the sweep was begun elsewhere, here is {', '.join(other)}: chunks may differ in their last bits"]
 
     @property
     def done(self) -> int:
@@ -152,6 +198,40 @@ class Store:
             computed[plan.chunk_of(int(number)).box] = True
         values = {column.name: np.asarray(self.group[column.name][...]) for column in columns_of(plan.observables)}
         return Map(plan, values, computed)
+
+
+def processor() -> dict[str, str]:
+    """Return the processor for which the kernels are compiled: where it is the same, results have the same bits."""
+    from llvmlite import binding
+    from numba.core import config
+
+    return {
+        "name": getattr(config, "CPU_NAME", None) or binding.get_host_cpu_name(),
+        "features": getattr(config, "CPU_FEATURES", None) or binding.get_host_cpu_features().flatten(),
+    }
+
+
+def differences(there: Plan, asked: Plan) -> list[str]:
+    """Return what a plan that is asked for has otherwise than the one of a store, a sentence each."""
+    own, other = (dict(_leaves(plan)) for plan in (there, asked))
+    return [
+        f"{key} is {short_text(own.get(key, 'missing'))} there and {short_text(other.get(key, 'missing'))} here"
+        for key in {**own, **other}
+        if own.get(key) != other.get(key)
+    ]
+
+
+def _leaves(plan: Plan) -> Iterator[tuple[str, Any]]:
+    """Yield all that makes a plan, by name; its chunks and its step follow from that."""
+    table = plan.as_table()
+    for axis in table["axes"]:
+        yield f"the axis {axis['key']}", ", ".join(str(value) for key, value in axis.items() if key != "key")
+    yield "the order of the axes", ", ".join(axis["key"] for axis in table["axes"])
+    for name in ("observables", "duration_s", "tolerance", "seed"):
+        yield name, table[name]
+    for name, part in table["scene"].items():
+        inner = {f"{name}.{key}": value for key, value in part.items()} if isinstance(part, dict) else {name: part}
+        yield from inner.items()
 
 
 def _described(unit: str, meaning: str) -> dict[str, Any]:
