@@ -1,4 +1,4 @@
-"""The limits of the spin that the master's thesis on the Levitron simulated and measured, and the device they are of."""
+"""The limits of the spin that the master's thesis on the Levitron simulated and measured, and their device."""
 
 from __future__ import annotations
 

@@ -23,8 +23,7 @@ from levilab.errors import UsageError
 from levilab.present.style import STYLE
 from levilab.simulator.equilibrium import stability_of
 from levilab.stability.thesis import HIGHEST_HZ, MEASURED_HZ, MEASURED_U_HZ, SIMULATED_HZ, is_thesis_device
-from levilab.sweeps.observables import OBSERVABLES
-from levilab.sweeps.quantities import quantity_of
+from levilab.sweeps.quantities import quantity_of, step_in_words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -51,7 +50,10 @@ NAN_IS_UP = {"lifetime_s", "fall_spin_hz"}
 MOST_PANELS, PANELS_IN_A_ROW, MOST_CELLS = 12, 4, 1600
 #: A window that changes along an axis is found for so many of its values.
 CURVE_POINTS = 61
-RIM = [withStroke(linewidth=3.5, foreground="white")]
+RIM = [withStroke(linewidth=3.2, foreground="white")]
+DASHED: Any = {"color": "black", "linewidth": 1, "linestyle": "dashed"}
+#: Where panels begin and end, as shares of the width: a colour bar fits beside them.
+LEFT, RIGHT = 0.075, 0.9
 
 
 @dataclass(frozen=True)
@@ -106,22 +108,29 @@ def map_figure(found: Map, column: str = "survived", notes: Sequence[str] = ()) 
     if column not in found.values:
         raise UsageError("observe", f"the map has {', '.join(found.values)}", value=column)
     view = _view_of(found.plan)
+    kinds, numbers = _cells(found, column)
+    norm = _norm(numbers, column)
     with mpl.rc_context(STYLE):
-        figure, panels = _panels(view)
-        kinds, numbers = _cells(found, column)
-        norm = _norm(numbers, column)
+        figure = Figure(figsize=(8.0, 6.0) if len(view.chosen) == 1 else (10.0, 6.0))
+        panels = [figure.add_subplot() for _ in view.chosen]
+        lines: list[Artist] = []
         for axes, index in zip(panels, view.chosen, strict=True):
             _draw_cells(axes, view, _slice(kinds, view, index), _slice(numbers, view, index), norm)
-            artists = _draw_limits(axes, found.plan, view)
+            lines = _draw_limits(axes, found.plan, view)
         _label(panels, view)
+        handles = [*_kind_patches(kinds, column, found.plan), *lines]
+        caption = _caption(found, view, [*_reading_sentences(view, column, lines), *notes], figure.get_figwidth())
+        box = _place(figure, panels, head=0.62 + 0.17 * -(-len(handles) // 2), foot=0.62 + 0.145 * len(caption))
         if norm is not None:
-            _draw_colour_bar(figure, panels, norm, column)
-        handles = [*_kind_patches(kinds, column, found.plan), *artists]
-        _head(figure, found, column, kinds)
+            _draw_colour_bar(figure, box, norm, column)
+        top = figure.get_figheight()
+        figure.text(LEFT, 1 - 0.28 / top, _headline(found, column), fontsize=11)
         figure.legend(
-            handles=handles, loc="upper left", bbox_to_anchor=(0.075, 1 - _inches(figure, 0.42)), ncols=2, fontsize=8
-        )
-        _caption(figure, found, view, column, artists, notes)
+            handles=handles, loc="upper left", bbox_to_anchor=(LEFT - 0.01, 1 - 0.34 / top), ncols=2, fontsize=7.5,
+            labelspacing=0.4,
+        )  # fmt: skip
+        style: Any = {"fontsize": 7.5, "color": "#404040", "va": "top", "linespacing": 1.35}
+        figure.text(LEFT, (0.12 + 0.145 * len(caption)) / top, "\n".join(caption), **style)
     return figure
 
 
@@ -149,28 +158,24 @@ def _view_of(plan: Plan) -> _View:
     return _View(x, y, panels, order, tuple(chosen.tolist()))
 
 
-def _panels(view: _View) -> tuple[Figure, list[Axes]]:
-    """Return the figure with its panels, placed by hand: head and caption keep their inches."""
-    count = len(view.chosen)
-    columns = min(count, PANELS_IN_A_ROW)
-    rows = -(-count // columns)
-    width, panel = (8.0, 4.2) if count == 1 else (10.0, 2.1)
-    head, caption, gap = 1.65, 1.75, 0.5
-    height = head + caption + rows * panel + (rows - 1) * gap
-    figure = Figure(figsize=(width, height))
-    left, right, between = 0.075, 0.965, 0.03
-    wide = (right - left - (columns - 1) * between) / columns
-    panels = []
-    for k in range(count):
+def _place(figure: Figure, panels: list[Axes], *, head: float, foot: float) -> tuple[float, float, float]:
+    """Place the panels by hand between head and foot, which keep their inches, and give the figure its height.
+
+    Returns:
+        Where a colour bar goes: its left, bottom and height, as shares of the figure.
+    """
+    columns = min(len(panels), PANELS_IN_A_ROW)
+    rows = -(-len(panels) // columns)
+    panel, gap, between = (4.2, 0.0, 0.0) if len(panels) == 1 else (2.1, 0.62, 0.03)
+    above = 0.2 if len(panels) == 1 else 0.42
+    height = head + above + rows * panel + (rows - 1) * gap + foot
+    figure.set_figheight(height)
+    wide = (RIGHT - LEFT - (columns - 1) * between) / columns
+    for k, axes in enumerate(panels):
         row, place = divmod(k, columns)
-        bottom = (caption + (rows - 1 - row) * (panel + gap)) / height
-        panels.append(figure.add_axes((left + place * (wide + between), bottom, wide, panel / height)))
-    return figure, panels
-
-
-def _inches(figure: Figure, inches: float) -> float:
-    """Return a height in inches as a share of the figure's."""
-    return float(inches / figure.get_figheight())
+        bottom = (foot + (rows - 1 - row) * (panel + gap)) / height
+        axes.set_position((LEFT + place * (wide + between), bottom, wide, panel / height))
+    return RIGHT + 0.015, foot / height, (rows * panel + (rows - 1) * gap) / height
 
 
 def _slice(values: NDArray[Any], view: _View, index: int) -> NDArray[Any]:
@@ -194,7 +199,7 @@ def _edges(axis: Axis) -> Array:
 
 
 def _cells(found: Map, column: str) -> tuple[NDArray[np.int8], Array]:
-    """Return the kind of each cell, and its number where it has one, NaN elsewhere."""
+    """Return the kind of each cell, and its number in the shown unit where it has one, NaN elsewhere."""
     values = found.values[column]
     known = found.computed if found.filled is None else found.computed | found.filled
     filled = np.zeros_like(known) if found.filled is None else found.filled
@@ -206,7 +211,7 @@ def _cells(found: Map, column: str) -> tuple[NDArray[np.int8], Array]:
         kinds[filled & (kinds == UP)] = UP_FILLED
         kinds[filled & (kinds == LOST)] = LOST_FILLED
         return kinds, np.full(values.shape, np.nan)
-    numbers = np.where(found.computed, values, np.nan)
+    numbers = np.where(found.computed, values * quantity_of(column).factor, np.nan)
     kinds[found.computed] = UP if column in NAN_IS_UP else NONE
     if column in NAN_IS_UP and "survived" in found.values:
         kinds[filled & found.values["survived"]] = UP_FILLED
@@ -216,7 +221,7 @@ def _cells(found: Map, column: str) -> tuple[NDArray[np.int8], Array]:
 
 def _norm(numbers: Array, column: str) -> Normalize | None:
     """Return how numbers become colours; None where there are none."""
-    there = numbers[np.isfinite(numbers)] * quantity_of(column).factor
+    there = numbers[np.isfinite(numbers)]
     if not there.size:
         return None
     if column in LOGARITHMIC and (positive := there[there > 0]).size:
@@ -231,10 +236,192 @@ def _draw_cells(axes: Axes, view: _View, kinds: NDArray[Any], numbers: Array, no
     colours = ListedColormap([KINDS[kind].colour for kind in sorted(KINDS)])
     axes.pcolormesh(x, y, kinds, cmap=colours, vmin=-0.5, vmax=len(KINDS) - 0.5, **flat)
     if norm is not None:
-        shown = numbers * norm_factor if (norm_factor := getattr(norm, "factor", 1.0)) != 1.0 else numbers
-        axes.pcolormesh(x, y, np.ma.masked_invalid(shown), cmap=NUMBERS, norm=norm, **flat)
+        axes.pcolormesh(x, y, np.ma.masked_invalid(numbers), cmap=NUMBERS, norm=norm, **flat)
     for axis, set_scale in ((view.x, axes.set_xscale), (view.y, axes.set_yscale)):
         if axis.scale == "log":
             set_scale("log")
     axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
     axes.grid(visible=False)
+
+
+# --- lines over the cells ---
+
+
+def _draw_limits(axes: Axes, plan: Plan, view: _View) -> list[Artist]:
+    """Draw what theory and the thesis say of the spin at the start, and return what the legend needs."""
+    if view.x.key == DRIVE:
+        return _draw_spin_at_the_start(axes, plan.scene)
+    if view.x.key != SPIN or view.x.scale == "log":
+        return []
+    return [*_draw_window(axes, plan.scene, view), *_draw_adiabatic(axes, plan.scene, view), *_draw_thesis(axes, plan)]
+
+
+def _draw_spin_at_the_start(axes: Axes, scene: Scene) -> list[Artist]:
+    spin = abs(scene.start.spin_hz)
+    low, high = axes.get_xlim()
+    if not low < spin < high:
+        return []
+    _draw_rim(axes, x=spin)
+    return [axes.axvline(spin, label=f"spin at the start, {spin:g} Hz", **DASHED)]
+
+
+def _draw_window(axes: Axes, scene: Scene, view: _View) -> list[Artist]:
+    """Draw the slowest and the fastest spin of small motions, of either sense."""
+    heights, low, high = _windows_along(scene, view.y)
+    if np.all(np.isnan(low)):
+        return []
+    style: Any = {"color": ORANGE, "linewidth": 1.6, "path_effects": RIM, "scalex": False, "scaley": False}
+    for edge in (low, high, -low, -high):
+        axes.plot(edge, heights, **style)
+    return [Line2D([], [], color=ORANGE, linewidth=1.6, label="slowest and fastest spin for small motions (linear)")]
+
+
+def _windows_along(scene: Scene, axis: Axis) -> tuple[Array, Array, Array]:
+    """Return some values of an axis, as they are shown, and the linear window [Hz] at each, NaN where none is."""
+    values = axis.values[np.unique(np.linspace(0, len(axis.values) - 1, CURVE_POINTS).round().astype(int))]
+    if not axis.key.startswith(("top.", "base.", "gravity")):  # how it starts does not change the window
+        values = values[[0, -1]]
+        windows = [_window(scene)] * 2
+    else:
+        windows = [_window(scene.changed({axis.key: float(value), "start.place": "given"})) for value in values]
+    low, high = np.array(windows).T
+    return values * quantity_of(axis.key).factor, low, high
+
+
+def _window(scene: Scene) -> tuple[float, float]:
+    floating = stability_of(scene).floating
+    return floating.spins[0] if floating and floating.spins else (math.nan, math.nan)
+
+
+def _draw_adiabatic(axes: Axes, scene: Scene, view: _View) -> list[Artist]:
+    """Draw where the masses, or the heights, end at which a fast top floats."""
+    lifted = stability_of(scene).lifted
+    if view.y.key == MASS:
+        places = [mass for window in lifted for mass in (window.light, window.heavy)]
+        label = "masses that float (adiabatic)"
+    elif view.y.key == HEIGHT:
+        places = [height for window in lifted for height in (window.low, window.high)]
+        label = "heights that are stable (adiabatic)"
+    else:
+        return []
+    quantity, (low, high) = quantity_of(view.y.key), axes.get_ylim()
+    shown = [place * quantity.factor for place in places if low < place * quantity.factor < high]
+    for place in shown:
+        _draw_rim(axes, y=place)
+        axes.axhline(place, **DASHED)
+    numbers = " to ".join(f"{place * quantity.factor:.2f}" for place in places[:2])
+    return [Line2D([], [], **DASHED, label=f"{label}: {numbers} {quantity.unit}")] if shown else []
+
+
+def _draw_rim(axes: Axes, *, x: float | None = None, y: float | None = None) -> None:
+    """Draw what sets a line with dashes off from the cells below it."""
+    style: Any = {"color": "white", "linewidth": 2.6}
+    if x is not None:
+        axes.axvline(x, **style)
+    if y is not None:
+        axes.axhline(y, **style)
+
+
+def _draw_thesis(axes: Axes, plan: Plan) -> list[Artist]:
+    """Mark the limits of the thesis where they are of this device: measured ones as lines, simulated ones above."""
+    if not is_thesis_device(plan.scene):
+        return []
+    low, high = axes.get_xlim()
+    artists: list[Artist] = []
+    for spin, dashes, label in (
+        (MEASURED_HZ, "dashdot", f"thesis, measured: lower limit {MEASURED_HZ} ± {MEASURED_U_HZ} Hz"),
+        (HIGHEST_HZ, "dotted", f"thesis, measured: highest synchronised spin, about {HIGHEST_HZ:g} Hz"),
+    ):
+        if low < spin < high:
+            _draw_rim(axes, x=spin)
+            artists.append(axes.axvline(spin, color=PURPLE, linewidth=1.3, linestyle=dashes, label=label))
+    simulated = [spin for pair in SIMULATED_HZ.values() for spin in pair if low < spin < high]
+    if simulated:
+        style: Any = {"color": PURPLE, "marker": "v", "markersize": 5, "linestyle": "none"}
+        axes.plot(
+            simulated, np.full(len(simulated), 1.02), transform=axes.get_xaxis_transform(), clip_on=False, **style
+        )
+        artists.append(Line2D([], [], **style, label=f"thesis, simulated: limits of {', '.join(SIMULATED_HZ)}"))
+    return artists
+
+
+# --- words ---
+
+
+def _label(panels: list[Axes], view: _View) -> None:
+    across = min(len(panels), PANELS_IN_A_ROW)
+    for k, axes in enumerate(panels):
+        if k + across >= len(panels):
+            axes.set_xlabel(quantity_of(view.x.key).label)
+        else:
+            axes.tick_params(labelbottom=False)
+        if k % across == 0:
+            axes.set_ylabel(quantity_of(view.y.key).label)
+        else:
+            axes.tick_params(labelleft=False)
+        if view.panels is not None:
+            quantity = quantity_of(view.panels.key)
+            axes.set_title(f"{quantity.name} {quantity.text(view.panels.values[view.chosen[k]])}", loc="left", pad=9)
+
+
+def _draw_colour_bar(figure: Figure, box: tuple[float, float, float], norm: Normalize, column: str) -> None:
+    left, bottom, height = box
+    bar = figure.colorbar(mpl.cm.ScalarMappable(norm, NUMBERS), cax=figure.add_axes((left, bottom, 0.015, height)))
+    bar.set_label(quantity_of(column).label)
+    bar.outline.set_visible(False)
+
+
+def _kind_patches(kinds: NDArray[Any], column: str, plan: Plan) -> list[Artist]:
+    meanings = {kind: one.meaning for kind, one in KINDS.items()}
+    meanings[UP] = f"still up after {plan.duration_s:g} s"
+    if column == "locked":
+        meanings |= {UP: "locked to the drive", LOST: "not locked"}
+        if np.any(kinds == SLIPS):
+            meanings[LOST] = "lost"
+    drawn = [kind for kind in KINDS if np.any(kinds == kind)]
+    if column not in NAN_IS_UP and UP not in drawn and MISSING not in drawn and NONE in drawn:
+        drawn.remove(NONE)
+    return [
+        Patch(facecolor=KINDS[kind].colour, edgecolor="#999999", linewidth=0.5, label=meanings[kind]) for kind in drawn
+    ]
+
+
+def _headline(found: Map, column: str) -> str:
+    name = (found.plan.scene.name or "the scene").replace("$", r"\$")[:50]
+    size, after = found.computed.size, f"after {found.plan.duration_s:g} s"
+    if column == "survived":
+        return f"{name}: {np.count_nonzero(found.values[column])} of {size} tops are still up {after}"
+    if column == "locked":
+        return f"{name}: {np.count_nonzero(found.values[column])} of {size} tops are locked to the drive {after}"
+    return f"{name}: {quantity_of(column).name}, of {size} tops in {found.plan.duration_s:g} s"
+
+
+def _caption(found: Map, view: _View, sentences: Sequence[str], width: float) -> list[str]:
+    """Return the lines that explain the map below it."""
+    wide, high = (_step(axis) for axis in (view.x, view.y))
+    said = [
+        f"Each cell is one top, simulated for {found.plan.duration_s:g} s.",
+        f"A cell spans {wide} by {high}: a limit is known no better.",
+    ]
+    if view.panels is not None and len(view.chosen) < len(view.panels.values):
+        said.append(f"{len(view.chosen)} of {len(view.panels.values)} values of the third axis are shown.")
+    said += [f"{text[0].upper()}{text[1:]}".removesuffix(".") + "." for text in sentences]
+    if found.filled is None and not found.computed.all():
+        said.append(f"{np.count_nonzero(~found.computed)} of {found.computed.size} points are not computed yet.")
+    return textwrap.wrap(" ".join(said), round(16 * width))
+
+
+def _step(axis: Axis) -> str:
+    return step_in_words(axis.key, axis.values, logarithmic=axis.scale == "log")
+
+
+def _reading_sentences(view: _View, column: str, lines: Sequence[Artist]) -> list[str]:
+    if column == "locked":
+        return ["Locked: the top is up, and its body slipped by no turn behind the drive in the last half of the time"]
+    if view.x.key != SPIN or not lines:
+        return []
+    said = (
+        "Between the orange lines small motions stay small. A top that is lost there started too far from its place "
+        "for its spin; one that is up outside would take longer to be lost, or swings on a wider path."
+    )
+    return [said]

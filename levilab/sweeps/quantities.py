@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from levilab.sweeps.observables import OBSERVABLES
 from levilab.sweeps.plan import unit_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 
 @dataclass(frozen=True)
@@ -77,6 +81,22 @@ def quantity_of(name: str) -> Quantity:
     unit = OBSERVABLES[name].unit if name in OBSERVABLES else unit_of(name)
     shown, factor = _UNITS.get(unit, (unit, 1.0))
     return Quantity(_NAMES.get(name) or _plain(name, unit), shown, factor)
+
+
+def step_in_words(key: str, values: NDArray[np.float64], count: int = 1, *, logarithmic: bool = False) -> str:
+    """Return so many steps of an axis in words.
+
+    >>> import numpy as np
+    >>> step_in_words("start.spin_hz", np.linspace(20, 30, 21), 8)
+    '4 Hz of spin at the start'
+    >>> step_in_words("drive.amplitude_t", np.geomspace(1e-5, 1e-3, 3), logarithmic=True)
+    'a factor 10 of amplitude of the drive'
+    """
+    quantity, steps = quantity_of(key), len(values) - 1
+    if logarithmic:
+        return f"a factor {(values[-1] / values[0]) ** (count / steps):.3g} of {quantity.name}"
+    step = abs(values[-1] - values[0]) * quantity.factor * count / steps
+    return f"{f'{step:.3g} {quantity.unit}'.strip()} of {quantity.name}"
 
 
 def _plain(name: str, unit: str) -> str:
