@@ -67,12 +67,12 @@ class _Kind:
 UP, UP_FILLED, LOST, LOST_FILLED, MISSING, NONE, SLIPS = range(7)
 KINDS = {
     UP: _Kind("#0072B2", "still up"),
-    UP_FILLED: _Kind("#85B9DC", "the same, filled in"),
+    UP_FILLED: _Kind("#85B9DC", "filled in: still up"),
     LOST: _Kind("#B8B8B8", "lost before"),
-    LOST_FILLED: _Kind("#E4E4E4", "the same, filled in"),
+    LOST_FILLED: _Kind("#E4E4E4", "filled in: lost before"),
     MISSING: _Kind("#FFFFFF", "not computed"),
     NONE: _Kind("#F7F7F7", "no value"),
-    SLIPS: _Kind("#E8C07D", "up, but not locked"),
+    SLIPS: _Kind("#F5E1A4", "up, but not locked"),
 }
 
 
@@ -120,7 +120,7 @@ def map_figure(found: Map, column: str = "survived", notes: Sequence[str] = ()) 
         _label(panels, view)
         handles = [*_kind_patches(kinds, column, found.plan), *lines]
         caption = _caption(found, view, [*_reading_sentences(view, column, lines), *notes], figure.get_figwidth())
-        box = _place(figure, panels, head=0.62 + 0.17 * -(-len(handles) // 2), foot=0.62 + 0.145 * len(caption))
+        box = _place(figure, panels, head=0.45 + 0.17 * -(-len(handles) // 2), foot=0.62 + 0.145 * len(caption))
         if norm is not None:
             _draw_colour_bar(figure, box, norm, column)
         top = figure.get_figheight()
@@ -376,6 +376,7 @@ def _kind_patches(kinds: NDArray[Any], column: str, plan: Plan) -> list[Artist]:
     meanings[UP] = f"still up after {plan.duration_s:g} s"
     if column == "locked":
         meanings |= {UP: "locked to the drive", LOST: "not locked"}
+        meanings |= {UP_FILLED: "filled in: locked", LOST_FILLED: "filled in: not locked"}
         if np.any(kinds == SLIPS):
             meanings[LOST] = "lost"
     drawn = [kind for kind in KINDS if np.any(kinds == kind)]
@@ -400,8 +401,8 @@ def _caption(found: Map, view: _View, sentences: Sequence[str], width: float) ->
     """Return the lines that explain the map below it."""
     wide, high = (_step(axis) for axis in (view.x, view.y))
     said = [
-        f"Each cell is one top, simulated for {found.plan.duration_s:g} s.",
-        f"A cell spans {wide} by {high}: a limit is known no better.",
+        f"Each cell is one top, simulated for {found.plan.duration_s:g} s, and spans {wide} by {high}: "
+        "a limit is known no better."
     ]
     if view.panels is not None and len(view.chosen) < len(view.panels.values):
         said.append(f"{len(view.chosen)} of {len(view.panels.values)} values of the third axis are shown.")

@@ -88,15 +88,15 @@ def step_in_words(key: str, values: NDArray[np.float64], count: int = 1, *, loga
 
     >>> import numpy as np
     >>> step_in_words("start.spin_hz", np.linspace(20, 30, 21), 8)
-    '4 Hz of spin at the start'
+    '4 Hz (spin at the start)'
     >>> step_in_words("drive.amplitude_t", np.geomspace(1e-5, 1e-3, 3), logarithmic=True)
-    'a factor 10 of amplitude of the drive'
+    'a factor 10 (amplitude of the drive)'
     """
     quantity, steps = quantity_of(key), len(values) - 1
     if logarithmic:
-        return f"a factor {(values[-1] / values[0]) ** (count / steps):.3g} of {quantity.name}"
+        return f"a factor {(values[-1] / values[0]) ** (count / steps):.3g} ({quantity.name})"
     step = abs(values[-1] - values[0]) * quantity.factor * count / steps
-    return f"{f'{step:.3g} {quantity.unit}'.strip()} of {quantity.name}"
+    return f"{f'{step:.3g} {quantity.unit}'.strip()} ({quantity.name})"
 
 
 def _plain(name: str, unit: str) -> str:
