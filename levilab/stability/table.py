@@ -7,18 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
 
-from levilab.files import CannotWrite, replace_atomically, writing
 from levilab.present.terminal import new_table, terminal
 from levilab.simulator.equilibrium import advice
 from levilab.stability.thesis import HIGHEST_HZ, MEASURED_HZ, MEASURED_U_HZ, SIMULATED_HZ, is_thesis_device
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from pathlib import Path
 
     from levilab.simulator.equilibrium import Stability
     from levilab.simulator.scene import Scene
-    from levilab.stability.map import Map
 
 
 def _range(which: int) -> str:
@@ -170,36 +167,3 @@ def as_document(found: Stability) -> dict[str, Any]:
 
 def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
-
-
-TABLE, PICTURE = "survival.csv", "survival.png"
-
-
-_ELSEWHERE = "give another folder with `out`"
-
-
-def place_for_map(folder: Path) -> None:
-    """Make the folder, before anything is simulated; a map that is there stays.  Raises CannotWrite."""
-    for path in (folder / TABLE, folder / PICTURE):
-        if path.exists():
-            raise CannotWrite(f"{path} is there already: give another folder with `out`, or move it away")
-    with writing(f"{folder}: the map cannot be written", _ELSEWHERE):
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / TABLE).touch()
-        (folder / TABLE).unlink()
-
-
-def write_map(found: Map, folder: Path) -> list[Path]:
-    """survival.png and survival.csv (one row a top; 1: survived) into a folder."""
-    # matplotlib, which a command without --map does not need
-    from levilab.present.style import save_png
-    from levilab.stability.figure import map_figure
-
-    rows = ["mass_kg,spin_hz,survived"]
-    for mass, alive in zip(found.masses, found.survived, strict=True):
-        rows += [f"{mass:.8g},{spin:.6g},{one:d}" for spin, one in zip(found.spins, alive, strict=True)]
-    with writing(f"{folder}: the map cannot be written", _ELSEWHERE):
-        folder.mkdir(parents=True, exist_ok=True)
-        replace_atomically(folder / TABLE, "\n".join(rows) + "\n")
-        save_png(map_figure(found), folder / PICTURE)
-    return [folder / TABLE, folder / PICTURE]

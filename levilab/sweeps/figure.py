@@ -400,10 +400,8 @@ def _headline(found: Map, column: str) -> str:
 def _caption(found: Map, view: _View, sentences: Sequence[str], width: float) -> list[str]:
     """Return the lines that explain the map below it."""
     wide, high = (_step(axis) for axis in (view.x, view.y))
-    said = [
-        f"Each cell is one top, simulated for {found.plan.duration_s:g} s, and spans {wide} by {high}: "
-        "a limit is known no better."
-    ]
+    cell = f"Each cell is one top, simulated for {found.plan.duration_s:g} s, and spans {wide} by {high}"
+    said = [f"{cell}: a limit is known no better."]
     if view.panels is not None and len(view.chosen) < len(view.panels.values):
         said.append(f"{len(view.chosen)} of {len(view.panels.values)} values of the third axis are shown.")
     said += [f"{text[0].upper()}{text[1:]}".removesuffix(".") + "." for text in sentences]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from levilab.sweeps.observables import OBSERVABLES
 from levilab.sweeps.plan import unit_of
@@ -83,7 +83,7 @@ def quantity_of(name: str) -> Quantity:
     return Quantity(_NAMES.get(name) or _plain(name, unit), shown, factor)
 
 
-def step_in_words(key: str, values: NDArray[np.float64], count: int = 1, *, logarithmic: bool = False) -> str:
+def step_in_words(key: str, values: NDArray[Any], count: int = 1, *, logarithmic: bool = False) -> str:
     """Return so many steps of an axis in words.
 
     >>> import numpy as np
