@@ -91,6 +91,8 @@ def sweep(
         "sweep": sweep, "points": points, "observe": observe, "duration": duration, "tolerance": tolerance,
         "settings": settings, "seed": seed, "out": out, "adaptive": adaptive or None,
     }  # fmt: skip
+    if scheduler is not None and cores is not None:
+        raise UsageError("cores", "a cluster has its own workers: leave it out, or leave out `scheduler`")
     shown = _is_store(scene)
     store = _opened(Path(scene), given, resume=resume) if shown else _begun(scene, given, resume=resume)
     if resume or not shown:

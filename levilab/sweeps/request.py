@@ -93,13 +93,15 @@ def store_for(request: SweepRequest, path: Path, message: Callable[[str], None],
 
 
 def _going_on(request: SweepRequest, plan: Plan, path: Path, *, resume: bool) -> Store:
-    if not resume:
-        there = f"it is there already: levilab sweep {path} shows it, `resume` goes on with it; or take another place"
-        raise UsageError("out", there, value=path)
+    there = f"it is there already: levilab sweep {path} shows it, `resume` goes on with it; or take another place"
+    if not resume and not (path / "zarr.json").exists():
+        raise UsageError("out", "it is there already, and no store of a sweep: take another place", value=path)
     store = Store.open(path, writable=True)
     other = differences(store.plan, plan)
     if is_adaptive(store) != request.adaptive:
         other.append(f"adaptive is {is_adaptive(store)} there and {request.adaptive} here")
+    if not resume and (other or store.done or request.adaptive):  # one that is begun and empty is no loss
+        raise UsageError("out", there, value=path)
     if other:
         more = f" (and {len(other) - 3} more)" if len(other) > 3 else ""
         raise UsageError(
