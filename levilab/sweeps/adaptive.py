@@ -287,3 +287,9 @@ def in_words(report: dict[str, Any], plan: Plan) -> list[str]:
         sure,
         f"an island that holds a box of {size} is sure to be seen, a smaller one by chance alone",
     ]
+
+
+def report_in(store: Store) -> dict[str, Any] | None:
+    """Return the report of an adaptive store that is complete; None of any other."""
+    found: dict[str, Any] | None = store.group.attrs.get(FOUND)
+    return found

@@ -188,6 +188,12 @@ class Store:
             self.group[DONE][chunk.number] = 1
         self.marks[chunk.number] = 1
 
+    def known(self, chunk: Chunk) -> NDArray[np.bool_]:
+        """Return which points of a chunk are computed, or filled in."""
+        if STATUS in self.group:
+            return np.asarray(self.group[STATUS][chunk.box]) > 0
+        return np.full(chunk.shape, bool(self.marks[chunk.number]))
+
     def read(self, chunk: Chunk) -> dict[str, NDArray[Any]]:
         """Return column → values of a chunk."""
         return {
