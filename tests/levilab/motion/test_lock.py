@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
 
 from levilab.motion.lock import RATE_HZ, body_angle, can_lock, is_locked, turns_behind
 from levilab.simulator.kernels.motion import ARM, N
-from levilab.simulator.scene import Scene, preset
+from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
-from levilab.simulator.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from levilab.simulator.scene import Scene
+    from levilab.simulator.trajectory import Trajectory
 
 DRIVEN = preset("driven")
 

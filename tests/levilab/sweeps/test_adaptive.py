@@ -28,8 +28,8 @@ SCENE = preset("undriven").changed({"start.place": "given"})
 def plan(spins: int, masses: int, duration: float = 3.0) -> Plan:
     """The upper edge, with its islands."""
     axes = (
-        Axis("start.spin_hz", np.linspace(58, 82, spins)),
-        Axis("top.mass_kg", np.linspace(0.0248, 0.0256, masses)),
+        Axis("start.spin_hz", np.linspace(46, 94, spins)),
+        Axis("top.mass_kg", np.linspace(0.0251, 0.0259, masses)),
     )
     made = Plan.of(SCENE, axes, ("survived", "lifetime_s"), duration)
     share = step_share_of(SCENE, grid({axis.key: axis.values for axis in axes}), duration, tolerance=1e-6)
@@ -39,13 +39,13 @@ def plan(spins: int, masses: int, duration: float = 3.0) -> Plan:
 def made_up(task: Any) -> dict[str, np.ndarray]:
     """An edge and an island that cost nothing."""
     spin, mass = task.values["start.spin_hz"], 1e5 * task.values["top.mass_kg"]
-    return {"survived": (spin < 65) | ((spin - 75) ** 2 + (mass - 2520) ** 2 < 9), "lifetime_s": spin + mass}
+    return {"survived": (spin < 65) | ((spin - 80) ** 2 + (mass - 2550) ** 2 < 9), "lifetime_s": spin + mass}
 
 
 def test_a_map_with_islands_agrees_with_the_full_one_within_its_limit() -> None:
-    asked = plan(45, 37)
+    asked = plan(61, 41)
     store = Store.create(None, asked)
-    begin_adaptive(store, stride=4, audit=100)
+    begin_adaptive(store, stride=4, audit=60)
     report = run_adaptive(store, this_process())
     found = store.load()
     full = observe(asked, grid({axis.key: axis.values for axis in asked.axes}))
@@ -57,11 +57,11 @@ def test_a_map_with_islands_agrees_with_the_full_one_within_its_limit() -> None:
     wrong = np.count_nonzero(found.values["survived"] != full["survived"])
     assert wrong <= report["most_wrong"]
     assert report["saved"] == pytest.approx(found.filled.mean())
-    assert report["saved"] > 0.25
+    assert report["saved"] > 0.2
     assert np.all(np.isnan(found.values["lifetime_s"][found.filled]))
     said = " ".join(in_words(report, asked))
     assert "with 95 % confidence at most" in said
-    assert "a box of 2.18 Hz (spin at the start) by 0.0889 g (mass) is sure to be seen" in said
+    assert "a box of 3.2 Hz (spin at the start) by 0.08 g (mass) is sure to be seen" in said
 
 
 def test_the_result_does_not_depend_on_the_workers(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -81,7 +81,7 @@ def test_a_map_that_was_interrupted_goes_on_without_computing_anew(
 ) -> None:
     asked, computed = plan(65, 65, 0.01), []
 
-    class Cut(Exception):  # noqa: N818 - it stands for a signal
+    class Cut(Exception):
         pass
 
     def counted(task: Any) -> dict[str, np.ndarray]:
@@ -105,7 +105,7 @@ def test_a_map_that_was_interrupted_goes_on_without_computing_anew(
     with contextlib.suppress(Cut):
         run_adaptive(stores[1], this_process(), cut)
     before = len(computed)
-    assert 0 < before
+    assert before > 0
     again = Store.open(tmp_path / "cut.zarr", writable=True)
     assert again.done == 0
     run_adaptive(again, this_process())
