@@ -19,6 +19,7 @@ import argparse
 import contextlib
 import json
 import os
+import pickle
 import subprocess
 import sys
 import tempfile
@@ -55,9 +56,8 @@ MAPS = {
 CHUNKS = 32
 #: Tasks that do nothing.
 EMPTY_TASKS = 2000
-#: Points of the maps that are written, and of a chunk of theirs, which is as large as one of 2 s of work.
+#: Points of the maps that are written.
 WRITTEN = (10_000, 1_000_000, 10_000_000)
-CHUNK_POINTS = 4096
 
 
 def main() -> None:
@@ -171,10 +171,8 @@ def memory_of(points: int) -> dict[str, Any]:
 def write_a_map(points: int) -> dict[str, Any]:
     side = round(points**0.5)
     axes = parse_axis(f"start.spin_hz=18:90:{side}"), parse_axis(f"top.mass_kg=0.0247:0.0255:{side}")
-    edge = round(CHUNK_POINTS**0.5)
-    plan = cut(Plan.of(preset("undriven"), axes, ("survived", "lifetime_s", "fall_spin_hz"), 30.0))
-    plan = replace(plan, chunk=(edge, edge), step_share=0.25)
-    writing, peak = 0.0, 0
+    plan = with_step(cut(Plan.of(preset("undriven"), axes, ("survived", "lifetime_s", "fall_spin_hz"), 30.0)), str)
+    writing, peak, results = 0.0, 0, 0
     with tempfile.TemporaryDirectory() as folder:
         store = Store.create(Path(folder, "map.zarr"), plan)
         begun, cpu = time.perf_counter(), time.process_time()
@@ -183,17 +181,20 @@ def write_a_map(points: int) -> dict[str, Any]:
             at = time.perf_counter()
             store.write(done.task.chunk, done.result)
             writing += time.perf_counter() - at
-            peak = max(peak, psutil.Process().memory_info().rss)
+            results += sum(values.nbytes for values in done.result.values())
+            peak, task = max(peak, psutil.Process().memory_info().rss), done.task
         wall, cpu = time.perf_counter() - begun, time.process_time() - cpu
         files = [path.stat().st_size for path in Path(folder).rglob("*") if path.is_file()]
     return {
         "points": plan.size,
         "chunks": plan.chunk_count,
         "columns": len(plan.observables),
+        "task_bytes": len(pickle.dumps(task)),
         "peak_mb": round(peak / 1e6, 1),
         "wall_s": round(wall, 2),
         "parent_cpu_per_chunk_s": round(cpu / plan.chunk_count, 6),
         "write_per_chunk_s": round(writing / plan.chunk_count, 6),
+        "results_bytes": results,
         "files": len(files),
         "bytes": sum(files),
     }
