@@ -10,7 +10,7 @@ import typer
 
 from levilab.cli.options import Json, Settings
 from levilab.cli.output import interruptible, message, print_json, result
-from levilab.errors import DataError, UsageError
+from levilab.errors import DataError, UsageError, WorkersLost
 
 if TYPE_CHECKING:
     from levilab.sweeps.store import Store
@@ -154,10 +154,13 @@ def _computed(store: Store, cores: int | None, scheduler: str | None) -> None:
     with interruptible(kept), store.locked(), contextlib.closing(bar):
         with announce_compilation(message):
             compile_for(store.plan)
-        if is_adaptive(store):
-            run_adaptive(store, workers, bar)
-        else:
-            run(store, workers, bar)
+        try:
+            if is_adaptive(store):
+                run_adaptive(store, workers, bar)
+            else:
+                run(store, workers, bar)
+        except WorkersLost as lost:
+            raise WorkersLost(f"{lost}; {kept()}") from lost
 
 
 def _shown(store: Store, *, as_json: bool) -> None:

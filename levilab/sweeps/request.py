@@ -68,12 +68,18 @@ def plan_of(request: SweepRequest) -> Plan:
     return cut(plan)
 
 
-def store_for(request: SweepRequest, path: Path, message: Callable[[str], None], *, resume: bool = False) -> Store:
+def _say_nothing(text: str) -> None:
+    """Ignore a message."""
+
+
+def store_for(
+    request: SweepRequest, path: Path | None, message: Callable[[str], None] = _say_nothing, *, resume: bool = False
+) -> Store:
     """Return the store of a request, ready to be computed.
 
     Args:
         request: what is asked.
-        path: of its folder.
+        path: of its folder; None: in memory.
         message: called with what takes a moment.
         resume: go on with the store that is there, if one is.
 
@@ -82,7 +88,7 @@ def store_for(request: SweepRequest, path: Path, message: Callable[[str], None],
         CannotWrite, DataError: the store cannot be made or read.
     """
     plan = plan_of(request)
-    if path.exists():
+    if path is not None and path.exists():
         return _going_on(request, plan, path, resume=resume)
     if request.adaptive:  # what it refuses leaves no store behind
         begin_adaptive(Store.create(None, plan), _boundary(plan))

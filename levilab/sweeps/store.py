@@ -22,6 +22,7 @@ from levilab.simulator.keys import SceneError, short_text
 from levilab.software import software_versions
 from levilab.sweeps.observables import columns_of
 from levilab.sweeps.plan import Axis, Chunk, Plan, unit_of
+from levilab.sweeps.quantities import quantity_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -218,9 +219,10 @@ def processor() -> dict[str, str]:
     from llvmlite import binding
     from numba.core import config
 
+    name, features = getattr(config, "CPU_NAME", None), getattr(config, "CPU_FEATURES", None)
     return {
-        "name": getattr(config, "CPU_NAME", None) or binding.get_host_cpu_name(),
-        "features": getattr(config, "CPU_FEATURES", None) or binding.get_host_cpu_features().flatten(),
+        "name": binding.get_host_cpu_name() if name is None else name,
+        "features": binding.get_host_cpu_features().flatten() if features is None else features,
     }
 
 
@@ -257,7 +259,7 @@ def _add_coordinate(group: Any, axis: Axis, dimension: str) -> None:
     values, words = axis.values, None
     if values.dtype.kind == "U":
         words, values = np.unique(values, return_inverse=True)
-    attributes = _described(unit_of(axis.key), f"{axis.key} of the scene") | {"scale": axis.scale}
+    attributes = _described(unit_of(axis.key), quantity_of(axis.key).name) | {"scale": axis.scale}
     coordinate = group.create_array(
         axis.key,
         shape=values.shape,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import itertools
 import os
 import signal
@@ -87,6 +88,12 @@ def test_an_error_that_cannot_be_unpickled_keeps_its_words() -> None:
 def test_a_function_that_cannot_be_sent_is_refused() -> None:
     with pytest.raises(LevilabError, match="a function at the head of a module"):
         list(results_of(lambda task: task, [0], processes(1)))
+
+
+def test_a_function_of_the_script_that_runs_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tasks.square, "__module__", "__main__")
+    with pytest.raises(LevilabError, match="put it into a module"):
+        list(results_of(functools.partial(tasks.square), [0], processes(1)))
 
 
 def test_a_worker_with_other_versions_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
