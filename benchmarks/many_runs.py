@@ -26,9 +26,7 @@ COPIED = ("events.jsonl", "datapackage.json", "run.lock")
 NOISE_HZ, STEP_S = 0.03, 10.0
 
 
-def make_runs(
-    root: Path, count: int, *, template: Path = TEMPLATE, seed: int = 0, broken: int = BROKEN
-) -> list[Path]:
+def make_runs(root: Path, count: int, *, template: Path = TEMPLATE, seed: int = 0, broken: int = BROKEN) -> list[Path]:
     """Make spin-down runs of a laminar disc's drag.
 
     Args:

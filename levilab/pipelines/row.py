@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 #: What stands in a column: a float, a whole number, true or false, text.
 Kind = Literal["number", "count", "truth", "text"]
 
+Cell = str | float | int | bool | None
+
 #: Units of results → the end of a column's name.
 _ENDS = MappingProxyType({
     "Hz": "hz", "s": "s", "1": "", "1/s": "per_s", "1/rad": "per_rad", "(rad/s)^-1/2/s": "per_sqrt_rad_s",
@@ -83,3 +85,38 @@ def entry(name: str, kind: Kind, meaning: str, key: str = "") -> Column:
         return len(found) if isinstance(found, list | tuple) else found
 
     return Column(name, kind, meaning, read)
+
+
+def plain(found: Any, kind: Kind) -> Cell:
+    """A value as it stands in a table: a plain one of Python, a text in one line, None where there is none."""
+    if found is None:
+        return None
+    if kind == "text":
+        return " ".join(str(found).split()) or None
+    if kind == "truth":
+        return bool(found)
+    return float(found) if kind == "number" else int(found)
+
+
+def text_of(cell: Cell) -> str:
+    """A value as text, empty for None; a float with all its digits.
+
+    >>> text_of(0.1 + 0.2), text_of(True), text_of(None)
+    ('0.30000000000000004', 'true', '')
+    """
+    if cell is None:
+        return ""
+    return str(cell).lower() if isinstance(cell, bool) else str(cell)
+
+
+def value_of_text(text: str, kind: Kind) -> Cell:
+    """The value of a text.  Raises ValueError."""
+    if not text:
+        return None
+    if kind == "text":
+        return text
+    if kind == "truth":
+        if text not in {"true", "false"}:
+            raise ValueError(f"{text!r} is neither true nor false")
+        return text == "true"
+    return float(text) if kind == "number" else int(text)

@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any, Self
 
 from levilab.errors import DataError, UsageError
 from levilab.files import parse_json, replace_atomically, replacing, writing
+from levilab.pipelines.row import text_of, value_of_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
     from pathlib import Path
 
-    from levilab.pipelines.many.one import Cell
-    from levilab.pipelines.row import Column
+    from levilab.pipelines.row import Cell, Column
 
 SCHEMA = "levilab-table/1"
 CSV, PARQUET = ".csv", ".parquet"
@@ -106,7 +106,7 @@ class TableFile:
         """Append a row; it is with the operating system before this returns.  Raises CannotWrite."""
         with writing(f"{self.part}: could not be written", "make room, and go on with `resume`"):
             place = self._file.tell()
-            self._file.write(_line([_text(cell) for cell in cells]))
+            self._file.write(_line([text_of(cell) for cell in cells]))
             self._file.flush()
         self._places[str(cells[0])] = place
 
@@ -144,12 +144,15 @@ class TableFile:
         with pq.ParquetWriter(file, schema) as writer:
             while group := list(islice(rows, GROUP)):
                 values = [self._values(line) for line in group]
-                arrays = [pa.array(column, field.type) for column, field in zip(zip(*values, strict=True), fields, strict=True)]
+                arrays = [
+                    pa.array(column, field.type)
+                    for column, field in zip(zip(*values, strict=True), fields, strict=True)
+                ]
                 writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
 
     def _values(self, line: bytes) -> list[Cell]:
         texts = next(csv.reader([line.decode("utf-8")]))
-        return [_value(text, column) for text, column in zip(texts, self._columns, strict=True)]
+        return [value_of_text(text, column.kind) for text, column in zip(texts, self._columns, strict=True)]
 
     # --- what an earlier call left ---
 
@@ -218,19 +221,3 @@ def _line(texts: Sequence[str]) -> bytes:
     written = io.StringIO()
     csv.writer(written, lineterminator="\n").writerow(texts)
     return written.getvalue().encode("utf-8", errors="replace")
-
-
-def _text(cell: Cell) -> str:
-    """A value as it stands in the CSV; a float in all its digits."""
-    if cell is None:
-        return ""
-    return str(cell).lower() if isinstance(cell, bool) else str(cell)
-
-
-def _value(text: str, column: Column) -> Cell:
-    """The value of a text in the CSV.  Raises ValueError."""
-    if not text:
-        return None
-    if column.kind == "truth":
-        return {"true": True, "false": False}[text]
-    return {"number": float, "count": int, "text": str}[column.kind](text)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import DataError, DoesNotSuit, unquoted
@@ -11,13 +10,13 @@ from levilab.files import CannotWrite
 from levilab.formats.waveforms.header import NoRate
 from levilab.pipelines.catalogue import ANALYSES, Analysis, save
 from levilab.pipelines.result import relative
-from levilab.pipelines.row import Column, Kind
+from levilab.pipelines.row import Cell, Column, Kind, plain
 from levilab.runs.run import Run
 
 if TYPE_CHECKING:
-    from levilab.pipelines.sources import InputOptions
+    from pathlib import Path
 
-Cell = str | float | int | bool | None
+    from levilab.pipelines.sources import InputOptions
 
 
 @dataclass(frozen=True)
@@ -99,12 +98,12 @@ def analyze_one(task: Task) -> Row | PassedOver:
     about: dict[str, Any] = {"path": relative(task.path, task.folder)}
     part: dict[str, Any] | None = None
     try:
-        if passed_over := _look(task, analysis, about):
+        if task.is_run and (passed_over := _look(task, analysis, about)):
             return passed_over
         part = _analyze(task, analysis, about)
-    except (DoesNotSuit, NoRate) as error:
+    except DoesNotSuit as error:
         if task.searched and not task.is_run:
-            return PassedOver("" if isinstance(error, DoesNotSuit) else unquoted(str(error)))
+            return PassedOver(unquoted(str(error)) if isinstance(error, NoRate) else "")
         about["problem"] = str(error)
     except (DataError, CannotWrite, OSError) as error:
         about["problem"] = str(error)
@@ -120,17 +119,15 @@ def row(analysis: Analysis[Any], about: dict[str, Any], part: dict[str, Any] | N
     if problem := about.get("problem", ""):
         about["problem"] = problem = " ".join(unquoted(problem).split())
     cells = (
-        *(_plain(column, about) for column in HEAD),
-        *(None if part is None else _plain(column, part) for column in analysis.row),
-        *(_plain(column, about) for column in TAIL),
+        *(plain(column.read(about), column.kind) for column in HEAD),
+        *(None if part is None else plain(column.read(part), column.kind) for column in analysis.row),
+        *(plain(column.read(about), column.kind) for column in TAIL),
     )
     return Row(cells, problem, about.get("readings_sha256"))
 
 
 def _look(task: Task, analysis: Analysis[Any], about: dict[str, Any]) -> PassedOver | None:
     """Note what run.json says; return what keeps a run out of the table.  Raises DataError."""
-    if not task.is_run:
-        return None
     run = Run.load(task.path)
     about |= {
         "started_utc": run.record.started_utc,
@@ -156,13 +153,3 @@ def _analyze(task: Task, analysis: Analysis[Any], about: dict[str, Any]) -> dict
         save(analysis, found, with_figure=False)
     part: dict[str, Any] = document["runs"][0]
     return part
-
-
-def _plain(column: Column, of: dict[str, Any]) -> Cell:
-    """What stands in a column, as a plain value of Python; a text is one line."""
-    found = column.read(of)
-    if found is None or found == "":
-        return None
-    if column.kind == "text":
-        return " ".join(str(found).split())
-    return {"number": float, "count": int, "truth": bool}[column.kind](found)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from contextlib import closing
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import DataError, NoneUsable
@@ -20,6 +19,7 @@ from levilab.workers import processes, results_of, this_process
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
+    from pathlib import Path
 
     from levilab.pipelines.catalogue import Analysis
     from levilab.workers import Done
@@ -38,7 +38,8 @@ class Tally:
         done: inputs that are dealt with, those of an earlier call included.
         failed: of the rows of this call.
         failures: the first of them, (path, problem).
-        passed_over: why → how many inputs do not belong into the table.
+        left_out: inputs that do not belong into the table.
+        passed_over: why → how many of them; not of files that are of no concern.
         same: rows of this call with the same readings as another one.
     """
 
@@ -47,15 +48,23 @@ class Tally:
     done: int = 0
     failed: int = 0
     failures: list[tuple[str, str]] = field(default_factory=list)
+    left_out: int = 0
     passed_over: Counter[str] = field(default_factory=Counter)
     same: int = 0
     _seen: set[str] = field(default_factory=set)
+
+    @property
+    def rows(self) -> int:
+        """Rows of the table."""
+        return self.done - self.left_out
 
     def count(self, outcome: Row | PassedOver) -> None:
         """Count an input."""
         self.done += 1
         if isinstance(outcome, PassedOver):
-            self.passed_over[outcome.why] += bool(outcome.why)
+            self.left_out += 1
+            if outcome.why:
+                self.passed_over[outcome.why] += 1
             return
         if outcome.problem:
             self.failed += 1
@@ -97,7 +106,8 @@ def write_table(
     check_name(table)
     options = analysis.options_from(given)
     tasks = [
-        Task(path, is_run, searched, analysis.name, options, table.parent, save) for path, is_run, searched in inputs(paths)
+        Task(path, is_run, searched, analysis.name, options, table.parent, save)
+        for path, is_run, searched in inputs(paths)
     ]
     if not tasks:
         raise NoneUsable(f"{paths[0]}: holds no run and no data file; name run folders, or a folder with some of them")
@@ -138,7 +148,7 @@ def inputs(paths: Sequence[Path]) -> Iterator[tuple[Path, bool, bool]]:
 
     Raises DataError for a path that does not exist.
     """
-    seen: set[Path] = set()
+    seen = set()
     for path in map(find_run, paths):
         if not path.exists():
             raise DataError(f"{path}: there is no such file or folder")

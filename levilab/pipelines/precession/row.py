@@ -20,7 +20,9 @@ PRECESSION_ROW = (
     *estimate("intercept", "Hz", "of precession against drive"),
     value("p_locked", "1", "joint test of slope 1 and intercept 0"),
     Column("reduced_chi_square", "number", "χ² per degree of freedom of the line", _statistic("reduced_chi_square")),
-    Column("rms_residual_hz", "number", "root of the mean square of what the line leaves over", _statistic("rms_residual")),
+    Column(
+        "rms_residual_hz", "number", "root of the mean square of what the line leaves over", _statistic("rms_residual")
+    ),
     *estimate("robust_slope", "1", "slope of the median line"),
     *estimate("robust_intercept", "Hz", "intercept of the median line"),
     *estimate("spin_offset", "Hz", "spin beside the drive"),
