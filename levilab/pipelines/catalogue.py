@@ -59,6 +59,8 @@ if TYPE_CHECKING:
 
 #: Starts of runs that the terminal shows; the report has all.
 MOST_STARTS = 6
+#: So many warnings that are like an earlier one are counted, and not said.
+MANY_ALIKE = 3
 
 
 @dataclass(frozen=True)
@@ -247,6 +249,7 @@ def _suiting(
     errors: list[DoesNotSuit] = []
     unusable: list[NoneUsable] = []
     left = dict.fromkeys(paths)  # no analysis took these
+    said: set[str] = set()  # what is wrong with inputs, as the other analyses say
     for analysis in ANALYSES.values():
         try:
             found, taken = _of_those_that_suit(run, analysis, paths, given, of_none=analysis.name in of_none)
@@ -257,14 +260,15 @@ def _suiting(
             unusable.append(error)
             continue
         left = {path: None for path in left if path not in taken}
+        said.update(getattr(found, "found", found).warnings)
         yield analysis, found
     if len(errors) + len(unusable) == len(ANALYSES):
         raise [*unusable, *errors][0]
     refusals = (_refusal(analysis, path, given) for path in left for analysis in ANALYSES.values())
     if not unusable and (refusal := next(filter(None, refusals), None)):
         raise refusal  # that of the first analysis
-    if tell:
-        for left_out in unusable:
+    for left_out in unusable:
+        if tell and not said.issuperset(left_out.reasons):
             tell(str(left_out))
 
 
@@ -340,5 +344,8 @@ def print_analysis(
         more = f"; and {len(starts) - MOST_STARTS} more" if len(starts) > MOST_STARTS else ""
         console.print(f"[bold]Start, local time.[/bold] {escape('; '.join(starts[:MOST_STARTS]))}{more}")
     console.print(f"[bold]What the data say.[/bold] {escape(found.text)}")
-    for warning in found.all_warnings:
-        console.print(f"[yellow]note:[/yellow] {escape(in_words(warning))}")
+    for first, *others in found.grouped_warnings:
+        many = len(others) >= MANY_ALIKE
+        more = f" (and {len(others)} more like this one)" if many else ""
+        for warning in [first] if many else [first, *others]:
+            console.print(f"[yellow]note:[/yellow] {escape(in_words(warning))}{more}")
