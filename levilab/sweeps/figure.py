@@ -20,6 +20,7 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
 from levilab.errors import UsageError
+from levilab.motion.lock import LAST_SHARE
 from levilab.motion.summary import changing_energy
 from levilab.present.style import STYLE
 from levilab.simulator.equilibrium import stability_of
@@ -451,7 +452,9 @@ def _step(axis: Axis) -> str:
 
 def _reading_sentences(plan: Plan, view: _View, column: str, lines: Sequence[Artist]) -> list[str]:
     if column == "locked":
-        return ["Locked: the top is up, and its body slipped by no turn behind the drive in the last half of the time"]
+        slowest = 1 / (LAST_SHARE * plan.duration_s)
+        said = "Locked: the top is up, and its body slipped by no turn behind the drive in the last half of the time"
+        return [f"{said}; a slip slower than {slowest:.2g} Hz would not show"]
     if view.x.key != SPIN or not lines:
         return []
     said = (
