@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from levilab.errors import UsageError
 from levilab.simulator.ensemble import simulate_many
-from levilab.simulator.equilibrium import HEAVIEST_KG, stability_of
+from levilab.simulator.equilibrium import HEAVIEST_KG, stability_of, windows_over
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -110,15 +110,15 @@ def survival_map(
     spins, masses = spins or USUAL_SPINS, masses or _usual_masses(scene, floating)
     _check(spins, masses)
     over_spins, over_masses = np.linspace(*spins), np.linspace(*masses)
-    edges = [_window(scene.changed({"top.mass_kg": float(mass)})) for mass in over_masses]
+    theory = windows_over(scene, over_masses)
     return Map(
         scene,
         over_spins,
         over_masses,
         duration,
         survival(scene, over_spins, over_masses, duration, progress),
-        np.array([low for low, _ in edges]),
-        np.array([high for _, high in edges]),
+        theory.slowest,
+        theory.fastest,
         floating,
     )
 
@@ -149,11 +149,6 @@ def _check(spins: Span, masses: Span) -> None:
             f"{spins[2]} spins and {masses[2]} masses are {tops} tops, at most {MOST_TOPS} are possible: "
             "take longer steps in `spins` or `masses`",
         )
-
-
-def _window(scene: Scene) -> tuple[float, float]:
-    floating = stability_of(scene).floating
-    return floating.spins[0] if floating and floating.spins else (np.nan, np.nan)
 
 
 def survival(
