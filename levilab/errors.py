@@ -70,6 +70,10 @@ class LeftRange(SimulationError):
     """A motion whose numbers leave their range, as at the base's edges, so that it cannot be continued."""
 
 
+class WorkersLost(LevilabError):
+    """The processes or machines that were to do the work cannot be reached, or cannot do it; results so far stand."""
+
+
 def _short_text(value: object) -> str:
     """Return a value as text of at most 60 characters."""
     text = f"{value:g}" if isinstance(value, float) else str(value)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 benchmark_app = typer.Typer(no_args_is_help=True, add_completion=False)
 
 
-def _scene(name: str, settings: list[str] | None) -> "Scene":
+def chosen_scene(name: str, settings: list[str] | None) -> "Scene":
     """The scene with the changes; a wrong name or key raises before anything heavy is loaded."""
     from levilab.simulator.scene import SceneError, read_scene, with_settings
 
@@ -51,7 +51,7 @@ def simulate(
     as_json: Json = False,
 ) -> None:
     """Simulate a scene, and print what the motion is like."""
-    chosen = _scene(scene, settings)
+    chosen = chosen_scene(scene, settings)
 
     from levilab.files import finite
     from levilab.motion.simulation import SimulationRequest, run_simulation
@@ -112,7 +112,7 @@ def stability(
     as_json: Json = False,
 ) -> None:
     """Find where the top floats."""
-    chosen = _scene(scene, settings)
+    chosen = chosen_scene(scene, settings)
     of_map = {"spins": spins, "masses": masses, "duration": duration, "out": out}
     if not survival and (without := [name for name, given in of_map.items() if given is not None]):
         raise UsageError(without[0], "it is of a map: give `survival`, too")
