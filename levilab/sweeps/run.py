@@ -6,7 +6,7 @@ import contextlib
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from levilab.errors import LevilabError, UsageError
+from levilab.errors import LevilabError
 from levilab.interruption import interruption_postponed
 from levilab.simulator.compilation import announce_compilation
 from levilab.simulator.ensemble import grid, simulate_many, step_share_of
@@ -94,14 +94,9 @@ def workers_for(plan: Plan, count: int | None = None, scheduler: str | None = No
     Args:
         plan: decides whether other processes are worth their start.
         count: of processes on this machine; None: one for each core.
-        scheduler: address of a Dask cluster.
-
-    Raises:
-        UsageError: these do not go together.
+        scheduler: address of a Dask cluster; None: on this machine.
     """
     if scheduler is not None:
-        if count is not None:
-            raise UsageError("cores", "a cluster has its own workers: leave it out, or leave out `scheduler`")
         return cluster(scheduler)
     most = min(count or available_cores(), plan.chunk_count)
     quick = plan.size * seconds_per_point(plan) < QUICK_S
