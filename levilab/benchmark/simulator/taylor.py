@@ -1,10 +1,10 @@
 """The motions for heyoka, an integrator by Taylor's method, which compiles the equations that it is given.
 
 It is taken at its best.  Its code is compiled with `fast_math`, which is 9 to 43 % faster, at some orders twice, and
-no less exact here.  A moment that leans is a vector of its own, three more equations; the body's x axis in its place, of
-length 1 instead of 0.03, shortens the steps, and is up to a fifth slower at the same error.  A sine is a pair of linear
-equations, as fast as a cosine of the time.  A square wave is integrated from kink to kink, its field a parameter:
-stopping at events takes 1.4 to 1.7 times as long.
+no less exact here.  A moment that leans is a vector of its own, three more equations; the body's x axis in its place,
+of length 1 instead of 0.03, shortens the steps, and is up to a fifth slower at the same error.  A sine is a pair of
+linear equations, as fast as a cosine of the time.  A square wave is integrated from kink to kink, its field a
+parameter: stopping at events takes 1.4 to 1.7 times as long.
 """
 
 from __future__ import annotations
