@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from levilab.benchmark.simulator import motion
-from levilab.benchmark.simulator.as_called import many
+from levilab.benchmark.simulator.as_called import comparison, many
 from levilab.benchmark.simulator.as_called.comparison import Case, measure_calls
 from levilab.benchmark.simulator.as_called.contenders import CONTENDERS, Contender, scene_of
 from levilab.benchmark.simulator.as_called.figure import as_called_figure
@@ -108,8 +108,9 @@ def test_the_ensemble_s_references_are_ends_of_its_tops():
     assert np.abs(ours.position - many.reference()[::7]).max() < 2e-11
 
 
-def test_a_contender_is_prepared_once_and_its_error_is_the_largest():
+def test_a_contender_is_prepared_once_and_its_error_is_the_largest(monkeypatch):
     prepared = []
+    monkeypatch.setattr(comparison, "best_time_and_result", lambda work, _: (0.5, work()))
 
     def prepare(subject, tolerance):
         prepared.append((subject, tolerance))
@@ -117,7 +118,7 @@ def test_a_contender_is_prepared_once_and_its_error_is_the_largest():
 
     ours = Contender("simulate", "levilab", (1e-6, 1e-8), prepare)
     absent = Contender("heyoka", "no_such_package_at_all", (1e-6,), prepare)
-    task = SimpleNamespace(**{**vars(SINE), "contenders": (ours, absent)})
+    task = SimpleNamespace(**{**vars(SINE), "contenders": (ours, absent), "tops": 3})
     longer = SimpleNamespace(**{**vars(task), "duration": 120.0})
     one, two = measure_calls([task, longer])
     assert prepared == [(SINE.subject, 1e-6), (SINE.subject, 1e-8)]
@@ -126,6 +127,7 @@ def test_a_contender_is_prepared_once_and_its_error_is_the_largest():
         ("simulate", "tolerance 1e-08"),
     ]
     assert [p.error for p in two.points] == pytest.approx([1e-6, 1e-8])
+    assert [case.points[0].speed for case in (one, two)] == [3 * 60 / 0.5, 3 * 120 / 0.5]
 
 
 def test_a_case_compares_both_sides_at_the_same_error():
