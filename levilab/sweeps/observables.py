@@ -93,9 +93,7 @@ OBSERVABLES: dict[str, Observable] = {
         Observable(
             "position_error_m", "m", "Estimated error of the place at the end, or at the fall.", "float64", "errors"
         ),
-        Observable(
-            "height_spread_m", "m", "Highest less lowest place up to the end, or to the fall.", "float64", "samples"
-        ),
+        Observable("height_spread_m", "m", "Highest less lowest place; NaN of a top that falls.", "float64", "samples"),
         Observable(
             "locked",
             "1",
@@ -233,7 +231,7 @@ def _observe_motion(plan: Plan, scene: Scene, names: tuple[str, ...]) -> dict[st
         "fall_spin_hz": math.nan if motion.survived else motion.spin_hz[-1],
         "energy_error": _energy_error(scene, motion.states[-1]) if "energy_error" in names else math.nan,
         "position_error_m": motion.accuracy.position,
-        "height_spread_m": high - low,
+        "height_spread_m": high - low if motion.survived else math.nan,
         "locked": "locked" in names and bool(is_locked(scene, motion.states, survived=motion.survived)),
         **_line_columns(lines_of(motion) if with_lines else AxisLines()),
     }

@@ -22,6 +22,7 @@ from levilab.simulator.keys import SceneError, short_text
 from levilab.software import software_versions
 from levilab.sweeps.observables import columns_of
 from levilab.sweeps.plan import Axis, Chunk, Plan, unit_of
+from levilab.sweeps.quantities import quantity_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 
 SCHEMA = "levilab-sweep/1"
 DONE = "done"
+#: Of an adaptive map: an array with a mark for each point.
+STATUS, COMPUTED, FILLED = "status", 1, 2
 #: Marks that share a file.
 MARKS = 4096
 
@@ -42,11 +45,13 @@ class Map:
         plan: of the sweep.
         values: column → values, in the shape of the plan; what is not computed is NaN, False or 0.
         computed: whether a point is computed, in the shape of the plan.
+        filled: whether a point of an adaptive map is filled in from points around it; None of a map that is not.
     """
 
     plan: Plan
     values: dict[str, NDArray[Any]]
     computed: NDArray[np.bool_]
+    filled: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True)
@@ -184,6 +189,12 @@ class Store:
             self.group[DONE][chunk.number] = 1
         self.marks[chunk.number] = 1
 
+    def known(self, chunk: Chunk) -> NDArray[np.bool_]:
+        """Return which points of a chunk are computed, or filled in."""
+        if STATUS in self.group:
+            return np.asarray(self.group[STATUS][chunk.box]) > 0
+        return np.full(chunk.shape, bool(self.marks[chunk.number]))
+
     def read(self, chunk: Chunk) -> dict[str, NDArray[Any]]:
         """Return column → values of a chunk."""
         return {
@@ -197,7 +208,10 @@ class Store:
         for number in np.flatnonzero(self.marks):
             computed[plan.chunk_of(int(number)).box] = True
         values = {column.name: np.asarray(self.group[column.name][...]) for column in columns_of(plan.observables)}
-        return Map(plan, values, computed)
+        if STATUS not in self.group:
+            return Map(plan, values, computed)
+        status = np.asarray(self.group[STATUS][...])
+        return Map(plan, values, status == COMPUTED, status == FILLED)
 
 
 def processor() -> dict[str, str]:
@@ -205,9 +219,10 @@ def processor() -> dict[str, str]:
     from llvmlite import binding
     from numba.core import config
 
+    name, features = getattr(config, "CPU_NAME", None), getattr(config, "CPU_FEATURES", None)
     return {
-        "name": getattr(config, "CPU_NAME", None) or binding.get_host_cpu_name(),
-        "features": getattr(config, "CPU_FEATURES", None) or binding.get_host_cpu_features().flatten(),
+        "name": binding.get_host_cpu_name() if name is None else name,
+        "features": binding.get_host_cpu_features().flatten() if features is None else features,
     }
 
 
@@ -244,7 +259,7 @@ def _add_coordinate(group: Any, axis: Axis, dimension: str) -> None:
     values, words = axis.values, None
     if values.dtype.kind == "U":
         words, values = np.unique(values, return_inverse=True)
-    attributes = _described(unit_of(axis.key), f"{axis.key} of the scene") | {"scale": axis.scale}
+    attributes = _described(unit_of(axis.key), quantity_of(axis.key).name) | {"scale": axis.scale}
     coordinate = group.create_array(
         axis.key,
         shape=values.shape,

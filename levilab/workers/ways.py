@@ -9,7 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import UsageError
-from levilab.workers.processes import MAX_PROCESSES, Pool
+from levilab.workers.pool import MAX_PROCESSES, Pool
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -21,6 +21,10 @@ def _cancel(executor: Executor) -> None:
 
 def _nothing_to_check(executor: Executor) -> None:
     pass
+
+
+def _no_death(_: BaseException) -> bool:
+    return False
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,8 @@ class Workers:
         in_flight: the most tasks that are submitted before a result is waited for; None: the caller decides.
         end_at_once: leaves the executor without waiting for what is under way.
         check: called now and then while no result comes; raises WorkersLost where none will come.
+        count_now: asks an open executor for its count, where that may change; None: it stays.
+        is_death: whether an error of a future says that the process died which did the task, while others go on.
     """
 
     open: Callable[[], Executor]
@@ -44,6 +50,12 @@ class Workers:
     in_flight: int | None = None
     end_at_once: Callable[[Any], None] = _cancel
     check: Callable[[Any], None] = _nothing_to_check
+    count_now: Callable[[Any], int] | None = None
+    is_death: Callable[[BaseException], bool] = _no_death
+
+    def count_in(self, executor: Executor) -> int:
+        """How many tasks an open executor does at the same time."""
+        return self.count if self.count_now is None else self.count_now(executor)
 
 
 def this_process() -> Workers:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import itertools
 import os
 import signal
@@ -89,10 +90,16 @@ def test_a_function_that_cannot_be_sent_is_refused() -> None:
         list(results_of(lambda task: task, [0], processes(1)))
 
 
+def test_a_function_of_the_script_that_runs_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tasks.square, "__module__", "__main__")
+    with pytest.raises(LevilabError, match="put it into a module"):
+        list(results_of(functools.partial(tasks.square), [0], processes(1)))
+
+
 def test_a_worker_with_other_versions_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    here = packing.versions()
-    monkeypatch.setattr(packing, "versions", lambda: here | {"numba": "0.1"})
-    expected = f"one of the worker processes has numba {here['numba']}, and numba 0.1 is expected"
+    here = packing.version_of
+    monkeypatch.setattr(packing, "version_of", lambda name: "0.1" if name == "numba" else here(name))
+    expected = f"one of the worker processes has numba {here('numba')} instead of 0.1"
     with pytest.raises(WorkersLost, match=expected):
         list(results_of(tasks.square, [0], processes(1)))
 
@@ -107,7 +114,7 @@ def test_a_killed_worker_costs_only_what_was_under_way(tmp_path: Path) -> None:
 def test_a_task_that_kills_its_worker_is_an_error_and_the_others_are_done() -> None:
     ended = {done.task: done for done in results_of(tasks.die_at_three, range(8), processes(2))}
     assert isinstance(ended[3].error, WorkersLost)
-    assert "died 3 times" in str(ended[3].error)
+    assert "each process that does it dies" in str(ended[3].error)
     assert sorted(done.result for done in ended.values() if done.error is None) == [0, 1, 2, 4, 5, 6, 7]
 
 
