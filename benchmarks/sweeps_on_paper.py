@@ -1,6 +1,6 @@
 """What a map of a thousand million points takes on a hundred machines, and what breaks first.
 
-    python benchmarks/sweeps_on_paper.py       # prints what docs/sweeps-at-scale.md holds
+    python benchmarks/sweeps_on_paper.py       # prints its tables and puts them into docs/sweeps-at-scale.md
 
 Nothing of this was run: it is computed from what `sweeps.py` has measured on one small machine (results/sweeps.json),
 and from the assumptions below.
@@ -17,6 +17,8 @@ from typing import Any
 from levilab.sweeps.plan import CHUNK_S, MOST
 
 RESULTS = Path(__file__).parent / "results" / "sweeps.json"
+PAGE = Path(__file__).parents[1] / "docs" / "sweeps-at-scale.md"
+BEGIN, END = "<!-- made by benchmarks/sweeps_on_paper.py -->", "<!-- end -->"
 
 # Assumed, not measured.
 POINTS = 10**9
@@ -85,8 +87,8 @@ class Limit:
     Attributes:
         name: of what is used.
         used: as text.
-        of: what there is, as text.
-        share: of what there is; above 1 it breaks.
+        of: the capacity, as text.
+        share: of the capacity; above 1 it breaks.
         points: of the largest map that does not break it; infinite if the map's size does not matter.
         cores: likewise the most cores.
     """
@@ -182,7 +184,10 @@ def _table(one: Measured, chunk_s: float) -> list[str]:
 
 
 def main() -> None:
-    print(page(json.loads(RESULTS.read_text(encoding="utf-8"))))
+    tables = page(json.loads(RESULTS.read_text(encoding="utf-8")))
+    head, begin, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
+    PAGE.write_text(f"{head}{begin}\n{tables}\n{END}{rest.partition(END)[2]}", encoding="utf-8")
+    print(tables)
 
 
 if __name__ == "__main__":

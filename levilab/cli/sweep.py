@@ -45,7 +45,10 @@ def sweep(
     observe: Annotated[
         str | None,
         typer.Option(
-            metavar="NAME,…", help="What is observed; a wrong name lists them all.", show_default="survived,lifetime_s"
+            metavar="NAME,…",
+            help="What is observed: survived, lifetime_s, fall_spin_hz, energy_error, position_error_m, "
+            "height_spread_m, locked, lines.",
+            show_default="survived,lifetime_s",
         ),
     ] = None,
     duration: Annotated[
@@ -123,7 +126,7 @@ def _begun(name: str, given: dict[str, Any], *, resume: bool) -> Store:
 
     from levilab.sweeps.request import SweepRequest, store_for
 
-    out = given.pop("out") or Path(f"{scene.name or 'sweep'}.zarr")
+    out = given.pop("out") or Path(f"{Path(name).stem}.zarr")
     request = SweepRequest(scene, **{name: value for name, value in given.items() if value is not None})
     with interruptible("nothing was written"):
         return store_for(request, out, message, resume=resume)

@@ -20,9 +20,10 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
 from levilab.errors import UsageError
+from levilab.motion.lock import LAST_SHARE
 from levilab.motion.summary import changing_energy
 from levilab.present.style import STYLE
-from levilab.simulator.equilibrium import stability_of
+from levilab.simulator.equilibrium import stability_of, windows_over
 from levilab.stability.thesis import HIGHEST_HZ, MEASURED_HZ, MEASURED_U_HZ, SIMULATED_HZ, is_thesis_device
 from levilab.sweeps.quantities import quantity_of, step_in_words
 
@@ -288,6 +289,9 @@ def _theory_of(scene: Scene, axis: Axis) -> _Theory | None:
     if scene.gravity_m_s2 == 0 or axis.key.startswith("gravity"):
         return None
     values = axis.values[np.unique(np.linspace(0, len(axis.values) - 1, CURVE_POINTS).round().astype(int))]
+    if axis.key == MASS:
+        found = windows_over(scene, values)
+        return _Theory(values * quantity_of(axis.key).factor, found.slowest, found.fastest, found.adiabatic)
     if _changes_the_window(axis):
         windows = [_window(scene.changed({axis.key: float(value), "start.place": "given"})) for value in values]
     else:
@@ -451,7 +455,9 @@ def _step(axis: Axis) -> str:
 
 def _reading_sentences(plan: Plan, view: _View, column: str, lines: Sequence[Artist]) -> list[str]:
     if column == "locked":
-        return ["Locked: the top is up, and its body slipped by no turn behind the drive in the last half of the time"]
+        slowest = 1 / (LAST_SHARE * plan.duration_s)
+        said = "Locked: the top is up, and its body slipped by no turn behind the drive in the last half of the time"
+        return [f"{said}; a slip slower than {slowest:.2g} Hz would not show"]
     if view.x.key != SPIN or not lines:
         return []
     said = (

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from typing import TYPE_CHECKING
 
 import pytest
 
 from levilab.sweeps import run as run_module
+from levilab.sweeps.observables import NAMES
 from support.commands import command
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 SPINS, MASSES = "start.spin_hz=18:24:40", "top.mass_kg=0.0250:0.0254:20"
-MAP = ("sweep", "undriven", "--sweep", SPINS, "--sweep", MASSES, "--duration", "0.3", "--out", "map.zarr")
+MAP = (
+    "sweep", "undriven", "--sweep", SPINS, "--sweep", MASSES, "--observe", "survived", "--duration", "0.3",
+    "--out", "map.zarr",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -48,8 +53,8 @@ def test_json_has_the_plan_and_each_column_in_numbers(shown: tuple[Path, str]) -
     found = json.loads(ended.out)
     assert (found["points"], found["computed"], found["plan"]["duration_s"]) == (800, 800, 0.3)
     assert 0 < found["values"]["survived"]["mean"] < 1
-    assert found["values"]["lifetime_s"]["unit"] == "s"
-    assert found["figures"] == ["map.zarr.survived.png", "map.zarr.lifetime_s.png"]
+    assert found["values"]["survived"]["unit"] == "1"
+    assert found["figures"] == ["map.zarr.survived.png"]
 
 
 def test_ctrl_c_says_what_is_kept_and_what_goes_on_and_that_yields_the_same(
@@ -106,6 +111,12 @@ def test_a_mistake_is_answered_before_anything_is_computed(
     assert said in ended.err
     assert ended.status in {1, 2}
     assert [path.name for path in tmp_path.iterdir() if path.suffix == ".zarr"] == ["map.zarr"]
+
+
+def test_the_help_names_all_that_can_be_observed(tmp_path: Path) -> None:
+    shown = command("sweep", "--help", cwd=tmp_path).out
+    words = set(re.findall(r"[a-z_]+", shown.replace("\n", " ")))
+    assert set(NAMES) <= words
 
 
 def test_few_points_in_a_row_are_printed_one_by_one(tmp_path: Path) -> None:

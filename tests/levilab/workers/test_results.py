@@ -130,6 +130,7 @@ def wait_until_at_work(*conversations: Connection) -> list[int]:
 
 def wait_until_dead(conversation: Connection) -> None:
     """The operating system closes the conversations of a process that has ended."""
+    assert conversation.poll(HANG_GUARD_S)
     with pytest.raises((EOFError, ConnectionError)):
         conversation.recv()
 
@@ -158,10 +159,12 @@ list(results_of(wait_for_ever, [{address}] * 2, processes(2)))
 """
 
 
-def test_workers_do_not_outlive_a_killed_parent() -> None:
+def test_workers_do_not_outlive_a_killed_parent(tmp_path: Path) -> None:
     with Listener(("127.0.0.1", 0)) as listener:
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-        command = [sys.executable, "-c", PARENT.format(address=listener.address)]
+        script = tmp_path / "script.py"  # without `if __name__ == "__main__"`
+        script.write_text(PARENT.format(address=listener.address), encoding="utf-8")
+        command = [sys.executable, script]
         with (
             subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL) as parent,
             listener.accept() as one,
