@@ -87,8 +87,8 @@ class Limit:
     Attributes:
         name: of what is used.
         used: as text.
-        of: what there is, as text.
-        share: of what there is; above 1 it breaks.
+        of: what is available, as text.
+        share: used over available; above 1 it breaks.
         points: of the largest map that does not break it; infinite if the map's size does not matter.
         cores: likewise the most cores.
         slows: above 1 it does not end the sweep, but slows it down.
@@ -180,12 +180,13 @@ def _table(one: Measured, chunk_s: float) -> list[str]:
     verdict = f"First breaks: {first.name}" if first.share > 1 else f"Nothing breaks; the first would be: {first.name}"
     text = (
         f"{heading}  {chunk_points} points each{allowed}, {math.ceil(POINTS / chunk_points)} chunks.  A killed parent "
-        f"loses at most {_short(cores * chunk_s / 3600)} core hours.  Wall time: {_short(wall / 60)} minutes.  {verdict}."
+        f"loses at most {_short(cores * chunk_s / 3600)} core hours.  Wall time: {_short(wall / 60)} minutes.  "
+        f"{verdict}."
     )
     lines = [
         text,
         "",
-        "| what is used | used | there is | share | enough for |",
+        "| resource | used | available | share | enough for |",
         "|---|---|---|---|---|",
     ]
     for limit in limits:
