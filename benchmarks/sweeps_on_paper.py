@@ -87,8 +87,8 @@ class Limit:
     Attributes:
         name: of what is used.
         used: as text.
-        of: what is available, as text.
-        share: used over available; above 1 it breaks.
+        of: the capacity, as text.
+        share: of the capacity; above 1 it breaks.
         points: of the largest map that does not break it; infinite if the map's size does not matter.
         cores: likewise the most cores.
         slows: above 1 it does not end the sweep, but slows it down.
