@@ -66,9 +66,9 @@ class Measured:
         """Take it from the kept results."""
         speed, written = found["speed"]["ends"], found["memory"][-1]
         dask = found["overhead"]["Dask, 2 workers"]
-        per_core = speed["ways"]["2 processes"]["per_core"]
+        here = speed["ways"]["this process"]
         return cls(
-            point_s=speed["top_seconds"] / speed["points"] / per_core,
+            point_s=here["parent_cpu_s"] / speed["points"],
             duration_s=speed["duration_s"],
             write_s=written["write_per_chunk_s"],
             client_s=dask["parent_cpu_s"],
@@ -91,6 +91,7 @@ class Limit:
         share: of the capacity; above 1 it breaks.
         points: of the largest map that does not break it; infinite if the map's size does not matter.
         cores: likewise the most cores.
+        slows: above 1 it does not end the sweep, but slows it down.
     """
 
     name: str
@@ -99,6 +100,7 @@ class Limit:
     share: float
     points: float = math.inf
     cores: float = math.inf
+    slows: bool = False
 
 
 def limits_of(one: Measured, chunk_s: float) -> list[Limit]:
@@ -110,22 +112,30 @@ def limits_of(one: Measured, chunk_s: float) -> list[Limit]:
     parent, scheduler = 1 / (one.write_s + one.client_s), 1 / one.scheduler_s
     files = chunks * (one.columns + 1 / 4096)
     loaded = POINTS * (one.point_bytes[0] + 1)
-    under_way = 2 * cores * (TASK_BYTES_IN_SCHEDULER + one.task_bytes) + one.base_bytes + chunks
+    # if results come faster than the parent writes, all that is under way waits in its memory
+    a_task = TASK_BYTES_IN_SCHEDULER + one.task_bytes + chunk_points * one.point_bytes[0]
+    under_way = 2 * cores * a_task + one.base_bytes + chunks
     network = rate * (2 * one.task_bytes + chunk_points * one.point_bytes[0])
     limits = [
-        Limit("the parent, which writes", f"{rate:.3g} chunks/s", f"{parent:.3g}/s", rate / parent,
-              cores=parent * chunk_s),
-        Limit("the scheduler", f"{rate:.3g} tasks/s", f"{scheduler:.3g}/s", rate / scheduler,
-              cores=scheduler * chunk_s),
+        Limit("the parent, which writes", f"{_short(rate)} chunks/s", f"{_short(parent)}/s", rate / parent,
+              cores=parent * chunk_s, slows=True),
+        Limit("the scheduler", f"{_short(rate)} tasks/s", f"{_short(scheduler)}/s", rate / scheduler,
+              cores=scheduler * chunk_s, slows=True),
         Limit("files of the store", f"{files:.3g}", f"{FILES_QUOTA:.3g}", files / FILES_QUOTA,
               points=POINTS * FILES_QUOTA / files),
-        Limit("memory while it runs", f"{under_way / 1e9:.2g} GB", f"{MEMORY / 1e9:.2g} GB", under_way / MEMORY),
+        Limit("memory while it runs", f"{under_way / 1e9:.2g} GB", f"{MEMORY / 1e9:.2g} GB", under_way / MEMORY,
+              cores=cores * MEMORY / under_way),
         Limit("memory to open the map whole", f"{loaded / 1e9:.2g} GB", f"{MEMORY / 1e9:.2g} GB", loaded / MEMORY,
               points=POINTS * MEMORY / loaded),
         Limit("network of the parent", f"{network / 1e6:.2g} MB/s", f"{NETWORK / 1e6:.4g} MB/s", network / NETWORK,
-              cores=cores * NETWORK / network),
+              cores=cores * NETWORK / network, slows=True),
     ]  # fmt: skip
     return sorted(limits, key=lambda limit: -limit.share)
+
+
+def _short(number: float) -> str:
+    """A number with two digits."""
+    return f"{float(f'{number:.2g}'):.0f}" if 10 <= number < 1e5 else f"{number:.2g}"
 
 
 def page(found: dict[str, Any]) -> str:
@@ -136,10 +146,15 @@ def page(found: dict[str, Any]) -> str:
     what = f"{POINTS:.0e} points of {one.duration_s:g} s, {one.columns} columns of results"
     lines = [
         f"{what}; {MACHINES} machines with {CORES_A_MACHINE} cores each.",
+        *(
+            []
+            if not found["brief"]
+            else ["", "**Preliminary:** measured with smaller maps, on a machine that was busy."]
+        ),
         "",
         "| quantity | value | from |",
         "|---|---|---|",
-        f"| core time of a point | {one.point_s * 1e3:.2g} ms | measured, two processes |",
+        f"| core time of a point | {one.point_s * 1e3:.2g} ms | measured in one process |",
         f"| core time of the map | {core_s / 3600:.3g} hours | × points |",
         f"| wall time with nothing in the way | {core_s / cores / 60:.3g} minutes | ÷ {cores} cores |",
         f"| the same on a machine with two cores | {core_s / 2 / 86400:.3g} days | |",
@@ -160,23 +175,24 @@ def _table(one: Measured, chunk_s: float) -> list[str]:
     heading = f"**Chunks of {chunk_s:g} s{', as now' if chunk_s == CHUNK_S else ''}.**"
     limits = limits_of(one, chunk_s)
     first = limits[0]
-    wall = POINTS * one.point_s / cores * max(1.0, *(limit.share for limit in limits if math.isfinite(limit.cores)))
+    wall = POINTS * one.point_s / cores * max(1.0, *(limit.share for limit in limits if limit.slows))
     allowed = "" if chunk_points <= MOST else f" (now at most {MOST})"
     verdict = f"First breaks: {first.name}" if first.share > 1 else f"Nothing breaks; the first would be: {first.name}"
     text = (
         f"{heading}  {chunk_points} points each{allowed}, {math.ceil(POINTS / chunk_points)} chunks.  A killed parent "
-        f"loses at most {cores * chunk_s / 3600:.2g} core hours.  Wall time: {wall / 60:.3g} minutes.  {verdict}."
+        f"loses at most {_short(cores * chunk_s / 3600)} core hours.  Wall time: {_short(wall / 60)} minutes.  "
+        f"{verdict}."
     )
     lines = [
         text,
         "",
-        "| what is used | used | there is | share | enough for |",
+        "| resource | used | available | share | enough for |",
         "|---|---|---|---|---|",
     ]
     for limit in limits:
         enough = [
-            f"{limit.points:.2g} points" if math.isfinite(limit.points) else "",
-            f"{limit.cores:.2g} cores" if math.isfinite(limit.cores) else "",
+            f"{_short(limit.points)} points" if math.isfinite(limit.points) else "",
+            f"{_short(limit.cores)} cores" if math.isfinite(limit.cores) else "",
         ]
         row = (limit.name, limit.used, limit.of, f"{limit.share:.2g}", ", ".join(filter(None, enough)) or "any map")
         lines.append(f"| {' | '.join(row)} |")
