@@ -29,7 +29,7 @@ def plus(a: Vector, k: float, b: Vector) -> Vector:
 
 #: Taylor coefficients in x² of sin(x)/x and of (1 − cos x)/x².
 _SINC: tuple[float, ...] = tuple((-1) ** k / math.factorial(2 * k + 1) for k in range(12))
-_COSC: tuple[float, ...] = tuple((-1) ** k / math.factorial(2 * k + 2) for k in range(7))
+_COSC: tuple[float, ...] = tuple((-1) ** k / math.factorial(2 * k + 2) for k in range(8))
 
 
 @part
@@ -41,8 +41,8 @@ def rotation(square: float) -> tuple[float, float]:
     """
     s, c, t, t2 = _SINC, _COSC, square, square * square
     t4 = t2 * t2
-    sinc = (s[0] + t * s[1] + t2 * (s[2] + t * s[3])) + t4 * (s[4] + t * s[5] + t2 * s[6])
-    cosc = (c[0] + t * c[1] + t2 * (c[2] + t * c[3])) + t4 * (c[4] + t * c[5] + t2 * c[6])
+    sinc = (s[0] + t * s[1] + t2 * (s[2] + t * s[3])) + t4 * (s[4] + t * s[5] + t2 * (s[6] + t * s[7]))
+    cosc = (c[0] + t * c[1] + t2 * (c[2] + t * c[3])) + t4 * (c[4] + t * c[5] + t2 * (c[6] + t * c[7]))
     return sinc, cosc
 
 
