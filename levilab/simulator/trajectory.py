@@ -42,6 +42,8 @@ class Accuracy:
         steps: how many.
         nodes: the larger of both errors as far as the nodes of a magnet of finite size make it, which are enough where
             the top starts, and not at the base.
+        tries: how many times all of the motion was integrated, each time at another step, until this was the result;
+            runs that serve the estimate alone are not counted.
     """
 
     position: float
@@ -51,6 +53,7 @@ class Accuracy:
     step: float
     steps: int
     nodes: float = 0.0
+    tries: int = 1
 
     @property
     def reached(self) -> bool:

@@ -1,0 +1,340 @@
+"""The step that a tolerance takes, and the error at the end, forecast from the first second or two of a motion.
+
+The compositions are symplectic, so their error is that of a slightly other motion: its frequencies are off by a little,
+its phases by more and more, in proportion to the time.  A drive adds an error that does not grow.  Both are seen in the
+first second or two, by a second run with other steps; the rest of the motion is integrated once.
+
+    mean square of the error at the time t = offset² + (rate·t)²
+
+The motion is integrated in the careful way instead (`levilab.simulator.single`), with coarser runs of all of it, where
+this law may not hold: where the top falls, where the error grows faster in the pilot run or at the end, where the drag
+has a kink that the spin comes near to, with a magnet of finite size, with events, and near to the limit of rounding.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from levilab.simulator.accuracy import comes_near_zero, has_kink, rounding_error, turning_rate
+from levilab.simulator.energy import spins_of
+from levilab.simulator.kernels.loads import Disc, PiecewiseLinear
+from levilab.simulator.kernels.motion import TIME, N, R
+from levilab.simulator.kernels.splitting import mean_squares
+from levilab.simulator.problem import NO_LIMITS, Problem, integrate
+from levilab.simulator.stops import Stops, even_stops, stops_between
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+Array = NDArray[np.float64]
+
+#: The pilot run takes this share of the duration, and so many seconds at least: about one turn of the slow sideways
+#: mode, and many of the precession.
+PILOT_SHARE, PILOT_S = 1 / 30, 1.0
+#: Shorter motions [s] are integrated in the careful way.
+SHORTEST_S = 0.5
+#: Stops of the pilot run, where both runs are compared.
+PILOT_STOPS = 16
+#: The other run of the pilot has steps so many times as long, or as short where they would be too long.
+STEP_RATIO = 1.4
+#: The longest step, as the angle [rad] by which the axis turns meanwhile: near it a scheme is hardly of its order, and
+#: at 1.3 times as much no longer stable.
+LONGEST_TURN = 7.0
+LONGEST_TURN_COMPARED = 8.2
+
+#: A typical error is this times (angle in a step)^order times the time [rad/s]; a sine's part that does not grow is that
+#: of so many seconds.  Without a drive it is that of a top that leans by 0.02 rad, and about in proportion to its lean.
+#: They are medians of random scenes; within a factor of 3 the first pilot run is the beginning of the result.
+TYPICAL_RATE, TYPICAL_LEAN_RAD = 5e-12, 0.02
+TYPICAL_RATE_OF_SINE, TYPICAL_OFFSET_OF_SINE_S, TYPICAL_RATE_OF_CORNERS = 1.3e-10, 4.0, 3e-11
+TYPICAL_RATE_OF_ANY_SPLIT = 6e-11
+
+#: The share of the tolerance that the error is to have, by forecast, and the most.
+AIM, MOST = 0.25, 0.38
+#: An estimate is this times what is forecast.
+SAFETY = 2.5
+#: At this ratio of steps the law error ∝ step^order is no longer trusted, and another pilot run is made.
+MOST_EXTRAPOLATION = 1.8
+#: Pilot runs at most; then the careful way is taken.
+MOST_PILOTS = 4
+#: Mean squares of the differences in the later and in the earlier half of the pilot run differ by 7 where the error
+#: grows in proportion to the time, by some 30 where with its square; above that it grows exponentially.
+MOST_GROWTH = 40.0
+#: Shorter rests of a motion [s] are not checked at the end.
+SHORTEST_TO_CHECK_S = 8.0
+#: The error may grow so many times as fast at the end as in the pilot run, for the motion changes.
+MOST_CHANGE = 10.0
+#: The tolerance is so many times the error by rounding at least.
+LEAST_OF_ROUNDING = 50.0
+#: The error of a rate is at least this share of the differences over the time: a small one may be chance.
+LEAST_RATE_SHARE = 0.2
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A motion integrated once, at the step that was forecast.
+
+    Attributes:
+        states: at the stops, shape (n, 18).
+        steps: how many were taken.
+        step: their length [s].
+        errors: of place [m] and axis [rad] at the end, estimated.
+    """
+
+    states: Array
+    steps: int
+    step: float
+    errors: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class _Trend:
+    """How the errors of place [m] and axis [rad] grow: pairs of offset and rate."""
+
+    offset2: tuple[float, float]
+    rate2: tuple[float, float]
+
+    def at(self, time: float) -> tuple[float, float]:
+        """Return the errors of place [m] and axis [rad] so long [s] after the start."""
+        (a, b), (c, d), t2 = self.offset2, self.rate2, time * time
+        return math.sqrt(a + c * t2), math.sqrt(b + d * t2)
+
+    def times(self, factor: float) -> _Trend:
+        """Return the trend of errors so many times as large."""
+        (a, b), (c, d), f2 = self.offset2, self.rate2, factor * factor
+        return _Trend((a * f2, b * f2), (c * f2, d * f2))
+
+
+@dataclass(frozen=True)
+class _Pilot:
+    """The beginning of a motion, integrated at two steps.
+
+    Attributes:
+        states: of the run at `step`, at its stops, shape (n, 18).
+        steps: taken in it.
+        step: [s].
+        trend: of the errors at that step.
+    """
+
+    states: Array
+    steps: int
+    step: float
+    trend: _Trend
+
+
+def run_by_forecast(
+    problem: Problem,
+    duration: float,
+    tolerance: float,
+    samples: Array,
+    progress: Callable[[float], None] | None = None,
+) -> Outcome | None:
+    """Integrate a motion at the step that its tolerance takes, by forecast.
+
+    Args:
+        problem: where it starts, and what moves it.
+        duration: [s], negative to go back in time.
+        tolerance: wanted error of the place [m] and the axis [rad] at the end.
+        samples: times at which the state is wanted, too, shape (n,) [s].
+        progress: called with the share of the steps that are done.
+
+    Returns:
+        The motion; None where the forecast may not hold.
+    """
+    drive = problem.scene.drive
+    smooth = drive.off_s is None or drive.waveform == "off"
+    if abs(duration) < SHORTEST_S or isinstance(problem.model.magnet, Disc) or not smooth:
+        return None
+    return _Forecast(problem, duration, tolerance, samples).run(progress)
+
+
+class _Forecast:
+    """The search for the step, and the run at it."""
+
+    def __init__(self, problem: Problem, duration: float, tolerance: float, samples: Array) -> None:
+        self.problem, self.duration, self.tolerance, self.samples = problem, duration, tolerance, samples
+        self.begin = float(problem.start[TIME])
+        self.end = self.begin + duration
+        self.lasts, self.sign = abs(duration), math.copysign(1.0, duration)
+        self.order = problem.scheme.order
+        self.kinked = isinstance(problem.model.drive, PiecewiseLinear)
+        turning = turning_rate(problem.model, problem.start)
+        self.longest = min(LONGEST_TURN / turning, self.lasts / 8)
+        self.longest_compared = LONGEST_TURN_COMPARED / turning
+        self.turning = turning
+        #: Time between stops that every step has to divide, if there is one [s].
+        self.cell: float | None = None
+        if self.kinked:
+            self.cell = 0.5 / problem.scene.drive.frequency_hz
+            self.longest_compared = max(self.longest_compared, self.cell)
+        elif samples.size > PILOT_STOPS:
+            self.cell = abs(float(samples[0]) - self.begin)
+
+    def run(self, progress: Callable[[float], None] | None) -> Outcome | None:
+        """Return the motion, or None."""
+        step = self._fitting(self._typical_step())
+        for _ in range(MOST_PILOTS):
+            pilot = self._pilot(step)
+            if pilot is None:
+                return None
+            step = pilot.step
+            share = max(pilot.trend.at(self.lasts)) / self.tolerance
+            if share == 0:
+                return None
+            wanted = self._fitting(step * (AIM / share) ** (1 / self.order))
+            begun = abs(float(pilot.states[-1, TIME]) - self.begin) / self.lasts
+            if share <= MOST and wanted * (1 - begun) <= step:  # longer steps would not make up for a second beginning
+                return self._continue(pilot, progress)
+            if max(wanted / step, step / wanted) <= MOST_EXTRAPOLATION:
+                trend = pilot.trend.times((wanted / step) ** self.order)
+                return self._continue(_Pilot(self.problem.start[None], 0, wanted, trend), progress)
+            step = wanted
+        return None
+
+    def _typical_step(self) -> float:
+        drive, lasts = self.problem.model.drive, self.lasts
+        if self.problem.scheme.any_split:
+            error = TYPICAL_RATE_OF_ANY_SPLIT * lasts
+        elif drive is None:
+            lean = math.hypot(*self.problem.start[N][:2].tolist())
+            error = TYPICAL_RATE * (max(lean, 1e-3) / TYPICAL_LEAN_RAD) ** 0.65 * lasts
+        elif self.kinked:
+            error = TYPICAL_RATE_OF_CORNERS * lasts
+        else:
+            error = TYPICAL_RATE_OF_SINE * (lasts + TYPICAL_OFFSET_OF_SINE_S)
+        angle = (AIM * self.tolerance / error) ** (1 / self.order)
+        return min(angle, LONGEST_TURN) / self.turning
+
+    def _fitting(self, step: float) -> float:
+        """Return the longest step [s] up to this one that divides the time between stops."""
+        step = min(step, self.longest)
+        return step if self.cell is None else self.cell / math.ceil(self.cell / step * (1 - 1e-9))
+
+    # --- the pilot run ---
+
+    def _pilot(self, step: float) -> _Pilot | None:
+        """Integrate the beginning at this step [s] and another one, and compare."""
+        wanted = max(PILOT_S, PILOT_SHARE * self.lasts)
+        if wanted > 0.7 * self.lasts:
+            wanted = self.lasts
+        one, other, ratio = self._pilot_stops(step, wanted)
+        start = self.problem.start
+        states, through = self.problem.advance_to_stops(start, one, self.problem.escape)
+        compared, finished = self.problem.advance_to_stops(start, other, NO_LIMITS)
+        if not (through and finished):
+            return None
+        every = (one.times.size - 1) // (other.times.size - 1)
+        trend = _trend(states, every, compared, abs(ratio**self.order - 1))
+        if trend is None:
+            return None
+        length = abs(one.times[1] - one.times[0]) / one.counts[0] if not self.kinked else step
+        return _Pilot(states, int(one.counts.sum()), float(length), trend)
+
+    def _pilot_stops(self, step: float, lasts: float) -> tuple[Stops, Stops, float]:
+        """Return the stops of both runs of the pilot, and how many times as long the steps of the other one are."""
+        begin, sign, drive = self.begin, self.sign, self.problem.scene.drive
+        if self.kinked and self.cell is not None:
+            count = round(self.cell / step)
+            fewer = min(count - 1, int(count / (STEP_RATIO - 0.07)))
+            others = fewer if fewer and self.cell / fewer <= self.longest_compared else math.ceil(STEP_RATIO * count)
+            one, other = (
+                stops_between(begin, begin + sign * lasts, self.cell / n * (1 + 1e-9), drive) for n in (count, others)
+            )
+            return one, other, count / others
+        if self.cell is not None:
+            count = round(self.cell / step)
+            cells = max(1, math.ceil(max(4.0, lasts / (PILOT_STOPS * step)) / count))
+            blocks = max(min(int(self.samples.size / cells), math.ceil(lasts / (cells * self.cell))), 1)
+            inside, step = count * cells, self.cell / count
+            times = np.concatenate([[begin], self.samples[: blocks * cells]])
+            one = even_stops(times, count)
+            others = self._other_count(step, inside)
+            return one, even_stops(times[::cells], others), inside / others
+        inside = max(4, math.ceil(lasts / (PILOT_STOPS * step)))
+        blocks = max(6, round(lasts / (inside * step)))
+        length = lasts if lasts == self.lasts else min(blocks * inside * step, self.lasts)
+        blocks = max(blocks, math.ceil(length / (inside * self.longest) * (1 - 1e-9)))
+        times = begin + sign * length / blocks * np.arange(blocks + 1)
+        others = self._other_count(length / (blocks * inside), inside)
+        return even_stops(times, inside), even_stops(times, others), inside / others
+
+    def _other_count(self, step: float, count: int) -> int:
+        """Return how many steps the other run takes where the one takes `count`."""
+        fewer = round(count / STEP_RATIO)
+        return fewer if step * count / fewer <= self.longest_compared else math.ceil(STEP_RATIO * count)
+
+    # --- all of the motion ---
+
+    def _continue(self, pilot: _Pilot, progress: Callable[[float], None] | None) -> Outcome | None:
+        """Integrate from the end of the pilot run, or from the start where it is at another step."""
+        states, steps, reached = pilot.states, pilot.steps, float(pilot.states[-1, TIME])
+        if self.samples.size and self.cell is None or (self.kinked and self.samples.size):
+            states, steps, reached = self.problem.start[None], 0, self.begin
+        tail = self.end - self.sign * PILOT_S / 3
+        whole = abs(self.end - reached) <= 1e-9 * self.lasts
+        if not whole:
+            wanted = self.samples[(self.samples - reached) * self.sign > 1e-12]
+            checks = self.sign * (tail - reached) > SHORTEST_TO_CHECK_S
+            stops = stops_between(
+                reached, self.end, pilot.step * (1 + 1e-9), self.problem.scene.drive,
+                np.append(wanted, tail) if checks and not wanted.size else wanted,
+            )  # fmt: skip
+            rest, fell, taken = integrate(replace(self.problem, start=states[-1]), stops, progress)
+            if fell is not None:
+                return None
+            states, steps = np.concatenate([states, rest[1:]]), steps + taken
+            if checks and not self._holds_at_the_end(states, pilot, tail):
+                return None
+        elif progress is not None:
+            progress(1.0)
+        if has_kink(self.problem.model.drag) and np.any(comes_near_zero(spins_of(self.problem.scene, states))):
+            return None
+        rounding = rounding_error(self.problem.scheme, steps, states[-1])
+        place, axis = (SAFETY * e + r for e, r in zip(pilot.trend.at(self.lasts), rounding, strict=True))
+        if not max(place, axis) <= self.tolerance or LEAST_OF_ROUNDING * max(rounding) > self.tolerance:
+            return None
+        return Outcome(states, steps, pilot.step, (place, axis))
+
+    def _holds_at_the_end(self, states: Array, pilot: _Pilot, tail: float) -> bool:
+        """Whether the error still grows about as fast, by a second run of the last part of a second."""
+        at = int(np.argmin(np.abs(states[:, TIME] - tail)))
+        lasted = abs(self.end - states[at, TIME])
+        count = math.ceil(lasted / pilot.step * (1 - 1e-9))
+        if self.kinked:
+            step = pilot.step / STEP_RATIO
+        else:
+            step = lasted / self._other_count(lasted / count, count)
+        stops = stops_between(states[at, TIME], self.end, step * (1 + 1e-9), self.problem.scene.drive)
+        ends, through = self.problem.advance_to_stops(states[at], stops, NO_LIMITS)
+        ratio = stops.counts.sum() / count
+        factor = abs(ratio**-self.order - 1)
+        found = [math.dist(ends[-1][part].tolist(), states[-1][part].tolist()) / factor for part in (R, N)]
+        usual = pilot.trend.at(max(lasted, PILOT_S))
+        return through and all(one <= MOST_CHANGE * other for one, other in zip(found, usual, strict=True))
+
+
+def _trend(states: Array, every: int, others: Array, factor: float) -> _Trend | None:
+    """Fit the trend of an error to the differences of two runs, which are `factor` times the error.
+
+    Args:
+        states: of the one at its stops, shape (n·every + 1, 18).
+        every: how many stops of the one there are to one of the other.
+        others: of the other at its stops, shape (n + 1, 18).
+        factor: see above.
+    """
+    if len(others) < 3:
+        return None
+    early_t2, *early, late_t2, late_place, late_axis = mean_squares(states, every, others)
+    if not late_axis <= MOST_GROWTH * early[1]:
+        return None
+    offsets, rates = [], []
+    for before, after in zip(early, (late_place, late_axis), strict=True):
+        rate2 = max((after - before) / (late_t2 - early_t2), LEAST_RATE_SHARE**2 * after / late_t2)
+        rates.append(rate2 / factor**2)
+        offsets.append(max(after - rate2 * late_t2, 0.0) / factor**2)
+    return _Trend((offsets[0], offsets[1]), (rates[0], rates[1]))
