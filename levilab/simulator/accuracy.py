@@ -44,7 +44,7 @@ def longest_step(scene: Scene, model: Model, start: Array, scheme: Scheme) -> fl
     """Return the longest step [s] for which the kernels' polynomials hold and no motion is skipped.
 
     Three limits: a drift turns the axis by 2 rad, a kick slows the spin by a fifth, a step takes half a period of the
-    drive.  
+    drive.
     """
     turning = turning_rate(model, start)
     drift, kick = (float(np.max(np.abs(c))) for c in (scheme.drifts, scheme.kicks))

@@ -26,7 +26,7 @@ from levilab.simulator.kernels.loads import Disc, PiecewiseLinear
 from levilab.simulator.kernels.motion import TIME, N, R
 from levilab.simulator.kernels.splitting import mean_squares
 from levilab.simulator.problem import NO_LIMITS, Problem, integrate
-from levilab.simulator.stops import Stops, even_stops, stops_between
+from levilab.simulator.stops import STEPS_BETWEEN_STOPS, Stops, even_stops, stops_between
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 
 #: The pilot run takes this share of the duration, and so many seconds at least: about one turn of the slow sideways
 #: mode, and many of the precession.
-PILOT_SHARE, PILOT_S = 1 / 30, 1.0
+PILOT_SHARE, PILOT_S, PILOT_SHARE_OF_SHORT = 1 / 30, 2.0, 1 / 4
 #: Shorter motions [s] are integrated in the careful way.
 SHORTEST_S = 0.5
 #: Stops of the pilot run, where both runs are compared.
@@ -55,13 +55,19 @@ TYPICAL_RATE_OF_SINE, TYPICAL_OFFSET_OF_SINE_S, TYPICAL_RATE_OF_CORNERS = 1.3e-1
 TYPICAL_RATE_OF_ANY_SPLIT = 6e-11
 
 #: The share of the tolerance that the error is to have, by forecast, and the most.
-AIM, MOST = 0.25, 0.38
-#: An estimate is this times what is forecast.
-SAFETY = 2.5
+AIM, MOST = 0.2, 0.28
+#: The share of the tolerance that the estimate is to have where it was above the tolerance.
+AIM_AGAIN = 0.6
+#: An estimate is so many times what is forecast; the place's error grows less evenly, and is far below the axis's.
+SAFETY, SAFETY_PLACE = 3.0, 6.0
+#: An estimate from two runs of all of the motion is so many times what they give.
+SAFETY_COMPARED = 3.0
+#: The last seconds that are integrated twice [s].
+TAIL_S = 2.0
 #: At this ratio of steps the law error ∝ step^order is no longer trusted, and another pilot run is made.
 MOST_EXTRAPOLATION = 1.8
-#: Pilot runs at most; then the careful way is taken.
-MOST_PILOTS = 4
+#: Pilot runs and runs of the whole motion at most; then the careful way is taken.
+MOST_PILOTS, MOST_TRIES = 4, 2
 #: Mean squares of the differences in the later and in the earlier half of the pilot run differ by 7 where the error
 #: grows in proportion to the time, by some 30 where with its square; above that it grows exponentially.
 MOST_GROWTH = 40.0
@@ -72,7 +78,7 @@ MOST_CHANGE = 10.0
 #: The tolerance is so many times the error by rounding at least.
 LEAST_OF_ROUNDING = 50.0
 #: The error of a rate is at least this share of the differences over the time: a small one may be chance.
-LEAST_RATE_SHARE = 0.2
+LEAST_RATE_SHARE, LEAST_RATE_SHARE_DRIVEN = 0.2, 0.06
 
 
 @dataclass(frozen=True)
@@ -84,12 +90,14 @@ class Outcome:
         steps: how many were taken.
         step: their length [s].
         errors: of place [m] and axis [rad] at the end, estimated.
+        tries: how many times all of the motion was integrated.
     """
 
     states: Array
     steps: int
     step: float
     errors: tuple[float, float]
+    tries: int
 
 
 @dataclass(frozen=True)
@@ -172,12 +180,14 @@ class _Forecast:
         if self.kinked:
             self.cell = 0.5 / problem.scene.drive.frequency_hz
             self.longest_compared = max(self.longest_compared, self.cell)
+            self.corners = stops_between(self.begin, self.end, self.cell, problem.scene.drive, samples)
+            self.intervals = np.abs(np.diff(self.corners.times))
         elif samples.size > PILOT_STOPS:
             self.cell = abs(float(samples[0]) - self.begin)
 
     def run(self, progress: Callable[[float], None] | None) -> Outcome | None:
         """Return the motion, or None."""
-        step = self._fitting(self._typical_step())
+        step, tries = self._fitting(self._typical_step()), 0
         for _ in range(MOST_PILOTS):
             pilot = self._pilot(step)
             if pilot is None:
@@ -187,14 +197,29 @@ class _Forecast:
             if share == 0:
                 return None
             wanted = self._fitting(step * (AIM / share) ** (1 / self.order))
-            begun = abs(float(pilot.states[-1, TIME]) - self.begin) / self.lasts
-            if share <= MOST and wanted * (1 - begun) <= step:  # longer steps would not make up for a second beginning
-                return self._continue(pilot, progress)
-            if max(wanted / step, step / wanted) <= MOST_EXTRAPOLATION:
-                trend = pilot.trend.times((wanted / step) ** self.order)
-                return self._continue(_Pilot(self.problem.start[None], 0, wanted, trend), progress)
+            if max(wanted / step, step / wanted) <= MOST_EXTRAPOLATION or (wanted < step and share <= MOST):
+                break
             step = wanted
+        else:
+            return None
+        begun = abs(float(pilot.states[-1, TIME]) - self.begin) / self.lasts
+        if share > MOST or wanted * (1 - begun) > step:  # longer steps do not make up for a second beginning
+            pilot = self._at_other_step(pilot, wanted)
+        while tries < MOST_TRIES:
+            tries += 1
+            found = self._continue(pilot, tries, progress)
+            if not isinstance(found, float):
+                return found
+            wanted = self._fitting(pilot.step * (AIM_AGAIN * self.tolerance / found) ** (1 / self.order))
+            if wanted >= pilot.step or pilot.step / wanted > MOST_EXTRAPOLATION:
+                return None
+            pilot = self._at_other_step(pilot, wanted)
         return None
+
+    def _at_other_step(self, pilot: _Pilot, step: float) -> _Pilot:
+        """Return what a pilot run says of another step, and no beginning."""
+        trend = pilot.trend.times((step / pilot.step) ** self.order)
+        return _Pilot(self.problem.start[None], 0, step, trend)
 
     def _typical_step(self) -> float:
         drive, lasts = self.problem.model.drive, self.lasts
@@ -219,7 +244,7 @@ class _Forecast:
 
     def _pilot(self, step: float) -> _Pilot | None:
         """Integrate the beginning at this step [s] and another one, and compare."""
-        wanted = max(PILOT_S, PILOT_SHARE * self.lasts)
+        wanted = max(min(PILOT_S, max(1.0, self.lasts * PILOT_SHARE_OF_SHORT)), PILOT_SHARE * self.lasts)
         if wanted > 0.7 * self.lasts:
             wanted = self.lasts
         one, other, ratio = self._pilot_stops(step, wanted)
@@ -229,7 +254,8 @@ class _Forecast:
         if not (through and finished):
             return None
         every = (one.times.size - 1) // (other.times.size - 1)
-        trend = _trend(states, every, compared, abs(ratio**self.order - 1))
+        least = LEAST_RATE_SHARE if self.problem.model.drive is None else LEAST_RATE_SHARE_DRIVEN
+        trend = _trend(states, every, compared, abs(ratio**self.order - 1), least)
         if trend is None:
             return None
         length = abs(one.times[1] - one.times[0]) / one.counts[0] if not self.kinked else step
@@ -237,14 +263,12 @@ class _Forecast:
 
     def _pilot_stops(self, step: float, lasts: float) -> tuple[Stops, Stops, float]:
         """Return the stops of both runs of the pilot, and how many times as long the steps of the other one are."""
-        begin, sign, drive = self.begin, self.sign, self.problem.scene.drive
+        begin, sign = self.begin, self.sign
         if self.kinked and self.cell is not None:
             count = round(self.cell / step)
-            fewer = min(count - 1, int(count / (STEP_RATIO - 0.07)))
-            others = fewer if fewer and self.cell / fewer <= self.longest_compared else math.ceil(STEP_RATIO * count)
-            one, other = (
-                stops_between(begin, begin + sign * lasts, self.cell / n * (1 + 1e-9), drive) for n in (count, others)
-            )
+            others = self._other_count_of_cell(count)
+            until = int(np.searchsorted(np.cumsum(self.intervals), lasts * (1 - 1e-9))) + 1
+            one, other = (self._at_corners(self.cell / n, 0, until) for n in (count, others))
             return one, other, count / others
         if self.cell is not None:
             count = round(self.cell / step)
@@ -268,57 +292,129 @@ class _Forecast:
         fewer = round(count / STEP_RATIO)
         return fewer if step * count / fewer <= self.longest_compared else math.ceil(STEP_RATIO * count)
 
+    def _at_corners(self, step: float, first: int, last: int) -> Stops:
+        """Return the stops from one corner of the drive to another, by number, with steps no longer than this [s]."""
+        part = self.corners.part(first, last)
+        counts = np.ceil(self.intervals[first:last] / step * (1 - 1e-9)).astype(np.int64)
+        return replace(part, counts=np.maximum(counts, 1))
+
+    def _other_count_of_cell(self, count: int) -> int:
+        """Return how many steps the other run takes between two corners of the drive, where the one takes `count`."""
+        cell = self.cell or 0.0
+        fewer = min(count - 1, int(count / (STEP_RATIO - 0.07)))
+        return fewer if fewer and cell / fewer <= self.longest_compared else math.ceil(STEP_RATIO * count)
+
     # --- all of the motion ---
 
-    def _continue(self, pilot: _Pilot, progress: Callable[[float], None] | None) -> Outcome | None:
-        """Integrate from the end of the pilot run, or from the start where it is at another step."""
+    def _continue(self, pilot: _Pilot, tries: int, progress: Callable[[float], None] | None) -> Outcome | float | None:
+        """Integrate from the end of the pilot run, or from the start where it is at another step.
+
+        Returns:
+            The motion; its error, as estimated, where that is above the tolerance; None where no estimate holds.
+        """
         states, steps, reached = pilot.states, pilot.steps, float(pilot.states[-1, TIME])
-        if self.samples.size and self.cell is None or (self.kinked and self.samples.size):
+        if self.samples.size and self.cell is None:
             states, steps, reached = self.problem.start[None], 0, self.begin
-        tail = self.end - self.sign * PILOT_S / 3
-        whole = abs(self.end - reached) <= 1e-9 * self.lasts
-        if not whole:
-            wanted = self.samples[(self.samples - reached) * self.sign > 1e-12]
-            checks = self.sign * (tail - reached) > SHORTEST_TO_CHECK_S
-            stops = stops_between(
-                reached, self.end, pilot.step * (1 + 1e-9), self.problem.scene.drive,
-                np.append(wanted, tail) if checks and not wanted.size else wanted,
-            )  # fmt: skip
+        if abs(self.end - reached) > 1e-9 * self.lasts:
+            if self.kinked:
+                stops = self._at_corners(pilot.step, len(states) - 1, self.intervals.size)
+            else:
+                stops = self._stops(reached, pilot.step, (self.samples - reached) * self.sign > 1e-12)
             rest, fell, taken = integrate(replace(self.problem, start=states[-1]), stops, progress)
             if fell is not None:
                 return None
             states, steps = np.concatenate([states, rest[1:]]), steps + taken
-            if checks and not self._holds_at_the_end(states, pilot, tail):
-                return None
         elif progress is not None:
             progress(1.0)
         if has_kink(self.problem.model.drag) and np.any(comes_near_zero(spins_of(self.problem.scene, states))):
             return None
         rounding = rounding_error(self.problem.scheme, steps, states[-1])
-        place, axis = (SAFETY * e + r for e, r in zip(pilot.trend.at(self.lasts), rounding, strict=True))
-        if not max(place, axis) <= self.tolerance or LEAST_OF_ROUNDING * max(rounding) > self.tolerance:
+        if LEAST_OF_ROUNDING * max(rounding) > self.tolerance:
             return None
-        return Outcome(states, steps, pilot.step, (place, axis))
-
-    def _holds_at_the_end(self, states: Array, pilot: _Pilot, tail: float) -> bool:
-        """Whether the error still grows about as fast, by a second run of the last part of a second."""
-        at = int(np.argmin(np.abs(states[:, TIME] - tail)))
-        lasted = abs(self.end - states[at, TIME])
-        count = math.ceil(lasted / pilot.step * (1 - 1e-9))
-        if self.kinked:
-            step = pilot.step / STEP_RATIO
+        if self.problem.model.drive is not None:
+            found = self._compared(states, pilot.step)
         else:
-            step = lasted / self._other_count(lasted / count, count)
-        stops = stops_between(states[at, TIME], self.end, step * (1 + 1e-9), self.problem.scene.drive)
-        ends, through = self.problem.advance_to_stops(states[at], stops, NO_LIMITS)
-        ratio = stops.counts.sum() / count
-        factor = abs(ratio**-self.order - 1)
-        found = [math.dist(ends[-1][part].tolist(), states[-1][part].tolist()) / factor for part in (R, N)]
-        usual = pilot.trend.at(max(lasted, PILOT_S))
-        return through and all(one <= MOST_CHANGE * other for one, other in zip(found, usual, strict=True))
+            found = self._trend_to_the_end(states, pilot)
+        if found is None:
+            return None
+        place, axis = found[0] + rounding[0], found[1] + rounding[1]
+        if not max(place, axis) <= self.tolerance:
+            return max(place, axis)
+        return Outcome(states, steps, pilot.step, (place, axis), tries)
+
+    def _stops(self, reached: float, step: float, which: NDArray[np.bool_]) -> Stops:
+        """Return the stops from a time on, with some before the end, where a second run begins."""
+        drive, samples = self.problem.scene.drive, self.samples[which]
+        if samples.size or self.sign * (self.end - reached) < SHORTEST_TO_CHECK_S:
+            return stops_between(reached, self.end, step * (1 + 1e-9), drive, samples)
+        count = math.ceil(abs(self.end - reached) / step * (1 - 1e-9))
+        inside = max(4, math.ceil(TAIL_S / (PILOT_STOPS * step)))
+        blocks = min(PILOT_STOPS, (count - 1) // inside)
+        before = count - inside * blocks
+        exact = (self.end - reached) / count
+        cuts = [*range(0, before, STEPS_BETWEEN_STOPS), *range(before, count + 1, inside)]
+        return Stops(
+            reached + exact * np.array(cuts, dtype=np.float64),
+            np.diff(cuts),
+            np.ones(len(cuts) - 1),
+            np.zeros(len(cuts) - 1),
+        )
+
+    def _trend_to_the_end(self, states: Array, pilot: _Pilot) -> tuple[float, float] | None:
+        """Estimate the errors at the end from the trend of the pilot run, and from that of the last seconds."""
+        place, axis = pilot.trend.at(self.lasts)
+        tail = self._tail(states, pilot.step)
+        if tail is not None:
+            every, first, stops, factor = tail
+            ends, through = self.problem.advance_to_stops(states[first], stops, NO_LIMITS)
+            trend = _trend(states[first:], every, ends, factor) if through else None
+            if trend is None:
+                return None
+            others = trend.at(self.lasts)
+            if max(others) > MOST_CHANGE * max(place, axis):
+                return None
+            place, axis = math.hypot(place, others[0]) / math.sqrt(2), math.hypot(axis, others[1]) / math.sqrt(2)
+        return SAFETY_PLACE * place, SAFETY * axis
+
+    def _tail(self, states: Array, step: float) -> tuple[int, int, Stops, float] | None:
+        """Return what a second run of the last seconds needs; None where the motion is short.
+
+        Returns:
+            How many stops of the first run there are to one of the second, the state it begins at, its stops, and how
+            many times as large as the error the difference is.
+        """
+        times = states[:, TIME]
+        if self.lasts < SHORTEST_TO_CHECK_S or len(times) < PILOT_STOPS // 2:
+            return None
+        first = int(np.searchsorted(times * self.sign, (self.end - self.sign * 1.01 * TAIL_S) * self.sign))
+        first = min(first, len(times) - 3)
+        every = max(1, (len(times) - 1 - first) // PILOT_STOPS)
+        first = len(times) - 1 - every * ((len(times) - 1 - first) // every)
+        cuts = times[first::every]
+        count = max(1, round(abs(cuts[1] - cuts[0]) / step))
+        others = self._other_count(abs(cuts[1] - cuts[0]) / count, count)
+        return every, first, even_stops(cuts, others), abs((count / others) ** self.order - 1)
+
+    def _compared(self, states: Array, step: float) -> tuple[float, float] | None:
+        """Estimate the errors at the end from a second run of all of the motion."""
+        if self.kinked and self.cell is not None:
+            count = round(self.cell / step)
+            others = self._other_count_of_cell(count)
+            stops = self._at_corners(self.cell / others, 0, self.intervals.size)
+        else:
+            count = math.ceil(self.lasts / step)
+            others = self._other_count(step, count)
+            stops = stops_between(self.begin, self.end, self.lasts / others * (1 + 1e-9), self.problem.scene.drive)
+        ratio = count / others
+        ends, through = self.problem.advance_to_stops(self.problem.start, stops, NO_LIMITS)
+        if not through:
+            return None
+        factor = abs(ratio**self.order - 1)
+        place, axis = (math.dist(ends[-1][part].tolist(), states[-1][part].tolist()) / factor for part in (R, N))
+        return SAFETY_COMPARED * place, SAFETY_COMPARED * axis
 
 
-def _trend(states: Array, every: int, others: Array, factor: float) -> _Trend | None:
+def _trend(states: Array, every: int, others: Array, factor: float, least: float = LEAST_RATE_SHARE) -> _Trend | None:
     """Fit the trend of an error to the differences of two runs, which are `factor` times the error.
 
     Args:
@@ -326,6 +422,7 @@ def _trend(states: Array, every: int, others: Array, factor: float) -> _Trend | 
         every: how many stops of the one there are to one of the other.
         others: of the other at its stops, shape (n + 1, 18).
         factor: see above.
+        least: of the rate, as a share of the differences over the time.
     """
     if len(others) < 3:
         return None
@@ -334,7 +431,7 @@ def _trend(states: Array, every: int, others: Array, factor: float) -> _Trend | 
         return None
     offsets, rates = [], []
     for before, after in zip(early, (late_place, late_axis), strict=True):
-        rate2 = max((after - before) / (late_t2 - early_t2), LEAST_RATE_SHARE**2 * after / late_t2)
+        rate2 = max((after - before) / (late_t2 - early_t2), least**2 * after / late_t2)
         rates.append(rate2 / factor**2)
         offsets.append(max(after - rate2 * late_t2, 0.0) / factor**2)
     return _Trend((offsets[0], offsets[1]), (rates[0], rates[1]))

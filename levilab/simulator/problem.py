@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from levilab.errors import LeftRange, SimulationError
 from levilab.simulator.escape import locate_escape
 from levilab.simulator.kernels.braking import DragFlow, WasherDragFlow
-from levilab.simulator.kernels.loads import PiecewiseLinear
 from levilab.simulator.kernels.motion import STATE_SIZE, TIME, R
 from levilab.simulator.kernels.splitting import advance
 from levilab.simulator.model import model_of

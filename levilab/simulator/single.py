@@ -156,7 +156,9 @@ def _to_tolerance(problem: Problem, wanted: _Wanted, tolerance: float, step: flo
     if step is None and not wanted.events:
         found = run_by_forecast(problem, wanted.duration, tolerance, samples, wanted.progress)
         if found is not None:
-            accuracy = Accuracy(*found.errors, tolerance, problem.scheme.name, found.step, found.steps)
+            accuracy = Accuracy(
+                *found.errors, tolerance, problem.scheme.name, found.step, found.steps, tries=found.tries
+            )
             kept = found.states[_are_wanted(found.states[:, TIME], samples, abs(wanted.duration) * 1e-11)]
             return Run(kept, None, (), found.steps), accuracy
     longest = longest_step(problem.scene, problem.model, problem.start, problem.scheme)

@@ -63,7 +63,13 @@ def _ring_to_second_power(strength: Any, radius2: Any, z: Any, z2: Any, half: An
     square = inverse * inverse
     cube = square * inverse
     bend = a * square
-    return math.sqrt(radius2 + z2), -0.5 * kz * cube, (half * bend - k) * square, bend * square, (kz - b * square) * cube
+    return (
+        math.sqrt(radius2 + z2),
+        -0.5 * kz * cube,
+        (half * bend - k) * square,
+        bend * square,
+        (kz - b * square) * cube,
+    )
 
 
 def to_second_power(field: Any, z: Any, r2: Any) -> Any:

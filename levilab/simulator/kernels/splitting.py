@@ -80,7 +80,9 @@ def advance(
     for i in range(counts.size):
         h = (stops[i + 1] - stops[i]) / counts[i]
         level, slope = levels[i], slopes[i]
-        a[:], b[:] = drifts * h, kicks * h
+        for j in range(stages):  # not drifts * h, which would make an array at each stop
+            a[j], b[j] = drifts[j] * h, kicks[j] * h
+        a[stages] = drifts[stages] * h
         first, last = a[0], a[stages]
         s = drift(model, s, first)
         for step in range(counts[i]):
