@@ -39,6 +39,8 @@ Counts = NDArray[np.int64]
 PILOTS = 6
 #: How long these are simulated [s]; errors grow with the time, so they get this share of the tolerance.
 PILOT_DURATION = 3.0
+#: The largest part of its longest step that a top takes: runs at four times as much are compared with.
+LARGEST_SHARE = 0.25
 #: A spin below this [rad/s] may be turned through zero by the field; a top that floats is never as slow.
 SLOW_RAD_S = 2 * math.pi * 5.0
 
@@ -228,7 +230,7 @@ def _step_share(tops: list[_Top], pilots: set[int], duration: float, tolerance: 
         motion = simulate(tops[i].problem.scene, time, tolerance=tolerance * time / duration, rate=None)
         if motion.accuracy.reached:
             shares.append(motion.accuracy.step / tops[i].longest)
-    return min(shares, default=0.25)
+    return min([*shares, LARGEST_SHARE])
 
 
 def _groups(tops: list[_Top]) -> Iterable[list[int]]:

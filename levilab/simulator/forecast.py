@@ -25,7 +25,7 @@ from levilab.simulator.energy import spins_of
 from levilab.simulator.kernels.loads import Disc, PiecewiseLinear
 from levilab.simulator.kernels.motion import TIME, N, R
 from levilab.simulator.kernels.splitting import mean_squares
-from levilab.simulator.problem import NO_LIMITS, Problem, integrate
+from levilab.simulator.problem import NO_LIMITS, STEPS_IN_A_CALL, Problem, integrate, integrate_to_end
 from levilab.simulator.stops import STEPS_BETWEEN_STOPS, Stops, even_stops, stops_between
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 
 #: The pilot run takes this share of the duration, and so many seconds at least: about one turn of the slow sideways
 #: mode, and many of the precession.
-PILOT_SHARE, PILOT_S, PILOT_SHARE_OF_SHORT = 1 / 30, 2.0, 1 / 4
+PILOT_SHARE, PILOT_S, PILOT_SHARE_OF_SHORT = 1 / 30, 2.0, 1 / 5
 #: Shorter motions [s] are integrated in the careful way.
 SHORTEST_S = 0.5
 #: Stops of the pilot run, where both runs are compared.
@@ -44,11 +44,11 @@ PILOT_STOPS = 16
 STEP_RATIO = 1.4
 #: The longest step, as the angle [rad] by which the axis turns meanwhile: near it a scheme is hardly of its order, and
 #: at 1.3 times as much no longer stable.
-LONGEST_TURN = 7.0
+LONGEST_TURN = 7.5
 LONGEST_TURN_COMPARED = 8.2
 
-#: A typical error is this times (angle in a step)^order times the time [rad/s]; a sine's part that does not grow is that
-#: of so many seconds.  Without a drive it is that of a top that leans by 0.02 rad, and about in proportion to its lean.
+#: A typical error is this times (angle in a step)^order times the time [rad/s]; a sine's part that does not grow is
+#: that of so many seconds.  Without a drive it is that of a top that leans by 0.02 rad, and grows with its lean.
 #: They are medians of random scenes; within a factor of 3 the first pilot run is the beginning of the result.
 TYPICAL_RATE, TYPICAL_LEAN_RAD = 5e-12, 0.02
 TYPICAL_RATE_OF_SINE, TYPICAL_OFFSET_OF_SINE_S, TYPICAL_RATE_OF_CORNERS = 1.3e-10, 4.0, 3e-11
@@ -68,9 +68,10 @@ TAIL_S = 2.0
 MOST_EXTRAPOLATION = 1.8
 #: Pilot runs and runs of the whole motion at most; then the careful way is taken.
 MOST_PILOTS, MOST_TRIES = 4, 2
-#: Mean squares of the differences in the later and in the earlier half of the pilot run differ by 7 where the error
-#: grows in proportion to the time, by some 30 where with its square; above that it grows exponentially.
-MOST_GROWTH = 40.0
+#: Mean squares of the differences in the later and in the earlier half of the pilot run differ by a factor of 7 where
+#: the error grows in proportion to the time.  Above this neighbours may part exponentially: all of it is run twice.
+#: At the upper edge of the spins the place's shows it first, by 12 to 800; in regular motions it is at most 8.5.
+MOST_GROWTH = 10.0
 #: Shorter rests of a motion [s] are not checked at the end.
 SHORTEST_TO_CHECK_S = 8.0
 #: The error may grow so many times as fast at the end as in the pilot run, for the motion changes.
@@ -106,6 +107,7 @@ class _Trend:
 
     offset2: tuple[float, float]
     rate2: tuple[float, float]
+    growth: float
 
     def at(self, time: float) -> tuple[float, float]:
         """Return the errors of place [m] and axis [rad] so long [s] after the start."""
@@ -115,7 +117,7 @@ class _Trend:
     def times(self, factor: float) -> _Trend:
         """Return the trend of errors so many times as large."""
         (a, b), (c, d), f2 = self.offset2, self.rate2, factor * factor
-        return _Trend((a * f2, b * f2), (c * f2, d * f2))
+        return _Trend((a * f2, b * f2), (c * f2, d * f2), self.growth)
 
 
 @dataclass(frozen=True)
@@ -187,34 +189,42 @@ class _Forecast:
 
     def run(self, progress: Callable[[float], None] | None) -> Outcome | None:
         """Return the motion, or None."""
-        step, tries = self._fitting(self._typical_step()), 0
+        pilot = self._search()
+        tries = 0
+        while pilot is not None and tries < MOST_TRIES:
+            tries += 1
+            found = self._integrate(pilot, progress)
+            errors = None if found is None else self._errors(*found, pilot)
+            if found is None or errors is None:
+                return None
+            if max(errors) <= self.tolerance:
+                return Outcome(*found, pilot.step, errors, tries)
+            pilot = self._shorter(pilot, max(errors))
+        return None
+
+    def _search(self) -> _Pilot | None:
+        """Return the beginning of the motion at a step that fits, or that step and no beginning."""
+        step = self._fitting(self._typical_step())
         for _ in range(MOST_PILOTS):
             pilot = self._pilot(step)
-            if pilot is None:
+            share = 0.0 if pilot is None else max(pilot.trend.at(self.lasts)) / self.tolerance
+            if pilot is None or share == 0:
                 return None
-            step = pilot.step
-            share = max(pilot.trend.at(self.lasts)) / self.tolerance
-            if share == 0:
-                return None
-            wanted = self._fitting(step * (AIM / share) ** (1 / self.order))
-            if max(wanted / step, step / wanted) <= MOST_EXTRAPOLATION or (wanted < step and share <= MOST):
-                break
-            step = wanted
-        else:
-            return None
-        begun = abs(float(pilot.states[-1, TIME]) - self.begin) / self.lasts
-        if share > MOST or wanted * (1 - begun) > step:  # longer steps do not make up for a second beginning
-            pilot = self._at_other_step(pilot, wanted)
-        while tries < MOST_TRIES:
-            tries += 1
-            found = self._continue(pilot, tries, progress)
-            if not isinstance(found, float):
-                return found
-            wanted = self._fitting(pilot.step * (AIM_AGAIN * self.tolerance / found) ** (1 / self.order))
-            if wanted >= pilot.step or pilot.step / wanted > MOST_EXTRAPOLATION:
-                return None
-            pilot = self._at_other_step(pilot, wanted)
+            wanted = self._fitting(pilot.step * (AIM / share) ** (1 / self.order))
+            if max(wanted / pilot.step, pilot.step / wanted) > MOST_EXTRAPOLATION:
+                step = wanted
+                continue
+            begun = abs(float(pilot.states[-1, TIME]) - self.begin) / self.lasts
+            # longer steps have to make up for a second beginning
+            keep = share <= MOST and wanted * (1 - begun) <= pilot.step
+            return pilot if keep else self._at_other_step(pilot, wanted)
         return None
+
+    def _shorter(self, pilot: _Pilot, error: float) -> _Pilot | None:
+        """Return a shorter step after one whose error was too large; None where that is no matter of the step."""
+        step = self._fitting(pilot.step * (AIM_AGAIN * self.tolerance / error) ** (1 / self.order))
+        fits = pilot.step / MOST_EXTRAPOLATION <= step < pilot.step
+        return self._at_other_step(pilot, step) if fits else None
 
     def _at_other_step(self, pilot: _Pilot, step: float) -> _Pilot:
         """Return what a pilot run says of another step, and no beginning."""
@@ -233,7 +243,7 @@ class _Forecast:
         else:
             error = TYPICAL_RATE_OF_SINE * (lasts + TYPICAL_OFFSET_OF_SINE_S)
         angle = (AIM * self.tolerance / error) ** (1 / self.order)
-        return min(angle, LONGEST_TURN) / self.turning
+        return float(min(angle, LONGEST_TURN) / self.turning)
 
     def _fitting(self, step: float) -> float:
         """Return the longest step [s] up to this one that divides the time between stops."""
@@ -247,6 +257,10 @@ class _Forecast:
         wanted = max(min(PILOT_S, max(1.0, self.lasts * PILOT_SHARE_OF_SHORT)), PILOT_SHARE * self.lasts)
         if wanted > 0.7 * self.lasts:
             wanted = self.lasts
+        most = STEPS_IN_A_CALL / 4 * step
+        if most < min(1.0, self.lasts):
+            return None
+        wanted = min(wanted, most)
         one, other, ratio = self._pilot_stops(step, wanted)
         start = self.problem.start
         states, through = self.problem.advance_to_stops(start, one, self.problem.escape)
@@ -283,9 +297,9 @@ class _Forecast:
         blocks = max(6, round(lasts / (inside * step)))
         length = lasts if lasts == self.lasts else min(blocks * inside * step, self.lasts)
         blocks = max(blocks, math.ceil(length / (inside * self.longest) * (1 - 1e-9)))
-        times = begin + sign * length / blocks * np.arange(blocks + 1)
+        ends: Array = np.linspace(begin, begin + sign * length, blocks + 1)
         others = self._other_count(length / (blocks * inside), inside)
-        return even_stops(times, inside), even_stops(times, others), inside / others
+        return even_stops(ends, inside), even_stops(ends, others), inside / others
 
     def _other_count(self, step: float, count: int) -> int:
         """Return how many steps the other run takes where the one takes `count`."""
@@ -306,41 +320,39 @@ class _Forecast:
 
     # --- all of the motion ---
 
-    def _continue(self, pilot: _Pilot, tries: int, progress: Callable[[float], None] | None) -> Outcome | float | None:
+    def _integrate(self, pilot: _Pilot, progress: Callable[[float], None] | None) -> tuple[Array, int] | None:
         """Integrate from the end of the pilot run, or from the start where it is at another step.
 
         Returns:
-            The motion; its error, as estimated, where that is above the tolerance; None where no estimate holds.
+            The states at the stops, and the steps taken; None where the top falls.
         """
-        states, steps, reached = pilot.states, pilot.steps, float(pilot.states[-1, TIME])
-        if self.samples.size and self.cell is None:
-            states, steps, reached = self.problem.start[None], 0, self.begin
-        if abs(self.end - reached) > 1e-9 * self.lasts:
-            if self.kinked:
-                stops = self._at_corners(pilot.step, len(states) - 1, self.intervals.size)
-            else:
-                stops = self._stops(reached, pilot.step, (self.samples - reached) * self.sign > 1e-12)
-            rest, fell, taken = integrate(replace(self.problem, start=states[-1]), stops, progress)
-            if fell is not None:
-                return None
-            states, steps = np.concatenate([states, rest[1:]]), steps + taken
-        elif progress is not None:
-            progress(1.0)
-        if has_kink(self.problem.model.drag) and np.any(comes_near_zero(spins_of(self.problem.scene, states))):
+        states, steps = pilot.states, pilot.steps
+        if self.samples.size and self.cell is None:  # the pilot run does not stop at them
+            states, steps = self.problem.start[None], 0
+        reached = float(states[-1, TIME])
+        if abs(self.end - reached) <= 1e-9 * self.lasts:
+            if progress is not None:
+                progress(1.0)
+            return states, steps
+        if self.kinked:
+            stops = self._at_corners(pilot.step, len(states) - 1, self.intervals.size)
+        else:
+            stops = self._stops(reached, pilot.step, (self.samples - reached) * self.sign > 1e-12)
+        rest, fell, taken = integrate(replace(self.problem, start=states[-1]), stops, progress)
+        return None if fell is not None else (np.concatenate([states, rest[1:]]), steps + taken)
+
+    def _errors(self, states: Array, steps: int, pilot: _Pilot) -> tuple[float, float] | None:
+        """Estimate the errors of place [m] and axis [rad] at the end; None where no estimate holds."""
+        problem = self.problem
+        if has_kink(problem.model.drag) and np.any(comes_near_zero(spins_of(problem.scene, states))):
             return None
-        rounding = rounding_error(self.problem.scheme, steps, states[-1])
+        rounding = rounding_error(problem.scheme, steps, states[-1])
         if LEAST_OF_ROUNDING * max(rounding) > self.tolerance:
             return None
-        if self.problem.model.drive is not None:
-            found = self._compared(states, pilot.step)
-        else:
-            found = self._trend_to_the_end(states, pilot)
+        found = None if problem.model.drive is not None else self._trend_to_the_end(states, pilot)
         if found is None:
-            return None
-        place, axis = found[0] + rounding[0], found[1] + rounding[1]
-        if not max(place, axis) <= self.tolerance:
-            return max(place, axis)
-        return Outcome(states, steps, pilot.step, (place, axis), tries)
+            found = self._compared(states, pilot.step)
+        return None if found is None else (found[0] + rounding[0], found[1] + rounding[1])
 
     def _stops(self, reached: float, step: float, which: NDArray[np.bool_]) -> Stops:
         """Return the stops from a time on, with some before the end, where a second run begins."""
@@ -361,14 +373,20 @@ class _Forecast:
         )
 
     def _trend_to_the_end(self, states: Array, pilot: _Pilot) -> tuple[float, float] | None:
-        """Estimate the errors at the end from the trend of the pilot run, and from that of the last seconds."""
+        """Estimate the errors at the end from the trend of the pilot run, and from that of the last seconds.
+
+        Returns:
+            The errors of place [m] and axis [rad]; None where they may have grown in another way.
+        """
+        if pilot.trend.growth > MOST_GROWTH:
+            return None
         place, axis = pilot.trend.at(self.lasts)
         tail = self._tail(states, pilot.step)
         if tail is not None:
             every, first, stops, factor = tail
             ends, through = self.problem.advance_to_stops(states[first], stops, NO_LIMITS)
             trend = _trend(states[first:], every, ends, factor) if through else None
-            if trend is None:
+            if trend is None or trend.growth > MOST_GROWTH:
                 return None
             others = trend.at(self.lasts)
             if max(others) > MOST_CHANGE * max(place, axis):
@@ -406,11 +424,11 @@ class _Forecast:
             others = self._other_count(step, count)
             stops = stops_between(self.begin, self.end, self.lasts / others * (1 + 1e-9), self.problem.scene.drive)
         ratio = count / others
-        ends, through = self.problem.advance_to_stops(self.problem.start, stops, NO_LIMITS)
-        if not through:
-            return None
+        end = integrate_to_end(self.problem, stops)
         factor = abs(ratio**self.order - 1)
-        place, axis = (math.dist(ends[-1][part].tolist(), states[-1][part].tolist()) / factor for part in (R, N))
+        place, axis = (math.dist(end[part].tolist(), states[-1][part].tolist()) / factor for part in (R, N))
+        if not math.isfinite(place + axis):
+            return None
         return SAFETY_COMPARED * place, SAFETY_COMPARED * axis
 
 
@@ -427,11 +445,14 @@ def _trend(states: Array, every: int, others: Array, factor: float, least: float
     if len(others) < 3:
         return None
     early_t2, *early, late_t2, late_place, late_axis = mean_squares(states, every, others)
-    if not late_axis <= MOST_GROWTH * early[1]:
+    if not min(early) > 0:
+        return None
+    growth = max(late_place / early[0], late_axis / early[1])
+    if not growth < math.inf:
         return None
     offsets, rates = [], []
     for before, after in zip(early, (late_place, late_axis), strict=True):
         rate2 = max((after - before) / (late_t2 - early_t2), least**2 * after / late_t2)
         rates.append(rate2 / factor**2)
         offsets.append(max(after - rate2 * late_t2, 0.0) / factor**2)
-    return _Trend((offsets[0], offsets[1]), (rates[0], rates[1]))
+    return _Trend((offsets[0], offsets[1]), (rates[0], rates[1]), growth)

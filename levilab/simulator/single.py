@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from levilab.errors import SimulationError
 from levilab.simulator.accuracy import NODES_ORDER, comes_near_zero, estimate, has_kink, longest_step, rounding_error
-from levilab.simulator.energy import energy, spins_of
+from levilab.simulator.energy import spins_of
 from levilab.simulator.escape import exit_speed, locate_zero, margins
 from levilab.simulator.forecast import run_by_forecast
 from levilab.simulator.kernels.loads import Disc
@@ -134,7 +134,7 @@ def simulate(
     problem = Problem(scene, model, state, scheme_for(scheme, model))
     wanted = _Wanted(duration, rate, events, progress)
     run, accuracy = _to_tolerance(problem, wanted, tolerance, step)
-    return Trajectory(scene, run.states, energy(scene, model, run.states), accuracy, run.fell, run.events)
+    return Trajectory(scene, run.states, model, accuracy, run.fell, run.events)
 
 
 def check(*, duration: float, tolerance: float, rate: float | None, step: float | None) -> None:
@@ -294,8 +294,7 @@ def _events(problem: Problem, states: Array, stops: Stops, events: Watch) -> tup
 
     def on(function: Callable[[Trajectory], Array], rows: Array) -> Array:
         nothing = Accuracy(0, 0, 0, "", 0, 0)
-        energies = energy(problem.scene, problem.model, rows)
-        return np.asarray(function(Trajectory(problem.scene, rows, energies, nothing)), dtype=np.float64)
+        return np.asarray(function(Trajectory(problem.scene, rows, problem.model, nothing)), dtype=np.float64)
 
     found = []
     for name, function in events.items():
@@ -332,5 +331,4 @@ def spin_alone(scene: Scene, duration: float, tolerance: float, rate: float | No
         now = DECAYS[scene.drag.law].after(spin, times, *scene.drag.constants)
         states[:, L] = start[L] * (now / spin)[:, None]
         states[:, CLOCK] = np.copysign(now, start[CLOCK])
-    energies = energy(scene, model_of(scene), states)
-    return Trajectory(scene, states, energies, Accuracy(0.0, 0.0, tolerance, "closed form", duration, 0))
+    return Trajectory(scene, states, model_of(scene), Accuracy(0.0, 0.0, tolerance, "closed form", duration, 0))

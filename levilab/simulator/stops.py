@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+#: No times at all: the kinks of a drive that has none.
 NO_TIMES: Array = np.empty(0)
 
 #: At most so many steps between stops: they are repeated one by one to find the moment of an escape.
@@ -98,8 +99,7 @@ def stops_between(start: float, end: float, step: float, drive: Drive, samples: 
             "a shorter duration, a slower spin or heavier inertias are expected"
         )
     corners = kinks(drive, low, high)
-    none = corners.size == 0 and (samples is None or samples.size == 0)
-    if none and drive.off_s is None and drive.waveform in ("off", "sine"):
+    if corners is NO_TIMES and (samples is None or samples.size == 0):
         count = max(math.ceil((high - low) / step * (1 - 1e-12)), 1)
         if count <= STEPS_BETWEEN_STOPS:
             return even_stops(np.array([start, end]), count)
@@ -135,10 +135,10 @@ def kinks(drive: Drive, low: float, high: float) -> Array:
     Raises:
         SimulationError: there are too many.
     """
-    if drive.waveform == "off":
+    if drive.waveform == "off" or (drive.waveform == "sine" and drive.off_s is None):
         return NO_TIMES
     found = []
-    if drive.off_s is not None and low < drive.off_s < high and drive.waveform != "off":
+    if drive.off_s is not None and low < drive.off_s < high:
         found.append(drive.off_s)
     offset = {"square": 0.0, "unipolar": 0.0, "triangle": 0.25}.get(drive.waveform)
     if offset is not None and drive.amplitude_t != 0:

@@ -109,7 +109,7 @@ with_force = by_type(
 
 @part
 def dipole_load(model: Any, r: Vector, moment: Vector, at: Any, v: Vector, push: float) -> tuple[Vector, Vector]:
-    """The vector v with push times the force [N] added, and the torque [N m], on a dipole in base and drive's fields."""
+    """The vector v with push times the force [N] on a dipole added, and the torque [N m], of base and drive."""
     x, y, z = r
     five = field_functions(model.field, z, x * x + y * y)
     b = with_drive(model.drive, (five[0] * x, five[0] * y, five[2]), at)

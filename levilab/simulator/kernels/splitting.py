@@ -117,5 +117,6 @@ def mean_squares(states: Array, every: int, others: Array) -> tuple[float, float
         for j in range(3):
             sums[part, 1] += (a[j] - b[j]) * (a[j] - b[j])
             sums[part, 2] += (a[j + 6] - b[j + 6]) * (a[j + 6] - b[j + 6])
-    e, l = 1 / half, 1 / (n - half)
-    return e * sums[0, 0], e * sums[0, 1], e * sums[0, 2], l * sums[1, 0], l * sums[1, 1], l * sums[1, 2]
+    sums[0] /= half
+    sums[1] /= n - half
+    return sums[0, 0], sums[0, 1], sums[0, 2], sums[1, 0], sums[1, 1], sums[1, 2]
