@@ -59,7 +59,7 @@ AIM, MOST = 0.2, 0.28
 #: The share of the tolerance that the estimate is to have where it was above the tolerance.
 AIM_AGAIN = 0.6
 #: An estimate is so many times what is forecast; the place's error grows less evenly, and is far below the axis's.
-SAFETY, SAFETY_PLACE = 3.0, 6.0
+SAFETY, SAFETY_PLACE = 3.5, 8.0
 #: An estimate from two runs of all of the motion is so many times what they give.
 SAFETY_COMPARED = 3.0
 #: The last seconds that are integrated twice [s].
