@@ -86,7 +86,7 @@ def draw_scene(kind: str, draw: np.random.Generator) -> Scene:
         return preset("tilted").changed(changes)
     frequency = within(26, 40)
     changes |= {
-        "drive.waveform": kind.split()[-1] if kind.endswith("sine") else "square",
+        "drive.waveform": kind.rsplit(maxsplit=1)[-1] if kind.endswith("sine") else "square",
         "drive.frequency_hz": frequency,
         "drive.amplitude_t": within(2e-4, 6e-4),
         "drive.phase_rad": within(0, 2 * np.pi),

@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 #: mode, and many of the precession.
 PILOT_SHARE, PILOT_S, PILOT_SHARE_OF_SHORT = 1 / 30, 2.0, 1 / 5
 #: Shorter motions [s] are integrated in the careful way.
-SHORTEST_S = 0.5
+SHORTEST_S = 1.0
 #: Stops of the pilot run, where both runs are compared.
 PILOT_STOPS = 16
 #: The other run of the pilot has steps so many times as long, or as short where they would be too long.
@@ -158,7 +158,12 @@ def run_by_forecast(
     """
     drive = problem.scene.drive
     smooth = drive.off_s is None or drive.waveform == "off"
-    if abs(duration) < SHORTEST_S or isinstance(problem.model.magnet, Disc) or not smooth:
+    if (
+        abs(duration) < SHORTEST_S
+        or turning_rate(problem.model, problem.start) == 0
+        or isinstance(problem.model.magnet, Disc)
+        or not smooth
+    ):
         return None
     return _Forecast(problem, duration, tolerance, samples).run(progress)
 

@@ -1,9 +1,9 @@
-"""The step by forecast: errors near to the tolerance, bounded by their estimates, and where the careful way is taken."""
+"""The step by forecast: errors near to the tolerance and below their estimates, and where the careful way is taken."""
 
 import numpy as np
 import pytest
-from accuracy import KINDS, trial
 
+from accuracy import KINDS, trial
 from levilab.simulator import forecast
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
