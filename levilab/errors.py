@@ -55,7 +55,15 @@ class DoesNotSuit(DataError):
 
 
 class NoneUsable(DataError):
-    """A folder without anything that an analysis can use."""
+    """A folder without anything that an analysis can use.
+
+    Attributes:
+        reasons: why each of what is there cannot be used.
+    """
+
+    def __init__(self, text: str, reasons: tuple[str, ...] = ()) -> None:
+        self.reasons = reasons
+        super().__init__(text)
 
 
 class NoInstrument(LevilabError):
@@ -68,6 +76,10 @@ class SimulationError(LevilabError):
 
 class LeftRange(SimulationError):
     """A motion whose numbers leave their range, as at the base's edges, so that it cannot be continued."""
+
+
+class WorkersLost(LevilabError):
+    """The processes or machines that were to do the work cannot be reached, or cannot do it; results so far stand."""
 
 
 def _short_text(value: object) -> str:

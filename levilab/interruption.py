@@ -2,7 +2,8 @@
 
 An acquisition finishes its reading, switches the outputs off and keeps the run (`watching_for_interruption`).  A server
 ends when its event loop has its turn (`watching_for_end`).  Work that must not be torn postpones Ctrl-C
-(`interruption_postponed`).  Elsewhere Ctrl-C is Python's KeyboardInterrupt, which the command line turns into one line
+(`interruption_postponed`).  A process that works for another leaves Ctrl-C to that one (`interruption_blocked`,
+`ignore_interruption`).  Elsewhere Ctrl-C is Python's KeyboardInterrupt, which the command line turns into one line
 and an exit status.
 """
 
@@ -156,3 +157,24 @@ def interruption_postponed() -> Iterator[Callable[[], None]]:
     with postponed:
         yield admit
     admit()
+
+
+def ignore_interruption() -> None:
+    """Ignore Ctrl-C in this process from now on: the process that started it receives it as well, and ends it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+@contextlib.contextmanager
+def interruption_blocked() -> Iterator[None]:
+    """Block Ctrl-C for the moment in which a process is started: it inherits that, and this process gets it afterwards.
+
+    On Windows nothing is blocked; what is started there ignores Ctrl-C once it calls `ignore_interruption`.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

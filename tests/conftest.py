@@ -27,9 +27,9 @@ SLOW = """
     levilab/pipelines/spindown  levilab/pipelines/test_result.py
     levilab/report/test_page.py
     levilab/runs/test_hostile.py  levilab/runs/test_kill.py
-    levilab/simulator  ../levilab/simulator  levilab/stability
+    levilab/simulator  ../levilab/simulator  levilab/stability  levilab/sweeps/test_killed.py
     levilab/world/test_base.py  levilab/world/test_motion_world.py  levilab/world/test_serve.py
-    levilab/world/test_spin_world.py
+    levilab/workers  levilab/world/test_spin_world.py
     test_documentation.py
 """
 

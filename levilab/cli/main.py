@@ -129,6 +129,22 @@ def stability() -> Callable[..., None]:
     return stability
 
 
+@app.command(
+    cls=Later,
+    epilog="Example: levilab sweep undriven --sweep start.spin_hz=18:40:23 --sweep top.mass_kg=0.0250:0.0255:11 "
+    "--duration 5 --out map.zarr",
+)
+def sweep() -> Callable[..., None]:
+    """Map a scene over its parameters: does the top survive, and how long, at each of thousands of points.
+
+    Results go chunk by chunk into a store of Zarr.  Ctrl-C costs only the chunks under way, and --resume goes on.
+    The store's name instead of a scene shows its summary and draws its figure again, without simulating.
+    """
+    from levilab.cli.sweep import sweep
+
+    return sweep
+
+
 @app.command(cls=Later, epilog="Example: levilab crosscheck spindown --trials 100")
 def crosscheck() -> Callable[..., None]:
     """Check the analyses: simulate, acquire through the real drivers, analyze, and compare with the truth, many times.

@@ -11,7 +11,7 @@ from levilab.cli import exit_codes
 from levilab.present.characters import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
 
 def print_json(document: Any, *, indent: int | None = 2, sort_keys: bool = False) -> None:
@@ -32,10 +32,10 @@ def message(text: str) -> None:
 
 
 @contextlib.contextmanager
-def interruptible(what_is_left: str) -> Iterator[None]:
-    """Ctrl-C ends the command with one line."""
+def interruptible(what_is_left: str | Callable[[], str]) -> Iterator[None]:
+    """Ctrl-C ends the command with one line, which says what is left."""
     try:
         yield
     except KeyboardInterrupt:
-        message(f"levilab: interrupted, {what_is_left}")
+        message(f"levilab: interrupted, {what_is_left if isinstance(what_is_left, str) else what_is_left()}")
         raise typer.Exit(exit_codes.INTERRUPTED) from None

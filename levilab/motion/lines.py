@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.lines import FEWEST, LOBE, amplitude_spectrum, spectral_lines
+from levilab.motion.lock import keeps_phase
 from levilab.simulator.equilibrium import modes_at
 
 if TYPE_CHECKING:
@@ -24,8 +25,6 @@ Array = NDArray[np.float64]
 NEAR_HZ, NEAR_SHARE = 0.1, 0.06
 #: A line within this distance of a stronger, named one is its sideband [Hz].
 SIDEBAND_HZ = 2.0
-#: A top whose mean spin is farther than this from the drive's frequency is not locked [Hz].
-UNLOCKED_HZ = 0.5
 #: In a shorter motion lines cannot be distinguished [s]; of a longer one this part shows them all, and the rest would
 #: only broaden lines that are never quite steady.
 SHORTEST_S, LONGEST_S = 1.0, 300.0
@@ -144,8 +143,7 @@ def _expected_lines(motion: Trajectory) -> dict[str, float]:
     if scene.drive.waveform != "off" and scene.drive.amplitude_t > 0:
         places["drive"] = math.copysign(scene.drive.frequency_hz, scene.start.spin_hz)
     spin = float(motion.spin_hz.mean())
-    locked = abs(spin - places.get("drive", math.inf)) < UNLOCKED_HZ  # then the wobble is the drive's line
-    if not scene.top.aligned and not locked:
+    if not scene.top.aligned and not keeps_phase(scene, motion.states):  # otherwise the wobble is the drive's line
         places["wobble, once a turn"] = spin
     return places | _modes(motion)
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from levilab.files import finite
 from levilab.motion.lines import LONGEST_S, AxisLines, lines_of, rate_for
+from levilab.motion.lock import is_locked
 from levilab.simulator.equilibrium import advice, stability_of
 from levilab.simulator.scene import remarks
 
@@ -120,6 +121,12 @@ def summarise(motion: Trajectory, duration: float, rate: float, computing: float
     return Summary(motion, duration, rate, computing, lines, change, tuple(_notes(motion, lines, rate)))
 
 
+def height_range(motion: Trajectory) -> tuple[float, float]:
+    """Return the lowest and the highest place of the samples [m], up to the end or to the fall."""
+    height = motion.position[:, 2]
+    return float(height.min()), float(height.max())
+
+
 def changing_energy(scene: Scene) -> tuple[str, ...]:
     """Return what changes the energy in a scene, in words; empty if the energy is conserved."""
     there = {
@@ -192,6 +199,7 @@ def as_document(summary: Summary) -> dict[str, Any]:
     """Return the summary for programs, with units in the names; a value that is not finite is null."""
     motion = summary.motion
     height, accuracy, fell = motion.position[:, 2], motion.accuracy, motion.fell
+    lowest, highest = height_range(motion)
     document = {
         "scene": motion.scene.name,
         "survived": motion.survived,
@@ -199,8 +207,8 @@ def as_document(summary: Summary) -> dict[str, Any]:
         "duration_s": summary.duration,
         "end_s": summary.end,
         "height_mean_m": float(height.mean()),
-        "height_min_m": float(height.min()),
-        "height_max_m": float(height.max()),
+        "height_min_m": lowest,
+        "height_max_m": highest,
         "distance_from_axis_max_m": float(np.hypot(*motion.position[:, :2].T).max()),
         "tilt_max_rad": float(motion.tilt.max()),
         "spin_start_hz": float(motion.spin_hz[0]),
@@ -208,6 +216,7 @@ def as_document(summary: Summary) -> dict[str, Any]:
         "spin_mean_hz": float(motion.spin_hz.mean()),
         "spin_min_hz": float(motion.spin_hz.min()),
         "spin_max_hz": float(motion.spin_hz.max()),
+        "locked": is_locked(motion.scene, motion.states, survived=motion.survived),
         **_washers(motion),
         "energy_conserved": not changing_energy(motion.scene),
         "energy_change_relative": summary.energy_change,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from rich.markup import escape
 
 from levilab.motion.effects import LEAST_HZ, LEAST_M
+from levilab.motion.lock import is_locked
 from levilab.motion.summary import changing_energy
 from levilab.present.terminal import new_table, terminal
 
@@ -60,6 +61,8 @@ def _motion_facts(summary: Summary) -> list[tuple[str, str]]:
     if motion.scene.washers.inertia_kg_m2 > 0:
         washers = motion.washer_spin_hz
         facts.append(("loose washers", f"{washers[0]:.3f} Hz at the start, {washers[-1]:.3f} Hz at the end"))
+    if (locked := is_locked(motion.scene, motion.states, survived=motion.survived)) is not None:
+        facts.append(("drive", "holds the top, which is locked to it" if locked else "does not hold the top"))
     facts.append(("tilt", f"up to {_angle(float(motion.tilt.max()))}"))
     return facts
 

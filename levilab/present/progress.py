@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import time
 from typing import TYPE_CHECKING, Protocol
@@ -115,36 +116,75 @@ def to_stderr() -> Display:
     return BarDisplay() if sys.stderr.isatty() else LineDisplay()
 
 
+def time_in_words(seconds: float) -> str:
+    """Return a time that is not known well, in whole seconds, minutes, hours or days.
+
+    >>> [time_in_words(seconds) for seconds in (0.2, 47, 130, 4000, 40_000, 400_000)]
+    ['1 s', '47 s', '2 min', '1 h 7 min', '11 h', '5 days']
+    """
+    minutes = round(seconds / 60)
+    if seconds < 99.5:
+        return f"{max(round(seconds), 1)} s"
+    if minutes < 60:
+        return f"{minutes} min"
+    if minutes < 5 * 60:
+        return f"{minutes // 60} h {minutes % 60} min"
+    return f"{round(minutes / 60)} h" if minutes < 48 * 60 else f"{round(minutes / 60 / 24)} days"
+
+
 class ShareBar:
     """A bar on a terminal for work whose progress is known, once it takes longer than a second.
 
     A share that goes back is a new attempt: a simulation tries shorter steps until its error is small enough.
+
+    Args:
+        description: of the work.
+        first: the share that was done before.
+        line_every: print a line so often [s] where no bar can be seen, as in the log of a batch system; None: never.
     """
 
-    def __init__(self, description: str) -> None:
-        self._description = description
-        self._begin = time.monotonic()
+    def __init__(self, description: str, *, first: float = 0.0, line_every: float | None = None) -> None:
+        self._description, self._line_every = description, line_every
+        self._begin = self._line = time.monotonic()
         self._bar: Progress | None = None
-        self._last, self._attempt = 0.0, 1
+        self._first = self._last = first
+        self._attempt = 1
 
-    def __call__(self, share: float) -> None:
-        """Show the share that is done."""
+    def __call__(self, share: float, description: str = "") -> None:
+        """Show the share that is done, and of what, if that changes."""
+        now = time.monotonic()
+        self._description = description or self._description
         if share < self._last:
             self._attempt += 1
+            self._first, self._begin = 0.0, now
         self._last = share
-        if self._bar is None and sys.stderr.isatty() and time.monotonic() - self._begin > 1:
+        left = self._time_left(share, now)
+        if self._bar is None and sys.stderr.isatty() and (now - self._begin > 1 or self._attempt > 1):
             self._bar = self._opened()
         if self._bar is not None:
             again = f", attempt {self._attempt} with shorter steps" if self._attempt > 1 else ""
-            self._bar.update(self._task, description=self._description + again, completed=share)
+            self._bar.update(self._task, description=self._description + again, completed=share, left=left)
+        elif self._line_every is not None and now - self._line >= self._line_every:
+            self._line = now
+            with contextlib.suppress(OSError):  # a closed standard error ends no work
+                text = f"{self._description}: {100 * share:.0f} %{', ' * bool(left)}{left}"
+                print(printable(text), file=sys.stderr, flush=True)  # noqa: T201 - this is where it is shown
+
+    def _time_left(self, share: float, now: float) -> str:
+        """Return how long the rest takes if it goes on as it did since the first share; empty where that is unknown."""
+        since, passed = share - self._first, now - self._begin
+        if since <= 0 or share >= 1 or passed < 1:
+            return ""
+        return f"about {time_in_words(passed * (1 - share) / since)} left"
 
     def _opened(self) -> Progress:
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn
 
-        columns = TextColumn("{task.description}"), BarColumn(bar_width=30), TextColumn("{task.percentage:3.0f} %")
+        percentage, left = TextColumn("{task.percentage:3.0f} %"), TextColumn("{task.fields[left]}")
+        columns = TextColumn("{task.description}"), BarColumn(bar_width=30), percentage, left
         bar = Progress(*columns, console=Console(stderr=True), transient=True)
-        self._task = bar.add_task(self._description, total=1.0)
+        self._task = bar.add_task(self._description, total=1.0, left="")
         bar.start()
         return bar
 

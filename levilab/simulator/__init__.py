@@ -16,14 +16,16 @@ from typing import TYPE_CHECKING, Any
 from levilab.errors import SimulationError
 
 if TYPE_CHECKING:
-    from levilab.simulator.ensemble import Ensemble, simulate_many
+    from levilab.simulator.ensemble import Ensemble, grid, simulate_many, step_share_of
     from levilab.simulator.scene import Scene, SceneError, preset, presets, read_scene, with_settings
     from levilab.simulator.single import simulate
     from levilab.simulator.trajectory import Accuracy, Event, Trajectory
 
 _HOME = {
     "Ensemble": "ensemble",
+    "grid": "ensemble",
     "simulate_many": "ensemble",
+    "step_share_of": "ensemble",
     "Scene": "scene",
     "SceneError": "scene",
     "preset": "scene",
@@ -38,7 +40,7 @@ _HOME = {
 
 __all__ = [
     "Accuracy", "Ensemble", "Event", "Scene", "SceneError", "SimulationError", "Trajectory",
-    "preset", "presets", "read_scene", "simulate", "simulate_many", "with_settings",
+    "grid", "preset", "presets", "read_scene", "simulate", "simulate_many", "step_share_of", "with_settings",
 ]  # fmt: skip
 
 

@@ -96,6 +96,7 @@ def simulate_many(
     *,
     tolerance: float = 1e-7,
     step: float | None = None,
+    step_share: float | None = None,
     cores: int | None = None,
     errors: bool = True,
     progress: Callable[[float], None] | None = None,
@@ -108,6 +109,8 @@ def simulate_many(
         duration: of each motion [s].
         tolerance: wanted error of place [m] and axis [rad] at the end; the step is chosen for it, on a few of the tops.
         step: of all tops [s]; None: the tolerance decides it.
+        step_share: the part of its own longest step that each top takes, from `step_share_of`; None: found on some of
+            these tops.  With it, each top's result depends on its own numbers alone, to the last bit.
         cores: number of threads; None: one for each core of the machine.
         errors: estimate every top's error by a second, coarser run, which takes half as long again.
         progress: called with the share of the work that is done.
@@ -137,7 +140,10 @@ def simulate_many(
         for i in range(values[0].size)
     ]
     longest = np.array([one.longest for one in tops])
-    steps = np.full(len(tops), step) if step else longest * _step_share(tops, _pilots(shape), duration, tolerance)
+    if step:
+        steps = np.full(len(tops), step)
+    else:
+        steps = longest * (step_share or _step_share([tops[i] for i in sorted(_pilots(shape))], duration, tolerance))
     ends = _Ends.empty(len(tops))
     threads = cores or os.cpu_count() or 1
     work = [part for group in _groups(tops) for part in _parts(group, threads)]
@@ -157,6 +163,50 @@ def simulate_many(
         ends.position_error.reshape(shape),
         ends.axis_error.reshape(shape),
     )
+
+
+def step_share_of(
+    scene: Scene, over: Mapping[str, ArrayLike], duration: float = 30.0, *, tolerance: float = 1e-7
+) -> float:
+    """Choose the step of a whole map on a few of its tops, so that it can be computed in any parts.
+
+    Args:
+        scene: what the tops have in common.
+        over: as for `simulate_many`, of the whole map; `grid` gives that of axes.  What broadcasts takes no memory.
+        duration: of each motion [s].
+        tolerance: wanted error of place [m] and axis [rad] at the end.
+
+    Returns:
+        The part of its own longest step that a top takes: an argument of `simulate_many`.
+
+    Raises:
+        SceneError, SimulationError: as `simulate_many`.
+
+    >>> import numpy as np
+    >>> from levilab.simulator.scene import preset
+    >>> axes = {"start.spin_hz": np.linspace(20, 40, 5000), "top.mass_kg": np.linspace(0.0249, 0.0254, 2000)}
+    >>> 0 < step_share_of(preset("undriven"), grid(axes), 1.0, tolerance=1e-6) <= 1
+    True
+    """
+    check(duration=duration, tolerance=tolerance, rate=None, step=None)
+    keys, values = list(over), _broadcast(over)
+    some = [
+        _Top.of(scene.changed({key: _plain(v.flat[i]) for key, v in zip(keys, values, strict=False)}))
+        for i in sorted(_pilots(values[0].shape))
+    ]
+    return _step_share(some, duration, tolerance)
+
+
+def grid(axes: Mapping[str, ArrayLike]) -> dict[str, NDArray[Any]]:
+    """Return the values of axes, shape (n,) each, as arrays that broadcast to the map of all their combinations.
+
+    >>> {key: values.shape for key, values in grid({"start.spin_hz": [20, 30, 40], "top.mass_kg": [0.025]}).items()}
+    {'start.spin_hz': (3, 1), 'top.mass_kg': (1, 1)}
+    """
+    return {
+        key: np.asarray(values).reshape(*(-1 if i == at else 1 for i in range(len(axes))))
+        for at, (key, values) in enumerate(axes.items())
+    }
 
 
 def _broadcast(over: Mapping[str, ArrayLike]) -> list[NDArray[Any]]:
@@ -222,14 +272,14 @@ def _pilots(shape: tuple[int, ...]) -> set[int]:
     return {int(i) for i in flat} | {round(i) for i in np.linspace(0, size - 1, PILOTS)}
 
 
-def _step_share(tops: list[_Top], pilots: set[int], duration: float, tolerance: float) -> float:
+def _step_share(pilots: list[_Top], duration: float, tolerance: float) -> float:
     """Return the part of its longest step that keeps a top's error within the tolerance, found on the pilots."""
     time = min(duration, PILOT_DURATION)
     shares = []
-    for i in pilots:
-        motion = simulate(tops[i].problem.scene, time, tolerance=tolerance * time / duration, rate=None)
+    for one in pilots:
+        motion = simulate(one.problem.scene, time, tolerance=tolerance * time / duration, rate=None)
         if motion.accuracy.reached:
-            shares.append(motion.accuracy.step / tops[i].longest)
+            shares.append(motion.accuracy.step / one.longest)
     return min([*shares, LARGEST_SHARE])
 
 

@@ -59,16 +59,19 @@ def at_the_crossing(
     before = moved(after, -lengths)
     height = crossed_height(after, escape)
     low, high = np.zeros_like(lengths), lengths.copy()
-    time, states = lengths.copy(), after
+    time, states, found = lengths.copy(), after, np.zeros(lengths.shape, dtype=np.bool_)
     for _ in range(_MOST):
         up, sideways = _margins(states, escape)
         margin = np.where(height, up, sideways)
         low, high = np.where(margin > 0, time, low), np.where(margin > 0, high, time)
         newton = time + margin / (_margin_rates(states, height))
         better = np.where((newton > low) & (newton < high), newton, (low + high) / 2)
-        if np.all(np.abs(better - time) <= 1e-15 * lengths):
+        # a top that is there stays, however long others take: its result is its own, whatever is beside it
+        found |= np.abs(better - time) <= 1e-15 * lengths
+        if np.all(found):
             break
-        time, states = better, moved(before, better)
+        time = np.where(found, time, better)
+        states = moved(before, time)
     states = states.copy()
     states[:, TIME] = before[:, TIME] + time
     return states

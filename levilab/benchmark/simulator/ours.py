@@ -1,4 +1,4 @@
-"""The simulator's own points: each scheme at fixed steps, lanes, and all of `simulate` with its error estimate."""
+"""The kernels' own points: each scheme at fixed steps, without an error estimate; one top, and lanes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from levilab.simulator.model import model_of
 from levilab.simulator.problem import Problem
 from levilab.simulator.scene import preset
 from levilab.simulator.schemes import SCHEMES
-from levilab.simulator.single import simulate
 from levilab.simulator.start import start_of
 from levilab.simulator.stops import stops_between
 
@@ -66,14 +65,3 @@ def many(quick: bool) -> Iterator[Point]:  # noqa: FBT001
             advance_many(*arguments)
             seconds = best_time(partial(advance_many, *arguments))
             yield Point(f"{name}, lanes", f"{count} steps", error_of(ends[0, :3]), tops * motion.DURATION / seconds)
-
-
-def with_estimate(quick: bool) -> Iterator[Point]:  # noqa: FBT001
-    """`simulate` as it is called: the step searched for, the error estimated, arrays made."""
-    scene = preset("undriven")
-    for tolerance in (1e-3, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)[:: 2 if quick else 1]:
-        end = simulate(scene, motion.DURATION, tolerance=tolerance, rate=None)
-        seconds = best_time(partial(simulate, scene, motion.DURATION, tolerance=tolerance, rate=None))
-        yield Point(
-            "simulate, all in all", f"tolerance {tolerance:g}", error_of(end.position[-1]), motion.DURATION / seconds
-        )

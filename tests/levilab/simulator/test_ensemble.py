@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from levilab.simulator import SceneError, SimulationError
-from levilab.simulator.ensemble import _pilots, simulate_many
+from levilab.simulator.ensemble import _pilots, grid, simulate_many, step_share_of
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
 
@@ -102,6 +102,36 @@ def test_a_fixed_step_is_that_of_every_top():
     for i, spin in enumerate(spins):
         alone = simulate(UNDRIVEN.changed({"start.spin_hz": spin}), 0.1, step=1e-3, rate=None)
         assert there.position[i] == pytest.approx(alone.position[-1], abs=1e-15)
+
+
+CUT = {
+    "aligned": (KINDS["aligned"], {"start.spin_hz": [12.0, 19.0, 24.0], "top.mass_kg": np.linspace(0.0251, 0.027, 9)}),
+    "square": (KINDS["square"], {"drive.frequency_hz": np.linspace(28, 32, 4), "drive.amplitude_t": [0.0, 1e-4, 4e-4]}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", CUT)
+def test_a_map_has_the_same_bits_however_it_is_cut(kind):
+    scene, axes = CUT[kind]
+    over = grid(axes)
+    share = step_share_of(scene, over, 1.0, tolerance=1e-8)
+    whole = simulate_many(scene, over, 1.0, step_share=share, cores=1)
+    shape = whole.survived.shape
+
+    def same(part, where):
+        for name in ("states", "survived", "position_error", "axis_error"):
+            assert getattr(part, name).tobytes() == getattr(whole, name)[where].tobytes(), name
+
+    same(simulate_many(scene, over, 1.0, step_share=share, cores=2), ...)
+    for i in range(shape[0]):
+        row = {key: np.broadcast_to(values, shape)[i] for key, values in over.items()}
+        same(simulate_many(scene, row, 1.0, step_share=share), i)
+    shuffled = np.random.default_rng(0).permutation(np.array(list(np.ndindex(shape)))).T
+    points = {key: np.broadcast_to(values, shape)[*shuffled] for key, values in over.items()}
+    same(simulate_many(scene, points, 1.0, step_share=share, cores=2), tuple(shuffled))
+    for i, j in ((0, 0), (1, 2), (shape[0] - 1, shape[1] - 1)):
+        point = {key: np.broadcast_to(values, shape)[i, j] for key, values in over.items()}
+        same(simulate_many(scene, point, 1.0, step_share=share), (i, j))
 
 
 def test_the_spin_is_that_of_each_tops_own_washers():

@@ -1,0 +1,201 @@
+"""The command of sweeps.  Heavy imports happen where they are needed."""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from levilab.cli.options import Json, Settings
+from levilab.cli.output import interruptible, message, print_json, result
+from levilab.errors import DataError, UsageError, WorkersLost
+
+if TYPE_CHECKING:
+    from levilab.sweeps.store import Store
+
+#: So often a line says how far the work is where no bar can be seen [s].
+LINE_EVERY_S = 60.0
+
+
+def sweep(
+    scene: Annotated[
+        str,
+        typer.Argument(
+            metavar="SCENE|STORE",
+            help="What is swept: undriven, friction, tilted, driven, loose-washers, precession, spindown, or a file.  "
+            "Or the store of a sweep, NAME.zarr, which is shown, and with --resume continued.",
+        ),
+    ],
+    sweep: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KEY=FROM:TO:N",
+            help="An axis: N values of a key of the scene, in its unit; :log behind N spaces them logarithmically.  "
+            "Repeatable, up to three.",
+        ),
+    ] = None,
+    points: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.csv", help="A table of points instead: its columns are named by keys, its rows are points."
+        ),
+    ] = None,
+    observe: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,…", help="What is observed; a wrong name lists them all.", show_default="survived,lifetime_s"
+        ),
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(metavar="S", help="Seconds that are simulated at each point.", show_default="30")
+    ] = None,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(
+            metavar="X", help="Wanted error at the end, of the place in m and of the axis in rad.", show_default="1e-6"
+        ),
+    ] = None,
+    settings: Settings = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Of the points that --adaptive checks at random.", show_default="0")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="STORE.zarr", help="Where the results go.", show_default="NAME.zarr")
+    ] = None,
+    cores: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Processes on this machine.", show_default="one a core")
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help=r"Compute on a Dask cluster, as tcp://10.0.0.1:8786; needs levilab\[cluster]."
+        ),
+    ] = None,
+    adaptive: Annotated[
+        bool,
+        typer.Option(
+            "--adaptive",
+            help="Compute points along the boundary of survival (or of what is observed and yes or no), fill in the "
+            "rest, and say what that may have missed.",
+        ),
+    ] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with a store that is there, where it was interrupted.")
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Map a scene over its parameters."""
+    given = {
+        "sweep": sweep, "points": points, "observe": observe, "duration": duration, "tolerance": tolerance,
+        "settings": settings, "seed": seed, "out": out, "adaptive": adaptive or None,
+    }  # fmt: skip
+    if scheduler is not None and cores is not None:
+        raise UsageError("cores", "a cluster has its own workers: leave it out, or leave out `scheduler`")
+    shown = _is_store(scene)
+    store = _opened(Path(scene), given, resume=resume) if shown else _begun(scene, given, resume=resume)
+    if resume or not shown:
+        _computed(store, cores, scheduler)
+    _shown(store, as_json=as_json)
+
+
+def _is_store(scene: str) -> bool:
+    return Path(scene).suffix == ".zarr" or (Path(scene) / "zarr.json").exists()
+
+
+def _opened(path: Path, given: dict[str, Any], *, resume: bool) -> Store:
+    """The store of a path, which says itself what is computed."""
+    if wrong := [name for name, value in given.items() if value is not None]:
+        raise UsageError(wrong[0], f"{path} has its own: leave it out, or name a scene for another sweep")
+    from levilab.sweeps.store import Store
+
+    if not path.exists():
+        raise DataError(f"{path}: there is no such store; levilab sweep SCENE with `out` = {path} makes one")
+    return Store.open(path, writable=resume)
+
+
+def _begun(name: str, given: dict[str, Any], *, resume: bool) -> Store:
+    """A new store, or the one that is there if it has the same plan."""
+    from levilab.cli.simulate import chosen_scene
+
+    scene = chosen_scene(name, given["settings"])
+
+    from levilab.sweeps.request import SweepRequest, store_for
+
+    out = given.pop("out") or Path(f"{scene.name or 'sweep'}.zarr")
+    request = SweepRequest(scene, **{name: value for name, value in given.items() if value is not None})
+    with interruptible("nothing was written"):
+        return store_for(request, out, message, resume=resume)
+
+
+def _computed(store: Store, cores: int | None, scheduler: str | None) -> None:
+    """Compute what is missing."""
+    from levilab.present.progress import ShareBar
+    from levilab.simulator.compilation import announce_compilation
+    from levilab.sweeps.adaptive import is_adaptive, run_adaptive
+    from levilab.sweeps.run import compile_for, run, workers_for
+
+    total = store.plan.chunk_count
+    if store.done == total:
+        message(f"{store.path} is complete: nothing is left to compute")
+        return
+    if store.done:
+        message(f"going on: {store.done} of {total} chunks are done")
+    for note in store.notes():
+        message(f"note: {note}")
+
+    def kept() -> str:
+        done = "what was computed is" if is_adaptive(store) else f"{store.done} of {total} chunks are"
+        return f"{done} kept in {store.path}; go on with: levilab sweep {store.path} --resume"
+
+    workers = workers_for(store.plan, cores, scheduler)
+    bar = ShareBar(f"{store.plan.size} points", first=store.done / total, line_every=LINE_EVERY_S)
+    with interruptible(kept), store.locked(), contextlib.closing(bar):
+        with announce_compilation(message):
+            compile_for(store.plan)
+        try:
+            if is_adaptive(store):
+                run_adaptive(store, workers, bar)
+            else:
+                run(store, workers, bar)
+        except WorkersLost as lost:
+            raise WorkersLost(f"{lost}; {kept()}") from lost
+
+
+def _shown(store: Store, *, as_json: bool) -> None:
+    """Print the summary and draw the figures."""
+    from levilab.sweeps.adaptive import report_in
+    from levilab.sweeps.summary import as_document, summarise
+
+    summary, report = summarise(store), report_in(store)
+    pictures = _drawn(store)
+    if as_json:
+        figures = [str(picture) for picture in pictures]
+        print_json(as_document(summary) | {"adaptive": report, "store": str(store.path), "figures": figures})
+        return
+    from levilab.present.terminal import draw, terminal
+    from levilab.sweeps.adaptive import in_words
+    from levilab.sweeps.table import FEW_POINTS, axes_lines, columns_table, headline, points_table
+
+    result(headline(summary))
+    for line in axes_lines(summary):
+        result(f"  {line}")
+    console = terminal()
+    console.print(draw(columns_table(summary)))
+    if len(store.plan.shape) == 1 and store.plan.size <= FEW_POINTS:
+        console.print(draw(points_table(store.load())))
+    for sentence in in_words(report, store.plan) if report else ():
+        console.print(f"• {sentence}", markup=False)
+    if summary.points < store.plan.size:
+        message(f"{summary.points} of {store.plan.size} points are known; levilab sweep {store.path} --resume goes on")
+
+
+def _drawn(store: Store) -> list[Path]:
+    """Draw a figure of each column beside the store, where the plan is a map."""
+    from levilab.sweeps.drawing import draw_figures
+
+    pictures = draw_figures(store)
+    for picture in pictures:
+        message(f"wrote {picture}")
+    return pictures

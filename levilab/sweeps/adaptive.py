@@ -1,0 +1,295 @@
+"""A map that is refined along its boundary, in a store: points go out round by round, and each has a mark.
+
+The mark of a point says whether it was computed or filled in.  Marks are written after values, chunk by chunk, so that
+what ends the process costs the last points at most; to go on, the refinement is run again from its beginning and finds
+its answers in the store.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections import deque
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from levilab.errors import UsageError, WorkersLost
+from levilab.files import writing
+from levilab.interruption import interruption_postponed
+from levilab.sweeps.observables import OBSERVABLES, columns_of, observe
+from levilab.sweeps.quantities import step_in_words
+from levilab.sweeps.refinement import AUDIT, CONFIDENCE, STRIDE, Points, Refined, refine
+from levilab.sweeps.store import COMPUTED, DONE, FILLED, STATUS
+from levilab.workers import results_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator
+
+    from numpy.typing import NDArray
+
+    from levilab.sweeps.plan import Plan
+    from levilab.sweeps.store import Store
+    from levilab.workers import Done, Workers
+
+#: Attributes of the store: what was asked for, and what came of it.
+ASKED, FOUND = "adaptive", "refined"
+#: Points of a task: enough to fill the lanes; a round is cut into about so many tasks; and no task has more.
+FEWEST, MANY, MOST = 64, 64, 4096
+#: After so many new points the store is written, or at the end of a round [points].
+KEPT = 20_000
+
+
+@dataclass(frozen=True)
+class PointsTask:
+    """Some points of a map.
+
+    Attributes:
+        plan: without the values of its axes.
+        points: flat indices into the map.
+        values: key → values at these points, shape (n,).
+    """
+
+    plan: Plan
+    points: Points
+    values: dict[str, NDArray[Any]]
+
+
+def compute_points(task: PointsTask) -> dict[str, NDArray[Any]]:
+    """Observe the points of a task: a function of the task alone, for any process on any machine."""
+    return observe(task.plan, task.values)
+
+
+def begin_adaptive(store: Store, observable: str = "survived", *, stride: int = STRIDE, audit: int = AUDIT) -> None:
+    """Make a new store adaptive.
+
+    Args:
+        store: nothing is computed in it.
+        observable: whose boundary is refined; it must be a yes or no, and the plan must have it.
+        stride: of the coarse grid, a power of 2 [points].
+        audit: points of each audit.
+
+    Raises:
+        UsageError: the plan or the observable does not allow it.
+    """
+    plan = store.plan
+    if plan.is_table:
+        raise UsageError("adaptive", "the rows of a table have no neighbours: give axes, FROM:TO:N")
+    columns = {column.name: column for column in columns_of(plan.observables)}
+    if observable not in columns or columns[observable].dtype != "bool":
+        flags = " or ".join(name for name, one in OBSERVABLES.items() if one.dtype == "bool")
+        expected = f"a boundary is one of a yes or no: `observe` must have {flags}, and this must be it"
+        raise UsageError("adaptive", expected, value=observable)
+    if stride < 2 or stride & (stride - 1):
+        raise UsageError("stride", "a power of 2 is expected, such as 8", value=stride)
+    if audit < 1:
+        raise UsageError("audit", "a number of points above 0 is expected", value=audit)
+    with _writing(store):
+        store.group.create_array(
+            STATUS,
+            shape=plan.shape,
+            chunks=plan.chunk,
+            dtype="uint8",
+            fill_value=0,
+            dimension_names=plan.dimensions,
+            attributes={
+                "unit": "1",
+                "meaning": f"{COMPUTED}: computed; {FILLED}: filled in from points around; 0: neither",
+            },
+        )
+        store.group.attrs[ASKED] = {"observable": observable, "stride": stride, "audit": audit}
+
+
+def is_adaptive(store: Store) -> bool:
+    """Whether a store is refined along a boundary."""
+    return ASKED in store.group.attrs
+
+
+def run_adaptive(store: Store, executor: Workers, progress: Callable[[float], None] | None = None) -> dict[str, Any]:
+    """Compute what an adaptive store lacks; what is there already is not computed again.
+
+    Returns:
+        What was computed and what may have been missed, as `report_of` does.
+
+    Raises:
+        CannotWrite: the store cannot be written.
+        WorkersLost, SimulationError: points could not be computed.
+    """
+    asked, plan = store.group.attrs[ASKED], store.plan
+    refinement = refine(plan.shape, stride=asked["stride"], audit=asked["audit"], seed=plan.seed)
+    run, feed = _Run.of(store, progress), _Feed()
+    with contextlib.closing(results_of(compute_points, feed, executor)) as results:
+        try:
+            question = next(refinement)
+            while True:
+                run.compute(run.missing(question.points), question.until, feed, results)
+                values = run.columns[asked["observable"]].flat[question.points]
+                question = refinement.send(np.asarray(values, dtype=np.bool_))
+        except StopIteration as end:
+            return run.finish(end.value)
+
+
+class _Feed:
+    """Tasks of one round after another, so that all rounds share one pool.
+
+    It runs dry at the end of a round.  `results_of` asks again after the last result of the round was taken, when the
+    next round's tasks are there.
+    """
+
+    def __init__(self) -> None:
+        self.tasks: deque[PointsTask] = deque()
+
+    def __iter__(self) -> _Feed:
+        return self
+
+    def __next__(self) -> PointsTask:
+        if not self.tasks:
+            raise StopIteration
+        return self.tasks.popleft()
+
+
+@dataclass
+class _Run:
+    """Values and marks in memory, and where they go.
+
+    Attributes:
+        store: where values and marks are kept.
+        columns: column → values, in the shape of the map.
+        status: of each point.
+        progress: called with the share of the work that is done.
+        share: of the work.
+        unwritten: points that are in memory alone.
+    """
+
+    store: Store
+    columns: dict[str, NDArray[Any]]
+    status: NDArray[np.uint8]
+    progress: Callable[[float], None] | None
+    share: float = 0.0
+    unwritten: list[Points] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, store: Store, progress: Callable[[float], None] | None) -> _Run:
+        names = [column.name for column in columns_of(store.plan.observables)]
+        columns = {name: np.asarray(store.group[name][...]) for name in names}
+        return cls(store, columns, np.asarray(store.group[STATUS][...]), progress)
+
+    def missing(self, points: Points) -> Points:
+        """Return those of the points that are not computed."""
+        return np.asarray(points[self.status.flat[points] != COMPUTED])
+
+    def compute(
+        self, points: Points, until: float, feed: _Feed, results: Generator[Done[PointsTask, dict[str, NDArray[Any]]]]
+    ) -> None:
+        """Compute points, all in one round."""
+        feed.tasks.extend(self.tasks_of(points))
+        begun, done = self.share, 0
+        while done < points.size:
+            one = next(results, None)
+            if one is None:
+                raise WorkersLost("the workers gave fewer results than they had tasks: start them anew, and resume")
+            self.keep(one)
+            done += one.task.points.size
+            self.share = max(begun + (until - begun) * done / points.size, begun)
+            if self.progress is not None:
+                self.progress(self.share)
+        self.write()
+
+    def tasks_of(self, points: Points) -> list[PointsTask]:
+        """Cut points into tasks."""
+        plan = self.store.plan
+        size = min(max(-(-points.size // MANY), FEWEST), MOST)
+        return [_task(plan, points[i : i + size]) for i in range(0, points.size, size)]
+
+    def keep(self, done: Done[PointsTask, dict[str, NDArray[Any]]]) -> None:
+        """Keep the result of a task in memory, and now and then in the store."""
+        if done.error is not None or done.result is None:
+            raise done.error or AssertionError
+        for name, values in done.result.items():
+            self.columns[name].flat[done.task.points] = values
+        self.status.flat[done.task.points] = COMPUTED
+        self.unwritten.append(done.task.points)
+        if sum(map(len, self.unwritten)) >= KEPT:
+            self.write()
+
+    def write(self) -> None:
+        """Write the chunks that hold new points: values first, then marks."""
+        if not self.unwritten:
+            return
+        plan = self.store.plan
+        places = np.unravel_index(np.concatenate(self.unwritten), plan.shape)
+        blocks = tuple(place // size for place, size in zip(places, plan.chunk, strict=True))
+        with _writing(self.store), interruption_postponed():
+            for number in np.unique(np.ravel_multi_index(blocks, plan.grid)):
+                box = plan.chunk_of(int(number)).box
+                for name, values in self.columns.items():
+                    self.store.group[name][box] = values[box]
+                self.store.group[STATUS][box] = self.status[box]
+        self.unwritten = []
+
+    def finish(self, found: Refined) -> dict[str, Any]:
+        """Fill in what was not computed, and write the report."""
+        store, report = self.store, report_of(found)
+        self.columns[store.group.attrs[ASKED]["observable"]][~found.computed] = found.values[~found.computed]
+        self.status[~found.computed] = FILLED
+        self.unwritten = [np.arange(found.values.size)]
+        self.write()
+        with _writing(store):
+            store.group.attrs[FOUND] = report
+            store.group[DONE][...] = 1
+        store.marks[...] = 1
+        return report
+
+
+def _writing(store: Store) -> contextlib.AbstractContextManager[None]:
+    return writing(f"{store.path}: cannot be written", "free space, then go on with `resume`")
+
+
+def _task(plan: Plan, points: Points) -> PointsTask:
+    places = np.unravel_index(points, plan.shape)
+    values = {axis.key: axis.values[place] for axis, place in zip(plan.axes, places, strict=True)}
+    return PointsTask(plan.without_values(), points, values)
+
+
+def report_of(found: Refined) -> dict[str, Any]:
+    """Return how much a refinement saved, and what it may have missed."""
+    return {
+        "points": found.values.size,
+        "computed": found.values.size - found.filled,
+        "filled": found.filled,
+        "saved": found.saved,
+        "strides": list(found.strides),
+        "audits": [vars(one) for one in found.audits],
+        "confidence": CONFIDENCE,
+        "most_wrong": found.most_wrong,
+        "most_wrong_share": found.most_wrong_share,
+    }
+
+
+def in_words(report: dict[str, Any], plan: Plan) -> list[str]:
+    """Return the report as sentences."""
+    *_, judge = report["audits"]
+    wrong = sum(audit["wrong"] for audit in report["audits"])
+    count = sum(audit["computed"] for audit in report["audits"])
+    size = " by ".join(
+        step_in_words(axis.key, axis.values, stride, logarithmic=axis.scale == "log")
+        for stride, axis in zip(report["strides"], plan.axes, strict=True)
+    )
+    share, limit = f"{100 * report['saved']:.0f} %", f"{100 * report['most_wrong_share']:.2g} %"
+    checked = f"{count} of those filled in were checked at random: {wrong} were wrong"
+    sure = (
+        f"with {100 * report['confidence']:.0f} % confidence at most {report['most_wrong']} ({limit}) of the "
+        f"{report['filled']} filled in are wrong: {judge['wrong']} of {judge['computed']} were in the last check"
+    )
+    return [
+        f"{report['computed']} of {report['points']} points were computed, {share} were filled in",
+        f"{checked}, and their surroundings were computed",
+        sure,
+        f"an island that holds a box of {size} is sure to be seen, a smaller one by chance alone",
+    ]
+
+
+def report_in(store: Store) -> dict[str, Any] | None:
+    """Return the report of an adaptive store that is complete; None of any other."""
+    found: dict[str, Any] | None = store.group.attrs.get(FOUND)
+    return found

@@ -1,0 +1,278 @@
+"""The axes of a sweep from KEY=FROM:TO:N or from a table of points; what the scene refuses is said before any work."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from levilab.errors import SimulationError, UsageError
+from levilab.formats.dialect import Dialect
+from levilab.settings import hint_about
+from levilab.simulator.keys import SceneError, short_text
+from levilab.simulator.scene import SWITCHES
+from levilab.simulator.start import start_of
+from levilab.sweeps.plan import Axis, Scale, unit_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+    from pathlib import Path
+
+    from levilab.simulator.scene import Scene
+
+#: Dimensions of a map: more can neither be drawn nor afforded.
+MOST_AXES = 3
+#: Values of one key, which are kept in memory.
+MOST_VALUES = 10_000_000
+#: So many values of an axis, or rows of a table, are tried in the scene before the work begins, besides the corners.
+TRIED = 200
+_EXPECTED = "KEY=FROM:TO:N is expected, such as start.spin_hz=18:40:23, or KEY=FROM:TO:N:log"
+
+
+def parse_axis(text: str) -> Axis:
+    """Return the axis of KEY=FROM:TO:N or KEY=FROM:TO:N:log.
+
+    Raises:
+        UsageError: it has another form, or its numbers make no axis.
+
+    >>> axis = parse_axis("start.tilt_rad=0.001:0.1:3:log")
+    >>> axis.key, axis.values.tolist(), axis.scale
+    ('start.tilt_rad', [0.001, 0.01, 0.1], 'log')
+    """
+    key, equals, spaced = (part.strip() for part in text.partition("="))
+    parts = [part.strip() for part in spaced.split(":")]
+    if not (key and equals and len(parts) in {3, 4}):
+        raise UsageError("sweep", _EXPECTED, value=text)
+    first, last = (_number(part, text) for part in parts[:2])
+    count = _count(parts[2], text)
+    scale = _scale(parts[3:], text)
+    _check_span(key, (first, last, count), scale, text)
+    values = np.geomspace(first, last, count) if scale == "log" else np.linspace(first, last, count)
+    return Axis(key, values, scale)
+
+
+def _number(part: str, text: str) -> float:
+    try:
+        number = float(part)
+    except ValueError:
+        hint = hint_about(part) or f"; {part!r} is no number, and words are swept by a table of `points`"
+        raise UsageError("sweep", f"{_EXPECTED}{hint}", value=text) from None
+    if not math.isfinite(number):
+        raise UsageError("sweep", f"{_EXPECTED}, with finite numbers", value=text)
+    return number
+
+
+def _count(part: str, text: str) -> int:
+    if not part.isdecimal():
+        raise UsageError("sweep", f"{_EXPECTED}; N, the number of values, is {part!r} here", value=text)
+    return int(part)
+
+
+def _scale(rest: Sequence[str], text: str) -> Scale:
+    if not rest or rest == ["linear"]:
+        return "linear"
+    if rest != ["log"]:
+        raise UsageError("sweep", f"{_EXPECTED}; after N stands log or nothing, not {rest[0]!r}", value=text)
+    return "log"
+
+
+def _check_span(key: str, span: tuple[float, float, int], scale: Scale, text: str) -> None:
+    """Raise UsageError unless first, last and how many make an axis of increasing values."""
+    first, last, count = span
+    ending = ":log" if scale == "log" else ""
+    if first == last or count == 1:
+        raise UsageError("sweep", f"one value is no axis: set it by `settings` = {key}={first:g}", value=text)
+    if first > last:
+        turned = f"{key}={last:g}:{first:g}:{count}{ending}"
+        raise UsageError("sweep", f"FROM is above TO: take {turned}, the map is the same", value=text)
+    if count < 2:
+        raise UsageError("sweep", f"{_EXPECTED}; N is the number of values, 2 or more", value=text)
+    if count > MOST_VALUES:
+        raise UsageError("sweep", f"at most {MOST_VALUES:.0e} values of a key are possible", value=text)
+    if scale == "log" and first <= 0:
+        raise UsageError("sweep", f"a logarithmic axis needs FROM above 0, not {first:g}; leave log out", value=text)
+    if (last - first) / count < 4 * max(math.ulp(first), math.ulp(last)):
+        raise UsageError("sweep", "its values lie so close that numbers cannot tell them apart", value=text)
+
+
+# --- a table of points ---
+
+
+def read_points(path: Path) -> tuple[Axis, ...]:
+    """Return the axes of a CSV table: its columns are named by keys of the scene, its rows are points.
+
+    Separators are commas, semicolons or tabs; with semicolons or tabs numbers may have decimal commas.
+
+    Raises:
+        UsageError: the file cannot be read, or holds no such table; with the line.
+    """
+    lines = _lines(path)
+    number, head = next(lines, (0, ""))
+    if not head:
+        raise UsageError("points", "it is empty; a first row with keys of the scene is expected", value=path)
+    separator = next((mark for mark in ";\t" if mark in head), ",")
+    dialect = Dialect(separator, ".")
+    keys = dialect.split(head)
+    if not all(keys) or len(set(keys)) < len(keys):
+        raise UsageError("points", f"line {number}: a key above each column is expected, each once", value=path)
+    rows = []
+    for number, line in lines:
+        cells = dialect.split(line)
+        if len(cells) != len(keys) or not all(cells):
+            raise UsageError("points", f"line {number}: {len(keys)} values are expected", value=path)
+        rows.append(cells)
+    if not rows:
+        raise UsageError("points", "it has no row below its keys", value=path)
+    columns = zip(*rows, strict=True)
+    return tuple(
+        Axis(key, _column(cells, decimal_comma=separator != ","), "table")
+        for key, cells in zip(keys, columns, strict=True)
+    )
+
+
+def _lines(path: Path) -> Iterator[tuple[int, str]]:
+    """Yield the lines that are neither blank nor comments, with their numbers.  Raises UsageError."""
+    try:
+        with path.open(encoding="utf-8-sig") as file:
+            for number, line in enumerate(file, 1):
+                if line.strip(" \t\n,;") and not line.lstrip().startswith("#"):
+                    yield number, line.rstrip("\n")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is no text in UTF-8"
+        raise UsageError("points", f"cannot be read ({reason}); a table of text is expected", value=path) from error
+
+
+def _column(cells: Sequence[str], *, decimal_comma: bool) -> np.ndarray[Any, np.dtype[Any]]:
+    """Return a column as numbers, or as words where one is no number."""
+    dialect = Dialect(None, "," if decimal_comma and any("," in cell for cell in cells) else ".")
+    try:
+        return np.array([dialect.number(cell) for cell in cells])
+    except ValueError:
+        return np.array(cells)
+
+
+# --- what the scene says ---
+
+
+def check_axes(scene: Scene, axes: Sequence[Axis], settings: Iterable[str] = ()) -> None:
+    """Raise UsageError for axes that the scene does not have or refuses, or that change nothing in it.
+
+    Args:
+        scene: with its settings.
+        axes: of the sweep.
+        settings: keys that are set for all points.
+    """
+    name = "points" if axes and axes[0].scale == "table" else "sweep"
+    if not axes:
+        raise UsageError("sweep", "no axis is given: at least one is needed, such as start.spin_hz=18:40:23")
+    if name == "sweep" and len(axes) > MOST_AXES:
+        expected = f"a map has at most {MOST_AXES}; sweep the others one by one, or give a table of `points`"
+        raise UsageError("sweep", expected, value=", ".join(axis.key for axis in axes))
+    for at, axis in enumerate(axes):
+        if axis.key in {other.key for other in axes[:at]}:
+            raise UsageError(name, "each key is swept once", value=axis.key)
+        if axis.key in settings:
+            raise UsageError(name, "`settings` has this key, too: leave one of them out", value=axis.key)
+        _check_key(scene, axis, name)
+    for values in _tried(axes):
+        _try(scene, values, name)
+
+
+def _check_key(scene: Scene, axis: Axis, name: str) -> None:
+    """Raise UsageError for a key that the scene does not have, or that takes other values than those of an axis."""
+    now = _value_of(scene, axis, name)
+    if isinstance(now, list):
+        parts = ", ".join(f"{axis.key}.{k}" for k in range(len(now)))
+        raise UsageError(name, f"it has {len(now)} numbers: sweep one of them, {parts}", value=axis.key)
+    if axis.key in {"name", "description", "observed"}:
+        raise UsageError(name, "it is the same for a whole map: set it by `settings`", value=axis.key)
+    if isinstance(now, str) and axis.values.dtype.kind == "f":
+        expected = f"it takes words, now {now}: give a table of `points` with a column {axis.key}, or a map for each"
+        raise UsageError(name, expected, value=axis.key)
+    if isinstance(now, float) and axis.values.dtype.kind == "U":
+        word = next(word for word in axis.values.tolist() if not _is_number(word))
+        raise UsageError(name, f"numbers are expected in its column, not {word!r}{hint_about(word)}", value=axis.key)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _value_of(scene: Scene, axis: Axis, name: str) -> Any:
+    """Return the scene's own value of an axis's key.  Raises UsageError where it has none."""
+    try:
+        scene.changed({axis.key: _plain(axis.values[0])})
+    except SceneError as error:
+        if "there is no key" in str(error):
+            raise UsageError(name, str(error).partition(": ")[2], value=axis.key) from error
+    at: Any = scene.as_table()
+    for part in axis.key.split("."):
+        if isinstance(at, dict) and part in at:
+            at = at[part]
+        elif isinstance(at, list) and part.isdecimal() and int(part) < len(at):
+            at = at[int(part)]
+        else:
+            raise UsageError(name, "there is no such number in the scene", value=axis.key)
+    if isinstance(at, dict):
+        raise UsageError(name, f"it is a table: sweep one of its keys, {', '.join(at)}", value=axis.key)
+    return at
+
+
+def _tried(axes: Sequence[Axis]) -> Iterator[dict[str, Any]]:
+    """Yield points at which the scene is tried: the corners, and some on the way along each axis."""
+    if axes[0].scale == "table":
+        count = len(axes[0].values)
+        rows = set(np.linspace(0, count - 1, min(count, TRIED)).round().astype(int).tolist())
+        for axis in axes:
+            if axis.values.dtype.kind == "f":
+                rows |= {int(np.argmin(axis.values)), int(np.argmax(axis.values))}
+        for row in sorted(rows):
+            yield {axis.key: _plain(axis.values[row]) for axis in axes}
+        return
+    for corner in itertools.product((0, -1), repeat=len(axes)):
+        yield {axis.key: float(axis.values[k]) for axis, k in zip(axes, corner, strict=True)}
+    for axis in axes:
+        for k in np.linspace(0, len(axis.values) - 1, min(len(axis.values), TRIED)).round().astype(int):
+            yield {other.key: float(other.values[0]) for other in axes} | {axis.key: float(axis.values[k])}
+
+
+def _try(scene: Scene, values: dict[str, Any], name: str) -> None:
+    """Raise UsageError where the scene refuses these values, or where one of them has no effect in it."""
+    at = ", ".join(f"{key} = {short_text(value)}" for key, value in values.items())
+    try:
+        changed = scene.changed(values)
+        start_of(changed)
+    except (SceneError, SimulationError) as error:
+        raise UsageError(name, f"at {at} the scene is refused: {error}") from error
+    for key in values:
+        table, _, part = key.partition(".")
+        for switch in SWITCHES:
+            if table == switch.table and part.split(".")[0] in switch.keys and switch.is_off(changed):
+                raise UsageError(name, f"at {at} it changes nothing, since {switch.why}", value=key)
+        if changed.start.place == "equilibrium" and key.startswith(("start.position_m", "start.velocity_m_s")):
+            raise UsageError(name, "it changes nothing, since start.place = equilibrium", value=key)
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def in_words(axis: Axis) -> str:
+    """Return an axis as a line: its key, its ends with the unit, how many values.
+
+    >>> in_words(parse_axis("top.mass_kg=0.025:0.0255:11"))
+    'top.mass_kg from 0.025 to 0.0255 kg, 11 values'
+    """
+    count = f"{len(axis.values)} values"
+    if axis.values.dtype.kind != "f":
+        return f"{axis.key}: {', '.join(sorted(set(axis.values.tolist())))}; {count}"
+    unit = unit_of(axis.key)
+    spaced = ", logarithmic" if axis.scale == "log" else ""
+    ends = f"from {axis.values.min():g} to {axis.values.max():g}"
+    return f"{axis.key} {ends}{'' if unit == '1' else ' ' + unit}, {count}{spaced}"

@@ -1,0 +1,142 @@
+"""The run of a sweep: chunks go out, results come back in any order, and each is written as it comes."""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from levilab.errors import LevilabError
+from levilab.interruption import interruption_postponed
+from levilab.simulator.compilation import announce_compilation
+from levilab.simulator.ensemble import grid, simulate_many, step_share_of
+from levilab.sweeps.cost import seconds_per_point
+from levilab.sweeps.observables import observe
+from levilab.workers import cluster, processes, results_of, this_process
+from levilab.workers.ways import cores as available_cores
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from numpy.typing import NDArray
+
+    from levilab.sweeps.plan import Chunk, Plan
+    from levilab.sweeps.store import Store
+    from levilab.workers import Workers
+
+#: What one core computes so quickly [s] is not worth the start of other processes.
+QUICK_S = 4.0
+#: A sweep ends when so many chunks have failed: the others would, too.
+MOST_FAILURES = 20
+#: So much is simulated to have the kernels compiled before workers need them [s].
+_FIRST_S = 1e-3
+
+
+class ChunksFailed(LevilabError):
+    """Some chunks could not be computed."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """One chunk with all that a worker needs for it.
+
+    Attributes:
+        plan: without the values of its axes.
+        chunk: which part of the map it is.
+        values: key → values at its points.
+    """
+
+    plan: Plan
+    chunk: Chunk
+    values: dict[str, NDArray[Any]]
+
+
+def compute(task: Task) -> dict[str, NDArray[Any]]:
+    """Observe the points of a task: a function of the task alone, for any process on any machine."""
+    return observe(task.plan, task.values)
+
+
+def with_step(plan: Plan, message: Callable[[str], None]) -> Plan:
+    """Return the plan with the step of all its motions, chosen on some of them.
+
+    Args:
+        plan: without a step.
+        message: called with what takes a moment.
+
+    Raises:
+        SceneError, SimulationError: some of the points cannot be simulated.
+    """
+    with announce_compilation(message):
+        over = {axis.key: axis.values for axis in plan.axes} if plan.is_table else _grid(plan)
+        return replace(plan, step_share=step_share_of(plan.scene, over, plan.duration_s, tolerance=plan.tolerance))
+
+
+def _grid(plan: Plan) -> dict[str, NDArray[Any]]:
+    return grid({axis.key: axis.values for axis in plan.axes})
+
+
+def compile_for(plan: Plan) -> None:
+    """Compile the kernels of a plan's first point: workers find them on the disk, and need not all compile them."""
+    values = {axis.key: axis.values[:1] for axis in plan.axes}
+    with interruption_postponed():
+        simulate_many(plan.scene, values, min(_FIRST_S, plan.duration_s), step=_FIRST_S, errors=False, cores=1)
+
+
+def tasks_of(store: Store) -> Iterator[Task]:
+    """Yield the tasks that are left, made as they are asked for."""
+    light = store.plan.without_values()
+    return (Task(light, chunk, store.plan.values_of(chunk)) for chunk in store.missing())
+
+
+def workers_for(plan: Plan, count: int | None = None, scheduler: str | None = None) -> Workers:
+    """Return where a plan is computed: on a cluster, in this process if it is quick, else in several.
+
+    Args:
+        plan: decides whether other processes are worth their start.
+        count: of processes on this machine; None: one for each core.
+        scheduler: address of a Dask cluster; None: on this machine.
+    """
+    if scheduler is not None:
+        return cluster(scheduler)
+    most = min(count or available_cores(), plan.chunk_count)
+    quick = plan.size * seconds_per_point(plan) < QUICK_S
+    return this_process() if quick or most == 1 else processes(most)
+
+
+def run(store: Store, workers: Workers | None = None, progress: Callable[[float], None] | None = None) -> None:
+    """Compute what is missing in a store.
+
+    Args:
+        store: takes the results, chunk by chunk.
+        workers: compute them; None: this process.
+        progress: called with the share of the chunks that are done.
+
+    Raises:
+        ChunksFailed: some could not be computed; the others are done.
+        CannotWrite, WorkersLost: what is done so far is in the store.
+    """
+    failed: list[tuple[Chunk, Exception]] = []
+    with contextlib.closing(results_of(compute, tasks_of(store), workers or this_process())) as results:
+        for done in results:
+            if done.result is not None:
+                with interruption_postponed():
+                    store.write(done.task.chunk, done.result)
+                if progress is not None:
+                    progress(store.done / store.plan.chunk_count)
+            elif isinstance(done.error, LevilabError):
+                failed.append((done.task.chunk, done.error))
+                if len(failed) == MOST_FAILURES:
+                    break
+            elif done.error is not None:  # a defect of this program
+                raise done.error
+    if failed:
+        raise ChunksFailed(_why(failed, store))
+
+
+def _why(failed: list[tuple[Chunk, Exception]], store: Store) -> str:
+    chunk, error = failed[0]
+    first, last = chunk.start, tuple(k - 1 for k in chunk.stop)
+    ends = [store.plan.point(index) for index in (first, last)]
+    where = ", ".join(f"{key} from {ends[0][key]} to {ends[1][key]}" for key in ends[0])
+    count = f"{len(failed)} of {store.plan.chunk_count} chunks" if len(failed) > 1 else "a chunk"
+    return f"{count} could not be computed, the first of {where}: {error}; `resume` tries again"

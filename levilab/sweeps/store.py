@@ -1,0 +1,277 @@
+"""Where the results of a sweep are kept: a group of Zarr v3, in a folder or in memory.
+
+Each column is an array whose chunks are those of the plan, each axis a coordinate, and `done` marks the chunks that are
+written.  The process that made the plan is the only one that writes: a chunk's values first, then its mark, so that
+whatever ends the process costs at most the chunks that have no mark.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from levilab.errors import DataError
+from levilab.files import CannotWrite, writing
+from levilab.runs.run import utc_now
+from levilab.simulator.keys import SceneError, short_text
+from levilab.software import software_versions
+from levilab.sweeps.observables import columns_of
+from levilab.sweeps.plan import Axis, Chunk, Plan, unit_of
+from levilab.sweeps.quantities import quantity_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from numpy.typing import NDArray
+
+SCHEMA = "levilab-sweep/1"
+DONE = "done"
+#: Of an adaptive map: an array with a mark for each point.
+STATUS, COMPUTED, FILLED = "status", 1, 2
+#: Marks that share a file.
+MARKS = 4096
+
+
+@dataclass(frozen=True)
+class Map:
+    """What a sweep has found so far.
+
+    Attributes:
+        plan: of the sweep.
+        values: column → values, in the shape of the plan; what is not computed is NaN, False or 0.
+        computed: whether a point is computed, in the shape of the plan.
+        filled: whether a point of an adaptive map is filled in from points around it; None of a map that is not.
+    """
+
+    plan: Plan
+    values: dict[str, NDArray[Any]]
+    computed: NDArray[np.bool_]
+    filled: NDArray[np.bool_] | None = None
+
+
+@dataclass(frozen=True)
+class Store:
+    """The results of a sweep.
+
+    Attributes:
+        plan: what is to be computed.
+        group: of Zarr.
+        path: of its folder; None in memory.
+        marks: 1 where a chunk is done, shape (chunks,).
+    """
+
+    plan: Plan
+    group: Any
+    path: Path | None
+    marks: NDArray[np.uint8] = field(repr=False)
+
+    @classmethod
+    def create(cls, path: Path | None, plan: Plan) -> Store:
+        """Make a store for a plan.
+
+        Args:
+            path: of a folder that does not exist; None: in memory.
+            plan: what is to be computed.
+
+        Raises:
+            CannotWrite: something is there already, or the folder cannot be made.
+        """
+        import zarr
+
+        if path is not None and path.exists():
+            raise CannotWrite(f"{path} is there already: give another place with `out`, or go on with it by `resume`")
+        with writing(f"{path} cannot be made"):
+            if path is not None:
+                path.parent.mkdir(parents=True, exist_ok=True)
+            group = zarr.create_group(
+                zarr.storage.MemoryStore() if path is None else str(path),
+                attributes={
+                    "schema": SCHEMA,
+                    "plan": plan.as_table(),
+                    "scene_toml": plan.scene.as_toml(),
+                    "synthetic": True,
+                    "software": software_versions(),
+                    "processor": processor(),
+                    "created_utc": utc_now(),
+                    "command_line": sys.argv,
+                },
+            )
+            for axis in plan.axes:
+                _add_coordinate(group, axis, plan.dimensions[0] if plan.is_table else axis.key)
+            for column in columns_of(plan.observables):
+                group.create_array(
+                    column.name,
+                    shape=plan.shape,
+                    chunks=plan.chunk,
+                    dtype=column.dtype,
+                    fill_value=np.nan if column.dtype.startswith("float") else 0,
+                    dimension_names=plan.dimensions,
+                    attributes=_described(column.unit, column.meaning),
+                )
+            group.create_array(
+                DONE,
+                shape=(plan.chunk_count,),
+                chunks=(min(MARKS, plan.chunk_count),),
+                dtype="uint8",
+                fill_value=0,
+                dimension_names=("chunk",),
+                attributes=_described("1", "whether a chunk is written, in the order of their numbers"),
+            )
+        return cls(plan, group, path, np.zeros(plan.chunk_count, dtype=np.uint8))
+
+    @classmethod
+    def open(cls, path: Path, *, writable: bool = False) -> Store:
+        """Open a store.  Raises DataError where there is none."""
+        import zarr
+
+        try:
+            group: Any = zarr.open_group(str(path), mode="r+" if writable else "r")
+            if group.attrs.get("schema") != SCHEMA:
+                raise DataError(f"{path}: its schema is {group.attrs.get('schema')!r}, and {SCHEMA!r} is expected")
+            table: Any = group.attrs["plan"]
+            plan = Plan.from_table(table, {axis["key"]: _coordinate(group, axis["key"]) for axis in table["axes"]})
+            return cls(plan, group, path, np.asarray(group[DONE][:]))
+        except (OSError, KeyError, ValueError, TypeError, SceneError) as error:
+            raise DataError(
+                f"{path}: no store of a sweep ({error}); give a folder that `levilab sweep` wrote"
+            ) from error
+
+    @contextlib.contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other processes from writing into the store.  Raises CannotWrite where one does already."""
+        from filelock import FileLock, Timeout
+
+        if self.path is None:
+            yield
+            return
+        lock = FileLock(self.path.with_name(f".{self.path.name}.lock"))
+        try:
+            lock.acquire(blocking=False)
+        except Timeout:
+            raise CannotWrite(f"{self.path}: another process is computing it; wait for its end") from None
+        try:
+            yield
+        finally:
+            lock.release()
+            with contextlib.suppress(OSError):
+                Path(lock.lock_file).unlink(missing_ok=True)
+
+    def notes(self) -> list[str]:
+        """Return what differs here from where the store was begun, if results may differ in their last bits for it."""
+        begun, software = dict(self.group.attrs), software_versions()
+        versions = [(name, begun["software"].get(name), software[name]) for name in ("levilab", "numpy", "numba")]
+        other = [f"{name} {now} instead of {then}" for name, then, now in versions if now != then]
+        if begun["processor"] != processor():
+            other.append(f"the processor {processor()['name']} instead of {begun['processor']['name']}")
+        if not other:
+            return []
+        return [f"the sweep was begun elsewhere, here is {', '.join(other)}: chunks may differ in their last bits"]
+
+    @property
+    def done(self) -> int:
+        """How many chunks are done."""
+        return int(np.count_nonzero(self.marks))
+
+    def missing(self) -> Iterator[Chunk]:
+        """Yield the chunks that are not done, one after another."""
+        return (self.plan.chunk_of(number) for number in range(self.plan.chunk_count) if not self.marks[number])
+
+    def write(self, chunk: Chunk, values: Mapping[str, NDArray[Any]]) -> None:
+        """Write a chunk's values, then its mark.  Raises CannotWrite."""
+        with writing(f"{self.path}: cannot be written", "free space, then go on with `resume`"):
+            for column in columns_of(self.plan.observables):
+                self.group[column.name][chunk.box] = np.asarray(values[column.name], dtype=column.dtype)
+            self.group[DONE][chunk.number] = 1
+        self.marks[chunk.number] = 1
+
+    def known(self, chunk: Chunk) -> NDArray[np.bool_]:
+        """Return which points of a chunk are computed, or filled in."""
+        if STATUS in self.group:
+            return np.asarray(self.group[STATUS][chunk.box]) > 0
+        return np.full(chunk.shape, bool(self.marks[chunk.number]))
+
+    def read(self, chunk: Chunk) -> dict[str, NDArray[Any]]:
+        """Return column → values of a chunk."""
+        return {
+            column.name: np.asarray(self.group[column.name][chunk.box]) for column in columns_of(self.plan.observables)
+        }
+
+    def load(self) -> Map:
+        """Return all values, and which are computed."""
+        plan = self.plan
+        computed = np.zeros(plan.shape, dtype=np.bool_)
+        for number in np.flatnonzero(self.marks):
+            computed[plan.chunk_of(int(number)).box] = True
+        values = {column.name: np.asarray(self.group[column.name][...]) for column in columns_of(plan.observables)}
+        if STATUS not in self.group:
+            return Map(plan, values, computed)
+        status = np.asarray(self.group[STATUS][...])
+        return Map(plan, values, status == COMPUTED, status == FILLED)
+
+
+def processor() -> dict[str, str]:
+    """Return the processor for which the kernels are compiled: where it is the same, results have the same bits."""
+    from llvmlite import binding
+    from numba.core import config
+
+    name, features = getattr(config, "CPU_NAME", None), getattr(config, "CPU_FEATURES", None)
+    return {
+        "name": binding.get_host_cpu_name() if name is None else name,
+        "features": binding.get_host_cpu_features().flatten() if features is None else features,
+    }
+
+
+def differences(there: Plan, asked: Plan) -> list[str]:
+    """Return what a plan that is asked for has otherwise than the one of a store, a sentence each."""
+    own, other = (dict(_leaves(plan)) for plan in (there, asked))
+    return [
+        f"{key} is {short_text(own.get(key, 'missing'))} there and {short_text(other.get(key, 'missing'))} here"
+        for key in {**own, **other}
+        if own.get(key) != other.get(key)
+    ]
+
+
+def _leaves(plan: Plan) -> Iterator[tuple[str, Any]]:
+    """Yield all that makes a plan, by name; its chunks and its step follow from that."""
+    table = plan.as_table()
+    for axis in table["axes"]:
+        yield f"the axis {axis['key']}", ", ".join(str(value) for key, value in axis.items() if key != "key")
+    yield "the order of the axes", ", ".join(axis["key"] for axis in table["axes"])
+    for name in ("observables", "duration_s", "tolerance", "seed"):
+        yield name, table[name]
+    for name, part in table["scene"].items():
+        inner = {f"{name}.{key}": value for key, value in part.items()} if isinstance(part, dict) else {name: part}
+        yield from inner.items()
+
+
+def _described(unit: str, meaning: str) -> dict[str, Any]:
+    """Unit and meaning; xarray and others look for them by the names of the CF conventions, too."""
+    return {"unit": unit, "meaning": meaning, "units": unit, "long_name": meaning}
+
+
+def _add_coordinate(group: Any, axis: Axis, dimension: str) -> None:
+    """Add an axis's values; words are numbered, and the attribute `words` has them in the order of their numbers."""
+    values, words = axis.values, None
+    if values.dtype.kind == "U":
+        words, values = np.unique(values, return_inverse=True)
+    attributes = _described(unit_of(axis.key), quantity_of(axis.key).name) | {"scale": axis.scale}
+    coordinate = group.create_array(
+        axis.key,
+        shape=values.shape,
+        chunks=(min(len(values), MARKS),),
+        dtype="float64" if words is None else "int64",
+        dimension_names=(dimension,),
+        attributes=attributes | ({} if words is None else {"words": words.tolist()}),
+    )
+    coordinate[...] = values
+
+
+def _coordinate(group: Any, key: str) -> NDArray[Any]:
+    array = group[key]
+    values, words = np.asarray(array[...]), array.attrs.get("words")
+    return values if words is None else np.array(words)[values]

@@ -1,0 +1,74 @@
+"""A store keeps what was computed, and any reader of Zarr can read it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from levilab.files import CannotWrite
+from levilab.simulator.scene import preset
+from levilab.sweeps.plan import Axis, Plan
+from levilab.sweeps.run import run, tasks_of
+from levilab.sweeps.store import Store
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def plan() -> Plan:
+    axes = (Axis("start.spin_hz", np.linspace(18, 26, 40)), Axis("top.mass_kg", np.linspace(0.0250, 0.0254, 15)))
+    return Plan.of(preset("undriven"), axes, ("survived", "lifetime_s"), duration_s=0.2)
+
+
+def made_up(task) -> dict[str, np.ndarray]:
+    """Values that tell each point from every other."""
+    spin, mass = np.broadcast_arrays(task.values["start.spin_hz"], task.values["top.mass_kg"])
+    return {"survived": spin > 20, "lifetime_s": spin + mass}
+
+
+def test_a_store_that_is_opened_again_has_the_plan_and_the_values(tmp_path: Path) -> None:
+    made = Store.create(tmp_path / "map.zarr", plan())
+    assert made.plan.chunk_count > 2
+    *tasks, last = tasks_of(made)
+    for task in tasks:
+        made.write(task.chunk, made_up(task))
+    again = Store.open(tmp_path / "map.zarr")
+    assert again.plan.as_table() == made.plan.as_table()
+    assert [chunk.number for chunk in again.missing()] == [last.chunk.number]
+    found = again.load()
+    spin, mass = (axis.values for axis in plan().axes)
+    expected = spin[:, None] + mass
+    assert np.array_equal(found.values["lifetime_s"][found.computed], expected[found.computed])
+    assert np.all(np.isnan(found.values["lifetime_s"][~found.computed]))
+    assert np.count_nonzero(~found.computed) == np.prod(last.chunk.shape)
+
+
+def test_a_store_in_memory_and_one_on_the_disk_hold_the_same(tmp_path: Path) -> None:
+    stores = Store.create(None, plan()), Store.create(tmp_path / "map.zarr", plan())
+    for store in stores:
+        run(store)
+    maps = [store.load() for store in stores]
+    assert all(found.computed.all() for found in maps)
+    assert maps[0].values["survived"].tobytes() == maps[1].values["survived"].tobytes()
+    assert maps[0].values["lifetime_s"].tobytes() == maps[1].values["lifetime_s"].tobytes()
+
+
+def test_plain_zarr_reads_arrays_coordinates_and_units(tmp_path: Path) -> None:
+    import zarr
+
+    run(Store.create(tmp_path / "map.zarr", plan()))
+    group = zarr.open_group(tmp_path / "map.zarr", mode="r")
+    assert group.metadata.zarr_format == 3
+    assert group["lifetime_s"].metadata.dimension_names == ("start.spin_hz", "top.mass_kg")
+    assert group["lifetime_s"].attrs["unit"] == "s"
+    assert np.array_equal(group["top.mass_kg"][:], plan().axes[1].values)
+    assert group["top.mass_kg"].attrs["units"] == "kg"
+    assert group.attrs["plan"]["scene"]["base"]["inner_radius_m"] == 0.03
+
+
+def test_a_folder_that_is_there_is_not_written_over(tmp_path: Path) -> None:
+    Store.create(tmp_path / "map.zarr", plan())
+    with pytest.raises(CannotWrite, match="is there already"):
+        Store.create(tmp_path / "map.zarr", plan())

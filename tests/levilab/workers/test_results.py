@@ -1,0 +1,178 @@
+"""Tasks are done where there is room, and come back; workers are really killed."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import itertools
+import os
+import signal
+import subprocess
+import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from multiprocessing.connection import Listener
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from levilab.errors import LevilabError, UsageError, WorkersLost
+from levilab.workers import Workers, packing, processes, results_of, this_process, threads
+from support import tasks
+from support.waiting import HANG_GUARD_S
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from multiprocessing.connection import Connection
+    from pathlib import Path
+
+WAYS = {"this process": this_process(), "threads": threads(2), "processes": processes(2)}
+
+
+@pytest.mark.parametrize("name", WAYS)
+def test_every_way_gives_back_the_same_bits(name: str) -> None:
+    found = {done.task: done.result for done in results_of(tasks.noise, range(20), WAYS[name])}
+    assert found == {n: tasks.noise(n) for n in range(20)}
+
+
+@pytest.mark.parametrize("name", WAYS)
+def test_what_a_function_raises_comes_back_with_its_task(name: str) -> None:
+    ended = list(results_of(tasks.refuse_seven, range(10), WAYS[name]))
+    assert sorted(done.task for done in ended) == list(range(10))
+    assert [(done.task, str(done.error)) for done in ended if done.error] == [(7, "seven is refused")]
+    assert all(done.result == done.task for done in ended if not done.error)
+
+
+def test_tasks_are_taken_only_as_they_are_needed() -> None:
+    taken = []
+
+    def endless() -> Iterator[int]:
+        for n in itertools.count():
+            taken.append(n)
+            yield n
+
+    with contextlib.closing(results_of(tasks.square, endless(), threads(2), window=8)) as results:
+        assert len(list(itertools.islice(results, 100))) == 100
+    assert len(taken) <= 100 + 8
+
+
+def test_any_executor_of_a_caller_fits() -> None:
+    own = Workers(lambda: ThreadPoolExecutor(1), count=1)
+    assert [done.result for done in results_of(tasks.square, [1, 2, 3], own)] == [1, 4, 9]
+
+
+def test_an_executor_that_gives_up_its_tasks_ends_the_work() -> None:
+    class GivesUp(ThreadPoolExecutor):
+        def submit(self, *arguments: Any, **named: Any) -> Any:
+            future = super().submit(threading.Event().wait, 0)
+            future = type(future)()
+            future.cancel()
+            return future
+
+    with pytest.raises(WorkersLost, match="the batch jobs gave up what they were to do"):
+        list(results_of(tasks.square, [1], Workers(GivesUp, name="batch jobs")))
+
+
+def test_a_worker_leaves_ctrl_c_alone_and_has_one_thread() -> None:
+    [done] = results_of(tasks.surroundings, [0], processes(1))
+    assert done.result == {"interrupted": False, "threads": "1", "main": None}
+
+
+def test_an_error_that_cannot_be_unpickled_keeps_its_words() -> None:
+    [done] = results_of(tasks.raise_two_words, [0], processes(1))
+    assert isinstance(done.error, RuntimeError)
+    assert str(done.error) == "TwoWords: one and two"
+    assert "tasks.py" in done.error.__notes__[0]
+
+
+def test_a_function_that_cannot_be_sent_is_refused() -> None:
+    with pytest.raises(LevilabError, match="a function at the head of a module"):
+        list(results_of(lambda task: task, [0], processes(1)))
+
+
+def test_a_function_of_the_script_that_runs_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tasks.square, "__module__", "__main__")
+    with pytest.raises(LevilabError, match="put it into a module"):
+        list(results_of(functools.partial(tasks.square), [0], processes(1)))
+
+
+def test_a_worker_with_other_versions_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = packing.version_of
+    monkeypatch.setattr(packing, "version_of", lambda name: "0.1" if name == "numba" else here(name))
+    expected = f"one of the worker processes has numba {here('numba')} instead of 0.1"
+    with pytest.raises(WorkersLost, match=expected):
+        list(results_of(tasks.square, [0], processes(1)))
+
+
+def test_a_killed_worker_costs_only_what_was_under_way(tmp_path: Path) -> None:
+    given = [(n, str(tmp_path)) for n in range(12)]
+    found = {done.task[0]: done.result for done in results_of(tasks.die_at_three_once, given, processes(2))}
+    assert (tmp_path / "died").exists()
+    assert found == {n: tasks.noise(n) for n in range(12)}
+
+
+def test_a_task_that_kills_its_worker_is_an_error_and_the_others_are_done() -> None:
+    ended = {done.task: done for done in results_of(tasks.die_at_three, range(8), processes(2))}
+    assert isinstance(ended[3].error, WorkersLost)
+    assert "each process that does it dies" in str(ended[3].error)
+    assert sorted(done.result for done in ended.values() if done.error is None) == [0, 1, 2, 4, 5, 6, 7]
+
+
+def test_workers_that_always_die_end_the_work() -> None:
+    with pytest.raises(WorkersLost, match="died 5 times in a row before one gave a result"):
+        list(results_of(tasks.die_at_three, [3] * 20, processes(1)))
+
+
+def wait_until_at_work(*conversations: Connection) -> list[int]:
+    """The numbers of the processes at the other end."""
+    return [conversation.recv() for conversation in conversations]
+
+
+def wait_until_dead(conversation: Connection) -> None:
+    """The operating system closes the conversations of a process that has ended."""
+    with pytest.raises((EOFError, ConnectionError)):
+        conversation.recv()
+
+
+def test_ctrl_c_ends_workers_in_the_middle_of_a_task() -> None:
+    with Listener(("127.0.0.1", 0)) as listener, ThreadPoolExecutor(1) as beside:
+
+        def interrupt() -> None:
+            with listener.accept() as one, listener.accept() as other:
+                wait_until_at_work(one, other)
+                signal.raise_signal(signal.SIGINT)
+                wait_until_dead(one)
+                wait_until_dead(other)
+
+        ended = beside.submit(interrupt)
+        results = results_of(tasks.wait_for_ever, [listener.address] * 20, processes(2))
+        with pytest.raises(KeyboardInterrupt), contextlib.closing(results):
+            next(results)
+        ended.result(HANG_GUARD_S)
+
+
+PARENT = """
+from levilab.workers import processes, results_of
+from support.tasks import wait_for_ever
+list(results_of(wait_for_ever, [{address}] * 2, processes(2)))
+"""
+
+
+def test_workers_do_not_outlive_a_killed_parent() -> None:
+    with Listener(("127.0.0.1", 0)) as listener:
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+        command = [sys.executable, "-c", PARENT.format(address=listener.address)]
+        with (
+            subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL) as parent,
+            listener.accept() as one,
+            listener.accept() as other,
+        ):
+            wait_until_at_work(one, other)
+            parent.kill()
+            wait_until_dead(one)
+            wait_until_dead(other)
+
+
+def test_a_count_of_workers_below_one_is_refused() -> None:
+    with pytest.raises(UsageError, match="workers = 0"):
+        processes(0)

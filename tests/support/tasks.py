@@ -1,0 +1,78 @@
+"""Functions that a worker process can import, for the tests of what works on many tasks."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+from multiprocessing.connection import Client
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+
+def square(number: int) -> int:
+    return number * number
+
+
+def noise(number: int) -> bytes:
+    """Numbers that depend on the task alone, to the last bit."""
+    return np.random.default_rng(number).normal(size=100).tobytes()
+
+
+def refuse_seven(number: int) -> int:
+    if number == 7:
+        raise ValueError("seven is refused")
+    return number
+
+
+class TwoWords(Exception):
+    """An error that cannot be unpickled, as many that take more than one argument."""
+
+    def __init__(self, one: str, two: str) -> None:
+        super().__init__(f"{one} and {two}")
+
+
+def raise_two_words(number: int) -> int:
+    raise TwoWords("one", "two")
+
+
+def die() -> None:
+    """End this process, as a batch system or a lack of memory does; signal 9 ends one on Windows, too."""
+    os.kill(os.getpid(), 9)
+
+
+def die_at_three_once(task: tuple[int, str]) -> bytes:
+    """A worker process dies at task 3 when it is done for the first time."""
+    number, folder = task
+    mark = Path(folder, "died")
+    if number == 3 and not mark.exists():
+        mark.touch()
+        die()
+    return noise(number)
+
+
+def die_at_three(number: int) -> int:
+    if number == 3:
+        die()
+    return number
+
+
+def wait_for_ever(address: tuple[str, int] | None) -> None:
+    """Say which process this is, and wait until the other side ends the conversation; without an address do nothing."""
+    if address is None:
+        return
+    with Client(address) as conversation:
+        conversation.send(os.getpid())
+        with contextlib.suppress(EOFError, ConnectionError):
+            conversation.recv()
+
+
+def surroundings(number: int) -> dict[str, Any]:
+    """What a worker process has inherited."""
+    return {
+        "interrupted": signal.getsignal(signal.SIGINT) is not signal.SIG_IGN,
+        "threads": os.environ["OPENBLAS_NUM_THREADS"],
+        "main": __import__("__main__").__dict__.get("__file__"),
+    }
