@@ -55,7 +55,7 @@ TYPICAL_RATE_OF_SINE, TYPICAL_OFFSET_OF_SINE_S, TYPICAL_RATE_OF_CORNERS = 1.3e-1
 TYPICAL_RATE_OF_ANY_SPLIT = 6e-11
 
 #: The share of the tolerance that the error is to have, by forecast, and the most.
-AIM, MOST = 0.2, 0.28
+AIM, MOST = 0.16, 0.22
 #: The share of the tolerance that the estimate is to have where it was above the tolerance.
 AIM_AGAIN = 0.6
 #: An estimate is so many times what is forecast; the place's error grows less evenly, and is far below the axis's.
