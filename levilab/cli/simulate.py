@@ -36,8 +36,7 @@ def simulate(
         float,
         typer.Option(
             metavar="X",
-            help="Wanted error at the end, of the place in m and of the axis in rad.  It only shortens a longest step: "
-            "1e-7 and larger mostly give the same.",
+            help="Wanted error at the end, of the place in m and of the axis in rad.  The step is chosen for it.",
         ),
     ] = 1e-7,
     rate: Annotated[float, typer.Option(metavar="HZ", help="States per second that are written.")] = 100.0,

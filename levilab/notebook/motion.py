@@ -100,5 +100,5 @@ def simulate_motion(
     motion = done.summary.motion
     rows = kept_rows(motion, done.samples_per_state)
     own = {one.name: getattr(motion, one.name) for one in fields(motion)}
-    own |= {"states": motion.states[rows], "energies": motion.energies[rows]}
+    own |= {"states": motion.states[rows]}
     return SimulatedMotion(**own, found=done.summary, folder=done.folder)

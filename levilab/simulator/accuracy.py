@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,19 +21,36 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+#: A drift turns the axis by so much at most [rad], for which the kernels' polynomials are made.
+LONGEST_TURN = 2.0
+
+
+def turning_rate(model: Model, start: Array) -> Any:
+    """Return about how fast the axis turns about the angular momentum at most [rad/s]; of each top, if there are many.
+
+    A tumbling top turns faster than its angular momentum at the start says: the field's torque adds about √(|μ|B/I₁).
+    """
+    stiffness = length(np.moveaxis(flux_density(model.field, start[..., R]), -1, 0))  # |μ|B [J]
+    inverse = model.body.inverse_transverse
+    return length(np.moveaxis(start[..., L], -1, 0)) * inverse + sqrt(stiffness * inverse)
+
+
+def rounding_error(scheme: Scheme, steps: int, end: Array) -> tuple[float, float]:
+    """Return the error by rounding of place [m] and axis at the end: a random walk of half a unit, twice a stage."""
+    floor = 2.2e-16 * math.sqrt(2 * steps * scheme.stages)
+    return floor * math.hypot(*end[R].tolist()), floor
+
+
 def longest_step(scene: Scene, model: Model, start: Array, scheme: Scheme) -> Any:
     """Return the longest step [s] for which the kernels' polynomials hold and no motion is skipped.
 
-    It is that of each top, if there are many.  Three limits: a drift turns the axis by 1 rad, a kick slows the spin by
-    a fifth, a step takes half a period of the drive.  A tumbling top turns faster than its angular momentum at the
-    start says: the field's torque adds about √(|μ|B/I₁) to the rate.
+    It is that of each top, if there are many.  Three limits: a drift turns the axis by 2 rad, a kick slows the spin by
+    a fifth, a step takes half a period of the drive.
     """
-    stiffness = length(np.moveaxis(flux_density(model.field, start[..., R]), -1, 0))  # |μ|B [J]
-    turning = length(np.moveaxis(start[..., L], -1, 0)) * model.body.inverse_transverse
-    turning += sqrt(stiffness * model.body.inverse_transverse)
+    turning = turning_rate(model, start)
     drift, kick = (float(np.max(np.abs(c))) for c in (scheme.drifts, scheme.kicks))
     limits = [
-        1 / (drift * turning + 1e-300),
+        LONGEST_TURN / (drift * turning + 1e-300),
         0.2 / (max(drift, kick) * _strongest_damping(model.drag, start) + 1e-300),
     ]
     if model.drive is not None:

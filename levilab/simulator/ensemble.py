@@ -36,6 +36,8 @@ Array = NDArray[np.float64]
 PILOTS = 6
 #: How long these are simulated [s]; errors grow with the time, so they get this share of the tolerance.
 PILOT_DURATION = 3.0
+#: The largest part of its longest step that a top takes: runs at four times as much are compared with.
+LARGEST_SHARE = 0.25
 #: A spin below this [rad/s] may be turned through zero by the field; a top that floats is never as slow.
 SLOW_RAD_S = 2 * math.pi * 5.0
 
@@ -285,7 +287,7 @@ def _step_share(scene: Scene, over: Mapping[str, ArrayLike], duration: float, to
             motion = simulate(one, time, tolerance=tolerance * time / duration, rate=None)
             if motion.accuracy.reached:
                 shares.append(motion.accuracy.step / float(longest))
-    return min(shares, default=0.25)
+    return min([*shares, LARGEST_SHARE])
 
 
 # --- the motion ---

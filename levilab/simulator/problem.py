@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from levilab.errors import LeftRange, SimulationError
 from levilab.simulator.escape import locate_escape
 from levilab.simulator.kernels.braking import DragFlow, WasherDragFlow
-from levilab.simulator.kernels.loads import PiecewiseLinear
 from levilab.simulator.kernels.motion import STATE_SIZE, TIME, R
 from levilab.simulator.kernels.splitting import advance
 from levilab.simulator.model import model_of
@@ -97,8 +96,7 @@ def scheme_for(name: str | None, model: Any) -> Scheme:
     """
     flows = isinstance(model.drag, DragFlow | WasherDragFlow)
     if name is None:
-        smooth = "blanes-moan-6" if isinstance(model.drive, PiecewiseLinear) else "levitron-6"
-        return SCHEMES["kahan-li-8" if flows else smooth]
+        return SCHEMES["kahan-li-8" if flows else "levitron-6"]
     if name not in SCHEMES:
         raise SimulationError(f"scheme {name!r}: expected one of {', '.join(SCHEMES)}")
     if flows and not SCHEMES[name].any_split:
@@ -125,6 +123,12 @@ def integrate(
     Raises:
         LeftRange: the numbers leave their range, as at the base's edges.
     """
+    if int(stops.counts.sum()) <= STEPS_IN_A_CALL:
+        states, through = problem.advance_to_stops(problem.start, stops, problem.escape)
+        if through:
+            if progress is not None:
+                progress(1.0)
+            return states, None, int(stops.counts.sum())
     done = np.cumsum(stops.counts)
     pieces, state, at = [problem.start[None]], problem.start, 0
     while at < stops.counts.size:

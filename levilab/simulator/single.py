@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from levilab.errors import SimulationError
-from levilab.simulator.accuracy import NODES_ORDER, comes_near_zero, estimate, has_kink, longest_step
-from levilab.simulator.energy import energy, spins_of
+from levilab.simulator.accuracy import NODES_ORDER, comes_near_zero, estimate, has_kink, longest_step, rounding_error
+from levilab.simulator.energy import spins_of
 from levilab.simulator.escape import exit_speed, locate_zero, margins
+from levilab.simulator.forecast import run_by_forecast
 from levilab.simulator.kernels.loads import Disc
 from levilab.simulator.kernels.motion import CLOCK, TIME, L, N, R, V
 from levilab.simulator.model import model_of
@@ -27,7 +28,7 @@ from levilab.simulator.problem import (
 )
 from levilab.simulator.spin import DECAYS, since_infinity
 from levilab.simulator.start import start_of
-from levilab.simulator.stops import kinks, stop_after_each_step, stops_between
+from levilab.simulator.stops import NO_TIMES, kinks, stop_after_each_step, stops_between
 from levilab.simulator.trajectory import Accuracy, Event, Trajectory
 
 if TYPE_CHECKING:
@@ -42,6 +43,9 @@ SMALLEST_STEP_SHARE = 1 / 256
 #: After so many shorter steps in succession that did not halve the error, the motion is taken for chaotic: a single one
 #: may be chance in the estimates.
 MAX_FAILED_REFINEMENTS = 2
+
+#: The first step of the careful way, as a part of the longest one: there is room for four times as much.
+FIRST_STEP_SHARE = 1 / 4
 
 #: The longest simulation, thirty years [s].
 LONGEST_S = 1e9
@@ -130,7 +134,7 @@ def simulate(
     problem = Problem(scene, model, state, scheme_for(scheme, model))
     wanted = _Wanted(duration, rate, events, progress)
     run, accuracy = _to_tolerance(problem, wanted, tolerance, step)
-    return Trajectory(scene, run.states, energy(scene, model, run.states), accuracy, run.fell, run.events)
+    return Trajectory(scene, run.states, model, accuracy, run.fell, run.events)
 
 
 def check(*, duration: float, tolerance: float, rate: float | None, step: float | None) -> None:
@@ -148,15 +152,25 @@ def _to_tolerance(problem: Problem, wanted: _Wanted, tolerance: float, step: flo
     Returns:
         The run within the tolerance, else the best one; its accuracy.
     """
+    samples = _samples(float(problem.start[TIME]), wanted.duration, wanted.rate)
+    if step is None and not wanted.events:
+        found = run_by_forecast(problem, wanted.duration, tolerance, samples, wanted.progress)
+        if found is not None:
+            accuracy = Accuracy(
+                *found.errors, tolerance, problem.scheme.name, found.step, found.steps, tries=found.tries
+            )
+            kept = found.states[_are_wanted(found.states[:, TIME], samples, abs(wanted.duration) * 1e-11)]
+            return Run(kept, None, (), found.steps), accuracy
     longest = longest_step(problem.scene, problem.model, problem.start, problem.scheme)
-    h = step or min(longest / 2, abs(wanted.duration) / 2)
+    h = step or min(longest * FIRST_STEP_SHARE, abs(wanted.duration) / 2)
     best: tuple[Run, Accuracy] | None = None
-    smallest, failed = math.inf, 0
+    smallest, failed, tries = math.inf, 0, 0
     while True:
+        tries += 1
         run = _run(problem, wanted, h)
         of_steps, of_nodes = _errors(problem, run, h)
         position, axis = (float(error) for error in of_steps + of_nodes)
-        accuracy = Accuracy(position, axis, tolerance, problem.scheme.name, h, run.steps, float(max(of_nodes)))
+        accuracy = Accuracy(position, axis, tolerance, problem.scheme.name, h, run.steps, float(max(of_nodes)), tries)
         worst = float(max(of_steps))
         if best is None or worst <= 0.5 * smallest:
             best, smallest, failed = (run, accuracy), worst, 0
@@ -180,9 +194,7 @@ def _errors(problem: Problem, run: Run, step: float) -> tuple[Array, Array]:
     """
     end = run.states[-1]
     twice, four, length = _coarser_ends(problem, end[TIME], step)
-    # rounding: a random walk of half a unit in the last place, twice for each stage
-    floor = 2.2e-16 * math.sqrt(2 * run.steps * problem.scheme.stages)
-    rounding = floor * np.array([np.linalg.norm(end[R]), 1.0])
+    rounding = np.array(rounding_error(problem.scheme, run.steps, end))
     order = None if _crosses_kink(problem, run, length) else problem.scheme.order
     of_steps = rounding + [estimate(end[part], twice[part], four[part], order) for part in (R, N)]
     of_nodes = np.zeros(2)
@@ -260,6 +272,10 @@ def _are_wanted(times: Array, samples: Array, apart: float) -> NDArray[np.bool_]
 
     A kink within `apart` [s] of a sample, which is rounding, counts as that sample.
     """
+    if samples.size == 0:
+        ends = np.zeros(times.size, dtype=np.bool_)
+        ends[0] = ends[-1] = True
+        return ends
     wanted = np.sort(np.concatenate([samples, times[[0, -1]]]))
     after = np.clip(np.searchsorted(wanted, times), 1, wanted.size - 1)
     return np.asarray(np.minimum(np.abs(wanted[after] - times), np.abs(times - wanted[after - 1])) <= apart)
@@ -268,7 +284,7 @@ def _are_wanted(times: Array, samples: Array, apart: float) -> NDArray[np.bool_]
 def _samples(begin: float, duration: float, rate: float | None) -> Array:
     """Return the times of the samples [s], without the first and the last state."""
     if rate is None:
-        return np.array([])
+        return NO_TIMES
     inside = np.arange(1, math.ceil(abs(duration) * rate * (1 - 1e-12))) / rate
     return np.asarray(begin + math.copysign(1.0, duration) * inside)
 
@@ -278,8 +294,7 @@ def _events(problem: Problem, states: Array, stops: Stops, events: Watch) -> tup
 
     def on(function: Callable[[Trajectory], Array], rows: Array) -> Array:
         nothing = Accuracy(0, 0, 0, "", 0, 0)
-        energies = energy(problem.scene, problem.model, rows)
-        return np.asarray(function(Trajectory(problem.scene, rows, energies, nothing)), dtype=np.float64)
+        return np.asarray(function(Trajectory(problem.scene, rows, problem.model, nothing)), dtype=np.float64)
 
     found = []
     for name, function in events.items():
@@ -316,5 +331,4 @@ def spin_alone(scene: Scene, duration: float, tolerance: float, rate: float | No
         now = DECAYS[scene.drag.law].after(spin, times, *scene.drag.constants)
         states[:, L] = start[L] * (now / spin)[:, None]
         states[:, CLOCK] = np.copysign(now, start[CLOCK])
-    energies = energy(scene, model_of(scene), states)
-    return Trajectory(scene, states, energies, Accuracy(0.0, 0.0, tolerance, "closed form", duration, 0))
+    return Trajectory(scene, states, model_of(scene), Accuracy(0.0, 0.0, tolerance, "closed form", duration, 0))

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+#: No times at all: the kinks of a drive that has none.
+NO_TIMES: Array = np.empty(0)
+
 #: At most so many steps between stops: they are repeated one by one to find the moment of an escape.
 STEPS_BETWEEN_STOPS = 1000
 
@@ -66,6 +69,12 @@ def stop_after_each_step(stops: Stops) -> Stops:
     return Stops(times, np.ones(index.size, dtype=np.int64), stops.levels[index], stops.slopes[index])
 
 
+def even_stops(times: Array, count: int) -> Stops:
+    """Return stops at these times [s] with so many steps from each to the next, and no kink of the drive."""
+    n = times.size - 1
+    return Stops(times, np.full(n, count), np.ones(n), np.zeros(n))
+
+
 #: The most steps and kinks: more would take days, or the machine's memory.
 MOST_STEPS, MOST_KINKS = 10**11, 10**7
 
@@ -89,7 +98,12 @@ def stops_between(start: float, end: float, step: float, drive: Drive, samples: 
             f"{(high - low) / step:.2g} steps of {step:.2g} s would be needed, at most {MOST_STEPS:.0e} are taken: "
             "a shorter duration, a slower spin or heavier inertias are expected"
         )
-    wanted = [np.array([low, high]), kinks(drive, low, high)]
+    corners = kinks(drive, low, high)
+    if corners is NO_TIMES and (samples is None or samples.size == 0):
+        count = max(math.ceil((high - low) / step * (1 - 1e-12)), 1)
+        if count <= STEPS_BETWEEN_STOPS:
+            return even_stops(np.array([start, end]), count)
+    wanted = [np.array([low, high]), corners]
     if samples is not None:
         wanted.append(samples[(samples > low) & (samples < high)])
     times = _distinct(np.concatenate(wanted), (high - low) * 1e-12)
@@ -121,8 +135,10 @@ def kinks(drive: Drive, low: float, high: float) -> Array:
     Raises:
         SimulationError: there are too many.
     """
+    if drive.waveform == "off" or (drive.waveform == "sine" and drive.off_s is None):
+        return NO_TIMES
     found = []
-    if drive.off_s is not None and low < drive.off_s < high and drive.waveform != "off":
+    if drive.off_s is not None and low < drive.off_s < high:
         found.append(drive.off_s)
     offset = {"square": 0.0, "unipolar": 0.0, "triangle": 0.25}.get(drive.waveform)
     if offset is not None and drive.amplitude_t != 0:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from levilab.simulator.energy import spin_of
+from levilab.simulator.energy import energy, spin_of
 from levilab.simulator.kernels.motion import LOOSE, TIME, L, N, R, V
 
 if TYPE_CHECKING:
+    from levilab.simulator.kernels.motion import Model
     from levilab.simulator.scene import Scene
 
 Array = NDArray[np.float64]
@@ -42,6 +44,8 @@ class Accuracy:
         steps: how many.
         nodes: the larger of both errors as far as the nodes of a magnet of finite size make it, which are enough where
             the top starts, and not at the base.
+        tries: how many times all of the motion was integrated, each time at another step, until this was the result;
+            runs that serve the estimate alone are not counted.
     """
 
     position: float
@@ -51,6 +55,7 @@ class Accuracy:
     step: float
     steps: int
     nodes: float = 0.0
+    tries: int = 1
 
     @property
     def reached(self) -> bool:
@@ -65,14 +70,14 @@ class Trajectory:
     Attributes:
         scene: what was simulated.
         states: shape (n, 18), see `kernels.motion.State`.
-        energies: shape (n,) [J].
+        model: what the kernels computed.
         fell: the escape that ended it, None if it stayed to the end.
         events: found on the way, in their order.
     """
 
     scene: Scene
     states: Array
-    energies: Array
+    model: Model
     accuracy: Accuracy
     fell: Event | None = None
     events: tuple[Event, ...] = ()
@@ -81,6 +86,11 @@ class Trajectory:
         name, end = self.scene.name or "a scene", float(self.time[-1])
         how = "up to the end" if self.fell is None else f"lost at the limit of its {self.fell.name}"
         return f"<{type(self).__name__} of {name}: {len(self.time)} states in {end:.4g} s, {how}>"
+
+    @cached_property
+    def energies(self) -> Array:
+        """Energy without the drive's part, shape (n,) [J]."""
+        return energy(self.scene, self.model, self.states)
 
     @property
     def time(self) -> Array:

@@ -260,7 +260,7 @@ def _observe_samples(scene: Scene, ends: Ensemble, where: int, names: set[str]) 
         row["locked"] = bool(is_locked(scene, states, survived=survived))
     if names & set(GROUPS["lines"]):
         unknown = Accuracy(math.nan, math.nan, math.nan, "", math.nan, 0)
-        row |= _line_columns(lines_of(Trajectory(scene, states, np.empty(0), unknown)))
+        row |= _line_columns(lines_of(Trajectory(scene, states, model_of(scene, states[0, :3]), unknown)))
     return row
 
 

@@ -79,35 +79,46 @@ class Disc(NamedTuple):
     nodes: Array
 
 
-def _force(field: Any, five: Any, x: Any, y: Any, moment: Any) -> Any:
+def _pushed(field: Any, v: Any, five: Any, x: Any, y: Any, moment: Any) -> Any:
     p, q, _, s, g = five
-    mr = x * moment[0] + y * moment[1]
-    along = q * mr + s * moment[2]
-    return (p * moment[0] + along * x, p * moment[1] + along * y, s * mr + g * moment[2])
+    m = moment
+    across = x * m[0] + y * m[1]
+    return (
+        v[0] + p * m[0] + s * (m[2] * x) + q * (across * x),
+        v[1] + p * m[1] + s * (m[2] * y) + q * (across * y),
+        v[2] + s * across + g * m[2],
+    )
 
 
-def _force_without_q(field: Any, five: Any, x: Any, y: Any, moment: Any) -> Any:
+def _pushed_without_q(field: Any, v: Any, five: Any, x: Any, y: Any, moment: Any) -> Any:
     p, _, _, s, g = five
-    along = s * moment[2]
-    across = x * moment[0] + y * moment[1]
-    return (p * moment[0] + along * x, p * moment[1] + along * y, s * across + g * moment[2])
+    m = moment
+    return (
+        v[0] + p * m[0] + s * (m[2] * x),
+        v[1] + p * m[1] + s * (m[2] * y),
+        v[2] + s * (x * m[0] + y * m[1]) + g * m[2],
+    )
 
 
-#: ∇(M·B): (field, its five functions, x, y, moment).
-force_on = by_type({Paraxial2: _force_without_q, Paraxial: _force, ParaxialThick: _force, Sheet: _force, Thick: _force})
+#: A vector v with ∇(M·B) added to it: (field, v, its five functions, x, y, moment).  The field is known last, so all
+#: else is multiplied before.
+with_force = by_type(
+    {Paraxial2: _pushed_without_q, Paraxial: _pushed, ParaxialThick: _pushed, Sheet: _pushed, Thick: _pushed}
+)
 
 
 @part
-def dipole_load(model: Any, r: Vector, moment: Vector, at: Any) -> tuple[Vector, Vector]:
-    """Force [N] and torque [N m] on a dipole in the fields of base and drive."""
+def dipole_load(model: Any, r: Vector, moment: Vector, at: Any, v: Vector, push: float) -> tuple[Vector, Vector]:
+    """The vector v with push times the force [N] on a dipole added, and the torque [N m], of base and drive."""
     x, y, z = r
     five = field_functions(model.field, z, x * x + y * y)
     b = with_drive(model.drive, (five[0] * x, five[0] * y, five[2]), at)
-    return force_on(model.field, five, x, y, moment), cross(moment, b)
+    pushed = (push * moment[0], push * moment[1], push * moment[2])
+    return with_force(model.field, v, five, x, y, pushed), cross(moment, b)
 
 
-def _aligned_load(magnet: Any, model: Any, s: Any, at: Any) -> Any:
-    return dipole_load(model, s.r, s.n, at)
+def _aligned_load(magnet: Any, model: Any, s: Any, at: Any, v: Any, push: Any) -> Any:
+    return dipole_load(model, s.r, s.n, at, v, push)
 
 
 @part
@@ -117,25 +128,26 @@ def moment_of(magnet: Any, n: Vector, arm: Vector) -> Vector:
     return (a * n[0] + t * arm[0], a * n[1] + t * arm[1], a * n[2] + t * arm[2])
 
 
-def _tilted_load(magnet: Any, model: Any, s: Any, at: Any) -> Any:
-    return dipole_load(model, s.r, moment_of(magnet, s.n, s.arm), at)
+def _tilted_load(magnet: Any, model: Any, s: Any, at: Any, v: Any, push: Any) -> Any:
+    return dipole_load(model, s.r, moment_of(magnet, s.n, s.arm), at, v, push)
 
 
-def _disc_load(magnet: Any, model: Any, s: Any, at: Any) -> Any:
+def _disc_load(magnet: Any, model: Any, s: Any, at: Any, v: Any, push: Any) -> Any:
     moment = moment_of(magnet, s.n, s.arm)
     third = cross(s.n, s.arm)
     force, torque = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for i in range(magnet.nodes.shape[0]):
         node = magnet.nodes[i]
         offset = plus(plus((node[2] * s.n[0], node[2] * s.n[1], node[2] * s.n[2]), node[0], s.arm), node[1], third)
-        pull, twist = dipole_load(model, plus(s.r, 1.0, offset), moment, at)
+        pull, twist = dipole_load(model, plus(s.r, 1.0, offset), moment, at, (0.0, 0.0, 0.0), 1.0)
         force = plus(force, node[3], pull)
         torque = plus(plus(torque, node[3], twist), node[3], cross(offset, pull))
-    return force, torque
+    return plus(v, push, force), torque
 
 
-#: Force [N] and torque [N m] on a magnet: (magnet, model, state, moment of the drive).
-force_and_torque = by_type({Aligned: _aligned_load, Tilted: _tilted_load, Disc: _disc_load})
+#: The vector v with push times the force [N] on a magnet added, and the torque [N m]: (magnet, model, state, moment of
+#: the drive, v, push).
+pushed_and_torque = by_type({Aligned: _aligned_load, Tilted: _tilted_load, Disc: _disc_load})
 
 # --- the weight ---
 

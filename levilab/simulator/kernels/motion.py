@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from levilab.simulator.kernels.braking import clock_after, momentum_after
 from levilab.simulator.kernels.compiled import by_type, part
-from levilab.simulator.kernels.loads import force_and_torque, velocity_after_gravity
+from levilab.simulator.kernels.loads import pushed_and_torque, velocity_after_gravity
 from levilab.simulator.kernels.vectors import Vector, dot, plus, rotate, rotation
 
 
@@ -144,10 +144,8 @@ def kick(model: Model, s: State, k: float, level: float, slope: float) -> State:
     level, slope: of the drive, whose field is (level + slope·t) × amplitude × its carrier.
     """
     body = model.body
-    force, torque = force_and_torque(model.magnet, model, s, (s.t, level, slope))
-    v = plus(
-        velocity_after_gravity(body.gravity, s.v, k), k * body.inverse_mass, force
-    )  # what is known first is added first
+    v = velocity_after_gravity(body.gravity, s.v, k)  # what is known first is added first
+    v, torque = pushed_and_torque(model.magnet, model, s, (s.t, level, slope), v, k * body.inverse_mass)
     momentum, loose = momentum_after(model.drag, body, s, torque, k)
     return State(s.r, v, s.n, momentum, s.arm, s.clock, loose, s.t)
 

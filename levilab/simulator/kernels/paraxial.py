@@ -50,27 +50,34 @@ def weights(terms: int) -> tuple[float, ...]:
 
 
 @part
-def _ring_to_second_power(strength: Any, radius2: Any, z: Any, z2: Any, r2: Any) -> Any:
-    """√(R² + z²), and what p, bz, s, g of one ring are besides.
+def _ring_to_second_power(strength: Any, radius2: Any, z: Any, z2: Any, half: Any) -> Any:
+    """√(R² + z²), and what p, bz, s, g of one ring are besides; half: r²/2.
 
-    The root takes longest: all the rest is made of 1/(R² + z²) meanwhile, and multiplied by it at the very end.
+    The root takes longest: all the rest is made of 1/(R² + z²) meanwhile, and multiplied by it at the very end.  What
+    does not wait for the quotient is multiplied before it is there, and few of its powers wait for each other.
     """
     inverse = 1 / (radius2 + z2)
+    k = strength * radius2
+    kz = 3 * k * z
+    a, b = 1.5 * k * (4 * z2 - radius2), 2.5 * half * kz * (4 * z2 - 3 * radius2)
     square = inverse * inverse
-    first = strength * radius2 * square
-    second = first * inverse
-    third = 1.5 * (first * square) * (4 * z2 - radius2)
-    fourth = second * square * (4 * z2 - 3 * radius2)
-    root = math.sqrt(radius2 + z2)
-    return root, -1.5 * z * second, 0.5 * r2 * third - first, third, 3 * z * second - 3.75 * z * r2 * fourth
+    cube = square * inverse
+    bend = a * square
+    return (
+        math.sqrt(radius2 + z2),
+        -0.5 * kz * cube,
+        (half * bend - k) * square,
+        bend * square,
+        (kz - b * square) * cube,
+    )
 
 
 def to_second_power(field: Any, z: Any, r2: Any) -> Any:
     """The commonest field, written out: φ₁ = 2πρ R² (R² + z²)^(−3/2) and its derivatives, of each ring."""
     height = z - field.origin
-    z2 = height * height
-    u, a1, a2, a3, a4 = _ring_to_second_power(field.strength, field.inner2, height, z2, r2)
-    w, b1, b2, b3, b4 = _ring_to_second_power(field.strength, field.outer2, height, z2, r2)
+    z2, half = height * height, 0.5 * r2
+    u, a1, a2, a3, a4 = _ring_to_second_power(field.strength, field.inner2, height, z2, half)
+    w, b1, b2, b3, b4 = _ring_to_second_power(field.strength, field.outer2, height, z2, half)
     return u * a1 - w * b1, 0.0, u * a2 - w * b2, u * a3 - w * b3, u * a4 - w * b4
 
 

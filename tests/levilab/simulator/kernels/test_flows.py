@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from levilab.simulator.accuracy import LONGEST_TURN
 from levilab.simulator.kernels import braking, vectors
 from levilab.simulator.spin import DECAYS
 
@@ -20,9 +21,10 @@ def test_a_turn_is_that_of_rodrigues_to_rounding(angle):
 
 
 def test_the_longest_turn_of_a_drift_is_as_exact_as_said():
-    sinc, cosc = vectors.rotation(1.0)
-    assert sinc == pytest.approx(math.sin(1), abs=8e-13)
-    assert cosc == pytest.approx(1 - math.cos(1), abs=8e-13)
+    for angle, error in ((1.0, 3e-15), (LONGEST_TURN, 2e-10)):
+        sinc, cosc = vectors.rotation(angle**2)
+        assert sinc == pytest.approx(math.sin(angle) / angle, abs=error)
+        assert cosc == pytest.approx((1 - math.cos(angle)) / angle**2, abs=error)
 
 
 def test_the_sine_of_turns_agrees_with_the_library_at_any_phase():

@@ -1,0 +1,74 @@
+"""The step by forecast: errors near to the tolerance and below their estimates, and where the careful way is taken."""
+
+import numpy as np
+import pytest
+
+from accuracy import KINDS, trial
+from levilab.simulator import forecast
+from levilab.simulator.scene import preset
+from levilab.simulator.single import simulate
+
+UNDRIVEN = preset("undriven")
+
+
+def test_random_scenes_end_near_their_tolerance_and_below_their_estimate():
+    # 5 to 60 s, 1e-5 to 1e-10; benchmarks/accuracy.py has 500 scenes: 86, 96 and 88 %
+    draws = (np.random.default_rng([7, number]) for number in range(len(KINDS)))
+    tried = [trial(kind, draw) for kind, draw in zip(KINDS, draws, strict=True) for _ in range(8)]
+    found = [one for one in tried if one is not None]  # the others have fallen
+    assert len(found) >= 30
+    assert np.mean([one.is_sharp for one in found]) >= 0.7
+    assert np.mean([one.is_honest for one in found]) >= 0.9
+    assert np.mean([one.tries == 1 for one in found]) >= 0.7
+
+
+@pytest.mark.parametrize("rate", [None, 1.0, 60.0, 1000.0])
+def test_a_looser_tolerance_takes_longer_steps_also_between_samples(rate):
+    loose, tight = (simulate(UNDRIVEN, 6.0, tolerance=tolerance, rate=rate) for tolerance in (1e-6, 1e-10))
+    assert loose.accuracy.reached
+    assert tight.accuracy.reached
+    assert loose.accuracy.step >= tight.accuracy.step
+    assert loose.time.size == tight.time.size
+    assert np.linalg.norm(loose.axis[-1] - tight.axis[-1]) <= loose.accuracy.axis
+    assert loose.accuracy.tries == tight.accuracy.tries == 1
+
+
+def test_backwards_the_forecast_is_as_good_as_forwards():
+    there = simulate(UNDRIVEN, 20.0, tolerance=1e-8, rate=None)
+    back = simulate(UNDRIVEN, -20.0, tolerance=1e-8, rate=None, start=there.states[-1])
+    assert back.accuracy.tries == 1
+    assert np.linalg.norm(back.axis[-1] - there.axis[0]) <= there.accuracy.axis + back.accuracy.axis
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"top.magnet": "disc"},
+        {"start.spin_hz": 20.0},  # it falls
+        {"drive.waveform": "square", "drive.off_s": 1.0},
+    ],
+    ids=["disc", "fall", "drive that goes off"],
+)
+def test_where_the_law_may_not_hold_the_careful_way_is_taken(changes, monkeypatch):
+    found = []
+    real = forecast.run_by_forecast
+
+    def watch(*values):
+        found.append(real(*values))
+        return found[-1]
+
+    monkeypatch.setattr("levilab.simulator.single.run_by_forecast", watch)
+    scene = UNDRIVEN.changed(changes)
+    motion = simulate(scene, 3.0, tolerance=1e-8, rate=None)
+    assert found == [None]
+    exact = simulate(scene, 3.0, tolerance=1e-8, rate=None, step=motion.accuracy.step / 4)
+    assert np.linalg.norm(motion.axis[-1] - exact.axis[-1]) <= motion.accuracy.axis + exact.accuracy.axis
+
+
+@pytest.mark.parametrize("duration", [10.0, 12.0])
+def test_where_neighbours_part_exponentially_the_estimate_grows_with_the_error(duration):
+    # at the edge of the upper limit; from the pilot run alone it would be 50 times too small after 12 s
+    chaotic = UNDRIVEN.changed({"top.mass_kg": 0.02527, "start.spin_hz": 70.75})
+    motion = simulate(chaotic, duration, tolerance=1e-6, rate=None)
+    exact = simulate(chaotic, duration, scheme="kahan-li-8", step=4e-4, rate=None)
+    assert np.linalg.norm(motion.axis[-1] - exact.axis[-1]) <= motion.accuracy.axis + exact.accuracy.axis
