@@ -64,6 +64,17 @@ def sweep(
     out: Annotated[
         Path | None, typer.Option(metavar="STORE.zarr", help="Where the results go.", show_default="NAME.zarr")
     ] = None,
+    cores: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Processes on this machine.", show_default="one a core")
+    ] = None,
+    adaptive: Annotated[
+        bool,
+        typer.Option(
+            "--adaptive",
+            help="Compute points along the boundary of survival (or of what is observed and yes or no), fill in the "
+            "rest, and say what that may have missed.",
+        ),
+    ] = False,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with a store that is there, where it was interrupted.")
     ] = False,
@@ -72,12 +83,12 @@ def sweep(
     """Map a scene over its parameters."""
     given = {
         "sweep": sweep, "points": points, "observe": observe, "duration": duration, "tolerance": tolerance,
-        "settings": settings, "seed": seed, "out": out,
+        "settings": settings, "seed": seed, "out": out, "adaptive": adaptive or None,
     }  # fmt: skip
     shown = _is_store(scene)
     store = _opened(Path(scene), given, resume=resume) if shown else _begun(scene, given, resume=resume)
     if resume or not shown:
-        _computed(store)
+        _computed(store, cores)
     _shown(store, as_json=as_json)
 
 
@@ -142,7 +153,8 @@ def _axes(scene: Scene, given: dict[str, Any]) -> tuple[Axis, ...]:
 
 def _plan(scene: Scene, axes: tuple[Axis, ...], given: dict[str, Any]) -> Plan:
     from levilab.simulator.single import LONGEST_S
-    from levilab.sweeps.observables import columns_of
+    from levilab.sweeps.cost import cut
+    from levilab.sweeps.observables import check_observables, columns_of
     from levilab.sweeps.plan import Plan
 
     names = tuple(dict.fromkeys(name.strip() for name in (given["observe"] or OBSERVE).split(",")))
@@ -152,14 +164,17 @@ def _plan(scene: Scene, axes: tuple[Axis, ...], given: dict[str, Any]) -> Plan:
         numbers[name] = usual if given[name] is None else given[name]
         if not 0 < numbers[name] <= LONGEST_S:
             raise UsageError(name, f"a number above 0 and up to {LONGEST_S:.0e} is expected", value=numbers[name])
-    return Plan.of(scene, axes, names, numbers["duration"], tolerance=numbers["tolerance"], seed=given["seed"] or 0)
+    plan = Plan.of(scene, axes, names, numbers["duration"], tolerance=numbers["tolerance"], seed=given["seed"] or 0)
+    check_observables(plan)
+    return cut(plan)
 
 
-def _computed(store: Store) -> None:
+def _computed(store: Store, cores: int | None) -> None:
     """Compute what is missing."""
     from levilab.present.progress import ShareBar
     from levilab.simulator.compilation import announce_compilation
-    from levilab.sweeps.run import compile_for, run
+    from levilab.sweeps.adaptive import is_adaptive, run_adaptive
+    from levilab.sweeps.run import compile_for, run, workers_for
 
     total = store.plan.chunk_count
     if store.done == total:
@@ -171,14 +186,19 @@ def _computed(store: Store) -> None:
             message(f"note: {note}")
 
     def kept() -> str:
-        done = f"{store.done} of {total} chunks are kept in {store.path}"
+        done = f"{store.done} of {total} chunks are" if not is_adaptive(store) else "what was computed is"
+        done += f" kept in {store.path}"
         return f"{done}; go on with: levilab sweep {store.path} --resume"
 
     bar = ShareBar(f"{store.plan.size} points", first=store.done / total, line_every=LINE_EVERY_S)
     with interruptible(kept), store.locked(), contextlib.closing(bar):
         with announce_compilation(message):
             compile_for(store.plan)
-        run(store, bar)
+        workers = workers_for(store.plan, cores)
+        if is_adaptive(store):
+            run_adaptive(store, workers, bar)
+        else:
+            run(store, workers, bar)
 
 
 def _shown(store: Store, *, as_json: bool) -> None:

@@ -26,10 +26,12 @@ Scale = Literal["linear", "log", "table"]
 ROWS = "point"
 #: A chunk takes about this long on one core [s] ...
 CHUNK_S = 2.0
-#: ... unless it had fewer points than fill the lanes well, or more than a chunk may lose and a window may hold.
-FEWEST, MOST = 256, 65_536
+#: ... unless it had fewer points than fill the lanes, or more than a window of chunks may hold in memory.
+FEWEST, MOST = 64, 65_536
+#: Seconds of motion that one core simulates in a second, side by side in lanes: the order of magnitude suffices.
+QUICKLY = 1e5
 #: A plan has about so many chunks or more, where each has enough points: the cores end together, and progress shows.
-MANY_CHUNKS = 64
+MANY_CHUNKS, ENOUGH = 64, 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,9 +137,9 @@ class Plan:
         tolerance: float = 1e-6,
         seed: int = 0,
     ) -> Plan:
-        """Make a plan whose chunks have a useful size."""
+        """Make a plan whose chunks suit ends of motions in lanes; `levilab.sweeps.cost.cut` suits them to any plan."""
         plan = cls(scene, axes, observables, duration_s, tolerance, seed)
-        return replace(plan, chunk=chunk_shape(plan.shape, top_seconds_per_second(plan) / duration_s))
+        return replace(plan, chunk=chunk_shape(plan.shape, QUICKLY / duration_s))
 
     @property
     def is_table(self) -> bool:
@@ -240,24 +242,9 @@ def chunk_shape(shape: tuple[int, ...], points_per_second: float) -> tuple[int, 
     ((23, 11), (198, 99))
     """
     most = min(max(CHUNK_S * points_per_second, FEWEST), MOST)
-    wanted = max(min(most, math.prod(shape) / MANY_CHUNKS), FEWEST)
+    wanted = max(min(most, math.prod(shape) / MANY_CHUNKS), min(most, ENOUGH))
     chunk = list(shape)
     while math.prod(chunk) > wanted:
         longest = max(range(len(chunk)), key=lambda k: (chunk[k], k))
         chunk[longest] = -(-chunk[longest] // 2)
     return tuple(chunk)
-
-
-#: Seconds of motion that one core simulates in a second, of many tops side by side: the order of magnitude suffices.
-IN_LANES, SINGLY = 3e5, 4e4
-#: How much longer a step takes with an exact field, and with a magnet that is a disc.
-EXACT, DISC = 5.0, 60.0
-
-
-def top_seconds_per_second(plan: Plan) -> float:
-    """Return roughly how many seconds of motion one core simulates in a second, for the size of chunks."""
-    drive, words = plan.scene.drive, {axis.key for axis in plan.axes}
-    kinked = drive.waveform not in {"off", "sine"} or drive.off_s is not None or "drive.waveform" in words
-    rate = SINGLY if kinked else IN_LANES
-    rate /= EXACT if plan.scene.base.field == "exact" else 1.0
-    return rate / (DISC if plan.scene.top.magnet == "disc" else 1.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +10,9 @@ from levilab.errors import LevilabError
 from levilab.interruption import interruption_postponed
 from levilab.simulator.compilation import announce_compilation
 from levilab.simulator.ensemble import grid, simulate_many, step_share_of
+from levilab.sweeps.cost import seconds_per_point
 from levilab.sweeps.observables import observe
+from levilab.workers import processes, results_of, this_process
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -18,7 +21,10 @@ if TYPE_CHECKING:
 
     from levilab.sweeps.plan import Chunk, Plan
     from levilab.sweeps.store import Store
+    from levilab.workers import Workers
 
+#: What one core computes so quickly [s] is not worth the start of other processes.
+QUICK_S = 4.0
 #: A sweep ends when so many chunks have failed: the others would, too.
 MOST_FAILURES = 20
 #: So much is simulated to have the kernels compiled before workers need them [s].
@@ -81,29 +87,47 @@ def tasks_of(store: Store) -> Iterator[Task]:
     return (Task(light, chunk, store.plan.values_of(chunk)) for chunk in store.missing())
 
 
-def run(store: Store, progress: Callable[[float], None] | None = None) -> None:
+def workers_for(plan: Plan, count: int | None = None) -> Workers:
+    """Return where a plan is computed on this machine: in this process if it is quick, else on several cores.
+
+    Args:
+        plan: decides whether other processes are worth their start.
+        count: of processes; None: one for each core.
+
+    Raises:
+        UsageError: the count makes no sense.
+    """
+    quick = plan.chunk_count == 1 or plan.size * seconds_per_point(plan) < QUICK_S
+    several = processes(count)
+    return this_process() if quick or several.count == 1 else processes(min(several.count, plan.chunk_count))
+
+
+def run(store: Store, workers: Workers | None = None, progress: Callable[[float], None] | None = None) -> None:
     """Compute what is missing in a store.
 
     Args:
         store: takes the results, chunk by chunk.
+        workers: compute them; None: this process.
         progress: called with the share of the chunks that are done.
 
     Raises:
-        ChunksFailed: some could not be computed; all others are done.
+        ChunksFailed: some could not be computed; the others are done.
+        CannotWrite, WorkersLost: what is done so far is in the store.
     """
     failed: list[tuple[Chunk, Exception]] = []
-    for task in tasks_of(store):
-        try:
-            values = compute(task)
-        except LevilabError as error:
-            failed.append((task.chunk, error))
-            if len(failed) >= MOST_FAILURES:
-                break
-            continue
-        with interruption_postponed():
-            store.write(task.chunk, values)
-        if progress is not None:
-            progress(store.done / store.plan.chunk_count)
+    with contextlib.closing(results_of(compute, tasks_of(store), workers or this_process())) as results:
+        for done in results:
+            if done.result is not None:
+                with interruption_postponed():
+                    store.write(done.task.chunk, done.result)
+                if progress is not None:
+                    progress(store.done / store.plan.chunk_count)
+            elif isinstance(done.error, LevilabError):
+                failed.append((done.task.chunk, done.error))
+                if len(failed) == MOST_FAILURES:
+                    break
+            elif done.error is not None:  # a defect of this program
+                raise done.error
     if failed:
         raise ChunksFailed(_why(failed, store))
 

@@ -62,7 +62,7 @@ def test_an_interrupted_run_goes_on_to_the_same_bits(
     again = Store.open(tmp_path / "map.zarr", writable=True)
     assert (again.done, [chunk.number for chunk in again.missing()]) == (2, [2, 3])
     shares: list[float] = []
-    run(again, shares.append)
+    run(again, progress=shares.append)
     assert shares == [0.75, 1.0]
     assert bits(Store.open(tmp_path / "map.zarr").load()) == bits(whole)
 
