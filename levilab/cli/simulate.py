@@ -13,7 +13,7 @@ from levilab.errors import UsageError
 if TYPE_CHECKING:
     from levilab.motion.effects import Effect
     from levilab.simulator.scene import Scene
-    from levilab.stability.map import Span
+    from levilab.sweeps.spin_mass import Span
 
 benchmark_app = typer.Typer(no_args_is_help=True, add_completion=False)
 
@@ -117,7 +117,7 @@ def stability(
     if not survival and (without := [name for name, given in of_map.items() if given is not None]):
         raise UsageError(without[0], "it is of a map: give `survival`, too")
 
-    from levilab.stability.map import check_duration
+    from levilab.sweeps.spin_mass import check_duration
 
     spans = _span("spins", spins), _span("masses", masses)
     stay = check_duration(30.0 if duration is None else duration)
@@ -136,32 +136,29 @@ def stability(
 
 
 def _span(name: str, text: str | None) -> "Span | None":
-    from levilab.stability.map import span_of
+    from levilab.sweeps.spin_mass import span_of
 
     return None if text is None else span_of(name, text)
 
 
 def _mapped(scene: "Scene", spans: "tuple[Span | None, Span | None]", duration: float, out: Path) -> dict[str, object]:
     from levilab.present.progress import ShareBar
-    from levilab.stability.map import survival_map
-    from levilab.stability.table import place_for_map, write_map
+    from levilab.sweeps.run import compile_for, run, with_step, workers_for
+    from levilab.sweeps.spin_mass import as_document, notes_of, place_for_map, plan_of, write_map
+    from levilab.sweeps.store import Store
 
+    plan = plan_of(scene, *spans, duration=duration)
     place_for_map(out)
     with interruptible("no map was written"), contextlib.closing(ShareBar("simulating the map")) as share:
-        found = survival_map(scene, *spans, duration=duration, progress=share)
-    for path in write_map(found, out):
-        message(f"wrote {path}")
-    for note in found.notes:
+        store = Store.create(None, with_step(plan, message))
+        compile_for(store.plan)
+        run(store, workers_for(store.plan), share)
+        found = store.load()
+        for path in write_map(found, out):
+            message(f"wrote {path}")
+    for note in notes_of(plan):
         message(f"note: {note}")
-    return {
-        "duration_s": found.duration,
-        "spin_step_hz": found.spin_step,
-        "spins_hz": found.spins.tolist(),
-        "masses_kg": found.masses.tolist(),
-        "survived": found.survived.tolist(),
-        "floating_kg": [list(region) for region in found.floating],
-        "notes": list(found.notes),
-    }
+    return as_document(found)
 
 
 @benchmark_app.command("simulator", epilog="Example: levilab benchmark simulator --out speed")

@@ -7,22 +7,27 @@ from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
 
-from levilab.files import CannotWrite, replace_atomically, writing
 from levilab.present.terminal import new_table, terminal
 from levilab.simulator.equilibrium import advice
+from levilab.stability.thesis import HIGHEST_HZ, MEASURED_HZ, MEASURED_U_HZ, SIMULATED_HZ, is_thesis_device
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from pathlib import Path
 
     from levilab.simulator.equilibrium import Stability
     from levilab.simulator.scene import Scene
-    from levilab.stability.map import Map
+
+
+def _range(which: int) -> str:
+    """The range of the simulated lower (0) or upper (1) limits."""
+    limits = [pair[which] for pair in SIMULATED_HZ.values()]
+    return f"{min(limits):.2f} – {max(limits):.2f}"
+
 
 #: The master's thesis on the Levitron: its simulated limits of four starts, and what it measured.
 THESIS = {
-    "lower": "14.005 by its own estimate; 21.78 – 23.02 simulated; 21.86 ± 0.08 measured",
-    "upper": "65.01 – 81.73 simulated; about 61 highest synchronised",
+    "lower": f"14.005 by its own estimate; {_range(0)} simulated; {MEASURED_HZ} ± {MEASURED_U_HZ} measured",
+    "upper": f"{_range(1)} simulated; about {HIGHEST_HZ:g} highest synchronised",
     "height": "7.3 measured",
     "mass": "25.5 printed, which its own field cannot lift",
 }
@@ -42,13 +47,6 @@ LEFT_OUT: tuple[tuple[Callable[[Scene], bool], str], ...] = (
         "the loose washers are left out here: they turn with the top as if they were fixed",
     ),
 )
-
-
-def _is_thesis_device(found: Stability) -> bool:
-    base, top = found.scene.base, found.scene.top
-    ring = (base.inner_radius_m, base.outer_radius_m, base.strength_t_m, base.thickness_m)
-    body = (top.inertia_transverse_kg_m2, top.inertia_axial_kg_m2, abs(top.moment_a_m2))
-    return ring == (0.030, 0.055, 1.40e-3, 0.0) and body == (1.04e-6, 1.731314e-6, 0.714)
 
 
 def print_stability(found: Stability) -> None:
@@ -101,7 +99,7 @@ def _spins(windows: Sequence[tuple[float, float]]) -> str:
 
 def _facts_table(found: Stability) -> Any:
     assert found.floating
-    beside = _is_thesis_device(found)
+    beside = is_thesis_device(found.scene)
     table = new_table("The floating top", "", "here", *(["in the thesis"] if beside else []))
     lower, upper = found.floating.spins[0] if found.floating.spins else (math.nan, math.nan)
     rows = [
@@ -169,36 +167,3 @@ def as_document(found: Stability) -> dict[str, Any]:
 
 def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
-
-
-TABLE, PICTURE = "survival.csv", "survival.png"
-
-
-_ELSEWHERE = "give another folder with `out`"
-
-
-def place_for_map(folder: Path) -> None:
-    """Make the folder, before anything is simulated; a map that is there stays.  Raises CannotWrite."""
-    for path in (folder / TABLE, folder / PICTURE):
-        if path.exists():
-            raise CannotWrite(f"{path} is there already: give another folder with `out`, or move it away")
-    with writing(f"{folder}: the map cannot be written", _ELSEWHERE):
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / TABLE).touch()
-        (folder / TABLE).unlink()
-
-
-def write_map(found: Map, folder: Path) -> list[Path]:
-    """survival.png and survival.csv (one row a top; 1: survived) into a folder."""
-    # matplotlib, which a command without --map does not need
-    from levilab.present.style import save_png
-    from levilab.stability.figure import map_figure
-
-    rows = ["mass_kg,spin_hz,survived"]
-    for mass, alive in zip(found.masses, found.survived, strict=True):
-        rows += [f"{mass:.8g},{spin:.6g},{one:d}" for spin, one in zip(found.spins, alive, strict=True)]
-    with writing(f"{folder}: the map cannot be written", _ELSEWHERE):
-        folder.mkdir(parents=True, exist_ok=True)
-        replace_atomically(folder / TABLE, "\n".join(rows) + "\n")
-        save_png(map_figure(found), folder / PICTURE)
-    return [folder / TABLE, folder / PICTURE]

@@ -17,8 +17,9 @@ import numpy as np
 from levilab.errors import UsageError, WorkersLost
 from levilab.files import writing
 from levilab.sweeps.observables import OBSERVABLES, columns_of, observe
+from levilab.sweeps.quantities import step_in_words
 from levilab.sweeps.refinement import AUDIT, CONFIDENCE, STRIDE, Points, Refined, refine
-from levilab.sweeps.store import DONE
+from levilab.sweeps.store import COMPUTED, DONE, FILLED, STATUS
 from levilab.workers import results_of
 
 if TYPE_CHECKING:
@@ -30,9 +31,8 @@ if TYPE_CHECKING:
     from levilab.sweeps.store import Store
     from levilab.workers import Done, Workers
 
-#: The array of marks, and the attributes: what was asked for, and what came of it.
-STATUS, ASKED, FOUND = "status", "adaptive", "refined"
-COMPUTED, FILLED = 1, 2
+#: Attributes of the store: what was asked for, and what came of it.
+ASKED, FOUND = "adaptive", "refined"
 #: Points of a task: enough to fill the lanes; a round is cut into about so many tasks; and no task has more.
 FEWEST, MANY, MOST = 64, 64, 4096
 #: After so many new points the store is written, or at the end of a round [points].
@@ -115,8 +115,7 @@ def run_adaptive(store: Store, executor: Workers, progress: Callable[[float], No
         WorkersLost, SimulationError: points could not be computed.
     """
     asked, plan = store.group.attrs[ASKED], store.plan
-    apart = [k for k, axis in enumerate(plan.axes) if axis.values.dtype.kind != "f"]
-    refinement = refine(plan.shape, stride=asked["stride"], audit=asked["audit"], seed=plan.seed, apart=apart)
+    refinement = refine(plan.shape, stride=asked["stride"], audit=asked["audit"], seed=plan.seed)
     run, feed = _Run.of(store, progress), _Feed()
     with contextlib.closing(results_of(compute_points, feed, executor)) as results:
         try:
@@ -271,8 +270,9 @@ def in_words(report: dict[str, Any], plan: Plan) -> list[str]:
     *_, judge = report["audits"]
     wrong = sum(audit["wrong"] for audit in report["audits"])
     count = sum(audit["computed"] for audit in report["audits"])
-    size = " x ".join(
-        f"{stride} points of {axis.key}" for stride, axis in zip(report["strides"], plan.axes, strict=True)
+    size = " by ".join(
+        step_in_words(axis.key, axis.values, stride, logarithmic=axis.scale == "log")
+        for stride, axis in zip(report["strides"], plan.axes, strict=True)
     )
     share, limit = f"{100 * report['saved']:.0f} %", f"{100 * report['most_wrong_share']:.2g} %"
     checked = f"{count} of those filled in were checked at random: {wrong} were wrong"
@@ -284,5 +284,5 @@ def in_words(report: dict[str, Any], plan: Plan) -> list[str]:
         f"{report['computed']} of {report['points']} points were computed, {share} were filled in",
         f"{checked}, and their surroundings were computed",
         sure,
-        f"an island is sure to be seen if it holds a box of {size}; smaller ones only by chance",
+        f"an island that holds a box of {size} is sure to be seen, a smaller one by chance alone",
     ]

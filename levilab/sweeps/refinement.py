@@ -123,9 +123,7 @@ class Refined:
         return self.most_wrong / self.filled if self.filled else 0.0
 
 
-def refine(
-    shape: Sequence[int], *, stride: int = STRIDE, audit: int = AUDIT, seed: int = 0, apart: Sequence[int] = ()
-) -> Refinement:
+def refine(shape: Sequence[int], *, stride: int = STRIDE, audit: int = AUDIT, seed: int = 0) -> Refinement:
     """Refine a yes/no map along its boundary.
 
     A generator that asks for points and is sent their values; what it asks for depends on the values alone, so that
@@ -136,15 +134,14 @@ def refine(
         stride: of the coarse grid, a power of 2.
         audit: points of each audit.
         seed: of the audits' choice.
-        apart: axes along which neighbours have nothing to do with each other, such as waveforms.
 
     Raises:
         ValueError: stride is no power of 2.
     """
     if stride < 1 or stride & (stride - 1):
         raise ValueError(f"stride = {stride}: a power of 2 is expected, such as 8")
-    grids = _grids(shape, stride, apart)
-    linked = tuple(axis for axis, n in enumerate(shape) if n > 1 and axis not in apart)
+    grids = _grids(shape, stride)
+    linked = tuple(axis for axis, n in enumerate(shape) if n > 1)
     state = _State(np.zeros(shape, dtype=np.bool_), np.zeros(shape, dtype=np.bool_), linked)
     # each level has about twice as many points as the one before: a boundary is a line
     ends = [0.9 * 2.0 ** (level - len(grids) + 1) for level in range(len(grids))]
@@ -191,9 +188,9 @@ def run_refinement(refinement: Refinement, values_of: Callable[[Points], Flags])
 Grid = list[Points]
 
 
-def _grids(shape: Sequence[int], stride: int, apart: Sequence[int]) -> list[Grid]:
+def _grids(shape: Sequence[int], stride: int) -> list[Grid]:
     """Return the grids from the coarse to the full one; a coarse one never has less than three points along an axis."""
-    finest = [1 if axis in apart else min(stride, _power_below(n // 2)) for axis, n in enumerate(shape)]
+    finest = [min(stride, _power_below(n // 2)) for n in shape]
     grids = []
     while True:
         grids.append([_every(step, n) for step, n in zip(finest, shape, strict=True)])

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 SCHEMA = "levilab-sweep/1"
 DONE = "done"
+#: Of an adaptive map: an array with a mark for each point.
+STATUS, COMPUTED, FILLED = "status", 1, 2
 #: Marks that share a file.
 MARKS = 4096
 
@@ -42,11 +44,13 @@ class Map:
         plan: of the sweep.
         values: column → values, in the shape of the plan; what is not computed is NaN, False or 0.
         computed: whether a point is computed, in the shape of the plan.
+        filled: whether a point of an adaptive map is filled in from points around it; None of a map that is not.
     """
 
     plan: Plan
     values: dict[str, NDArray[Any]]
     computed: NDArray[np.bool_]
+    filled: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True)
@@ -197,7 +201,10 @@ class Store:
         for number in np.flatnonzero(self.marks):
             computed[plan.chunk_of(int(number)).box] = True
         values = {column.name: np.asarray(self.group[column.name][...]) for column in columns_of(plan.observables)}
-        return Map(plan, values, computed)
+        if STATUS not in self.group:
+            return Map(plan, values, computed)
+        status = np.asarray(self.group[STATUS][...])
+        return Map(plan, values, status == COMPUTED, status == FILLED)
 
 
 def processor() -> dict[str, str]:

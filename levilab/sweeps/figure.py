@@ -1,0 +1,426 @@
+"""A map → its figure: what was found, the windows that theory gives, the thesis's limits, and what all of it means.
+
+Blue is up and grey is lost, paler where a point was filled in; lines over the map have a white rim, and differ in their
+dashes as well as in colour.
+"""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.colors import ListedColormap, LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
+
+from levilab.errors import UsageError
+from levilab.present.style import STYLE
+from levilab.simulator.equilibrium import stability_of
+from levilab.stability.thesis import HIGHEST_HZ, MEASURED_HZ, MEASURED_U_HZ, SIMULATED_HZ, is_thesis_device
+from levilab.sweeps.quantities import quantity_of, step_in_words
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from levilab.simulator.scene import Scene
+    from levilab.sweeps.plan import Axis, Plan
+    from levilab.sweeps.store import Map
+
+    Array = NDArray[np.float64]
+
+SPIN, MASS, HEIGHT, DRIVE = "start.spin_hz", "top.mass_kg", "start.position_m.2", "drive.frequency_hz"
+ORANGE, PURPLE = "#D55E00", "#7A1F5C"
+#: Numbers, from few to many; blue stays for the tops that are up.
+NUMBERS = "YlOrBr_r"
+#: Columns whose values spread over decades.
+LOGARITHMIC = {"energy_error", "position_error_m"}
+#: Columns in which NaN says that the top is still up; in the others there is no value.
+NAN_IS_UP = {"lifetime_s", "fall_spin_hz"}
+#: The most small multiples, how many beside each other, and the most cells along a side that a picture can show.
+MOST_PANELS, PANELS_IN_A_ROW, MOST_CELLS = 12, 4, 1600
+#: A window that changes along an axis is found for so many of its values.
+CURVE_POINTS = 61
+RIM = [withStroke(linewidth=3.2, foreground="white")]
+DASHED: Any = {"color": "black", "linewidth": 1, "linestyle": "dashed"}
+#: Where panels begin and end, as shares of the width: a colour bar fits beside them.
+LEFT, RIGHT = 0.075, 0.9
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """A kind of cell: its colour, and what it means."""
+
+    colour: str
+    meaning: str
+
+
+UP, UP_FILLED, LOST, LOST_FILLED, MISSING, NONE, SLIPS = range(7)
+KINDS = {
+    UP: _Kind("#0072B2", "still up"),
+    UP_FILLED: _Kind("#85B9DC", "filled in: still up"),
+    LOST: _Kind("#B8B8B8", "lost before"),
+    LOST_FILLED: _Kind("#E4E4E4", "filled in: lost before"),
+    MISSING: _Kind("#FFFFFF", "not computed"),
+    NONE: _Kind("#F7F7F7", "no value"),
+    SLIPS: _Kind("#F5E1A4", "up, but not locked"),
+}
+
+
+@dataclass(frozen=True)
+class _View:
+    """What lies along the axes of the panels.
+
+    Attributes:
+        x, y: axes of each panel.
+        panels: axis whose values are the panels; None: there is one panel.
+        order: dimensions of the map in the order panels, y, x.
+        chosen: indices of the panels' values.
+    """
+
+    x: Axis
+    y: Axis
+    panels: Axis | None
+    order: tuple[int, ...]
+    chosen: tuple[int, ...] = (0,)
+
+
+def map_figure(found: Map, column: str = "survived", notes: Sequence[str] = ()) -> Figure:
+    """Draw a column of a map of two or three axes.
+
+    Args:
+        found: the map; nothing is simulated.
+        column: of `OBSERVABLES`.
+        notes: sentences for below the map, as `adaptive.in_words` has them.
+
+    Raises:
+        UsageError: the map has no such column, or is no map: one axis, or the rows of a table.
+    """
+    if column not in found.values:
+        raise UsageError("observe", f"the map has {', '.join(found.values)}", value=column)
+    view = _view_of(found.plan)
+    kinds, numbers = _cells(found, column)
+    norm = _norm(numbers, column)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(8.0, 6.0) if len(view.chosen) == 1 else (10.0, 6.0))
+        panels = [figure.add_subplot() for _ in view.chosen]
+        lines: list[Artist] = []
+        for axes, index in zip(panels, view.chosen, strict=True):
+            _draw_cells(axes, view, _slice(kinds, view, index), _slice(numbers, view, index), norm)
+            lines = _draw_limits(axes, found.plan, view)
+        _label(panels, view)
+        handles = [*_kind_patches(kinds, column, found.plan), *lines]
+        caption = _caption(found, view, [*_reading_sentences(view, column, lines), *notes], figure.get_figwidth())
+        box = _place(figure, panels, head=0.45 + 0.17 * -(-len(handles) // 2), foot=0.62 + 0.145 * len(caption))
+        if norm is not None:
+            _draw_colour_bar(figure, box, norm, column)
+        top = figure.get_figheight()
+        figure.text(LEFT, 1 - 0.28 / top, _headline(found, column), fontsize=11)
+        figure.legend(
+            handles=handles, loc="upper left", bbox_to_anchor=(LEFT - 0.01, 1 - 0.34 / top), ncols=2, fontsize=7.5,
+            labelspacing=0.4,
+        )  # fmt: skip
+        style: Any = {"fontsize": 7.5, "color": "#404040", "va": "top", "linespacing": 1.35}
+        figure.text(LEFT, (0.12 + 0.145 * len(caption)) / top, "\n".join(caption), **style)
+    return figure
+
+
+def has_figure(plan: Plan) -> bool:
+    """Whether a plan has a figure: two or three axes that form a grid."""
+    return not plan.is_table and 2 <= len(plan.axes) <= 3 and min(plan.shape) > 1
+
+
+# --- what goes where ---
+
+
+def _view_of(plan: Plan) -> _View:
+    if not has_figure(plan):
+        raise UsageError("sweep", "a figure needs two or three axes, each with two values or more")
+    axes = list(plan.axes)
+    x = next((axis for key in (SPIN, DRIVE) for axis in axes if axis.key == key), axes[0])
+    rest = [axis for axis in axes if axis is not x]
+    y = max(rest, key=lambda axis: len(axis.values))
+    panels = next((axis for axis in rest if axis is not y), None)
+    order = tuple(axes.index(axis) for axis in (panels, y, x) if axis is not None)
+    if panels is None:
+        return _View(x, y, None, order)
+    count = len(panels.values)
+    chosen = np.unique(np.linspace(0, count - 1, min(count, MOST_PANELS)).round().astype(int))
+    return _View(x, y, panels, order, tuple(chosen.tolist()))
+
+
+def _place(figure: Figure, panels: list[Axes], *, head: float, foot: float) -> tuple[float, float, float]:
+    """Place the panels by hand between head and foot, which keep their inches, and give the figure its height.
+
+    Returns:
+        Where a colour bar goes: its left, bottom and height, as shares of the figure.
+    """
+    columns = min(len(panels), PANELS_IN_A_ROW)
+    rows = -(-len(panels) // columns)
+    panel, gap, between = (4.2, 0.0, 0.0) if len(panels) == 1 else (2.1, 0.62, 0.03)
+    above = 0.2 if len(panels) == 1 else 0.42
+    height = head + above + rows * panel + (rows - 1) * gap + foot
+    figure.set_figheight(height)
+    wide = (RIGHT - LEFT - (columns - 1) * between) / columns
+    for k, axes in enumerate(panels):
+        row, place = divmod(k, columns)
+        bottom = (foot + (rows - 1 - row) * (panel + gap)) / height
+        axes.set_position((LEFT + place * (wide + between), bottom, wide, panel / height))
+    return RIGHT + 0.015, foot / height, (rows * panel + (rows - 1) * gap) / height
+
+
+def _slice(values: NDArray[Any], view: _View, index: int) -> NDArray[Any]:
+    """Return the values of a panel, shape (y, x), thinned to what a picture can show."""
+    arranged = values.transpose(view.order)
+    panel = arranged if view.panels is None else arranged[index]
+    down, across = (-(-n // MOST_CELLS) for n in panel.shape)
+    return np.asarray(panel[::down, ::across])
+
+
+def _edges(axis: Axis) -> Array:
+    """Return the edges of the cells of an axis, as it is shown; between values in the middle, as its scale has it."""
+    values = axis.values[:: -(-len(axis.values) // MOST_CELLS)] * quantity_of(axis.key).factor
+    places = np.log(values) if axis.scale == "log" else values
+    middle = (places[1:] + places[:-1]) / 2
+    edges = np.concatenate([[1.5 * places[0] - places[1] / 2], middle, [1.5 * places[-1] - places[-2] / 2]])
+    return np.asarray(np.exp(edges) if axis.scale == "log" else edges)
+
+
+# --- cells ---
+
+
+def _cells(found: Map, column: str) -> tuple[NDArray[np.int8], Array]:
+    """Return the kind of each cell, and its number in the shown unit where it has one, NaN elsewhere."""
+    values = found.values[column]
+    known = found.computed if found.filled is None else found.computed | found.filled
+    filled = np.zeros_like(known) if found.filled is None else found.filled
+    kinds = np.full(values.shape, MISSING, dtype=np.int8)
+    if values.dtype == np.bool_:
+        kinds[known] = np.where(values, UP, LOST)[known]
+        if column == "locked" and "survived" in found.values:
+            kinds[known & found.values["survived"] & ~values & ~filled] = SLIPS
+        kinds[filled & (kinds == UP)] = UP_FILLED
+        kinds[filled & (kinds == LOST)] = LOST_FILLED
+        return kinds, np.full(values.shape, np.nan)
+    numbers = np.where(found.computed, values * quantity_of(column).factor, np.nan)
+    kinds[found.computed] = UP if column in NAN_IS_UP else NONE
+    if column in NAN_IS_UP and "survived" in found.values:
+        kinds[filled & found.values["survived"]] = UP_FILLED
+        kinds[filled & ~found.values["survived"]] = LOST_FILLED
+    return kinds, numbers
+
+
+def _norm(numbers: Array, column: str) -> Normalize | None:
+    """Return how numbers become colours; None where there are none."""
+    there = numbers[np.isfinite(numbers)]
+    if not there.size:
+        return None
+    if column in LOGARITHMIC and (positive := there[there > 0]).size:
+        return LogNorm(positive.min(), positive.max())
+    low, high = float(there.min()), float(there.max())
+    return Normalize(low, high if high > low else low + 1.0)
+
+
+def _draw_cells(axes: Axes, view: _View, kinds: NDArray[Any], numbers: Array, norm: Normalize | None) -> None:
+    x, y = _edges(view.x), _edges(view.y)
+    flat: dict[str, Any] = {"shading": "flat", "rasterized": True}
+    colours = ListedColormap([KINDS[kind].colour for kind in sorted(KINDS)])
+    axes.pcolormesh(x, y, kinds, cmap=colours, vmin=-0.5, vmax=len(KINDS) - 0.5, **flat)
+    if norm is not None:
+        axes.pcolormesh(x, y, np.ma.masked_invalid(numbers), cmap=NUMBERS, norm=norm, **flat)
+    for axis, set_scale in ((view.x, axes.set_xscale), (view.y, axes.set_yscale)):
+        if axis.scale == "log":
+            set_scale("log")
+    axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+    axes.grid(visible=False)
+
+
+# --- lines over the cells ---
+
+
+def _draw_limits(axes: Axes, plan: Plan, view: _View) -> list[Artist]:
+    """Draw what theory and the thesis say of the spin at the start, and return what the legend needs."""
+    if view.x.key == DRIVE:
+        return _draw_spin_at_the_start(axes, plan.scene)
+    if view.x.key != SPIN or view.x.scale == "log":
+        return []
+    return [*_draw_window(axes, plan.scene, view), *_draw_adiabatic(axes, plan.scene, view), *_draw_thesis(axes, plan)]
+
+
+def _draw_spin_at_the_start(axes: Axes, scene: Scene) -> list[Artist]:
+    spin = abs(scene.start.spin_hz)
+    low, high = axes.get_xlim()
+    if not low < spin < high:
+        return []
+    _draw_rim(axes, x=spin)
+    return [axes.axvline(spin, label=f"spin at the start, {spin:g} Hz", **DASHED)]
+
+
+def _draw_window(axes: Axes, scene: Scene, view: _View) -> list[Artist]:
+    """Draw the slowest and the fastest spin of small motions, of either sense."""
+    heights, low, high = _windows_along(scene, view.y)
+    if np.all(np.isnan(low)):
+        return []
+    style: Any = {"color": ORANGE, "linewidth": 1.6, "path_effects": RIM, "scalex": False, "scaley": False}
+    for edge in (low, high, -low, -high):
+        axes.plot(edge, heights, **style)
+    return [Line2D([], [], color=ORANGE, linewidth=1.6, label="slowest and fastest spin for small motions (linear)")]
+
+
+def _windows_along(scene: Scene, axis: Axis) -> tuple[Array, Array, Array]:
+    """Return some values of an axis, as they are shown, and the linear window [Hz] at each, NaN where none is."""
+    values = axis.values[np.unique(np.linspace(0, len(axis.values) - 1, CURVE_POINTS).round().astype(int))]
+    if not axis.key.startswith(("top.", "base.", "gravity")):  # how it starts does not change the window
+        values = values[[0, -1]]
+        windows = [_window(scene)] * 2
+    else:
+        windows = [_window(scene.changed({axis.key: float(value), "start.place": "given"})) for value in values]
+    low, high = np.array(windows).T
+    return values * quantity_of(axis.key).factor, low, high
+
+
+def _window(scene: Scene) -> tuple[float, float]:
+    floating = stability_of(scene).floating
+    return floating.spins[0] if floating and floating.spins else (math.nan, math.nan)
+
+
+def _draw_adiabatic(axes: Axes, scene: Scene, view: _View) -> list[Artist]:
+    """Draw where the masses, or the heights, end at which a fast top floats."""
+    lifted = stability_of(scene).lifted
+    if view.y.key == MASS:
+        places = [mass for window in lifted for mass in (window.light, window.heavy)]
+        label = "masses that float (adiabatic)"
+    elif view.y.key == HEIGHT:
+        places = [height for window in lifted for height in (window.low, window.high)]
+        label = "heights that are stable (adiabatic)"
+    else:
+        return []
+    quantity, (low, high) = quantity_of(view.y.key), axes.get_ylim()
+    shown = [place * quantity.factor for place in places if low < place * quantity.factor < high]
+    for place in shown:
+        _draw_rim(axes, y=place)
+        axes.axhline(place, **DASHED)
+    numbers = " to ".join(f"{place * quantity.factor:.2f}" for place in places[:2])
+    return [Line2D([], [], **DASHED, label=f"{label}: {numbers} {quantity.unit}")] if shown else []
+
+
+def _draw_rim(axes: Axes, *, x: float | None = None, y: float | None = None) -> None:
+    """Draw what sets a line with dashes off from the cells below it."""
+    style: Any = {"color": "white", "linewidth": 2.6}
+    if x is not None:
+        axes.axvline(x, **style)
+    if y is not None:
+        axes.axhline(y, **style)
+
+
+def _draw_thesis(axes: Axes, plan: Plan) -> list[Artist]:
+    """Mark the limits of the thesis where they are of this device: measured ones as lines, simulated ones above."""
+    if not is_thesis_device(plan.scene):
+        return []
+    low, high = axes.get_xlim()
+    artists: list[Artist] = []
+    for spin, dashes, label in (
+        (MEASURED_HZ, "dashdot", f"thesis, measured: lower limit {MEASURED_HZ} ± {MEASURED_U_HZ} Hz"),
+        (HIGHEST_HZ, "dotted", f"thesis, measured: highest synchronised spin, about {HIGHEST_HZ:g} Hz"),
+    ):
+        if low < spin < high:
+            _draw_rim(axes, x=spin)
+            artists.append(axes.axvline(spin, color=PURPLE, linewidth=1.3, linestyle=dashes, label=label))
+    simulated = [spin for pair in SIMULATED_HZ.values() for spin in pair if low < spin < high]
+    if simulated:
+        style: Any = {"color": PURPLE, "marker": "v", "markersize": 5, "linestyle": "none"}
+        axes.plot(
+            simulated, np.full(len(simulated), 1.02), transform=axes.get_xaxis_transform(), clip_on=False, **style
+        )
+        artists.append(Line2D([], [], **style, label=f"thesis, simulated: limits of {', '.join(SIMULATED_HZ)}"))
+    return artists
+
+
+# --- words ---
+
+
+def _label(panels: list[Axes], view: _View) -> None:
+    across = min(len(panels), PANELS_IN_A_ROW)
+    for k, axes in enumerate(panels):
+        if k + across >= len(panels):
+            axes.set_xlabel(quantity_of(view.x.key).label)
+        else:
+            axes.tick_params(labelbottom=False)
+        if k % across == 0:
+            axes.set_ylabel(quantity_of(view.y.key).label)
+        else:
+            axes.tick_params(labelleft=False)
+        if view.panels is not None:
+            quantity = quantity_of(view.panels.key)
+            axes.set_title(f"{quantity.name} {quantity.text(view.panels.values[view.chosen[k]])}", loc="left", pad=9)
+
+
+def _draw_colour_bar(figure: Figure, box: tuple[float, float, float], norm: Normalize, column: str) -> None:
+    left, bottom, height = box
+    bar = figure.colorbar(mpl.cm.ScalarMappable(norm, NUMBERS), cax=figure.add_axes((left, bottom, 0.015, height)))
+    bar.set_label(quantity_of(column).label)
+    bar.outline.set_visible(False)
+
+
+def _kind_patches(kinds: NDArray[Any], column: str, plan: Plan) -> list[Artist]:
+    meanings = {kind: one.meaning for kind, one in KINDS.items()}
+    meanings[UP] = f"still up after {plan.duration_s:g} s"
+    if column == "locked":
+        meanings |= {UP: "locked to the drive", LOST: "not locked"}
+        meanings |= {UP_FILLED: "filled in: locked", LOST_FILLED: "filled in: not locked"}
+        if np.any(kinds == SLIPS):
+            meanings[LOST] = "lost"
+    drawn = [kind for kind in KINDS if np.any(kinds == kind)]
+    if column not in NAN_IS_UP and UP not in drawn and MISSING not in drawn and NONE in drawn:
+        drawn.remove(NONE)
+    return [
+        Patch(facecolor=KINDS[kind].colour, edgecolor="#999999", linewidth=0.5, label=meanings[kind]) for kind in drawn
+    ]
+
+
+def _headline(found: Map, column: str) -> str:
+    name = (found.plan.scene.name or "the scene").replace("$", r"\$")[:50]
+    size, after = found.computed.size, f"after {found.plan.duration_s:g} s"
+    if column == "survived":
+        return f"{name}: {np.count_nonzero(found.values[column])} of {size} tops are still up {after}"
+    if column == "locked":
+        return f"{name}: {np.count_nonzero(found.values[column])} of {size} tops are locked to the drive {after}"
+    return f"{name}: {quantity_of(column).name}, of {size} tops in {found.plan.duration_s:g} s"
+
+
+def _caption(found: Map, view: _View, sentences: Sequence[str], width: float) -> list[str]:
+    """Return the lines that explain the map below it."""
+    wide, high = (_step(axis) for axis in (view.x, view.y))
+    cell = f"Each cell is one top, simulated for {found.plan.duration_s:g} s, and spans {wide} by {high}"
+    said = [f"{cell}: a limit is known no better."]
+    if view.panels is not None and len(view.chosen) < len(view.panels.values):
+        said.append(f"{len(view.chosen)} of {len(view.panels.values)} values of the third axis are shown.")
+    said += [f"{text[0].upper()}{text[1:]}".removesuffix(".") + "." for text in sentences]
+    if found.filled is None and not found.computed.all():
+        said.append(f"{np.count_nonzero(~found.computed)} of {found.computed.size} points are not computed yet.")
+    return textwrap.wrap(" ".join(said), round(16 * width))
+
+
+def _step(axis: Axis) -> str:
+    return step_in_words(axis.key, axis.values, logarithmic=axis.scale == "log")
+
+
+def _reading_sentences(view: _View, column: str, lines: Sequence[Artist]) -> list[str]:
+    if column == "locked":
+        return ["Locked: the top is up, and its body slipped by no turn behind the drive in the last half of the time"]
+    if view.x.key != SPIN or not lines:
+        return []
+    said = (
+        "Between the orange lines small motions stay small. A top that is lost there started too far from its place "
+        "for its spin; one that is up outside would take longer to be lost, or swings on a wider path."
+    )
+    return [said]

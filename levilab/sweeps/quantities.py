@@ -1,0 +1,106 @@
+"""How the quantities of a map are shown to people: names, and units with the prefixes of a laboratory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from levilab.sweeps.observables import OBSERVABLES
+from levilab.sweeps.plan import unit_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity on an axis or a colour bar.
+
+    Attributes:
+        name: in words.
+        unit: as it is shown; empty for a number without one.
+        factor: from SI to that unit.
+    """
+
+    name: str
+    unit: str
+    factor: float
+
+    @property
+    def label(self) -> str:
+        """For an axis."""
+        return f"{self.name}  [{self.unit}]" if self.unit else self.name
+
+    def text(self, value: float) -> str:
+        """A value in SI, as people read it."""
+        return f"{value * self.factor:.4g} {self.unit}".strip()
+
+
+#: Unit in SI → the one that is shown, and the factor.
+_UNITS = {
+    "kg": ("g", 1e3),
+    "m": ("cm", 1e2),
+    "T": ("mT", 1e3),
+    "rad": ("mrad", 1e3),
+    "m/s": ("cm/s", 1e2),
+    "T m": ("mT cm", 1e5),
+    "kg m^2": ("g cm²", 1e7),
+    "A m^2": ("A m²", 1.0),
+    "m/s^2": ("m/s²", 1.0),
+    "1": ("", 1.0),
+}
+_NAMES = {
+    "start.spin_hz": "spin at the start",
+    "start.tilt_rad": "tilt at the start",
+    "start.position_m.0": "distance from the axis at the start, x",
+    "start.position_m.1": "distance from the axis at the start, y",
+    "start.position_m.2": "height at the start",
+    "start.velocity_m_s.2": "upward velocity at the start",
+    "top.mass_kg": "mass",
+    "top.moment_a_m2": "moment",
+    "top.moment_tilt.0": "transverse part of the moment",
+    "base.strength_t_m": "strength of the base, ρ",
+    "drive.frequency_hz": "frequency of the drive",
+    "drive.amplitude_t": "amplitude of the drive",
+    "lifetime_s": "time until the fall",
+    "fall_spin_hz": "spin at the fall",
+    "height_spread_m": "spread of the height",
+    "energy_error": "relative change of the energy",
+    "position_error_m": "estimated error of the place",
+}
+
+
+def quantity_of(name: str) -> Quantity:
+    """Return how a key of a scene or a column is shown.
+
+    >>> quantity_of("top.mass_kg").label, quantity_of("drive.amplitude_t").text(4e-4)
+    ('mass  [g]', '0.4 mT')
+    >>> quantity_of("precession_line_hz").label, quantity_of("escape.radius_m").label
+    ('precession line  [Hz]', 'escape.radius  [cm]')
+    """
+    unit = OBSERVABLES[name].unit if name in OBSERVABLES else unit_of(name)
+    shown, factor = _UNITS.get(unit, (unit, 1.0))
+    return Quantity(_NAMES.get(name) or _plain(name, unit), shown, factor)
+
+
+def step_in_words(key: str, values: NDArray[Any], count: int = 1, *, logarithmic: bool = False) -> str:
+    """Return so many steps of an axis in words.
+
+    >>> import numpy as np
+    >>> step_in_words("start.spin_hz", np.linspace(20, 30, 21), 8)
+    '4 Hz (spin at the start)'
+    >>> step_in_words("drive.amplitude_t", np.geomspace(1e-5, 1e-3, 3), logarithmic=True)
+    'a factor 10 (amplitude of the drive)'
+    """
+    quantity, steps = quantity_of(key), len(values) - 1
+    if logarithmic:
+        return f"a factor {(values[-1] / values[0]) ** (count / steps):.3g} ({quantity.name})"
+    step = abs(values[-1] - values[0]) * quantity.factor * count / steps
+    return f"{f'{step:.3g} {quantity.unit}'.strip()} ({quantity.name})"
+
+
+def _plain(name: str, unit: str) -> str:
+    """A name without its unit; words of a column have spaces between them."""
+    ending = "_" + unit.lower().replace("^", "").replace("/", "_").replace(" ", "_")
+    plain = name.removesuffix(ending)
+    return plain.replace("_", " ") if name in OBSERVABLES else plain
