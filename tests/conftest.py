@@ -29,7 +29,7 @@ SLOW = """
     levilab/runs/test_hostile.py  levilab/runs/test_kill.py
     levilab/simulator  ../levilab/simulator  levilab/stability
     levilab/world/test_base.py  levilab/world/test_motion_world.py  levilab/world/test_serve.py
-    levilab/world/test_spin_world.py
+    levilab/workers  levilab/world/test_spin_world.py
     test_documentation.py
 """
 

@@ -13,12 +13,8 @@ from levilab.cli.output import interruptible, message, print_json, result
 from levilab.errors import DataError, UsageError
 
 if TYPE_CHECKING:
-    from levilab.simulator.scene import Scene
-    from levilab.sweeps.plan import Axis, Plan
     from levilab.sweeps.store import Store
 
-#: What is observed, how long, and how well, unless an option says it.
-OBSERVE, DURATION_S, TOLERANCE = "survived,lifetime_s", 30.0, 1e-6
 #: So often a line says how far the work is where no bar can be seen [s].
 LINE_EVERY_S = 60.0
 
@@ -48,7 +44,9 @@ def sweep(
     ] = None,
     observe: Annotated[
         str | None,
-        typer.Option(metavar="NAME,…", help="What is observed; a wrong name lists them all.", show_default=OBSERVE),
+        typer.Option(
+            metavar="NAME,…", help="What is observed; a wrong name lists them all.", show_default="survived,lifetime_s"
+        ),
     ] = None,
     duration: Annotated[
         float | None, typer.Option(metavar="S", help="Seconds that are simulated at each point.", show_default="30")
@@ -112,61 +110,13 @@ def _begun(name: str, given: dict[str, Any], *, resume: bool) -> Store:
     from levilab.cli.simulate import chosen_scene
 
     scene = chosen_scene(name, given["settings"])
-    axes = _axes(scene, given)
 
-    from levilab.sweeps.store import Store, differences
+    from levilab.sweeps.request import SweepRequest, store_for
 
-    plan = _plan(scene, axes, given)
-    path = given["out"] or Path(f"{scene.name or 'sweep'}.zarr")
-    if resume and path.exists():
-        store = Store.open(path, writable=True)
-        if other := differences(store.plan, plan):
-            more = f" (and {len(other) - 3} more)" if len(other) > 3 else ""
-            raise UsageError(
-                "resume",
-                f"{path} is of another sweep: {'; '.join(other[:3])}{more}.  Take `out` for another store, or "
-                f"levilab sweep {path} --resume to go on with that one",
-            )
-        return store
-    if path.exists():
-        raise UsageError(
-            "out",
-            f"it is there already: levilab sweep {path} shows it, `resume` goes on with it; or take another place",
-            value=path,
-        )
-    from levilab.sweeps.run import with_step
-
+    out = given.pop("out") or Path(f"{scene.name or 'sweep'}.zarr")
+    request = SweepRequest(scene, **{name: value for name, value in given.items() if value is not None})
     with interruptible("nothing was written"):
-        return Store.create(path, with_step(plan, message))
-
-
-def _axes(scene: Scene, given: dict[str, Any]) -> tuple[Axis, ...]:
-    if given["sweep"] and given["points"]:
-        raise UsageError("points", "a table has all axes: leave out `sweep`, or give it as columns of the table")
-    from levilab.simulator.keys import parse_setting
-    from levilab.sweeps.axes import check_axes, parse_axis, read_points
-
-    axes = read_points(given["points"]) if given["points"] else tuple(parse_axis(one) for one in given["sweep"] or ())
-    check_axes(scene, axes, {parse_setting(one)[0] for one in given["settings"] or ()})
-    return axes
-
-
-def _plan(scene: Scene, axes: tuple[Axis, ...], given: dict[str, Any]) -> Plan:
-    from levilab.simulator.single import LONGEST_S
-    from levilab.sweeps.cost import cut
-    from levilab.sweeps.observables import check_observables, columns_of
-    from levilab.sweeps.plan import Plan
-
-    names = tuple(dict.fromkeys(name.strip() for name in (given["observe"] or OBSERVE).split(",")))
-    columns_of(names)
-    numbers = {}
-    for name, usual in (("duration", DURATION_S), ("tolerance", TOLERANCE)):
-        numbers[name] = usual if given[name] is None else given[name]
-        if not 0 < numbers[name] <= LONGEST_S:
-            raise UsageError(name, f"a number above 0 and up to {LONGEST_S:.0e} is expected", value=numbers[name])
-    plan = Plan.of(scene, axes, names, numbers["duration"], tolerance=numbers["tolerance"], seed=given["seed"] or 0)
-    check_observables(plan)
-    return cut(plan)
+        return store_for(request, out, message, resume=resume)
 
 
 def _computed(store: Store, cores: int | None) -> None:

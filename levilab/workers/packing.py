@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 #: Results depend to the last bit on the versions of these, and pickles on Python's.
-LIBRARIES = ("levilab", "numpy", "numba", "llvmlite")
+LIBRARIES = ("levilab", "Python", "numpy", "numba", "llvmlite")
 
 
 @dataclass(frozen=True)
@@ -38,15 +38,14 @@ class Outcome:
 
 
 @cache
-def versions() -> dict[str, str]:
-    """Name → version of what results depend on, in this process."""
-    found = {"Python": ".".join(platform.python_version_tuple()[:2])}
-    for name in LIBRARIES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "missing"
-    return found
+def version_of(name: str) -> str:
+    """The version of a library in this process."""
+    if name == "Python":
+        return ".".join(platform.python_version_tuple()[:2])
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "missing"
 
 
 def call_here(function: Callable[[Any], Any], task: Any) -> Outcome:
@@ -57,13 +56,15 @@ def call_here(function: Callable[[Any], Any], task: Any) -> Outcome:
         return Outcome(error=error)
 
 
-def packed(function: Callable[[Any], Any]) -> Callable[[Any], tuple[Callable[..., Outcome], bytes, bytes]]:
+def packed(function: Callable[[Any], Any]) -> Callable[[Any], tuple[Callable[..., bytes], bytes, bytes]]:
     """Return what turns a task into what a worker is given: a function of this module and two pickles.
+
+    The worker returns a pickle, too: `unpacked` makes an outcome of it.
 
     Raises:
         LevilabError: the function or a task cannot be pickled.
     """
-    head = pickle.dumps((versions(), _pickled(function, "function")))
+    head = pickle.dumps(({name: version_of(name) for name in LIBRARIES}, _pickled(function, "function")))
     return lambda task: (call_there, head, _pickled(task, "task"))
 
 
@@ -77,17 +78,31 @@ def _pickled(thing: Any, what: str) -> bytes:
         ) from error
 
 
-def call_there(head: bytes, task: bytes) -> Outcome:
-    """Call a packed function with a packed task; this runs in the worker."""
+def call_there(head: bytes, task: bytes) -> bytes:
+    """Call a packed function with a packed task and pack what came of it; this runs in the worker."""
     try:
         function = _function(head)
         argument = pickle.loads(task)
     except _OtherVersionsError as error:
-        return Outcome(unusable=str(error))
+        outcome = Outcome(unusable=str(error))
     except Exception as error:  # noqa: BLE001 - anything may go wrong in unpickling
-        return Outcome(unusable=f"cannot load the task ({type(error).__name__}: {error})")
-    outcome = call_here(function, argument)
-    return outcome if outcome.error is None else Outcome(error=_that_travels(outcome.error))
+        outcome = Outcome(unusable=f"cannot load the task ({type(error).__name__}: {error})")
+    else:
+        outcome = call_here(function, argument)
+    if outcome.error is not None:
+        outcome = Outcome(error=_that_travels(outcome.error))
+    try:
+        return _pickled(outcome, "result")
+    except LevilabError as error:
+        return pickle.dumps(Outcome(error=error))
+
+
+def unpacked(answer: Outcome | bytes) -> Outcome:
+    """Return the outcome of a call, made here or there."""
+    if isinstance(answer, Outcome):
+        return answer
+    outcome: Outcome = pickle.loads(answer)
+    return outcome
 
 
 class _OtherVersionsError(Exception):
@@ -97,11 +112,11 @@ class _OtherVersionsError(Exception):
 @lru_cache(maxsize=4)
 def _function(head: bytes) -> Callable[[Any], Any]:
     """Unpickle a function, once in this process.  Raises what unpickling raises."""
-    theirs, function = pickle.loads(head)
-    other = [f"{name} {number}" for name, number in versions().items() if number != theirs[name]]
+    expected, function = pickle.loads(head)
+    other = [name for name, number in expected.items() if version_of(name) != number]
     if other:
-        expected = ", ".join(f"{name} {number}" for name, number in theirs.items() if number != versions()[name])
-        raise _OtherVersionsError(f"has {', '.join(other)}, and {expected} is expected")
+        seen = ", ".join(f"{name} {version_of(name)}" for name in other)
+        raise _OtherVersionsError(f"has {seen} instead of {', '.join(expected[name] for name in other)}")
     unpickled: Callable[[Any], Any] = pickle.loads(function)
     return unpickled
 

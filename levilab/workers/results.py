@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from levilab.errors import WorkersLost
-from levilab.workers.packing import Outcome, call_here, packed
+from levilab.workers.packing import Outcome, call_here, packed, unpacked
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable, Iterator
@@ -21,8 +21,11 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 R = TypeVar("R")
 
-#: A task that is under way whenever its pool breaks is given back as an error after so many times.
-MAX_BREAKS = 3
+#: What came of a call, here or packed by a worker.
+_Future = Future[Outcome | bytes]
+
+#: A task that was under way so often when a pool broke is done alone, at the end.  If that breaks too, it is an error.
+MAX_BREAKS_IN_COMPANY = 2
 #: So many pools in a row may break before one of them has given a result.
 MAX_FRUITLESS_POOLS = 5
 #: How often a waiting caller wakes up [s]: on Windows Ctrl-C does not end a wait.
@@ -50,9 +53,9 @@ def results_of(
     """Yield the results of tasks as they come, in any order.
 
     What the function raises is given back with its task and ends nothing else.  If a worker process dies, the others
-    are started anew, and only what was under way is done again.  A task that was under way three times, the last time
-    alone, is given back as an error.  Ctrl-C ends what is under way; so does a caller that wants no more and closes
-    the iterator (`contextlib.closing`), which Python by itself may do late.
+    are started anew, and only what was under way is done again.  A task that was under way whenever workers died, the
+    last time alone, is given back as an error.  Ctrl-C ends what is under way; so does a caller that wants no more and
+    closes the iterator (`contextlib.closing`), which Python by itself may do late.
 
     Args:
         function: pure, so that it may be done again; at the head of a module if it is done elsewhere.
@@ -111,6 +114,16 @@ class _Attempt(Generic[T]):
     task: T
     breaks: int = 0
 
+    @property
+    def is_to_be_alone(self) -> bool:
+        """Whether nothing else may be under way with it, so that it is known what breaks a pool."""
+        return self.breaks >= MAX_BREAKS_IN_COMPANY
+
+    @property
+    def as_deadly(self) -> Done[T, Any]:
+        """The task with the error that it kills its worker."""
+        return Done(self.task, None, WorkersLost("each process that does it dies: memory may be short"))
+
 
 @dataclass
 class _Queue(Generic[T]):
@@ -119,7 +132,7 @@ class _Queue(Generic[T]):
     Attributes:
         fresh: those never submitted.
         again: those that were under way when a pool broke.
-        alone: those that were so once more: at the end they are done one by one, which shows who it is.
+        alone: those that are to be done alone, after all others.
     """
 
     fresh: Iterator[T]
@@ -138,38 +151,52 @@ class _Queue(Generic[T]):
         """Take back what was under way, in the order of submission; the pool broke by one of the first few."""
         for place, attempt in enumerate(attempts):
             attempt.breaks += place < suspects
-            (self.again if attempt.breaks < MAX_BREAKS - 1 else self.alone).append(attempt)
+            (self.alone if attempt.is_to_be_alone else self.again).append(attempt)
+
+    def put_aside(self, attempt: _Attempt[T]) -> None:
+        """Take back a task whose worker died again and again."""
+        attempt.breaks = MAX_BREAKS_IN_COMPANY
+        self.alone.append(attempt)
 
 
 def _results_of_one_pool(
     queued: _Queue[T], call: Callable[[T], tuple[Any, ...]], pool: Executor, executor: Workers, window: int
 ) -> Iterator[Done[T, Any]]:
     """Yield results until all tasks are done.  Raises BrokenExecutor after all tasks under way are queued again."""
-    most = executor.in_flight or max(window, 2 * executor.count)
-    under_way: dict[Future[Outcome], _Attempt[T]] = {}
-    ended: queue.SimpleQueue[Future[Outcome]] = queue.SimpleQueue()
+    under_way: dict[_Future, _Attempt[T]] = {}
+    ended: queue.SimpleQueue[_Future] = queue.SimpleQueue()
     while True:
+        most = executor.in_flight or max(window, 2 * executor.count_in(pool))
         try:
             while len(under_way) < most and (attempt := queued.next(nothing_under_way=not under_way)):
-                try:
-                    future = pool.submit(*call(attempt.task))
-                except BrokenExecutor:
-                    queued.again.appendleft(attempt)
-                    raise
+                future = _submit(pool, call, attempt, queued)
                 under_way[future] = attempt
                 future.add_done_callback(ended.put)
             if not under_way:
                 return
             future = _next_of(ended, pool, executor)
-            outcome = _outcome_of(future, executor)
-        except BrokenExecutor as error:
-            yield from _after_a_break(queued, under_way, executor, error)
+            outcome = _outcome_of(future, pool, executor)
+        except BrokenExecutor:
+            yield from _after_a_break(queued, under_way, pool, executor)
             raise
         attempt = under_way.pop(future)
-        yield Done(attempt.task, outcome.result, outcome.error)
+        if outcome is not None:
+            yield Done(attempt.task, outcome.result, outcome.error)
+        elif attempt.is_to_be_alone:
+            yield attempt.as_deadly
+        else:
+            queued.put_aside(attempt)
 
 
-def _next_of(ended: queue.SimpleQueue[Future[Outcome]], pool: Executor, executor: Workers) -> Future[Outcome]:
+def _submit(pool: Executor, call: Callable[[T], tuple[Any, ...]], attempt: _Attempt[T], queued: _Queue[T]) -> _Future:
+    try:
+        return pool.submit(*call(attempt.task))
+    except BrokenExecutor:
+        queued.again.appendleft(attempt)
+        raise
+
+
+def _next_of(ended: queue.SimpleQueue[_Future], pool: Executor, executor: Workers) -> _Future:
     while True:
         try:
             return ended.get(timeout=WAKE_UP_S)
@@ -177,36 +204,47 @@ def _next_of(ended: queue.SimpleQueue[Future[Outcome]], pool: Executor, executor
             executor.check(pool)
 
 
-def _outcome_of(future: Future[Outcome], executor: Workers) -> Outcome:
-    """Return the outcome of a future that has ended.  Raises BrokenExecutor and WorkersLost."""
+def _outcome_of(future: _Future, pool: Executor, executor: Workers) -> Outcome | None:
+    """Return the outcome of a future that has ended; None: its worker died, and others are there.
+
+    Raises:
+        BrokenExecutor: all workers of the pool died.
+        WorkersLost: no further results will come.
+    """
     if future.cancelled():
-        raise WorkersLost(f"the {executor.name} gave up what they were to do: start them anew, and resume")
+        executor.check(pool)
+        raise WorkersLost(f"the {executor.name} gave up what they were to do: start them anew")
     error = future.exception()
-    if isinstance(error, BrokenExecutor):
+    if error is None:
+        outcome = unpacked(future.result())
+        if outcome.unusable:
+            raise WorkersLost(f"one of the {executor.name} {outcome.unusable}: install the same on all machines")
+        return outcome
+    if executor.is_death(error):
+        return None
+    if isinstance(error, BrokenExecutor) or not isinstance(error, Exception):
         raise error
-    if isinstance(error, Exception):
-        return Outcome(error=error)
-    if error is not None:
-        raise error
-    outcome = future.result()
-    if outcome.unusable:
-        raise WorkersLost(f"one of the {executor.name} {outcome.unusable}: install the same on all of them")
-    return outcome
+    raise WorkersLost(f"the {executor.name} cannot do the work ({type(error).__name__}: {_first_line(error)})")
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().partition("\n")[0]
 
 
 def _after_a_break(
-    queued: _Queue[T], under_way: dict[Future[Outcome], _Attempt[T]], executor: Workers, error: BrokenExecutor
+    queued: _Queue[T], under_way: dict[_Future, _Attempt[T]], pool: Executor, executor: Workers
 ) -> Iterator[Done[T, Any]]:
     """Yield what ended before the pool broke and queue the rest again."""
     lost = []
     for future, attempt in under_way.items():
         try:
-            outcome = _outcome_of(future, executor)  # waits: the pool gives every future its end
+            outcome = _outcome_of(future, pool, executor)  # waits: the pool gives every future its end
         except BrokenExecutor:
+            outcome = None
+        if outcome is None:
             lost.append(attempt)
         else:
             yield Done(attempt.task, outcome.result, outcome.error)
-    if len(lost) == 1 and lost[0].breaks == MAX_BREAKS - 1:
-        task = lost.pop().task
-        yield Done(task, None, WorkersLost(f"the process that does it died {MAX_BREAKS} times ({error})"))
-    queued.put_back(lost, executor.count)
+    if len(lost) == 1 and lost[0].is_to_be_alone:
+        yield lost.pop().as_deadly
+    queued.put_back(lost, executor.count_in(pool))

@@ -9,7 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import UsageError
-from levilab.workers.processes import MAX_PROCESSES, Pool
+from levilab.workers.pool import MAX_PROCESSES, Pool
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,27 +23,37 @@ def _nothing_to_check(executor: Executor) -> None:
     pass
 
 
+def _no_death(_: BaseException) -> bool:
+    return False
+
+
 @dataclass(frozen=True)
 class Workers:
     """How an executor is opened and left.  `Workers(MPIPoolExecutor, count=100)` is one of a caller's own.
 
     Attributes:
         open: opens an executor; called again where one is broken.
-        count: how many tasks it does at the same time.
+        count: how many tasks it does at the same time, or what finds that out of an open one.
         name: for messages, in the plural.
         elsewhere: tasks are done in other processes, so that function, tasks and results are pickled.
         in_flight: the most tasks that are submitted before a result is waited for; None: the caller decides.
         end_at_once: leaves the executor without waiting for what is under way.
         check: called now and then while no result comes; raises WorkersLost where none will come.
+        is_death: whether an error of a future says that the process died which did the task, while others go on.
     """
 
     open: Callable[[], Executor]
-    count: int = 1
+    count: int | Callable[[Any], int] = 1
     name: str = "workers"
     elsewhere: bool = True
     in_flight: int | None = None
     end_at_once: Callable[[Any], None] = _cancel
     check: Callable[[Any], None] = _nothing_to_check
+    is_death: Callable[[BaseException], bool] = _no_death
+
+    def count_in(self, executor: Executor) -> int:
+        """How many tasks an open executor does at the same time."""
+        return self.count(executor) if callable(self.count) else self.count
 
 
 def this_process() -> Workers:

@@ -1,0 +1,116 @@
+"""What is asked of a sweep → a plan, and a store to compute it in: a new one, or one that is there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from levilab.errors import UsageError
+from levilab.simulator.keys import parse_setting
+from levilab.simulator.single import LONGEST_S
+from levilab.sweeps.adaptive import begin_adaptive, is_adaptive
+from levilab.sweeps.axes import check_axes, parse_axis, read_points
+from levilab.sweeps.cost import cut
+from levilab.sweeps.observables import check_observables, columns_of
+from levilab.sweeps.plan import Plan
+from levilab.sweeps.run import with_step
+from levilab.sweeps.store import Store, differences
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    from levilab.simulator.scene import Scene
+
+
+@dataclass(frozen=True)
+class SweepRequest:
+    """What is asked of a sweep.
+
+    Attributes:
+        scene: with its settings.
+        sweep: its axes, KEY=FROM:TO:N each.
+        points: a table of points instead.
+        settings: KEY=VALUE each, which the scene has already.
+        observe: names of what is observed, with commas between them.
+        duration: of each motion [s].
+        tolerance: wanted error of place [m] and axis [rad].
+        seed: of what is random.
+        adaptive: whether points are computed along a boundary alone.
+    """
+
+    scene: Scene
+    sweep: Sequence[str] = ()
+    points: Path | None = None
+    settings: Sequence[str] = ()
+    observe: str = "survived,lifetime_s"
+    duration: float = 30.0
+    tolerance: float = 1e-6
+    seed: int = 0
+    adaptive: bool = False
+
+
+def plan_of(request: SweepRequest) -> Plan:
+    """Return the plan of a request, without its step.  Raises UsageError."""
+    if request.sweep and request.points:
+        raise UsageError("points", "a table has all axes: leave out `sweep`, or make it a column of the table")
+    for name, value in (("duration", request.duration), ("tolerance", request.tolerance)):
+        if not 0 < value <= LONGEST_S:
+            raise UsageError(name, f"a number above 0 and up to {LONGEST_S:.0e} is expected", value=value)
+    names = tuple(dict.fromkeys(filter(None, (name.strip() for name in request.observe.split(",")))))
+    columns_of(names)
+    if not names:
+        raise UsageError("observe", "names are expected, such as survived,lifetime_s", value=request.observe)
+    axes = read_points(request.points) if request.points else tuple(map(parse_axis, request.sweep))
+    check_axes(request.scene, axes, {parse_setting(one)[0] for one in request.settings})
+    plan = Plan.of(request.scene, axes, names, request.duration, tolerance=request.tolerance, seed=request.seed)
+    check_observables(plan)
+    return cut(plan)
+
+
+def store_for(request: SweepRequest, path: Path, message: Callable[[str], None], *, resume: bool = False) -> Store:
+    """Return the store of a request, ready to be computed.
+
+    Args:
+        request: what is asked.
+        path: of its folder.
+        message: called with what takes a moment.
+        resume: go on with the store that is there, if one is.
+
+    Raises:
+        UsageError: the request cannot be carried out, or what is at the path is not its store.
+        CannotWrite, DataError: the store cannot be made or read.
+    """
+    plan = plan_of(request)
+    if path.exists():
+        return _going_on(request, plan, path, resume=resume)
+    if request.adaptive:  # what it refuses leaves no store behind
+        begin_adaptive(Store.create(None, plan), _boundary(plan))
+    store = Store.create(path, with_step(plan, message))
+    if request.adaptive:
+        begin_adaptive(store, _boundary(plan))
+    return store
+
+
+def _going_on(request: SweepRequest, plan: Plan, path: Path, *, resume: bool) -> Store:
+    if not resume:
+        there = f"it is there already: levilab sweep {path} shows it, `resume` goes on with it; or take another place"
+        raise UsageError("out", there, value=path)
+    store = Store.open(path, writable=True)
+    other = differences(store.plan, plan)
+    if is_adaptive(store) != request.adaptive:
+        other.append(f"adaptive is {is_adaptive(store)} there and {request.adaptive} here")
+    if other:
+        more = f" (and {len(other) - 3} more)" if len(other) > 3 else ""
+        raise UsageError(
+            "resume",
+            f"{path} is of another sweep: {'; '.join(other[:3])}{more}.  Take `out` for another store, or "
+            f"levilab sweep {path} --resume to go on with that one",
+        )
+    return store
+
+
+def _boundary(plan: Plan) -> str:
+    """Return the observable whose boundary is refined: the first that is yes or no."""
+    flags = [column.name for column in columns_of(plan.observables) if column.dtype == "bool"]
+    return next(iter(flags), plan.observables[0])

@@ -1,0 +1,92 @@
+"""Tasks on a Dask cluster whose processes are really killed."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import threading
+from concurrent.futures import Future, ThreadPoolExecutor
+from multiprocessing.connection import Listener
+from typing import TYPE_CHECKING
+
+import pytest
+
+from levilab.errors import LevilabError, WorkersLost
+from levilab.workers import cluster, results_of
+from support import tasks
+from support.dask_cluster import DaskCluster
+from support.waiting import HANG_GUARD_S
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def test_a_killed_worker_of_a_cluster_costs_no_bit(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    given = [(n, str(tmp_path)) for n in range(20)]
+    with DaskCluster(workers=2) as dask:
+        workers = cluster(dask.address)
+        found = {done.task[0]: done.result for done in results_of(tasks.die_at_three_once, given, workers)}
+        assert (tmp_path / "died").exists()
+        errors = [str(done.error) for done in results_of(tasks.refuse_seven, range(10), workers)]
+    assert found == {n: tasks.noise(n) for n in range(20)}
+    assert errors.count("seven is refused") == 1
+    assert capfd.readouterr().err == ""
+
+
+def test_a_lost_scheduler_ends_the_work_at_once(capfd: pytest.CaptureFixture[str]) -> None:
+    with (
+        DaskCluster(workers=1, threads=2) as dask,
+        Listener(("127.0.0.1", 0)) as listener,
+        ThreadPoolExecutor(1) as beside,
+    ):
+        some_came = threading.Event()
+
+        def kill_the_scheduler() -> None:
+            with listener.accept() as worker:
+                worker.recv()
+                assert some_came.wait(HANG_GUARD_S)
+                dask.scheduler.kill()
+                dask.scheduler.wait()
+
+        killed = beside.submit(kill_the_scheduler)
+        given = [None, None, listener.address, None]
+        results = results_of(tasks.wait_for_ever, given, cluster(dask.address))
+        with contextlib.closing(results):
+            assert [next(results).result for _ in range(3)] == [None, None, None]
+            some_came.set()
+            with pytest.raises(WorkersLost, match=f"the Dask scheduler at {dask.address} is lost"):
+                next(results)
+        killed.result(HANG_GUARD_S)
+    assert capfd.readouterr().err == ""
+
+
+def test_ctrl_c_leaves_a_cluster_at_once() -> None:
+    with DaskCluster(workers=1) as dask, Listener(("127.0.0.1", 0)) as listener, ThreadPoolExecutor(1) as beside:
+
+        def interrupt() -> None:
+            with listener.accept() as worker:
+                worker.recv()
+                signal.raise_signal(signal.SIGINT)
+                assert left.result(HANG_GUARD_S)
+
+        left: Future[bool] = Future()
+        ended = beside.submit(interrupt)
+        results = results_of(tasks.wait_for_ever, [listener.address] * 10, cluster(dask.address))
+        with pytest.raises(KeyboardInterrupt), contextlib.closing(results):
+            next(results)
+        left.set_result(True)  # while the worker is still at work
+        ended.result(HANG_GUARD_S)
+
+
+def test_a_cluster_without_workers_says_how_to_start_one() -> None:
+    with DaskCluster(workers=0) as dask, pytest.raises(WorkersLost, match=f"dask worker {dask.address}"):
+        list(results_of(tasks.square, [1], cluster(dask.address, patience_s=0)))
+
+
+@pytest.mark.parametrize("address", ["nowhere.json", "tcp://127.0.0.1:1", "gopher://127.0.0.1:1"])
+def test_a_wrong_address_of_a_scheduler_is_an_error_in_one_line(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("levilab.workers.dask.ANSWER_S", 0.2)
+    with pytest.raises(LevilabError) as raised:
+        list(results_of(tasks.square, [1], cluster(address)))
+    assert address in str(raised.value)
+    assert "\n" not in str(raised.value)
