@@ -20,8 +20,11 @@ from plans import SWEEPS, Sweep
 
 from levilab.sweeps.run import run, with_step, workers_for
 from levilab.sweeps.store import Store
+from levilab.workers import this_process
 
 HERE = Path(__file__).parent
+#: Fewer simulated seconds than these are not worth the start of other processes.
+SMALL_S = 60_000
 RESULTS, FIGURES = HERE.parent / "results", HERE.parents[1] / "docs" / "study"
 
 
@@ -34,9 +37,13 @@ def compute(sweep: Sweep, path: Path) -> dict[str, Any]:
     """Make the store of a sweep.  Returns its points and what it cost."""
     wall, cpu = time.perf_counter(), cpu_s()
     store = Store.open(path, writable=True) if path.exists() else Store.create(path, with_step(sweep.plan, print))
-    run(store, workers_for(store.plan))
+    small = store.plan.size * store.plan.duration_s < SMALL_S
+    run(store, this_process() if small else workers_for(store.plan))
     found = {"points": store.plan.size, "wall_s": time.perf_counter() - wall, "cpu_s": cpu_s() - cpu}
-    print(f"{sweep.name:24} {found['points']:7d} points  {found['wall_s']:6.1f} s, processors {found['cpu_s']:6.1f} s", flush=True)
+    print(
+        f"{sweep.name:24} {found['points']:7d} points  {found['wall_s']:6.1f} s, processors {found['cpu_s']:6.1f} s",
+        flush=True,
+    )
     return found
 
 
@@ -64,7 +71,7 @@ def main() -> None:
     from figures import draw
     from numbers_of import numbers
 
-    found = numbers(wanted.out) | {"costs": costs}
+    found = numbers(wanted.out) | {"costs": costs, "commands": [sweep.command for sweep in SWEEPS]}
     (RESULTS / "study.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     draw(wanted.out, found, FIGURES)
 

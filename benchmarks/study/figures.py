@@ -11,7 +11,8 @@ from matplotlib.colors import LinearSegmentedColormap, ListedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from numbers_of import FALLS_HZ, SCATTER_HZ, THESIS_KG, TOP, load, slow_resonance, swing_hz
+from numbers_of import SCATTER_HZ, THESIS_KG, TOP, load, slow_resonance, swing_hz
+from PIL import Image
 from plans import STARTS
 
 from levilab.present.style import STYLE, save_png
@@ -30,6 +31,10 @@ if TYPE_CHECKING:
 
 BLUE, GREY, ORANGE, PURPLE, GREEN, TAN = "#0072B2", "#B8B8B8", "#D55E00", "#CC79A7", "#009E73", "#E8C07D"
 MARKS = {"IC1": "o", "IC2": "s", "IC3": "D", "IC4": "^"}
+#: Colours of a picture that is kept: a page shows no difference, and it takes half of the room.
+COLOURS = 128
+#: Falls: slower than measured, within its scatter, within its standard error, faster.
+FALLS = ("#F6E3A1", "#A6DBA0", "#1B7837", ORANGE)
 #: Lost tops, from those that are lost at once to those that last.
 LOST = LinearSegmentedColormap.from_list("lost", ["#F2F2F2", "#B0B0B0", "#5A5A5A"])
 LIFETIMES = LogNorm(0.1, 30.0)
@@ -61,7 +66,7 @@ def survival_by_height(folder: Path, _: dict[str, Any]) -> Figure:
     found = load(folder, "survival")
     spins, masses, heights = found.axes
     chosen = (0.0246, 0.02484, 0.02502, 0.02514, 0.02526, 0.02538)
-    figure = Figure(figsize=(11, 7.2))
+    figure = Figure(figsize=(10.4, 6.9))
     panels = figure.subplots(2, 3, sharex=True, sharey=True).ravel()
     figure.subplots_adjust(0.055, 0.15, 0.92, 0.955, 0.06, 0.14)
     for axes, mass in zip(panels, chosen, strict=True):
@@ -96,7 +101,7 @@ def survival_by_height(folder: Path, _: dict[str, Any]) -> Figure:
             *handles,
         ],
         loc="lower center",
-        ncols=5,
+        ncols=4,
         fontsize=8,
     )
     return figure
@@ -159,7 +164,9 @@ def edge(folder: Path, numbers: dict[str, Any]) -> Figure:
     axes.axvline(slow_resonance(TOP), color=PURPLE, linewidth=1.4, linestyle="--")
     axes.axhline(1e2 * stability.floating.height, color="black", linewidth=0.8, linestyle=":")
     axes.set(xlabel="spin at the start  [Hz]", ylabel="height of the start  [cm]")
-    axes.set_title(f"{1e3 * THESIS_KG:.2f} g, started as IC1 at each height: up (blue) or lost (darker: later)", loc="left")
+    axes.set_title(
+        f"{1e3 * THESIS_KG:.2f} g, started as IC1 at each height: up (blue) or lost (darker: later)", loc="left"
+    )
     published(axes)
     axes.set_xlim(spins[0], spins[-1])
     figure.legend(
@@ -175,9 +182,11 @@ def edge(folder: Path, numbers: dict[str, Any]) -> Figure:
         ncols=4,
         fontsize=7.5,
     )
-    count = figure.add_axes((0.625, 0.6, 0.36, 0.32))
+    count = figure.add_axes((0.625, 0.6, 0.31, 0.32))
     steps = [one["step_hz"] for one in told["counts"]]
     count.loglog(steps, [one["islands"] for one in told["counts"]], "o-", color=BLUE)
+    count.set_yticks([3, 10, 30, 100], ["3", "10", "30", "100"])
+    count.minorticks_off()
     count.set(xlabel="step of the scan  [Hz]", ylabel="islands")
     count.set_title(f"IC1, 65 to 83 Hz: islands grow as step$^{{-{told['count_exponent']:.2f}}}$", loc="left")
     share = count.twinx()
@@ -186,8 +195,8 @@ def edge(folder: Path, numbers: dict[str, Any]) -> Figure:
     share.set_ylabel("share up  [%]", color=ORANGE)
     share.grid(visible=False)
     chance = figure.add_axes((0.625, 0.13, 0.155, 0.32))
-    flips = told["flips_of_nudge_m"]
-    chance.loglog([float(n) for n in flips], [max(100 * f / told["nudge_tops"], 0.02) for f in flips.values()], "o-", color=BLUE)
+    flips = {float(n): 100 * f / told["nudge_tops"] for n, f in told["flips_of_nudge_m"].items()}
+    chance.semilogx(list(flips), list(flips.values()), "o-", color=BLUE)
     chance.set(xlabel="start moved by  [m]", ylabel="fate changed  [%]")
     chance.set_title("sensitivity", loc="left")
     longer = figure.add_axes((0.845, 0.13, 0.14, 0.32))
@@ -207,52 +216,94 @@ def published_handles() -> list[Line2D]:
 def limits(folder: Path, numbers: dict[str, Any]) -> Figure:
     """The lower limit by height, with its reason; and where a top with drag falls."""
     told = numbers["foot"]
-    figure = Figure(figsize=(11, 4.4))
-    left, right = figure.add_axes((0.06, 0.12, 0.41, 0.8)), figure.add_axes((0.55, 0.12, 0.36, 0.8))
+    figure = Figure(figsize=(11, 5))
+    left, right = figure.add_axes((0.06, 0.29, 0.41, 0.64)), figure.add_axes((0.55, 0.29, 0.43, 0.64))
     height = np.array(told["height_cm"])
     left.axhspan(MEASURED_HZ - MEASURED_U_HZ, MEASURED_HZ + MEASURED_U_HZ, color=GREEN, alpha=0.35, linewidth=0)
-    left.plot(height, np.array(told["limit_hz"], dtype=float), "o", color=BLUE, markersize=4, label="up from here on (simulated, IC1's start)")
-    left.plot(height, np.array(told["sleeping_hz"], dtype=float), color="black", linewidth=1, label="sleeping top's limit where it swings deepest")
+    left.plot(
+        height,
+        np.array(told["limit_hz"], dtype=float),
+        "o",
+        color=BLUE,
+        markersize=4,
+        label="up from here on (simulated, IC1's start)",
+    )
+    left.plot(
+        height,
+        np.array(told["sleeping_hz"], dtype=float),
+        color="black",
+        linewidth=1,
+        label="sleeping top's limit where it swings deepest",
+    )
     left.axhline(told["window_hz"][0], color=ORANGE, linewidth=1.4, label="lower edge of the window of small motions")
     for name, settings in STARTS.items():
         place = 1e2 * with_settings(TOP, list(settings)).start.position_m[2]
-        left.plot(place, SIMULATED_HZ[name][0], marker=MARKS[name], color="white", markeredgecolor="black", linestyle="none", label=f"thesis {name}, simulated")
-    left.set(xlabel="height of the start  [cm]", ylabel="lower limit of the spin  [Hz]", ylim=(21.4, 24.1))
+        left.plot(
+            place,
+            SIMULATED_HZ[name][0],
+            marker=MARKS[name],
+            color="white",
+            markeredgecolor="black",
+            linestyle="none",
+            label=f"thesis {name}, simulated",
+        )
+    left.set(xlabel="height of the start  [cm]", ylabel="lower limit of the spin  [Hz]", ylim=(21.5, 23.15))
     left.set_title(f"No drag, {1e3 * THESIS_KG:.2f} g; band: measured {MEASURED_HZ} ± {MEASURED_U_HZ} Hz", loc="left")
-    left.legend(fontsize=8, loc="upper center")
+    left.legend(fontsize=7.5, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2)
     found = load(folder, "fall")
     masses, heights = found.axes
     spin = found.values["fall_spin_hz"]
-    shown = np.ma.masked_where(~(np.isfinite(spin) & (spin < 24)), spin)
-    image = right.pcolormesh(1e2 * heights, 1e3 * masses, shown, cmap="YlOrBr", vmin=21.2, vmax=23.5, shading="nearest", rasterized=True)
-    smooth = np.where(np.isfinite(spin), spin, 30.0)
-    for width, style in ((MEASURED_U_HZ, "solid"), (SCATTER_HZ, "dotted")):
-        right.contour(1e2 * heights, 1e3 * masses, smooth, [MEASURED_HZ - width, MEASURED_HZ + width], colors=GREEN, linestyles=style, linewidths=1.3)
-    floats = [(1e2 * f.height, 1e3 * m) for m in masses if (f := stability_of(TOP.changed({"top.mass_kg": float(m)})).floating)]
-    right.plot(*np.array(floats).T, color="black", linestyle=":", linewidth=1)
-    for name, settings in list(STARTS.items())[:2]:
-        place = 1e2 * with_settings(TOP, list(settings)).start.position_m[2]
+    off = np.where(np.isfinite(spin) & (spin < 29), spin - MEASURED_HZ, np.nan)
+    classes = np.select(
+        [np.abs(off) <= MEASURED_U_HZ, np.abs(off) <= SCATTER_HZ, off < 0, off > 0], [2, 1, 0, 3], default=-1
+    )
+    right.pcolormesh(
+        1e2 * heights, 1e3 * masses, np.ma.masked_less(classes, 0), cmap=ListedColormap(list(FALLS)), vmin=0, vmax=3,
+        shading="nearest", rasterized=True,
+    )  # fmt: skip
+    floats = [
+        (1e2 * f.height, 1e3 * m)
+        for m in masses
+        if (f := stability_of(TOP.changed({"top.mass_kg": float(m)})).floating)
+    ]
+    right.plot(*np.array(floats).T, color="black", linestyle=":", linewidth=1.2)
+    for name in ("IC1", "IC2"):
+        place = 1e2 * with_settings(TOP, list(STARTS[name])).start.position_m[2]
         right.plot(place, 1e3 * THESIS_KG, marker=MARKS[name], color="white", markeredgecolor="black")
-        right.annotate(f" {name}: {FALLS_HZ[name]}", (place, 1e3 * THESIS_KG), fontsize=8)
     right.grid(visible=False)
     right.set(xlabel="height of the start  [cm]", ylabel="mass  [g]")
-    right.set_title("With drag from 30 Hz: spin when it is down at 6 cm", loc="left")
-    figure.colorbar(image, ax=right, cax=figure.add_axes((0.925, 0.12, 0.013, 0.8))).set_label("Hz  (green: measured ± s.e., dotted ± scatter)")
+    right.set_title("With drag from 30 Hz: the spin when the top is down at 6 cm", loc="left")
+    means = [
+        f"slower than {MEASURED_HZ - SCATTER_HZ:.2f} Hz",
+        f"measured ± its scatter, {SCATTER_HZ} Hz",
+        f"measured {MEASURED_HZ} ± {MEASURED_U_HZ} Hz",
+        f"faster than {MEASURED_HZ + SCATTER_HZ:.2f} Hz",
+    ]
+    figure.legend(
+        handles=[
+            *(Patch(color=colour, label=meaning) for colour, meaning in zip(FALLS, means, strict=True)),
+            Line2D([], [], color="black", linestyle=":", label="where the top floats"),
+            *published_handles()[:2],
+        ],
+        loc="lower left", bbox_to_anchor=(0.535, 0.0), ncols=3, fontsize=7.5,
+    )  # fmt: skip
     return figure
 
 
 def lock(folder: Path, numbers: dict[str, Any]) -> Figure:
     """Tongues of sine and square, the start's phase, and the frequencies that throw the top."""
     told = numbers["locks"]
-    figure = Figure(figsize=(11, 7.4))
+    figure = Figure(figsize=(9.4, 6.0))
     spin = preset("driven").start.spin_hz
     colours = ListedColormap([GREY, TAN, BLUE])
     for k, wave in enumerate(("sine", "square")):
         found = load(folder, f"lock-{wave}")
-        axes = figure.add_axes((0.055 + 0.325 * k, 0.58, 0.28, 0.36))
+        axes = figure.add_axes((0.065 + 0.325 * k, 0.58, 0.26, 0.36))
         drives, amplitudes = found.axes
         what = found.up.astype(int) + (found.values["locked"].astype(bool) & found.up)
-        axes.pcolormesh(drives, 1e3 * amplitudes, what.T, cmap=colours, vmin=0, vmax=2, shading="nearest", rasterized=True)
+        axes.pcolormesh(
+            drives, 1e3 * amplitudes, what.T, cmap=colours, vmin=0, vmax=2, shading="nearest", rasterized=True
+        )
         field = np.linspace(0, amplitudes[-1], 200)
         scale = 1e3 * field
         half = np.array([2 * swing_hz(found.scene, float(b), wave=wave) for b in field])
@@ -263,7 +314,12 @@ def lock(folder: Path, numbers: dict[str, Any]) -> Figure:
         for sign in (-1, 1):
             axes.axvline(spin + sign * vertical, color=PURPLE, linestyle="--", linewidth=1.2)
         axes.grid(visible=False)
-        axes.set(xlabel="frequency of the drive  [Hz]", ylabel="amplitude  [mT]", xlim=(drives[0], drives[-1]), ylim=(0.02, 0.82))
+        axes.set(
+            xlabel="frequency of the drive  [Hz]",
+            ylabel="amplitude  [mT]",
+            xlim=(drives[0], drives[-1]),
+            ylim=(0.02, 0.82),
+        )
         axes.set_title(f"{wave}, spin at the start {spin} Hz", loc="left")
     axes = figure.add_axes((0.72, 0.58, 0.27, 0.36))
     phase = told["phase"]
@@ -273,15 +329,14 @@ def lock(folder: Path, numbers: dict[str, Any]) -> Figure:
     axes.set(xlabel="phase of the drive at the start  [turns]", ylabel="width of the tongue  [Hz]", ylim=(0, None))
     axes.set_title("sine of 0.2 mT: the phase decides", loc="left")
     axes.legend(fontsize=8)
-    bottom = figure.add_axes((0.055, 0.12, 0.935, 0.33))
-    rows = [(wave, amplitude) for wave in ("sine", "square") for amplitude in (0.1, 0.4)]
-    for k, (wave, amplitude) in enumerate(rows):
+    bottom = figure.add_axes((0.1, 0.16, 0.89, 0.25))
+    waves = ("sine", "square")
+    for k, wave in enumerate(waves):
         found = load(folder, f"modes-{wave}")
-        index = int(np.argmin(np.abs(1e3 * found.axes[1] - amplitude)))
-        what = (found.up.astype(int) + (found.values["locked"].astype(bool) & found.up))[:, index]
+        what = found.up.astype(int) + (found.values["locked"].astype(bool) & found.up)
         edges = np.append(found.axes[0] - 0.125, found.axes[0][-1] + 0.125)
         bottom.pcolormesh(edges, [k - 0.45, k + 0.45], what[None], cmap=colours, vmin=0, vmax=2, rasterized=True)
-    bottom.set_yticks(range(len(rows)), [f"{wave}, {amplitude} mT" for wave, amplitude in rows])
+    bottom.set_yticks(range(len(waves)), [f"{wave}, 0.2 mT" for wave in waves])
     modes = [abs(x) for x in told["modes"]["modes_hz"]] + [told["modes"]["vertical_hz"]]
     for mode in modes:
         bottom.axvline(mode, color="black", linewidth=1)
@@ -291,7 +346,9 @@ def lock(folder: Path, numbers: dict[str, Any]) -> Figure:
     bottom.axvline(spin / 3, color=ORANGE, linewidth=1, linestyle=":")
     bottom.grid(visible=False)
     bottom.set(xlabel="frequency of the drive  [Hz]", xlim=(0, 60))
-    bottom.set_title("What throws the top: a drive at one of its own frequencies (black; a third of it, dotted), 30 s", loc="left")
+    bottom.set_title(
+        "A drive of any frequency, 30 s; the top's own frequencies (black), a third of them (dotted)", loc="left"
+    )
     figure.legend(
         handles=[
             Patch(color=BLUE, label="up and locked"),
@@ -302,8 +359,8 @@ def lock(folder: Path, numbers: dict[str, Any]) -> Figure:
             Line2D([], [], color=ORANGE, label="below: spin (a third, dotted)"),
         ],
         loc="lower center",
-        ncols=6,
-        fontsize=7.5,
+        ncols=3,
+        fontsize=8,
     )
     return figure
 
@@ -322,5 +379,9 @@ def draw(folder: Path, numbers: dict[str, Any], out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
     with mpl.rc_context(STYLE):
         for name, figure in FIGURES.items():
-            save_png(figure(folder, numbers), out / f"{name}.png")
+            path = out / f"{name}.png"
+            save_png(figure(folder, numbers), path)
+            with Image.open(path) as picture:
+                small = picture.convert("RGB").quantize(COLOURS)
+            small.save(path, optimize=True)
             print(f"{out / name}.png: {(out / f'{name}.png').stat().st_size / 1000:.0f} kB")

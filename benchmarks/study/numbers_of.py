@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 from analysis.stability import sleeping_limit, wobble_resonance
 from levilab.simulator.equilibrium import modes_at, stability_of
 from levilab.simulator.scene import preset
+from levilab.simulator.single import simulate
 from levilab.stability.thesis import MEASURED_HZ, MEASURED_U_HZ, SIMULATED_HZ
 from levilab.sweeps.store import Store
 
@@ -34,6 +35,10 @@ FALLS_HZ = {"IC1": 21.86, "IC2": 21.65, "IC3": 21.81, "IC4": 22.90}
 SCATTER_HZ = 0.25
 #: Steps [Hz] in which the fine scan is looked at, as multiples of its own.
 MULTIPLES = (200, 100, 40, 20, 10, 4, 2, 1)
+#: The sleeping top's limit is compared for starts that swing at least so far [m], between these heights [m].
+SWINGS_M, COMPARED_M = 0.0007, (0.0692, 0.0756)
+#: Points of the map that are kept for tests.
+SPOTS = 24
 #: A place at the end that is known no better was chaotic [m].
 CHAOTIC_M = 1e-5
 
@@ -150,8 +155,6 @@ def survival(folder: Path) -> dict[str, Any]:
     inside = (spins[:, None, None] > windows[None, :, None, 0]) & (spins[:, None, None] < windows[None, :, None, 1])
     inside = np.broadcast_to(inside, up.shape)
     at = int(np.argmin(np.abs(masses - THESIS_KG)))
-    tail = load(folder, "tail")
-    tail_masses = tail.axes[1][tail.up.any(axis=(0, 2))]
     return {
         "tops": up.size,
         "up": int(up.sum()),
@@ -168,16 +171,44 @@ def survival(folder: Path) -> dict[str, Any]:
         "adiabatic_cm": [1e2 * adiabatic.low, 1e2 * adiabatic.high],
         "window_share_up": float(up[inside].mean()),
         "heights_cm_of_thesis_mass": {
-            f"{spin:g}": extremes(1e2 * heights[up[int(np.argmin(np.abs(spins - spin))), at]]) for spin in (25, 30, 50, 70, 75, 80)
+            f"{spin:g}": extremes(1e2 * heights[up[int(np.argmin(np.abs(spins - spin))), at]])
+            for spin in (25, 30, 50, 70, 75, 80)
         },
-        "tail_lightest_g": float(1e3 * tail_masses.min()),
-        "tail_up": int(tail.up.sum()),
     }
 
 
 def extremes(values: Array) -> list[float]:
     """Smallest and largest; nothing of nothing."""
     return [round(float(values.min()), 4), round(float(values.max()), 4)] if values.size else []
+
+
+def bounces(folder: Path) -> dict[str, Any]:
+    """Tops too light to float, that bounce: how many last, in the field near the axis and in the exact one."""
+    answers: dict[str, Any] = {}
+    for name in ("bounce", "bounce-exact"):
+        found = load(folder, name)
+        lifetimes = np.where(found.up, np.inf, found.values["lifetime_s"])
+        by_mass = zip(found.axes[1], (lifetimes > 30).sum(axis=(0, 2)), found.up.sum(axis=(0, 2)), strict=True)
+        answers[name] = [[1e3 * float(mass), int(short), int(long)] for mass, short, long in by_mass]
+    found = load(folder, "bounce-exact")
+    lightest = int(np.flatnonzero(found.up.any(axis=(0, 2)))[0])
+    places = np.argwhere(found.up[:, lightest])
+    motions = []
+    for i, k in places:
+        keys = ("start.spin_hz", "top.mass_kg", "start.position_m.2")
+        values = (found.axes[0][i], found.axes[1][lightest], found.axes[2][k])
+        scene = found.scene.changed({key: float(value) for key, value in zip(keys, values, strict=True)})
+        motions.append(simulate(scene, 300.0, rate=100.0, tolerance=1e-6))
+    calmest = min(motions, key=lambda motion: float(np.hypot(*motion.position[:, :2].T).max()))
+    answers["example"] = {
+        "mass_g": 1e3 * calmest.scene.top.mass_kg,
+        "spin_hz": calmest.scene.start.spin_hz,
+        "start_cm": 1e2 * calmest.scene.start.position_m[2],
+        "height_cm": extremes(1e2 * calmest.position[:, 2]),
+        "aside_mm": float(1e3 * np.hypot(*calmest.position[:, :2].T).max()),
+        "position_error_m": calmest.accuracy.position,
+    }
+    return answers
 
 
 def edge(folder: Path) -> dict[str, Any]:
@@ -200,7 +231,9 @@ def edge(folder: Path) -> dict[str, Any]:
     ic1 = load(folder, "IC1")
     upper = (ic1.axes[0] >= 65) & (ic1.axes[0] <= 83)
     errors = ic1.values["position_error_m"]
+    blocks = [(float(spins[a]), float(spins[b])) for a, b in intervals(up) if spins[a] > 71]
     return {
+        "beyond_hole_hz": list(max(blocks, key=lambda block: block[1] - block[0])),
         "from_hz": 65.0,
         "to_hz": 83.0,
         "counts": counts,
@@ -209,7 +242,9 @@ def edge(folder: Path) -> dict[str, Any]:
         "islands_below_0.05_hz": int(np.sum(widths < 0.05)),
         "nudge_tops": int(base.size),
         "flips_of_nudge_m": flips,
-        "uncertainty_exponent": float(np.polyfit(np.log([n for n, _ in some]), np.log([f for _, f in some]), 1)[0]) if len(some) > 1 else math.nan,
+        "uncertainty_exponent": float(np.polyfit(np.log([n for n, _ in some]), np.log([f for _, f in some]), 1)[0])
+        if len(some) > 1
+        else math.nan,
         "share_up_after_s": {f"{t:g}": float(np.mean(lifetimes > t)) for t in (5, 10, 30, 60, 120, 299)},
         "islands_after_300_s": len(intervals(long.up)),
         "chaotic_survivors": int(np.sum((errors > CHAOTIC_M) & ic1.up & upper)),
@@ -231,9 +266,9 @@ def foot(folder: Path) -> dict[str, Any]:
     speed = TOP.start.velocity_m_s[2]
     limits = np.array([lower_limit(spins, found.up[:, k]) for k in range(heights.size)])
     sleeping = np.array([sleeping_at_lowest(stability, float(z), speed) for z in heights])
-    swung = np.abs(heights - stability.floating.height) > 0.0007 if stability.floating else np.zeros(0, dtype=bool)
-    both = np.isfinite(limits) & np.isfinite(sleeping)
-    off = (limits - sleeping)[both & swung]
+    assert stability.floating is not None
+    swing = np.abs(heights - stability.floating.height)
+    off = (limits - sleeping)[(swing > SWINGS_M) & (heights > COMPARED_M[0]) & (heights < COMPARED_M[1])]
     return {
         "height_cm": (1e2 * heights).round(4).tolist(),
         "limit_hz": [None if math.isnan(x) else round(float(x), 3) for x in limits],
@@ -241,8 +276,9 @@ def foot(folder: Path) -> dict[str, Any]:
         "compared": int(off.size),
         "largest_difference_hz": float(np.abs(off).max()),
         "rms_difference_hz": float(np.sqrt(np.mean(off**2))),
-        "window_hz": list(stability.floating.spins[0]) if stability.floating else [],
-        "floats_at_cm": 1e2 * stability.floating.height if stability.floating else math.nan,
+        "window_hz": list(stability.floating.spins[0]),
+        "floats_at_cm": 1e2 * stability.floating.height,
+        "lowest_hz": float(np.nanmin(limits)),
     }
 
 
@@ -264,15 +300,17 @@ def starts(folder: Path) -> dict[str, Any]:
             "all_up_until_hz": main[1],
             "last_up_hz": blocks[-1][1],
             "islands_above": sum(block[0] > main[1] for block in blocks),
-            "islands_above_in_steps_of_0.1_hz": sum(spins[::5][a] > main[1] for a, _ in intervals(tenth)),
+            "islands_above_in_steps_of_0.1_hz": sum(bool(spins[::5][a] > main[1]) for a, _ in intervals(tenth)),
             "share_up_between": float(up[after & (spins <= blocks[-1][1])].mean()),
-            "up_beside_published_upper": [float(x) for x in neighbours(blocks, published[1])],
+            "up_beside_published_upper": [nothing_if_nan(x) for x in neighbours(blocks, published[1])],
             "with_drag_hz": [float(np.mean(drag)), float(np.min(drag)), float(np.max(drag))],
             "with_drag_published_hz": FALLS_HZ[name],
         }
     found["changes"] = {
         name: {
-            "lower_hz": nothing_if_nan(lower_limit(load(folder, f"{name}-low").axes[0], load(folder, f"{name}-low").up)),
+            "lower_hz": nothing_if_nan(
+                lower_limit(load(folder, f"{name}-low").axes[0], load(folder, f"{name}-low").up)
+            ),
             "hole_hz": hole(load(folder, f"{name}-high").axes[0], load(folder, f"{name}-high").up),
             "last_up_hz": last_up(load(folder, f"{name}-high")),
         }
@@ -294,7 +332,7 @@ def last_up(found: Found) -> float | None:
 def neighbours(blocks: list[tuple[float, float]], spin: float) -> tuple[float, float]:
     """The highest spin that is up at or below one, and the lowest above it [Hz]; NaN where none is."""
     edges = [min(b, spin) for a, b in blocks if a <= spin]
-    later = [a if a > spin else spin for a, b in blocks if b > spin]
+    later = [max(spin, a) for a, b in blocks if b > spin]
     return max(edges, default=math.nan), min(later, default=math.nan)
 
 
@@ -318,8 +356,12 @@ def falls(folder: Path) -> dict[str, Any]:
         ]
     at = int(np.argmin(np.abs(masses - THESIS_KG)))
     answers["thesis_mass_lowest_hz"] = float(np.nanmin(np.where(came[at], spin[at], np.nan)))
-    lowest = np.array([np.nanmin(np.where(c, s, np.nan)) if c.any() else np.nan for c, s in zip(came, spin, strict=True)])
-    answers["lowest_by_mass"] = {f"{1e3 * m:.2f}": nothing_if_nan(round(float(x), 3)) for m, x in zip(masses, lowest, strict=True)}
+    lowest = np.array(
+        [np.nanmin(np.where(c, s, np.nan)) if c.any() else np.nan for c, s in zip(came, spin, strict=True)]
+    )
+    answers["lowest_by_mass"] = {
+        f"{1e3 * m:.2f}": nothing_if_nan(round(float(x), 3)) for m, x in zip(masses, lowest, strict=True)
+    }
     return answers
 
 
@@ -329,7 +371,11 @@ def resonance(folder: Path) -> list[dict[str, Any]]:
     for mass in RESONANT:
         scan = load(folder, f"resonance-{1000 * mass:g}")
         found.append(
-            {"mass_g": 1e3 * mass, "resonance_hz": slow_resonance(TOP.changed({"top.mass_kg": mass})), "hole_hz": hole(scan.axes[0], scan.up)}
+            {
+                "mass_g": 1e3 * mass,
+                "resonance_hz": slow_resonance(TOP.changed({"top.mass_kg": mass})),
+                "hole_hz": hole(scan.axes[0], scan.up),
+            }
         )
     return found
 
@@ -359,7 +405,11 @@ def locks(folder: Path) -> dict[str, Any]:
         x, y = np.log([row["amplitude_mt"] for row in weak]), np.log([row["width_hz"] for row in weak])
         found[wave] = {"rows": rows, "exponent": float(np.polyfit(x, y, 1)[0])}
         found[wave]["width_over_4_swings"] = float(np.mean([row["width_hz"] / (4 * row["swing_hz"]) for row in weak]))
-    ratio = [b["width_hz"] / a["width_hz"] for a, b in zip(found["sine"]["rows"], found["square"]["rows"], strict=True) if a["amplitude_mt"] <= 0.4]
+    ratio = [
+        b["width_hz"] / a["width_hz"]
+        for a, b in zip(found["sine"]["rows"], found["square"]["rows"], strict=True)
+        if a["amplitude_mt"] <= 0.4
+    ]
     found["square_over_sine"] = float(np.mean(ratio))
     found["phase"] = by_phase(folder)
     found["modes"] = by_mode(folder)
@@ -398,11 +448,11 @@ def by_mode(folder: Path) -> dict[str, Any]:
     }
     for wave in ("sine", "square"):
         found = load(folder, f"modes-{wave}")
-        drives, amplitudes = found.axes
-        for k, amplitude in enumerate(amplitudes):
-            lost = [[float(drives[a]), float(drives[b])] for a, b in intervals(~found.up[:, k])]
-            locked = found.values["locked"].astype(bool)[:, k]
-            answers[f"{wave}_{1e3 * amplitude:g}_mt"] = {"lost_hz": lost, "locked_hz": drives[locked].tolist()}
+        drives = found.axes[0]
+        answers[wave] = {
+            "lost_hz": [[float(drives[a]), float(drives[b])] for a, b in intervals(~found.up)],
+            "locked_hz": drives[found.values["locked"].astype(bool)].tolist(),
+        }
     return answers
 
 
@@ -419,22 +469,53 @@ def by_beat(folder: Path) -> list[dict[str, Any]]:
             {
                 "mass_g": 1e3 * float(mass),
                 "vertical_hz": stability_of(scene).vertical,
-                "lost_above_hz": [[round(float(off[a]), 3), round(float(off[b]), 3)] for a, b in intervals(~found.up[:, k] & (off > 0))],
-                "lost_below_hz": [[round(float(off[a]), 3), round(float(off[b]), 3)] for a, b in intervals(~found.up[:, k] & (off < 0))],
+                "lost_above_hz": [
+                    [round(float(off[a]), 3), round(float(off[b]), 3)]
+                    for a, b in intervals(~found.up[:, k] & (off > 0))
+                ],
+                "lost_below_hz": [
+                    [round(float(off[a]), 3), round(float(off[b]), 3)]
+                    for a, b in intervals(~found.up[:, k] & (off < 0))
+                ],
                 "median_off_hz": float(np.median(lost)) if lost.size else None,
             }
         )
     return rows
 
 
+def spots(folder: Path) -> dict[str, list[list[Any]]]:
+    """Points whose fate is no chance, for tests to compute again: all around them ended alike."""
+    found = load(folder, "survival")
+    spins, masses, heights = found.axes
+    up, lifetimes = found.up, found.values["lifetime_s"]
+    draw = np.random.default_rng(11)
+    chosen: list[list[Any]] = []
+    while len(chosen) < SPOTS:
+        i, j, k = (int(draw.integers(2, size - 2)) for size in up.shape)
+        around = up[i - 2 : i + 3, j - 1 : j + 2, k - 1 : k + 2]
+        if around.min() == around.max() and int(up[i, j, k]) == len(chosen) % 2:
+            lasted = None if up[i, j, k] else round(float(lifetimes[i, j, k]), 6)
+            chosen.append([float(spins[i]), float(masses[j]), float(heights[k]), bool(up[i, j, k]), lasted])
+    tongue = load(folder, "lock-sine")
+    drives, amplitudes = tongue.axes
+    k = int(np.argmin(np.abs(amplitudes - 3e-4)))
+    locks = [
+        [float(drives[i]), float(amplitudes[k]), bool(tongue.up[i, k]), bool(tongue.values["locked"][i, k])]
+        for i in (int(np.argmin(np.abs(drives - drive))) for drive in (29.3, 30.0, 30.3, 30.7))
+    ]
+    return {"survival": chosen, "lock": locks}
+
+
 def numbers(folder: Path) -> dict[str, Any]:
     """All of them."""
     return {
         "survival": survival(folder),
+        "bounces": bounces(folder),
         "edge": edge(folder),
         "foot": foot(folder),
         "starts": starts(folder),
         "falls": falls(folder),
         "resonance": resonance(folder),
         "locks": locks(folder),
+        "spots": spots(folder),
     }

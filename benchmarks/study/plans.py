@@ -19,6 +19,8 @@ STARTS: dict[str, tuple[str, ...]] = {
     "IC3": ("start.position_m=[0.003,0,0.0725]", "start.velocity_m_s=[-0.002,0,0.0005]"),
     "IC4": ("start.tilt_rad=0.1",),
 }
+#: Wanted errors of place [m] and axis [rad]; with the second, the longest step is taken.
+TOLERANCE, LONGEST_STEP = 1e-6, 100.0
 ON_AXIS = "start.position_m=[0,0,0.071]"
 AT_REST = "start.velocity_m_s=[0,0,0]"
 
@@ -44,10 +46,17 @@ class Sweep:
     settings: tuple[str, ...] = ()
 
     @property
+    def tolerance(self) -> float:
+        """A driven top takes the longest step: good where it moves regularly; chaos has no step that is good."""
+        return LONGEST_STEP if self.scene == "driven" else TOLERANCE
+
+    @property
     def plan(self) -> Plan:
         """Its plan, with a step still to be chosen."""
         axes = tuple(parse_axis(axis) for axis in self.axes)
-        return Plan.of(self.changed_scene, axes, tuple(self.observe.split(",")), self.duration_s)
+        return Plan.of(
+            self.changed_scene, axes, tuple(self.observe.split(",")), self.duration_s, tolerance=self.tolerance
+        )
 
     @property
     def changed_scene(self) -> Scene:
@@ -57,13 +66,19 @@ class Sweep:
     @property
     def command(self) -> str:
         """What makes the same store on the command line."""
+        how = f"--duration {self.duration_s:g} --tolerance {self.tolerance:g}"
         words = [f"levilab sweep {self.scene}", *(f"--sweep {axis}" for axis in self.axes)]
         words += [f"--set '{setting}'" for setting in self.settings]
-        return " ".join([*words, f"--observe {self.observe} --duration {self.duration_s:g} --out {self.name}.zarr"])
+        return " ".join(
+            [
+                *words,
+                f"--observe {self.observe} {how} --out {self.name}.zarr",
+            ]
+        )
 
 
 SPINS, UPPER = "start.spin_hz=18:90:145", "start.spin_hz=65:83:1801"
-FEET, HEADS = "start.spin_hz=21:25:201", "start.spin_hz=55:83:561"
+FEET, HEADS = "start.spin_hz=21:25:201", "start.spin_hz=55:83:281"
 #: By how much the start is moved sideways to see what is chance [m].
 NUDGES = (1e-12, 1e-10, 1e-8, 1e-6, 1e-5, 1e-4)
 #: Starts in which one thing is changed, to see whether it is the reason: name → start, settings.
@@ -77,18 +92,31 @@ CHANGES: dict[str, tuple[str, ...]] = {
     "IC4-steady": (*STARTS["IC4"], "start.precession=steady"),
 }
 #: Masses [kg] and heights of starts 0.5 mm below where each floats [m], for the resonance of three slow motions.
-RESONANT = {0.0249: 0.07445, 0.025: 0.0740, 0.0251: 0.07345, 0.0252: 0.07289, 0.02526: 0.07249, 0.0253: 0.0722, 0.0254: 0.07131}
+RESONANT = {
+    0.0249: 0.07445,
+    0.025: 0.0740,
+    0.0251: 0.07345,
+    0.0252: 0.07289,
+    0.02526: 0.07249,
+    0.0253: 0.0722,
+    0.0254: 0.07131,
+}
 
 LOCK = "survived,lifetime_s,locked"
 
 SWEEPS: tuple[Sweep, ...] = (
-    Sweep("survival", "undriven", (SPINS, "top.mass_kg=0.02418:0.0255:23", "start.position_m.2=0.067:0.079:25")),
+    Sweep("survival", "undriven", (SPINS, "top.mass_kg=0.02418:0.0255:23", "start.position_m.2=0.067:0.085:37")),
     Sweep("edge", "undriven", ("start.spin_hz=64:84:401", "start.position_m.2=0.069:0.077:33")),
     Sweep("foot", "undriven", ("start.spin_hz=21:24:151", "start.position_m.2=0.068:0.0775:39")),
-    Sweep(
-        "tail",
-        "undriven",
-        ("start.spin_hz=20:80:31", "top.mass_kg=0.021:0.0248:39", "start.position_m.2=0.0665:0.0735:29"),
+    *(
+        Sweep(
+            f"bounce{suffix}",
+            "undriven",
+            ("start.spin_hz=24:36:4", "top.mass_kg=0.012:0.024:7", "start.position_m.2=0.0645:0.0715:29"),
+            300.0,
+            settings=settings,
+        )
+        for suffix, settings in (("", ()), ("-exact", ("base.field=exact",)))
     ),
     Sweep(
         "fall",
@@ -99,12 +127,24 @@ SWEEPS: tuple[Sweep, ...] = (
         ("escape.height_m=0.06",),
     ),
     *(
-        Sweep(name, "undriven", ("start.spin_hz=18:90:3601",), observe="survived,lifetime_s,position_error_m", settings=settings)
+        Sweep(
+            name,
+            "undriven",
+            ("start.spin_hz=55:90:1751",),
+            observe="survived,lifetime_s,position_error_m",
+            settings=settings,
+        )
         for name, settings in STARTS.items()
     ),
     *(
-        Sweep(f"{name}-drag", "friction", ("start.spin_hz=30:30.9:10",), 150.0, "survived,lifetime_s,fall_spin_hz",
-              (*settings, "escape.height_m=0.06"))
+        Sweep(
+            f"{name}-drag",
+            "friction",
+            ("start.spin_hz=30:30.9:10",),
+            150.0,
+            "survived,lifetime_s,fall_spin_hz",
+            (*settings, "escape.height_m=0.06"),
+        )
         for name, settings in STARTS.items()
     ),
     Sweep("fine", "undriven", ("start.spin_hz=65:83:7201",)),
@@ -122,7 +162,11 @@ SWEEPS: tuple[Sweep, ...] = (
             "undriven",
             (HEADS,),
             60.0,
-            settings=(f"top.mass_kg={mass}", f"start.position_m=[0.001,0,{height}]", "start.velocity_m_s=[-0.0007,0,0]"),
+            settings=(
+                f"top.mass_kg={mass}",
+                f"start.position_m=[0.001,0,{height}]",
+                "start.velocity_m_s=[-0.0007,0,0]",
+            ),
         )
         for mass, height in RESONANT.items()
     ),
@@ -130,7 +174,7 @@ SWEEPS: tuple[Sweep, ...] = (
         Sweep(
             f"lock-{wave}",
             "driven",
-            ("drive.frequency_hz=28.6:31.4:57", "drive.amplitude_t=0.00004:0.0008:20"),
+            ("drive.frequency_hz=28.6:31.4:57", "drive.amplitude_t=0.0001:0.0008:8"),
             60.0,
             LOCK,
             (f"drive.waveform={wave}",),
@@ -140,7 +184,7 @@ SWEEPS: tuple[Sweep, ...] = (
     Sweep(
         "lock-phase",
         "driven",
-        ("drive.frequency_hz=28.6:31.4:57", "drive.phase_rad=0:6.021385919380436:24"),
+        ("drive.frequency_hz=28.6:31.4:57", "drive.phase_rad=0:5.759586531581287:12"),
         60.0,
         LOCK,
         ("drive.amplitude_t=0.0002",),
@@ -149,10 +193,10 @@ SWEEPS: tuple[Sweep, ...] = (
         Sweep(
             f"modes-{wave}",
             "driven",
-            ("drive.frequency_hz=0.25:60:240", "drive.amplitude_t=0.0001:0.0004:2"),
+            ("drive.frequency_hz=0.25:60:240",),
             30.0,
             LOCK,
-            (f"drive.waveform={wave}",),
+            (f"drive.waveform={wave}", "drive.amplitude_t=0.0002"),
         )
         for wave in ("sine", "square")
     ),
@@ -162,6 +206,6 @@ SWEEPS: tuple[Sweep, ...] = (
         ("drive.frequency_hz=28:32:81", "top.mass_kg=0.0241:0.0246:6"),
         60.0,
         LOCK,
-        ("drive.amplitude_t=0.0003",),
+        ("drive.amplitude_t=0.0003", "start.place=equilibrium"),
     ),
 )
