@@ -55,7 +55,15 @@ class DoesNotSuit(DataError):
 
 
 class NoneUsable(DataError):
-    """A folder without anything that an analysis can use."""
+    """A folder without anything that an analysis can use.
+
+    Attributes:
+        reasons: why each of what is there cannot be used.
+    """
+
+    def __init__(self, text: str, reasons: tuple[str, ...] = ()) -> None:
+        self.reasons = reasons
+        super().__init__(text)
 
 
 class NoInstrument(LevilabError):

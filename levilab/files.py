@@ -9,7 +9,7 @@ import os
 import re
 import time
 import tomllib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from levilab.errors import LevilabError
 
@@ -156,12 +156,18 @@ def replace_atomically(path: Path, content: str | bytes) -> None:
     Text is written as UTF-8 with line feeds; what UTF-8 has no place for, as the name of a file that is none, becomes a
     question mark.  Raises OSError.
     """
-    data = content.encode(errors="replace") if isinstance(content, str) else content
+    with replacing(path) as file:
+        file.write(content.encode(errors="replace") if isinstance(content, str) else content)
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[BinaryIO]:
+    """Yield a file for what takes the place of another one, whole, when the context ends well.  Raises OSError."""
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         part.unlink(missing_ok=True)  # of an earlier process of this number
         with part.open("xb") as file:  # never through a link that stands there
-            file.write(data)
+            yield file
             file.flush()
             os.fsync(file.fileno())
         _replace(part, path)

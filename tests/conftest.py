@@ -22,12 +22,12 @@ SLOW = """
     levilab/acquisition/experiments/test_limit.py  levilab/acquisition/experiments/test_precession.py
     levilab/acquisition/experiments/test_trace.py  levilab/acquisition/test_loop.py
     levilab/acquisition/test_losses.py
-    levilab/benchmark  levilab/cli/test_main.py  levilab/crosscheck
+    levilab/benchmark  levilab/cli/test_main.py  levilab/cli/test_sweep.py  levilab/crosscheck
     levilab/formats/waveforms/test_memory.py  levilab/motion  levilab/notebook
     levilab/pipelines/spindown  levilab/pipelines/test_result.py
     levilab/report/test_page.py
     levilab/runs/test_hostile.py  levilab/runs/test_kill.py
-    levilab/simulator  ../levilab/simulator  levilab/stability
+    levilab/simulator  ../levilab/simulator  levilab/stability  levilab/sweeps
     levilab/world/test_base.py  levilab/world/test_motion_world.py  levilab/world/test_serve.py
     levilab/workers  levilab/world/test_spin_world.py
     test_documentation.py

@@ -83,7 +83,7 @@ def survival_by_height(folder: Path, _: dict[str, Any]) -> Figure:
             axes.axvline(slow_resonance(scene), color=PURPLE, linewidth=1.4, linestyle="--")
         axes.set_title(title, loc="left")
     handles = published(panels[4])
-    panels[4].axvspan(MEASURED_HZ - MEASURED_U_HZ, MEASURED_HZ + MEASURED_U_HZ, color=GREEN)
+    panels[4].axvspan(MEASURED_HZ - MEASURED_U_HZ, MEASURED_HZ + MEASURED_U_HZ, color=GREEN, zorder=3)
     for axes in panels[3:]:
         axes.set_xlabel("spin at the start  [Hz]")
     for axes in panels[::3]:
@@ -336,7 +336,7 @@ def lock(folder: Path, numbers: dict[str, Any]) -> Figure:
         what = found.up.astype(int) + (found.values["locked"].astype(bool) & found.up)
         edges = np.append(found.axes[0] - 0.125, found.axes[0][-1] + 0.125)
         bottom.pcolormesh(edges, [k - 0.45, k + 0.45], what[None], cmap=colours, vmin=0, vmax=2, rasterized=True)
-    bottom.set_yticks(range(len(waves)), [f"{wave}, 0.2 mT" for wave in waves])
+    bottom.set_yticks(range(len(waves)), list(waves))
     modes = [abs(x) for x in told["modes"]["modes_hz"]] + [told["modes"]["vertical_hz"]]
     for mode in modes:
         bottom.axvline(mode, color="black", linewidth=1)
@@ -347,7 +347,8 @@ def lock(folder: Path, numbers: dict[str, Any]) -> Figure:
     bottom.grid(visible=False)
     bottom.set(xlabel="frequency of the drive  [Hz]", xlim=(0, 60))
     bottom.set_title(
-        "A drive of any frequency, 30 s; the top's own frequencies (black), a third of them (dotted)", loc="left"
+        "A drive of 0.2 mT and any frequency, 30 s; the top's own frequencies (black), a third of them (dotted)",
+        loc="left",
     )
     figure.legend(
         handles=[

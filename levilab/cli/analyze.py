@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from functools import partial
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
@@ -13,12 +13,13 @@ import typer.core
 
 from levilab.cli.later import Later
 from levilab.cli.options import Channel, Columns, Json, KeepOutliers, Paths, Rate, ReadingU
-from levilab.cli.output import interruptible, message, print_json
+from levilab.cli.output import interruptible, message, print_json, result
 from levilab.cli.quantities import with_options
-from levilab.errors import DoesNotSuit, LevilabError, UsageError
+from levilab.errors import DoesNotSuit, LevilabError, NoneUsable, UsageError
 
 if TYPE_CHECKING:
     from levilab.pipelines.catalogue import Analysis
+    from levilab.pipelines.many.table import Tally
 
 
 class AnalyzeGroup(typer.core.TyperGroup):
@@ -260,12 +261,39 @@ def _command(options: Sequence[str]) -> Callable[..., None]:
     def analyze(
         context: typer.Context,
         paths: Paths,
-        save: Annotated[bool, typer.Option(help="Write the result and figures beside the run.")] = True,
+        save: Annotated[
+            bool | None,
+            typer.Option(
+                "--save/--no-save",
+                help="Write the result and figures beside the run; with --table the results alone.",
+                show_default="save; with --table no-save",
+            ),
+        ] = None,
         out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Write them there instead.")] = None,
+        table: Annotated[
+            Path | None,
+            typer.Option(
+                metavar="FILE",
+                help="Of many runs: analyze each by itself, in parallel, and write a row for each, .csv or .parquet.",
+            ),
+        ] = None,
+        cores: Annotated[
+            int | None, typer.Option(metavar="N", min=1, help="Of --table.", show_default="all of them")
+        ] = None,
+        resume: Annotated[
+            bool, typer.Option("--resume", help="Keep the rows of an earlier --table, and analyze the other runs.")
+        ] = False,
         as_json: Json = False,
         **given: Any,
     ) -> None:
-        _analyze(context, paths, analysis_options(given), save=save, out=out, as_json=as_json)
+        if table is not None:
+            writing = Writing(table, cores=cores, resume=resume, save=bool(save))
+            _tabulate(context, paths, analysis_options(given), writing, out=out, as_json=as_json)
+            return
+        for name, value in (("cores", cores), ("resume", resume or None)):
+            if value is not None:
+                raise UsageError(name, "goes with `table` alone")
+        _analyze(context, paths, analysis_options(given), save=save is not False, out=out, as_json=as_json)
 
     context, paths, *shared, _ = inspect.signature(analyze).parameters.values()
     own = [
@@ -320,6 +348,83 @@ def _analyze(
             results = [(analysis, _analyze_as(analysis, paths, given))]
     with interruptible("look which results are written: each one is whole"):
         _write_and_print(context, results, left_out, save=save, out=out, as_json=as_json)
+
+
+class Writing(NamedTuple):
+    """How a table of many runs is written; see `levilab.pipelines.many.table.write_table`."""
+
+    table: Path
+    cores: int | None
+    resume: bool
+    save: bool
+
+
+#: So often a line says how far a table is where no bar can be seen [s].
+LINE_EVERY_S = 30.0
+#: From so many runs on a plain analysis is not what is wanted, most often.
+MANY_RUNS = 500
+
+
+def _tabulate(
+    context: typer.Context,
+    paths: Sequence[Path],
+    given: Mapping[str, Any],
+    writing: Writing,
+    *,
+    out: Path | None,
+    as_json: bool,
+) -> None:
+    """Write a row of each run into a table."""
+    from levilab.pipelines.catalogue import ANALYSES
+    from levilab.pipelines.many.table import write_table
+    from levilab.present.progress import ShareBar
+
+    if context.info_name == _EACH:
+        example = f"as levilab analyze spindown {paths[0]} --table {writing.table}"
+        raise UsageError("table", f"has columns of one analysis: name it, {example}")
+    if out is not None:
+        raise UsageError("out", "does not go with `table`: the results have names that differ only beside their runs")
+    bar: ShareBar | None = None
+
+    def show(tally: "Tally") -> None:
+        nonlocal bar
+        if bar is None:
+            bar = ShareBar("runs", first=tally.done / tally.total, line_every=LINE_EVERY_S)
+        failed = f", {tally.failed} failed" if tally.failed else ""
+        bar(tally.done / tally.total, f"{tally.done} of {tally.total} runs{failed}")
+
+    kept = f"the rows so far are in {writing.table}.part.csv: the same command with --resume goes on with them"
+    with interruptible(kept):
+        try:
+            tally = write_table(ANALYSES[str(context.info_name)], paths, given, **writing._asdict(), show=show)
+        finally:
+            if bar:
+                bar.close()
+    _print_tally(context, tally, writing.table, as_json=as_json)
+
+
+def _print_tally(context: typer.Context, tally: "Tally", table: Path, *, as_json: bool) -> None:
+    """Print where the table is and what did not get into it.  Raises NoneUsable where nothing was analyzed."""
+    app = context.find_root().command
+    for path, problem in tally.failures:
+        named = problem if PurePath(path).name in problem else f"{path}: {problem}"
+        message(with_options(f"failed: {named}", app))
+    if (more := tally.failed - len(tally.failures)) > 0:
+        message(f"and {more} more, whose problem stands in the table")
+    for why, count in tally.passed_over.items():
+        message(f"passed over: {count} times {why}")
+    if tally.same:
+        message(f"note: {tally.same} rows have the same readings as another one (readings_sha256): count them once")
+    if as_json:
+        print_json({
+            "table": table.as_posix(), "rows": tally.rows, "failed": tally.failed, "kept": tally.kept,
+            "passed_over": dict(tally.passed_over), "same_readings": tally.same,
+        })  # fmt: skip
+    else:
+        kept = f", {tally.kept} of them of an earlier call" if tally.kept else ""
+        result(f"the table of {tally.rows} runs is in {table}{kept}; {tally.failed} could not be analyzed")
+    if tally.failed and tally.failed == tally.rows:
+        raise NoneUsable(f"none of {tally.rows} runs could be analyzed; their problems stand in {table}")
 
 
 def _analyze_as(analysis: "Analysis[Any]", paths: Sequence[Path], given: Mapping[str, Any]) -> Any:

@@ -44,12 +44,14 @@ def runs(
     folder: Annotated[Path, typer.Argument(metavar="[DIR]", readable=False, help="The folder to search.")] = Path(
         "runs"
     ),
+    last: Annotated[int | None, typer.Option(metavar="N", min=1, help="The latest N runs alone.")] = None,
     as_json: Json = False,
 ) -> None:
     """List the runs in a folder."""
     from levilab.runs.listing import list_runs, print_runs
 
     found = list_runs(folder)
+    found = found if last is None else found[-last:]
     if as_json:
         print_json([vars(run) for run in found])
     else:

@@ -10,7 +10,7 @@ import typer
 
 from levilab.cli.options import Json, Settings
 from levilab.cli.output import interruptible, message, print_json, result
-from levilab.errors import DataError, UsageError
+from levilab.errors import DataError, UsageError, WorkersLost
 
 if TYPE_CHECKING:
     from levilab.sweeps.store import Store
@@ -45,7 +45,10 @@ def sweep(
     observe: Annotated[
         str | None,
         typer.Option(
-            metavar="NAME,…", help="What is observed; a wrong name lists them all.", show_default="survived,lifetime_s"
+            metavar="NAME,…",
+            help="What is observed: survived, lifetime_s, fall_spin_hz, energy_error, position_error_m, "
+            "height_spread_m, locked, lines.",
+            show_default="survived,lifetime_s",
         ),
     ] = None,
     duration: Annotated[
@@ -58,12 +61,20 @@ def sweep(
         ),
     ] = None,
     settings: Settings = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Of what is random.", show_default="0")] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Of the points that --adaptive checks at random.", show_default="0")
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="STORE.zarr", help="Where the results go.", show_default="NAME.zarr")
     ] = None,
     cores: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Processes on this machine.", show_default="one a core")
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help=r"Compute on a Dask cluster, as tcp://10.0.0.1:8786; needs levilab\[cluster]."
+        ),
     ] = None,
     adaptive: Annotated[
         bool,
@@ -83,10 +94,12 @@ def sweep(
         "sweep": sweep, "points": points, "observe": observe, "duration": duration, "tolerance": tolerance,
         "settings": settings, "seed": seed, "out": out, "adaptive": adaptive or None,
     }  # fmt: skip
+    if scheduler is not None and cores is not None:
+        raise UsageError("cores", "a cluster has its own workers: leave it out, or leave out `scheduler`")
     shown = _is_store(scene)
     store = _opened(Path(scene), given, resume=resume) if shown else _begun(scene, given, resume=resume)
     if resume or not shown:
-        _computed(store, cores)
+        _computed(store, cores, scheduler)
     _shown(store, as_json=as_json)
 
 
@@ -113,13 +126,13 @@ def _begun(name: str, given: dict[str, Any], *, resume: bool) -> Store:
 
     from levilab.sweeps.request import SweepRequest, store_for
 
-    out = given.pop("out") or Path(f"{scene.name or 'sweep'}.zarr")
+    out = given.pop("out") or Path(f"{Path(name).stem}.zarr")
     request = SweepRequest(scene, **{name: value for name, value in given.items() if value is not None})
     with interruptible("nothing was written"):
         return store_for(request, out, message, resume=resume)
 
 
-def _computed(store: Store, cores: int | None) -> None:
+def _computed(store: Store, cores: int | None, scheduler: str | None) -> None:
     """Compute what is missing."""
     from levilab.present.progress import ShareBar
     from levilab.simulator.compilation import announce_compilation
@@ -132,34 +145,40 @@ def _computed(store: Store, cores: int | None) -> None:
         return
     if store.done:
         message(f"going on: {store.done} of {total} chunks are done")
-        for note in store.notes():
-            message(f"note: {note}")
+    for note in store.notes():
+        message(f"note: {note}")
 
     def kept() -> str:
-        done = f"{store.done} of {total} chunks are" if not is_adaptive(store) else "what was computed is"
-        done += f" kept in {store.path}"
-        return f"{done}; go on with: levilab sweep {store.path} --resume"
+        done = "what was computed is" if is_adaptive(store) else f"{store.done} of {total} chunks are"
+        return f"{done} kept in {store.path}; go on with: levilab sweep {store.path} --resume"
 
+    workers = workers_for(store.plan, cores, scheduler)
     bar = ShareBar(f"{store.plan.size} points", first=store.done / total, line_every=LINE_EVERY_S)
     with interruptible(kept), store.locked(), contextlib.closing(bar):
         with announce_compilation(message):
             compile_for(store.plan)
-        workers = workers_for(store.plan, cores)
-        if is_adaptive(store):
-            run_adaptive(store, workers, bar)
-        else:
-            run(store, workers, bar)
+        try:
+            if is_adaptive(store):
+                run_adaptive(store, workers, bar)
+            else:
+                run(store, workers, bar)
+        except WorkersLost as lost:
+            raise WorkersLost(f"{lost}; {kept()}") from lost
 
 
 def _shown(store: Store, *, as_json: bool) -> None:
-    """Print the summary."""
+    """Print the summary and draw the figures."""
+    from levilab.sweeps.adaptive import report_in
     from levilab.sweeps.summary import as_document, summarise
 
-    summary = summarise(store)
+    summary, report = summarise(store), report_in(store)
+    pictures = _drawn(store)
     if as_json:
-        print_json(as_document(summary) | {"store": str(store.path)})
+        figures = [str(picture) for picture in pictures]
+        print_json(as_document(summary) | {"adaptive": report, "store": str(store.path), "figures": figures})
         return
     from levilab.present.terminal import draw, terminal
+    from levilab.sweeps.adaptive import in_words
     from levilab.sweeps.table import FEW_POINTS, axes_lines, columns_table, headline, points_table
 
     result(headline(summary))
@@ -169,5 +188,17 @@ def _shown(store: Store, *, as_json: bool) -> None:
     console.print(draw(columns_table(summary)))
     if len(store.plan.shape) == 1 and store.plan.size <= FEW_POINTS:
         console.print(draw(points_table(store.load())))
+    for sentence in in_words(report, store.plan) if report else ():
+        console.print(f"• {sentence}", markup=False)
     if summary.points < store.plan.size:
-        message(f"{summary.chunks} of {store.plan.chunk_count} chunks are done; levilab sweep {store.path} --resume")
+        message(f"{summary.points} of {store.plan.size} points are known; levilab sweep {store.path} --resume goes on")
+
+
+def _drawn(store: Store) -> list[Path]:
+    """Draw a figure of each column beside the store, where the plan is a map."""
+    from levilab.sweeps.drawing import draw_figures
+
+    pictures = draw_figures(store)
+    for picture in pictures:
+        message(f"wrote {picture}")
+    return pictures

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -99,6 +100,20 @@ class Analyzed(Generic[S, R, T, Opt]):
             texts += [text if text in of_every else _with_name(source, text) for text in said]
         return list(dict.fromkeys(texts))
 
+    @property
+    def grouped_warnings(self) -> list[list[str]]:
+        """Every warning once, those together that differ in the names of inputs and in numbers alone."""
+        names = sorted((source.name for source in self.sources), key=len, reverse=True)
+        name = re.compile("|".join([*map(re.escape, names), _RUN.pattern]))
+        groups: dict[str, list[str]] = {}
+        for text in self.all_warnings:
+            groups.setdefault(_NUMBER.sub("#", name.sub("…", text)), []).append(text)
+        return [*groups.values()]
+
+
+#: A run's folder with what stands before it and behind it, and a number with its uncertainty.
+_RUN = re.compile(r"\S*\d{8}T\d{6}Z-\S+")
+_NUMBER = re.compile(r"\d[\d.]*(\(\d+\))?([eE][+-]?\d+)?")
 
 A = TypeVar("A", bound=Analyzed[Any, Any, Any, Any])
 

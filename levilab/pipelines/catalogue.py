@@ -12,14 +12,17 @@ from levilab.pipelines.analyzed import A
 from levilab.pipelines.field.columns import field_columns
 from levilab.pipelines.field.document import DOCUMENT as FIELD
 from levilab.pipelines.field.report import field_part
+from levilab.pipelines.field.row import FIELD_ROW
 from levilab.pipelines.field.table import field_tables
 from levilab.pipelines.limit.columns import limit_columns
 from levilab.pipelines.limit.document import DOCUMENT as LIMIT
 from levilab.pipelines.limit.report import limit_part
+from levilab.pipelines.limit.row import LIMIT_ROW
 from levilab.pipelines.limit.table import limit_tables
 from levilab.pipelines.precession.columns import precession_columns
 from levilab.pipelines.precession.document import DOCUMENT as PRECESSION
 from levilab.pipelines.precession.report import precession_part
+from levilab.pipelines.precession.row import PRECESSION_ROW
 from levilab.pipelines.precession.table import precession_tables
 from levilab.pipelines.result import Place, is_of_another, read_inputs, results_in
 from levilab.pipelines.result import save as save_files
@@ -27,10 +30,12 @@ from levilab.pipelines.sources import collect, data_files
 from levilab.pipelines.spin.columns import spin_columns
 from levilab.pipelines.spin.document import DOCUMENT as SPIN
 from levilab.pipelines.spin.report import spin_part
+from levilab.pipelines.spin.row import SPIN_ROW
 from levilab.pipelines.spin.table import spin_tables
 from levilab.pipelines.spindown.columns import spindown_columns
 from levilab.pipelines.spindown.document import DOCUMENT as SPINDOWN
 from levilab.pipelines.spindown.report import spindown_part
+from levilab.pipelines.spindown.row import SPINDOWN_ROW
 from levilab.pipelines.spindown.table import spindown_tables
 from levilab.present.clock import moment
 from levilab.present.numbers import short_name
@@ -46,6 +51,7 @@ if TYPE_CHECKING:
     from levilab.pipelines.document import Document, Looked
     from levilab.pipelines.part import ReportPart
     from levilab.pipelines.result import Written
+    from levilab.pipelines.row import Column
     from levilab.pipelines.sources import InputOptions, Needs, Source
     from levilab.present.style import Figure
     from levilab.present.tables import Table
@@ -53,6 +59,8 @@ if TYPE_CHECKING:
 
 #: Starts of runs that the terminal shows; the report has all.
 MOST_STARTS = 6
+#: So many warnings that are like an earlier one are counted, and not said.
+MANY_ALIKE = 3
 
 
 @dataclass(frozen=True)
@@ -64,6 +72,7 @@ class Analysis(Generic[A]):
         tables: for the terminal.
         part: of a report.
         columns: the readings of each input as columns of a table, with residuals.
+        row: the columns that an input has as one row of a table of many.
 
     Its figure is in `levilab.pipelines.figures`.
     """
@@ -72,6 +81,7 @@ class Analysis(Generic[A]):
     tables: Callable[[A], tuple[Table, ...]]
     part: Callable[[A], ReportPart]
     columns: Callable[[A], Iterable[Mapping[str, np.ndarray]]]
+    row: tuple[Column, ...] = ()
 
     @property
     def needs(self) -> Needs[Any]:
@@ -123,11 +133,11 @@ class Analysis(Generic[A]):
 
 
 _TABLE: tuple[Analysis[Any], ...] = (
-    Analysis(SPINDOWN, spindown_tables, spindown_part, spindown_columns),
-    Analysis(SPIN, spin_tables, spin_part, spin_columns),
-    Analysis(FIELD, field_tables, field_part, field_columns),
-    Analysis(LIMIT, limit_tables, limit_part, limit_columns),
-    Analysis(PRECESSION, precession_tables, precession_part, precession_columns),
+    Analysis(SPINDOWN, spindown_tables, spindown_part, spindown_columns, SPINDOWN_ROW),
+    Analysis(SPIN, spin_tables, spin_part, spin_columns, SPIN_ROW),
+    Analysis(FIELD, field_tables, field_part, field_columns, FIELD_ROW),
+    Analysis(LIMIT, limit_tables, limit_part, limit_columns, LIMIT_ROW),
+    Analysis(PRECESSION, precession_tables, precession_part, precession_columns, PRECESSION_ROW),
 )
 ANALYSES = MappingProxyType({analysis.name: analysis for analysis in _TABLE})
 
@@ -239,6 +249,7 @@ def _suiting(
     errors: list[DoesNotSuit] = []
     unusable: list[NoneUsable] = []
     left = dict.fromkeys(paths)  # no analysis took these
+    said: set[str] = set()  # what is wrong with inputs, as the other analyses say
     for analysis in ANALYSES.values():
         try:
             found, taken = _of_those_that_suit(run, analysis, paths, given, of_none=analysis.name in of_none)
@@ -249,14 +260,15 @@ def _suiting(
             unusable.append(error)
             continue
         left = {path: None for path in left if path not in taken}
+        said.update(getattr(found, "found", found).warnings)
         yield analysis, found
     if len(errors) + len(unusable) == len(ANALYSES):
         raise [*unusable, *errors][0]
     refusals = (_refusal(analysis, path, given) for path in left for analysis in ANALYSES.values())
     if not unusable and (refusal := next(filter(None, refusals), None)):
         raise refusal  # that of the first analysis
-    if tell:
-        for left_out in unusable:
+    for left_out in unusable:
+        if tell and not said.issuperset(left_out.reasons):
             tell(str(left_out))
 
 
@@ -292,7 +304,7 @@ def _refusal(analysis: Analysis[Any], path: Path, given: Mapping[str, Any]) -> D
     return None
 
 
-def save(analysis: Analysis[A], found: A, folder: Path | None = None) -> list[Path]:
+def save(analysis: Analysis[A], found: A, folder: Path | None = None, *, with_figure: bool = True) -> list[Path]:
     """Write the result and the figure beside the inputs, or into a folder; returns the files.  Raises CannotWrite.
 
     The name result.json belongs to the first row that is for the run's experiment, or where none is to the first one
@@ -305,7 +317,8 @@ def save(analysis: Analysis[A], found: A, folder: Path | None = None) -> list[Pa
         rows = [row for row in rows if _is_for_run(row, run)] or rows
     place = replace(found.place, folder=folder or found.output_folder)
     first = rows[0].name == analysis.name and not (folder and is_of_another(place.result(), analysis.name))
-    return save_files(analysis.result.of(found, place), place, analysis.png(found), first=first)
+    picture = analysis.png(found) if with_figure else None
+    return save_files(analysis.result.of(found, place), place, picture, first=first)
 
 
 def print_analysis(
@@ -331,5 +344,8 @@ def print_analysis(
         more = f"; and {len(starts) - MOST_STARTS} more" if len(starts) > MOST_STARTS else ""
         console.print(f"[bold]Start, local time.[/bold] {escape('; '.join(starts[:MOST_STARTS]))}{more}")
     console.print(f"[bold]What the data say.[/bold] {escape(found.text)}")
-    for warning in found.all_warnings:
-        console.print(f"[yellow]note:[/yellow] {escape(in_words(warning))}")
+    for first, *others in found.grouped_warnings:
+        many = len(others) >= MANY_ALIKE
+        more = f" (and {len(others)} more like this one)" if many else ""
+        for warning in [first] if many else [first, *others]:
+            console.print(f"[yellow]note:[/yellow] {escape(in_words(warning))}{more}")

@@ -106,7 +106,7 @@ class Document(Generic[S, R, Opt, A, D]):
             "inputs": [{"path": relative(one.data, place.folder), "sha256": one.sha256} for one in found.sources],
             "synthetic": any(source.synthetic for source in found.sources),
             "software": software_versions(),
-            "settings": self._settings(found.options),
+            "settings": self.settings(found.options),
             "values": {},
             "models": [],
             "runs": [
@@ -121,7 +121,8 @@ class Document(Generic[S, R, Opt, A, D]):
         own = self.run_entries(source, run)
         return head | own | {"warnings": [unquoted(text) for text in (*source.warnings, *own.get("warnings", ()))]}
 
-    def _settings(self, options: Opt) -> Settings:
+    def settings(self, options: Opt) -> Settings:
+        """The options as they stand in the file."""
         kind: type[Settings] = self.result.model_fields["settings"].annotation  # type: ignore[assignment]
         return kind.of(options)
 
@@ -175,7 +176,7 @@ class Document(Generic[S, R, Opt, A, D]):
     def _holds(self, earlier: Earlier[D], given: Mapping[str, Any], source: Source[S]) -> bool:
         """Whether a result was made with the given options, as far as they matter to the input."""
         made_with = self._options(earlier)
-        return self._settings(replace(made_with, **self._own(given, source))) == self._settings(made_with)
+        return self.settings(replace(made_with, **self._own(given, source))) == self.settings(made_with)
 
     def _own(self, given: Mapping[str, Any], source: Source[S]) -> dict[str, Any]:
         """Those of the given options that matter to an input."""

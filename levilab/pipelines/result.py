@@ -154,22 +154,24 @@ def _together(paths: Sequence[Path]) -> Place:
     return Place(Path("..") if Path(RECORD).exists() else Path())
 
 
-def save(result: Result, place: Place, picture: bytes, *, first: bool = True) -> list[Path]:
+def save(result: Result, place: Place, picture: bytes | None, *, first: bool = True) -> list[Path]:
     """Write a result and its figure; returns the files.  Raises CannotWrite.
 
     Args:
         result: what is written.
         place: where.
-        picture: the figure, as PNG.
+        picture: the figure, as PNG; None: none is written.
         first: whether the analysis is the first here, so that result.json is its own.
     """
     text = json.dumps(result.as_dict(), indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False)
-    files = [place.result("" if first else result.analysis), place.figure(result.analysis)]
+    files = [place.result("" if first else result.analysis)]
     advice = "choose another place with `out`, or print only with `save` = False"
     with writing(f"the result could not be written into {place.folder}", advice):
         place.folder.mkdir(parents=True, exist_ok=True)
         replace_atomically(files[0], text + "\n")
-        replace_atomically(files[1], picture)
+        if picture is not None:
+            files.append(place.figure(result.analysis))
+            replace_atomically(files[1], picture)
     return files
 
 

@@ -255,7 +255,7 @@ def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]
             found.append(_of_file(file, needs, chosen))
     if not found:
         text = f"{root}: {_nothing_found(needs, others, broken, [file.name for file in files])}"
-        raise NoneUsable(text) if broken else DoesNotSuit(text)
+        raise NoneUsable(text, tuple(broken)) if broken else DoesNotSuit(text)
     kinds = [f"passed over: {count} {kind} run{'s' * (count > 1)}" for kind, count in sorted(others.items())]
     return Found(tuple(found), tuple(broken), (*kinds, *remarks))
 

@@ -150,9 +150,10 @@ class ShareBar:
         self._first = self._last = first
         self._attempt = 1
 
-    def __call__(self, share: float) -> None:
-        """Show the share that is done."""
+    def __call__(self, share: float, description: str = "") -> None:
+        """Show the share that is done, and of what, if that changes."""
         now = time.monotonic()
+        self._description = description or self._description
         if share < self._last:
             self._attempt += 1
             self._first, self._begin = 0.0, now

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from levilab.pipelines.part import InputPart, ReportPart
     from levilab.pipelines.sources import Source
     from levilab.runs.run import RunRecord
+
+#: What is known, as "Counter", and that in words.
+Fact = tuple[str, tuple[str, ...]]
 
 #: Events printed in the page; more stay in the run folder.
 MOST_EVENTS = 100
@@ -49,10 +52,27 @@ class Input:
     """
 
     name: str
-    facts: tuple[tuple[str, tuple[str, ...]], ...]
+    facts: tuple[Fact, ...]
     events: tuple[tuple[str, str], ...]
     events_left_out: int
     parts: tuple[About, ...]
+
+    @property
+    def heading(self) -> str:
+        """What tells it from others: how it ended, unless that was well, and how much was read."""
+        facts = dict(self.facts)
+        texts = [*facts.get("Status", ()), *facts.get("Readings", ())[:1]]
+        return "; ".join(text for text in texts if text != "finished")
+
+    def without(self, common: Sequence[Fact]) -> Input:
+        """The same without the facts that are said elsewhere."""
+        return replace(self, facts=tuple(fact for fact in self.facts if fact not in common))
+
+
+def in_common(inputs: Sequence[Input]) -> tuple[Fact, ...]:
+    """The facts that hold for all inputs alike."""
+    first, *others = inputs
+    return tuple(fact for fact in first.facts if all(fact in other.facts for other in others))
 
 
 def describe(parts: Sequence[About]) -> Input:
@@ -69,7 +89,7 @@ def describe(parts: Sequence[About]) -> Input:
     )
 
 
-def _facts(source: Source[Any], parts: Sequence[About]) -> list[tuple[str, tuple[str, ...]]]:
+def _facts(source: Source[Any], parts: Sequence[About]) -> list[Fact]:
     about_readings = _of_one(parts[0]) if len(parts) == 1 else [_of_several(part) for part in parts]
     if source.run is None:
         return [*about_readings, ("Instruments", ("no instruments recorded",))]
@@ -88,13 +108,13 @@ def _facts(source: Source[Any], parts: Sequence[About]) -> list[tuple[str, tuple
     ]
 
 
-def _of_one(about: About) -> list[tuple[str, tuple[str, ...]]]:
+def _of_one(about: About) -> list[Fact]:
     """What the only analysis says."""
     alone = [("This run alone", (about.part.alone,))] if about.several else []
     return [*alone, ("Readings", about.part.readings), ("Analysis", (about.part.origin,))]
 
 
-def _of_several(about: About) -> tuple[str, tuple[str, ...]]:
+def _of_several(about: About) -> Fact:
     """What one of several analyses says."""
     subject = about.whole.subject
     alone = (about.part.alone,) if about.several else ()

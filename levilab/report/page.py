@@ -13,7 +13,7 @@ from levilab.errors import UsageError, unquoted
 from levilab.files import replace_atomically, writing
 from levilab.pipelines.catalogue import recall_suiting, remarks
 from levilab.pipelines.document import NO_RESULT
-from levilab.report.inputs import About, describe
+from levilab.report.inputs import About, describe, in_common
 from levilab.runs.run import utc_now
 from levilab.software import software_versions
 
@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 
 #: Inputs that a message names at most.
 MOST_NAMES = 4
+#: Of more inputs the page is an overview: what they have in common is said once, each by itself can be unfolded, and
+#: the figure is made of pixels, which are a tenth of so many lines.
+MOST_IN_FULL = 12
 
 
 class UnknownFormat(UsageError):
@@ -85,12 +88,17 @@ def _without_result(results: Results) -> Iterator[str]:
         for source, origin in zip(found.sources, found.origins, strict=True)
         if origin.text.endswith(NO_RESULT)
     }
-    names = [*lacking][:MOST_NAMES] + (["…"] if len(lacking) > MOST_NAMES else [])
-    if names:
+    if lacking:
         yield (
-            f"no result lies beside {', '.join(names)}: analyzed for the page; if levilab analyze wrote one elsewhere "
-            "(`out`), give that folder or file"
+            f"no result lies beside {_listed([*lacking])}: analyzed for the page; if levilab analyze wrote one "
+            "elsewhere (`out`), give that folder or file"
         )
+
+
+def _listed(names: Sequence[str]) -> str:
+    """The names, or the first of them."""
+    more = len(names) - MOST_NAMES
+    return ", ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
 @dataclass(frozen=True)
@@ -102,13 +110,14 @@ class Section:
         count: of its inputs, in words.
         banner: which of them are synthetic, where that matters here.
         figure: as an address of data.
+        warnings: those that are alike together.
     """
 
     part: ReportPart
     count: str
     banner: tuple[str, str] | None
     figure: str
-    warnings: tuple[str, ...]
+    warnings: tuple[tuple[str, ...], ...]
 
 
 def render_part(analysis: Analysis[A], found: A) -> str:
@@ -130,10 +139,15 @@ def render(results: Results) -> str:
         several = len(found.sources) > 1
         for source, part in zip(found.sources, section.part.inputs, strict=True):
             abouts.setdefault(source.path.resolve(), []).append(About(source, section.part, part, several))
+    inputs = [describe(of_input) for of_input in abouts.values()]
+    many = len(inputs) > MOST_IN_FULL
+    common = in_common(inputs) if many else ()
     return _template("report/page.html.j2").render(
         sections=sections,
+        many=many,
+        common=common,
         banner=sections[0].banner if len(sections) == 1 else _banner([one[0].source for one in abouts.values()]),
-        inputs=[describe(of_input) for of_input in abouts.values()],
+        inputs=[one.without(common) for one in inputs],
         counted=counted([one[0].source for one in abouts.values()]),
         software=software_versions(),
         written=utc_now()[:19].replace("T", " ") + " UTC",
@@ -156,13 +170,16 @@ def _template(name: str) -> Template:
 
 def _section(analysis: Analysis[Any], found: Analyzed[Any, Any, Any, Any], *, alone: bool) -> Section:
     """alone: there is no other, so that it says which inputs are synthetic even where they are not mixed."""
+    many = len(found.sources) > MOST_IN_FULL
     mixes = any(0 < sum(one.synthetic for one in together) < len(together) for together in found.averaged)
     return Section(
         part=analysis.part(found),
         count=counted(found.sources),
         banner=_banner(found.sources, mixed=mixes) if alone or mixes else None,
-        figure=_as_image(analysis.svg(found)),
-        warnings=tuple(unquoted(text) for text in found.all_warnings),
+        figure=_address("image/png", analysis.png(found))
+        if many
+        else _address("image/svg+xml", analysis.svg(found).encode()),
+        warnings=tuple(tuple(map(unquoted, alike)) for alike in found.grouped_warnings),
     )
 
 
@@ -178,9 +195,9 @@ def _banner(sources: Sequence[Source[Any]], *, mixed: bool = False) -> tuple[str
     below = "How each was made stands below, under its name."
     if len(made_up) == total:
         return "SYNTHETIC.", f"None of these {total} runs came from a real bench. {below}"
-    said = f"{len(made_up)} of {total} runs did not come from a real bench ({', '.join(made_up)})."
+    said = f"{len(made_up)} of {total} runs did not come from a real bench ({_listed(made_up)})."
     if not mixed and files:
-        said = f"Of {counted(sources)} {len(made_up)} did not come from a real bench ({', '.join(made_up)})."
+        said = f"Of {counted(sources)} {len(made_up)} did not come from a real bench ({_listed(made_up)})."
         return "SYNTHETIC IN PART.", f"{said} A data file does not say where it is from. {below}"
     if not mixed:
         return "REAL AND SYNTHETIC RUNS.", f"{said} {below}"
@@ -195,6 +212,6 @@ def counted(sources: Sequence[Source[Any]]) -> str:
     return " and ".join(f"{n} {kind}{'s' * (n > 1)}" for n, kind in kinds if n)
 
 
-def _as_image(svg: str) -> str:
-    """An SVG as a data address: it keeps its ids to itself and runs no script."""
-    return "data:image/svg+xml;base64," + base64.b64encode(svg.encode()).decode()
+def _address(kind: str, picture: bytes) -> str:
+    """A picture as a data address: an SVG keeps its ids to itself and runs no script."""
+    return f"data:{kind};base64,{base64.b64encode(picture).decode()}"

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+import math
 import os
+import stat
 from dataclasses import dataclass
-from pathlib import PurePath
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
+import pydantic_core
+from rich.cells import cell_len
 from rich.markup import escape
 
 from levilab.errors import DataError
 from levilab.formats.table import NO_READING
 from levilab.present.numbers import short_name
 from levilab.present.terminal import print_rows, terminal
-from levilab.runs.run import READINGS, Run, find_runs
+from levilab.runs.run import READINGS, RECORD, Run, RunRecord, find_runs
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ def list_runs(root: Path) -> list[Listed]:
 
 def _listed(folder: Path) -> Listed:
     try:
-        run = Run.load(folder)
+        run = _load(folder) or Run.load(folder)
         rows = _glance(run) or _read(run)
     except DataError as error:
         return Listed(str(folder), None, "?", "unreadable", 0, None, synthetic=False, note="", problem=str(error))
@@ -93,6 +95,32 @@ def _listed(folder: Path) -> Listed:
         scene=str(_table(run.record.configuration, "scene").get("name", "")),
         records=rows.readings if rows.of_records else 0,
     )
+
+
+#: The longest file that is glanced at [bytes].
+_GLANCED_BYTES = 1 << 20
+
+
+def _load(folder: Path) -> Run | None:
+    """The same as Run.load in half the time, of a run that is at its end and whose record is sound; else None."""
+    content = _content(f"{folder}{os.sep}{RECORD}")
+    try:
+        record = RunRecord.model_validate(pydantic_core.from_json(content, allow_inf_nan=False)) if content else None
+    except ValueError:
+        return None
+    return None if record is None or record.status == "running" else Run(folder, record, record.status)
+
+
+def _content(path: str) -> bytes | None:
+    """What is in a file; None where it is no file, as a pipe, which would be waited for, or a long one."""
+    try:
+        if not stat.S_ISREG(os.stat(path).st_mode):  # noqa: PTH116 - of ten thousand folders
+            return None
+        with open(path, "rb", buffering=0) as stream:  # noqa: PTH123 - likewise
+            content = stream.read(_GLANCED_BYTES)
+    except OSError:
+        return None
+    return content if content is not None and len(content) < _GLANCED_BYTES else None
 
 
 class _Rows(NamedTuple):
@@ -113,26 +141,21 @@ def _read(run: Run) -> _Rows:
     return _Rows(len(frame), length, "record" in frame)
 
 
-#: The longest file that is glanced at, and its bytes.
-_GLANCED_BYTES, _PLAIN = 1 << 20, b"0123456789+-.,eE\n"
+#: The bytes of numbers as this program writes them.
+_PLAIN = b"0123456789+-.,eE\n"
 
 
 def _glance(run: Run) -> _Rows | None:
     """The same in a twentieth of the time, where every line is as this program writes it; None where one is not."""
-    path = run.folder / READINGS
-    if not path.is_file():  # a pipe would be waited for
+    content = _content(f"{run.folder}{os.sep}{READINGS}")
+    if content is None:
         return None
-    try:
-        with path.open("rb") as stream:
-            head, body = stream.readline(_GLANCED_BYTES), stream.read(_GLANCED_BYTES)
-    except OSError:
-        return None
-    titles = head.decode("ascii", errors="replace").rstrip("\n").split(",")
+    head, _, body = content.partition(b"\n")
+    titles = head.decode("ascii", errors="replace").split(",")
     lines = body.split(b"\n")[:-1]  # a torn last line is left out
     commas = len(titles) - 1
     if (
-        len(head) + len(body) >= _GLANCED_BYTES
-        or titles[0] != "time_s"
+        titles[0] != "time_s"
         or len(set(titles)) < len(titles)
         or not lines
         or body.translate(None, _PLAIN)
@@ -140,14 +163,13 @@ def _glance(run: Run) -> _Rows | None:
     ):
         return None
     try:
-        numbers = np.array(b",".join(lines).split(b","), dtype=np.float64)
+        numbers = [float(number) for number in b",".join(lines).split(b",")]
     except ValueError:  # an empty field, which is a missed reading, or a damaged line
         return None
-    if not np.all(np.abs(numbers) < NO_READING):
+    if not (min(numbers) > -NO_READING and max(numbers) < NO_READING):
         return None
-    times = numbers[:: len(titles)]
     return _Rows(
-        len(lines), _length(run, float(times[0]), float(times[-1])), "record" in titles and "record" in _declared(run)
+        len(lines), _length(run, numbers[0], numbers[-len(titles)]), "record" in titles and "record" in _declared(run)
     )
 
 
@@ -168,11 +190,15 @@ def _table(of: dict[str, Any] | None, key: str) -> dict[str, Any]:
 
 def _number(table: dict[str, Any], key: str) -> float:
     value = table.get(key)
-    return float(value) if isinstance(value, int | float) else 0.0
+    return float(value) if isinstance(value, int | float) and math.isfinite(value) else 0.0
 
 
 #: Columns of a terminal from which on the list of runs shows notes.
 ROOM_FOR_NOTES = 110
+#: Columns of the list that a narrow terminal has no room for, the first one first.
+DISPENSABLE = ("length", "readings")
+#: So many broken runs are explained below the list.
+MOST_PROBLEMS = 5
 
 
 def print_runs(runs: Sequence[Listed], root: Path) -> None:
@@ -183,29 +209,50 @@ def print_runs(runs: Sequence[Listed], root: Path) -> None:
         return
     heads = ["when (UTC)", "run", "what", "status", "readings", "length"]
     room = console.width - 80 if console.width >= ROOM_FOR_NOTES else 0
-    rows = [_cells(run, root, room) for run in runs]
-    print_rows(console, [*heads, "note"] if room else heads, rows, numbers=["readings", "length"])
-    for run in runs:
-        if run.problem:
-            console.print(f"[yellow]note:[/yellow] {escape(run.problem)}")
+    above = f"{root}{os.sep}" if root != Path() else ""
+    rows = [_cells(run, above, room) for run in runs]
+    heads, rows = _that_fit([*heads, "note"] if room else heads, rows, console.width)
+    print_rows(console, heads, rows, numbers=["readings", "length"])
+    problems = [run.problem for run in runs if run.problem]
+    for problem in problems[:MOST_PROBLEMS]:
+        console.print(f"[yellow]note:[/yellow] {escape(problem)}")
+    if (more := len(problems) - MOST_PROBLEMS) > 0:
+        console.print(f"[yellow]note:[/yellow] and {more} more that cannot be read; levilab runs --json says why")
+
+
+def _that_fit(heads: list[str], rows: list[list[str]], width: int) -> tuple[list[str], list[list[str]]]:
+    """The list without the columns for which a terminal is too narrow, even if it folds texts between their words."""
+    for left_out in DISPENSABLE:
+        if _narrowest(heads, rows) <= width or left_out not in heads:
+            break
+        k = heads.index(left_out)
+        heads, rows = heads[:k] + heads[k + 1 :], [row[:k] + row[k + 1 :] for row in rows]
+    return heads, rows
+
+
+def _narrowest(heads: list[str], rows: list[list[str]]) -> int:
+    """The width that the longest words and two columns between them take."""
+    columns = zip(heads, *rows, strict=True)
+    return sum(max(cell_len(word) for text in set(column) for word in text.split()) + 2 for column in columns)
 
 
 def _seconds(length: float | None) -> str:
     return "—" if length is None else f"{length:.0f} s"
 
 
-def _cells(run: Listed, root: Path, room: int) -> list[str]:
-    """A row of the list; room: for a note, none where it is 0."""
+def _cells(run: Listed, above: str, room: int) -> list[str]:
+    """A row of the list; above: the folder that was searched; room: for a note, none where it is 0."""
     when = (run.started_utc or "—")[:16].replace("T", " ")
     scene = f" {run.scene}" if run.scene not in {"", run.experiment} else ""
     what = run.experiment + scene + (", synthetic" if run.synthetic else "")
-    cells = [when, _below(run.path, root), what, run.status, run.size, _seconds(run.length_s)]
+    cells = [when, _below(run.path, above), what, run.status, run.size, _seconds(run.length_s)]
     if room:
         cells.append(run.note if len(run.note) <= room else f"{run.note[: room - 1]}…")
-    return [" ".join(cell.splitlines()) for cell in cells]
+    return [cell if cell.isprintable() else " ".join(cell.splitlines()) for cell in cells]
 
 
-def _below(path: str, root: Path) -> str:
-    """A run's path as seen from the folder that was searched."""
-    below = PurePath(path).relative_to(root)
-    return (below.parent / short_name(PurePath(path).name)).as_posix()
+def _below(path: str, above: str) -> str:
+    """A run's path as seen from the folder that was searched; a run that is that folder has its name."""
+    below = path.removeprefix(above) if path.startswith(above) else path
+    parent, _, name = below.replace(os.sep, "/").rpartition("/")
+    return f"{parent}/{short_name(name)}" if parent and path.startswith(above) else short_name(name)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from levilab.simulator.field import flux_density
 from levilab.simulator.kernels import braking
 from levilab.simulator.kernels.motion import CLOCK, L, R
+from levilab.simulator.numbers import largest, length, smallest, sqrt
 
 if TYPE_CHECKING:
     from levilab.simulator.kernels.motion import Model
@@ -20,16 +20,16 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-def longest_step(scene: Scene, model: Model, start: Array, scheme: Scheme) -> float:
+def longest_step(scene: Scene, model: Model, start: Array, scheme: Scheme) -> Any:
     """Return the longest step [s] for which the kernels' polynomials hold and no motion is skipped.
 
-    Three limits: a drift turns the axis by 1 rad, a kick slows the spin by a fifth, a step takes half a period of the
-    drive.  A tumbling top turns faster than its angular momentum at the start says: the field's torque adds about
-    √(|μ|B/I₁) to the rate.
+    It is that of each top, if there are many.  Three limits: a drift turns the axis by 1 rad, a kick slows the spin by
+    a fifth, a step takes half a period of the drive.  A tumbling top turns faster than its angular momentum at the
+    start says: the field's torque adds about √(|μ|B/I₁) to the rate.
     """
-    stiffness = float(np.linalg.norm(flux_density(model.field, start[None, R])))  # |μ|B [J]
-    turning = float(np.linalg.norm(start[L])) * model.body.inverse_transverse
-    turning += math.sqrt(stiffness * model.body.inverse_transverse)
+    stiffness = length(np.moveaxis(flux_density(model.field, start[..., R]), -1, 0))  # |μ|B [J]
+    turning = length(np.moveaxis(start[..., L], -1, 0)) * model.body.inverse_transverse
+    turning += sqrt(stiffness * model.body.inverse_transverse)
     drift, kick = (float(np.max(np.abs(c))) for c in (scheme.drifts, scheme.kicks))
     limits = [
         1 / (drift * turning + 1e-300),
@@ -37,17 +37,17 @@ def longest_step(scene: Scene, model: Model, start: Array, scheme: Scheme) -> fl
     ]
     if model.drive is not None:
         limits.append(0.5 / scene.drive.frequency_hz)
-    return min(limits)
+    return smallest(*limits)
 
 
-def _strongest_damping(drag: Any, start: Array) -> float:
+def _strongest_damping(drag: Any, start: Array) -> Any:
     """Return the greatest relative rate |ω̇/ω| [1/s] that drag or the washers' friction has at the start."""
     if drag is None:
         return 0.0
-    spin = abs(float(start[CLOCK]))
+    spin = abs(start[..., CLOCK])
     if isinstance(drag, braking.WasherDragFlow):
         friction = drag.coupling * (drag.inverse_washers + drag.inverse_core)
-        return max(friction, _damping_rate(drag.washers, spin), _damping_rate(drag.core, spin))
+        return largest(friction, _damping_rate(drag.washers, spin), _damping_rate(drag.core, spin))
     return _damping_rate(drag.law, spin)
 
 
@@ -74,15 +74,15 @@ def comes_near_zero(spins: Array) -> NDArray[np.bool_]:
     return np.asarray(np.abs(spins).min(axis=0) <= 2 * changes)
 
 
-def _damping_rate(law: Any, spin: float) -> float:
+def _damping_rate(law: Any, spin: Any) -> Any:
     """Return |ω̇/ω| of a drag law at a spin [1/s]."""
     if isinstance(law, braking.Stokes):
         return law.c
     if isinstance(law, braking.Newton):
         return law.c * spin
     if isinstance(law, braking.LaminarDisc):
-        return law.c * math.sqrt(spin)
-    return float(law.c1 + law.c2 * spin)
+        return law.c * sqrt(spin)
+    return law.c1 + law.c2 * spin
 
 
 #: An estimate is to bound the true error; with this factor it is about six times as large.

@@ -9,10 +9,12 @@ and torque, against a rule of 2800 nodes, for radii of 5 to 30 mm, heights of 2 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from levilab.simulator.numbers import ceil, hypot, largest, log, smallest, uniform
 
 if TYPE_CHECKING:
     from levilab.simulator.parts import Base, Top
@@ -38,42 +40,45 @@ class Rule(NamedTuple):
         return Rule(max(self.rings + number, 1), max(self.layers + number, 1), max(self.angles + number, 3))
 
 
-def rule_for(radius: float, height: float, distance: float) -> Rule:
+def rule_for(radius: Any, height: Any, distance: Any) -> Rule:
     """The smallest rule for a disc of this radius and height at this distance from the base's nearest edge, all [m].
 
     >>> rule_for(0.0144, 0.0033, 0.0763)
     Rule(rings=4, layers=4, angles=8)
     """
     across, along = radius / distance, height / 2 / distance
+    half = across / 2
     return Rule(
-        _number(1000, (across / 2) ** 4, MOST[0]),
-        _number(15, along**2, MOST[1]),
+        _number(1000, half * half * half * half, MOST[0]),
+        _number(15, along * along, MOST[1]),
         # a harmonic of the angle is felt by as much of it as the disc leans and lies off the base's axis
         max(_number(100, across / 8, MOST[2]), 6),
     )
 
 
-def _number(factor: float, rate: float, most: int) -> int:
+def _number(factor: float, rate: Any, most: int) -> int:
     """The least n with factor · rateⁿ ≤ TARGET."""
-    return most if rate >= 1 else min(max(math.ceil(math.log(TARGET / factor) / math.log(rate)), 1), most)
+    return most if rate >= 1 else min(max(int(uniform(ceil(math.log(TARGET / factor) / log(rate)))), 1), most)
 
 
-def distance_to(base: Base, place: Array) -> float:
-    """The distance [m] of a place, shape (3,), from the nearest edge of the base."""
-    away = math.hypot(place[0], place[1])
-    above = max(abs(float(place[2]) - base.origin_m) - base.thickness_m / 2, 0.0)
-    return max(min(math.hypot(radius - away, above) for radius in (base.inner_radius_m, base.outer_radius_m)), 1e-9)
+def distance_to(base: Base, place: Any) -> Any:
+    """The distance [m] of a place, three numbers, from the nearest edge of the base."""
+    away = hypot(place[0], place[1])
+    above = largest(abs(place[2] - base.origin_m) - base.thickness_m / 2, 0.0)
+    inner, outer = (hypot(radius - away, above) for radius in (base.inner_radius_m, base.outer_radius_m))
+    return largest(smallest(inner, outer), 1e-9)
 
 
 def nodes_of(top: Top, rule: Rule) -> Array:
     """The nodes of a rule, shape (n, 4): place along e₁, e₂, axis [m], and weight; the weights add up to 1."""
     x, wx = np.polynomial.legendre.leggauss(rule.rings)
     z, wz = np.polynomial.legendre.leggauss(rule.layers)
-    rings = top.magnet_radius_m * np.sqrt((x + 1) / 2)
+    radius, height = uniform(top.magnet_radius_m), uniform(top.magnet_height_m)
+    rings = radius * np.sqrt((x + 1) / 2)
     angles = 2 * np.pi * np.arange(rule.angles) / rule.angles
     return np.array(
         [
-            [ring * math.cos(angle), ring * math.sin(angle), layer * top.magnet_height_m / 2, u * w / 4 / rule.angles]
+            [ring * math.cos(angle), ring * math.sin(angle), layer * height / 2, u * w / 4 / rule.angles]
             for ring, u in zip(rings, wx, strict=True)
             for angle in angles
             for layer, w in zip(z, wz, strict=True)

@@ -12,6 +12,8 @@ from levilab.simulator.kernels.motion import ARM, LOOSE, L, Model, N, R, V
 from levilab.simulator.model import Array, gravity
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from levilab.simulator.scene import Scene
 
 
@@ -48,16 +50,30 @@ def magnetic_energy(model: Model, states: Array) -> Array:
     return total
 
 
+def core_spin(states: Array, axial: ArrayLike, washers: ArrayLike) -> Array:
+    """ω₃ [rad/s] of the top, or of its core where washers are loose, which carries the magnet.
+
+    Args:
+        states: shape (…, 18).
+        axial: inertia of the whole [kg m²], shape (…).
+        washers: that of loose washers, 0 where none are.
+    """
+    along, washers = np.einsum("...i,...i->...", states[..., L], states[..., N]), np.asarray(washers)
+    return np.asarray((along - states[..., LOOSE] * (washers > 0)) / (axial - washers))
+
+
+def both_spins(states: Array, axial: ArrayLike, washers: ArrayLike) -> Array:
+    """ω₃ of the core as `core_spin` and that of loose washers, shape (…, 2) [rad/s]; both the same where none are."""
+    core, washers = core_spin(states, axial, washers), np.asarray(washers)
+    loose = states[..., LOOSE] / np.where(washers > 0, washers, 1.0)
+    return np.stack([core, np.where(washers > 0, loose, core)], axis=-1)
+
+
 def spin_of(scene: Scene, states: Array) -> Array:
     """ω₃ = L·n/I₃ of the states [rad/s]; with loose washers that of the core, which carries the magnet."""
-    s = np.atleast_2d(states)
-    along = np.einsum("ij,ij->i", s[:, L], s[:, N])
-    washers = scene.washers.inertia_kg_m2
-    return np.asarray((along - s[:, LOOSE] * (washers > 0)) / (scene.top.inertia_axial_kg_m2 - washers))
+    return core_spin(np.atleast_2d(states), scene.top.inertia_axial_kg_m2, scene.washers.inertia_kg_m2)
 
 
 def spins_of(scene: Scene, states: Array) -> Array:
     """ω₃ of the top, or of its core, and that of loose washers, shape (n, 2) [rad/s]; both the same where none are."""
-    s, spins = np.atleast_2d(states), spin_of(scene, states)
-    washers = scene.washers.inertia_kg_m2
-    return np.column_stack([spins, s[:, LOOSE] / washers if washers else spins])
+    return both_spins(np.atleast_2d(states), scene.top.inertia_axial_kg_m2, scene.washers.inertia_kg_m2)

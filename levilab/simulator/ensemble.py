@@ -7,33 +7,30 @@ import math
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from levilab.errors import SimulationError
-from levilab.simulator.accuracy import NODES_ORDER, comes_near_zero, estimate, has_kink, longest_step
-from levilab.simulator.energy import spins_of
-from levilab.simulator.escape import at_the_crossing, crossed_height, exit_speeds, within_limits
-from levilab.simulator.kernels.lanes import LANES, advance_many, numbers_of
-from levilab.simulator.kernels.loads import Disc
-from levilab.simulator.kernels.motion import LOOSE, STATE_SIZE, TIME, L, N, R, V
+from levilab.simulator.accuracy import NODES_ORDER, comes_near_zero, estimate, has_kink
+from levilab.simulator.energy import both_spins, core_spin
+from levilab.simulator.escape import at_the_crossing, crossed_height, exit_speeds
+from levilab.simulator.kernels.columns import LANES
+from levilab.simulator.kernels.lanes import advance_many
+from levilab.simulator.kernels.motion import STATE_SIZE, TIME, L, N, R, V
+from levilab.simulator.kernels.pieces import DURATION, FIRST, HEIGHT, OFF, RADIUS, RATE, STEEP, STEP
 from levilab.simulator.keys import SceneError
-from levilab.simulator.model import model_of
-from levilab.simulator.problem import NO_LIMITS, Problem, integrate, integrate_to_end, scheme_for
-from levilab.simulator.schemes import SCHEMES
 from levilab.simulator.single import MIN_STEPS_FOR_DOUBLING, check, simulate
-from levilab.simulator.start import start_of
-from levilab.simulator.stops import stops_between
+from levilab.simulator.stops import MOST_KINKS, MOST_STEPS
+from levilab.simulator.varied import Batch, batches, broadcast, scene_at
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Mapping
 
     from levilab.simulator.scene import Scene
 
 Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 #: The step of all tops is chosen on a few, simulated one by one: the corners of a map and so many evenly through it.
 PILOTS = 6
@@ -55,6 +52,8 @@ class Ensemble:
         states: at the end, shape (…, 18).
         position_error: estimated [m], NaN if errors were not estimated.
         axis_error: likewise [rad].
+        sample_times: of the samples, shape (samples,) [s]; none without a rate.
+        samples: columns of the states then, shape (…, samples, columns); NaN after an escape.
 
     Where an error is larger than the tolerance, the motion was chaotic, and whether it survived is chance.
     """
@@ -67,6 +66,8 @@ class Ensemble:
     states: Array
     position_error: Array
     axis_error: Array
+    sample_times: Array
+    samples: Array
 
     @property
     def position(self) -> Array:
@@ -81,10 +82,9 @@ class Ensemble:
     @property
     def spin_hz(self) -> Array:
         """Spins ω₃/2π at the end [Hz]."""
-        along = np.sum(self.states[..., L] * self.states[..., N], axis=-1)
-        washers = self.values.get("washers.inertia_kg_m2", np.array(self.scene.washers.inertia_kg_m2))
-        inertia = self.values.get("top.inertia_axial_kg_m2", np.array(self.scene.top.inertia_axial_kg_m2))
-        return np.asarray((along - self.states[..., LOOSE] * (washers > 0)) / (inertia - washers) / (2 * np.pi))
+        washers = self.values.get("washers.inertia_kg_m2", self.scene.washers.inertia_kg_m2)
+        inertia = self.values.get("top.inertia_axial_kg_m2", self.scene.top.inertia_axial_kg_m2)
+        return core_spin(self.states, inertia, washers) / (2 * np.pi)
 
 
 def simulate_many(
@@ -95,6 +95,8 @@ def simulate_many(
     tolerance: float = 1e-7,
     step: float | None = None,
     step_share: float | None = None,
+    rate: float | None = None,
+    columns: slice | ArrayLike = slice(None),
     cores: int | None = None,
     errors: bool = True,
     progress: Callable[[float], None] | None = None,
@@ -109,6 +111,9 @@ def simulate_many(
         step: of all tops [s]; None: the tolerance decides it.
         step_share: the part of its own longest step that each top takes, from `step_share_of`; None: found on some of
             these tops.  With it, each top's result depends on its own numbers alone, to the last bit.
+        rate: samples per second, the first at the start; None: the ends alone.  Steps are shortened to divide the time
+            between samples, so that samples lie on steps, and at the same times for all tops.
+        columns: of the state (`kernels.motion`) that samples keep, such as R or [0, 1, 2]; they are what takes memory.
         cores: number of threads; None: one for each core of the machine.
         errors: estimate every top's error by a second, coarser run, which takes half as long again.
         progress: called with the share of the work that is done.
@@ -126,41 +131,48 @@ def simulate_many(
     >>> simulate_many(preset("undriven"), {"start.spin_hz": spins}, 5.0).survived
     array([False,  True,  True])
     """
-    check(duration=duration, tolerance=tolerance, rate=None, step=step)
-    if duration < 0:
-        raise SimulationError(f"duration = {duration} s: many at once go forwards only")
-    if scene.observed == "spin":
-        raise SceneError("observed = spin: the spin alone has a closed form; many at once need observed = motion")
-    keys, values = list(over), _broadcast(over)
-    shape = values[0].shape
-    tops = [
-        _Top.of(scene.changed({key: _plain(v.flat[i]) for key, v in zip(keys, values, strict=False)}))
-        for i in range(values[0].size)
-    ]
-    longest = np.array([one.longest for one in tops])
-    if step:
-        steps = np.full(len(tops), step)
-    else:
-        steps = longest * (step_share or _step_share([tops[i] for i in sorted(_pilots(shape))], duration, tolerance))
-    ends = _Ends.empty(len(tops))
+    check(duration=duration, tolerance=tolerance, rate=rate, step=step)
+    _check_forwards(scene, duration)
+    values = broadcast(over)
+    shape = next(iter(values.values())).shape if values else (1,)
+    groups = batches(scene, over)
+    if not (step or step_share) and groups:
+        step_share = _step_share(scene, over, duration, tolerance)
+    which: Any = columns
+    kept = np.arange(STATE_SIZE)[which] if rate else np.empty(0, dtype=np.intp)
+    times = np.arange(math.floor(duration * rate * (1 + 1e-12)) + 1) / rate if rate else np.empty(0)
+    wanted = _Wanted(duration, rate or 0.0, kept.astype(np.int64), errors)
+    ends = _Ends.empty(math.prod(shape), times.size, kept.size)
     threads = cores or os.cpu_count() or 1
-    work = [part for group in _groups(tops) for part in _parts(group, threads)]
+    work = [part for group in groups for part in _parts(group, threads)]
+
+    def advance(part: Batch) -> None:
+        _advance(part, wanted, np.full(part.longest.shape, step) if step else part.longest * (step_share or 1.0), ends)
+
     with ThreadPoolExecutor(threads) as pool:
-        for done, _ in enumerate(
-            pool.map(lambda part: _advance(tops, part, duration, steps, ends, errors=errors), work), 1
-        ):
+        for done, _ in enumerate(pool.map(advance, work), 1):
             if progress is not None:
                 progress(done / len(work))
     return Ensemble(
         scene,
-        {key: np.array(v) for key, v in zip(keys, values, strict=False)},
+        {key: np.array(column) for key, column in values.items()},
         duration,
         ends.survived.reshape(shape),
         ends.states[:, TIME].reshape(shape),
         ends.states.reshape(*shape, STATE_SIZE),
         ends.position_error.reshape(shape),
         ends.axis_error.reshape(shape),
+        times,
+        ends.samples.reshape(*shape, times.size, kept.size),
     )
+
+
+def _check_forwards(scene: Scene, duration: float) -> None:
+    """Raise SceneError or SimulationError for what many at once cannot do."""
+    if duration < 0:
+        raise SimulationError(f"duration = {duration} s: many at once go forwards only")
+    if scene.observed == "spin":
+        raise SceneError("observed = spin: the spin alone has a closed form; many at once need observed = motion")
 
 
 def step_share_of(
@@ -187,12 +199,8 @@ def step_share_of(
     True
     """
     check(duration=duration, tolerance=tolerance, rate=None, step=None)
-    keys, values = list(over), _broadcast(over)
-    some = [
-        _Top.of(scene.changed({key: _plain(v.flat[i]) for key, v in zip(keys, values, strict=False)}))
-        for i in sorted(_pilots(values[0].shape))
-    ]
-    return _step_share(some, duration, tolerance)
+    _check_forwards(scene, duration)
+    return _step_share(scene, over, duration, tolerance)
 
 
 def grid(axes: Mapping[str, ArrayLike]) -> dict[str, NDArray[Any]]:
@@ -207,45 +215,13 @@ def grid(axes: Mapping[str, ArrayLike]) -> dict[str, NDArray[Any]]:
     }
 
 
-def _broadcast(over: Mapping[str, ArrayLike]) -> list[NDArray[Any]]:
-    """Broadcast the values of all keys to one shape; without a key there is one value.  Raises SimulationError."""
-    if not over:
-        return [np.zeros(1)]
-    arrays = {key: np.asarray(values) for key, values in over.items()}
-    try:
-        return list(np.broadcast_arrays(*arrays.values()))
-    except ValueError:
-        shapes = ", ".join(f"{key} {array.shape}" for key, array in arrays.items())
-        raise SimulationError(
-            f"these values do not fit together: {shapes}; shapes that broadcast are expected"
-        ) from None
+class _Wanted(NamedTuple):
+    """What the caller of `simulate_many` wants: how long [s], samples a second (0: none) of these columns, errors."""
 
-
-def _plain(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value
-
-
-@dataclass(frozen=True)
-class _Top:
-    """One top.
-
-    Attributes:
-        problem: what is to be integrated.
-        longest: the longest step that it allows [s].
-        kinked: whether its drive is other than a sine that lasts.
-    """
-
-    problem: Problem
-    longest: float
-    kinked: bool
-
-    @classmethod
-    def of(cls, scene: Scene) -> _Top:
-        start = start_of(scene)
-        model = model_of(scene, start[R])
-        problem = Problem(scene, model, start, scheme_for(None, model))
-        kinked = model.drive is not None and (scene.drive.waveform != "sine" or scene.drive.off_s is not None)
-        return cls(problem, longest_step(scene, model, start, problem.scheme), kinked)
+    duration: float
+    sample_rate: float
+    columns: NDArray[np.int64]
+    errors: bool
 
 
 @dataclass(frozen=True)
@@ -254,10 +230,37 @@ class _Ends:
     survived: NDArray[np.bool_]
     position_error: Array
     axis_error: Array
+    samples: Array
 
     @classmethod
-    def empty(cls, n: int) -> _Ends:
-        return cls(np.empty((n, STATE_SIZE)), np.zeros(n, dtype=np.bool_), np.full(n, np.nan), np.full(n, np.nan))
+    def empty(cls, n: int, samples: int, columns: int) -> _Ends:
+        unknown = np.full(n, np.nan), np.full(n, np.nan), np.full((n, samples, columns), np.nan)
+        return cls(np.empty((n, STATE_SIZE)), np.zeros(n, dtype=np.bool_), *unknown)
+
+
+class _Sampling(NamedTuple):
+    """Samples a second, the columns of the state that they keep, and where: shape (n, samples, columns)."""
+
+    rate: float
+    columns: NDArray[np.int64]
+    samples: Array
+
+
+class _Passed(NamedTuple):
+    """How runs ended.
+
+    Attributes:
+        states: at the ends, or after the step in which a top escaped, shape (n, 18).
+        survived: shape (n,).
+        steps: the length of each one's last step [s], level and slope of the drive in it, shape (n, 3).
+    """
+
+    states: Array
+    survived: NDArray[np.bool_]
+    steps: Array
+
+
+# --- the step ---
 
 
 def _pilots(shape: tuple[int, ...]) -> set[int]:
@@ -270,151 +273,145 @@ def _pilots(shape: tuple[int, ...]) -> set[int]:
     return {int(i) for i in flat} | {round(i) for i in np.linspace(0, size - 1, PILOTS)}
 
 
-def _step_share(pilots: list[_Top], duration: float, tolerance: float) -> float:
-    """Return the part of its longest step that keeps a top's error within the tolerance, found on the pilots."""
-    time = min(duration, PILOT_DURATION)
-    shares = []
-    for one in pilots:
-        motion = simulate(one.problem.scene, time, tolerance=tolerance * time / duration, rate=None)
-        if motion.accuracy.reached:
-            shares.append(motion.accuracy.step / one.longest)
+def _step_share(scene: Scene, over: Mapping[str, ArrayLike], duration: float, tolerance: float) -> float:
+    """Return the part of its longest step that keeps a top's error within the tolerance, found on a few of them."""
+    values = broadcast(over)
+    pilots = sorted(_pilots(next(iter(values.values())).shape if values else (1,)))
+    some = {key: np.array([column.flat[i] for i in pilots], dtype=column.dtype) for key, column in values.items()}
+    time, shares = min(duration, PILOT_DURATION), []
+    for batch in batches(scene, some):
+        for where, longest in zip(batch.where, batch.longest, strict=True):
+            one = scene_at(scene, some, int(where))
+            motion = simulate(one, time, tolerance=tolerance * time / duration, rate=None)
+            if motion.accuracy.reached:
+                shares.append(motion.accuracy.step / float(longest))
     return min(shares, default=0.25)
 
 
-def _groups(tops: list[_Top]) -> Iterable[list[int]]:
-    """Group the tops, as indices, by the kind of their model: each kind has a kernel of its own."""
-    groups: dict[Any, list[int]] = {}
-    for i, one in enumerate(tops):
-        kind = (_kind(one.problem.model), one.problem.scheme.name, one.kinked, one.problem.escape)
-        groups.setdefault(kind, []).append(i)
-    return groups.values()
+# --- the motion ---
 
 
-def _kind(model: Any) -> Any:
-    if isinstance(model, np.ndarray):
-        return model.tobytes()
-    if isinstance(model, tuple):
-        return (type(model).__name__, *(_kind(inner) for inner in model))
-    return type(model).__name__
-
-
-def _parts(group: list[int], threads: int) -> list[list[int]]:
+def _parts(group: Batch, threads: int) -> list[Batch]:
     """Cut a group into pieces of work: enough to keep all threads busy, large enough to fill the lanes."""
-    size = max(8 * LANES, math.ceil(len(group) / (8 * threads)))
-    return [group[i : i + size] for i in range(0, len(group), size)]
+    n = group.where.size
+    size = max(8 * LANES, math.ceil(n / (8 * threads)))
+    return [group.part(slice(i, i + size)) for i in range(0, n, size)]
 
 
-def _advance(
-    tops: list[_Top], part: list[int], duration: float, all_steps: Array, ends: _Ends, *, errors: bool
-) -> None:
-    some, steps = [tops[i] for i in part], all_steps[part]
-    counts = np.maximum(np.ceil(duration / steps * (1 - 1e-12)), 1).astype(np.int64)
-    problem = some[0].problem
-    if some[0].kinked:
-        states, survived = _integrate_singly(some, np.full(len(some), duration), steps, escape=True)
-    else:
-        starts = np.array([one.problem.start for one in some])
-        states, taken = _integrate_in_lanes(some, starts, duration / counts, counts, problem.escape)
-        survived = (taken == counts) & within_limits(states, problem.escape)
-    if errors:
-        ends.position_error[part], ends.axis_error[part] = _estimates(some, states, steps)
-    late = np.flatnonzero(~survived)
+def _advance(some: Batch, wanted: _Wanted, steps: Array, ends: _Ends) -> None:
+    """Simulate tops of one kind, and write into `ends` at their places."""
+    _check_counts(some, wanted.duration, steps)
+    shape = (some.where.size, ends.samples.shape[1], wanted.columns.size)
+    samples = np.full(shape, np.nan)
+    sampling = _Sampling(wanted.sample_rate, wanted.columns, samples)
+    passed = integrate_in_lanes(some, runs_of(some, wanted.duration, steps), sampling)
+    states = passed.states
+    if wanted.errors:
+        ends.position_error[some.where], ends.axis_error[some.where] = _estimates(some, states, steps)
+    late = np.flatnonzero(~passed.survived)
     if late.size:
-        if not some[0].kinked:
-            fallen = [some[i] for i in late]
-            states[late] = at_the_crossing(
-                states[late], (duration / counts)[late], problem.escape, lambda s, h: _in_one_step(fallen, s, h)
-            )
-        _add_uncertain_moment([some[i] for i in late], states[late], np.array(part)[late], ends)
-    ends.states[part], ends.survived[part] = states, survived
+        fallen, last = some.part(late), passed.steps[late]
+        states[late] = at_the_crossing(
+            states[late], last[:, 0], _limits(fallen), lambda s, times: _in_one_step(fallen, s, times, last)
+        )
+        if wanted.errors:
+            _add_uncertain_moment(fallen, states[late], ends)
+    ends.states[some.where], ends.survived[some.where], ends.samples[some.where] = states, passed.survived, samples
 
 
-def _estimates(some: list[_Top], states: Array, steps: Array) -> tuple[Array, Array]:
+def _check_counts(some: Batch, duration: float, steps: Array) -> None:
+    """Raise SimulationError if a top would take too many steps, or its drive has too many corners."""
+    if not np.all(duration / steps < MOST_STEPS):
+        raise SimulationError(
+            f"{duration / steps.min():.2g} steps of {steps.min():.2g} s would be needed, at most {MOST_STEPS:.0e} are "
+            "taken: a shorter duration, a slower spin or heavier inertias are expected"
+        )
+    rate = some.runs[:, RATE].max()
+    if 2 * rate * duration > MOST_KINKS:
+        raise SimulationError(
+            f"drive.frequency_hz = {rate:g}: it has {2 * rate * duration:.2g} corners in {duration:g} s, "
+            f"at most {MOST_KINKS:.0e} are gone through: take a sine, a lower frequency or a shorter duration"
+        )
+
+
+def _limits(some: Batch) -> tuple[Array, Array]:
+    """Radius and height of each top's escape, shape (n,) [m]."""
+    return some.runs[:, RADIUS], some.runs[:, HEIGHT]
+
+
+def runs_of(some: Batch, durations: ArrayLike, steps: Array) -> Array:
+    """Return the runs of tops that last so long, with steps no longer than these [s]."""
+    runs = some.runs.copy()
+    runs[:, DURATION], runs[:, STEP] = durations, steps
+    return runs
+
+
+def integrate_in_lanes(
+    some: Batch, runs: Array, sampling: _Sampling | None = None, starts: Array | None = None
+) -> _Passed:
+    """Integrate tops of one kind, each its own run; from other states than their starts if these are given."""
+    n = some.where.size
+    passed = _Passed(np.empty((n, STATE_SIZE)), np.zeros(n, dtype=np.bool_), np.empty((n, 3)))
+    rate, columns, samples = sampling or _Sampling(0.0, np.empty(0, dtype=np.int64), np.empty((n, 0, 0)))
+    a, b = np.array(some.scheme.drifts), np.array(some.scheme.kicks)
+    begin = some.starts if starts is None else starts
+    advance_many(some.model, begin, some.numbers, runs, a, b, *passed, rate, columns, samples)
+    return passed
+
+
+def _integrate_coarsely(some: Batch, times: Array, steps: Array) -> Array:
+    """Return the states at these times [s], with steps of these lengths [s] and without an escape."""
+    runs = runs_of(some, times, steps)
+    runs[:, RADIUS], runs[:, HEIGHT] = math.inf, -math.inf
+    return integrate_in_lanes(some, runs).states
+
+
+def _in_one_step(some: Batch, states: Array, times: Array, last: Array) -> Array:
+    """Return the states that much later, or earlier [s], each in one step, under the drive of the last step."""
+    runs = runs_of(some, times, np.full(times.shape, math.inf))
+    runs[:, RADIUS], runs[:, HEIGHT], runs[:, RATE], runs[:, OFF] = math.inf, -math.inf, 0.0, math.inf
+    runs[:, FIRST], runs[:, STEEP] = last[:, 1], last[:, 2]
+    return integrate_in_lanes(some, runs, starts=states).states
+
+
+# --- the errors ---
+
+
+def _estimates(some: Batch, states: Array, steps: Array) -> tuple[Array, Array]:
     """Estimate the errors of places [m] and axes [rad] at the ends, shape (n,) each."""
-    problem, lasted = some[0].problem, states[:, TIME]
-    # if a fall or a kink of the drive leaves no room for longer steps, half of the step shows the error as well
-    room = (lasted > MIN_STEPS_FOR_DOUBLING * steps) & ~np.array([one.kinked for one in some])
+    lasted = states[:, TIME]
+    off = some.runs[:, OFF]
+    pieces = 1 + np.floor(2 * some.runs[:, RATE] * np.minimum(lasted, off)) + (off < lasted)
+    # if a fall or the next kink of the drive leaves no room for longer steps, half of the step shows the error as well
+    room = lasted / pieces > MIN_STEPS_FOR_DOUBLING * steps
     lengths = [np.where(room, times * steps, np.minimum(steps, lasted) / 2) for times in (2, 4)]
     twice = _integrate_coarsely(some, lasted, lengths[0])
     four = _integrate_coarsely(some, lasted, lengths[1]) if np.any(room) else twice
-    found = [estimate(states[:, part], twice[:, part], four[:, part], problem.scheme.order) for part in (R, N)]
-    if has_kink(problem.model.drag):
+    found = [estimate(states[:, part], twice[:, part], four[:, part], some.scheme.order) for part in (R, N)]
+    if has_kink(some.model.drag):
         lost = _may_have_stopped(some, states)
         for error, part in zip(found, (R, N), strict=True):
             error[lost] = estimate(states[lost][:, part], twice[lost][:, part], four[lost][:, part], None)
-    if isinstance(problem.model.magnet, Disc):
-        fewer, fewest = (_integrate_coarsely(_with_nodes(some, -less), lasted, lengths[0]) for less in (1, 2))
+    if some.fewer:
+        fewer, fewest = (_integrate_coarsely(replace(some, model=less), lasted, lengths[0]) for less in some.fewer)
         of_nodes = [estimate(twice[:, part], fewer[:, part], fewest[:, part], NODES_ORDER) for part in (R, N)]
         found = [a + b for a, b in zip(found, of_nodes, strict=True)]
     return found[0], found[1]
 
 
-def _may_have_stopped(some: list[_Top], states: Array) -> NDArray[np.bool_]:
+def _may_have_stopped(some: Batch, states: Array) -> NDArray[np.bool_]:
     """Whether the spin of each top, or that of its washers, may have passed zero on the way to its end.
 
     Only start and end are known: it may have, if the spin is slow at one of them, or has changed by half.
     """
-    ways = [
-        spins_of(one.problem.scene, np.array([one.problem.start, state]))
-        for one, state in zip(some, states, strict=True)
-    ]
-    spins = np.stack(ways, axis=1)
+    spins = both_spins(np.array([some.starts, states]), *some.inertias.T)
     return np.asarray(np.any(comes_near_zero(spins) | (np.abs(spins).min(axis=0) < SLOW_RAD_S), axis=-1))
 
 
-def _with_nodes(some: list[_Top], more: int) -> list[_Top]:
-    """Return the same tops with so many more rings, layers and angles in their magnets."""
-    return [replace(one, problem=one.problem.with_nodes(more)) for one in some]
-
-
-def _add_uncertain_moment(some: list[_Top], states: Array, where: NDArray[np.intp], ends: _Ends) -> None:
+def _add_uncertain_moment(some: Batch, states: Array, ends: _Ends) -> None:
     """Add to the errors of fallen tops what the error of the fall's time makes: the place's error over the speed."""
-    height = crossed_height(states, some[0].problem.escape)
-    time = ends.position_error[where] / exit_speeds(states, height)
-    inverse = np.array([one.problem.model.body.inverse_transverse for one in some])
-    ends.position_error[where] += time * np.linalg.norm(states[:, V], axis=1)
-    ends.axis_error[where] += time * inverse * np.linalg.norm(np.cross(states[:, L], states[:, N]), axis=1)
-
-
-def _in_one_step(some: list[_Top], states: Array, times: Array) -> Array:
-    """Return the states that much later, or earlier [s], each in one step."""
-    return _integrate_in_lanes(some, states, times, np.ones(len(some), dtype=np.int64), NO_LIMITS)[0]
-
-
-def _integrate_coarsely(some: list[_Top], times: Array, steps: Array) -> Array:
-    """Return the states at these times [s], with steps of these lengths [s] and without an escape."""
-    if some[0].kinked:
-        return _integrate_singly(some, times, steps, escape=False)[0]
-    counts = np.maximum(np.ceil(times / steps), 1).astype(np.int64)
-    starts = np.array([one.problem.start for one in some])
-    return _integrate_in_lanes(some, starts, times / counts, counts, NO_LIMITS)[0]
-
-
-def _integrate_in_lanes(
-    some: list[_Top], starts: Array, steps: Array, counts: Counts, escape: tuple[float, float]
-) -> tuple[Array, Counts]:
-    """Integrate with the kernel that has lanes.  Returns the states at the ends and the steps taken."""
-    scheme = SCHEMES[some[0].problem.scheme.name]
-    numbers = np.array([numbers_of(one.problem.model) for one in some])
-    states, taken = np.empty_like(starts), np.zeros(len(some), dtype=np.int64)
-    model, a, b = some[0].problem.model, np.array(scheme.drifts), np.array(scheme.kicks)
-    advance_many(model, starts, numbers, steps, counts, a, b, escape, states, taken)
-    states[:, TIME] = starts[:, TIME] + steps * taken
-    return states, taken
-
-
-def _integrate_singly(some: list[_Top], times: Array, steps: Array, *, escape: bool) -> tuple[Array, NDArray[np.bool_]]:
-    """Integrate top after top: with kinks in the drive, steps differ from top to top.
-
-    Returns:
-        The states at the ends, shape (n, 18), and whether each end was reached.
-    """
-    states, lasted = np.empty((len(some), STATE_SIZE)), np.ones(len(some), dtype=np.bool_)
-    for i, one in enumerate(some):
-        stops = stops_between(0.0, times[i], steps[i], one.problem.scene.drive)
-        if escape:
-            passed, fell, _ = integrate(one.problem, stops)
-            states[i], lasted[i] = passed[-1] if fell is None else fell.state, fell is None
-        else:
-            states[i] = integrate_to_end(one.problem, stops)
-    return states, lasted
+    height = crossed_height(states, _limits(some))
+    time = ends.position_error[some.where] / exit_speeds(states, height)
+    ends.position_error[some.where] += time * np.linalg.norm(states[:, V], axis=1)
+    across = np.linalg.norm(np.cross(states[:, L], states[:, N]), axis=1)
+    ends.axis_error[some.where] += time * some.transverse * across

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from analysis import stability
 from levilab.simulator.disc import nodes_of, rule_for
 from levilab.simulator.field import flux_density, flux_gradient, on_axis
 from levilab.simulator.keys import SceneError
 from levilab.simulator.model import base_field
+from levilab.simulator.numbers import Numbers, uniform
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,6 +25,8 @@ Array = NDArray[np.float64]
 
 #: Heights in which a top is looked for: from a tenth of the inner radius to four outer radii above the base.
 _LOW, _HIGH = 0.1, 4.0
+
+WEIGHTLESS = "gravity_m_s2 = 0: without weight there is nothing to float; a number above 0 is expected"
 
 #: A heavier top was most likely given in grams [kg].
 HEAVIEST_KG = 1.0
@@ -146,7 +149,7 @@ def modes_at(scene: Scene, height: float, spin_hz: float) -> NDArray[np.complex1
 def stability_of(scene: Scene) -> Stability:
     """Windows, equilibria and modes of a scene's top, upright on the axis of its base (a lean of it is left out)."""
     if scene.gravity_m_s2 == 0:
-        raise SceneError("gravity_m_s2 = 0: without weight there is nothing to float; a number above 0 is expected")
+        raise SceneError(WEIGHTLESS)
     top, field = top_of(scene), axial_field(scene)
     low, high = _range(scene)
     found = stability.windows(field, top, low, high)
@@ -189,12 +192,204 @@ def nearest_mass(
     return min(candidates, key=lambda mass: abs(mass - top.mass), default=None)
 
 
-def floating_height(scene: Scene) -> float:
-    """The height [m] at which the scene's top floats.  Raises SceneError, with the nearest mass that does."""
-    found = stability_of(scene)
-    if found.floating:
-        return found.floating.height
-    raise SceneError(f"top.mass_kg = {scene.top.mass_kg:g}: {advice(found)}")
+def floating_height(scene: Scene) -> Any:
+    """The height [m] at which the scene's top floats.  Raises SceneError, with the nearest mass that does.
+
+    If numbers of the scene are those of many tops, so is the height.
+    """
+    given = scene.top.mass_kg
+    # an average over a magnet's nodes may be rounded in another way beside others: one at a time
+    masses = uniform(given) if scene.top.magnet == "disc" else given
+    common = _for_all(scene)
+    heights = floating_heights(common, np.atleast_1d(np.asarray(masses)))
+    missing = np.isnan(heights).view(Numbers)
+    if missing:
+        first = common.top.model_copy(update={"mass_kg": float(np.ravel(masses)[0])})
+        found = stability_of(common.model_copy(update={"top": first}))
+        raise SceneError(f"top.mass_kg = {first.mass_kg:g}: {advice(found)}")
+    return heights.view(Numbers) if isinstance(masses, Numbers) else float(heights[0])
+
+
+def _for_all(scene: Scene) -> Scene:
+    """Return a scene with one value for all tops in what decides where they float, but for their mass.
+
+    Raises Mixed where they have several.
+    """
+    shared = {
+        name: getattr(scene, name).model_copy(
+            update={
+                key: tuple(map(uniform, value)) if isinstance(value, tuple) else uniform(value)
+                for key, value in getattr(scene, name)
+                if key != "mass_kg"
+            }
+        )
+        for name in ("base", "top")
+    }
+    start = scene.start.model_copy(update={"spin_hz": 0.0})
+    return scene.model_copy(update={**shared, "gravity_m_s2": uniform(scene.gravity_m_s2), "start": start})
+
+
+# --- many masses ---
+
+
+@dataclass(frozen=True)
+class MassWindows:
+    """Where tops of several masses float, and how fast they may spin there; NaN for a mass that floats nowhere.
+
+    Attributes:
+        masses: shape (n,) [kg].
+        heights: of the highest equilibrium that is stable if the moment follows the field, shape (n,) [m].
+        slowest, fastest: the first window of spin in which small motions stay small, shape (n,) [Hz]; fastest is inf
+            where it is beyond 20 times the sleeping top's limit, both NaN where there is none.
+        adiabatic: the masses at which a moment that follows the field is stable, as `Stability.lifted` has them.
+    """
+
+    masses: Array
+    heights: Array
+    slowest: Array
+    fastest: Array
+    adiabatic: tuple[stability.Window, ...]
+
+
+def windows_over(scene: Scene, masses: ArrayLike) -> MassWindows:
+    """Return what `stability_of` says of a scene's top, for many masses [kg] at once.
+
+    Raises:
+        SceneError: nothing weighs.
+
+    >>> from levilab.simulator.scene import preset
+    >>> windows_over(preset("undriven"), [0.0252, 0.0260]).slowest.round(2)
+    array([21.57,   nan])
+    """
+    if scene.gravity_m_s2 == 0:
+        raise SceneError(WEIGHTLESS)
+    masses = np.atleast_1d(np.asarray(masses, dtype=np.float64))
+    top, field = top_of(scene), axial_field(scene)
+    heights = floating_heights(scene, masses)
+    slowest, fastest = np.full((2, masses.size), math.nan)
+    floats = np.flatnonzero(np.isfinite(heights))
+    if floats.size:
+        slowest[floats], fastest[floats] = _first_windows(field, top, heights[floats], masses[floats])
+    adiabatic = tuple(w for w in stability.windows(field, top, *_range(scene)) if _lifts(w, top, field))
+    return MassWindows(masses, heights, slowest, fastest, adiabatic)
+
+
+#: Newton's steps at most; each doubles the digits, and where it leaves the bracket half of that is taken instead.
+_MOST = 60
+
+
+def floating_heights(scene: Scene, masses: Array) -> Array:
+    """Return the heights [m] at which tops of these masses [kg] float, shape (n,); NaN for those that float nowhere.
+
+    Each of them depends on its own mass alone, to the last bit.
+    """
+    top, field = top_of(scene), axial_field(scene)
+    z = np.linspace(*_range(scene), stability.HEIGHTS)
+    lift, heights = top.moment * field(z)[1], np.full(masses.shape, math.nan)
+    # each crossing between two heights, of all masses between the lifts there
+    order = np.argsort(masses, kind="stable")
+    weights = masses * top.gravity
+    low, high = np.minimum(lift[:-1], lift[1:]), np.maximum(lift[:-1], lift[1:])
+    first = np.searchsorted(weights[order], low, side="right")
+    last = np.searchsorted(weights[order], high, side="left")
+    number = np.maximum(last - first, 0)
+    interval = np.repeat(np.arange(number.size), number)
+    inside = np.arange(interval.size) - np.repeat(np.cumsum(number) - number, number)
+    who = order[first[interval] + inside]
+    if who.size == 0:
+        return heights
+    places = _crossings(field, top, weights[who], z[interval], z[interval + 1])
+    bend = field(places)[2]
+    tilt, sideways, both = top.stiffness(field, places)
+    stable = (-top.moment * bend > 0) & (sideways - both**2 / tilt > 0)
+    # intervals come in the order of their heights: the highest one is written last
+    heights[who[stable]] = places[stable]
+    return heights
+
+
+def _crossings(field: stability.AxialField, top: stability.SymmetricTop, weights: Array, a: Array, b: Array) -> Array:
+    """Return the heights [m] between a and b, shape (n,), at which the force μB′ carries these weights [N]."""
+    rising = top.moment * field(b)[1] > weights
+    low, high = a.copy(), b.copy()
+    place, found = (a + b) / 2, np.zeros(a.shape, dtype=np.bool_)
+    for _ in range(_MOST):
+        _, slope, bend = field(place)[:3]
+        missing, change = top.moment * slope - weights, top.moment * bend
+        above = (missing > 0) == rising
+        low, high = np.where(above, low, place), np.where(above, place, high)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            newton = place - missing / change
+        better = np.where((newton > low) & (newton < high), newton, (low + high) / 2)
+        found |= np.abs(better - place) <= 1e-15
+        if np.all(found):
+            break
+        place = np.where(found, place, better)
+    return place
+
+
+def _first_windows(
+    field: stability.AxialField, top: stability.SymmetricTop, heights: Array, masses: Array
+) -> tuple[Array, Array]:
+    """Return the first window of spin [Hz] with four real modes of each top, shape (n,) each.
+
+    The quartic x⁴ − βs x³ + c x² − δs x + e of `stability.quartic` depends on the spin s so that its discriminant is a
+    cubic in s².  Its positive roots bound the windows; in each of them one spin tells whether the modes are real.
+    """
+    tilt, sideways, both = top.stiffness(field, heights)
+    p, half = -tilt / top.transverse, -sideways / masses
+    beta = np.full(heights.shape, top.axial / top.transverse)
+    c, delta, e = p + half, beta * half, p * half - both**2 / masses / top.transverse
+    limits = 2 * np.sqrt(np.maximum(p, 0)) / beta  # of the sleeping top [rad/s]
+    end = 20 * limits
+    squares = _real_roots(_discriminant_cubic(beta, c, delta, e))
+    edges = np.sort(np.where((squares > 0) & (squares < (end**2)[:, None]), np.sqrt(np.abs(squares)), np.nan), axis=1)
+    bounds = np.column_stack([np.zeros(heights.size), edges, end])
+    # an edge that is missing is the one before: a window of no width
+    for i in range(1, 5):
+        bounds[:, i] = np.where(np.isnan(bounds[:, i]), bounds[:, i - 1], bounds[:, i])
+    middles = (bounds[:, 1:] + bounds[:, :-1]) / 2
+    companion = np.zeros((*middles.shape, 4, 4))
+    companion[..., [1, 2, 3], [0, 1, 2]] = 1
+    companion[..., 0, 0], companion[..., 0, 1] = beta[:, None] * middles, -c[:, None]
+    companion[..., 0, 2], companion[..., 0, 3] = delta[:, None] * middles, -e[:, None]
+    roots = np.linalg.eigvals(companion)
+    real = np.abs(roots.imag).max(axis=-1) < 1e-6 * np.abs(roots).max(axis=-1)
+    real &= (bounds[:, 1:] > bounds[:, :-1]) & (limits > 0)[:, None]
+    first = np.argmax(real, axis=1)
+    at = np.arange(heights.size)
+    slow, fast = bounds[at, first], bounds[at, first + 1]
+    fast = np.where(fast == end, math.inf, fast)
+    none = ~real.any(axis=1)
+    return np.where(none, math.nan, slow / (2 * math.pi)), np.where(none, math.nan, fast / (2 * math.pi))
+
+
+def _discriminant_cubic(beta: Array, c: Array, delta: Array, e: Array) -> Array:
+    """Return the discriminant of x⁴ − βs x³ + c x² − δs x + e as a cubic in s², highest power first, shape (n, 4)."""
+    b2, bd, d2 = beta * beta, beta * delta, delta * delta  # of s², each
+    constant = 16 * c**4 * e - 128 * c**2 * e**2 + 256 * e**3
+    first = (
+        -4 * c**3 * b2 * e - 4 * c**3 * d2 - 80 * bd * c**2 * e + 144 * b2 * c * e**2 + 144 * c * d2 * e
+        - 192 * bd * e**2
+    )  # fmt: skip
+    second = c**2 * bd**2 - 27 * b2**2 * e**2 + 18 * b2 * bd * c * e + 18 * bd * d2 * c - 6 * bd**2 * e - 27 * d2**2
+    third = -4 * bd**3
+    return np.stack([third, second, first, constant], axis=-1)
+
+
+def _real_roots(cubics: Array) -> Array:
+    """Return the real roots of cubics, shape (n, 4), to the last digits, shape (n, 3); NaN for those that are not."""
+    a = cubics[:, 1:] / cubics[:, :1]
+    companion = np.zeros((len(cubics), 3, 3))
+    companion[:, [1, 2], [0, 1]] = 1
+    companion[:, 0] = -a
+    roots = np.linalg.eigvals(companion)
+    x = np.where(np.abs(roots.imag) < 1e-6 * np.abs(roots).max(axis=1, keepdims=True), roots.real, np.nan)
+    for _ in range(3):
+        value = ((x + a[:, :1]) * x + a[:, 1:2]) * x + a[:, 2:]
+        slope = (3 * x + 2 * a[:, :1]) * x + a[:, 1:2]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            x = np.where(slope != 0, x - value / slope, x)
+    return x
 
 
 def advice(found: Stability) -> str:

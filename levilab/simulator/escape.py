@@ -15,15 +15,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 Array = NDArray[np.float64]
+#: Radius and height of the escapes of many tops, shape (n,) each [m].
+Limits = tuple[Array, Array]
 
 #: Newton's steps at most; each doubles the digits, and where it leaves the bracket half of that is taken instead.
 _MOST = 60
-
-
-def within_limits(states: Array, escape: tuple[float, float]) -> NDArray[np.bool_]:
-    """Whether states, shape (n, 18), are within the escape's radius and above its height [m]."""
-    x, y, z = states[:, R].T
-    return np.asarray((z > escape[1]) & (np.hypot(x, y) < escape[0]))
 
 
 def exit_speeds(states: Array, across_height: NDArray[np.bool_]) -> Array:
@@ -34,26 +30,24 @@ def exit_speeds(states: Array, across_height: NDArray[np.bool_]) -> Array:
     return np.asarray(np.maximum(np.abs(np.where(across_height, vz, outwards)), 1e-12))
 
 
-def crossed_height(states: Array, escape: tuple[float, float]) -> NDArray[np.bool_]:
+def crossed_height(states: Array, escape: Limits) -> NDArray[np.bool_]:
     """Whether it is the height that states are farther outside of, or nearer to, than the radius."""
     return np.asarray(np.argmin(_margins(states, escape), axis=0) == 0)
 
 
-def _margins(states: Array, escape: tuple[float, float]) -> Array:
+def _margins(states: Array, escape: Limits) -> Array:
     """How far [m] inside of the height and of the radius, shape (2, n)."""
     x, y, z = states[:, R].T
     return np.array([z - escape[1], escape[0] - np.hypot(x, y)])
 
 
-def at_the_crossing(
-    after: Array, lengths: Array, escape: tuple[float, float], moved: Callable[[Array, Array], Array]
-) -> Array:
+def at_the_crossing(after: Array, lengths: Array, escape: Limits, moved: Callable[[Array, Array], Array]) -> Array:
     """The states at the limits, shape (n, 18), of tops that a step of these lengths [s] took there.
 
     Args:
         after: at the step's end, shape (n, 18).
         lengths: of the steps, shape (n,) [s].
-        escape: the limits, radius and height [m].
+        escape: the limits, radius and height [m], shape (n,) each.
         moved: (states, times [s]) → states, each in one step.  The integrator can go back.
     """
     before = moved(after, -lengths)

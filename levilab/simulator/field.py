@@ -11,6 +11,7 @@ from levilab.errors import LevilabError
 from levilab.simulator.kernels.fields import Field, evaluate
 from levilab.simulator.kernels.paraxial import Paraxial, Paraxial2, ParaxialThick, weights
 from levilab.simulator.kernels.ring import Sheet, Thick
+from levilab.simulator.numbers import Numbers, numbers_of, row, template_of, uniform
 
 Array = NDArray[np.float64]
 
@@ -51,11 +52,11 @@ def field_of(
         FieldError: there is no such ring, or no such kind.
     """
     _check(inner_radius, outer_radius, strength, thickness, origin)
-    ring = (2 * math.pi * strength, inner_radius**2, outer_radius**2, origin)
+    ring = (2 * math.pi * strength, inner_radius * inner_radius, outer_radius * outer_radius, origin)
     power = _power(kind)
     if power is None:
         series = weights(_NEAR_AXIS_TERMS)
-        return Sheet(*ring, series) if thickness == 0 else Thick(*ring, thickness, series, _sheets(thickness))
+        return Sheet(*ring, series) if thickness == 0 else Thick(*ring, thickness, series, _sheets(uniform(thickness)))
     if thickness > 0:
         return ParaxialThick(*ring, thickness, weights(power // 2))
     return Paraxial2(*ring) if power == 2 else Paraxial(*ring, weights(power // 2))
@@ -63,7 +64,7 @@ def field_of(
 
 def _check(inner: float, outer: float, strength: float, thickness: float, origin: float) -> None:
     for name, value in (("inner radius", inner), ("strength", strength), ("thickness", thickness), ("origin", origin)):
-        if not math.isfinite(value):
+        if not -math.inf < value < math.inf:
             raise FieldError(f"{name} = {value}: a finite number is expected")
     if not 0 < inner < outer < math.inf:
         raise FieldError(f"inner radius {inner} m, outer radius {outer} m: 0 < inner < outer is expected")
@@ -86,11 +87,21 @@ def _sheets(thickness: float) -> Array:
 
 
 def _five(field: Field, positions: ArrayLike) -> tuple[Array, Array]:
+    """Return the places, shape (…, 3), and the field's five functions there, shape (…, 5).
+
+    If the field has the numbers of n tops, there are n places, or one that all share.
+    """
     places = np.ascontiguousarray(positions, dtype=np.float64)
+    rows = row(*numbers_of(field))
+    if isinstance(rows, Numbers) and places.ndim == 1:
+        places = np.tile(places, (len(rows), 1))
     flat = places.reshape(-1, 3)
     values = np.empty((len(flat), 5))
-    evaluate(field, flat, values)
-    return places, values.reshape(*places.shape[:-1], 5)
+    evaluate(template_of(field), np.ascontiguousarray(np.atleast_2d(rows)), flat, values)
+    values = values.reshape(*places.shape[:-1], 5)
+    if isinstance(rows, Numbers) or isinstance(positions, Numbers):
+        return places.view(Numbers), values.view(Numbers)
+    return places, values
 
 
 def flux_density(field: Field, positions: ArrayLike) -> Array:

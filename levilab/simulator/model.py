@@ -13,6 +13,7 @@ from levilab.simulator.field import field_of
 from levilab.simulator.kernels import braking
 from levilab.simulator.kernels.loads import Aligned, Disc, Leaning, PiecewiseLinear, Sine, Tilted, Upright
 from levilab.simulator.kernels.motion import Body, Loose, Model, Rigid
+from levilab.simulator.numbers import cos, sin
 
 if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
@@ -20,10 +21,10 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-def model_of(scene: Scene, place: Array | None = None, more_nodes: int = 0) -> Model:
-    """The numbers of a scene, typed by what it models.
+def model_of(scene: Scene, place: Any = None, more_nodes: int = 0) -> Model:
+    """The numbers of a scene, typed by what it models; of many tops, if some of its numbers are `Numbers`.
 
-    place: where the motion begins, shape (3,) [m], which a magnet of finite size takes its number of nodes from; the
+    place: where the motion begins, three numbers [m], which a magnet of finite size takes its number of nodes from; the
     scene's own position if none is given.  more_nodes: rings, layers and angles beyond that number, negative for fewer,
     to tell their error from.
     """
@@ -36,7 +37,7 @@ def model_of(scene: Scene, place: Array | None = None, more_nodes: int = 0) -> M
             top.inertia_axial_kg_m2,
             Upright(scene.gravity_m_s2) if scene.base.tilt_rad == 0 else Leaning(*gravity(scene)),
         ),
-        magnet=_magnet(scene, np.array(scene.start.position_m) if place is None else place, more_nodes),
+        magnet=_magnet(scene, scene.start.position_m if place is None else place, more_nodes),
         turning=_turning(scene),
         drag=_drag(scene),
         drive=_drive(scene),
@@ -60,8 +61,8 @@ def _moment(scene: Scene) -> float:
 def gravity(scene: Scene) -> tuple[float, float, float]:
     """Gravity in the base's frame [m/s²]: where the base leans, gravity leans the other way."""
     g, tilt, azimuth = scene.gravity_m_s2, scene.base.tilt_rad, scene.base.tilt_azimuth_rad
-    across = g * math.sin(tilt)
-    return across * math.cos(azimuth), across * math.sin(azimuth), -g * math.cos(tilt)
+    across = g * sin(tilt)
+    return across * cos(azimuth), across * sin(azimuth), -g * cos(tilt)
 
 
 def has_attitude(scene: Scene) -> bool:
@@ -69,7 +70,7 @@ def has_attitude(scene: Scene) -> bool:
     return bool(scene.top.moment_tilt[0] != 0 or scene.top.magnet == "disc" or scene.washers.inertia_kg_m2 > 0)
 
 
-def _magnet(scene: Scene, place: Array, more_nodes: int) -> Any:
+def _magnet(scene: Scene, place: Any, more_nodes: int) -> Any:
     top = scene.top
     transverse, axial = top.moment_tilt
     if top.magnet == "disc":

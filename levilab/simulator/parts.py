@@ -202,6 +202,12 @@ class Start(Part):
     spin_hz: Turns = 30.0
     precession: Literal["thesis", "steady", "none"] = "thesis"
 
+    @property
+    def away2(self) -> float:
+        """The square of the place's distance from the base's axis [m²]."""
+        x, y, _ = self.position_m
+        return x * x + y * y
+
 
 class Escape(Part):
     """Where the top counts as fallen: farther than radius_m from the base's axis, or at height_m or below."""

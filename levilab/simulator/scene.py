@@ -7,7 +7,6 @@ SceneError with the key, its value and what is allowed.
 
 from __future__ import annotations
 
-import math
 from importlib import resources
 from operator import attrgetter
 from pathlib import Path
@@ -144,7 +143,7 @@ RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "start.position_m",
-        lambda s: not _place_is_given(s) or math.hypot(*s.start.position_m[:2]) <= s.escape.radius_m,
+        lambda s: not _place_is_given(s) or s.start.away2 <= s.escape.radius_m * s.escape.radius_m,
         "a place within escape.radius_m = {s.escape.radius_m} of the base's axis is expected",
     ),
     Rule(

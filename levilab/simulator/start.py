@@ -3,49 +3,54 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from levilab.simulator.equilibrium import floating_height
 from levilab.simulator.field import flux_density
-from levilab.simulator.kernels.motion import ARM, CLOCK, LOOSE, STATE_SIZE, TIME, L, N, R, V
+from levilab.simulator.kernels.motion import L, N, R
 from levilab.simulator.model import Array, base_field
+from levilab.simulator.numbers import copysign, cos, row, sin, sqrt
 
 if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
 
 
 def start_of(scene: Scene) -> Array:
-    """Return the state at time 0 in the base's frame, shape (18,)."""
+    """Return the state at time 0 in the base's frame, shape (18,), or (n, 18) if some numbers are those of n tops."""
     start = scene.start
-    place, velocity = np.array(start.position_m), np.array(start.velocity_m_s)
+    place, velocity = start.position_m, start.velocity_m_s
     if start.place == "equilibrium":
-        place, velocity = np.array([0.0, 0.0, floating_height(scene)]), np.zeros(3)
-    n = np.array([0.0, -math.sin(start.tilt_rad), math.cos(start.tilt_rad)])
+        place, velocity = (0.0, 0.0, floating_height(scene)), (0.0, 0.0, 0.0)
+    n = (0.0, -sin(start.tilt_rad), cos(start.tilt_rad))
     spin = 2 * math.pi * start.spin_hz
-    transverse = np.array([0.0, 0.0, 1.0]) - n * math.cos(start.tilt_rad)
-    rate = _precession(scene, spin, place)
-    momentum = scene.top.inertia_axial_kg_m2 * spin * n + scene.top.inertia_transverse_kg_m2 * rate * transverse
-    arm = np.array([1.0, 0.0, 0.0])  # φ = ψ = 0: the node line, at right angles to the axis
-    state = np.empty(STATE_SIZE)
-    for part, vector in ((R, place), (V, velocity), (N, n), (L, momentum), (ARM, arm)):
-        state[part] = vector
-    state[CLOCK], state[LOOSE], state[TIME] = spin, scene.washers.inertia_kg_m2 * spin, 0.0
+    along, across = (
+        scene.top.inertia_axial_kg_m2 * spin,
+        scene.top.inertia_transverse_kg_m2 * _precession(scene, spin, place),
+    )
+    # ω = ω₃ n + φ̇ (e_z − n cos θ)
+    momentum = (
+        along * n[0] + across * (0.0 - n[0] * n[2]),
+        along * n[1] + across * (0.0 - n[1] * n[2]),
+        along * n[2] + across * (1.0 - n[2] * n[2]),
+    )
+    arm = (1.0, 0.0, 0.0)  # φ = ψ = 0: the node line, at right angles to the axis
+    state: Array = row(*place, *velocity, *n, *momentum, *arm, spin, scene.washers.inertia_kg_m2 * spin, 0.0)
     return state
 
 
-def _precession(scene: Scene, spin: float, place: Array) -> float:
+def _precession(scene: Scene, spin: Any, place: Any) -> Any:
     """Return the rate φ̇ of the azimuth at the start [rad/s]."""
     start = scene.start
     if start.precession == "thesis":  # φ̇ = ψ̇ and ω₃ = ψ̇ + φ̇ cos θ
-        return spin / (1 + math.cos(start.tilt_rad))
+        return spin / (1 + cos(start.tilt_rad))
     if start.precession == "none":
         return 0.0
     return steady_precession(scene, spin, place)
 
 
-def steady_precession(scene: Scene, spin: float, place: Array) -> float:
+def steady_precession(scene: Scene, spin: Any, place: Any) -> Any:
     """Return the rate of steady precession, without nutation [rad/s].
 
     It is the slow root of I₁ cosθ φ̇² − I₃ω₃ φ̇ + P = 0, P = −μB_z (Goldstein, Classical Mechanics, § 5.7, with the
@@ -55,22 +60,22 @@ def steady_precession(scene: Scene, spin: float, place: Array) -> float:
     Args:
         scene: with top, base and tilt.
         spin: ω₃ [rad/s].
-        place: of the top, shape (3,) [m].
+        place: of the top, three numbers [m].
     """
     return steady_rates(scene, spin, place)[0]
 
 
-def steady_rates(scene: Scene, spin: float, place: Array) -> tuple[float, float]:
+def steady_rates(scene: Scene, spin: Any, place: Any) -> tuple[Any, Any]:
     """Return both roots of the equation of `steady_precession` [rad/s]: the precession and a steady nutation."""
     top = scene.top
-    bz = float(flux_density(base_field(scene), place[None, :])[0, 2])
+    bz = flux_density(base_field(scene), row(*place))[..., 2]
     restoring = -top.moment_a_m2 * top.moment_tilt[1] * bz
-    a = top.inertia_transverse_kg_m2 * math.cos(scene.start.tilt_rad)
+    a = top.inertia_transverse_kg_m2 * cos(scene.start.tilt_rad)
     b = top.inertia_axial_kg_m2 * spin
     square = b * b - 4 * a * restoring
     if square < 0:
         return b / (2 * a), b / (2 * a)
-    root = math.copysign(math.sqrt(square), b)
+    root = copysign(sqrt(square), b)
     return (2 * restoring / (b + root) if b + root else 0.0), (b + root) / (2 * a)
 
 

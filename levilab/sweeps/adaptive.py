@@ -16,6 +16,7 @@ import numpy as np
 
 from levilab.errors import UsageError, WorkersLost
 from levilab.files import writing
+from levilab.interruption import interruption_postponed
 from levilab.sweeps.observables import OBSERVABLES, columns_of, observe
 from levilab.sweeps.quantities import step_in_words
 from levilab.sweeps.refinement import AUDIT, CONFIDENCE, STRIDE, Points, Refined, refine
@@ -218,7 +219,7 @@ class _Run:
         plan = self.store.plan
         places = np.unravel_index(np.concatenate(self.unwritten), plan.shape)
         blocks = tuple(place // size for place, size in zip(places, plan.chunk, strict=True))
-        with _writing(self.store):
+        with _writing(self.store), interruption_postponed():
             for number in np.unique(np.ravel_multi_index(blocks, plan.grid)):
                 box = plan.chunk_of(int(number)).box
                 for name, values in self.columns.items():
@@ -286,3 +287,9 @@ def in_words(report: dict[str, Any], plan: Plan) -> list[str]:
         sure,
         f"an island that holds a box of {size} is sure to be seen, a smaller one by chance alone",
     ]
+
+
+def report_in(store: Store) -> dict[str, Any] | None:
+    """Return the report of an adaptive store that is complete; None of any other."""
+    found: dict[str, Any] | None = store.group.attrs.get(FOUND)
+    return found

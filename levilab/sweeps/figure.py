@@ -20,8 +20,10 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
 from levilab.errors import UsageError
+from levilab.motion.lock import LAST_SHARE
+from levilab.motion.summary import changing_energy
 from levilab.present.style import STYLE
-from levilab.simulator.equilibrium import stability_of
+from levilab.simulator.equilibrium import stability_of, windows_over
 from levilab.stability.thesis import HIGHEST_HZ, MEASURED_HZ, MEASURED_U_HZ, SIMULATED_HZ, is_thesis_device
 from levilab.sweeps.quantities import quantity_of, step_in_words
 
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
+    from analysis.stability import Window
     from levilab.simulator.scene import Scene
     from levilab.sweeps.plan import Axis, Plan
     from levilab.sweeps.store import Map
@@ -46,6 +49,8 @@ NUMBERS = "YlOrBr_r"
 LOGARITHMIC = {"energy_error", "position_error_m"}
 #: Columns in which NaN says that the top is still up; in the others there is no value.
 NAN_IS_UP = {"lifetime_s", "fall_spin_hz"}
+#: Columns in which NaN says that the top was lost.
+NAN_IS_LOST = {"height_spread_m"}
 #: The most small multiples, how many beside each other, and the most cells along a side that a picture can show.
 MOST_PANELS, PANELS_IN_A_ROW, MOST_CELLS = 12, 4, 1600
 #: A window that changes along an axis is found for so many of its values.
@@ -67,12 +72,12 @@ class _Kind:
 UP, UP_FILLED, LOST, LOST_FILLED, MISSING, NONE, SLIPS = range(7)
 KINDS = {
     UP: _Kind("#0072B2", "still up"),
-    UP_FILLED: _Kind("#85B9DC", "filled in: still up"),
-    LOST: _Kind("#B8B8B8", "lost before"),
-    LOST_FILLED: _Kind("#E4E4E4", "filled in: lost before"),
+    UP_FILLED: _Kind("#6AA5CF", "filled in: still up"),
+    LOST: _Kind("#D0D0D0", "lost before"),
+    LOST_FILLED: _Kind("#EFEFEF", "filled in: lost before"),
     MISSING: _Kind("#FFFFFF", "not computed"),
-    NONE: _Kind("#F7F7F7", "no value"),
-    SLIPS: _Kind("#F5E1A4", "up, but not locked"),
+    NONE: _Kind("#F7F7F7", "has no such value"),
+    SLIPS: _Kind("#D9A441", "up, but not locked"),
 }
 
 
@@ -114,12 +119,13 @@ def map_figure(found: Map, column: str = "survived", notes: Sequence[str] = ()) 
         figure = Figure(figsize=(8.0, 6.0) if len(view.chosen) == 1 else (10.0, 6.0))
         panels = [figure.add_subplot() for _ in view.chosen]
         lines: list[Artist] = []
-        for axes, index in zip(panels, view.chosen, strict=True):
+        for axes, index, theory in zip(panels, view.chosen, _theories(found.plan, view), strict=True):
             _draw_cells(axes, view, _slice(kinds, view, index), _slice(numbers, view, index), norm)
-            lines = _draw_limits(axes, found.plan, view)
+            lines = _draw_limits(axes, found.plan, view, theory) or lines
         _label(panels, view)
-        handles = [*_kind_patches(kinds, column, found.plan), *lines]
-        caption = _caption(found, view, [*_reading_sentences(view, column, lines), *notes], figure.get_figwidth())
+        handles = [*_kind_patches(kinds, numbers, column, found.plan), *lines]
+        sentences = [*_reading_sentences(found.plan, view, column, lines), *notes]
+        caption = _caption(found, view, sentences, figure.get_figwidth())
         box = _place(figure, panels, head=0.45 + 0.17 * -(-len(handles) // 2), foot=0.62 + 0.145 * len(caption))
         if norm is not None:
             _draw_colour_bar(figure, box, norm, column)
@@ -212,7 +218,7 @@ def _cells(found: Map, column: str) -> tuple[NDArray[np.int8], Array]:
         kinds[filled & (kinds == LOST)] = LOST_FILLED
         return kinds, np.full(values.shape, np.nan)
     numbers = np.where(found.computed, values * quantity_of(column).factor, np.nan)
-    kinds[found.computed] = UP if column in NAN_IS_UP else NONE
+    kinds[found.computed] = UP if column in NAN_IS_UP else LOST if column in NAN_IS_LOST else NONE
     if column in NAN_IS_UP and "survived" in found.values:
         kinds[filled & found.values["survived"]] = UP_FILLED
         kinds[filled & ~found.values["survived"]] = LOST_FILLED
@@ -247,13 +253,66 @@ def _draw_cells(axes: Axes, view: _View, kinds: NDArray[Any], numbers: Array, no
 # --- lines over the cells ---
 
 
-def _draw_limits(axes: Axes, plan: Plan, view: _View) -> list[Artist]:
+@dataclass(frozen=True)
+class _Theory:
+    """What theory says of the top of a panel.
+
+    Attributes:
+        places: along y, as they are shown.
+        low, high: the linear window [Hz] there, NaN where none is.
+        lifted: heights and masses at which a fast top floats.
+    """
+
+    places: Array
+    low: Array
+    high: Array
+    lifted: tuple[Window, ...]
+
+
+def _theories(plan: Plan, view: _View) -> list[_Theory | None]:
+    """Return the theory of each panel, computed once where the panels' axis does not change it; None for none."""
+    if view.x.key != SPIN or view.x.scale == "log":
+        return [None] * len(view.chosen)
+    if view.panels is None or not _changes_the_window(view.panels):
+        return [_theory_of(plan.scene, view.y)] * len(view.chosen)
+    scenes = (plan.scene.changed({view.panels.key: float(view.panels.values[k])}) for k in view.chosen)
+    return [_theory_of(scene, view.y) for scene in scenes]
+
+
+def _changes_the_window(axis: Axis) -> bool:
+    """Whether the window is another along an axis; how the top starts does not change it."""
+    return axis.key.startswith(("top.", "base.", "gravity"))
+
+
+def _theory_of(scene: Scene, axis: Axis) -> _Theory | None:
+    """Return what theory says at some values of an axis; None without weight, where it says nothing."""
+    if scene.gravity_m_s2 == 0 or axis.key.startswith("gravity"):
+        return None
+    values = axis.values[np.unique(np.linspace(0, len(axis.values) - 1, CURVE_POINTS).round().astype(int))]
+    if axis.key == MASS:
+        found = windows_over(scene, values)
+        return _Theory(values * quantity_of(axis.key).factor, found.slowest, found.fastest, found.adiabatic)
+    if _changes_the_window(axis):
+        windows = [_window(scene.changed({axis.key: float(value), "start.place": "given"})) for value in values]
+    else:
+        values = values[[0, -1]]
+        windows = [_window(scene)] * 2
+    low, high = np.array(windows).T
+    return _Theory(values * quantity_of(axis.key).factor, low, high, stability_of(scene).lifted)
+
+
+def _window(scene: Scene) -> tuple[float, float]:
+    floating = stability_of(scene).floating
+    return floating.spins[0] if floating and floating.spins else (math.nan, math.nan)
+
+
+def _draw_limits(axes: Axes, plan: Plan, view: _View, theory: _Theory | None) -> list[Artist]:
     """Draw what theory and the thesis say of the spin at the start, and return what the legend needs."""
     if view.x.key == DRIVE:
         return _draw_spin_at_the_start(axes, plan.scene)
-    if view.x.key != SPIN or view.x.scale == "log":
+    if theory is None:
         return []
-    return [*_draw_window(axes, plan.scene, view), *_draw_adiabatic(axes, plan.scene, view), *_draw_thesis(axes, plan)]
+    return [*_draw_window(axes, theory), *_draw_adiabatic(axes, theory, view), *_draw_thesis(axes, plan)]
 
 
 def _draw_spin_at_the_start(axes: Axes, scene: Scene) -> list[Artist]:
@@ -265,52 +324,34 @@ def _draw_spin_at_the_start(axes: Axes, scene: Scene) -> list[Artist]:
     return [axes.axvline(spin, label=f"spin at the start, {spin:g} Hz", **DASHED)]
 
 
-def _draw_window(axes: Axes, scene: Scene, view: _View) -> list[Artist]:
+def _draw_window(axes: Axes, theory: _Theory) -> list[Artist]:
     """Draw the slowest and the fastest spin of small motions, of either sense."""
-    heights, low, high = _windows_along(scene, view.y)
-    if np.all(np.isnan(low)):
+    if np.all(np.isnan(theory.low)):
         return []
     style: Any = {"color": ORANGE, "linewidth": 1.6, "path_effects": RIM, "scalex": False, "scaley": False}
-    for edge in (low, high, -low, -high):
-        axes.plot(edge, heights, **style)
+    for edge in (theory.low, theory.high, -theory.low, -theory.high):
+        axes.plot(edge, theory.places, **style)
     return [Line2D([], [], color=ORANGE, linewidth=1.6, label="slowest and fastest spin for small motions (linear)")]
 
 
-def _windows_along(scene: Scene, axis: Axis) -> tuple[Array, Array, Array]:
-    """Return some values of an axis, as they are shown, and the linear window [Hz] at each, NaN where none is."""
-    values = axis.values[np.unique(np.linspace(0, len(axis.values) - 1, CURVE_POINTS).round().astype(int))]
-    if not axis.key.startswith(("top.", "base.", "gravity")):  # how it starts does not change the window
-        values = values[[0, -1]]
-        windows = [_window(scene)] * 2
-    else:
-        windows = [_window(scene.changed({axis.key: float(value), "start.place": "given"})) for value in values]
-    low, high = np.array(windows).T
-    return values * quantity_of(axis.key).factor, low, high
-
-
-def _window(scene: Scene) -> tuple[float, float]:
-    floating = stability_of(scene).floating
-    return floating.spins[0] if floating and floating.spins else (math.nan, math.nan)
-
-
-def _draw_adiabatic(axes: Axes, scene: Scene, view: _View) -> list[Artist]:
+def _draw_adiabatic(axes: Axes, theory: _Theory, view: _View) -> list[Artist]:
     """Draw where the masses, or the heights, end at which a fast top floats."""
-    lifted = stability_of(scene).lifted
     if view.y.key == MASS:
-        places = [mass for window in lifted for mass in (window.light, window.heavy)]
+        regions = [(window.light, window.heavy) for window in theory.lifted]
         label = "masses that float (adiabatic)"
     elif view.y.key == HEIGHT:
-        places = [height for window in lifted for height in (window.low, window.high)]
+        regions = [(window.low, window.high) for window in theory.lifted]
         label = "heights that are stable (adiabatic)"
     else:
         return []
     quantity, (low, high) = quantity_of(view.y.key), axes.get_ylim()
-    shown = [place * quantity.factor for place in places if low < place * quantity.factor < high]
-    for place in shown:
+    regions = [(a * quantity.factor, b * quantity.factor) for a, b in regions]
+    shown = [(a, b) for a, b in regions if low < a < high or low < b < high]
+    for place in [place for region in shown for place in region if low < place < high]:
         _draw_rim(axes, y=place)
         axes.axhline(place, **DASHED)
-    numbers = " to ".join(f"{place * quantity.factor:.2f}" for place in places[:2])
-    return [Line2D([], [], **DASHED, label=f"{label}: {numbers} {quantity.unit}")] if shown else []
+    said = " and ".join(f"{a:.2f} to {b:.2f}" for a, b in shown)
+    return [Line2D([], [], **DASHED, label=f"{label}: {said} {quantity.unit}")] if shown else []
 
 
 def _draw_rim(axes: Axes, *, x: float | None = None, y: float | None = None) -> None:
@@ -371,7 +412,7 @@ def _draw_colour_bar(figure: Figure, box: tuple[float, float, float], norm: Norm
     bar.outline.set_visible(False)
 
 
-def _kind_patches(kinds: NDArray[Any], column: str, plan: Plan) -> list[Artist]:
+def _kind_patches(kinds: NDArray[Any], numbers: Array, column: str, plan: Plan) -> list[Artist]:
     meanings = {kind: one.meaning for kind, one in KINDS.items()}
     meanings[UP] = f"still up after {plan.duration_s:g} s"
     if column == "locked":
@@ -379,9 +420,7 @@ def _kind_patches(kinds: NDArray[Any], column: str, plan: Plan) -> list[Artist]:
         meanings |= {UP_FILLED: "filled in: locked", LOST_FILLED: "filled in: not locked"}
         if np.any(kinds == SLIPS):
             meanings[LOST] = "lost"
-    drawn = [kind for kind in KINDS if np.any(kinds == kind)]
-    if column not in NAN_IS_UP and UP not in drawn and MISSING not in drawn and NONE in drawn:
-        drawn.remove(NONE)
+    drawn = [kind for kind in KINDS if np.any((kinds == kind) & np.isnan(numbers))]
     return [
         Patch(facecolor=KINDS[kind].colour, edgecolor="#999999", linewidth=0.5, label=meanings[kind]) for kind in drawn
     ]
@@ -414,13 +453,16 @@ def _step(axis: Axis) -> str:
     return step_in_words(axis.key, axis.values, logarithmic=axis.scale == "log")
 
 
-def _reading_sentences(view: _View, column: str, lines: Sequence[Artist]) -> list[str]:
+def _reading_sentences(plan: Plan, view: _View, column: str, lines: Sequence[Artist]) -> list[str]:
     if column == "locked":
-        return ["Locked: the top is up, and its body slipped by no turn behind the drive in the last half of the time"]
+        slowest = 1 / (LAST_SHARE * plan.duration_s)
+        said = "Locked: the top is up, and its body slipped by no turn behind the drive in the last half of the time"
+        return [f"{said}; a slip slower than {slowest:.2g} Hz would not show"]
     if view.x.key != SPIN or not lines:
         return []
     said = (
         "Between the orange lines small motions stay small. A top that is lost there started too far from its place "
-        "for its spin; one that is up outside would take longer to be lost, or swings on a wider path."
+        "for its spin; one that is up outside would take longer to be lost, or swings on a wider path"
     )
-    return [said]
+    left_out = changing_energy(plan.scene)
+    return [said, *([f"The lines leave out what the scene has: {', '.join(left_out)}"] if left_out else [])]

@@ -13,26 +13,39 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from levilab.errors import UsageError
-from levilab.motion.lines import AxisLines, lines_of, rate_for
+from levilab.motion.lines import lines_of, rate_for
 from levilab.motion.lock import LAST_SHARE, RATE_HZ, SHORTEST_S, can_lock, is_locked
-from levilab.motion.summary import changing_energy, height_range
+from levilab.motion.summary import changing_energy
 from levilab.simulator.energy import energy
 from levilab.simulator.ensemble import simulate_many
+from levilab.simulator.kernels.motion import STATE_SIZE, TIME
 from levilab.simulator.keys import nearest
 from levilab.simulator.model import model_of
-from levilab.simulator.single import simulate
 from levilab.simulator.start import start_of
+from levilab.simulator.trajectory import Accuracy, Trajectory
+from levilab.simulator.varied import broadcast, scene_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from numpy.typing import NDArray
 
+    from levilab.motion.lines import AxisLines
+    from levilab.simulator.ensemble import Ensemble
     from levilab.simulator.scene import Scene
     from levilab.sweeps.plan import Plan
 
+    Values = Mapping[str, NDArray[Any]]
+
 #: What must be simulated: the ends alone, those and once more with longer steps, or samples on the way.
 Need = Literal["ends", "errors", "samples"]
+
+#: Samples per second for the height, whose fastest motion is some Hz: its turning points are met to 0.5 % of the swing.
+HEIGHT_RATE_HZ = 100.0
+#: Rates for lines are rounded up to multiples of this [Hz].
+ROUND_HZ = 100.0
+#: Numbers in the samples of points that are simulated together, unless they are fewer than fill the lanes.
+MOST_NUMBERS, FEWEST = 16_000_000, 32
 
 
 @dataclass(frozen=True)
@@ -93,9 +106,7 @@ OBSERVABLES: dict[str, Observable] = {
         Observable(
             "position_error_m", "m", "Estimated error of the place at the end, or at the fall.", "float64", "errors"
         ),
-        Observable(
-            "height_spread_m", "m", "Highest less lowest place up to the end, or to the fall.", "float64", "samples"
-        ),
+        Observable("height_spread_m", "m", "Highest less lowest place; NaN of a top that falls.", "float64", "samples"),
         Observable(
             "locked",
             "1",
@@ -150,7 +161,7 @@ def check_observables(plan: Plan) -> None:
         )
 
 
-def observe(plan: Plan, values: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+def observe(plan: Plan, values: Values) -> dict[str, NDArray[Any]]:
     """Simulate some points and observe them.
 
     With the plan's `step_share`, the result of each point depends on its own numbers alone.
@@ -163,21 +174,23 @@ def observe(plan: Plan, values: Mapping[str, NDArray[Any]]) -> dict[str, NDArray
         Column → values, in the shape to which the values of the keys broadcast.
     """
     columns = columns_of(plan.observables)
-    needs = {column.needs for column in columns}
-    found = _from_samples(plan, values, columns) if "samples" in needs else _from_ends(plan, values, columns)
+    names = {column.name for column in columns}
+    if not any(column.needs == "samples" for column in columns):
+        found = _ends_of(plan, values, names)
+    else:
+        found = _ends_and_samples_of(plan, values, names)
     return {column.name: np.asarray(found[column.name], dtype=column.dtype) for column in columns}
 
 
-def _from_ends(
-    plan: Plan, values: Mapping[str, NDArray[Any]], columns: tuple[Observable, ...]
-) -> dict[str, NDArray[Any]]:
-    names = {column.name for column in columns}
+def _ends_of(plan: Plan, values: Values, names: set[str], rate: float | None = None) -> dict[str, NDArray[Any]]:
+    """Return the columns that come from ends; with a rate those that come from samples, too."""
     ends = simulate_many(
         plan.scene,
         values,
         plan.duration_s,
         tolerance=plan.tolerance,
         step_share=plan.step_share,
+        rate=rate,
         cores=1,
         errors="position_error_m" in names,
     )
@@ -187,21 +200,43 @@ def _from_ends(
         "fall_spin_hz": np.where(ends.survived, np.nan, ends.spin_hz),
         "position_error_m": ends.position_error,
     }
+    shape, size = ends.survived.shape, ends.survived.size
     if "energy_error" in names:
-        scenes = _scenes(plan.scene, ends.values)
-        states = ends.states.reshape(-1, ends.states.shape[-1])
-        errors = [_energy_error(scene, state) for scene, state in zip(scenes, states, strict=True)]
-        found["energy_error"] = np.reshape(errors, ends.survived.shape)
+        states = ends.states.reshape(size, -1)
+        errors = [_energy_error(scene_at(plan.scene, ends.values, i), states[i]) for i in range(size)]
+        found["energy_error"] = np.reshape(errors, shape)
+    if rate:
+        rows = [_observe_samples(scene_at(plan.scene, ends.values, i), ends, i, names) for i in range(size)]
+        found |= {name: np.reshape([row[name] for row in rows], shape) for name in rows[0]}
     return found
 
 
-def _scenes(scene: Scene, values: Mapping[str, NDArray[Any]]) -> list[Scene]:
-    """Return the scene of each point, in the order of the flat index."""
-    arrays = np.broadcast_arrays(*values.values())
-    return [
-        scene.changed({key: array.flat[i].item() for key, array in zip(values, arrays, strict=True)})
-        for i in range(arrays[0].size)
-    ]
+def _ends_and_samples_of(plan: Plan, values: Values, names: set[str]) -> dict[str, NDArray[Any]]:
+    """Return the columns of motions with samples, some points at a time: samples are what takes memory.
+
+    The rate of a point's samples depends on its own numbers: steps are cut to fit between samples.
+    """
+    arrays = {key: array.ravel() for key, array in broadcast(values).items()}
+    shape = np.broadcast_shapes(*(np.shape(one) for one in values.values()))
+    size = math.prod(shape)
+    rates = np.array([_rate_for(scene_at(plan.scene, arrays, i), names) for i in range(size)])
+    found: dict[str, NDArray[Any]] = {}
+    for rate in np.unique(rates).tolist():
+        alike = np.flatnonzero(rates == rate)
+        many = max(int(MOST_NUMBERS / (rate * plan.duration_s * STATE_SIZE)), FEWEST)
+        for some in np.split(alike, range(many, alike.size, many)):
+            part = _ends_of(plan, {key: array[some] for key, array in arrays.items()}, names, rate)
+            for name, column in part.items():
+                found.setdefault(name, np.empty(size, dtype=column.dtype))[some] = column
+    return {name: column.reshape(shape) for name, column in found.items()}
+
+
+def _rate_for(scene: Scene, names: set[str]) -> float:
+    """Return the samples per second that a point needs, rounded up so that many points have the same."""
+    rate = HEIGHT_RATE_HZ if "height_spread_m" in names else RATE_HZ
+    if names & set(GROUPS["lines"]):
+        rate = max(rate, math.ceil(rate_for(scene) / ROUND_HZ) * ROUND_HZ)
+    return rate
 
 
 def _energy_error(scene: Scene, end: NDArray[np.float64]) -> float:
@@ -213,30 +248,20 @@ def _energy_error(scene: Scene, end: NDArray[np.float64]) -> float:
     return abs(float(last - first)) / (abs(float(first)) or 1.0)
 
 
-def _from_samples(
-    plan: Plan, values: Mapping[str, NDArray[Any]], columns: tuple[Observable, ...]
-) -> dict[str, NDArray[Any]]:
-    names = tuple(column.name for column in columns)
-    shape = np.broadcast_shapes(*(np.shape(one) for one in values.values()))
-    rows = [_observe_motion(plan, scene, names) for scene in _scenes(plan.scene, values)]
-    return {name: np.reshape([row[name] for row in rows], shape) for name in names}
-
-
-def _observe_motion(plan: Plan, scene: Scene, names: tuple[str, ...]) -> dict[str, Any]:
-    with_lines = any(name in GROUPS["lines"] for name in names)
-    rate = max(rate_for(scene) if with_lines else 0.0, 2 * RATE_HZ if "height_spread_m" in names else RATE_HZ)
-    motion = simulate(scene, plan.duration_s, tolerance=plan.tolerance, rate=rate)
-    low, high = height_range(motion)
-    return {
-        "survived": motion.survived,
-        "lifetime_s": math.nan if motion.survived else motion.time[-1],
-        "fall_spin_hz": math.nan if motion.survived else motion.spin_hz[-1],
-        "energy_error": _energy_error(scene, motion.states[-1]) if "energy_error" in names else math.nan,
-        "position_error_m": motion.accuracy.position,
-        "height_spread_m": high - low,
-        "locked": "locked" in names and bool(is_locked(scene, motion.states, survived=motion.survived)),
-        **_line_columns(lines_of(motion) if with_lines else AxisLines()),
-    }
+def _observe_samples(scene: Scene, ends: Ensemble, where: int, names: set[str]) -> dict[str, Any]:
+    """Return the columns of one motion that need its samples."""
+    samples = ends.samples.reshape(-1, *ends.samples.shape[-2:])[where]
+    end, survived = ends.states.reshape(-1, STATE_SIZE)[where], bool(ends.survived.flat[where])
+    states = np.vstack([samples[ends.sample_times < end[TIME] * (1 - 1e-12)], end])
+    row: dict[str, Any] = {}
+    if "height_spread_m" in names:
+        row["height_spread_m"] = np.ptp(states[:, 2]) if survived else math.nan
+    if "locked" in names:
+        row["locked"] = bool(is_locked(scene, states, survived=survived))
+    if names & set(GROUPS["lines"]):
+        unknown = Accuracy(math.nan, math.nan, math.nan, "", math.nan, 0)
+        row |= _line_columns(lines_of(Trajectory(scene, states, np.empty(0), unknown)))
+    return row
 
 
 def _line_columns(found: AxisLines) -> dict[str, float]:

@@ -68,12 +68,18 @@ def plan_of(request: SweepRequest) -> Plan:
     return cut(plan)
 
 
-def store_for(request: SweepRequest, path: Path, message: Callable[[str], None], *, resume: bool = False) -> Store:
+def _say_nothing(text: str) -> None:
+    """Ignore a message."""
+
+
+def store_for(
+    request: SweepRequest, path: Path | None, message: Callable[[str], None] = _say_nothing, *, resume: bool = False
+) -> Store:
     """Return the store of a request, ready to be computed.
 
     Args:
         request: what is asked.
-        path: of its folder.
+        path: of its folder; None: in memory.
         message: called with what takes a moment.
         resume: go on with the store that is there, if one is.
 
@@ -82,7 +88,7 @@ def store_for(request: SweepRequest, path: Path, message: Callable[[str], None],
         CannotWrite, DataError: the store cannot be made or read.
     """
     plan = plan_of(request)
-    if path.exists():
+    if path is not None and path.exists():
         return _going_on(request, plan, path, resume=resume)
     if request.adaptive:  # what it refuses leaves no store behind
         begin_adaptive(Store.create(None, plan), _boundary(plan))
@@ -93,13 +99,15 @@ def store_for(request: SweepRequest, path: Path, message: Callable[[str], None],
 
 
 def _going_on(request: SweepRequest, plan: Plan, path: Path, *, resume: bool) -> Store:
-    if not resume:
-        there = f"it is there already: levilab sweep {path} shows it, `resume` goes on with it; or take another place"
-        raise UsageError("out", there, value=path)
+    there = f"it is there already: levilab sweep {path} shows it, `resume` goes on with it; or take another place"
+    if not resume and not (path / "zarr.json").exists():
+        raise UsageError("out", "it is there already, and no store of a sweep: take another place", value=path)
     store = Store.open(path, writable=True)
     other = differences(store.plan, plan)
     if is_adaptive(store) != request.adaptive:
         other.append(f"adaptive is {is_adaptive(store)} there and {request.adaptive} here")
+    if not resume and (other or store.done or request.adaptive):  # one that is begun and empty is no loss
+        raise UsageError("out", there, value=path)
     if other:
         more = f" (and {len(other) - 3} more)" if len(other) > 3 else ""
         raise UsageError(

@@ -12,7 +12,8 @@ from levilab.simulator.compilation import announce_compilation
 from levilab.simulator.ensemble import grid, simulate_many, step_share_of
 from levilab.sweeps.cost import seconds_per_point
 from levilab.sweeps.observables import observe
-from levilab.workers import processes, results_of, this_process
+from levilab.workers import cluster, processes, results_of, this_process
+from levilab.workers.ways import cores as available_cores
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -87,19 +88,19 @@ def tasks_of(store: Store) -> Iterator[Task]:
     return (Task(light, chunk, store.plan.values_of(chunk)) for chunk in store.missing())
 
 
-def workers_for(plan: Plan, count: int | None = None) -> Workers:
-    """Return where a plan is computed on this machine: in this process if it is quick, else on several cores.
+def workers_for(plan: Plan, count: int | None = None, scheduler: str | None = None) -> Workers:
+    """Return where a plan is computed: on a cluster, in this process if it is quick, else in several.
 
     Args:
         plan: decides whether other processes are worth their start.
-        count: of processes; None: one for each core.
-
-    Raises:
-        UsageError: the count makes no sense.
+        count: of processes on this machine; None: one for each core.
+        scheduler: address of a Dask cluster; None: on this machine.
     """
-    quick = plan.chunk_count == 1 or plan.size * seconds_per_point(plan) < QUICK_S
-    several = processes(count)
-    return this_process() if quick or several.count == 1 else processes(min(several.count, plan.chunk_count))
+    if scheduler is not None:
+        return cluster(scheduler)
+    most = min(count or available_cores(), plan.chunk_count)
+    quick = plan.size * seconds_per_point(plan) < QUICK_S
+    return this_process() if quick or most == 1 else processes(most)
 
 
 def run(store: Store, workers: Workers | None = None, progress: Callable[[float], None] | None = None) -> None:

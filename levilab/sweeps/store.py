@@ -8,6 +8,7 @@ whatever ends the process costs at most the chunks that have no mark.
 from __future__ import annotations
 
 import contextlib
+import os
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,12 +17,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from levilab.errors import DataError
-from levilab.files import CannotWrite, writing
+from levilab.files import CannotWrite, sync_folder, writing
 from levilab.runs.run import utc_now
 from levilab.simulator.keys import SceneError, short_text
 from levilab.software import software_versions
 from levilab.sweeps.observables import columns_of
 from levilab.sweeps.plan import Axis, Chunk, Plan, unit_of
+from levilab.sweeps.quantities import quantity_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -181,18 +183,35 @@ class Store:
         return (self.plan.chunk_of(number) for number in range(self.plan.chunk_count) if not self.marks[number])
 
     def write(self, chunk: Chunk, values: Mapping[str, NDArray[Any]]) -> None:
-        """Write a chunk's values, then its mark.  Raises CannotWrite."""
+        """Write a chunk's values, and when they are on the disk its mark.  Raises CannotWrite."""
         with writing(f"{self.path}: cannot be written", "free space, then go on with `resume`"):
             for column in columns_of(self.plan.observables):
                 self.group[column.name][chunk.box] = np.asarray(values[column.name], dtype=column.dtype)
+            self._sync(chunk)
             self.group[DONE][chunk.number] = 1
         self.marks[chunk.number] = 1
 
+    def _sync(self, chunk: Chunk) -> None:
+        """Wait until a chunk's files are on the disk: a power cut must not leave a mark without values."""
+        if self.path is None:
+            return
+        place = [str(k) for k in np.unravel_index(chunk.number, self.plan.grid)]
+        for column in columns_of(self.plan.observables):
+            file = self.path.joinpath(column.name, "c", *place)
+            if file.exists():  # a chunk without any value has none
+                with file.open("r+b") as open_file:
+                    os.fsync(open_file.fileno())
+                sync_folder(file.parent)
+
+    def known(self, chunk: Chunk) -> NDArray[np.bool_]:
+        """Return which points of a chunk are computed, or filled in."""
+        if STATUS not in self.group:
+            return np.full(chunk.shape, bool(self.marks[chunk.number]))
+        return self._array(STATUS, chunk.box) > 0
+
     def read(self, chunk: Chunk) -> dict[str, NDArray[Any]]:
         """Return column → values of a chunk."""
-        return {
-            column.name: np.asarray(self.group[column.name][chunk.box]) for column in columns_of(self.plan.observables)
-        }
+        return {column.name: self._array(column.name, chunk.box) for column in columns_of(self.plan.observables)}
 
     def load(self) -> Map:
         """Return all values, and which are computed."""
@@ -200,11 +219,20 @@ class Store:
         computed = np.zeros(plan.shape, dtype=np.bool_)
         for number in np.flatnonzero(self.marks):
             computed[plan.chunk_of(int(number)).box] = True
-        values = {column.name: np.asarray(self.group[column.name][...]) for column in columns_of(plan.observables)}
+        values = {column.name: self._array(column.name, ...) for column in columns_of(plan.observables)}
         if STATUS not in self.group:
             return Map(plan, values, computed)
-        status = np.asarray(self.group[STATUS][...])
+        status = self._array(STATUS, ...)
         return Map(plan, values, status == COMPUTED, status == FILLED)
+
+    def _array(self, name: str, box: Any) -> NDArray[Any]:
+        """Return part of an array.  Raises DataError where its files are not what they were."""
+        try:
+            return np.asarray(self.group[name][box])
+        except Exception as error:  # libraries that decompress have errors of many kinds
+            raise DataError(
+                f"{self.path}: a file of {name} is damaged or missing ({error}); take a copy, or compute it anew"
+            ) from error
 
 
 def processor() -> dict[str, str]:
@@ -212,9 +240,10 @@ def processor() -> dict[str, str]:
     from llvmlite import binding
     from numba.core import config
 
+    name, features = getattr(config, "CPU_NAME", None), getattr(config, "CPU_FEATURES", None)
     return {
-        "name": getattr(config, "CPU_NAME", None) or binding.get_host_cpu_name(),
-        "features": getattr(config, "CPU_FEATURES", None) or binding.get_host_cpu_features().flatten(),
+        "name": binding.get_host_cpu_name() if name is None else name,
+        "features": binding.get_host_cpu_features().flatten() if features is None else features,
     }
 
 
@@ -251,7 +280,7 @@ def _add_coordinate(group: Any, axis: Axis, dimension: str) -> None:
     values, words = axis.values, None
     if values.dtype.kind == "U":
         words, values = np.unique(values, return_inverse=True)
-    attributes = _described(unit_of(axis.key), f"{axis.key} of the scene") | {"scale": axis.scale}
+    attributes = _described(unit_of(axis.key), quantity_of(axis.key).name) | {"scale": axis.scale}
     coordinate = group.create_array(
         axis.key,
         shape=values.shape,

@@ -39,7 +39,7 @@ class Summary:
 
     Attributes:
         plan: of the sweep.
-        points: that are computed.
+        points: that are computed, or filled in by an adaptive sweep.
         chunks: that are done.
         columns: one for each column.
     """
@@ -55,11 +55,11 @@ def summarise(store: Store) -> Summary:
     plan = store.plan
     parts: dict[str, list[tuple[int, float, float, float]]] = {one.name: [] for one in columns_of(plan.observables)}
     points = 0
-    for number in np.flatnonzero(store.marks):
-        chunk = plan.chunk_of(int(number))
-        points += math.prod(chunk.shape)
-        for name, values in store.read(chunk).items():
-            numbers = values[np.isfinite(values)].astype(np.float64)
+    for chunk in plan.chunks():
+        known = store.known(chunk)
+        points += int(np.count_nonzero(known))
+        for name, values in store.read(chunk).items() if np.any(known) else ():
+            numbers = values[known & np.isfinite(values)].astype(np.float64)
             if numbers.size:
                 parts[name].append((numbers.size, numbers.min(), float(numbers.sum()), numbers.max()))
     columns = tuple(_joined(column, parts[column.name]) for column in columns_of(plan.observables))

@@ -40,12 +40,11 @@ def columns_table(summary: Summary) -> Table:
 
 def _row(one: ColumnSummary, points: int) -> tuple[str, ...]:
     meaning = one.column.meaning
-    unit = unit_in_words(one.column.unit)
     if one.column.dtype == "bool":
         yes = round(one.mean * one.defined) if one.defined else 0
         return (one.column.name, "", f"{100 * one.mean:.1f} %" if points else "", "", f"{yes} of {points}", meaning)
     numbers = (_number(value) for value in (one.least, one.mean, one.greatest))
-    return (one.column.name, *numbers, str(one.defined), f"{meaning} [{unit}]" if unit else meaning)
+    return (one.column.name, *numbers, str(one.defined), meaning)
 
 
 def _number(value: Any) -> str:

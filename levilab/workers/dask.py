@@ -41,7 +41,7 @@ def cluster(scheduler: str, *, patience_s: float = PATIENCE_S) -> Workers:
     """
     return Workers(
         partial(Cluster, scheduler, patience_s),
-        count=lambda pool: pool.count,
+        count_now=lambda pool: pool.count,
         name=f"workers of the Dask cluster at {scheduler}",
         end_at_once=Cluster.end_at_once,
         check=Cluster.check,

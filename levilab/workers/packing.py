@@ -9,7 +9,7 @@ import pickle
 import platform
 import traceback
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
@@ -64,6 +64,12 @@ def packed(function: Callable[[Any], Any]) -> Callable[[Any], tuple[Callable[...
     Raises:
         LevilabError: the function or a task cannot be pickled.
     """
+    inner = function.func if isinstance(function, partial) else function
+    if getattr(inner, "__module__", "") == "__main__":
+        raise LevilabError(
+            f"the function {getattr(inner, '__name__', inner)} stands in the script that runs, which other processes "
+            "do not run again: put it into a module of its own, and import it"
+        )
     head = pickle.dumps(({name: version_of(name) for name in LIBRARIES}, _pickled(function, "function")))
     return lambda task: (call_there, head, _pickled(task, "task"))
 

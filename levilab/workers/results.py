@@ -224,7 +224,8 @@ def _outcome_of(future: _Future, pool: Executor, executor: Workers) -> Outcome |
         return None
     if isinstance(error, BrokenExecutor) or not isinstance(error, Exception):
         raise error
-    raise WorkersLost(f"the {executor.name} cannot do the work ({type(error).__name__}: {_first_line(error)})")
+    why = f"{type(error).__name__}: {_first_line(error)}"
+    raise WorkersLost(f"the {executor.name} cannot do the work ({why}): install the same on all machines")
 
 
 def _first_line(error: Exception) -> str:

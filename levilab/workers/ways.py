@@ -33,27 +33,29 @@ class Workers:
 
     Attributes:
         open: opens an executor; called again where one is broken.
-        count: how many tasks it does at the same time, or what finds that out of an open one.
+        count: how many tasks it does at the same time.
         name: for messages, in the plural.
         elsewhere: tasks are done in other processes, so that function, tasks and results are pickled.
         in_flight: the most tasks that are submitted before a result is waited for; None: the caller decides.
         end_at_once: leaves the executor without waiting for what is under way.
         check: called now and then while no result comes; raises WorkersLost where none will come.
+        count_now: asks an open executor for its count, where that may change; None: it stays.
         is_death: whether an error of a future says that the process died which did the task, while others go on.
     """
 
     open: Callable[[], Executor]
-    count: int | Callable[[Any], int] = 1
+    count: int = 1
     name: str = "workers"
     elsewhere: bool = True
     in_flight: int | None = None
     end_at_once: Callable[[Any], None] = _cancel
     check: Callable[[Any], None] = _nothing_to_check
+    count_now: Callable[[Any], int] | None = None
     is_death: Callable[[BaseException], bool] = _no_death
 
     def count_in(self, executor: Executor) -> int:
         """How many tasks an open executor does at the same time."""
-        return self.count(executor) if callable(self.count) else self.count
+        return self.count if self.count_now is None else self.count_now(executor)
 
 
 def this_process() -> Workers:

@@ -1,4 +1,4 @@
-"""`levilab benchmark simulator`: measures, prints a table, writes JSON and the figure."""
+"""`levilab benchmark simulator`: measures, prints tables, writes JSON and the figures."""
 
 from __future__ import annotations
 
@@ -8,16 +8,25 @@ from typing import TYPE_CHECKING
 from rich.markup import escape
 
 from levilab.benchmark.found import give, tell
-from levilab.benchmark.simulator.work_precision import Comparison, as_document, compare
-from levilab.present.terminal import new_table, terminal
+from levilab.benchmark.simulator.speeds import best_speed
+from levilab.benchmark.simulator.work_precision import PARTS, Comparison, as_document, compare
+from levilab.errors import UsageError
+from levilab.present.terminal import Terminal, new_table, terminal
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
     from pathlib import Path
 
+    from levilab.benchmark.simulator.as_called.comparison import Case
 
-def run_and_tell(*, quick: bool, out: Path | None, as_json: bool) -> None:
-    """The whole command.  Raises CannotWrite."""
-    found = compare(quick=quick, tell=tell)
+
+def run_and_tell(*, only: str | None, quick: bool, out: Path | None, as_json: bool) -> None:
+    """The whole command.  Raises CannotWrite, and UsageError for a part that is none."""
+    if only is not None and only not in PARTS:
+        raise UsageError("only", f"`only` = {only}: {' or '.join(PARTS)} is expected")
+    if only and out:
+        raise UsageError("out", "`out` keeps the figures of all parts: leave `only` away, or take `json`")
+    found = compare((only,) if only else PARTS, quick=quick, tell=tell)
 
     def save_figure(path: Path) -> None:
         from levilab.benchmark.simulator.figure import work_precision_figure
@@ -29,17 +38,29 @@ def run_and_tell(*, quick: bool, out: Path | None, as_json: bool) -> None:
 
 
 def print_comparison(found: Comparison) -> None:
-    """Points, ratios, and the kernels' share of the processor's peak."""
+    """All tables of what was measured."""
     console = terminal()
+    if found.points:
+        print_kernels(console, found)
+    if found.cases:
+        print_called(console, found.cases)
+    for package in found.missing:
+        console.print(f"[yellow]note:[/yellow] {escape(package)} is not installed: pip install 'levilab\\[peers]'")
+
+
+def print_kernels(console: Terminal, found: Comparison) -> None:
+    """Points, ratios, and the kernels' share of the processor's peak."""
     numbers = ("error \\[cm]", "simulated s per s")
-    points = new_table("One top, 5 s of the scene undriven, one core", "method", "setting", *numbers, numbers=numbers)
+    title = "One top, 5 s of the scene undriven, one core: kernels at fixed steps, without an error estimate"
+    points = new_table(title, "method", "setting", *numbers, numbers=numbers)
     for p in found.points:
-        points.add_row(p.method, p.setting, f"{100 * p.error:.1e}", f"{float(f'{p.speed:.3g}'):,.0f}".replace(",", " "))
+        points.add_row(p.method, p.setting, f"{100 * p.error:.1e}", _number(p.speed, 3))
     console.print(points)
     columns = ("ours", "theirs", "ratio", "aim")
     shown = new_table(
-        "Speeds at the same error, each at its best setting", "", "", "error \\[cm]", *columns, numbers=columns
-    )
+        "Kernels at fixed steps against the peers, at the same error, each at its best setting",
+        "", "", "error \\[cm]", *columns, numbers=columns,
+    )  # fmt: skip
     for r in found.ratios:
         values = (_number(r.speed), _number(r.peer_speed), _number(r.ratio, 3), f"≥ {r.aim:g}")
         shown.add_row(r.ours, f"against {r.peer}", f"{100 * r.error:.0e}", *values)
@@ -49,8 +70,21 @@ def print_comparison(found: Comparison) -> None:
         if name != "peak":
             share = f"{100 * rate.share:.0f} % of the {peak:.0f} Gflop/s that multiply-adds alone reach"
             console.print(f"{name}: {rate.ns:.2f} ns a stage, {rate.gflops:.1f} Gflop/s, {share}")
-    for package in found.missing:
-        console.print(f"[yellow]note:[/yellow] {escape(package)} is not installed: pip install 'levilab\\[peers]'")
+
+
+def print_called(console: Terminal, cases: Iterable[Case]) -> None:
+    """`simulate` against heyoka and DOP853, at the same achieved error."""
+    columns = ("simulate", "heyoka", "ratio", "aim", "DOP853")
+    shown = new_table(
+        "One top as called, with error estimate or step control: simulated s per s at the same achieved error",
+        "motion", "time", "error \\[cm]", *columns, numbers=("time", *columns),
+    )  # fmt: skip
+    for case in cases:
+        for r in case.ratios:
+            slow = best_speed(case.of("scipy DOP853"), r.error)
+            speeds = (_number(r.speed), _number(r.peer_speed), _number(r.ratio, 3), f"≥ {r.aim:g}", _number(slow, 3))
+            shown.add_row(case.motion, f"{case.duration:g} s", f"{100 * r.error:.0e}", *speeds)
+    console.print(shown)
 
 
 def _number(value: float, digits: int = 4) -> str:

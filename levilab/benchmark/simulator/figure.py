@@ -21,7 +21,6 @@ LINES = {
     "kahan-li-8": ("#56B4E9", "o", "-", "levilab, order 8"),
     "blanes-moan-4": ("#56B4E9", "^", "--", "levilab, order 4"),
     "strang": ("#56B4E9", "v", ":", "levilab, order 2"),
-    "simulate, all in all": ("#0072B2", "x", "--", "simulate(), error estimated"),
     "heyoka batch": ("#D55E00", "s", "-", "heyoka, batch"),
     "heyoka": ("#D55E00", "o", "-", "heyoka"),
     "scipy DOP853": ("#009E73", "o", "-", "scipy DOP853"),

@@ -1,38 +1,120 @@
-"""The motion that every contender integrates: scene `undriven`, IC1, 30 Hz, 25.26 g, 5 s, with its equations once more.
+"""The motions that every contender integrates, with their equations once more, apart from the simulator's.
 
-Written apart from the simulator, for the peers: in place, velocity, axis and angular momentum (12 numbers), and in
-Euler angles as the master's thesis on the Levitron has them (12 numbers, singular at θ = 0).
+In place, velocity, axis and angular momentum (12 numbers; with the direction of the moment, where it is not the axis,
+15), and for the undriven top in Euler angles, as the master's thesis on the Levitron has them (12 numbers, singular
+at θ = 0).
 """
 
 from __future__ import annotations
 
+import itertools
+import json
 import math
+from dataclasses import dataclass, field
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
 Array = NDArray[np.float64]
 
-A2, B2, K = 0.030**2, 0.055**2, 2 * math.pi * 1.40e-3
-M, G, I1, I3, MU = 0.02526, 9.82, 1.04e-6, 1.731314e-6, -0.714
-TILT, SPIN, DURATION = 0.01, 2 * math.pi * 30.0, 5.0
-RATE = SPIN / (1 + math.cos(TILT))  # φ̇ = ψ̇
-
-#: The place after 5 s [m], from heyoka in extended precision with a tolerance of 1e-18: IC1 of the golden data.
-REFERENCE = np.array([0.00030264930749574636, -0.0001858576495552388, 0.07450378489258647])
+M, A2, B2, K = 0.02526, 0.030**2, 0.055**2, 2 * math.pi * 1.40e-3
+G, I1, I3, MU = 9.82, 1.04e-6, 1.731314e-6, -0.714
+TILT = 0.01
+DRIVE_T, DRIVE_HZ = 4e-4, 30.0
 
 
-def vector_start() -> Array:
-    """(r, v, n, L) at the start."""
+@dataclass(frozen=True)
+class Motion:
+    """One motion: as a scene for the simulator, and in numbers for its peers.
+
+    Attributes:
+        name: of the motion.
+        preset: the scene of that name …
+        changes: … with these values by their dotted keys.
+        mass: [kg].
+        spin: ω₃ at the start [rad/s].
+        across, along: parts of the moment across and along the axis.
+        drive: waveform of the field along y that swings as a cosine or its sign; "off", "sine" or "square".
+
+    All of them stay up for 60 s, between 7.04 and 7.48 cm and within 4 mm of the axis, and none is chaotic: neighbours
+    are by then at most 250 times as far apart as at the start.  So errors mean something.
+    """
+
+    name: str
+    preset: str
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    mass: float = 0.02445
+    spin: float = 2 * math.pi * 30.0
+    across: float = 0.03
+    along: float = 0.97
+    drive: str = "off"
+
+    @property
+    def precession(self) -> float:
+        """φ̇ = ψ̇ at the start [rad/s]."""
+        return self.spin / (1 + math.cos(TILT))
+
+    def field_at(self, t: float) -> float:
+        """The drive's field along y at a time that is no kink [T]."""
+        value = math.cos(2 * math.pi * DRIVE_HZ * t)
+        return {"off": 0.0, "sine": DRIVE_T * value, "square": math.copysign(DRIVE_T, value)}[self.drive]
+
+    def pieces(self, duration: float) -> list[tuple[float, float, float]]:
+        """The smooth pieces of a square wave, or the whole of another drive: begin and end [s], steady field [T]."""
+        if self.drive != "square":
+            return [(0.0, duration, 0.0)]
+        inside = np.arange(1, math.ceil(2 * DRIVE_HZ * duration + 0.5)) / (2 * DRIVE_HZ) - 0.25 / DRIVE_HZ
+        ends = [0.0, *inside[inside < duration].tolist(), duration]
+        return [(a, b, self.field_at((a + b) / 2)) for a, b in itertools.pairwise(ends)]
+
+
+MOTIONS = {
+    motion.name: motion
+    for motion in (
+        Motion("undriven", "undriven", mass=M, across=0.0, along=1.0),
+        Motion("tilted", "tilted"),
+        Motion("sine", "driven", spin=2 * math.pi * 30.03, drive="sine"),
+        Motion("square", "driven", {"drive.waveform": "square"}, spin=2 * math.pi * 30.03, drive="square"),
+    )
+}
+#: The motion of the kernels' comparison, and its length [s].
+UNDRIVEN, DURATION = MOTIONS["undriven"], 5.0
+
+
+def references() -> dict[str, Any]:
+    """The true ends, from heyoka in extended precision (`python benchmarks/references.py` writes them anew).
+
+    "places_m": of each motion by its name and its length in whole seconds; "ensemble_m": of some tops of the ensemble.
+    """
+    text = files(__package__).joinpath("references.json").read_text(encoding="utf-8")
+    found: dict[str, Any] = json.loads(text)
+    return found
+
+
+def reference(motion: Motion = UNDRIVEN, duration: float = DURATION) -> Array:
+    """The true place at the end, shape (3,) [m]."""
+    return np.array(references()["places_m"][motion.name][f"{duration:g}"])
+
+
+def vector_start(motion: Motion = UNDRIVEN) -> Array:
+    """(r, v, n, L), and the moment's direction if it is not n, at the start."""
     n = np.array([0.0, -math.sin(TILT), math.cos(TILT)])
-    momentum = I3 * SPIN * n + I1 * RATE * (np.array([0.0, 0.0, 1.0]) - n * math.cos(TILT))
-    return np.concatenate([[0.001, 0, 0.071, -0.0007, 0, 0.002], n, momentum])
+    momentum = I3 * motion.spin * n + I1 * motion.precession * (np.array([0.0, 0.0, 1.0]) - n * math.cos(TILT))
+    moment = motion.along * n + motion.across * np.array([1.0, 0.0, 0.0])
+    state = [np.array([0.001, 0, 0.071, -0.0007, 0, 0.002]), n, momentum]
+    return np.concatenate([*state, moment] if motion.across else state)
 
 
 def euler_start() -> Array:
-    """(x, y, z, θ, φ, ψ and their rates) at the start."""
-    return np.array([0.001, 0, 0.071, TILT, 0, 0, -0.0007, 0, 0.002, 0, RATE, RATE])
+    """(x, y, z, θ, φ, ψ and their rates) of the undriven top at the start."""
+    rate = UNDRIVEN.precession
+    return np.array([0.001, 0, 0.071, TILT, 0, 0, -0.0007, 0, 0.002, 0, rate, rate])
 
 
 @numba.njit(cache=True)
@@ -47,19 +129,29 @@ def potential(z: float) -> tuple[float, float, float, float]:
 
 
 @numba.njit(cache=True)
-def vector_rate(t: float, s: Array) -> Array:
-    """ṙ = v, v̇ = ∇(M·B)/m − g, ṅ = L×n/I₁, L̇ = M×B."""
+def vector_rate(t: float, s: Array, mass: float, steady: float, swing: float) -> Array:
+    """ṙ = v, v̇ = ∇(M·B)/m − g, ṅ = L×n/I₁, L̇ = M×(B + B_d), and for a moment across the axis ė = ω×e.
+
+    steady, swing: the drive along y is steady + swing cos 2π DRIVE_HZ t [T].
+    """
     x, y, z = s[0], s[1], s[2]
     p1, p2, p3, p4 = potential(z)
     nx, ny, nz, lx, ly, lz = s[6], s[7], s[8], s[9], s[10], s[11]
+    d = np.empty(s.size)
+    mx, my, mz = nx, ny, nz
+    if s.size == 15:
+        mx, my, mz = s[12], s[13], s[14]
+        twist = (1 / I3 - 1 / I1) * (lx * nx + ly * ny + lz * nz)
+        wx, wy, wz = lx / I1 + twist * nx, ly / I1 + twist * ny, lz / I1 + twist * nz
+        d[12], d[13], d[14] = wy * mz - wz * my, wz * mx - wx * mz, wx * my - wy * mx
     bx, by, bz = p2 * x / 2, p2 * y / 2, p3 * (x * x + y * y) / 4 - p1
-    q = MU / M
-    d = np.empty(12)
+    by += steady + swing * math.cos(2 * math.pi * DRIVE_HZ * t)
+    q = MU / mass
     d[0], d[1], d[2] = s[3], s[4], s[5]
-    d[3], d[4] = q * (nx * p2 / 2 + nz * p3 * x / 2), q * (ny * p2 / 2 + nz * p3 * y / 2)
-    d[5] = q * ((nx * x + ny * y) * p3 / 2 + nz * (p4 * (x * x + y * y) / 4 - p2)) - G
+    d[3], d[4] = q * (mx * p2 / 2 + mz * p3 * x / 2), q * (my * p2 / 2 + mz * p3 * y / 2)
+    d[5] = q * ((mx * x + my * y) * p3 / 2 + mz * (p4 * (x * x + y * y) / 4 - p2)) - G
     d[6], d[7], d[8] = (ly * nz - lz * ny) / I1, (lz * nx - lx * nz) / I1, (lx * ny - ly * nx) / I1
-    d[9], d[10], d[11] = MU * (ny * bz - nz * by), MU * (nz * bx - nx * bz), MU * (nx * by - ny * bx)
+    d[9], d[10], d[11] = MU * (my * bz - mz * by), MU * (mz * bx - mx * bz), MU * (mx * by - my * bx)
     return d
 
 

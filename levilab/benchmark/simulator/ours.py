@@ -1,7 +1,8 @@
-"""The simulator's own points: each scheme at fixed steps, lanes, and all of `simulate` with its error estimate."""
+"""The kernels' own points: each scheme at fixed steps, without an error estimate; one top, and lanes."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -9,14 +10,15 @@ import numpy as np
 
 from levilab.benchmark.simulator import motion
 from levilab.benchmark.simulator.peers import Point, best_time, error_of
-from levilab.simulator.kernels.lanes import LANES, advance_many, numbers_of
+from levilab.simulator.ensemble import integrate_in_lanes, runs_of
+from levilab.simulator.kernels.columns import LANES
 from levilab.simulator.model import model_of
 from levilab.simulator.problem import Problem
 from levilab.simulator.scene import preset
 from levilab.simulator.schemes import SCHEMES
-from levilab.simulator.single import simulate
 from levilab.simulator.start import start_of
 from levilab.simulator.stops import stops_between
+from levilab.simulator.varied import batches
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -55,25 +57,14 @@ def many(quick: bool) -> Iterator[Point]:  # noqa: FBT001
     tops = 4 * LANES
     for name in ("levitron-6", "kahan-li-8"):
         ready = problem(name)
-        numbers = np.tile(numbers_of(ready.model), (tops, 1))
-        starts = np.tile(ready.start, (tops, 1))
-        starts[:, 0] += np.arange(tops) * 1e-6
-        a, b = np.array(ready.scheme.drifts), np.array(ready.scheme.kicks)
+        places = ready.start[0] + np.arange(tops) * 1e-6
+        (batch,) = batches(ready.scene, {"start.position_m.0": places})
         for count in STEPS[name][:: 2 if quick else 1]:
-            ends, taken = np.empty_like(starts), np.zeros(tops, dtype=np.int64)
-            h, counts = np.full(tops, motion.DURATION / count), np.full(tops, count)
-            arguments = (ready.model, starts, numbers, h, counts, a, b, ready.escape, ends, taken)
-            advance_many(*arguments)
-            seconds = best_time(partial(advance_many, *arguments))
+            run = partial(
+                integrate_in_lanes,
+                replace(batch, scheme=ready.scheme),
+                runs_of(batch, motion.DURATION, np.full(tops, motion.DURATION / count)),
+            )
+            ends = run().states
+            seconds = best_time(run)
             yield Point(f"{name}, lanes", f"{count} steps", error_of(ends[0, :3]), tops * motion.DURATION / seconds)
-
-
-def with_estimate(quick: bool) -> Iterator[Point]:  # noqa: FBT001
-    """`simulate` as it is called: the step searched for, the error estimated, arrays made."""
-    scene = preset("undriven")
-    for tolerance in (1e-3, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)[:: 2 if quick else 1]:
-        end = simulate(scene, motion.DURATION, tolerance=tolerance, rate=None)
-        seconds = best_time(partial(simulate, scene, motion.DURATION, tolerance=tolerance, rate=None))
-        yield Point(
-            "simulate, all in all", f"tolerance {tolerance:g}", error_of(end.position[-1]), motion.DURATION / seconds
-        )

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import math
 import platform
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from levilab.benchmark.machine import processor, version_of
 from levilab.benchmark.simulator import kernel, ours
+from levilab.benchmark.simulator.as_called.comparison import cases
 from levilab.benchmark.simulator.peers import PEERS
+from levilab.benchmark.simulator.speeds import Ratio, best_speed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
+    from levilab.benchmark.simulator.as_called.comparison import Case
     from levilab.benchmark.simulator.peers import Point
 
+#: The parts of the benchmark: kernels at fixed steps, and calls of one top.
+PARTS = ("kernel", "called")
 ROUNDS = 3
 #: What is to be compared: ours, the peer, the error [m], and the ratio that was aimed at.
 AIMS = (
@@ -28,41 +33,52 @@ AIMS = (
 
 
 @dataclass(frozen=True)
-class Ratio:
-    """speed, peer_speed: simulated seconds per second for the error [m]; NaN where a side has no such point."""
-
-    ours: str
-    peer: str
-    error: float
-    speed: float
-    peer_speed: float
-    aim: float
-
-    @property
-    def ratio(self) -> float:
-        """How many times faster."""
-        return self.speed / self.peer_speed
-
-
-@dataclass(frozen=True)
 class Comparison:
-    """All points, the ratios, the kernels' rates, and the peers that are not installed."""
+    """What was measured; empty what was not.
 
-    points: tuple[Point, ...]
-    ratios: tuple[Ratio, ...]
-    rates: dict[str, kernel.Rate]
-    missing: tuple[str, ...]
+    Attributes:
+        points: of the kernels at fixed steps and the peers, on one motion.
+        ratios: of their speeds.
+        rates: of the kernels.
+        cases: motions as called.
+        missing: the peers' packages that are not installed.
+    """
+
+    points: tuple[Point, ...] = ()
+    ratios: tuple[Ratio, ...] = ()
+    rates: Mapping[str, kernel.Rate] = field(default_factory=dict)
+    cases: tuple[Case, ...] = ()
+    missing: tuple[str, ...] = ()
 
 
-def compare(*, quick: bool = False, tell: Callable[[str], None] = lambda _: None) -> Comparison:
-    """Measure everything in one process.  tell: called with what is under way.
+def compare(
+    parts: Sequence[str] = PARTS, *, quick: bool = False, tell: Callable[[str], None] = lambda _: None
+) -> Comparison:
+    """Measure everything in one process.
+
+    Args:
+        parts: of PARTS.
+        quick: fewer settings, one round.
+        tell: called with what is under way.
+    """
+    points = kernel_points(quick=quick, tell=tell) if "kernel" in parts else ()
+    return Comparison(
+        points,
+        ratios(points) if points else (),
+        kernel.rates(points) if points else {},
+        cases(quick=quick, tell=tell) if "called" in parts else (),
+        tuple(sorted({peer.package for peer in PEERS if not peer.installed})),
+    )
+
+
+def kernel_points(*, quick: bool, tell: Callable[[str], None]) -> tuple[Point, ...]:
+    """Measure the kernels at fixed steps and the peers on the undriven motion.
 
     In ROUNDS, of which each point keeps its best: a machine that slows down for a while slows every contender.
     """
     sides: dict[str, Callable[[bool], Iterable[Point]]] = {
         "one top": ours.scalar,
         "many at once": ours.many,
-        "simulate()": ours.with_estimate,
         **{peer.name: peer.points for peer in PEERS if peer.installed},
     }
     best: dict[tuple[str, str], Point] = {}
@@ -73,9 +89,7 @@ def compare(*, quick: bool = False, tell: Callable[[str], None] = lambda _: None
             for point in measure(quick):
                 key = point.method, point.setting
                 best[key] = max(point, best.get(key, point), key=lambda p: p.speed)
-    points = tuple(best.values())
-    missing = sorted({peer.package for peer in PEERS if not peer.installed})
-    return Comparison(points, ratios(points), kernel.rates(points), tuple(missing))
+    return tuple(best.values())
 
 
 def ratios(points: Sequence[Point]) -> tuple[Ratio, ...]:
@@ -90,37 +104,6 @@ def ratios(points: Sequence[Point]) -> tuple[Ratio, ...]:
     return tuple(found)
 
 
-def best_speed(points: Iterable[Point], error: float) -> float:
-    """The speed at which the best of the methods reaches an error, along the line between its points; NaN if none does.
-
-    Between two settings of a method the logarithm of the speed is taken as linear in that of the error; beyond the
-    loosest setting nothing is assumed.
-    """
-    methods: dict[str, list[Point]] = {}
-    for point in points:
-        if point.error > 0 and math.isfinite(point.error):
-            key = f"{point.method}{point.setting.partition(',')[2]}"
-            methods.setdefault(key, []).append(point)
-    return max((_between(rows, error) for rows in methods.values()), default=math.nan, key=_or_nothing)
-
-
-def _or_nothing(speed: float) -> float:
-    return 0.0 if math.isnan(speed) else speed
-
-
-def _between(rows: list[Point], error: float) -> float:
-    good = [p.speed for p in rows if p.error <= error]
-    best = max(good, default=math.nan)
-    for p in rows:
-        for q in rows:
-            if p.error <= error < q.error and q.speed > p.speed:
-                share = math.log(error / p.error) / math.log(q.error / p.error)
-                # only neighbours: nothing in between
-                if not any(p.error < r.error < q.error for r in rows):
-                    best = max(best, math.exp(math.log(p.speed) + share * math.log(q.speed / p.speed)))
-    return best
-
-
 def as_document(found: Comparison) -> dict[str, Any]:
     """Everything, with units in the names."""
     return {
@@ -129,24 +112,35 @@ def as_document(found: Comparison) -> dict[str, Any]:
         "measured_utc": datetime.now(UTC).isoformat(timespec="seconds"),
         "machine": {"processor": processor(), "system": platform.system(), "python": platform.python_version()},
         "software": {name: version_of(name) for name in ("levilab", "numba", "numpy", "scipy", "heyoka")},
-        "points": [
-            {"method": p.method, "setting": p.setting, "error_m": _finite(p.error), "simulated_s_per_s": p.speed}
-            for p in found.points
-        ],
-        "ratios": [
-            {
-                "ours": r.ours,
-                "peer": r.peer,
-                "error_m": r.error,
-                "simulated_s_per_s": _finite(r.speed),
-                "peer_simulated_s_per_s": _finite(r.peer_speed),
-                "ratio": _finite(r.ratio),
-                "aim": r.aim,
-            }
-            for r in found.ratios
-        ],
+        "points": [_point(p) for p in found.points],
+        "ratios": [_ratio(r) for r in found.ratios],
         "kernel": {name: asdict(rate) for name, rate in found.rates.items()},
+        "called": [
+            {
+                "motion": case.motion,
+                "duration_s": case.duration,
+                "points": [_point(p) for p in case.points],
+                "ratios": [_ratio(r) for r in case.ratios],
+            }
+            for case in found.cases
+        ],
         "missing": list(found.missing),
+    }
+
+
+def _point(p: Point) -> dict[str, Any]:
+    return {"method": p.method, "setting": p.setting, "error_m": _finite(p.error), "simulated_s_per_s": p.speed}
+
+
+def _ratio(r: Ratio) -> dict[str, Any]:
+    return {
+        "ours": r.ours,
+        "peer": r.peer,
+        "error_m": r.error,
+        "simulated_s_per_s": _finite(r.speed),
+        "peer_simulated_s_per_s": _finite(r.peer_speed),
+        "ratio": _finite(r.ratio),
+        "aim": r.aim,
     }
 
 

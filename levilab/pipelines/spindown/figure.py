@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont, get_font
 
 from analysis.numbers import digits
-from levilab.pipelines.spindown.laws import SHOWN_LAWS
+from levilab.pipelines.spindown.laws import SHOWN_LAWS, SYMBOLS
 from levilab.pipelines.spindown.table import tilt_part
-from levilab.present.numbers import short_name
+from levilab.present.numbers import in_words, short_name
 from levilab.present.style import STYLE, row
 
 if TYPE_CHECKING:
@@ -40,7 +40,12 @@ def spindown_figure(analysis: SpinDownAnalysis) -> Figure:
     """Readings and laws; residuals of every law; the straight lines one draws on paper, and what departs from them."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10, 12.5))
-        _draw_spin(row(figure, 0.665, 0.31)[0], analysis)
+        if len(analysis.runs) > len(MARKERS):
+            spin, by_run = row(figure, 0.665, 0.31, 2, gap=0.09)
+            _draw_spin(spin, analysis)
+            _draw_by_run(by_run, analysis)
+        else:
+            _draw_spin(row(figure, 0.665, 0.31)[0], analysis)
         _draw_residuals(figure, row(figure, 0.425, 0.15, len(SHOWN_LAWS), gap=0.055), analysis)
         _draw_straight_lines(
             figure,
@@ -64,8 +69,12 @@ def _draw_spin(axes: Axes, analysis: SpinDownAnalysis) -> None:
         _draw_outliers(axes, analysis, k)
     axes.set(xlabel="time  [s]", ylabel="spin frequency ν  [Hz]")
     together = "" if len(analysis.runs) == 1 else f" of {len(analysis.runs)} runs"
-    axes.set_title(f"Spin-down{together}: readings and drag laws{_synthetic(analysis)}", loc="left", fontsize=11)
-    axes.legend(loc="upper right", ncols=2 if len(axes.get_lines()) > 9 else 1)
+    many = len(analysis.runs) > len(MARKERS)
+    what = "" if many else ": readings and drag laws"
+    axes.set_title(f"Spin-down{together}{what}{_synthetic(analysis)}", loc="left", fontsize=11)
+    axes.legend(
+        loc="upper right", ncols=2 if len(axes.get_lines()) > 9 and not many else 1, fontsize=8 if many else None
+    )
 
 
 def _set_range(axes: Axes, analysis: SpinDownAnalysis) -> float:
@@ -84,7 +93,8 @@ def _draw_law(axes: Axes, analysis: SpinDownAnalysis, name: str) -> None:
     as_good = name in verdict.needless or (name in verdict.indistinguishable and not best)
     note = "excluded" if excluded else "fits as well" if as_good else "best" if best and verdict.decided else ""
     label = f"{name}   {SHOWN_LAWS[name].equation}" + (f"   ({note})" if note else "")
-    thick = 1.2 if len(analysis.runs) > 1 or _many(analysis) else 2.4
+    several = len(analysis.runs)
+    thick = 2.4 if several == 1 and not _many(analysis) else 1.2 if several <= len(MARKERS) else 0.4
     for k, run in enumerate(analysis.runs if best else analysis.runs[:1]):
         t = np.linspace(run.time[0], run.time[-1], 200)
         axes.plot(
@@ -96,6 +106,29 @@ def _draw_law(axes: Axes, analysis: SpinDownAnalysis, name: str) -> None:
             zorder=2.5 if best else 2.2,
             label=label if k == 0 else None,
         )
+
+
+def _draw_by_run(axes: Axes, analysis: SpinDownAnalysis) -> None:
+    """The best law's constant in each run with its u, their mean and their scatter: does it drift, is one apart?"""
+    best = analysis.combined.fit(analysis.combined.best)
+    name, mean = next(iter(best.constants.items()))
+    found = [run.fit(best.name).parameters[name] for run in analysis.runs]
+    value, u = (
+        np.array([np.nan if x is None else x for x in of]) for of in zip(*((f.value, f.u) for f in found), strict=True)
+    )
+    number = np.arange(1, len(found) + 1)
+    colour = SHOWN_LAWS[best.name].colour
+    if mean.value is not None:
+        if mean.scatter is not None:
+            axes.axhspan(mean.value - mean.scatter, mean.value + mean.scatter, color="black", alpha=0.12, linewidth=0)
+        axes.axhline(mean.value, color=colour, linewidth=1.2)
+    few = len(found) <= MOST_BARS
+    axes.errorbar(number, value, u if few else None, color=colour, linestyle="none", marker="o",
+                  markersize=3 if few else 1.5, elinewidth=0.8)  # fmt: skip
+    unit = in_words(mean.unit).replace("^−½", "$^{−1/2}$").replace("^(1−n)", "$^{1−n}$")
+    axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 4), useMathText=True)
+    axes.set(xlabel="run, in the order of the table", ylabel=f"{SYMBOLS[name]}  [{unit}]")
+    axes.set_title(f"{SYMBOLS[name]} of the {best.name} law run by run; grey: ±s", loc="left", fontsize=11)
 
 
 def _run_label(analysis: SpinDownAnalysis, k: int) -> str | None:

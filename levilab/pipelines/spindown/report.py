@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 #: Readings printed in the page; more stay in the run folder.  They stand in blocks side by side.
 MOST_READINGS, BLOCK = 200, 10
+#: Falls that are told; of more the range is.
+MOST_FALLS = 8
 #: The event that says when the top fell.
 FELL = "fell"
 
@@ -41,6 +43,11 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
     """Verdict, laws, how well they fit, the constants run by run, and the readings."""
     combined, several = analysis.combined, len(analysis.runs) > 1
     n = combined.fit(combined.best).statistics.n
+    falls = [
+        (short_name(source.name), fall)
+        for source, run in zip(analysis.sources, analysis.runs, strict=True)
+        if (fall := _fall(source, run))
+    ]
     asked = {origin.options.uncertainty for origin in analysis.origins} - {"covariance"}
     return ReportPart(
         subject="spin-down",
@@ -52,11 +59,8 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
             "several": several,
             "verdict": combined.verdict.text,
             "best": combined.best + " law" + (", the best" if combined.verdict.decided else ""),
-            "falls": [
-                (short_name(source.name), fall)
-                for source, run in zip(analysis.sources, analysis.runs, strict=True)
-                if (fall := _fall(source, run))
-            ],
+            "falls": falls,
+            "all_falls": _falls_in_short(analysis, len(falls)) if len(falls) > MOST_FALLS else "",
             "laws": _laws_table(analysis),
             "quality": quality_table(analysis, QUALITY_IN_WORDS),
             "count": count_table(analysis),
@@ -223,3 +227,10 @@ def _fall(source: Source[Readings], fit: SpinDown) -> str:
     if text is None:
         return ""
     return f"{text}; last reading that was fitted {fit.frequency[-1]:.2f} Hz at {fit.time[-1]:.1f} s"
+
+
+def _falls_in_short(analysis: SpinDownAnalysis, seen: int) -> str:
+    """Between which spins the tops fell."""
+    last = sorted(float(run.frequency[-1]) for run in analysis.runs)
+    span = f"{last[0]:.2f} Hz to {last[-1]:.2f} Hz, {last[len(last) // 2]:.2f} Hz in the middle"
+    return f"Seen in {seen} of {len(last)} runs. The last reading that was fitted is {span}"

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from levilab.simulator.kernels.columns import LANES, of_lane
 from levilab.simulator.kernels.compiled import by_type, kernel
 from levilab.simulator.kernels.paraxial import (
     Paraxial,
@@ -40,8 +41,16 @@ field_functions = by_type(
 
 
 @kernel
-def evaluate(field: Any, positions: Array, values: Array) -> None:
-    """The five functions at places of shape (n, 3) [m], written into values of shape (n, 5)."""
+def evaluate(field: Any, numbers: Array, positions: Array, values: Array) -> None:
+    """The five functions at places of shape (n, 3) [m], written into values of shape (n, 5).
+
+    numbers: of the field, shape (n, k) or (1, k).  They go through a column of memory, which keeps the compiler from
+    computing several places at once: rounding might then depend on how many there are.
+    """
+    column = np.empty(numbers.shape[1] * LANES)
     for i in range(positions.shape[0]):
+        for k in range(numbers.shape[1]):
+            column[k * LANES] = numbers[i if numbers.shape[0] > 1 else 0, k]
         x, y, z = positions[i, 0], positions[i, 1], positions[i, 2]
-        values[i, 0], values[i, 1], values[i, 2], values[i, 3], values[i, 4] = field_functions(field, z, x * x + y * y)
+        five = field_functions(of_lane(field, column, 0), z, x * x + y * y)
+        values[i, 0], values[i, 1], values[i, 2], values[i, 3], values[i, 4] = five

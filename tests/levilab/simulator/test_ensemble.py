@@ -5,6 +5,7 @@ import pytest
 
 from levilab.simulator import SceneError, SimulationError
 from levilab.simulator.ensemble import _pilots, grid, simulate_many, step_share_of
+from levilab.simulator.kernels.motion import TIME, R
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
 
@@ -132,6 +133,36 @@ def test_a_map_has_the_same_bits_however_it_is_cut(kind):
     for i, j in ((0, 0), (1, 2), (shape[0] - 1, shape[1] - 1)):
         point = {key: np.broadcast_to(values, shape)[i, j] for key, values in over.items()}
         same(simulate_many(scene, point, 1.0, step_share=share), (i, j))
+
+
+SAMPLED = {
+    "aligned": (KINDS["aligned"], {"start.spin_hz": [12.0, 24.0, 31.0]}),
+    "square": (KINDS["square"], {"drive.frequency_hz": [29.0, 31.7], "drive.off_s": [0.83, 9.0]}),
+    "triangle": (KINDS["square"], {"drive.waveform": "triangle", "drive.phase_rad": [0.3, 4.0]}),
+    "unipolar": (KINDS["square"], {"drive.waveform": "unipolar", "drive.phase_rad": [0.0, np.pi, 5.0]}),
+    "corners at samples": (KINDS["square"], {"drive.frequency_hz": [25.0, 50.0], "drive.phase_rad": 0.0}),
+    "a sine that ends": (KINDS["driven"], {"drive.off_s": [0.0, 0.5]}),
+}
+
+
+@pytest.mark.parametrize("kind", SAMPLED)
+def test_samples_are_those_of_each_top_alone(kind):
+    scene, over = SAMPLED[kind]
+    many = simulate_many(scene, over, 1.005, tolerance=1e-9, rate=100.0)
+    assert many.sample_times.tolist() == [i / 100 for i in range(101)]
+    assert many.samples.shape == (*many.survived.shape, 101, 18)
+    for i, row in enumerate(many.samples):
+        one = {key: np.broadcast_to(values, many.survived.shape)[i].item() for key, values in over.items()}
+        alone = simulate(scene.changed(one), 1.005, tolerance=1e-10, rate=100.0)
+        assert np.linalg.norm(many.position[i] - alone.position[-1]) <= many.position_error[i] + 1e-10
+        # the last one is the end, or the fall: nothing is known after it
+        n = len(alone.states) - 1
+        assert np.abs(row[:n, :12] - alone.states[:n, :12]).max() < 2e-9
+        assert row[:n, TIME] == pytest.approx(alone.time[:n], abs=1e-12)
+        assert np.all(np.isnan(row[n:]))
+    place = simulate_many(scene, over, 1.005, tolerance=1e-9, rate=100.0, columns=R, errors=False).samples
+    assert np.array_equal(place, many.samples[..., R], equal_nan=True)
+    assert simulate_many(scene, over, 0.1, errors=False).samples.shape == (*many.survived.shape, 0, 0)
 
 
 def test_the_spin_is_that_of_each_tops_own_washers():

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from levilab.simulator.ensemble import simulate_many
-from levilab.simulator.equilibrium import _disc_stiffnesses, advice, axial_field, floating_height, stability_of
+from levilab.simulator.equilibrium import (
+    _disc_stiffnesses,
+    advice,
+    axial_field,
+    floating_height,
+    stability_of,
+    windows_over,
+)
 from levilab.simulator.field import flux_density
 from levilab.simulator.model import base_field
 from levilab.simulator.scene import SceneError, preset
@@ -121,3 +128,21 @@ def test_of_a_moment_that_leans_in_a_disc_its_part_along_the_axis_counts():
     leaning = DISC.changed({"top.moment_tilt": [0.0, 0.8], "top.moment_a_m2": DISC.top.moment_a_m2 / 0.8})
     one, other = (_disc_stiffnesses(scene)(np.array([0.07, 0.073])) for scene in (DISC, leaning))
     np.testing.assert_allclose(one, other, rtol=1e-6)
+
+
+@pytest.mark.parametrize("changes", [{}, {"base.field": "paraxial-4", "top.moment_a_m2": -0.70}])
+def test_the_windows_of_many_masses_are_those_of_each(changes):
+    scene = preset("undriven").changed(changes)
+    masses = np.linspace(0.0240, 0.0256, 9)
+    found = windows_over(scene, masses)
+    assert 2 < np.isfinite(found.heights).sum() < 9
+    for i, mass in enumerate(masses):
+        one = stability_of(scene.changed({"top.mass_kg": mass}))
+        spins = one.floating.spins[0] if one.floating and one.floating.spins else (np.nan, np.nan)
+        assert found.heights[i] == pytest.approx(
+            one.floating.height if one.floating else np.nan, rel=1e-12, nan_ok=True
+        )
+        # the discriminant of the quartic loses digits as its sums do
+        assert (found.slowest[i], found.fastest[i]) == pytest.approx(spins, rel=1e-11, nan_ok=True)
+    (window,) = found.adiabatic
+    assert [window.light < mass < window.heavy for mass in masses] == np.isfinite(found.heights).tolist()

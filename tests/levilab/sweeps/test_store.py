@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
+from levilab.errors import DataError
 from levilab.files import CannotWrite
 from levilab.simulator.scene import preset
 from levilab.sweeps.plan import Axis, Plan
@@ -66,6 +68,44 @@ def test_plain_zarr_reads_arrays_coordinates_and_units(tmp_path: Path) -> None:
     assert np.array_equal(group["top.mass_kg"][:], plan().axes[1].values)
     assert group["top.mass_kg"].attrs["units"] == "kg"
     assert group.attrs["plan"]["scene"]["base"]["inner_radius_m"] == 0.03
+
+
+def test_values_are_on_the_disk_before_their_mark(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = Store.create(tmp_path / "map.zarr", plan())
+    marks: list[int] = []
+    monkeypatch.setattr(os, "fsync", lambda _: marks.append(int(made.group["done"][:].sum())))
+    for task in tasks_of(made):
+        made.write(task.chunk, made_up(task))
+    files = [
+        file for column in ("survived", "lifetime_s") for file in (tmp_path / "map.zarr" / column / "c").glob("*/*")
+    ]
+    assert len(marks) >= len(files) > made.plan.chunk_count
+    assert sorted(set(marks)) == list(range(made.plan.chunk_count))
+
+
+def test_two_processes_cannot_write_into_one_store(tmp_path: Path) -> None:
+    made = Store.create(tmp_path / "map.zarr", plan())
+    second = Store.open(tmp_path / "map.zarr", writable=True)
+    with made.locked(), pytest.raises(CannotWrite, match="another process is computing it"), second.locked():
+        pass
+    with second.locked():
+        pass
+    assert [path.name for path in tmp_path.iterdir()] == ["map.zarr"]
+
+
+def test_a_store_that_is_damaged_is_an_error_that_names_it(tmp_path: Path) -> None:
+    made = Store.create(tmp_path / "map.zarr", plan())
+    task = next(tasks_of(made))
+    made.write(task.chunk, made_up(task))
+    (file,) = (tmp_path / "map.zarr" / "lifetime_s" / "c").glob("*/*")
+    file.write_bytes(b"torn")
+    with pytest.raises(DataError, match=r"map\.zarr: a file of lifetime_s is damaged"):
+        Store.open(tmp_path / "map.zarr").load()
+    (tmp_path / "map.zarr" / "zarr.json").write_text("{", encoding="utf-8")
+    with pytest.raises(DataError, match="no store of a sweep"):
+        Store.open(tmp_path / "map.zarr")
+    with pytest.raises(DataError, match="no store of a sweep"):
+        Store.open(tmp_path / "nothing")
 
 
 def test_a_folder_that_is_there_is_not_written_over(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import signal
 import threading
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -25,12 +26,17 @@ def test_a_killed_worker_of_a_cluster_costs_no_bit(tmp_path: Path, capfd: pytest
     given = [(n, str(tmp_path)) for n in range(20)]
     with DaskCluster(workers=2) as dask:
         workers = cluster(dask.address)
-        found = {done.task[0]: done.result for done in results_of(tasks.die_at_three_once, given, workers)}
+        found, speaks = {}, []
+        for done in results_of(tasks.die_at_three_once, given, workers):
+            found[done.task[0]] = done.result
+            speaks.append(logging.getLogger("distributed.client").isEnabledFor(logging.ERROR))
         assert (tmp_path / "died").exists()
         errors = [str(done.error) for done in results_of(tasks.refuse_seven, range(10), workers)]
     assert found == {n: tasks.noise(n) for n in range(20)}
     assert errors.count("seven is refused") == 1
     assert capfd.readouterr().err == ""
+    assert not any(speaks)
+    assert logging.getLogger("distributed.client").isEnabledFor(logging.ERROR)  # again
 
 
 def test_a_lost_scheduler_ends_the_work_at_once(capfd: pytest.CaptureFixture[str]) -> None:

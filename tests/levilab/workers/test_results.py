@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import itertools
 import os
 import signal
@@ -89,6 +90,12 @@ def test_a_function_that_cannot_be_sent_is_refused() -> None:
         list(results_of(lambda task: task, [0], processes(1)))
 
 
+def test_a_function_of_the_script_that_runs_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tasks.square, "__module__", "__main__")
+    with pytest.raises(LevilabError, match="put it into a module"):
+        list(results_of(functools.partial(tasks.square), [0], processes(1)))
+
+
 def test_a_worker_with_other_versions_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     here = packing.version_of
     monkeypatch.setattr(packing, "version_of", lambda name: "0.1" if name == "numba" else here(name))
@@ -123,6 +130,7 @@ def wait_until_at_work(*conversations: Connection) -> list[int]:
 
 def wait_until_dead(conversation: Connection) -> None:
     """The operating system closes the conversations of a process that has ended."""
+    assert conversation.poll(HANG_GUARD_S)
     with pytest.raises((EOFError, ConnectionError)):
         conversation.recv()
 
@@ -151,10 +159,12 @@ list(results_of(wait_for_ever, [{address}] * 2, processes(2)))
 """
 
 
-def test_workers_do_not_outlive_a_killed_parent() -> None:
+def test_workers_do_not_outlive_a_killed_parent(tmp_path: Path) -> None:
     with Listener(("127.0.0.1", 0)) as listener:
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-        command = [sys.executable, "-c", PARENT.format(address=listener.address)]
+        script = tmp_path / "script.py"  # without `if __name__ == "__main__"`
+        script.write_text(PARENT.format(address=listener.address), encoding="utf-8")
+        command = [sys.executable, script]
         with (
             subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL) as parent,
             listener.accept() as one,

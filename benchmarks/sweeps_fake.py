@@ -1,0 +1,27 @@
+"""Stand-ins for the work of a chunk, for `sweeps.py`: worker processes import them from here."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from levilab.sweeps.observables import columns_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from levilab.sweeps.run import Task
+
+
+def nothing(number: int) -> int:
+    return number
+
+
+def fake_chunk(task: Task) -> dict[str, NDArray[Any]]:
+    """Numbers of the right shape and type, without a simulation."""
+    rng = np.random.default_rng(task.chunk.number)
+    return {
+        column.name: (rng.normal(size=task.chunk.shape) * 10).astype(column.dtype)
+        for column in columns_of(task.plan.observables)
+    }

@@ -1,0 +1,223 @@
+"""The table's files: rows are appended to a CSV as they come, and published in the order of the inputs at the end.
+
+Beside the table FILE lies FILE.json: what it was made with, and what its columns mean.  Until it is whole the rows are
+in FILE.part.csv, in the order in which they were finished, so that a process that is killed loses the last row at most.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from importlib.util import find_spec
+from itertools import islice
+from typing import TYPE_CHECKING, Any, Self
+
+from levilab.errors import DataError, UsageError
+from levilab.files import parse_json, replace_atomically, replacing, writing
+from levilab.pipelines.row import text_of, value_of_text
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+    from pathlib import Path
+
+    from levilab.pipelines.row import Cell, Column
+
+SCHEMA = "levilab-table/1"
+CSV, PARQUET = ".csv", ".parquet"
+#: Rows of a row group: so many are in memory while a Parquet file is written.
+GROUP = 1000
+_ELSEWHERE = "choose another place with `table`"
+
+
+def check_name(table: Path) -> None:
+    """Raise UsageError for a table that cannot be written: that is said before hours of work, not after."""
+    kind = table.suffix.casefold()
+    if kind not in {CSV, PARQUET}:
+        raise UsageError("table", "a name that ends in .csv or .parquet is expected", value=table)
+    if kind == PARQUET and find_spec("pyarrow") is None:
+        what = "Parquet needs pyarrow: pip install 'levilab[parquet]', or name a table that ends in .csv"
+        raise UsageError("table", what, value=table)
+    if table.is_dir():
+        raise UsageError("table", "is a folder; the name of a file is expected", value=table)
+
+
+class TableFile:
+    """A table under way.
+
+    Args:
+        table: the file that it becomes.
+        columns: of the table; the first one is the path.
+        made_with: analysis, options and versions: rows that were made with others do not belong into it.
+    """
+
+    def __init__(self, table: Path, columns: Sequence[Column], made_with: dict[str, Any]) -> None:
+        self.table = table
+        self.part = table.with_name(f"{table.name}.part.csv")
+        self._about_part = table.with_name(f"{table.name}.part.json")
+        self._about = table.with_name(f"{table.name}.json")
+        self._columns = tuple(columns)
+        self._made_with = made_with
+        self._places: dict[str, int] = {}
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def __contains__(self, path: str) -> bool:
+        return path in self._places
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+
+    def open(self, *, resume: bool) -> Self:
+        """Begin, or go on with the rows of an earlier call.
+
+        Args:
+            resume: whether rows of an earlier call that was interrupted, or of the whole table, are kept.
+
+        Raises:
+            UsageError: rows of an earlier call were not asked for, or were made with other options.
+            CannotWrite: the place cannot be written to.
+        """
+        there = self.part.exists()
+        if there and not resume:
+            what = f"{self.part} holds runs of an analysis that was interrupted: go on with it (`resume`), or remove it"
+            raise UsageError("table", what, value=self.table)
+        with writing(f"{self.table}: could not be written", _ELSEWHERE):
+            self.table.parent.mkdir(parents=True, exist_ok=True)
+            if there and resume:
+                self._must_be_alike(self._about_part, self.part)
+                self._cut_torn_line()
+                self._file = self.part.open("r+b")
+                self._find_rows()
+            else:
+                earlier = self._earlier_rows() if resume and self.table.exists() else iter(())
+                replace_atomically(self._about_part, self._description())
+                self._file = self.part.open("x+b")
+                self._file.write(_line([column.name for column in self._columns]))
+                for cells in earlier:
+                    self.add(cells)
+        return self
+
+    def add(self, cells: Sequence[Cell]) -> None:
+        """Append a row; it is with the operating system before this returns.  Raises CannotWrite."""
+        with writing(f"{self.part}: could not be written", "make room, and go on with `resume`"):
+            place = self._file.tell()
+            self._file.write(_line([text_of(cell) for cell in cells]))
+            self._file.flush()
+        self._places[str(cells[0])] = place
+
+    def publish(self, paths: Iterable[str]) -> None:
+        """Write the table, its rows in the order of the paths, those without a row passed over.  Raises CannotWrite."""
+        with writing(f"{self.table}: could not be written, the rows are in {self.part}", _ELSEWHERE):
+            rows = self._rows(paths)
+            with replacing(self.table) as file:
+                if self.table.suffix.casefold() == PARQUET:
+                    self._write_parquet(file, rows)
+                else:
+                    file.write(_line([column.name for column in self._columns]))
+                    file.writelines(rows)
+            replace_atomically(self._about, self._description())
+            self._file.close()
+            self._about_part.unlink()
+            self.part.unlink()
+
+    def _rows(self, paths: Iterable[str]) -> Iterator[bytes]:
+        for path in paths:
+            if (place := self._places.get(path)) is not None:
+                self._file.seek(place)
+                yield self._file.readline()
+
+    def _write_parquet(self, file: Any, rows: Iterator[bytes]) -> None:
+        """In groups of rows, so that memory does not grow with the table."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        types = {"number": pa.float64(), "count": pa.int64(), "truth": pa.bool_(), "text": pa.string()}
+        fields = [
+            pa.field(column.name, types[column.kind], metadata={"meaning": column.meaning}) for column in self._columns
+        ]
+        schema = pa.schema(fields, metadata={"levilab": self._description()})
+        with pq.ParquetWriter(file, schema) as writer:
+            while group := list(islice(rows, GROUP)):
+                values = [self._values(line) for line in group]
+                arrays = [
+                    pa.array(column, field.type)
+                    for column, field in zip(zip(*values, strict=True), fields, strict=True)
+                ]
+                writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
+
+    def _values(self, line: bytes) -> list[Cell]:
+        texts = next(csv.reader([line.decode("utf-8")]))
+        return [value_of_text(text, column.kind) for text, column in zip(texts, self._columns, strict=True)]
+
+    # --- what an earlier call left ---
+
+    def _description(self) -> str:
+        columns = [{"name": column.name, "kind": column.kind, "meaning": column.meaning} for column in self._columns]
+        about = {"schema": SCHEMA, **self._made_with, "columns": columns}
+        return json.dumps(about, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+    def _must_be_alike(self, about: Path, rows: Path) -> None:
+        """Raise UsageError unless rows were made with the same options and versions."""
+        try:
+            theirs = parse_json(about.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            what = f"{about} says what {rows} was made with, and cannot be read ({error}): start anew, without it"
+            raise UsageError("resume", what) from error
+        ours = parse_json(self._description())
+        other = [key for key in ours if not isinstance(theirs, dict) or theirs.get(key) != ours[key]]
+        if other:
+            what = f"{rows} was made with other {' and '.join(other)}: give the same, or another `table`"
+            raise UsageError("resume", what)
+
+    def _cut_torn_line(self) -> None:
+        """Drop what a killed process left of its last row."""
+        with self.part.open("r+b") as file:
+            whole = 0
+            for line in file:
+                whole += len(line) if line.endswith(b"\n") else 0
+            if not whole:
+                file.seek(0)
+                whole = file.write(_line([column.name for column in self._columns]))
+            file.truncate(whole)
+
+    def _find_rows(self) -> None:
+        """Note where each path's row begins, and stand at the end."""
+        place = len(self._file.readline())
+        for line in self._file:
+            try:
+                values = self._values(line)
+            except (ValueError, csv.Error, StopIteration) as error:
+                raise DataError(f"{self.part}: a row is damaged ({error}): remove the file and start anew") from error
+            self._places[str(values[0])] = place
+            place += len(line)
+        self._file.seek(place)
+
+    def _earlier_rows(self) -> Iterator[list[Cell]]:
+        """The rows of the whole table of an earlier call, but for runs that were not at their end then."""
+        self._must_be_alike(self._about, self.table)
+        status = [column.name for column in self._columns].index("status")
+        rows = self._of_parquet() if self.table.suffix.casefold() == PARQUET else self._of_csv()
+        return (cells for cells in rows if cells[status] != "running")
+
+    def _of_csv(self) -> Iterator[list[Cell]]:
+        with self.table.open("rb") as file:
+            file.readline()
+            yield from map(self._values, file)
+
+    def _of_parquet(self) -> Iterator[list[Cell]]:
+        import pyarrow.parquet as pq
+
+        with pq.ParquetFile(self.table) as file:
+            for batch in file.iter_batches(batch_size=GROUP):
+                yield from (list(row.values()) for row in batch.to_pylist())
+
+
+def _line(texts: Sequence[str]) -> bytes:
+    written = io.StringIO()
+    csv.writer(written, lineterminator="\n").writerow(texts)
+    return written.getvalue().encode("utf-8", errors="replace")

@@ -1,0 +1,155 @@
+"""One input → its row: a pure function of the input and the options, for any process."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from levilab.errors import DataError, DoesNotSuit, unquoted
+from levilab.files import CannotWrite
+from levilab.formats.waveforms.header import NoRate
+from levilab.pipelines.catalogue import ANALYSES, Analysis, save
+from levilab.pipelines.result import relative
+from levilab.pipelines.row import Cell, Column, Kind, plain
+from levilab.runs.run import Run
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from levilab.pipelines.sources import InputOptions
+
+
+@dataclass(frozen=True)
+class Task:
+    """One input.
+
+    Attributes:
+        path: a run folder or a data file.
+        is_run: which of them.
+        searched: it was found in a folder, so that what does not suit is passed over; else that is a failure.
+        analysis: by its name.
+        options: of the analysis.
+        folder: of the table, from which the paths in it lead.
+        save: whether result.json is written beside the input.
+    """
+
+    path: Path
+    is_run: bool
+    searched: bool
+    analysis: str
+    options: InputOptions
+    folder: Path
+    save: bool = False
+
+
+@dataclass(frozen=True)
+class Row:
+    """The row of an input.
+
+    Attributes:
+        cells: one for each column of `columns_of`.
+        problem: why it could not be analyzed; empty if it was.
+        sha256: of its readings; None where there are none.
+    """
+
+    cells: tuple[Cell, ...]
+    problem: str
+    sha256: str | None
+
+
+@dataclass(frozen=True)
+class PassedOver:
+    """An input that does not belong into the table.
+
+    Attributes:
+        why: as "a trace run"; empty for a file that is of no concern.
+    """
+
+    why: str
+
+
+def _given(name: str, kind: Kind, meaning: str) -> Column:
+    return Column(name, kind, meaning, lambda about: about.get(name))
+
+
+#: What the table says of each input beside the analysis, before its columns and after them.
+HEAD = (
+    _given("path", "text", "run folder or data file, from the table's folder"),
+    _given("started_utc", "text", "when the run began, as in run.json"),
+    _given("experiment", "text", "of the run"),
+    _given("status", "text", "finished, interrupted, failed, or running when it was analyzed"),
+    _given("synthetic", "truth", "whether any of it was simulated or made up; empty for a data file"),
+    _given("readings_sha256", "text", "of the file with the readings"),
+)
+TAIL = (
+    _given("warnings", "count", "warnings that levilab analyze gives for the input by itself"),
+    _given("problem", "text", "why it could not be analyzed; the analysis's columns are empty then"),
+)
+
+
+def columns_of(analysis: Analysis[Any]) -> tuple[Column, ...]:
+    """The columns of the table."""
+    return (*HEAD, *analysis.row, *TAIL)
+
+
+def analyze_one(task: Task) -> Row | PassedOver:
+    """Analyze one input by itself; what is wrong with it stands in its row, and raises nothing."""
+    analysis = ANALYSES[task.analysis]
+    about: dict[str, Any] = {"path": relative(task.path, task.folder)}
+    part: dict[str, Any] | None = None
+    try:
+        if task.is_run and (passed_over := _look(task, analysis, about)):
+            return passed_over
+        part = _analyze(task, analysis, about)
+    except DoesNotSuit as error:
+        if task.searched and not task.is_run:
+            return PassedOver(unquoted(str(error)) if isinstance(error, NoRate) else "")
+        about["problem"] = str(error)
+    except (DataError, CannotWrite, OSError) as error:
+        about["problem"] = str(error)
+    except MemoryError:
+        about["problem"] = "memory ran out: analyze it alone, or record less at a time"
+    except Exception as error:  # noqa: BLE001 - a defect of ours in one run is no reason to lose thousands of others
+        about["problem"] = f"a defect of levilab, please report it: {type(error).__name__}: {error}"
+    return row(analysis, about, part)
+
+
+def row(analysis: Analysis[Any], about: dict[str, Any], part: dict[str, Any] | None) -> Row:
+    """The row from what is known of the input, and from its part of result.json, None where there is none."""
+    if problem := about.get("problem", ""):
+        about["problem"] = problem = " ".join(unquoted(problem).split())
+    cells = (
+        *(plain(column.read(about), column.kind) for column in HEAD),
+        *(None if part is None else plain(column.read(part), column.kind) for column in analysis.row),
+        *(plain(column.read(about), column.kind) for column in TAIL),
+    )
+    return Row(cells, problem, about.get("readings_sha256"))
+
+
+def _look(task: Task, analysis: Analysis[Any], about: dict[str, Any]) -> PassedOver | None:
+    """Note what run.json says; return what keeps a run out of the table.  Raises DataError."""
+    run = Run.load(task.path)
+    about |= {
+        "started_utc": run.record.started_utc,
+        "experiment": run.record.experiment,
+        "status": run.status,
+        "synthetic": run.record.synthetic,
+    }
+    if not task.searched:
+        return None
+    if run.continued_in:
+        return PassedOver("a run that was broken off and goes on in another folder")
+    return None if analysis.needs.take(run) else PassedOver(f"a {run.record.experiment} run")
+
+
+def _analyze(task: Task, analysis: Analysis[Any], about: dict[str, Any]) -> dict[str, Any]:
+    """Return the input's part of result.json.  Raises DataError, CannotWrite."""
+    options = replace(task.options, guess=False) if task.searched and not task.is_run else task.options
+    found = analysis.analyze([task.path], options)
+    about["readings_sha256"] = found.sources[0].sha256
+    document = analysis.document(found, task.path.parent)
+    about["warnings"] = len(document["warnings"])
+    if task.save:
+        save(analysis, found, with_figure=False)
+    part: dict[str, Any] = document["runs"][0]
+    return part

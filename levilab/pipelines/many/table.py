@@ -1,0 +1,166 @@
+"""Many inputs → one table, in parallel; a failure is a row, and ends nothing."""
+
+from __future__ import annotations
+
+from collections import Counter
+from contextlib import closing
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from levilab.errors import DataError, NoneUsable
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.many.file import TableFile, check_name
+from levilab.pipelines.many.one import PassedOver, Row, Task, analyze_one, columns_of, row
+from levilab.pipelines.result import relative
+from levilab.pipelines.sources import data_files
+from levilab.runs.run import RECORD, find_run, find_runs
+from levilab.software import software_versions
+from levilab.workers import processes, results_of, this_process
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from pathlib import Path
+
+    from levilab.pipelines.catalogue import Analysis
+    from levilab.workers import Done
+
+#: Failures that are kept for messages; all stand in the table.
+MOST_FAILURES = 10
+
+
+@dataclass
+class Tally:
+    """How far a table is.
+
+    Attributes:
+        total: inputs that were found.
+        kept: rows of an earlier call.
+        done: inputs that are dealt with, those of an earlier call included.
+        failed: of the rows of this call.
+        failures: the first of them, (path, problem).
+        left_out: inputs that do not belong into the table.
+        passed_over: why → how many of them; not of files that are of no concern.
+        same: rows of this call with the same readings as another one.
+    """
+
+    total: int
+    kept: int = 0
+    done: int = 0
+    failed: int = 0
+    failures: list[tuple[str, str]] = field(default_factory=list)
+    left_out: int = 0
+    passed_over: Counter[str] = field(default_factory=Counter)
+    same: int = 0
+    _seen: set[str] = field(default_factory=set)
+
+    @property
+    def rows(self) -> int:
+        """Rows of the table."""
+        return self.done - self.left_out
+
+    def count(self, outcome: Row | PassedOver) -> None:
+        """Count an input."""
+        self.done += 1
+        if isinstance(outcome, PassedOver):
+            self.left_out += 1
+            if outcome.why:
+                self.passed_over[outcome.why] += 1
+            return
+        if outcome.problem:
+            self.failed += 1
+            if len(self.failures) < MOST_FAILURES:
+                self.failures.append((str(outcome.cells[0]), outcome.problem))
+        if outcome.sha256:
+            self.same += outcome.sha256 in self._seen
+            self._seen.add(outcome.sha256)
+
+
+def write_table(
+    analysis: Analysis[Any],
+    paths: Sequence[Path],
+    given: Mapping[str, Any],
+    table: Path,
+    *,
+    cores: int | None = None,
+    resume: bool = False,
+    save: bool = False,
+    show: Callable[[Tally], None] = lambda _: None,
+) -> Tally:
+    """Analyze each input by itself, and write a row of each into a table; its rows are in the order of the paths.
+
+    Args:
+        analysis: a row of the catalogue.
+        paths: run folders, data files, folders to search.
+        given: options by their names.
+        table: the file, which ends in .csv or .parquet.
+        cores: processes that analyze, 1: this one alone; None: one for each core.
+        resume: whether rows of an earlier call are kept, and only the other inputs analyzed.
+        save: whether a result.json, without its figure, is written beside each input.
+        show: called after each input.
+
+    Raises:
+        DataError: no input was found.
+        UsageError: of the table's name, or an earlier call had other options.
+        CannotWrite: of the table.
+    """
+    check_name(table)
+    options = analysis.options_from(given)
+    tasks = [
+        Task(path, is_run, searched, analysis.name, options, table.parent, save)
+        for path, is_run, searched in inputs(paths)
+    ]
+    if not tasks:
+        raise NoneUsable(f"{paths[0]}: holds no run and no data file; name run folders, or a folder with some of them")
+    names = {task.path: relative(task.path, table.parent) for task in tasks}
+    made_with = {
+        "analysis": analysis.name,
+        "settings": analysis.result.settings(options).model_dump(mode="json", by_alias=True),
+        "software": software_versions(),
+    }
+    tally = Tally(len(tasks))
+    with TableFile(table, columns_of(analysis), made_with).open(resume=resume) as file:
+        left = [task for task in tasks if names[task.path] not in file]
+        tally.kept = tally.done = len(tasks) - len(left)
+        show(tally)
+        workers = this_process() if cores == 1 or len(left) == 1 else processes(cores)
+        with closing(results_of(analyze_one, left, workers)) as results:
+            for done in results:
+                outcome = _outcome(done)
+                if isinstance(outcome, Row):
+                    file.add(outcome.cells)
+                tally.count(outcome)
+                show(tally)
+        file.publish(names[task.path] for task in tasks)
+    return tally
+
+
+def _outcome(done: Done[Task, Row | PassedOver]) -> Row | PassedOver:
+    """What came of an input; one that killed its processes has a row that says so."""
+    if done.result is not None:
+        return done.result
+    task = done.task
+    about = {"path": relative(task.path, task.folder), "problem": f"its analysis ended its process: {done.error}"}
+    return row(ANALYSES[task.analysis], about, None)
+
+
+def inputs(paths: Sequence[Path]) -> Iterator[tuple[Path, bool, bool]]:
+    """Each input once, with whether it is a run and whether a search found it: in the order of the paths, by name.
+
+    Raises DataError for a path that does not exist.
+    """
+    seen = set()
+    for path in map(find_run, paths):
+        if not path.exists():
+            raise DataError(f"{path}: there is no such file or folder")
+        for found in _below(path):
+            if found[0] not in seen:
+                seen.add(found[0])
+                yield found
+
+
+def _below(path: Path) -> Iterator[tuple[Path, bool, bool]]:
+    if not path.is_dir() or (path / RECORD).exists():
+        yield path, path.is_dir(), False
+        return
+    found = [*((run, True, True) for run in find_runs(path)), *((file, False, True) for file in data_files(path))]
+    yield from sorted(found, key=lambda one: one[0].parts)

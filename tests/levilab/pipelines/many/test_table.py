@@ -1,0 +1,232 @@
+"""Many runs become one table, whatever becomes of some of them; the processes are really started once."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import pyarrow.parquet as pq
+import pytest
+
+from levilab.errors import UsageError, WorkersLost
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.many import table as many
+from levilab.pipelines.many.one import PassedOver, Row, Task, analyze_one, columns_of
+from levilab.pipelines.many.table import Tally, write_table
+from levilab.workers import Done
+from many_runs import make_runs
+from support.commands import command
+from support.paths import SAMPLE_DATA
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+SPINDOWN = ANALYSES["spindown"]
+COUNT = 8
+
+
+@pytest.fixture
+def runs(tmp_path: Path) -> Path:
+    """Eight runs of which each second one is broken, each in its way."""
+    make_runs(tmp_path / "runs", COUNT, broken=2)
+    return tmp_path / "runs"
+
+
+def tabulate(runs: Path, name: str = "all.csv", given: dict[str, Any] | None = None, **options: Any) -> Path:
+    """The table of a folder, made in this process unless it is said otherwise."""
+    file = runs.parent / name
+    write_table(SPINDOWN, [runs], given or {}, file, **({"cores": 1} | options))
+    return file
+
+
+def rows_of(file: Path) -> list[dict[str, str]]:
+    with file.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def interrupt_after(count: int, tally: Tally) -> None:
+    if tally.done == count:
+        raise KeyboardInterrupt
+
+
+def test_a_run_is_a_row_and_a_broken_one_says_why(runs: Path) -> None:
+    rows = rows_of(tabulate(runs))
+    assert [row["path"] for row in rows] == [f"runs/{folder.name}" for folder in sorted(runs.iterdir())]
+    assert [bool(row["problem"]) for row in rows] == [False, True] * (COUNT // 2)
+    said = [row["problem"] for row in rows[1::2]]
+    for text, expected in zip(said, ("not JSON", "no readings.csv", "2 readings", "times must increase"), strict=True):
+        assert expected in text
+    assert not any(rows[3][column.name] for column in SPINDOWN.row)
+    assert (rows[3]["status"], rows[3]["synthetic"]) == ("finished", "true")
+
+
+def test_a_row_says_what_the_result_of_the_run_says(runs: Path) -> None:
+    row = rows_of(tabulate(runs))[0]
+    folder = runs.parent / row["path"]
+    printed = json.loads(command("analyze", "spindown", folder, "--no-save", "--json", cwd=runs).out)
+    disc = next(model for model in printed["models"] if model["name"] == "disc")
+    assert float(row["disc_c32_per_sqrt_rad_s"]) == disc["parameters"]["c32"]["value"]
+    assert float(row["disc_c32_u_per_sqrt_rad_s"]) == disc["parameters"]["c32"]["u"]
+    assert float(row["disc_reduced_chi_square"]) == disc["statistics"]["reduced_chi_square"]
+    assert (row["best_model"], row["verdict"]) == (printed["best_model"], printed["verdict"])
+    assert row["readings_sha256"] == printed["inputs"][0]["sha256"]
+    assert int(row["warnings"]) == len(printed["warnings"])
+    assert not [*runs.glob("*/*result*")]
+
+
+def test_the_table_does_not_depend_on_the_number_of_processes(runs: Path) -> None:
+    assert tabulate(runs, "two.csv", cores=2).read_bytes() == tabulate(runs, "one.csv").read_bytes()
+
+
+def test_a_table_that_was_interrupted_goes_on(runs: Path) -> None:
+    whole = tabulate(runs, "whole.csv").read_bytes()
+    with pytest.raises(KeyboardInterrupt):
+        tabulate(runs, show=partial(interrupt_after, 3))
+    part = runs.parent / "all.csv.part.csv"
+    assert len(rows_of(part)) == 3
+    with part.open("ab") as file:
+        file.write(b"runs/torn,2026")  # as after a kill under way
+    seen: list[int] = []
+    assert tabulate(runs, resume=True, show=lambda tally: seen.append(tally.done)).read_bytes() == whole
+    assert seen == [*range(3, COUNT + 1)]
+    assert not part.exists()
+
+
+def test_rows_of_hours_are_not_replaced_unasked(runs: Path) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        tabulate(runs, show=partial(interrupt_after, 3))
+    with pytest.raises(UsageError, match="go on with it"):
+        tabulate(runs)
+    with pytest.raises(UsageError, match="other settings"):
+        tabulate(runs, given={"keep_outliers": True}, resume=True)
+    assert len(rows_of(runs.parent / "all.csv.part.csv")) == 3
+
+
+@pytest.mark.parametrize("name", ["all.csv", "all.parquet"])
+def test_of_runs_that_came_later_only_those_are_analyzed(runs: Path, name: str) -> None:
+    last = max(runs.iterdir())
+    shutil.move(last, runs.parent)
+    tabulate(runs, name)
+    shutil.move(runs.parent / last.name, last)
+    seen: list[int] = []
+    grown = tabulate(runs, name, resume=True, show=lambda tally: seen.append(tally.done))
+    assert seen == [COUNT - 1, COUNT]
+    if name.endswith(".csv"):
+        assert grown.read_bytes() == tabulate(runs, "anew.csv").read_bytes()
+    else:
+        assert pq.read_table(grown).equals(pq.read_table(tabulate(runs, "anew.parquet")))
+
+
+def test_parquet_holds_the_same_numbers_with_their_types(runs: Path) -> None:
+    texts, table = rows_of(tabulate(runs)), pq.read_table(tabulate(runs, "all.parquet"))
+    assert table.column_names == [column.name for column in columns_of(SPINDOWN)] == list(texts[0])
+    exponents = table["power_exponent"].to_pylist()
+    assert exponents == [float(row["power_exponent"]) if row["power_exponent"] else None for row in texts]
+    first = table.slice(0, 1).to_pylist()[0]
+    assert (first["synthetic"], first["outliers"], first["best_model"]) == (True, 0, texts[0]["best_model"])
+
+
+def test_a_run_that_kills_its_process_is_a_row_and_no_end(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def results(function: Any, tasks: list[Task], *_: Any) -> Iterator[Done[Task, Any]]:
+        yield Done(tasks[2], error=WorkersLost("the process that does it died 3 times"))
+        yield from (Done(task, function(task)) for task in tasks if task is not tasks[2])
+
+    monkeypatch.setattr(many, "results_of", results)
+    rows = rows_of(tabulate(runs))
+    assert "died 3 times" in rows[2]["problem"]
+    assert len(rows) == COUNT
+
+
+@pytest.mark.parametrize("raised", [MemoryError(), ZeroDivisionError("by zero")])
+def test_what_no_run_should_cause_stands_in_its_row(
+    runs: Path, monkeypatch: pytest.MonkeyPatch, raised: Exception
+) -> None:
+    def analyze(*_: object) -> None:
+        raise raised
+
+    monkeypatch.setattr(type(SPINDOWN), "analyze", analyze)
+    found = analyze_one(Task(min(runs.iterdir()), True, True, "spindown", SPINDOWN.options_from({}), runs))
+    assert isinstance(found, Row)
+    assert ("memory ran out" if isinstance(raised, MemoryError) else "ZeroDivisionError: by zero") in found.problem
+
+
+@pytest.mark.parametrize(
+    ("name", "sample"),
+    [("spin", "trace-laser"), ("field", "field-scan"), ("limit", "upper-limits"), ("precession", "precession-sweep")],
+)
+def test_every_analysis_fills_its_columns(name: str, sample: str) -> None:
+    analysis = ANALYSES[name]
+    task = Task(SAMPLE_DATA / sample, True, True, name, analysis.options_from({}), SAMPLE_DATA)
+    row = analyze_one(task)
+    assert isinstance(row, Row)
+    empty = {column.name for column, cell in zip(columns_of(analysis), row.cells, strict=True) if cell is None}
+    assert empty == {"problem", "started_utc"}  # which the samples leave out
+
+
+def test_what_does_not_suit_is_passed_over_and_counted(tmp_path: Path) -> None:
+    shutil.copytree(SAMPLE_DATA / "trace-laser", tmp_path / "runs" / "trace")
+    shutil.copytree(SAMPLE_DATA / "spin-down-1", tmp_path / "runs" / "one")
+    shutil.copytree(SAMPLE_DATA / "spin-down-1", tmp_path / "runs" / "two")
+    (tmp_path / "runs" / "notes.csv").write_text("day,who\n1,me\n2,you\n", encoding="utf-8")
+    printed = json.loads(
+        command("analyze", "spindown", "runs", "--table", "t.csv", "--cores", "1", "--json", cwd=tmp_path).out
+    )
+    assert printed == {
+        "table": "t.csv", "rows": 2, "failed": 0, "kept": 0, "passed_over": {"a trace run": 1}, "same_readings": 1,
+    }  # fmt: skip
+
+
+def test_save_writes_a_result_beside_each_run_and_no_figure(runs: Path) -> None:
+    ended = command("analyze", "spindown", "runs", "--table", "t.csv", "--cores", "1", "--save", cwd=runs.parent)
+    assert (ended.status, ended.out.split(";")[1].strip()) == (0, "4 could not be analyzed")
+    assert len([*runs.glob("*/result.json")]) == COUNT // 2
+    assert not [*runs.glob("*/*.png")]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["runs", "--table", "t.csv"], "name it, as levilab analyze spindown runs --table t.csv"),
+        (["spindown", "runs", "--table", "t.xlsx"], "--table t.xlsx: a name that ends in .csv or .parquet is expected"),
+        (["spindown", "runs", "--table", "t.csv", "--out", "x"], "--out: does not go with --table"),
+        (["spindown", "runs", "--cores", "2"], "--cores: goes with --table alone"),
+    ],
+)
+def test_wrong_words_are_refused(runs: Path, words: list[str], said: str) -> None:
+    ended = command("analyze", *words, cwd=runs.parent)
+    assert ended.status == 2
+    assert said in ended.err
+
+
+def test_a_missing_parquet_library_is_named_before_the_work(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("levilab.pipelines.many.file.find_spec", lambda _: None)
+    ended = command("analyze", "spindown", "runs", "--table", "t.parquet", cwd=runs.parent)
+    assert ended.status == 2
+    assert "pip install 'levilab[parquet]'" in ended.err
+
+
+def test_a_table_without_any_sound_run_ends_with_a_failure(runs: Path) -> None:
+    for folder in sorted(runs.iterdir())[::2]:
+        shutil.rmtree(folder)
+    ended = command("analyze", "spindown", "runs", "--table", "t.csv", "--cores", "1", cwd=runs.parent)
+    assert ended.status == 1
+    assert "none of 4 runs could be analyzed" in ended.err
+    assert len(rows_of(runs.parent / "t.csv")) == 4
+
+
+def test_ctrl_c_says_where_the_rows_are(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Tally, "count", lambda tally, _: interrupt_after(0, tally))
+    ended = command("analyze", "spindown", "runs", "--table", "t.csv", "--cores", "1", cwd=runs.parent)
+    assert ended.status == 130
+    assert "the rows so far are in t.csv.part.csv" in ended.err
+    assert len(rows_of(runs.parent / "t.csv.part.csv")) == 1
+
+
+def test_a_file_of_no_concern_is_passed_over_in_silence(tmp_path: Path) -> None:
+    (tmp_path / "notes.csv").write_text("day,who\n1,me\n2,you\n", encoding="utf-8")
+    task = Task(tmp_path / "notes.csv", False, True, "spindown", SPINDOWN.options_from({}), tmp_path)
+    assert analyze_one(task) == PassedOver("")

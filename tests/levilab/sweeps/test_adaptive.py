@@ -1,0 +1,130 @@
+"""An adaptive map in its store: right where it is computed, marked where not, the same however it came about."""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from levilab.errors import UsageError
+from levilab.simulator.ensemble import grid, step_share_of
+from levilab.simulator.scene import preset
+from levilab.sweeps import adaptive
+from levilab.sweeps.adaptive import FOUND, begin_adaptive, in_words, run_adaptive
+from levilab.sweeps.observables import observe
+from levilab.sweeps.plan import Axis, Plan
+from levilab.sweeps.store import Store
+from levilab.workers import this_process, threads
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+SCENE = preset("undriven").changed({"start.place": "given"})
+
+
+def plan(spins: int, masses: int, duration: float = 3.0) -> Plan:
+    """The upper edge, with its islands."""
+    axes = (
+        Axis("start.spin_hz", np.linspace(46, 94, spins)),
+        Axis("top.mass_kg", np.linspace(0.0251, 0.0259, masses)),
+    )
+    made = Plan.of(SCENE, axes, ("survived", "lifetime_s"), duration)
+    share = step_share_of(SCENE, grid({axis.key: axis.values for axis in axes}), duration, tolerance=1e-6)
+    return replace(made, step_share=share)
+
+
+def made_up(task: Any) -> dict[str, np.ndarray]:
+    """An edge and an island that cost nothing."""
+    spin, mass = task.values["start.spin_hz"], 1e5 * task.values["top.mass_kg"]
+    return {"survived": (spin < 65) | ((spin - 80) ** 2 + (mass - 2550) ** 2 < 9), "lifetime_s": spin + mass}
+
+
+def test_a_map_with_islands_agrees_with_the_full_one_within_its_limit() -> None:
+    asked = plan(61, 41)
+    store = Store.create(None, asked)
+    begin_adaptive(store, stride=4, audit=60)
+    report = run_adaptive(store, this_process())
+    found = store.load()
+    full = observe(asked, grid({axis.key: axis.values for axis in asked.axes}))
+    for name in ("survived", "lifetime_s"):  # to the last bit, in whatever company a point was computed
+        assert found.values[name][found.computed].tobytes() == full[name][found.computed].tobytes()
+    assert found.filled is not None
+    assert not np.any(found.computed & found.filled)
+    assert np.all(found.computed | found.filled)
+    wrong = np.count_nonzero(found.values["survived"] != full["survived"])
+    assert wrong <= report["most_wrong"]
+    assert report["saved"] == pytest.approx(found.filled.mean())
+    assert report["saved"] > 0.2
+    assert np.all(np.isnan(found.values["lifetime_s"][found.filled]))
+    said = " ".join(in_words(report, asked))
+    assert "with 95 % confidence at most" in said
+    assert "a box of 3.2 Hz (spin at the start) by 0.08 g (mass) is sure to be seen" in said
+
+
+def test_the_result_does_not_depend_on_the_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(adaptive, "compute_points", made_up)
+    monkeypatch.setattr(adaptive, "FEWEST", 16)
+    asked, found = plan(65, 65, 0.01), []
+    for workers in (this_process(), threads(3)):
+        store = Store.create(None, asked)
+        begin_adaptive(store)
+        report = run_adaptive(store, workers)
+        found.append([report, *(store.group[name][...].tobytes() for name in ("survived", "lifetime_s", "status"))])
+    assert found[0] == found[1]
+
+
+def test_a_map_that_was_interrupted_goes_on_without_computing_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked, computed = plan(65, 65, 0.01), []
+
+    class Cut(Exception):
+        pass
+
+    def counted(task: Any) -> dict[str, np.ndarray]:
+        computed.extend(task.points.tolist())
+        return made_up(task)
+
+    def cut(share: float) -> None:
+        if share > 0.5:
+            raise Cut
+
+    monkeypatch.setattr(adaptive, "compute_points", counted)
+    monkeypatch.setattr(adaptive, "KEPT", 1)
+    stores = [Store.create(tmp_path / name, asked) for name in ("whole.zarr", "cut.zarr")]
+    for store in stores:
+        begin_adaptive(store)
+    shares: list[float] = []
+    run_adaptive(stores[0], this_process(), shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1.0)
+    computed.clear()
+    with contextlib.suppress(Cut):
+        run_adaptive(stores[1], this_process(), cut)
+    before = len(computed)
+    assert before > 0
+    again = Store.open(tmp_path / "cut.zarr", writable=True)
+    assert again.done == 0
+    run_adaptive(again, this_process())
+    assert len(computed) > before
+    assert len(set(computed)) == len(computed)
+    for name in ("survived", "lifetime_s", "status"):
+        assert again.group[name][...].tobytes() == stores[0].group[name][...].tobytes()
+    assert again.group.attrs[FOUND] == stores[0].group.attrs[FOUND]
+    assert again.done == asked.chunk_count
+
+
+def test_what_has_no_boundary_cannot_be_refined() -> None:
+    asked = plan(5, 5, 0.01)
+    with pytest.raises(UsageError, match="adaptive = lifetime_s: a boundary is one of a yes or no"):
+        begin_adaptive(Store.create(None, asked), "lifetime_s")
+    with pytest.raises(UsageError, match="`observe` must have survived or locked"):
+        begin_adaptive(Store.create(None, asked), "locked")
+    with pytest.raises(UsageError, match="stride = 6: a power of 2"):
+        begin_adaptive(Store.create(None, asked), stride=6)
+    table = Plan.of(SCENE, (Axis("start.spin_hz", np.linspace(58, 82, 9), "table"),), ("survived",), 0.01)
+    with pytest.raises(UsageError, match="rows of a table have no neighbours"):
+        begin_adaptive(Store.create(None, table))

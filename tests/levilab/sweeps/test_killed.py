@@ -1,0 +1,65 @@
+"""Processes of a sweep are really killed under way: what is in the store stays, and going on gives the same bits."""
+
+from __future__ import annotations
+
+import multiprocessing
+import re
+from typing import TYPE_CHECKING
+
+from levilab.sweeps.run import run
+from levilab.sweeps.store import Store
+from levilab.workers import processes
+from support.commands import command
+from support.dask_cluster import DaskCluster
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pytest
+
+#: A map of 16 chunks.
+SWEEP = (
+    "sweep", "undriven", "--sweep", "start.spin_hz=18:24:64", "--sweep", "top.mass_kg=0.0250:0.0254:64",
+    "--duration", "0.3", "--observe", "survived,lifetime_s,position_error_m", "--out", "map.zarr",
+)  # fmt: skip
+
+
+def bits(store: Store) -> dict[str, bytes]:
+    return {name: values.tobytes() for name, values in store.load().values.items()}
+
+
+def test_killed_workers_and_a_killed_scheduler_change_no_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write, written = Store.write, []
+    with DaskCluster(workers=2) as dask, monkeypatch.context() as patched:
+        scheduler, worker, _ = dask.processes
+        kill_after = {1: worker, 3: scheduler}
+
+        def write_and_kill(self: Store, *arguments) -> None:
+            write(self, *arguments)
+            written.append(arguments)
+            if len(written) in kill_after:
+                kill_after[len(written)].kill()
+
+        patched.setattr(Store, "write", write_and_kill)
+        ended = command(*SWEEP, "--scheduler", dask.address, cwd=tmp_path)
+
+    line = ended.err.splitlines()[-1]
+    lost = rf"levilab: the Dask scheduler at {dask.address} is lost, .*; (\d+) of 16 chunks are kept in map\.zarr; "
+    match = re.fullmatch(lost + "go on with: levilab sweep map.zarr --resume", line)
+    assert match, ended.err
+    assert (ended.status, int(match[1])) == (1, len(written))
+    assert 3 <= len(written) < 16
+
+    killed = []
+
+    def kill_one(share: float) -> None:
+        if not killed:
+            killed.append(multiprocessing.active_children()[0])
+            killed[0].kill()
+
+    store = Store.open(tmp_path / "map.zarr", writable=True)
+    run(store, processes(2), kill_one)
+    assert killed
+    whole = Store.create(None, store.plan)
+    run(whole)
+    assert bits(Store.open(tmp_path / "map.zarr")) == bits(whole)

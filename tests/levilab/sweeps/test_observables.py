@@ -1,0 +1,134 @@
+"""What is observed at a point is what a single simulation says of it, whatever lies beside it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from levilab.errors import UsageError
+from levilab.motion.summary import as_document, summarise
+from levilab.simulator.scene import Scene, preset
+from levilab.simulator.single import simulate
+from levilab.sweeps import observables
+from levilab.sweeps.observables import GROUPS, NAMES, OBSERVABLES, check_observables, columns_of, observe
+from levilab.sweeps.plan import Axis, Plan
+
+UNDRIVEN, DRIVEN = preset("undriven"), preset("driven")
+SPINS = np.array([19.0, 22.0, 30.0])
+
+
+def plan(scene: Scene, names: tuple[str, ...], duration: float, *axes: Axis) -> Plan:
+    made = Plan.of(scene, axes or (Axis("start.spin_hz", SPINS),), names, duration)
+    return Plan(made.scene, made.axes, names, duration, 1e-7, chunk=made.chunk, step_share=0.2)
+
+
+def summary_of(scene: Scene, duration: float, rate: float) -> dict[str, Any]:
+    motion = simulate(scene, duration, tolerance=1e-7, rate=rate)
+    return as_document(summarise(motion, duration, rate, 1.0))
+
+
+def test_the_ends_are_those_of_single_simulations() -> None:
+    names = ("survived", "lifetime_s", "fall_spin_hz", "energy_error", "position_error_m")
+    found = observe(plan(UNDRIVEN, names, 4.0), {"start.spin_hz": SPINS})
+    assert [found[name].dtype.kind for name in names] == list("bffff")
+    for i, spin in enumerate(SPINS):
+        single = summary_of(UNDRIVEN.changed({"start.spin_hz": float(spin)}), 4.0, 100.0)
+        assert found["survived"][i] == single["survived"]
+        lifetime, at_fall = found["lifetime_s"][i], found["fall_spin_hz"][i]
+        if single["survived"]:
+            assert math.isnan(lifetime)
+            assert math.isnan(at_fall)
+        else:  # both are within their tolerance of the truth, where the place says when the fall is
+            assert lifetime == pytest.approx(single["end_s"], abs=1e-5)
+            assert at_fall == pytest.approx(single["spin_end_hz"], abs=1e-5)
+        assert found["energy_error"][i] < 1e-6  # a symplectic scheme keeps it within the size of its steps' error
+        assert 0 < found["position_error_m"][i] < 1e-5
+
+
+def test_what_needs_samples_is_what_simulate_prints() -> None:
+    names = ("survived", "locked", "height_spread_m", "lines")
+    drives = np.array([30.0, 33.0])
+    asked = plan(DRIVEN, names, 10.0, Axis("drive.frequency_hz", drives))
+    found = observe(asked, {"drive.frequency_hz": drives})
+    assert found["locked"].tolist() == [True, False]
+    for i, frequency in enumerate(drives):
+        single = summary_of(DRIVEN.changed({"drive.frequency_hz": float(frequency)}), 10.0, 340.0)
+        spread = single["height_max_m"] - single["height_min_m"]
+        assert found["height_spread_m"][i] == pytest.approx(spread, rel=1e-3)  # other samples of the same motion
+        assert found["locked"][i] == single["locked"]
+        lines = {line["name"]: line for line in single["lines"]}
+        for start, name in observables.LINES.items():
+            frequency_hz, amplitude = found[f"{start}_line_hz"][i], found[f"{start}_line_rad"][i]
+            if name in lines:
+                assert frequency_hz == pytest.approx(lines[name]["frequency_hz"], abs=0.02)
+                assert amplitude == pytest.approx(lines[name]["amplitude_rad"], rel=0.05)
+            else:
+                assert math.isnan(frequency_hz)
+    assert found["drive_line_hz"] == pytest.approx(drives, abs=0.01)
+    assert found["wobble_line_hz"][1] == pytest.approx(30.0, abs=0.1)
+
+
+@pytest.mark.parametrize("names", [("survived", "fall_spin_hz", "energy_error"), ("locked", "nutation_line_hz")])
+def test_a_point_has_the_same_bits_alone_and_among_others(names: tuple[str, ...]) -> None:
+    scene = DRIVEN.changed({"drive.off_s": None})
+    asked = plan(scene, names, 10.0 if "locked" in names else 1.0)
+    values = {"start.spin_hz": SPINS[:, None], "top.mass_kg": np.array([0.0244, 0.0249])}
+    together = observe(asked, values)
+    for i, j in np.ndindex(3, 2):
+        alone = observe(asked, {"start.spin_hz": SPINS[i : i + 1], "top.mass_kg": values["top.mass_kg"][j : j + 1]})
+        for column in columns_of(names):
+            assert together[column.name].shape == (3, 2)
+            assert alone[column.name].tobytes() == together[column.name][i, j].tobytes()
+
+
+def test_ends_alone_are_not_paid_with_samples_or_errors(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: dict[str, Any] = {}
+    many = observables.simulate_many
+
+    def watched(*arguments: Any, **named: Any) -> Any:
+        given.update(named)
+        return many(*arguments, **named)
+
+    monkeypatch.setattr(observables, "simulate_many", watched)
+    observe(plan(UNDRIVEN, ("survived", "lifetime_s", "fall_spin_hz"), 0.1), {"start.spin_hz": SPINS})
+    assert given["errors"] is False
+    assert given["rate"] is None
+    assert given["cores"] == 1
+
+
+def test_the_energy_has_no_error_where_drag_or_drive_change_it() -> None:
+    for name in ("friction", "driven"):
+        found = observe(plan(preset(name), ("energy_error",), 0.1), {"start.spin_hz": SPINS})
+        assert np.all(np.isnan(found["energy_error"]))
+
+
+def test_each_row_says_what_it_is() -> None:
+    for name, one in OBSERVABLES.items():
+        assert one.name == name
+        assert one.meaning.endswith(".")
+        assert one.dtype in {"bool", "float64"}
+        assert one.unit == "1" or name.endswith(f"_{one.unit.lower()}")
+    assert [column.name for column in columns_of(["survived", "lines", "survived"])] == ["survived", *GROUPS["lines"]]
+    assert {"survived", "lines", "locked"} <= set(NAMES)
+
+
+@pytest.mark.parametrize(
+    ("scene", "name", "duration", "said"),
+    [
+        (UNDRIVEN, "lifetme_s", 10.0, "observe = lifetme_s: there is no such observable; did you mean lifetime_s"),
+        (UNDRIVEN, "locked", 10.0, "locked needs a drive"),
+        (DRIVEN, "locked", 9.0, "duration = 9: locked needs a duration of 10 s"),
+        (preset("friction").changed({"observed": "spin"}), "survived", 10.0, "take observed = motion"),
+    ],
+)
+def test_what_no_point_can_show_is_refused(scene: Scene, name: str, duration: float, said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        check_observables(plan(scene, (name,), duration) if name != "lifetme_s" else _unknown(scene, name))
+    check_observables(plan(UNDRIVEN, ("locked",), 10.0, Axis("drive.amplitude_t", np.array([0.0, 4e-4]))))
+
+
+def _unknown(scene: Scene, name: str) -> Plan:
+    return Plan(scene, (Axis("start.spin_hz", SPINS),), (name,), 10.0)
