@@ -154,8 +154,8 @@ def measure(counts: Sequence[int]) -> dict[str, object]:
             make_runs(runs, count, template=template)
             commands = {
                 "runs": ["runs", runs],
-                "table, 1 core": ["analyze", "spindown", runs, "--table", folder / "one.csv", "--cores", "1"],
                 "table, 2 cores": ["analyze", "spindown", runs, "--table", folder / "two.csv", "--cores", "2"],
+                "table, 1 core": ["analyze", "spindown", runs, "--table", folder / "one.csv", "--cores", "1"],
             }
             for what, words in commands.items():
                 found.append({"runs": count, "what": what} | asdict(cost(words)))

@@ -17,29 +17,45 @@ import heyoka as hy
 import numpy as np
 
 import levilab.benchmark.simulator as room
-from levilab.benchmark.simulator.motion import MOTIONS, Motion
+from levilab.benchmark.simulator.as_called import many
+from levilab.benchmark.simulator.motion import MOTIONS, MU, UNDRIVEN, Motion
 from levilab.benchmark.simulator.taylor import heyoka_start, heyoka_system, propagate
 
 Q = np.longdouble
 WHERE = Path(room.__file__).parent / "references.json"
 
 
-def end(motion: Motion, duration: float, tolerance: float) -> Any:
-    """The place at the end [m], 80-bit."""
+def integrator_of(motion: Motion, tolerance: float) -> Any:
+    """An integrator of one top, on 80-bit numbers."""
     start = heyoka_start(motion).astype(Q)
-    integrator = hy.taylor_adaptive(heyoka_system(motion), start, tol=Q(tolerance), fp_type=Q, compact_mode=True)
-    return propagate(integrator, motion, start, duration)
+    system = heyoka_system(motion, each_pull=motion.drive == "off")
+    return hy.taylor_adaptive(system, start, tol=Q(tolerance), fp_type=Q, compact_mode=True)
+
+
+def end(integrator: Any, motion: Motion, duration: float) -> Any:
+    """The place at the end [m], 80-bit."""
+    if motion.drive == "off":
+        integrator.pars[0] = Q(MU / motion.mass)
+    return propagate(integrator, motion, heyoka_start(motion).astype(Q), duration)
 
 
 def main() -> None:
     """Write references.json."""
-    places: dict[str, dict[str, list[float]]] = {}
-    for name, motion in MOTIONS.items():
-        for duration in (5.0, 60.0):
-            true, other = (end(motion, duration, tolerance) for tolerance in (1e-18, 1e-16))
-            print(f"{name}, {duration:g} s: {true}, apart by {np.abs(true - other).max():.1e} m")
-            places.setdefault(name, {})[f"{duration:g}"] = [float(v) for v in true]
-    WHERE.write_text(json.dumps({"places_m": places}, indent=2) + "\n", encoding="utf-8")
+    fine, coarse = {}, {}
+    for tolerance, found in ((1e-18, fine), (1e-16, coarse)):
+        for name, motion in MOTIONS.items():
+            integrator = integrator_of(motion, tolerance)
+            found[name] = {f"{duration:g}": end(integrator, motion, duration) for duration in (5.0, 60.0)}
+        integrator = integrator_of(UNDRIVEN, tolerance)
+        tops = many.tops()
+        found["ensemble"] = {str(i): end(integrator, tops[i], many.DURATION) for i in many.COMPARED}
+    for name, ends in fine.items():
+        apart = max(float(np.abs(place - coarse[name][key]).max()) for key, place in ends.items())
+        print(f"{name}: the ends lie apart by at most {apart:.1e} m")
+    as_lists = {name: {key: [float(v) for v in place] for key, place in ends.items()} for name, ends in fine.items()}
+    ensemble = list(as_lists.pop("ensemble").values())
+    text = json.dumps({"places_m": as_lists, "ensemble_m": ensemble}, indent=1)
+    WHERE.write_text(f"{text}\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

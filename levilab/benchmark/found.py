@@ -22,18 +22,18 @@ def give(
     name: str,
     document: Mapping[str, Any],
     print_tables: Callable[[], None],
-    save_figure: Callable[[Path], None],
+    figures: Mapping[str, Callable[[Path], None]],
     *,
     out: Path | None,
     as_json: bool,
 ) -> None:
-    """Print the tables, or the document as JSON; write name.json and name.png into a folder, if one is given.
+    """Print the tables, or the document as JSON; write name.json and the figures into a folder, if one is given.
 
     Args:
-        name: of the files.
+        name: of the document's file.
         document: for JSON.
         print_tables: for people.
-        save_figure: draws and writes it; imports matplotlib, which takes long.
+        figures: for each file of a figure what draws and writes it; it imports matplotlib, which takes long.
         out: the folder.
         as_json: whether the document is printed.
 
@@ -49,5 +49,6 @@ def give(
         with writing(f"{out}: the result cannot be written"):
             out.mkdir(parents=True, exist_ok=True)
             replace_atomically(out / f"{name}.json", text + "\n")
-            save_figure(out / f"{name}.png")
-        print(f"wrote {out / name}.json and {out / name}.png", file=sys.stderr)  # noqa: T201
+            for file, save in figures.items():
+                save(out / file)
+        print(f"wrote {' and '.join(str(out / file) for file in (f'{name}.json', *figures))}", file=sys.stderr)  # noqa: T201

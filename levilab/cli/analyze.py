@@ -341,6 +341,7 @@ def _analyze(
 
     left_out: list[str] = []
     with interruptible("what was fitted so far is lost, nothing is written"):
+        _advise_on_many(paths)
         if context.info_name == _EACH:
             results = analyze_suiting(paths, given, left_out.append)
         else:
@@ -348,6 +349,15 @@ def _analyze(
             results = [(analysis, _analyze_as(analysis, paths, given))]
     with interruptible("look which results are written: each one is whole"):
         _write_and_print(context, results, left_out, save=save, out=out, as_json=as_json)
+
+
+def _advise_on_many(paths: Sequence[Path]) -> None:
+    """Name --table where there are so many runs that all together take long."""
+    from levilab.runs.run import find_runs
+
+    if (count := sum(len(find_runs(path)) for path in paths if path.is_dir())) >= MANY_RUNS:
+        advice = "--table FILE.csv writes a row for each by itself, in parallel, and goes on where it was interrupted"
+        message(f"{count} runs are analyzed together, in one process, which holds them all; {advice}")
 
 
 class Writing(NamedTuple):

@@ -164,11 +164,12 @@ def _mapped(scene: "Scene", spans: "tuple[Span | None, Span | None]", duration: 
 @benchmark_app.command("simulator", epilog="Example: levilab benchmark simulator --out speed")
 def benchmark_simulator(
     only: Annotated[
-        str | None, typer.Option(metavar="PART", help="kernel (fixed steps) or called (one top as called).")
+        str | None,
+        typer.Option(metavar="PART", help="kernel (fixed steps), called (one top) or ensemble (1000)."),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer points and repetitions: a first look.")] = False,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write simulator.json and simulator.png there.")
+        Path | None, typer.Option(metavar="DIR", help="Write simulator.json and both figures there.")
     ] = None,
     as_json: Json = False,
 ) -> None:

@@ -260,7 +260,7 @@ def _suiting(
             unusable.append(error)
             continue
         left = {path: None for path in left if path not in taken}
-        said.update(getattr(found, "found", found).warnings)
+        said.update(_warnings_of(found))
         yield analysis, found
     if len(errors) + len(unusable) == len(ANALYSES):
         raise [*unusable, *errors][0]
@@ -270,6 +270,12 @@ def _suiting(
     for left_out in unusable:
         if tell and not said.issuperset(left_out.reasons):
             tell(str(left_out))
+
+
+def _warnings_of(found: Any) -> Sequence[str]:
+    """What an analysis, or a look at its inputs, warns of."""
+    warnings: Sequence[str] = getattr(getattr(found, "found", found), "warnings", ())
+    return warnings
 
 
 def _of_those_that_suit(

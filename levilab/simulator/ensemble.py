@@ -301,8 +301,8 @@ def _parts(group: Batch, threads: int) -> list[Batch]:
 def _advance(some: Batch, wanted: _Wanted, steps: Array, ends: _Ends) -> None:
     """Simulate tops of one kind, and write into `ends` at their places."""
     _check_counts(some, wanted.duration, steps)
-    shape = (some.where.size, ends.samples.shape[1], wanted.columns.size)
-    samples = np.full(shape, np.nan)
+    together = some.where[-1] - some.where[0] + 1 == some.where.size  # then samples are written where they belong
+    samples = ends.samples[some.where[0] : some.where[-1] + 1] if together else ends.samples[some.where]
     sampling = _Sampling(wanted.sample_rate, wanted.columns, samples)
     passed = integrate_in_lanes(some, runs_of(some, wanted.duration, steps), sampling)
     states = passed.states
@@ -316,7 +316,9 @@ def _advance(some: Batch, wanted: _Wanted, steps: Array, ends: _Ends) -> None:
         )
         if wanted.errors:
             _add_uncertain_moment(fallen, states[late], ends)
-    ends.states[some.where], ends.survived[some.where], ends.samples[some.where] = states, passed.survived, samples
+    ends.states[some.where], ends.survived[some.where] = states, passed.survived
+    if not together:
+        ends.samples[some.where] = samples
 
 
 def _check_counts(some: Batch, duration: float, steps: Array) -> None:

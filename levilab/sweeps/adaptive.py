@@ -283,7 +283,7 @@ def in_words(report: dict[str, Any], plan: Plan) -> list[str]:
     )
     return [
         f"{report['computed']} of {report['points']} points were computed, {share} were filled in",
-        f"{checked}, and their surroundings were computed",
+        checked + (", and their surroundings were computed" if wrong else ""),
         sure,
         f"an island that holds a box of {size} is sure to be seen, a smaller one by chance alone",
     ]

@@ -58,7 +58,7 @@ CURVE_POINTS = 61
 RIM = [withStroke(linewidth=3.2, foreground="white")]
 DASHED: Any = {"color": "black", "linewidth": 1, "linestyle": "dashed"}
 #: Where panels begin and end, as shares of the width: a colour bar fits beside them.
-LEFT, RIGHT = 0.075, 0.9
+LEFT, RIGHT = 0.095, 0.9
 
 
 @dataclass(frozen=True)
@@ -446,7 +446,7 @@ def _caption(found: Map, view: _View, sentences: Sequence[str], width: float) ->
     said += [f"{text[0].upper()}{text[1:]}".removesuffix(".") + "." for text in sentences]
     if found.filled is None and not found.computed.all():
         said.append(f"{np.count_nonzero(~found.computed)} of {found.computed.size} points are not computed yet.")
-    return textwrap.wrap(" ".join(said), round(16 * width))
+    return textwrap.wrap(" ".join(said), round(15.3 * width))
 
 
 def _step(axis: Axis) -> str:

@@ -27,7 +27,14 @@ def run_and_tell(*, trials: int, cases: Sequence[str], seed: int, out: Path | No
 
         save_png(estimators_figure(found), path)
 
-    give("estimators", as_document(found), lambda: print_study(found), save_figure, out=out, as_json=as_json)
+    give(
+        "estimators",
+        as_document(found),
+        lambda: print_study(found),
+        {"estimators.png": save_figure},
+        out=out,
+        as_json=as_json,
+    )
 
 
 def print_study(found: Study) -> None:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from rich.markup import escape
 
 from levilab.benchmark.found import give, tell
-from levilab.benchmark.simulator.speeds import best_speed
 from levilab.benchmark.simulator.work_precision import PARTS, Comparison, as_document, compare
 from levilab.errors import UsageError
 from levilab.present.terminal import Terminal, new_table, terminal
@@ -18,23 +17,31 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from levilab.benchmark.simulator.as_called.comparison import Case
+    from levilab.benchmark.simulator.as_called.overhead import Overhead
 
 
 def run_and_tell(*, only: str | None, quick: bool, out: Path | None, as_json: bool) -> None:
     """The whole command.  Raises CannotWrite, and UsageError for a part that is none."""
     if only is not None and only not in PARTS:
-        raise UsageError("only", f"`only` = {only}: {' or '.join(PARTS)} is expected")
+        raise UsageError("only", f"{', '.join(PARTS[:-1])} or {PARTS[-1]} is expected", value=only)
     if only and out:
         raise UsageError("out", "`out` keeps the figures of all parts: leave `only` away, or take `json`")
     found = compare((only,) if only else PARTS, quick=quick, tell=tell)
 
-    def save_figure(path: Path) -> None:
+    def save_kernels(path: Path) -> None:
         from levilab.benchmark.simulator.figure import work_precision_figure
         from levilab.present.style import save_png
 
         save_png(work_precision_figure(found), path)
 
-    give("simulator", as_document(found), lambda: print_comparison(found), save_figure, out=out, as_json=as_json)
+    def save_calls(path: Path) -> None:
+        from levilab.benchmark.simulator.as_called.figure import as_called_figure
+        from levilab.present.style import save_png
+
+        save_png(as_called_figure(found.cases), path)
+
+    figures = {"simulator.png": save_kernels, "simulator_as_called.png": save_calls}
+    give("simulator", as_document(found), lambda: print_comparison(found), figures, out=out, as_json=as_json)
 
 
 def print_comparison(found: Comparison) -> None:
@@ -44,6 +51,8 @@ def print_comparison(found: Comparison) -> None:
         print_kernels(console, found)
     if found.cases:
         print_called(console, found.cases)
+    if found.overheads:
+        print_overheads(console, found.overheads)
     for package in found.missing:
         console.print(f"[yellow]note:[/yellow] {escape(package)} is not installed: pip install 'levilab\\[peers]'")
 
@@ -73,17 +82,27 @@ def print_kernels(console: Terminal, found: Comparison) -> None:
 
 
 def print_called(console: Terminal, cases: Iterable[Case]) -> None:
-    """`simulate` against heyoka and DOP853, at the same achieved error."""
-    columns = ("simulate", "heyoka", "ratio", "aim", "DOP853")
+    """`simulate` and `simulate_many` against heyoka, and DOP853, at the same achieved error."""
+    columns = ("levilab", "heyoka", "ratio", "aim", "DOP853")
     shown = new_table(
-        "One top as called, with error estimate or step control: simulated s per s at the same achieved error",
+        "As called, with error estimate or step control: simulated s per s at the same achieved error",
         "motion", "time", "error \\[cm]", *columns, numbers=("time", *columns),
     )  # fmt: skip
     for case in cases:
         for r in case.ratios:
-            slow = best_speed(case.of("scipy DOP853"), r.error)
-            speeds = (_number(r.speed), _number(r.peer_speed), _number(r.ratio, 3), f"≥ {r.aim:g}", _number(slow, 3))
-            shown.add_row(case.motion, f"{case.duration:g} s", f"{100 * r.error:.0e}", *speeds)
+            values = (r.speed, r.peer_speed, r.ratio, case.speed("scipy DOP853", r.error))
+            ours, theirs, ratio, slow = (_number(value, 3) for value in values)
+            what = case.task.name, f"{case.task.duration:g} s", f"{100 * r.error:.0e}"
+            shown.add_row(*what, ours, theirs, ratio, f"≥ {r.aim:g}", slow)
+    console.print(shown)
+
+
+def print_overheads(console: Terminal, overheads: Iterable[Overhead]) -> None:
+    """What calls take in Python."""
+    columns = ("in Python", "aim", "whole call")
+    shown = new_table("Time of a call", "", *columns, numbers=columns)
+    for o in overheads:
+        shown.add_row(o.call, *(f"{_number(1e3 * seconds, 3)} ms" for seconds in (o.outside, o.aim, o.whole)))
     console.print(shown)
 
 

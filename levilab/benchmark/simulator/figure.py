@@ -31,6 +31,7 @@ LINES = {
 }
 #: Lines that end at a larger error [cm] have their name there, not at the right.
 BESIDE = 3e-9
+TITLE = "One top of the scene undriven; levilab's kernels at fixed steps, without an error estimate: higher is faster"
 #: Errors that are drawn [cm].
 RANGE = (1e-1, 3e-12)
 
@@ -62,9 +63,7 @@ def work_precision_figure(found: Comparison) -> Figure:
         axes.set(xlabel="error of the place after 5 s  [cm]", ylabel="simulated seconds per second of one core")
         axes.grid(visible=True, which="major", alpha=0.3)
         _write(axes, labels)
-        figure.text(
-            0.08, 0.955, "One top of the scene undriven: further right is better, higher is faster", fontsize=11
-        )
+        figure.text(0.08, 0.955, TITLE, fontsize=11)
     return figure
 
 

@@ -10,16 +10,13 @@ from __future__ import annotations
 import itertools
 import json
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 Array = NDArray[np.float64]
 
@@ -36,7 +33,7 @@ class Motion:
     Attributes:
         name: of the motion.
         preset: the scene of that name …
-        changes: … with these values by their dotted keys.
+        changes: … with these values of its dotted keys.
         mass: [kg].
         spin: ω₃ at the start [rad/s].
         across, along: parts of the moment across and along the axis.
@@ -48,7 +45,7 @@ class Motion:
 
     name: str
     preset: str
-    changes: Mapping[str, Any] = field(default_factory=dict)
+    changes: tuple[tuple[str, Any], ...] = ()
     mass: float = 0.02445
     spin: float = 2 * math.pi * 30.0
     across: float = 0.03
@@ -80,7 +77,7 @@ MOTIONS = {
         Motion("undriven", "undriven", mass=M, across=0.0, along=1.0),
         Motion("tilted", "tilted"),
         Motion("sine", "driven", spin=2 * math.pi * 30.03, drive="sine"),
-        Motion("square", "driven", {"drive.waveform": "square"}, spin=2 * math.pi * 30.03, drive="square"),
+        Motion("square", "driven", (("drive.waveform", "square"),), spin=2 * math.pi * 30.03, drive="square"),
     )
 }
 #: The motion of the kernels' comparison, and its length [s].

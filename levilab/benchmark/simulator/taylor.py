@@ -1,15 +1,19 @@
 """The motions for heyoka, an integrator by Taylor's method, which compiles the equations that it is given.
 
-It is taken at its best.  Its code is compiled with `fast_math`, which is 10 to 45 % faster and no less exact here.  A
-moment that leans is a vector of its own, three more equations; the body's x axis in its place, of length 1 instead of
-0.03, shortens the steps.  A sine is a pair of linear equations, as fast as a cosine of the time.  A square wave is
-integrated from kink to kink, its field a parameter: stopping at events takes 1.4 to 1.7 times as long.
+It is taken at its best.  Its code is compiled with `fast_math`, which is 9 to 43 % faster, at some orders twice, and
+no less exact here.  A moment that leans is a vector of its own, three more equations; the body's x axis in its place,
+of length 1 instead of 0.03, shortens the steps, and is up to a fifth slower at the same error.  A sine is a pair of
+linear equations, as fast as a cosine of the time.  A square wave is integrated from kink to kink, its field a
+parameter: stopping at events takes 1.4 to 1.7 times as long.
 """
 
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from levilab.benchmark.simulator import motion as given
 from levilab.benchmark.simulator.motion import UNDRIVEN, Array, Motion, vector_start
@@ -17,15 +21,13 @@ from levilab.benchmark.simulator.motion import UNDRIVEN, Array, Motion, vector_s
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-import numpy as np
-
 VARIABLES = ("x", "y", "z", "vx", "vy", "vz", "nx", "ny", "nz", "lx", "ly", "lz")
 
 
-def heyoka_system(motion: Motion = UNDRIVEN, *, parameter: str = "") -> list[Any]:
+def heyoka_system(motion: Motion = UNDRIVEN, *, each_pull: bool = False) -> list[Any]:
     """The equations of a motion for heyoka, shared subexpressions written once.
 
-    parameter: "mass" if heyoka's first parameter is the mass, for tops that differ; a square wave's is its field.
+    heyoka's first parameter is a square wave's field; or, if `each_pull` is set, μ/m of a top.
     """
     import heyoka as hy
 
@@ -41,7 +43,7 @@ def heyoka_system(motion: Motion = UNDRIVEN, *, parameter: str = "") -> list[Any
         terms = (c3, -3.0 * c5, 3.0 * c7 * (4.0 * z2 - radius2), -15.0 * c7 * u2 * (4.0 * z2 - 3.0 * radius2))
         sums = [a + b for a, b in zip(sums, terms, strict=True)]
     p1, half2, half3, p4z = sums[0], 0.5 * z * sums[1], 0.5 * sums[2], z * sums[3]
-    q = given.MU / (hy.par[0] if parameter == "mass" else motion.mass)
+    q = hy.par[0] if each_pull else given.MU / motion.mass
     (mx, my, mz), turning = _moment((nx, ny, nz), (lx, ly, lz), motion)
     drive, swinging = _drive(motion)
     bx, by, bz = given.MU * half2 * x, given.MU * (half2 * y + drive), given.MU * (0.5 * half3 * r2 - p1)
@@ -87,19 +89,21 @@ def heyoka_start(motion: Motion) -> Array:
     return np.append(start, [given.DRIVE_T, 0.0]) if motion.drive == "sine" else start
 
 
+@cache
 def heyoka_integrator(motion: Motion, tolerance: float) -> Any:
-    """An integrator of one top."""
+    """An integrator of one top, built once: that takes up to a second."""
     import heyoka as hy
 
     return hy.taylor_adaptive(heyoka_system(motion), heyoka_start(motion), tol=tolerance, fast_math=True)
 
 
-def heyoka_batch(motion: Motion, tolerance: float, starts: Array, *, parameter: str = "") -> Any:
-    """An integrator of as many tops as there are columns in `starts`."""
+@cache
+def heyoka_batch(motion: Motion, tolerance: float, lanes: int) -> Any:
+    """An integrator of so many tops, built once, whose μ/m is a parameter of each."""
     import heyoka as hy
 
-    system = heyoka_system(motion, parameter=parameter)
-    return hy.taylor_adaptive_batch(system, starts.copy(), tol=tolerance, fast_math=True)
+    starts = np.repeat(heyoka_start(motion)[:, None], lanes, axis=1)
+    return hy.taylor_adaptive_batch(heyoka_system(motion, each_pull=True), starts, tol=tolerance, fast_math=True)
 
 
 def propagate(integrator: Any, motion: Motion, start: Array, duration: float) -> Array:

@@ -10,18 +10,21 @@ from typing import TYPE_CHECKING, Any
 
 from levilab.benchmark.machine import processor, version_of
 from levilab.benchmark.simulator import kernel, ours
-from levilab.benchmark.simulator.as_called.comparison import cases
-from levilab.benchmark.simulator.peers import PEERS
+from levilab.benchmark.simulator.as_called.comparison import measure_calls
+from levilab.benchmark.simulator.as_called.overhead import OVERHEADS, overhead
+from levilab.benchmark.simulator.as_called.tasks import TASKS
+from levilab.benchmark.simulator.peers import PEERS, Peer
 from levilab.benchmark.simulator.speeds import Ratio, best_speed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from levilab.benchmark.simulator.as_called.comparison import Case
+    from levilab.benchmark.simulator.as_called.overhead import Overhead
     from levilab.benchmark.simulator.peers import Point
 
-#: The parts of the benchmark: kernels at fixed steps, and calls of one top.
-PARTS = ("kernel", "called")
+#: The parts of the benchmark: kernels at fixed steps, one top as called, many tops as called.
+PARTS = ("kernel", "called", "ensemble")
 ROUNDS = 3
 #: What is to be compared: ours, the peer, the error [m], and the ratio that was aimed at.
 AIMS = (
@@ -40,7 +43,8 @@ class Comparison:
         points: of the kernels at fixed steps and the peers, on one motion.
         ratios: of their speeds.
         rates: of the kernels.
-        cases: motions as called.
+        cases: motions and ensembles as called.
+        overheads: of calls.
         missing: the peers' packages that are not installed.
     """
 
@@ -48,6 +52,7 @@ class Comparison:
     ratios: tuple[Ratio, ...] = ()
     rates: Mapping[str, kernel.Rate] = field(default_factory=dict)
     cases: tuple[Case, ...] = ()
+    overheads: tuple[Overhead, ...] = ()
     missing: tuple[str, ...] = ()
 
 
@@ -66,7 +71,8 @@ def compare(
         points,
         ratios(points) if points else (),
         kernel.rates(points) if points else {},
-        cases(quick=quick, tell=tell) if "called" in parts else (),
+        measure_calls([task for task in TASKS if task.part in parts], quick=quick, tell=tell),
+        tuple(overhead(call) for call in OVERHEADS if call.part in parts),
         tuple(sorted({peer.package for peer in PEERS if not peer.installed})),
     )
 
@@ -76,17 +82,15 @@ def kernel_points(*, quick: bool, tell: Callable[[str], None]) -> tuple[Point, .
 
     In ROUNDS, of which each point keeps its best: a machine that slows down for a while slows every contender.
     """
-    sides: dict[str, Callable[[bool], Iterable[Point]]] = {
-        "one top": ours.scalar,
-        "many at once": ours.many,
-        **{peer.name: peer.points for peer in PEERS if peer.installed},
-    }
+    sides = (Peer("one top", "levilab", ours.scalar), Peer("many at once", "levilab", ours.many), *PEERS)
     best: dict[tuple[str, str], Point] = {}
     rounds = 1 if quick else ROUNDS
     for number in range(rounds):
-        for name, measure in sides.items():
-            tell(f"round {number + 1} of {rounds}: {name}")
-            for point in measure(quick):
+        for side in sides:
+            if not side.installed or number >= (side.rounds or rounds):
+                continue
+            tell(f"round {number + 1} of {rounds}: {side.name}")
+            for point in side.points(quick):
                 key = point.method, point.setting
                 best[key] = max(point, best.get(key, point), key=lambda p: p.speed)
     return tuple(best.values())
@@ -117,12 +121,17 @@ def as_document(found: Comparison) -> dict[str, Any]:
         "kernel": {name: asdict(rate) for name, rate in found.rates.items()},
         "called": [
             {
-                "motion": case.motion,
-                "duration_s": case.duration,
+                "motion": case.task.name,
+                "duration_s": case.task.duration,
+                "tops": case.task.tops,
                 "points": [_point(p) for p in case.points],
                 "ratios": [_ratio(r) for r in case.ratios],
             }
             for case in found.cases
+        ],
+        "overheads": [
+            {"call": o.call, "outside_kernels_s": o.outside, "whole_s": o.whole, "aim_s": o.aim}
+            for o in found.overheads
         ],
         "missing": list(found.missing),
     }

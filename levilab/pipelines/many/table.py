@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from contextlib import closing
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import DataError, NoneUsable
@@ -13,13 +15,12 @@ from levilab.pipelines.many.file import TableFile, check_name
 from levilab.pipelines.many.one import PassedOver, Row, Task, analyze_one, columns_of, row
 from levilab.pipelines.result import relative
 from levilab.pipelines.sources import data_files
-from levilab.runs.run import RECORD, find_run, find_runs
+from levilab.runs.run import RECORD, find_run, run_folders
 from levilab.software import software_versions
 from levilab.workers import processes, results_of, this_process
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
-    from pathlib import Path
 
     from levilab.pipelines.catalogue import Analysis
     from levilab.workers import Done
@@ -51,7 +52,7 @@ class Tally:
     left_out: int = 0
     passed_over: Counter[str] = field(default_factory=Counter)
     same: int = 0
-    _seen: set[str] = field(default_factory=set)
+    _seen: set[bytes] = field(default_factory=set)
 
     @property
     def rows(self) -> int:
@@ -71,8 +72,9 @@ class Tally:
             if len(self.failures) < MOST_FAILURES:
                 self.failures.append((str(outcome.cells[0]), outcome.problem))
         if outcome.sha256:
-            self.same += outcome.sha256 in self._seen
-            self._seen.add(outcome.sha256)
+            readings = bytes.fromhex(outcome.sha256)
+            self.same += readings in self._seen
+            self._seen.add(readings)
 
 
 def write_table(
@@ -105,32 +107,34 @@ def write_table(
     """
     check_name(table)
     options = analysis.options_from(given)
-    tasks = [
-        Task(path, is_run, searched, analysis.name, options, table.parent, save)
-        for path, is_run, searched in inputs(paths)
-    ]
-    if not tasks:
+    folder = table.parent
+    found = [*inputs(paths)]
+    if not found:
         raise NoneUsable(f"{paths[0]}: holds no run and no data file; name run folders, or a folder with some of them")
-    names = {task.path: relative(task.path, table.parent) for task in tasks}
+    names = [relative(Path(path), folder) for path, _, _ in found]
     made_with = {
         "analysis": analysis.name,
         "settings": analysis.result.settings(options).model_dump(mode="json", by_alias=True),
         "software": software_versions(),
     }
-    tally = Tally(len(tasks))
+    tally = Tally(len(found))
     with TableFile(table, columns_of(analysis), made_with).open(resume=resume) as file:
-        left = [task for task in tasks if names[task.path] not in file]
-        tally.kept = tally.done = len(tasks) - len(left)
+        tally.kept = tally.done = sum(name in file for name in names)
         show(tally)
-        workers = this_process() if cores == 1 or len(left) == 1 else processes(cores)
-        with closing(results_of(analyze_one, left, workers)) as results:
+        tasks = (
+            Task(Path(path), is_run, searched, analysis.name, options, folder, save)
+            for name, (path, is_run, searched) in zip(names, found, strict=True)
+            if name not in file
+        )
+        workers = this_process() if cores == 1 or tally.total - tally.done <= 1 else processes(cores)
+        with closing(results_of(analyze_one, tasks, workers)) as results:
             for done in results:
                 outcome = _outcome(done)
                 if isinstance(outcome, Row):
                     file.add(outcome.cells)
                 tally.count(outcome)
                 show(tally)
-        file.publish(names[task.path] for task in tasks)
+        file.publish(names)
     return tally
 
 
@@ -143,10 +147,10 @@ def _outcome(done: Done[Task, Row | PassedOver]) -> Row | PassedOver:
     return row(ANALYSES[task.analysis], about, None)
 
 
-def inputs(paths: Sequence[Path]) -> Iterator[tuple[Path, bool, bool]]:
+def inputs(paths: Sequence[Path]) -> Iterator[tuple[str, bool, bool]]:
     """Each input once, with whether it is a run and whether a search found it: in the order of the paths, by name.
 
-    Raises DataError for a path that does not exist.
+    As text: a Path takes a kilobyte.  Raises DataError for a path that does not exist.
     """
     seen = set()
     for path in map(find_run, paths):
@@ -158,9 +162,10 @@ def inputs(paths: Sequence[Path]) -> Iterator[tuple[Path, bool, bool]]:
                 yield found
 
 
-def _below(path: Path) -> Iterator[tuple[Path, bool, bool]]:
+def _below(path: Path) -> Iterator[tuple[str, bool, bool]]:
     if not path.is_dir() or (path / RECORD).exists():
-        yield path, path.is_dir(), False
+        yield str(path), path.is_dir(), False
         return
-    found = [*((run, True, True) for run in find_runs(path)), *((file, False, True) for file in data_files(path))]
-    yield from sorted(found, key=lambda one: one[0].parts)
+    files = [str(file) for file in data_files(path)]
+    found = [*((run, True, True) for run in run_folders(path)), *((file, False, True) for file in files)]
+    yield from sorted(found, key=lambda one: one[0].split(os.sep))  # noqa: PTH206 - as text, see `inputs`

@@ -71,6 +71,13 @@ def part(function: F) -> F:
     return compiled
 
 
+def aside(function: F) -> F:
+    """A part that kernels call seldom: it is compiled beside them, and not once for each place that calls it."""
+    options = PART_OPTIONS | {"forceinline": False}
+    compiled: F = numba.njit(function, **options)
+    return compiled
+
+
 def kernel(function: F) -> F:
     """An entry point: compiled once for each kind of scene, kept on disk, run without the interpreter's lock."""
     config: Any = numba.core.config

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from levilab.simulator.kernels.compiled import part
+from levilab.simulator.kernels.compiled import aside, part
 
 #: Columns of a job: what a lane needs to know of a run beside its model and its start.
 #: duration [s] from the start on, step: the longest [s]; radius, height: of the escape [m];
@@ -65,7 +65,7 @@ def _drive_at(run: Any, t: float) -> tuple[float, float]:
     return 1 - 4 * abs(phase - 0.5) - slope * t, slope
 
 
-@part
+@aside
 def next_piece(run: Any, start: float, begin: float, samples: int, sample_rate: float) -> Piece:
     """The piece of a run that begins at this time.
 

@@ -66,11 +66,10 @@ def test_a_map_with_islands_agrees_with_the_full_one_within_its_limit() -> None:
 
 def test_the_result_does_not_depend_on_the_workers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(adaptive, "compute_points", made_up)
-    monkeypatch.setattr(adaptive, "FEWEST", 16)
-    asked, found = plan(65, 65, 0.01), []
+    asked, found = plan(41, 41, 0.01), []
     for workers in (this_process(), threads(3)):
         store = Store.create(None, asked)
-        begin_adaptive(store)
+        begin_adaptive(store, audit=100)
         report = run_adaptive(store, workers)
         found.append([report, *(store.group[name][...].tobytes() for name in ("survived", "lifetime_s", "status"))])
     assert found[0] == found[1]
@@ -79,7 +78,7 @@ def test_the_result_does_not_depend_on_the_workers(monkeypatch: pytest.MonkeyPat
 def test_a_map_that_was_interrupted_goes_on_without_computing_anew(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked, computed = plan(65, 65, 0.01), []
+    asked, computed = plan(41, 41, 0.01), []
 
     class Cut(Exception):
         pass
@@ -93,10 +92,10 @@ def test_a_map_that_was_interrupted_goes_on_without_computing_anew(
             raise Cut
 
     monkeypatch.setattr(adaptive, "compute_points", counted)
-    monkeypatch.setattr(adaptive, "KEPT", 1)
+    monkeypatch.setattr(adaptive, "KEPT", 150)
     stores = [Store.create(tmp_path / name, asked) for name in ("whole.zarr", "cut.zarr")]
     for store in stores:
-        begin_adaptive(store)
+        begin_adaptive(store, audit=100)
     shares: list[float] = []
     run_adaptive(stores[0], this_process(), shares.append)
     assert shares == sorted(shares)
@@ -110,7 +109,7 @@ def test_a_map_that_was_interrupted_goes_on_without_computing_anew(
     assert again.done == 0
     run_adaptive(again, this_process())
     assert len(computed) > before
-    assert len(set(computed)) == len(computed)
+    assert len(computed) - len(set(computed)) < 150 < before  # what was in memory alone
     for name in ("survived", "lifetime_s", "status"):
         assert again.group[name][...].tobytes() == stores[0].group[name][...].tobytes()
     assert again.group.attrs[FOUND] == stores[0].group.attrs[FOUND]

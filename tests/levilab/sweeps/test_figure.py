@@ -9,7 +9,6 @@ import pytest
 from matplotlib.colors import to_rgb
 
 from levilab.errors import UsageError
-from levilab.present.style import as_png
 from levilab.simulator.scene import Scene, preset
 from levilab.sweeps.figure import KINDS, MOST_PANELS, map_figure
 from levilab.sweeps.plan import Axis, Plan
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
 UNDRIVEN, DRIVEN = preset("undriven"), preset("driven")
 SPIN = Axis("start.spin_hz", np.linspace(18, 90, 37))
 MASS = Axis("top.mass_kg", np.linspace(0.0246, 0.0257, 12))
-HEIGHT = Axis("start.position_m.2", np.linspace(0.0695, 0.0765, 8))
+HEIGHT = Axis("start.position_m.2", np.linspace(0.0695, 0.0765, 5))
 
 
 def a_map(
@@ -79,12 +78,14 @@ def test_spins_the_other_way_round_have_their_window_there() -> None:
 
 
 def test_every_text_lies_inside_of_the_picture_and_off_the_map() -> None:
-    for found in (a_map(MASS, SPIN, adaptive=True), a_map(SPIN, MASS, HEIGHT)):
+    fine = Axis(MASS.key, np.linspace(0.0248, 0.0252, 9))  # its ticks have two decimals
+    for found in (a_map(fine, SPIN, adaptive=True), a_map(SPIN, fine, HEIGHT)):
         figure = map_figure(found, "lifetime_s", notes=["a sentence of a map that was refined " * 8])
         figure.draw_without_rendering()
         width, height = figure.get_size_inches() * figure.dpi
         panels = [panel.get_window_extent() for panel in figure.axes]
-        for artist in [*figure.texts, *figure.legends]:
+        labels = [axis.label for panel in figure.axes for axis in (panel.xaxis, panel.yaxis)]
+        for artist in [*figure.texts, *figure.legends, *labels]:
             box = artist.get_window_extent()
             assert box.x0 >= 0
             assert box.y0 >= 0
@@ -131,7 +132,7 @@ def test_a_lock_map_tells_tops_that_slip_from_tops_that_are_lost() -> None:
 def test_a_third_axis_gives_small_multiples_with_their_values() -> None:
     figure = map_figure(a_map(SPIN, MASS, HEIGHT))
     titles = [axes.get_title(loc="left") for axes in figure.axes]
-    assert len(titles) == 8
+    assert len(titles) == 5
     assert titles[0] == "height at the start 6.95 cm"
     tilt = Axis("start.tilt_rad", np.linspace(0, 0.1, 20))
     many = map_figure(a_map(SPIN, Axis(MASS.key, np.linspace(0.025, 0.0252, 16)), tilt, names=("survived",)))
@@ -147,10 +148,6 @@ def test_points_that_are_not_computed_yet_are_white_and_counted() -> None:
     figure = map_figure(found)
     assert "not computed" in legend(figure)
     assert "60 of 444 points are not computed yet." in caption(figure)
-
-
-def test_a_figure_of_the_same_map_has_the_same_bytes() -> None:
-    assert as_png(map_figure(a_map(MASS, SPIN))) == as_png(map_figure(a_map(MASS, SPIN)))
 
 
 def test_what_is_no_map_has_no_figure() -> None:

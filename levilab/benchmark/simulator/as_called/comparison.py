@@ -1,97 +1,76 @@
-"""Points of every contender on every motion, and the ratios that they come to."""
+"""Points of every contender on every task, and the ratios that they come to."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from levilab.benchmark.simulator.as_called.contenders import CONTENDERS, Contender
-from levilab.benchmark.simulator.motion import MOTIONS, Motion, reference
-from levilab.benchmark.simulator.peers import Point, best_time
+from levilab.benchmark.simulator.as_called.contenders import Contender
+from levilab.benchmark.simulator.peers import Point, best_time_and_result
 from levilab.benchmark.simulator.speeds import Ratio, best_speed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from levilab.benchmark.simulator.as_called.contenders import Call
-    from levilab.benchmark.simulator.motion import Array
+    from levilab.benchmark.simulator.as_called.tasks import Task
 
 ROUNDS = 3
 #: How long a point is repeated in a round [s].
 LEAST = 0.05
-DURATIONS = (5.0, 60.0)
-#: Errors at which speeds are compared [m].
-ERRORS = (1e-8, 1e-11)
-#: The ratios to heyoka that are aimed at: motion, duration [s] → at each of ERRORS.
-AIMS = {
-    (name, duration): (2.0, 2.0) if name == "square" else (2.5, 2.0) if duration == 5.0 else (5.0, 3.0)
-    for name in MOTIONS
-    for duration in DURATIONS
-}
 
 
 @dataclass(frozen=True)
 class Case:
-    """A motion of a duration [s], with a point for each contender and tolerance."""
+    """A task with a point for each contender and tolerance."""
 
-    motion: str
-    duration: float
+    task: Task
     points: tuple[Point, ...]
 
-    def of(self, method: str) -> list[Point]:
-        """The points of one contender, from loose to tight."""
-        return [point for point in self.points if point.method == method]
+    def speed(self, method: str, error: float) -> float:
+        """The speed of one contender at an achieved error [m], at its best setting; NaN if it does not reach it."""
+        return best_speed([point for point in self.points if point.method == method], error)
 
     @property
     def ratios(self) -> tuple[Ratio, ...]:
-        """`simulate` against heyoka, each at its best setting for each of ERRORS."""
-        own, theirs = self.of("simulate"), self.of("heyoka")
-        aims = AIMS[self.motion, self.duration]
+        """Ours against the task's peer at each of its errors."""
+        ours, peer = self.task.contenders[0].name, self.task.peer
         return tuple(
-            Ratio("simulate", "heyoka", error, best_speed(own, error), best_speed(theirs, error), aim)
-            for error, aim in zip(ERRORS, aims, strict=True)
+            Ratio(ours, peer, error, self.speed(ours, error), self.speed(peer, error), aim)
+            for error, aim in self.task.aims.items()
         )
 
 
-def cases(
-    *, quick: bool = False, contenders: Sequence[Contender] = CONTENDERS, tell: Callable[[str], None] = lambda _: None
+def measure_calls(
+    tasks: Sequence[Task], *, quick: bool = False, tell: Callable[[str], None] = lambda _: None
 ) -> tuple[Case, ...]:
-    """Measure every contender that is installed on every motion.
+    """Measure every contender that is installed on every task.
 
-    In ROUNDS, of which each point keeps its best.  What a contender prepares for a motion serves all durations and
+    In ROUNDS, of which each point keeps its best.  What a contender prepares for a subject serves all durations and
     rounds.
     """
-    tell("as called: building the integrators")
-    ready = [
-        (motion, contender, _setting(tolerance), contender.prepare(motion, tolerance))
-        for motion in MOTIONS.values()
-        for contender in contenders
-        if contender.installed
-        for tolerance in contender.tolerances[:: 2 if quick else 1]
-    ]
-    best: dict[tuple[str, float], dict[tuple[str, str], Point]] = {}
+    prepared = cache(Contender.prepared)
+    best: dict[tuple[int, Contender, float], Point] = {}
     rounds = 1 if quick else ROUNDS
     for number in range(rounds):
-        for motion, contender, setting, call in ready:
-            if number >= (contender.rounds or rounds):
-                continue
-            tell(f"as called, round {number + 1} of {rounds}: {motion.name}, {contender.name}, {setting}")
-            for duration in DURATIONS:
-                points = best.setdefault((motion.name, duration), {})
-                key = contender.name, setting
-                point = _measure(motion, duration, contender, setting, call)
-                points[key] = max(point, points.get(key, point), key=lambda p: p.speed)
-    return tuple(Case(name, duration, tuple(points.values())) for (name, duration), points in best.items())
+        for i, task in enumerate(tasks):
+            tell(f"round {number + 1} of {rounds}: {task.name} as called, {task.duration:g} s")
+            for contender in task.contenders:
+                if contender.installed and number < (contender.rounds or rounds):
+                    for tolerance in contender.tolerances[:: 2 if quick else 1]:
+                        key = i, contender, tolerance
+                        point = _point(task, contender, tolerance, prepared(contender, task.subject, tolerance))
+                        best[key] = max(point, best.get(key, point), key=lambda p: p.speed)
+    return tuple(
+        Case(task, tuple(point for (at, *_), point in best.items() if at == i)) for i, task in enumerate(tasks)
+    )
 
 
-def _setting(tolerance: float) -> str:
-    return f"tolerance {tolerance:g}"
-
-
-def _measure(motion: Motion, duration: float, contender: Contender, setting: str, call: Call) -> Point:
-    places: list[Array] = []
-    seconds = best_time(lambda: places.append(call(duration)), LEAST)
-    error = float(np.abs(places[-1] - reference(motion, duration)).max())
-    return Point(contender.name, setting, error, duration / seconds)
+def _point(task: Task, contender: Contender, tolerance: float, call: Call) -> Point:
+    seconds, places = best_time_and_result(lambda: call(task.duration), LEAST)
+    error = float(np.abs(places - task.reference).max())
+    setting = f"tolerance {tolerance:g}{contender.variant}"
+    return Point(contender.name, setting, error, task.tops * task.duration / seconds)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,7 @@ from levilab.simulator.single import simulate
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    #: Integrates for so long [s] and returns the place at the end, shape (3,) [m].
+    #: Integrates for so long [s] and returns the place at the end, shape (3,) or (n, 3) [m].
     Call = Callable[[float], Array]
 
 
@@ -29,14 +30,16 @@ class Contender:
         name: of the method.
         package: that it needs.
         tolerances: from loose to tight, in its own sense.
-        prepare: from a motion and a tolerance to what is timed; what it does itself is not.
+        prepare: from a motion, or an ensemble, and a tolerance to what is timed; what it does itself is not.
+        variant: of it, added to its settings.
         rounds: in how many rounds it takes part, None for all: a slow one in one.
     """
 
     name: str
     package: str
     tolerances: tuple[float, ...]
-    prepare: Callable[[Motion, float], Call]
+    prepare: Callable[[Any, float], Call]
+    variant: str = ""
     rounds: int | None = None
 
     @property
@@ -44,7 +47,12 @@ class Contender:
         """Whether its package is there."""
         return find_spec(self.package) is not None
 
+    def prepared(self, subject: Any, tolerance: float) -> Call:
+        """Return what is timed."""
+        return self.prepare(subject, tolerance)
 
+
+@cache
 def scene_of(motion: Motion) -> Scene:
     """The motion as a scene of the simulator."""
     return preset(motion.preset).changed(dict(motion.changes))
@@ -80,7 +88,7 @@ def _dop853(motion: Motion, tolerance: float) -> Call:
 #: heyoka's time does not hold the building of its integrator, which it compiles: users use it again.  That of
 #: `simulate` holds everything but the first call's compiling.
 CONTENDERS = (
-    Contender("simulate", "levilab", (1e-5, 1e-6, 1e-7, 3e-8, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12), _simulate),
-    Contender("heyoka", "heyoka", tuple(10.0**-k for k in range(3, 14)), taylor.caller),
+    Contender("simulate", "levilab", (1e-5, 1e-6, 1e-7, 3e-8, 1e-8, 1e-9, 1e-10, 3e-11, 1e-11), _simulate),
+    Contender("heyoka", "heyoka", tuple(10.0**-k for k in range(3, 13)), taylor.caller),
     Contender("scipy DOP853", "scipy", (1e-6, 1e-8, 1e-10, 1e-12), _dop853, rounds=1),
 )

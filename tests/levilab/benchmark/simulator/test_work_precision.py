@@ -1,26 +1,18 @@
 """The benchmark's own arithmetic, and that every side integrates the same motion."""
 
-import json
 import math
-import sys
-from types import SimpleNamespace
 
-import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from levilab.benchmark.simulator import motion
-from levilab.benchmark.simulator.as_called.comparison import Case
-from levilab.benchmark.simulator.as_called.contenders import CONTENDERS, scene_of
 from levilab.benchmark.simulator.command import print_comparison
 from levilab.benchmark.simulator.kernel import Rate
 from levilab.benchmark.simulator.ours import problem
 from levilab.benchmark.simulator.peers import PEERS, Peer, Point
 from levilab.benchmark.simulator.speeds import best_speed
-from levilab.benchmark.simulator.taylor import VARIABLES, heyoka_system
 from levilab.benchmark.simulator.work_precision import Comparison, as_document, ratios
 from levilab.simulator.single import simulate
-from support.paths import GOLDEN
 
 POINTS = (
     Point("levitron-6", "400 steps", 1e-8, 40000.0),
@@ -32,61 +24,12 @@ POINTS = (
     Point("scipy BDF", "rtol 1e-7", math.inf, 5.0),
 )
 
-CASE = Case(
-    "sine",
-    60.0,
-    (
-        Point("simulate", "tolerance 1e-08", 1e-9, 40000.0),
-        Point("simulate", "tolerance 1e-11", 1e-12, 9000.0),
-        Point("heyoka", "tolerance 1e-07", 1e-9, 5000.0),
-    ),
-)
-
 
 def test_the_form_in_euler_angles_describes_the_same_motion():
     # 0.2 s: long enough for eight nutations, short enough for a few milliseconds
     euler = solve_ivp(motion.euler_rate, (0, 0.2), motion.euler_start(), "DOP853", rtol=1e-12, atol=1e-14)
     ours = simulate(problem("levitron-6").scene, 0.2, tolerance=1e-11, rate=None)
     assert euler.y[:3, -1] == pytest.approx(ours.position[-1], abs=1e-9)
-
-
-@pytest.mark.parametrize("name", motion.MOTIONS)
-def test_the_equations_for_the_peers_are_the_simulator_s_motion(name):
-    """For 0.2 s, over twelve kinks of the square wave; DOP853 on motion.vector_rate."""
-    one = motion.MOTIONS[name]
-    dop853 = next(contender for contender in CONTENDERS if contender.package == "scipy")
-    ours = simulate(scene_of(one), 0.2, tolerance=1e-12, rate=None)
-    assert dop853.prepare(one, 1e-12)(0.2) == pytest.approx(ours.position[-1], abs=1e-11)
-
-
-@pytest.mark.parametrize("name", motion.MOTIONS)
-def test_the_equations_for_heyoka_are_those_of_the_other_sides(monkeypatch, name):
-    """Of numbers in the place of heyoka's symbols."""
-    one, field = motion.MOTIONS[name], 3e-4
-    place, axis, momentum = [2e-3, -1e-3, 0.073, 0.02, 0.03, -0.01], [0.1, -0.2, 0.97], [2e-6, -3e-6, 4e-4]
-    values = dict(zip(VARIABLES, place + axis + momentum, strict=True))
-    values |= {"mx": 0.12, "my": -0.17, "mz": 0.93, "cosine": field, "sine": 1e-4}
-    symbols = SimpleNamespace(make_vars=lambda *names: [values[name] for name in names], par=[field])
-    monkeypatch.setitem(sys.modules, "heyoka", symbols)
-    rates = [rate for _, rate in heyoka_system(one)]
-    state = np.array([*values.values()][: len(motion.vector_start(one))])
-    expected = motion.vector_rate(0.0, state, one.mass, 0.0 if one.drive == "off" else field, 0.0)
-    np.testing.assert_allclose(rates[: state.size], expected, rtol=1e-12)
-    turning = [-2 * math.pi * 30 * 1e-4, 2 * math.pi * 30 * field] if one.drive == "sine" else []
-    assert rates[state.size :] == pytest.approx(turning)
-
-
-@pytest.mark.parametrize("name", motion.MOTIONS)
-def test_the_references_are_ends_of_the_simulator_s_motions(name):
-    one = motion.MOTIONS[name]
-    ours = simulate(scene_of(one), motion.DURATION, tolerance=1e-11, rate=None)
-    assert np.abs(ours.position[-1] - motion.reference(one)).max() < 1e-11
-
-
-def test_the_reference_of_the_undriven_motion_is_the_golden_end_of_the_first_start():
-    golden = json.loads((GOLDEN / "trajectories.json").read_text(encoding="utf-8"))
-    end = next(case for case in golden if case["name"] == "IC1")
-    assert motion.reference() == pytest.approx(end["position_m"], abs=1e-16)
 
 
 def test_a_speed_lies_on_the_line_between_two_settings():
@@ -107,7 +50,7 @@ def test_the_ratios_compare_each_side_at_its_best():
 
 def test_the_table_and_the_document_tell_what_is_missing(capsys):
     rates = {"peak": Rate(0.0, 100.0, 1.0), "one top": Rate(19.0, 9.6, 0.096)}
-    found = Comparison(POINTS, ratios(POINTS), rates, (CASE,), ("heyoka",))
+    found = Comparison(POINTS, ratios(POINTS), rates, missing=("heyoka",))
     print_comparison(found)
     shown = capsys.readouterr().out
     assert "pip install 'levilab[peers]'" in shown
@@ -116,18 +59,6 @@ def test_the_table_and_the_document_tell_what_is_missing(capsys):
     assert document["missing"] == ["heyoka"]
     assert document["ratios"][3]["ratio"] is None
     assert document["points"][-1]["error_m"] is None
-    called = document["called"][0]
-    assert (called["motion"], called["duration_s"]) == ("sine", 60.0)
-    assert called["ratios"][0] == {
-        "ours": "simulate",
-        "peer": "heyoka",
-        "error_m": 1e-8,
-        "simulated_s_per_s": 40000.0,
-        "peer_simulated_s_per_s": 5000.0,
-        "ratio": 8.0,
-        "aim": 5.0,
-    }
-    assert called["ratios"][1]["ratio"] is None
 
 
 def test_a_peer_knows_whether_its_package_is_there():

@@ -1,0 +1,48 @@
+"""A report of many runs: an overview, in which nothing is said a hundred times and nothing is left out."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+import pytest
+
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.report.page import MOST_IN_FULL, write_report
+from many_runs import make_runs
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+COUNT = 16
+
+
+@pytest.fixture
+def page(tmp_path: Path, undrawn_figures: None) -> str:
+    """Of sixteen runs, two of which are broken."""
+    make_runs(tmp_path / "runs", COUNT, broken=8)
+    said: list[str] = []
+    output = write_report([tmp_path / "runs"], tmp_path / "report.html", tell=said.append)
+    assert len(said) == 1, "the broken runs are named once, not once by each analysis"
+    assert re.search(r"spin-0003 and 10 more: analyzed for the page", said[0])
+    return output.read_text(encoding="utf-8")
+
+
+def test_what_many_runs_share_is_said_once_and_each_unfolds(page: str) -> None:
+    assert COUNT - 2 > MOST_IN_FULL
+    assert page.count("<dt>Status</dt>") == page.count("no instruments recorded") == 1
+    assert page.count("<details><summary><strong>") == COUNT - 2
+    assert page.count("This run alone") == COUNT - 2
+    assert "data:image/png;base64," in page
+    assert all(f'id="{target}"' in page for target in re.findall(r'href="#([^"]+)"', page))
+
+
+def test_warnings_that_are_alike_stand_together(tmp_path: Path) -> None:
+    folders = make_runs(tmp_path / "runs", 6, broken=0)
+    for folder in folders[:4]:
+        with (folder / "readings.csv").open("a", encoding="utf-8") as file:
+            file.write("200,")
+    found = ANALYSES["spindown"].analyze([tmp_path / "runs"], ANALYSES["spindown"].options_from({}))
+    torn = [alike for alike in found.grouped_warnings if "cut off" in alike[0]]
+    assert [len(alike) for alike in torn] == [4]
+    assert sorted(text for alike in found.grouped_warnings for text in alike) == sorted(found.all_warnings)
