@@ -197,7 +197,7 @@ def _number(table: dict[str, Any], key: str) -> float:
 ROOM_FOR_NOTES = 110
 #: Columns of the list that a narrow terminal has no room for, the first one first.
 DISPENSABLE = ("length", "readings")
-#: So many broken runs are explained below the list.
+#: Most broken runs that are explained below the list.
 MOST_PROBLEMS = 5
 
 

@@ -116,7 +116,7 @@ def batches(scene: Scene, over: Mapping[str, ArrayLike]) -> list[Batch]:
         columns = {key: numbers(values[key].ravel()[group]) for key in varied}
         for batch in _of_one_scene(scene, sample, values, group, columns):
             found.setdefault((_kind(batch.model), batch.scheme.name), []).append(batch)
-    return [_joined(several) for several in found.values()]
+    return [_join(several) for several in found.values()]
 
 
 # --- values against the scene's limits ---
@@ -298,7 +298,7 @@ def _kind(model: Any) -> Any:
     return type(model).__name__
 
 
-def _joined(several: list[Batch]) -> Batch:
+def _join(several: list[Batch]) -> Batch:
     """Return batches of one kind as one, its tops in the order of the map."""
     if len(several) == 1:
         return several[0]

@@ -47,7 +47,7 @@ class Contender:
         """Whether its package is there."""
         return find_spec(self.package) is not None
 
-    def prepared(self, subject: Any, tolerance: float) -> Call:
+    def call_for(self, subject: Any, tolerance: float) -> Call:
         """Return what is timed."""
         return self.prepare(subject, tolerance)
 
