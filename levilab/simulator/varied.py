@@ -1,7 +1,7 @@
 """Many tops from one scene: varied numbers checked against the scene's own limits, and made ready for the kernels.
 
 The scene is validated once for all tops.  Varied numbers are checked as arrays by the very types of its fields and by
-its rules, and go through the formulas of one top as `Numbers`.  Words, lists and whatever else a key takes are few:
+its rules, and go through the formulas of one top as `Numbers`.  Words, lists and other values are few:
 each of them gets a scene of its own.
 """
 

@@ -22,7 +22,8 @@ SPINS = np.array([19.0, 22.0, 30.0])
 
 def plan(scene: Scene, names: tuple[str, ...], duration: float, *axes: Axis) -> Plan:
     made = Plan.of(scene, axes or (Axis("start.spin_hz", SPINS),), names, duration)
-    return Plan(made.scene, made.axes, names, duration, 1e-7, chunk=made.chunk, step_share=0.2)
+    # a drift turns the axis by 0.2 rad at most
+    return Plan(made.scene, made.axes, names, duration, 1e-7, chunk=made.chunk, step_share=0.1)
 
 
 def summary_of(scene: Scene, duration: float, rate: float) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Who takes part: each integrator as its users call it, with its own step control."""
+"""The contenders: each integrator as its users call it, with its own step control."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Contender:
         return find_spec(self.package) is not None
 
     def call_for(self, subject: Any, tolerance: float) -> Call:
-        """Return what is timed."""
+        """Return the call that is timed."""
         return self.prepare(subject, tolerance)
 
 
