@@ -78,7 +78,7 @@ def begin_adaptive(store: Store, observable: str = "survived", *, stride: int = 
     columns = {column.name: column for column in columns_of(plan.observables)}
     if observable not in columns or columns[observable].dtype != "bool":
         flags = " or ".join(name for name, one in OBSERVABLES.items() if one.dtype == "bool")
-        expected = f"a boundary is one of a yes or no: `observe` must have {flags}, and this must be it"
+        expected = f"a boundary lies between yes and no, and this is neither: add {flags} to `observe`"
         raise UsageError("adaptive", expected, value=observable)
     if stride < 2 or stride & (stride - 1):
         raise UsageError("stride", "a power of 2 is expected, such as 8", value=stride)
@@ -223,8 +223,8 @@ class _Run:
             for number in np.unique(np.ravel_multi_index(blocks, plan.grid)):
                 box = plan.chunk_of(int(number)).box
                 for name, values in self.columns.items():
-                    self.store.group[name][box] = values[box]
-                self.store.group[STATUS][box] = self.status[box]
+                    self.store.array(name)[box] = values[box]
+                self.store.array(STATUS)[box] = self.status[box]
         self.unwritten = []
 
     def finish(self, found: Refined) -> dict[str, Any]:
@@ -236,7 +236,7 @@ class _Run:
         self.write()
         with _writing(store):
             store.group.attrs[FOUND] = report
-            store.group[DONE][...] = 1
+            store.array(DONE)[...] = 1
         store.marks[...] = 1
         return report
 
@@ -276,7 +276,7 @@ def in_words(report: dict[str, Any], plan: Plan) -> list[str]:
         for stride, axis in zip(report["strides"], plan.axes, strict=True)
     )
     share, limit = f"{100 * report['saved']:.0f} %", f"{100 * report['most_wrong_share']:.2g} %"
-    checked = f"{count} of those filled in were checked at random: {wrong} were wrong"
+    checked = f"{count} of those filled in were checked at random: {wrong} {'was' if wrong == 1 else 'were'} wrong"
     sure = (
         f"with {100 * report['confidence']:.0f} % confidence at most {report['most_wrong']} ({limit}) of the "
         f"{report['filled']} filled in are wrong: {judge['wrong']} of {judge['computed']} were in the last check"

@@ -446,7 +446,8 @@ def _caption(found: Map, view: _View, sentences: Sequence[str], width: float) ->
     said += [f"{text[0].upper()}{text[1:]}".removesuffix(".") + "." for text in sentences]
     if found.filled is None and not found.computed.all():
         said.append(f"{np.count_nonzero(~found.computed)} of {found.computed.size} points are not computed yet.")
-    return textwrap.wrap(" ".join(said), round(15.3 * width))
+    whole = " ".join(said).replace(" %", "\u00a0%")  # a number and its per cent stay in one line
+    return textwrap.wrap(whole, round(15.3 * width))
 
 
 def _step(axis: Axis) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from levilab.errors import UsageError
 from levilab.files import CannotWrite, replace_atomically, writing
+from levilab.settings import hint_about
 from levilab.simulator.equilibrium import HEAVIEST_KG, stability_of
 from levilab.sweeps.cost import cut
 from levilab.sweeps.plan import Axis, Plan
@@ -44,11 +45,13 @@ def span_of(name: str, text: str) -> Span:
     >>> span_of("spins", "20:30:0.5")
     (20.0, 30.0, 21)
     """
-    expected = "LOW:HIGH:STEP is expected, such as 20:30:0.5"
+    example, unit = ("0.0250:0.0254:2e-5", "kg") if name == "masses" else ("20:30:0.5", "Hz")
+    expected = f"LOW:HIGH:STEP is expected, such as {example}"
     try:
         low, high, step = map(float, text.split(":"))
     except ValueError:
-        raise UsageError(name, expected, value=text) from None
+        hints = (hint_about(part, f"which is {unit}") for part in text.split(":"))
+        raise UsageError(name, expected + next(filter(None, hints), ""), value=text) from None
     if not (all(map(math.isfinite, (low, high, step))) and step > 0 and high >= low + step):
         raise UsageError(name, f"{expected}, with HIGH at least one STEP above LOW", value=text)
     steps = (high - low) / step * (1 + 1e-9)  # rounding must not lose the last one

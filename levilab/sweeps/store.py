@@ -182,13 +182,21 @@ class Store:
         """Yield the chunks that are not done, one after another."""
         return (self.plan.chunk_of(number) for number in range(self.plan.chunk_count) if not self.marks[number])
 
+    def array(self, name: str) -> Any:
+        """Return an array to write into.  Raises CannotWrite where the folder is no longer there."""
+        try:
+            return self.group[name]
+        except KeyError as error:
+            text = f"{self.path}: it was moved or removed meanwhile; where it is now, go on with `resume`"
+            raise CannotWrite(text) from error
+
     def write(self, chunk: Chunk, values: Mapping[str, NDArray[Any]]) -> None:
         """Write a chunk's values, and when they are on the disk its mark.  Raises CannotWrite."""
         with writing(f"{self.path}: cannot be written", "free space, then go on with `resume`"):
             for column in columns_of(self.plan.observables):
-                self.group[column.name][chunk.box] = np.asarray(values[column.name], dtype=column.dtype)
+                self.array(column.name)[chunk.box] = np.asarray(values[column.name], dtype=column.dtype)
             self._sync(chunk)
-            self.group[DONE][chunk.number] = 1
+            self.array(DONE)[chunk.number] = 1
         self.marks[chunk.number] = 1
 
     def _sync(self, chunk: Chunk) -> None:

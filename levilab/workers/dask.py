@@ -72,6 +72,7 @@ class Cluster(Executor):
     def _connect(self) -> Any:
         try:
             from distributed.client import Client
+            from distributed.comm.addressing import get_address_host_port
         except ImportError as error:
             raise LevilabError(
                 "a Dask cluster needs the library distributed, which is not installed: pip install 'levilab[cluster]'"
@@ -80,13 +81,23 @@ class Cluster(Executor):
         if is_file and not Path(self._scheduler).is_file():
             raise LevilabError(f"{self._scheduler}: no such file; `dask scheduler --scheduler-file` writes it")
         place = {"scheduler_file": self._scheduler} if is_file else {"address": self._scheduler}
+        if not is_file:  # distributed itself would say so after 20 s, with a traceback
+            try:
+                get_address_host_port(self._scheduler)
+            except ValueError as error:
+                expected = "a name with its port is expected, such as tcp://10.0.0.1:8786"
+                raise WorkersLost(
+                    f"{self._scheduler} is no address of a Dask scheduler ({error}): {expected}"
+                ) from error
         try:
             # different versions of libraries that results depend on are an error of `packing`, which names them
             with warnings.catch_warnings(action="ignore"):
                 connect: Any = Client
                 return connect(**place, timeout=ANSWER_S, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
-            text = f"no Dask scheduler answers at {self._scheduler}: start one (`dask scheduler`), give its address"
+            text = (
+                f"no Dask scheduler answers at {self._scheduler}: start one (`dask scheduler`), or correct the address"
+            )
             raise WorkersLost(text) from error
 
     def _wait_for_workers(self) -> None:

@@ -48,7 +48,8 @@ def test_a_text_that_is_no_axis_is_refused_with_what_is_expected(text: str, said
         (("start.spin=18:40:5",), "did you mean start.spin_hz?"),
         (("start=18:40:5",), "sweep one of its keys, place,"),
         (("start.position_m=1:2:5",), "start.position_m.0, start.position_m.1"),
-        (("start.position_m.3=1:2:5",), "no such number"),
+        (("start.position_m.3=1:2:5",), "start.position_m has 3 numbers: sweep one of them, start.position_m.0"),
+        (("top.mass_kg.0=1:2:5",), "no such number"),
         (("drive.waveform=1:2:5",), "it takes words, now off"),
         (("description=1:2:5",), "the same for a whole map"),
         (("drive.frequency_hz=29:31:5",), "it changes nothing, since drive.waveform = off"),
@@ -96,6 +97,16 @@ def test_a_table_of_points_may_be_of_commas_semicolons_or_tabs(text: str, tmp_pa
     assert (spin.key, spin.values.tolist(), spin.scale) == ("start.spin_hz", [20.0, 25.5], "table")
     assert waveform.values.tolist() == ["sine", "square"]
     check_axes(preset("driven"), (spin, waveform))
+
+
+def test_a_key_without_effect_at_some_points_alone_is_an_axis(tmp_path: Path) -> None:
+    table = read_points(points(tmp_path, "drive.waveform,drive.amplitude_t\nsine,4e-4\noff,0\n"))
+    check_axes(preset("driven"), table)
+    with pytest.raises(UsageError, match=r"it changes nothing, since drive\.waveform = off"):
+        check_axes(preset("driven"), read_points(points(tmp_path, "drive.waveform,drive.amplitude_t\noff,0\noff,1\n")))
+    check_axes(
+        preset("undriven"), [parse_axis("washers.inertia_kg_m2=0:1e-9:3"), parse_axis("washers.drag_share=0:1:3")]
+    )
 
 
 @pytest.mark.parametrize(

@@ -108,6 +108,14 @@ def test_a_store_that_is_damaged_is_an_error_that_names_it(tmp_path: Path) -> No
         Store.open(tmp_path / "nothing")
 
 
+def test_a_store_that_is_moved_while_it_is_written_is_an_error_that_names_it(tmp_path: Path) -> None:
+    made = Store.create(tmp_path / "map.zarr", plan())
+    (tmp_path / "map.zarr").rename(tmp_path / "elsewhere.zarr")
+    task = next(tasks_of(made))
+    with pytest.raises(CannotWrite, match=r"map\.zarr: it was moved or removed meanwhile"):
+        made.write(task.chunk, made_up(task))
+
+
 def test_a_folder_that_is_there_is_not_written_over(tmp_path: Path) -> None:
     Store.create(tmp_path / "map.zarr", plan())
     with pytest.raises(CannotWrite, match="is there already"):
