@@ -106,8 +106,14 @@ class TableFile:
         replace_atomically(self._about_part, self._description())
         self._file = self.part.open("x+b")
         self._file.write(_line([column.name for column in self._columns]))
-        for cells in earlier:
-            self.add(cells)
+        try:
+            for cells in earlier:
+                self.add(cells)
+        except (ValueError, csv.Error) as error:  # those of Arrow are ValueErrors, too
+            self._file.close()
+            self._remove_part()
+            what = f"{self.table}: is damaged ({error}): start anew, without `resume`"
+            raise DataError(what) from error
 
     def add(self, cells: Sequence[Cell]) -> None:
         """Append a row; it is with the operating system before this returns.  Raises CannotWrite."""
@@ -142,8 +148,11 @@ class TableFile:
                     file.writelines(rows)
             replace_atomically(self._about, self._description())
             self._file.close()
-            self._about_part.unlink()
-            self.part.unlink()
+            self._remove_part()
+
+    def _remove_part(self) -> None:
+        self._about_part.unlink()
+        self.part.unlink()
 
     def _rows(self, paths: Iterable[str]) -> Iterator[bytes]:
         for path in paths:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import pyarrow.parquet as pq
 import pytest
 
-from levilab.errors import UsageError, WorkersLost
+from levilab.errors import DataError, UsageError, WorkersLost
 from levilab.files import CannotWrite, locked
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.many import table as many
@@ -134,6 +134,17 @@ def test_of_a_whole_table_only_what_changed_is_done_again(runs: Path) -> None:
     assert seen[-1].kept == COUNT // 2 - 1
     assert not rows[1]["problem"]
     assert rows_of(tabulate(runs, "anew.csv")) == rows
+
+
+@pytest.mark.parametrize("name", ["all.csv", "all.parquet"])
+def test_a_table_that_is_damaged_is_refused_and_left_alone(runs: Path, name: str) -> None:
+    table = tabulate(runs, name)
+    damaged = table.read_bytes()[:900] + b"\n"
+    table.write_bytes(damaged)
+    with pytest.raises(DataError, match=rf"{name}: is damaged \(.*\): start anew"):
+        tabulate(runs, name, resume=True)
+    assert table.read_bytes() == damaged
+    assert sorted(file.name for file in runs.parent.glob("*all.*")) == [name, f"{name}.json"]
 
 
 def test_two_processes_do_not_write_one_table(runs: Path) -> None:
