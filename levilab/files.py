@@ -178,6 +178,33 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
         raise
 
 
+@contextlib.contextmanager
+def locked(path: Path, busy: str) -> Iterator[None]:
+    """Keep other processes that do the same from writing a file or a folder meanwhile.
+
+    Args:
+        path: of the file or folder; the lock lies beside it.
+        busy: what to say if another process holds the lock, behind the path.
+
+    Raises:
+        CannotWrite: another process holds it.
+        OSError: the lock cannot be made.
+    """
+    from filelock import FileLock, Timeout
+
+    lock = FileLock(path.with_name(f".{path.name}.lock"))
+    try:
+        lock.acquire(blocking=False)
+    except Timeout:
+        raise CannotWrite(f"{path}: {busy}") from None
+    try:
+        yield
+    finally:
+        lock.release()
+        with contextlib.suppress(OSError):
+            os.unlink(lock.lock_file)  # noqa: PTH108 - what it gives is text
+
+
 def sync_folder(folder: Path) -> None:
     """A new name is on the disk only with its folder; Windows keeps names without being asked."""
     if os.name != "posix":

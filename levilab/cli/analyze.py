@@ -281,7 +281,10 @@ def _command(options: Sequence[str]) -> Callable[..., None]:
             int | None, typer.Option(metavar="N", min=1, help="Processes for --table.", show_default="all of them")
         ] = None,
         resume: Annotated[
-            bool, typer.Option("--resume", help="Keep the rows of an earlier --table, and analyze the other runs.")
+            bool,
+            typer.Option(
+                "--resume", help="Keep the rows of an earlier --table; analyze what is new, changed or failed."
+            ),
         ] = False,
         as_json: Json = False,
         **given: Any,

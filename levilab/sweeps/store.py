@@ -11,13 +11,12 @@ import contextlib
 import os
 import sys
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from levilab.errors import DataError
-from levilab.files import CannotWrite, sync_folder, writing
+from levilab.files import CannotWrite, locked, sync_folder, writing
 from levilab.runs.run import utc_now
 from levilab.simulator.keys import SceneError, short_text
 from levilab.software import software_versions
@@ -27,6 +26,7 @@ from levilab.sweeps.quantities import quantity_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -145,22 +145,11 @@ class Store:
     @contextlib.contextmanager
     def lock(self) -> Iterator[None]:
         """Keep other processes from writing into the store.  Raises CannotWrite where one does already."""
-        from filelock import FileLock, Timeout
-
         if self.path is None:
             yield
             return
-        lock = FileLock(self.path.with_name(f".{self.path.name}.lock"))
-        try:
-            lock.acquire(blocking=False)
-        except Timeout:
-            raise CannotWrite(f"{self.path}: another process is computing it; wait for its end") from None
-        try:
+        with locked(self.path, "another process is computing it; wait for its end"):
             yield
-        finally:
-            lock.release()
-            with contextlib.suppress(OSError):
-                Path(lock.lock_file).unlink(missing_ok=True)
 
     def notes(self) -> list[str]:
         """Return the differences in software and processor since the store was begun that may change the last bits."""

@@ -52,6 +52,11 @@ class LimitReadings:
     def __len__(self) -> int:
         return len(self.limit)
 
+    @property
+    def fingerprint(self) -> float:
+        """The greatest limit [Hz]."""
+        return float(np.abs(self.limit).max())
+
     def same_as(self, other: LimitReadings) -> bool:
         """Whether these are the same limits, but for the rounding of another unit in the file."""
         return len(self) == len(other) and bool(np.allclose(self.limit, other.limit, rtol=_SAME, atol=0))

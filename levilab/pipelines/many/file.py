@@ -9,12 +9,14 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
+from contextlib import ExitStack
 from importlib.util import find_spec
 from itertools import islice
 from typing import TYPE_CHECKING, Any, Self
 
 from levilab.errors import DataError, UsageError
-from levilab.files import parse_json, replace_atomically, replacing, writing
+from levilab.files import locked, parse_json, replace_atomically, replacing, writing
 from levilab.pipelines.row import text_of, value_of_text
 
 if TYPE_CHECKING:
@@ -59,6 +61,7 @@ class TableFile:
         self._columns = tuple(columns)
         self._made_with = made_with
         self._places: dict[str, int] = {}
+        self._lock = ExitStack()
 
     def __len__(self) -> int:
         return len(self._places)
@@ -71,6 +74,7 @@ class TableFile:
 
     def __exit__(self, *_: object) -> None:
         self._file.close()
+        self._lock.close()
 
     def open(self, *, resume: bool) -> Self:
         """Begin a table, or continue that of an earlier call.
@@ -80,27 +84,36 @@ class TableFile:
 
         Raises:
             UsageError: rows of an earlier call were not asked for, or were made with other options.
-            CannotWrite: the place cannot be written to.
+            CannotWrite: the place cannot be written to, or another process writes there.
         """
-        there = self.part.exists()
-        if there and not resume:
-            what = f"{self.part} holds runs of an analysis that was interrupted: go on with it (`resume`), or remove it"
-            raise UsageError("table", what, value=self.table)
-        with writing(f"{self.table}: could not be written", _ELSEWHERE):
+        with writing(f"{self.table}: could not be written", _ELSEWHERE), ExitStack() as until_failure:
             self.table.parent.mkdir(parents=True, exist_ok=True)
-            if there and resume:
+            until_failure.enter_context(locked(self.table, "another process is writing it; wait for its end"))
+            if not self.part.exists():
+                self._begin(self._earlier_rows() if resume and self.table.exists() else iter(()))
+            elif resume:
                 self._must_be_alike(self._about_part, self.part)
                 self._cut_torn_line()
                 self._file = self.part.open("r+b")
                 self._find_rows()
             else:
-                earlier = self._earlier_rows() if resume and self.table.exists() else iter(())
-                replace_atomically(self._about_part, self._description())
-                self._file = self.part.open("x+b")
-                self._file.write(_line([column.name for column in self._columns]))
-                for cells in earlier:
-                    self.add(cells)
+                left = f"{self.part} holds runs of an analysis that was interrupted"
+                raise UsageError("table", f"{left}: go on with it (`resume`), or remove it", value=self.table)
+            self._lock = until_failure.pop_all()
         return self
+
+    def _begin(self, earlier: Iterable[Sequence[Cell]]) -> None:
+        replace_atomically(self._about_part, self._description())
+        self._file = self.part.open("x+b")
+        self._file.write(_line([column.name for column in self._columns]))
+        try:
+            for cells in earlier:
+                self.add(cells)
+        except (ValueError, csv.Error) as error:  # those of Arrow are ValueErrors, too
+            self._file.close()
+            self._remove_part()
+            what = f"{self.table}: is damaged ({error}): start anew, without `resume`"
+            raise DataError(what) from error
 
     def add(self, cells: Sequence[Cell]) -> None:
         """Append a row and hand it to the operating system.  Raises CannotWrite."""
@@ -109,6 +122,19 @@ class TableFile:
             self._file.write(_line([text_of(cell) for cell in cells]))
             self._file.flush()
         self._places[str(cells[0])] = place
+
+    def sha256(self, path: str) -> str:
+        """The hash of the readings that the row of a path was made of; empty for a path without a row."""
+        if (place := self._places.get(path)) is None:
+            return ""
+        self._file.seek(place)
+        found = self._values(self._file.readline())[self._index("readings_sha256")]
+        self._file.seek(0, os.SEEK_END)
+        return str(found)
+
+    def forget(self, path: str) -> None:
+        """Leave the row of a path out of the table, unless another one is added."""
+        del self._places[path]
 
     def publish(self, paths: Iterable[str]) -> None:
         """Write the table, its rows in the order of the paths, those without a row passed over.  Raises CannotWrite."""
@@ -122,8 +148,11 @@ class TableFile:
                     file.writelines(rows)
             replace_atomically(self._about, self._description())
             self._file.close()
-            self._about_part.unlink()
-            self.part.unlink()
+            self._remove_part()
+
+    def _remove_part(self) -> None:
+        self._about_part.unlink()
+        self.part.unlink()
 
     def _rows(self, paths: Iterable[str]) -> Iterator[bytes]:
         for path in paths:
@@ -186,23 +215,30 @@ class TableFile:
             file.truncate(whole)
 
     def _find_rows(self) -> None:
-        """Note where each path's row begins, and stand at the end."""
+        """Note where the row of each path begins, if it stands, and go to the end."""
         place = len(self._file.readline())
         for line in self._file:
             try:
                 values = self._values(line)
             except (ValueError, csv.Error, StopIteration) as error:
                 raise DataError(f"{self.part}: a row is damaged ({error}): remove the file and start anew") from error
-            self._places[str(values[0])] = place
+            if self._stands(values):
+                self._places[str(values[0])] = place
             place += len(line)
         self._file.seek(place)
 
     def _earlier_rows(self) -> Iterator[list[Cell]]:
-        """Return the rows of the complete table of an earlier call, without runs that were still running then."""
+        """Return the rows of the complete table of an earlier call that are kept."""
         self._must_be_alike(self._about, self.table)
-        status = [column.name for column in self._columns].index("status")
         rows = self._of_parquet() if self.table.suffix.casefold() == PARQUET else self._of_csv()
-        return (cells for cells in rows if cells[status] != "running")
+        return filter(self._stands, rows)
+
+    def _stands(self, cells: Sequence[Cell]) -> bool:
+        """Whether a row is to be kept: a run that failed, or was not at its end, is analyzed anew."""
+        return cells[self._index("status")] != "running" and cells[self._index("problem")] is None
+
+    def _index(self, column: str) -> int:
+        return [one.name for one in self._columns].index(column)
 
     def _of_csv(self) -> Iterator[list[Cell]]:
         with self.table.open("rb") as file:

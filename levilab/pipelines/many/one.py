@@ -92,10 +92,21 @@ def columns_of(analysis: Analysis[Any]) -> tuple[Column, ...]:
     return (*HEAD, *analysis.row, *TAIL)
 
 
+def name_of(path: Path, folder: Path) -> str:
+    r"""The path of an input from a folder, as it is but for line breaks and the like, which are escaped.
+
+    >>> from pathlib import Path
+    >>> name_of(Path("runs/two\n  lines"), Path())
+    'runs/two\\n  lines'
+    """
+    text = relative(path, folder)
+    return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+
+
 def analyze_one(task: Task) -> Row | PassedOver:
     """Analyze one input by itself; an error becomes the problem of its row."""
     analysis = ANALYSES[task.analysis]
-    about: dict[str, Any] = {"path": relative(task.path, task.folder)}
+    about: dict[str, Any] = {"path": name_of(task.path, task.folder)}
     part: dict[str, Any] | None = None
     try:
         if task.is_run and (passed_over := _read_record(task, analysis, about)):
@@ -118,8 +129,10 @@ def row(analysis: Analysis[Any], about: dict[str, Any], part: dict[str, Any] | N
     """Return the row from facts about the input, and from its part of result.json; None where there is no result."""
     if problem := about.get("problem", ""):
         about["problem"] = problem = " ".join(unquoted(problem).split())
+    path, *others = HEAD
     cells = (
-        *(plain(column.read(about), column.kind) for column in HEAD),
+        path.read(about),  # as it is: two names may differ in their spaces
+        *(plain(column.read(about), column.kind) for column in others),
         *(None if part is None else plain(column.read(part), column.kind) for column in analysis.row),
         *(plain(column.read(about), column.kind) for column in TAIL),
     )

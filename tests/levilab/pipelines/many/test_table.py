@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import shutil
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -11,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import pyarrow.parquet as pq
 import pytest
 
-from levilab.errors import UsageError, WorkersLost
+from levilab.errors import DataError, UsageError, WorkersLost
+from levilab.files import CannotWrite, locked
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.many import table as many
 from levilab.pipelines.many.one import PassedOver, Row, Task, analyze_one, columns_of
@@ -92,7 +94,7 @@ def test_a_table_that_was_interrupted_goes_on(runs: Path) -> None:
         file.write(b"runs/torn,2026")  # as after a kill under way
     seen: list[int] = []
     assert tabulate(runs, resume=True, show=lambda tally: seen.append(tally.done)).read_bytes() == whole
-    assert seen == [*range(3, COUNT + 1)]
+    assert seen == [*range(2, COUNT + 1)]  # of the three, one had failed, and is tried again
     assert not part.exists()
 
 
@@ -114,11 +116,56 @@ def test_resume_of_a_complete_table_analyzes_only_new_runs(runs: Path, name: str
     shutil.move(runs.parent / last.name, last)
     seen: list[int] = []
     grown = tabulate(runs, name, resume=True, show=lambda tally: seen.append(tally.done))
-    assert seen == [COUNT - 1, COUNT]
+    assert seen == [*range(COUNT // 2, COUNT + 1)]  # those that failed are tried again
     if name.endswith(".csv"):
         assert grown.read_bytes() == tabulate(runs, "anew.csv").read_bytes()
     else:
         assert pq.read_table(grown).equals(pq.read_table(tabulate(runs, "anew.parquet")))
+
+
+def test_of_a_whole_table_only_what_changed_is_done_again(runs: Path) -> None:
+    tabulate(runs)
+    changed, mended, *_ = sorted(runs.iterdir())
+    shutil.copy(changed / "run.json", mended)
+    readings = changed / "readings.csv"
+    readings.write_bytes(readings.read_bytes().replace(b",0.03", b",0.06"))
+    seen: list[Tally] = []
+    rows = rows_of(tabulate(runs, resume=True, show=seen.append))
+    assert seen[-1].kept == COUNT // 2 - 1
+    assert not rows[1]["problem"]
+    assert rows_of(tabulate(runs, "anew.csv")) == rows
+
+
+@pytest.mark.parametrize("name", ["all.csv", "all.parquet"])
+def test_a_table_that_is_damaged_is_refused_and_left_alone(runs: Path, name: str) -> None:
+    table = tabulate(runs, name)
+    damaged = table.read_bytes()[:900] + b"\n"
+    table.write_bytes(damaged)
+    with pytest.raises(DataError, match=rf"{name}: is damaged \(.*\): start anew"):
+        tabulate(runs, name, resume=True)
+    assert table.read_bytes() == damaged
+    assert sorted(file.name for file in runs.parent.glob("*all.*")) == [name, f"{name}.json"]
+
+
+def test_two_processes_do_not_write_one_table(runs: Path) -> None:
+    with locked(runs.parent / "all.csv", "busy"), pytest.raises(CannotWrite, match="another process is writing it"):
+        tabulate(runs)
+    assert not [*runs.parent.glob("*all.csv*")]
+    tabulate(runs)
+    assert sorted(file.name for file in runs.parent.glob("*all.csv*")) == ["all.csv", "all.csv.json"]
+
+
+def test_a_name_of_any_letters_is_a_row_and_one_alone(tmp_path: Path) -> None:
+    names = ["a  b", "a b", 'c,"d" é'] + ["two\nlines"] * (os.name == "posix")
+    for name in names:
+        shutil.copytree(SAMPLE_DATA / "spin-down-1", tmp_path / "runs" / name)
+    table = tmp_path / "t.csv"
+    both = [tmp_path / "runs", tmp_path / "runs" / ".." / "runs"]
+    tally = write_table(SPINDOWN, both, {}, table, cores=1)
+    found = [row["path"].removeprefix("runs/") for row in rows_of(table)]
+    assert sorted(found) == sorted(name.replace("\n", "\\n") for name in names)
+    assert tally.total == tally.rows == len(names)
+    assert write_table(SPINDOWN, both, {}, table, cores=1, resume=True).kept == len(names)
 
 
 def test_parquet_holds_the_same_numbers_with_their_types(runs: Path) -> None:
