@@ -29,7 +29,7 @@ CHUNK_S = 2.0
 #: ... unless it had fewer points than fill the lanes, or more than a window of chunks may hold in memory.
 FEWEST, MOST = 64, 65_536
 #: Seconds of motion that one core simulates in a second, side by side in lanes: the order of magnitude suffices.
-QUICKLY = 1e5
+QUICKLY = 7e4
 #: A plan has about so many chunks or more, where each has enough points: the cores end together, and progress shows.
 MANY_CHUNKS, ENOUGH = 64, 256
 
