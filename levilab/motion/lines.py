@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from levilab.motion.lock import keeps_phase
 from levilab.simulator.energy import spin_of
 from levilab.simulator.equilibrium import modes_at
 from levilab.simulator.kernels.motion import TIME, N, R
+from levilab.simulator.numbers import largest
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -77,10 +78,10 @@ class AxisLines:
         return None if self.signal is None else amplitude_spectrum(*self.signal)
 
 
-def rate_for(scene: Scene) -> float:
+def rate_for(scene: Scene) -> Any:
     """Return the samples per second for a spectrum: four times nutation plus spin, which leaves room for sidebands."""
     spin = abs(scene.start.spin_hz)
-    turning = max(spin, scene.drive.frequency_hz if scene.drive.waveform != "off" else 0.0)
+    turning = largest(spin, scene.drive.frequency_hz) if scene.drive.waveform != "off" else spin
     return 4 * (turning + spin * _flatness(scene)) + 40.0
 
 
@@ -127,7 +128,7 @@ def _signal_of(scene: Scene, states: Array) -> tuple[Signal, float, Array]:
     return axis[:, 0] + 1j * axis[:, 1], rate, spin
 
 
-def _flatness(scene: Scene) -> float:
+def _flatness(scene: Scene) -> Any:
     return scene.top.inertia_axial_kg_m2 / scene.top.inertia_transverse_kg_m2
 
 

@@ -9,13 +9,14 @@ slips, it does not.  The azimuth of the axis does not decide it either: it is no
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from levilab.simulator.energy import spin_of
+from levilab.simulator.energy import core_spin
 from levilab.simulator.kernels.motion import ARM, TIME, N
+from levilab.simulator.numbers import copysign
 
 if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
@@ -26,6 +27,8 @@ Array = NDArray[np.float64]
 LAST_SHARE = 0.5
 #: Least duration of that part [s]: slips of 1/SHORTEST_S and faster are distinguished from a lock.
 SHORTEST_S = 5.0
+#: Share of a motion's length by which the times of its samples are off, at most.
+_ROUNDING = 1e-9
 #: Samples per second of the angle; between two of them the spin gives the number of turns.
 RATE_HZ = 50.0
 
@@ -45,32 +48,48 @@ def body_angle(states: Array) -> Array:
     neither φ nor ψ is.
 
     Args:
-        states: shape (n, 18).
+        states: shape (…, n, 18).
     """
-    arm, third = states[:, ARM], np.cross(states[:, N], states[:, ARM])
-    return np.asarray(np.arctan2(arm[:, 1] - third[:, 0], arm[:, 0] + third[:, 1]))
+    (x, y, z), (ax, ay, az) = np.moveaxis(states[..., N], -1, 0), np.moveaxis(states[..., ARM], -1, 0)
+    return np.asarray(np.arctan2(ay - (y * az - z * ay), ax + (z * ax - x * az)))
 
 
 def turns_behind(scene: Scene, states: Array) -> Array:
-    """Return the angle of the body behind the drive, followed from sample to sample, shape (n,) [turns].
+    """Return the angle of the body behind the drive, followed from sample to sample, shape (…, n) [turns].
 
     Positive where the body is ahead.  From sample to sample the angle changes by what the spin says, give or take half
     a turn.  A drive that swings to and fro turns in either sense; the top goes with the one of its own spin.
     """
-    time, sense = states[:, TIME], math.copysign(1.0, scene.start.spin_hz)
-    rate = spin_of(scene, states) / (2 * math.pi) - sense * scene.drive.frequency_hz
-    followed = np.append(0.0, np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(time)))
-    seen = body_angle(states) / (2 * math.pi) - sense * scene.drive.frequency_hz * time
+    time, sense = states[..., TIME], copysign(1.0, _beside(scene.start.spin_hz))
+    turning = sense * _beside(scene.drive.frequency_hz)
+    spin = core_spin(states, _beside(scene.top.inertia_axial_kg_m2), _beside(scene.washers.inertia_kg_m2))
+    rate = spin / (2 * math.pi) - turning
+    followed = np.zeros(time.shape)
+    np.cumsum((rate[..., 1:] + rate[..., :-1]) / 2 * np.diff(time), axis=-1, out=followed[..., 1:])
+    seen = body_angle(states) / (2 * math.pi) - turning * time
     # the angle that is seen is known up to whole turns, the angle that is followed up to small errors, which add up
     off = np.unwrap(seen - followed, period=1.0)
     return np.asarray(sense * (followed + off))
 
 
-def keeps_phase(scene: Scene, states: Array) -> bool:
-    """Whether the body stays within one turn behind the drive, in the last part of these samples."""
-    end = states[-1, TIME]
-    last = states[states[:, TIME] >= end - LAST_SHARE * (end - states[0, TIME])]
-    return bool(can_lock(scene, end) and np.ptp(turns_behind(scene, last)) < 1)
+def _beside(number: Any) -> Any:
+    """Return a number, or one of each top in a shape that goes with their samples."""
+    return number[..., None] if isinstance(number, np.ndarray) else number
+
+
+def keeps_phase(scene: Scene, states: Array) -> NDArray[np.bool_]:
+    """Whether the body stays within one turn behind the drive, in the last part of these samples, shape (…).
+
+    Args:
+        scene: of the motion, or with `Numbers` of as many tops as states are of.
+        states: shape (…, n, 18), all sampled at the same times.
+    """
+    time = states[(0,) * (states.ndim - 2)][:, TIME]
+    if not can_lock(scene, time[-1]):
+        return np.zeros(states.shape[:-2], dtype=np.bool_)
+    length = time[-1] - time[0]
+    last = states[..., time >= time[-1] - (LAST_SHARE + _ROUNDING) * length, :]
+    return np.asarray(np.ptp(turns_behind(scene, last), axis=-1) < 1)
 
 
 def is_locked(scene: Scene, states: Array, *, survived: bool) -> bool | None:
@@ -88,7 +107,10 @@ def is_locked(scene: Scene, states: Array, *, survived: bool) -> bool | None:
         return None
     if not survived:
         return False
-    lasted = float(states[-1, TIME] - states[0, TIME])
-    if LAST_SHARE * lasted < SHORTEST_S * (1 - 1e-9) or len(states) < lasted * RATE_HZ / 2:
-        return None
-    return keeps_phase(scene, states)
+    return bool(keeps_phase(scene, states)) if shows_lock(states[:, TIME]) else None
+
+
+def shows_lock(time: Array) -> bool:
+    """Whether samples at these times [s], shape (n,), are long enough, and close enough, to say what is locked."""
+    lasted = float(time[-1] - time[0])
+    return LAST_SHARE * lasted >= SHORTEST_S * (1 - 1e-9) and len(time) >= lasted * RATE_HZ / 2

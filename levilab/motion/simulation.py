@@ -129,7 +129,7 @@ def _samples_per_state(request: SimulationRequest) -> int:
             f"take `rate` = {MOST_STATES / request.duration:.2g} or less",
             value=request.duration,
         )
-    wanted = math.ceil(rate_for(request.scene) / request.rate)
+    wanted: int = math.ceil(rate_for(request.scene) / request.rate)
     return max(min(wanted, int(MOST_STATES / states)), 1)
 
 

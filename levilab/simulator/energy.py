@@ -10,6 +10,7 @@ from levilab.simulator.field import flux_density
 from levilab.simulator.kernels.loads import Aligned, Disc
 from levilab.simulator.kernels.motion import ARM, LOOSE, L, Model, N, R, V
 from levilab.simulator.model import Array, gravity
+from levilab.simulator.numbers import row
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -18,15 +19,23 @@ if TYPE_CHECKING:
 
 
 def energy(scene: Scene, model: Model, states: Array) -> Array:
-    """Energy [J] of states of shape (n, 18), without the drive's part; constant where there is no drag and no drive."""
+    """Energy [J] of states of shape (n, 18), without the drive's part; constant where there is no drag and no drive.
+
+    If some numbers of scene and model are those of n tops, each has a state.
+    """
     s = np.atleast_2d(states)
     momentum, axis = s[:, L], s[:, N]
-    along = np.einsum("ij,ij->i", momentum, axis)
-    across = np.einsum("ij,ij->i", momentum, momentum) - along**2
-    kinetic = np.einsum("ij,ij->i", s[:, V], s[:, V]) / (2 * model.body.inverse_mass)
+    along = _product(momentum, axis)
+    across = _product(momentum, momentum) - along**2
+    kinetic = _product(s[:, V], s[:, V]) / (2 * model.body.inverse_mass)
     turning = across * model.body.inverse_transverse / 2 + _spinning(scene, along, s[:, LOOSE])
-    weight = -(s[:, R] @ np.array(gravity(scene))) * scene.top.mass_kg
+    weight = -_product(s[:, R], row(*gravity(scene))) * scene.top.mass_kg
     return np.asarray(kinetic + turning + weight + magnetic_energy(model, s))
+
+
+def _product(a: Array, b: Array) -> Array:
+    """Return the products of vectors, shape (…, 3), added in an order that does not depend on how many these are."""
+    return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
 
 
 def _spinning(scene: Scene, along: Array, loose: Array) -> Array:
@@ -39,14 +48,14 @@ def _spinning(scene: Scene, along: Array, loose: Array) -> Array:
 def magnetic_energy(model: Model, states: Array) -> Array:
     """−M·B [J] in the base's field, shape (n,)."""
     magnet, axis, arm = model.magnet, states[:, N], states[:, ARM]
-    direction = axis if isinstance(magnet, Aligned) else magnet.axial * axis + magnet.transverse * arm
+    direction = axis if isinstance(magnet, Aligned) else (magnet.axial * axis.T + magnet.transverse * arm.T).T
     if not isinstance(magnet, Disc):
-        return np.asarray(-np.einsum("ij,ij->i", direction, flux_density(model.field, states[:, R])))
+        return np.asarray(-_product(direction, flux_density(model.field, states[:, R])))
     third = np.cross(axis, arm)
     total = np.zeros(len(states))
     for e1, e2, e3, weight in magnet.nodes:
         place = states[:, R] + e1 * arm + e2 * third + e3 * axis
-        total -= weight * np.einsum("ij,ij->i", direction, flux_density(model.field, place))
+        total -= weight * _product(direction, flux_density(model.field, place))
     return total
 
 

@@ -25,7 +25,7 @@ from levilab.simulator.kernels.motion import R
 from levilab.simulator.kernels.pieces import FIRST, HEIGHT, JOB_SIZE, OFF, OFFSET, RADIUS, RATE, SECOND, STEEP, TURNS
 from levilab.simulator.keys import SceneError, plain
 from levilab.simulator.model import model_of
-from levilab.simulator.numbers import Indices, Numbers, numbers, numbers_of, split, template_of
+from levilab.simulator.numbers import Indices, Numbers, T, numbers, numbers_of, split, template_of
 from levilab.simulator.problem import scheme_for
 from levilab.simulator.scene import RULES, Scene
 from levilab.simulator.start import start_of
@@ -115,17 +115,56 @@ def batches(scene: Scene, over: Mapping[str, ArrayLike]) -> list[Batch]:
         SimulationError: the values do not fit together.
     """
     values = broadcast(over)
-    varied = [key for key, column in values.items() if column.dtype.kind in "iuf" and _checker(key) is not None]
+    varied = _varied(values)
     for key in varied:
         _check(scene, key, np.asarray(over[key]))
-    size = next(iter(values.values())).size if values else 1
     found: dict[Any, list[Batch]] = {}
+    for group, view in _views(scene, values, varied):
+        for batch in _of_one_scene(scene, values, group, view):
+            found.setdefault((_kind(batch.model), batch.scheme.name), []).append(batch)
+    return [_join(several) for several in found.values()]
+
+
+def for_each(scene: Scene, values: Values, formula: Callable[[Scene, Indices], T]) -> Iterator[tuple[Indices, T]]:
+    """Yield what a formula of one top gives, for the tops of a map that take the same branches of it.
+
+    Args:
+        scene: what they have in common.
+        values: what differs, checked by `batches` before.
+        formula: takes a scene with `Numbers` for those tops, and their places in the flat map.
+
+    Yields:
+        Their places in the flat map, shape (n,), and what the formula gives.
+    """
+    for group, view in _views(scene, values, _varied(values)):
+
+        def of_some(
+            which: Indices, group: Indices = group, view: Callable[[Indices], Scene] = view
+        ) -> tuple[Indices, T]:
+            return group[which], formula(view(which), group[which])
+
+        yield from (found for _, found in split(np.arange(group.size), of_some))
+
+
+def _varied(values: Values) -> list[str]:
+    """Return the keys whose values can be checked, and put into formulas, as arrays of numbers."""
+    return [key for key, column in values.items() if column.dtype.kind in "iuf" and _checker(key) is not None]
+
+
+def _views(scene: Scene, values: Values, varied: list[str]) -> Iterator[tuple[Indices, Callable[[Indices], Scene]]]:
+    """Yield the tops whose words and lists are the same, and what makes a scene with `Numbers` of some of them."""
+    size = next(iter(values.values())).size if values else 1
     for group in _alike([column for key, column in values.items() if key not in varied], size):
         sample = _scene_with_index(scene, values, int(group[0]))
         columns = {key: numbers(values[key].ravel()[group]) for key in varied}
-        for batch in _of_one_scene(scene, sample, values, group, columns):
-            found.setdefault((_kind(batch.model), batch.scheme.name), []).append(batch)
-    return [_join(several) for several in found.values()]
+
+        def view(which: Indices, sample: Scene = sample, columns: dict[str, Numbers] = columns) -> Scene:
+            changed = sample
+            for key, column in columns.items():
+                changed = _with_leaf(changed, key.split("."), column[which])
+            return changed
+
+        yield group, view
 
 
 # --- values against the scene's limits ---
@@ -195,25 +234,15 @@ def _alike(columns: list[NDArray[Any]], size: int) -> Iterator[Indices]:
     yield from np.split(order, np.flatnonzero(np.diff(codes[order])) + 1)
 
 
-def _of_one_scene(
-    scene: Scene, sample: Scene, values: Values, group: Indices, columns: Mapping[str, Numbers]
-) -> Iterator[Batch]:
+def _of_one_scene(scene: Scene, values: Values, group: Indices, view: Callable[[Indices], Scene]) -> Iterator[Batch]:
     """Yield the tops of one scene with varied numbers, in batches; checked by the scene's rules.
 
     Args:
         scene: as it was given, for messages.
-        sample: the scene of the first of them.
         values: of all tops.
         group: which of them these are, shape (n,).
-        columns: what varies, (n,) each.
+        view: makes the scene of some of them.
     """
-
-    def view(which: Indices) -> Scene:
-        changed = sample
-        for key, column in columns.items():
-            changed = _with_leaf(changed, key.split("."), column[which])
-        return changed
-
     if broken := list(_broken(view, group.size)):
         _scene_with_index(scene, values, int(group[min(broken)]))
 

@@ -11,10 +11,12 @@ from levilab.sweeps.plan import QUICKLY, chunk_shape
 if TYPE_CHECKING:
     from levilab.sweeps.plan import Plan
 
-#: Seconds of motion that one core does in a second, with samples on the way, and with the lines in them.
-SAMPLED, WITH_LINES = 1.2e4, 300.0
-#: Factors of the time for a field of higher order or the exact one, and for a magnet that is a disc.
-HIGHER_FIELD, DISC = 8.0, 400.0
+#: Seconds of motion that one core does in a second, with samples on the way.
+SAMPLED = 4e4
+#: Factors of the time: for an estimate of the error, in a field of higher order, in the exact one, for a disc.
+ERRORS, HIGHER_FIELD, EXACT_FIELD, DISC = 1.8, 2.5, 8.0, 400.0
+#: Time to find the lines of a top [s], and seconds of motion in which they are found in a second.
+LINES_S, SEARCHED = 1.2e-3, 5e3
 #: Time for each top before its motion begins [s].
 OVERHEAD_S = 1e-5
 
@@ -22,14 +24,17 @@ OVERHEAD_S = 1e-5
 def seconds_per_point(plan: Plan) -> float:
     """Return roughly how long one core takes for a point [s].
 
-    The constants were measured on one core of 2026 with the scenes undriven and driven; the order of
-    magnitude is enough.
+    The constants were measured on one busy core of 2026 (CPU time, the better of two, 32 to 512 tops of 3 to 30 s,
+    tolerance 1e-6) with the scenes undriven and driven; measured times are within a factor of two of them.
     """
     columns = columns_of(plan.observables)
-    rate = SAMPLED if any(column.needs == "samples" for column in columns) else QUICKLY
-    rate /= 1.0 if plan.scene.base.field == "paraxial-2" else HIGHER_FIELD
+    needs = {column.needs for column in columns}
+    rate = SAMPLED if "samples" in needs else QUICKLY
+    rate /= ERRORS if "errors" in needs else 1.0
+    rate /= {"paraxial-2": 1.0, "exact": EXACT_FIELD}.get(plan.scene.base.field, HIGHER_FIELD)
     rate /= DISC if plan.scene.top.magnet == "disc" else 1.0
-    lines = plan.duration_s / WITH_LINES if {column.name for column in columns} & set(GROUPS["lines"]) else 0.0
+    has_lines = {column.name for column in columns} & set(GROUPS["lines"])
+    lines = LINES_S + plan.duration_s / SEARCHED if has_lines else 0.0
     return OVERHEAD_S + plan.duration_s / rate + lines
 
 

@@ -14,15 +14,16 @@ import numpy as np
 
 from levilab.errors import UsageError
 from levilab.motion.lines import lines_of_many, rate_for
-from levilab.motion.lock import LAST_SHARE, RATE_HZ, SHORTEST_S, can_lock, is_locked
+from levilab.motion.lock import LAST_SHARE, RATE_HZ, SHORTEST_S, can_lock, keeps_phase, shows_lock
 from levilab.motion.summary import changing_energy
 from levilab.simulator.energy import energy
 from levilab.simulator.ensemble import simulate_many
-from levilab.simulator.kernels.motion import STATE_SIZE, TIME
+from levilab.simulator.kernels.motion import STATE_SIZE, TIME, R
 from levilab.simulator.keys import nearest
 from levilab.simulator.model import model_of
+from levilab.simulator.numbers import Numbers, ceil, largest
 from levilab.simulator.start import start_of
-from levilab.simulator.varied import broadcast, scene_at
+from levilab.simulator.varied import broadcast, for_each, scene_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -45,6 +46,10 @@ HEIGHT_RATE_HZ = 100.0
 ROUND_HZ = 100.0
 #: Greatest count of numbers in the samples of one call, and least number of points in it, which fills the lanes.
 MOST_NUMBERS, FEWEST = 16_000_000, 32
+#: Tops whose locks are looked at together: their samples stay in the processor's cache.
+TOGETHER = 32
+#: The column of a state that the height is.
+HEIGHT = R.stop - 1
 
 
 @dataclass(frozen=True)
@@ -190,6 +195,7 @@ def _ends_of(plan: Plan, values: Values, names: set[str], rate: float | None = N
         tolerance=plan.tolerance,
         step_share=plan.step_share,
         rate=rate,
+        columns=slice(None) if names & {"locked", *GROUPS["lines"]} else [HEIGHT],
         cores=1,
         errors="position_error_m" in names,
     )
@@ -199,11 +205,9 @@ def _ends_of(plan: Plan, values: Values, names: set[str], rate: float | None = N
         "fall_spin_hz": np.where(ends.survived, np.nan, ends.spin_hz),
         "position_error_m": ends.position_error,
     }
-    shape, size = ends.survived.shape, ends.survived.size
+    shape = ends.survived.shape
     if "energy_error" in names:
-        states = ends.states.reshape(size, -1)
-        errors = [_energy_error(scene_at(plan.scene, ends.values, i), states[i]) for i in range(size)]
-        found["energy_error"] = np.reshape(errors, shape)
+        found["energy_error"] = _energy_errors(ends).reshape(shape)
     if rate:
         found |= {name: np.reshape(column, shape) for name, column in _columns_of_samples(ends, names).items()}
     return found
@@ -217,7 +221,9 @@ def _ends_and_samples_of(plan: Plan, values: Values, names: set[str]) -> dict[st
     arrays = {key: array.ravel() for key, array in broadcast(values).items()}
     shape = np.broadcast_shapes(*(np.shape(one) for one in values.values()))
     size = math.prod(shape)
-    rates = np.array([_rate_for(scene_at(plan.scene, arrays, i), names) for i in range(size)])
+    rates = np.empty(size)
+    for where, rate in for_each(plan.scene, arrays, lambda scene, _: _rate_for(scene, names)):
+        rates[where] = rate
     found: dict[str, NDArray[Any]] = {}
     for rate in np.unique(rates).tolist():
         alike = np.flatnonzero(rates == rate)
@@ -229,40 +235,66 @@ def _ends_and_samples_of(plan: Plan, values: Values, names: set[str]) -> dict[st
     return {name: column.reshape(shape) for name, column in found.items()}
 
 
-def _rate_for(scene: Scene, names: set[str]) -> float:
+def _rate_for(scene: Scene, names: set[str]) -> Any:
     """Return the samples per second that a point needs, rounded up so that many points have the same."""
     rate = HEIGHT_RATE_HZ if "height_spread_m" in names else RATE_HZ
     if names & set(GROUPS["lines"]):
-        rate = max(rate, math.ceil(rate_for(scene) / ROUND_HZ) * ROUND_HZ)
+        return largest(rate, ceil(rate_for(scene) / ROUND_HZ) * ROUND_HZ)
     return rate
 
 
-def _energy_error(scene: Scene, end: NDArray[np.float64]) -> float:
-    if changing_energy(scene):
-        return math.nan
-    start = start_of(scene)
-    model = model_of(scene, start[:3])
-    first, last = energy(scene, model, np.array([start, end]))
-    return abs(float(last - first)) / (abs(float(first)) or 1.0)
+def _energy_errors(ends: Ensemble) -> NDArray[np.float64]:
+    """Return the changes of the energy from start to end, relative, in the order of the flat map."""
+    states = ends.states.reshape(-1, STATE_SIZE)
+    errors = np.full(len(states), math.nan)
+
+    def error(scene: Scene, where: NDArray[np.intp]) -> Any:
+        if changing_energy(scene):
+            return math.nan
+        starts = np.atleast_2d(start_of(scene))
+        model = model_of(scene, tuple(starts[:, i].view(Numbers) for i in range(3)))
+        first, last = (energy(scene, model, some) for some in (starts, states[where]))
+        return np.abs(last - first) / np.where(first == 0, 1.0, np.abs(first))
+
+    for where, found in for_each(ends.scene, ends.values, error):
+        errors[where] = found
+    return errors
 
 
-def _columns_of_samples(ends: Ensemble, names: set[str]) -> dict[str, list[Any]]:
+def _columns_of_samples(ends: Ensemble, names: set[str]) -> dict[str, Any]:
     """Return the columns of motions that need their samples, each in the order of the flat map."""
-    motions = [_motion_of(ends, i) for i in range(ends.survived.size)]
-    survived = ends.survived.ravel().tolist()
-    columns: dict[str, list[Any]] = {}
+    columns: dict[str, Any] = {}
     if "height_spread_m" in names:
-        columns["height_spread_m"] = [
-            np.ptp(states[:, 2]) if up else math.nan for (_, states), up in zip(motions, survived, strict=True)
-        ]
+        kept = min(HEIGHT, ends.samples.shape[-1] - 1)  # the only one, or one of all
+        heights = ends.samples[..., kept].reshape(-1, ends.sample_times.size)
+        last = ends.states[..., HEIGHT].ravel()
+        spread = np.maximum(heights.max(axis=1), last) - np.minimum(heights.min(axis=1), last)
+        columns["height_spread_m"] = np.where(ends.survived.ravel(), spread, np.nan)
     if "locked" in names:
-        columns["locked"] = [
-            bool(is_locked(scene, states, survived=up)) for (scene, states), up in zip(motions, survived, strict=True)
-        ]
+        columns["locked"] = _locked(ends)
     if names & set(GROUPS["lines"]):
+        motions = [_motion_of(ends, i) for i in range(ends.survived.size)]
         rows = [_line_columns(lines) for lines in lines_of_many(motions)]
         columns |= {name: [row[name] for row in rows] for name in GROUPS["lines"]}
     return columns
+
+
+def _locked(ends: Ensemble) -> NDArray[np.bool_]:
+    """Return whether each top is up and locked, in the order of the flat map."""
+    locked = np.zeros(ends.survived.size, dtype=np.bool_)
+    samples, states = ends.samples.reshape(-1, *ends.samples.shape[-2:]), ends.states.reshape(-1, STATE_SIZE)
+    before = ends.sample_times < ends.duration * (1 - 1e-12)
+    up = np.flatnonzero(ends.survived)
+    for some in np.split(up, range(TOGETHER, up.size, TOGETHER)):
+        values = {key: column.ravel()[some] for key, column in ends.values.items()}
+        motions = np.concatenate([samples[some][:, before], states[some][:, None]], axis=1)
+
+        def keep(scene: Scene, where: NDArray[np.intp], motions: NDArray[np.float64] = motions) -> Any:
+            return can_lock(scene) and shows_lock(motions[where[0], :, TIME]) and keeps_phase(scene, motions[where])
+
+        for where, found in for_each(ends.scene, values, keep):
+            locked[some[where]] = found
+    return locked
 
 
 def _motion_of(ends: Ensemble, where: int) -> tuple[Scene, NDArray[np.float64]]:

@@ -29,7 +29,7 @@ CHUNK_S = 2.0
 #: ... unless it then had fewer points than fill the lanes, or more than fit into memory with a window of chunks.
 FEWEST, MOST = 64, 65_536
 #: Seconds of motion that one core simulates in a second, in lanes; the order of magnitude suffices.
-QUICKLY = 1e5
+QUICKLY = 7e4
 #: A plan has at least about MANY_CHUNKS chunks, if each has ENOUGH points: then all cores end at about the same time.
 MANY_CHUNKS, ENOUGH = 64, 256
 

@@ -11,6 +11,7 @@ import contextlib
 import os
 import sys
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -183,10 +184,15 @@ class Store:
         """Write a chunk's values, and when they are on the disk its mark.  Raises CannotWrite."""
         with writing(f"{self.path}: cannot be written", "free space, then go on with `resume`"):
             for column in columns_of(self.plan.observables):
-                self.array(column.name)[chunk.box] = np.asarray(values[column.name], dtype=column.dtype)
+                self._written[column.name][chunk.box] = np.asarray(values[column.name], dtype=column.dtype)
             self._sync(chunk)
-            self.array(DONE)[chunk.number] = 1
+            self._written[DONE][chunk.number] = 1
         self.marks[chunk.number] = 1
+
+    @cached_property
+    def _written(self) -> dict[str, Any]:
+        """The arrays that chunks are written into; the group would read each one's description anew."""
+        return {name: self.array(name) for name in (*(one.name for one in columns_of(self.plan.observables)), DONE)}
 
     def _sync(self, chunk: Chunk) -> None:
         """Wait until a chunk's files are on the disk: a power cut must not leave a mark without values."""

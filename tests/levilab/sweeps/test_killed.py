@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 
     import pytest
 
-#: A map of 16 chunks.
+#: A map of 16 chunks, each of which takes longer than its values take to be written.
 SWEEP = (
     "sweep", "undriven", "--sweep", "start.spin_hz=18:24:64", "--sweep", "top.mass_kg=0.0250:0.0254:64",
-    "--duration", "0.3", "--observe", "survived,lifetime_s,position_error_m", "--out", "map.zarr",
+    "--duration", "10", "--observe", "survived,lifetime_s,position_error_m", "--out", "map.zarr",
 )  # fmt: skip
 
 
