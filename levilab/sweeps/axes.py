@@ -1,4 +1,4 @@
-"""The axes of a sweep from KEY=FROM:TO:N or from a table of points; what the scene refuses is said before any work."""
+"""The axes of a sweep from KEY=FROM:TO:N or from a table of points, checked in the scene before any simulation."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 
     from levilab.simulator.scene import Scene
 
-#: Dimensions of a map: more can neither be drawn nor afforded.
+#: Dimensions of a map: one with more can neither be drawn nor computed in reasonable time.
 MOST_AXES = 3
-#: Values of one key, which are kept in memory.
+#: Greatest number of values of one key, which are kept in memory.
 MOST_VALUES = 10_000_000
-#: So many values of an axis, or rows of a table, are tried in the scene before the work begins, besides the corners.
+#: Number of values of an axis, or rows of a table, that are tried in the scene before the work, besides the corners.
 TRIED = 200
 _EXPECTED = "KEY=FROM:TO:N is expected, such as start.spin_hz=18:40:23, or KEY=FROM:TO:N:log"
 
@@ -153,11 +153,11 @@ def _column(cells: Sequence[str], *, decimal_comma: bool) -> np.ndarray[Any, np.
         return np.array(cells)
 
 
-# --- what the scene says ---
+# --- checks in the scene ---
 
 
 def check_axes(scene: Scene, axes: Sequence[Axis], settings: Iterable[str] = ()) -> None:
-    """Raise UsageError for axes that the scene does not have or refuses, or that change nothing anywhere.
+    """Raise UsageError for axes that the scene does not have, that are invalid in it, or that change nothing anywhere.
 
     Args:
         scene: with its settings.
@@ -177,8 +177,8 @@ def check_axes(scene: Scene, axes: Sequence[Axis], settings: Iterable[str] = ())
             raise UsageError(name, "`settings` has this key, too: leave one of them out", value=axis.key)
         _check_key(scene, axis, name)
     idle = {axis.key: "" for axis in axes}
-    for values in _tried(axes):
-        here = _without_effect(_tried_scene(scene, values, name), idle)
+    for values in _points_to_try(axes):
+        here = _without_effect(_scene_with(scene, values, name), idle)
         idle = {key: here[key] for key in idle if key in here}
     for key, why in idle.items():
         raise UsageError(name, f"it changes nothing, since {why}", value=key)
@@ -232,7 +232,7 @@ def _value_of(scene: Scene, axis: Axis, name: str) -> Any:
     return at
 
 
-def _tried(axes: Sequence[Axis]) -> Iterator[dict[str, Any]]:
+def _points_to_try(axes: Sequence[Axis]) -> Iterator[dict[str, Any]]:
     """Yield points at which the scene is tried: the corners, and some on the way along each axis."""
     if axes[0].scale == "table":
         count = len(axes[0].values)
@@ -250,14 +250,14 @@ def _tried(axes: Sequence[Axis]) -> Iterator[dict[str, Any]]:
             yield {other.key: float(other.values[0]) for other in axes} | {axis.key: float(axis.values[k])}
 
 
-def _tried_scene(scene: Scene, values: dict[str, Any], name: str) -> Scene:
-    """Return the scene with these values.  Raises UsageError where it refuses them."""
+def _scene_with(scene: Scene, values: dict[str, Any], name: str) -> Scene:
+    """Return the scene with these values.  Raises UsageError where they are invalid in it."""
     try:
         changed = scene.changed(values)
         start_of(changed)
     except (SceneError, SimulationError) as error:
         at = ", ".join(f"{key} = {short_text(value)}" for key, value in values.items())
-        raise UsageError(name, f"at {at} the scene is refused: {error}") from error
+        raise UsageError(name, f"at {at} the scene is invalid: {error}") from error
     return changed
 
 
