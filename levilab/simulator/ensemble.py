@@ -290,7 +290,9 @@ def _step_share(
     pilots = sorted(_pilots(next(iter(values.values())).shape if values else (1,)))
     some = {key: np.array([column.flat[i] for i in pilots], dtype=column.dtype) for key, column in values.items()}
     time = min(duration, PILOT_DURATION)
-    stayed, lost, without_success = [], [], []
+    stayed: list[float] = []
+    lost: list[float] = []
+    without_success: list[float] = []
     for batch in batches(scene, some):
         for where, longest in zip(batch.where, batch.longest, strict=True):
             one = scene_at(scene, some, int(where))
