@@ -14,11 +14,14 @@ from levilab.settings import hint_about
 from levilab.simulator.keys import SceneError, short_text
 from levilab.simulator.scene import SWITCHES
 from levilab.simulator.start import start_of
+from levilab.simulator.varied import broadcast
 from levilab.sweeps.plan import Axis, Scale, unit_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
+
+    from numpy.typing import NDArray
 
     from levilab.simulator.scene import Scene
 
@@ -244,12 +247,10 @@ def _tried(axes: Sequence[Axis]) -> Iterator[dict[str, Any]]:
 
 def _try(scene: Scene, values: dict[str, Any], name: str) -> None:
     """Raise UsageError where the scene refuses these values, or where one of them has no effect in it."""
-    at = ", ".join(f"{key} = {short_text(value)}" for key, value in values.items())
-    try:
-        changed = scene.changed(values)
-        start_of(changed)
-    except (SceneError, SimulationError) as error:
-        raise UsageError(name, f"at {at} the scene is refused: {error}") from error
+    at = _point_in_words(values)
+    if refusal := refusal_of(scene, values):
+        raise UsageError(name, refusal)
+    changed = scene.changed(values)
     for key in values:
         table, _, part = key.partition(".")
         for switch in SWITCHES:
@@ -257,6 +258,26 @@ def _try(scene: Scene, values: dict[str, Any], name: str) -> None:
                 raise UsageError(name, f"at {at} it changes nothing, since {switch.why}", value=key)
         if changed.start.place == "equilibrium" and key.startswith(("start.position_m", "start.velocity_m_s")):
             raise UsageError(name, "it changes nothing, since start.place = equilibrium", value=key)
+
+
+def refusal_of(scene: Scene, values: Mapping[str, Any]) -> str:
+    """Return why the scene refuses the values of a point, as a sentence that names them; empty if it does not."""
+    try:
+        start_of(scene.changed(dict(values)))
+    except (SceneError, SimulationError) as error:
+        return f"at {_point_in_words(values)} the scene is refused: {error}"
+    return ""
+
+
+def first_refusal(scene: Scene, values: Mapping[str, NDArray[Any]]) -> str:
+    """Return why the scene refuses the first of some points that it refuses; empty if it refuses none of them."""
+    arrays = broadcast(values)
+    points = zip(*(array.ravel().tolist() for array in arrays.values()), strict=True)
+    return next(filter(None, (refusal_of(scene, dict(zip(arrays, point, strict=True))) for point in points)), "")
+
+
+def _point_in_words(values: Mapping[str, Any]) -> str:
+    return ", ".join(f"{key} = {short_text(value)}" for key, value in values.items())
 
 
 def _plain(value: Any) -> Any:

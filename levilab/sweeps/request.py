@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 from levilab.errors import UsageError
@@ -90,12 +91,11 @@ def store_for(
     plan = plan_of(request)
     if path is not None and path.exists():
         return _going_on(request, plan, path, resume=resume)
-    if request.adaptive:  # what it refuses leaves no store behind
-        begin_adaptive(Store.create(None, plan), _boundary(plan))
-    store = Store.create(path, with_step(plan, message))
-    if request.adaptive:
-        begin_adaptive(store, _boundary(plan))
-    return store
+    if not request.adaptive:
+        return Store.create(path, with_step(plan, message))
+    begin = partial(begin_adaptive, observable=_boundary(plan))
+    Store.create(None, plan, begin)  # what it refuses is answered before the step is chosen
+    return Store.create(path, with_step(plan, message), begin)
 
 
 def _going_on(request: SweepRequest, plan: Plan, path: Path, *, resume: bool) -> Store:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shutil
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,7 +27,7 @@ from levilab.sweeps.plan import Axis, Chunk, Plan, unit_of
 from levilab.sweeps.quantities import quantity_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from numpy.typing import NDArray
 
@@ -72,58 +73,77 @@ class Store:
     marks: NDArray[np.uint8] = field(repr=False)
 
     @classmethod
-    def create(cls, path: Path | None, plan: Plan) -> Store:
+    def create(cls, path: Path | None, plan: Plan, begin: Callable[[Store], None] | None = None) -> Store:
         """Make a store for a plan.
 
         Args:
             path: of a folder that does not exist; None: in memory.
             plan: what is to be computed.
+            begin: adds to the store what else it must have; whatever ends the process meanwhile leaves no store behind.
 
         Raises:
             CannotWrite: something is there already, or the folder cannot be made.
         """
         import zarr
 
-        if path is not None and path.exists():
+        if path is None:
+            return cls._in(zarr.storage.MemoryStore(), None, plan, begin)
+        if path.exists():
             raise CannotWrite(f"{path} is there already: give another place with `out`, or go on with it by `resume`")
+        part = path.with_name(f".{path.name}.{os.getpid()}.part")
         with writing(f"{path} cannot be made"):
-            if path is not None:
+            try:
                 path.parent.mkdir(parents=True, exist_ok=True)
-            group = zarr.create_group(
-                zarr.storage.MemoryStore() if path is None else str(path),
-                attributes={
-                    "schema": SCHEMA,
-                    "plan": plan.as_table(),
-                    "scene_toml": plan.scene.as_toml(),
-                    "synthetic": True,
-                    "software": software_versions(),
-                    "processor": processor(),
-                    "created_utc": utc_now(),
-                    "command_line": sys.argv,
-                },
-            )
-            for axis in plan.axes:
-                _add_coordinate(group, axis, plan.dimensions[0] if plan.is_table else axis.key)
-            for column in columns_of(plan.observables):
-                group.create_array(
-                    column.name,
-                    shape=plan.shape,
-                    chunks=plan.chunk,
-                    dtype=column.dtype,
-                    fill_value=np.nan if column.dtype.startswith("float") else 0,
-                    dimension_names=plan.dimensions,
-                    attributes=_described(column.unit, column.meaning),
-                )
+                cls._in(str(part), part, plan, begin)
+                part.rename(path)  # refused where another process was quicker
+            finally:
+                shutil.rmtree(part, ignore_errors=True)
+            sync_folder(path.parent)
+        return cls.open(path, writable=True)
+
+    @classmethod
+    def _in(cls, place: Any, path: Path | None, plan: Plan, begin: Callable[[Store], None] | None) -> Store:
+        """Make the group and its arrays in a place where nothing is.  Raises OSError."""
+        import zarr
+
+        group = zarr.create_group(
+            place,
+            attributes={
+                "schema": SCHEMA,
+                "plan": plan.as_table(),
+                "scene_toml": plan.scene.as_toml(),
+                "synthetic": True,
+                "software": software_versions(),
+                "processor": processor(),
+                "created_utc": utc_now(),
+                "command_line": sys.argv,
+            },
+        )
+        for axis in plan.axes:
+            _add_coordinate(group, axis, plan.dimensions[0] if plan.is_table else axis.key)
+        for column in columns_of(plan.observables):
             group.create_array(
-                DONE,
-                shape=(plan.chunk_count,),
-                chunks=(min(MARKS, plan.chunk_count),),
-                dtype="uint8",
-                fill_value=0,
-                dimension_names=("chunk",),
-                attributes=_described("1", "whether a chunk is written, in the order of their numbers"),
+                column.name,
+                shape=plan.shape,
+                chunks=plan.chunk,
+                dtype=column.dtype,
+                fill_value=np.nan if column.dtype.startswith("float") else 0,
+                dimension_names=plan.dimensions,
+                attributes=_described(column.unit, column.meaning),
             )
-        return cls(plan, group, path, np.zeros(plan.chunk_count, dtype=np.uint8))
+        group.create_array(
+            DONE,
+            shape=(plan.chunk_count,),
+            chunks=(min(MARKS, plan.chunk_count),),
+            dtype="uint8",
+            fill_value=0,
+            dimension_names=("chunk",),
+            attributes=_described("1", "whether a chunk is written, in the order of their numbers"),
+        )
+        store = cls(plan, group, path, np.zeros(plan.chunk_count, dtype=np.uint8))
+        if begin is not None:
+            begin(store)
+        return store
 
     @classmethod
     def open(cls, path: Path, *, writable: bool = False) -> Store:
@@ -136,8 +156,13 @@ class Store:
                 raise DataError(f"{path}: its schema is {group.attrs.get('schema')!r}, and {SCHEMA!r} is expected")
             table: Any = group.attrs["plan"]
             plan = Plan.from_table(table, {axis["key"]: _coordinate(group, axis["key"]) for axis in table["axes"]})
+            for column in columns_of(plan.observables):
+                if group[column.name].shape != plan.shape or group[column.name].chunks != plan.chunk:
+                    raise DataError(f"{path}: its {column.name} has not the shape of its plan; compute the map anew")
             return cls(plan, group, path, np.asarray(group[DONE][:]))
-        except (OSError, KeyError, ValueError, TypeError, SceneError) as error:
+        except KeyError as error:
+            raise DataError(f"{path}: no whole store of a sweep, {error} is missing; compute the map anew") from error
+        except (OSError, ValueError, TypeError, SceneError) as error:
             raise DataError(
                 f"{path}: no store of a sweep ({error}); give a folder that `levilab sweep` wrote"
             ) from error
@@ -151,16 +176,17 @@ class Store:
             yield
             return
         lock = FileLock(self.path.with_name(f".{self.path.name}.lock"))
-        try:
-            lock.acquire(blocking=False)
-        except Timeout:
-            raise CannotWrite(f"{self.path}: another process is computing it; wait for its end") from None
+        with writing(f"{self.path}: its lock cannot be made", "go on where its folder can be written, or in a copy"):
+            try:
+                lock.acquire(blocking=False)
+            except Timeout:
+                raise CannotWrite(f"{self.path}: another process is computing it; wait for its end") from None
         try:
             yield
         finally:
-            lock.release()
-            with contextlib.suppress(OSError):
+            with contextlib.suppress(OSError):  # while it is held, so that no file is removed that another one holds
                 Path(lock.lock_file).unlink(missing_ok=True)
+            lock.release()
 
     def notes(self) -> list[str]:
         """Return what differs here from where the store was begun, if results may differ in their last bits for it."""
