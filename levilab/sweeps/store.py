@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from levilab.errors import DataError
-from levilab.files import CannotWrite, sync_folder, writing
+from levilab.files import CannotWrite, move, sync_folder, writing
 from levilab.runs.run import utc_now
-from levilab.simulator.keys import SceneError, short_text
+from levilab.simulator.keys import short_text
 from levilab.software import software_versions
 from levilab.sweeps.observables import columns_of
 from levilab.sweeps.plan import Axis, Chunk, Plan, unit_of
@@ -95,7 +95,7 @@ class Store:
             try:
                 path.parent.mkdir(parents=True, exist_ok=True)
                 cls._in(str(part), part, plan, begin)
-                part.rename(path)  # refused where another process was quicker
+                move(part, path)  # refused where another process was quicker
             finally:
                 shutil.rmtree(part, ignore_errors=True)
             sync_folder(path.parent)
@@ -151,21 +151,27 @@ class Store:
         import zarr
 
         try:
-            group: Any = zarr.open_group(str(path), mode="r+" if writable else "r")
-            if group.attrs.get("schema") != SCHEMA:
-                raise DataError(f"{path}: its schema is {group.attrs.get('schema')!r}, and {SCHEMA!r} is expected")
-            table: Any = group.attrs["plan"]
-            plan = Plan.from_table(table, {axis["key"]: _coordinate(group, axis["key"]) for axis in table["axes"]})
-            for column in columns_of(plan.observables):
-                if group[column.name].shape != plan.shape or group[column.name].chunks != plan.chunk:
-                    raise DataError(f"{path}: its {column.name} has not the shape of its plan; compute the map anew")
-            return cls(plan, group, path, np.asarray(group[DONE][:]))
+            return cls._of(zarr.open_group(str(path), mode="r+" if writable else "r"), path)
+        except DataError:
+            raise
         except KeyError as error:
             raise DataError(f"{path}: no whole store of a sweep, {error} is missing; compute the map anew") from error
-        except (OSError, ValueError, TypeError, SceneError) as error:
+        except Exception as error:  # what is damaged shows in errors of many kinds
             raise DataError(
                 f"{path}: no store of a sweep ({error}); give a folder that `levilab sweep` wrote"
             ) from error
+
+    @classmethod
+    def _of(cls, group: Any, path: Path) -> Store:
+        """Return the store of a group.  Raises DataError where it is another group, or not whole."""
+        if group.attrs.get("schema") != SCHEMA:
+            raise DataError(f"{path}: its schema is {group.attrs.get('schema')!r}, and {SCHEMA!r} is expected")
+        table: Any = group.attrs["plan"]
+        plan = Plan.from_table(table, {axis["key"]: _coordinate(group, axis["key"]) for axis in table["axes"]})
+        for column in columns_of(plan.observables):
+            if group[column.name].shape != plan.shape or group[column.name].chunks != plan.chunk:
+                raise DataError(f"{path}: its {column.name} has not the shape of its plan; compute the map anew")
+        return cls(plan, group, path, np.asarray(group[DONE][:]))
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
