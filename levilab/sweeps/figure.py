@@ -58,7 +58,7 @@ CURVE_POINTS = 61
 RIM = [withStroke(linewidth=3.2, foreground="white")]
 DASHED: Any = {"color": "black", "linewidth": 1, "linestyle": "dashed"}
 #: Where panels begin and end, as shares of the width: a colour bar fits beside them.
-LEFT, RIGHT = 0.095, 0.87
+LEFT, RIGHT = 0.095, 0.86
 
 
 @dataclass(frozen=True)

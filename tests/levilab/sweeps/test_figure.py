@@ -164,6 +164,6 @@ def test_an_error_of_zero_is_drawn_as_the_smallest_and_the_colour_bar_fits() -> 
     figure = map_figure(found, "energy_error")
     shown = np.ma.getmaskarray(figure.axes[0].collections[-1].get_array())
     assert not shown.any()
-    bounds = figure.axes[-1].get_tightbbox(figure.canvas.get_renderer())  # type: ignore[attr-defined]
+    bounds = figure.axes[-1].get_tightbbox()
     assert bounds is not None
     assert bounds.x1 < figure.bbox.x1
