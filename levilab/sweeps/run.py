@@ -69,7 +69,8 @@ def with_step(plan: Plan, message: Callable[[str], None]) -> Plan:
     """
     with announce_compilation(message):
         over = {axis.key: axis.values for axis in plan.axes} if plan.is_table else _grid(plan)
-        return replace(plan, step_share=step_share_of(plan.scene, over, plan.duration_s, tolerance=plan.tolerance))
+        share = step_share_of(plan.scene, over, plan.duration_s, tolerance=plan.tolerance, survivors_only=True)
+        return replace(plan, step_share=share)
 
 
 def _grid(plan: Plan) -> dict[str, NDArray[Any]]:
