@@ -179,8 +179,10 @@ def check_axes(scene: Scene, axes: Sequence[Axis], settings: Iterable[str] = ())
         if axis.key in settings:
             raise UsageError(name, "`settings` has this key, too: leave one of them out", value=axis.key)
         _check_key(scene, axis, name)
-    for values in _tried(axes):
-        _try(scene, values, name)
+    idle = [_idle_keys(_try(scene, values, name), values) for values in _tried(axes)]
+    for key, why in idle[0].items():
+        if all(key in keys for keys in idle):
+            raise UsageError(name, f"it changes nothing, since {why}", value=key)
 
 
 def _check_key(scene: Scene, axis: Axis, name: str) -> None:
@@ -245,19 +247,24 @@ def _tried(axes: Sequence[Axis]) -> Iterator[dict[str, Any]]:
             yield {other.key: float(other.values[0]) for other in axes} | {axis.key: float(axis.values[k])}
 
 
-def _try(scene: Scene, values: dict[str, Any], name: str) -> None:
-    """Raise UsageError where the scene refuses these values, or where one of them has no effect in it."""
-    at = _point_in_words(values)
+def _try(scene: Scene, values: dict[str, Any], name: str) -> Scene:
+    """Return the scene with these values.  Raises UsageError where it refuses them."""
     if refusal := refusal_of(scene, values):
         raise UsageError(name, refusal)
-    changed = scene.changed(values)
-    for key in values:
+    return scene.changed(values)
+
+
+def _idle_keys(scene: Scene, keys: Iterable[str]) -> dict[str, str]:
+    """Return which of the keys have no effect in a scene, and why."""
+    idle = {}
+    for key in keys:
         table, _, part = key.partition(".")
         for switch in SWITCHES:
-            if table == switch.table and part.split(".")[0] in switch.keys and switch.is_off(changed):
-                raise UsageError(name, f"at {at} it changes nothing, since {switch.why}", value=key)
-        if changed.start.place == "equilibrium" and key.startswith(("start.position_m", "start.velocity_m_s")):
-            raise UsageError(name, "it changes nothing, since start.place = equilibrium", value=key)
+            if table == switch.table and part.split(".")[0] in switch.keys and switch.is_off(scene):
+                idle[key] = switch.why
+        if scene.start.place == "equilibrium" and key.startswith(("start.position_m", "start.velocity_m_s")):
+            idle[key] = "start.place = equilibrium"
+    return idle
 
 
 def refusal_of(scene: Scene, values: Mapping[str, Any]) -> str:

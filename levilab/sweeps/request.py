@@ -58,6 +58,8 @@ def plan_of(request: SweepRequest) -> Plan:
     for name, value in (("duration", request.duration), ("tolerance", request.tolerance)):
         if not 0 < value <= LONGEST_S:
             raise UsageError(name, f"a number above 0 and up to {LONGEST_S:.0e} is expected", value=value)
+    if request.seed and not request.adaptive:
+        raise UsageError("seed", "goes with `adaptive` alone: nothing else of a sweep is left to chance")
     names = tuple(dict.fromkeys(filter(None, (name.strip() for name in request.observe.split(",")))))
     columns_of(names)
     if not names:

@@ -68,6 +68,9 @@ def with_step(plan: Plan, message: Callable[[str], None]) -> Plan:
         SceneError, SimulationError: some of the points cannot be simulated.
     """
     with announce_compilation(message):
+        with interruption_postponed():  # a compilation would lose it
+            first = {axis.key: axis.values[:1] for axis in plan.axes}
+            step_share_of(plan.scene, first, min(_FIRST_S, plan.duration_s), tolerance=plan.tolerance)
         over = {axis.key: axis.values for axis in plan.axes} if plan.is_table else _grid(plan)
         share = step_share_of(plan.scene, over, plan.duration_s, tolerance=plan.tolerance, survivors_only=True)
         return replace(plan, step_share=share)
