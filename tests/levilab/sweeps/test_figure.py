@@ -162,8 +162,8 @@ def test_an_error_of_zero_is_drawn_as_the_smallest_and_the_colour_bar_fits() -> 
     found.values["energy_error"][...] = np.linspace(1e-3, 9e-3, found.computed.size).reshape(found.computed.shape)
     found.values["energy_error"][0, 0] = 0.0
     figure = map_figure(found, "energy_error")
-    shown = np.ma.getmaskarray(figure.axes[0].collections[-1].get_array())
-    assert not shown.any()
+    cells = figure.axes[0].collections[-1]
+    assert not np.ma.getmaskarray(cells.norm(cells.get_array())).any()
     bounds = figure.axes[-1].get_tightbbox()
     assert bounds is not None
     assert bounds.x1 < figure.bbox.x1
