@@ -1,8 +1,8 @@
-"""A map that is refined along its boundary, in a store: points go out round by round, and each has a mark.
+"""Compute a map that is refined along its boundary, round by round, in a store with a mark for each point.
 
-The mark of a point says whether it was computed or filled in.  Marks are written after values, chunk by chunk, so that
-what ends the process costs the last points at most; to go on, the refinement is run again from its beginning and finds
-its answers in the store.
+The mark of a point says whether it was computed or filled in.  Marks are written after values, chunk by chunk.  If the
+process is killed, at most the last points are lost: to continue, the refinement runs again from its beginning, and the
+values in the store answer its questions.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from levilab.errors import SimulationError, UsageError, WorkersLost
 from levilab.files import writing
 from levilab.interruption import interruption_postponed
-from levilab.sweeps.axes import first_refusal
+from levilab.sweeps.axes import first_error
 from levilab.sweeps.observables import OBSERVABLES, columns_of, observe
 from levilab.sweeps.quantities import step_in_words
 from levilab.sweeps.refinement import AUDIT, CONFIDENCE, STRIDE, Points, Refined, refine
@@ -33,11 +33,11 @@ if TYPE_CHECKING:
     from levilab.sweeps.store import Store
     from levilab.workers import Done, Workers
 
-#: Attributes of the store: what was asked for, and what came of it.
+#: Attributes of the store: the settings of the refinement, and its report.
 ASKED, FOUND = "adaptive", "refined"
-#: Points of a task: enough to fill the lanes; a round is cut into about so many tasks; and no task has more.
+#: Least points of a task, which fill the lanes; tasks of a round, about; most points of a task.
 FEWEST, MANY, MOST = 64, 64, 4096
-#: After so many new points the store is written, or at the end of a round [points].
+#: The store is written after this number of new points, and at the end of a round.
 KEPT = 20_000
 
 
@@ -107,7 +107,7 @@ def is_adaptive(store: Store) -> bool:
 
 
 def run_adaptive(store: Store, executor: Workers, progress: Callable[[float], None] | None = None) -> dict[str, Any]:
-    """Compute what an adaptive store lacks; what is there already is not computed again.
+    """Compute the points that an adaptive store lacks.
 
     Returns:
         What was computed and what may have been missed, as `report_of` does.
@@ -135,8 +135,8 @@ def run_adaptive(store: Store, executor: Workers, progress: Callable[[float], No
 class _Feed:
     """Tasks of one round after another, so that all rounds share one pool.
 
-    It runs dry at the end of a round.  `results_of` asks again after the last result of the round was taken, when the
-    next round's tasks are there.
+    It is empty at the end of a round.  `results_of` requests a task again after the caller has taken the last result of
+    the round; then the tasks of the next round have been added.
     """
 
     def __init__(self) -> None:
@@ -153,7 +153,7 @@ class _Feed:
 
 @dataclass
 class _Run:
-    """Values and marks in memory, and where they go.
+    """Values and marks in memory, and the store for them.
 
     Attributes:
         store: where values and marks are kept.
@@ -207,8 +207,8 @@ class _Run:
     def keep(self, done: Done[PointsTask, dict[str, NDArray[Any]]]) -> None:
         """Keep the result of a task in memory, and now and then in the store."""
         if done.error is not None or done.result is None:
-            refusal = first_refusal(self.store.plan.scene, done.task.values)
-            raise SimulationError(refusal) if refusal else done.error or AssertionError
+            invalid = first_error(self.store.plan.scene, done.task.values)
+            raise SimulationError(invalid) if invalid else done.error or AssertionError
         for name, values in done.result.items():
             self.columns[name].flat[done.task.points] = values
         self.status.flat[done.task.points] = COMPUTED

@@ -1,4 +1,4 @@
-"""The axes of a sweep from KEY=FROM:TO:N or from a table of points; what the scene refuses is said before any work."""
+"""The axes of a sweep from KEY=FROM:TO:N or from a table of points, checked in the scene before any simulation."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 
     from levilab.simulator.scene import Scene
 
-#: Dimensions of a map: more can neither be drawn nor afforded.
+#: Dimensions of a map: one with more can neither be drawn nor computed in reasonable time.
 MOST_AXES = 3
-#: Values of one key, which are kept in memory.
+#: Greatest number of values of one key, which are kept in memory.
 MOST_VALUES = 10_000_000
-#: So many values of an axis, or rows of a table, are tried in the scene before the work begins, besides the corners.
+#: Number of values of an axis, or rows of a table, that are tried in the scene before the work, besides the corners.
 TRIED = 200
 _EXPECTED = "KEY=FROM:TO:N is expected, such as start.spin_hz=18:40:23, or KEY=FROM:TO:N:log"
 
@@ -156,11 +156,11 @@ def _column(cells: Sequence[str], *, decimal_comma: bool) -> np.ndarray[Any, np.
         return np.array(cells)
 
 
-# --- what the scene says ---
+# --- checks in the scene ---
 
 
 def check_axes(scene: Scene, axes: Sequence[Axis], settings: Iterable[str] = ()) -> None:
-    """Raise UsageError for axes that the scene does not have or refuses, or that change nothing in it.
+    """Raise UsageError for axes that the scene does not have, that are invalid in it, or that change nothing.
 
     Args:
         scene: with its settings.
@@ -179,7 +179,7 @@ def check_axes(scene: Scene, axes: Sequence[Axis], settings: Iterable[str] = ())
         if axis.key in settings:
             raise UsageError(name, "`settings` has this key, too: leave one of them out", value=axis.key)
         _check_key(scene, axis, name)
-    idle = [_idle_keys(_try(scene, values, name), values) for values in _tried(axes)]
+    idle = [_idle_keys(_try(scene, values, name), values) for values in _points_to_try(axes)]
     for key, why in idle[0].items():
         if all(key in keys for keys in idle):
             raise UsageError(name, f"it changes nothing, since {why}", value=key)
@@ -229,7 +229,7 @@ def _value_of(scene: Scene, axis: Axis, name: str) -> Any:
     return at
 
 
-def _tried(axes: Sequence[Axis]) -> Iterator[dict[str, Any]]:
+def _points_to_try(axes: Sequence[Axis]) -> Iterator[dict[str, Any]]:
     """Yield points at which the scene is tried: the corners, and some on the way along each axis."""
     if axes[0].scale == "table":
         count = len(axes[0].values)
@@ -248,9 +248,9 @@ def _tried(axes: Sequence[Axis]) -> Iterator[dict[str, Any]]:
 
 
 def _try(scene: Scene, values: dict[str, Any], name: str) -> Scene:
-    """Return the scene with these values.  Raises UsageError where it refuses them."""
-    if refusal := refusal_of(scene, values):
-        raise UsageError(name, refusal)
+    """Return the scene with these values.  Raises UsageError where they are invalid."""
+    if error := error_at(scene, values):
+        raise UsageError(name, error)
     return scene.changed(values)
 
 
@@ -267,20 +267,20 @@ def _idle_keys(scene: Scene, keys: Iterable[str]) -> dict[str, str]:
     return idle
 
 
-def refusal_of(scene: Scene, values: Mapping[str, Any]) -> str:
-    """Return why the scene refuses the values of a point, as a sentence that names them; empty if it does not."""
+def error_at(scene: Scene, values: Mapping[str, Any]) -> str:
+    """Return why the values of a point are invalid in the scene, in a sentence that names them; empty where valid."""
     try:
         start_of(scene.changed(dict(values)))
     except (SceneError, SimulationError) as error:
-        return f"at {_point_in_words(values)} the scene is refused: {error}"
+        return f"at {_point_in_words(values)} the scene is invalid: {error}"
     return ""
 
 
-def first_refusal(scene: Scene, values: Mapping[str, NDArray[Any]]) -> str:
-    """Return why the scene refuses the first of some points that it refuses; empty if it refuses none of them."""
+def first_error(scene: Scene, values: Mapping[str, NDArray[Any]]) -> str:
+    """Return why the first invalid one of some points is invalid in the scene; empty if none is."""
     arrays = broadcast(values)
     points = zip(*(array.ravel().tolist() for array in arrays.values()), strict=True)
-    return next(filter(None, (refusal_of(scene, dict(zip(arrays, point, strict=True))) for point in points)), "")
+    return next(filter(None, (error_at(scene, dict(zip(arrays, point, strict=True))) for point in points)), "")
 
 
 def _point_in_words(values: Mapping[str, Any]) -> str:

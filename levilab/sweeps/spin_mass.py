@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 #: Tops that a map may have: some minutes of 30 s each.
 MOST_TOPS = 250_000
-#: A top outside of the window can take this long to be lost [s].
+#: Tops outside of the window may stay up for this time [s].
 SHORT_S = 10.0
 USUAL_SPINS = (18.0, 90.0, 145)
 MASS, SPIN = "top.mass_kg", "start.spin_hz"
@@ -106,7 +106,7 @@ def _check(spins: Span, masses: Span) -> None:
 
 
 def notes_of(plan: Plan) -> tuple[str, ...]:
-    """Return what to mind."""
+    """Return notes on a map that is easily misread."""
     if plan.duration_s >= SHORT_S:
         return ()
     reason = f"{plan.duration_s:g} s are short: tops outside of the window may only last a while"

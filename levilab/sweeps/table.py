@@ -1,4 +1,4 @@
-"""The tables that a sweep prints: what was asked, each column in numbers, and the points where they are few."""
+"""The tables that a sweep prints: its axes, each column in numbers, and the points where they are few."""
 
 from __future__ import annotations
 

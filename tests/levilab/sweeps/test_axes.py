@@ -52,7 +52,7 @@ def test_a_text_that_is_no_axis_is_refused_with_what_is_expected(text: str, said
         (("drive.waveform=1:2:5",), "it takes words, now off"),
         (("description=1:2:5",), "the same for a whole map"),
         (("drive.frequency_hz=29:31:5",), "it changes nothing, since drive.waveform = off"),
-        (("top.mass_kg=-1:1:5",), "top.mass_kg = -1.0 the scene is refused"),
+        (("top.mass_kg=-1:1:5",), "top.mass_kg = -1.0 the scene is invalid"),
         (("top.moment_a_m2=-1:1:5",), "any number but 0 is expected"),
         (("start.position_m.2=-0.01:0.07:2", "start.spin_hz=20:30:3"), "a height (the third number) above the base"),
         (("start.spin_hz=18:40:5", "start.spin_hz=18:40:5"), "each key is swept once"),
@@ -63,7 +63,7 @@ def test_a_text_that_is_no_axis_is_refused_with_what_is_expected(text: str, said
         ),
     ],
 )
-def test_axes_that_the_scene_lacks_or_refuses_are_named(axes: tuple[str, ...], said: str) -> None:
+def test_axes_that_the_scene_lacks_or_that_are_invalid_are_named(axes: tuple[str, ...], said: str) -> None:
     with pytest.raises(UsageError) as refused:
         check_axes(preset("undriven"), tuple(map(parse_axis, axes)), {"start.velocity_m_s.0"})
     assert said in refused.value.text

@@ -135,7 +135,9 @@ def test_a_point_that_the_scene_refuses_is_named(tmp_path: Path) -> None:
     )
     axes = Axis("top.mass_kg", masses), Axis("start.spin_hz", np.array([25.0, 30.0]))
     asked = replace(Plan.of(scene, axes, ("survived",), 0.01), chunk=(4, 1), step_share=0.1)
-    with pytest.raises(ChunksFailed, match=r"2 of 2 chunks .*: at top\.mass_kg = 0\.03, start\.spin_hz = 25(\.0)? the"):
+    with pytest.raises(
+        ChunksFailed, match=r"2 of 2 chunks .*: at top\.mass_kg = 0\.03, start\.spin_hz = 25.* is invalid"
+    ):
         run(Store.create(None, asked))
 
 
