@@ -170,7 +170,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
             yield file
             file.flush()
             os.fsync(file.fileno())
-        _replace(part, path)
+        move(part, path)
         sync_folder(path.parent)
     except BaseException:
         with contextlib.suppress(OSError):
@@ -200,9 +200,9 @@ def locked(path: Path, busy: str) -> Iterator[None]:
     try:
         yield
     finally:
-        lock.release()
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError):  # while it is held, so that no file is removed that another one holds
             os.unlink(lock.lock_file)  # noqa: PTH108 - what it gives is text
+        lock.release()
 
 
 def sync_folder(folder: Path) -> None:
@@ -216,8 +216,8 @@ def sync_folder(folder: Path) -> None:
         os.close(descriptor)
 
 
-def _replace(part: Path, path: Path) -> None:
-    """os.replace; Windows refuses for as long as another program reads the old file."""
+def move(part: Path, path: Path) -> None:
+    """Give a file or folder another name: os.replace, which Windows refuses while another program reads either."""
     for attempt in range(10):
         try:
             part.replace(path)

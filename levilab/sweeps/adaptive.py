@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from levilab.errors import UsageError, WorkersLost
+from levilab.errors import SimulationError, UsageError, WorkersLost
 from levilab.files import writing
 from levilab.interruption import interruption_postponed
+from levilab.sweeps.axes import first_error
 from levilab.sweeps.observables import OBSERVABLES, columns_of, observe
 from levilab.sweeps.quantities import step_in_words
 from levilab.sweeps.refinement import AUDIT, CONFIDENCE, STRIDE, Points, Refined, refine
@@ -127,6 +128,8 @@ def run_adaptive(store: Store, executor: Workers, progress: Callable[[float], No
                 question = refinement.send(np.asarray(values, dtype=np.bool_))
         except StopIteration as end:
             return run.finish(end.value)
+        finally:
+            run.write()
 
 
 class _Feed:
@@ -204,7 +207,8 @@ class _Run:
     def keep(self, done: Done[PointsTask, dict[str, NDArray[Any]]]) -> None:
         """Keep the result of a task in memory, and now and then in the store."""
         if done.error is not None or done.result is None:
-            raise done.error or AssertionError
+            invalid = first_error(self.store.plan.scene, done.task.values)
+            raise SimulationError(invalid) if invalid else done.error or AssertionError
         for name, values in done.result.items():
             self.columns[name].flat[done.task.points] = values
         self.status.flat[done.task.points] = COMPUTED

@@ -14,11 +14,14 @@ from levilab.settings import hint_about
 from levilab.simulator.keys import SceneError, short_text
 from levilab.simulator.scene import SWITCHES
 from levilab.simulator.start import start_of
+from levilab.simulator.varied import broadcast
 from levilab.sweeps.plan import Axis, Scale, unit_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
+
+    from numpy.typing import NDArray
 
     from levilab.simulator.scene import Scene
 
@@ -176,12 +179,10 @@ def check_axes(scene: Scene, axes: Sequence[Axis], settings: Iterable[str] = ())
         if axis.key in settings:
             raise UsageError(name, "`settings` has this key, too: leave one of them out", value=axis.key)
         _check_key(scene, axis, name)
-    idle = {axis.key: "" for axis in axes}
-    for values in _points_to_try(axes):
-        here = _without_effect(_scene_with(scene, values, name), idle)
-        idle = {key: here[key] for key in idle if key in here}
-    for key, why in idle.items():
-        raise UsageError(name, f"it changes nothing, since {why}", value=key)
+    idle = [_idle_keys(_try(scene, values, name), values) for values in _points_to_try(axes)]
+    for key, why in idle[0].items():
+        if all(key in keys for keys in idle):
+            raise UsageError(name, f"it changes nothing, since {why}", value=key)
 
 
 def _check_key(scene: Scene, axis: Axis, name: str) -> None:
@@ -250,28 +251,44 @@ def _points_to_try(axes: Sequence[Axis]) -> Iterator[dict[str, Any]]:
             yield {other.key: float(other.values[0]) for other in axes} | {axis.key: float(axis.values[k])}
 
 
-def _scene_with(scene: Scene, values: dict[str, Any], name: str) -> Scene:
-    """Return the scene with these values.  Raises UsageError where they are invalid in it."""
-    try:
-        changed = scene.changed(values)
-        start_of(changed)
-    except (SceneError, SimulationError) as error:
-        at = ", ".join(f"{key} = {short_text(value)}" for key, value in values.items())
-        raise UsageError(name, f"at {at} the scene is invalid: {error}") from error
-    return changed
+def _try(scene: Scene, values: dict[str, Any], name: str) -> Scene:
+    """Return the scene with these values.  Raises UsageError where they are invalid."""
+    if error := error_at(scene, values):
+        raise UsageError(name, error)
+    return scene.changed(values)
 
 
-def _without_effect(scene: Scene, keys: Iterable[str]) -> dict[str, str]:
-    """Return the keys that have no effect in a scene, each with the reason."""
-    found = {}
+def _idle_keys(scene: Scene, keys: Iterable[str]) -> dict[str, str]:
+    """Return which of the keys have no effect in a scene, and why."""
+    idle = {}
     for key in keys:
         table, _, part = key.partition(".")
         for switch in SWITCHES:
             if table == switch.table and part.split(".")[0] in switch.keys and switch.is_off(scene):
-                found[key] = switch.why
+                idle[key] = switch.why
         if scene.start.place == "equilibrium" and key.startswith(("start.position_m", "start.velocity_m_s")):
-            found[key] = "start.place = equilibrium"
-    return found
+            idle[key] = "start.place = equilibrium"
+    return idle
+
+
+def error_at(scene: Scene, values: Mapping[str, Any]) -> str:
+    """Return why the values of a point are invalid in the scene, in a sentence that names them; empty where valid."""
+    try:
+        start_of(scene.changed(dict(values)))
+    except (SceneError, SimulationError) as error:
+        return f"at {_point_in_words(values)} the scene is invalid: {error}"
+    return ""
+
+
+def first_error(scene: Scene, values: Mapping[str, NDArray[Any]]) -> str:
+    """Return why the first invalid one of some points is invalid in the scene; empty if none is."""
+    arrays = broadcast(values)
+    points = zip(*(array.ravel().tolist() for array in arrays.values()), strict=True)
+    return next(filter(None, (error_at(scene, dict(zip(arrays, point, strict=True))) for point in points)), "")
+
+
+def _point_in_words(values: Mapping[str, Any]) -> str:
+    return ", ".join(f"{key} = {short_text(value)}" for key, value in values.items())
 
 
 def _plain(value: Any) -> Any:

@@ -58,7 +58,7 @@ CURVE_POINTS = 61
 RIM = [withStroke(linewidth=3.2, foreground="white")]
 DASHED: Any = {"color": "black", "linewidth": 1, "linestyle": "dashed"}
 #: Where panels begin and end, as shares of the width: a colour bar fits beside them.
-LEFT, RIGHT = 0.095, 0.9
+LEFT, RIGHT = 0.095, 0.86
 
 
 @dataclass(frozen=True)
@@ -242,7 +242,8 @@ def _draw_cells(axes: Axes, view: _View, kinds: NDArray[Any], numbers: Array, no
     colours = ListedColormap([KINDS[kind].colour for kind in sorted(KINDS)])
     axes.pcolormesh(x, y, kinds, cmap=colours, vmin=-0.5, vmax=len(KINDS) - 0.5, **flat)
     if norm is not None:
-        axes.pcolormesh(x, y, np.ma.masked_invalid(numbers), cmap=NUMBERS, norm=norm, **flat)
+        shown = np.clip(numbers, norm.vmin, norm.vmax)  # a logarithm has no place for an error of zero
+        axes.pcolormesh(x, y, np.ma.masked_invalid(shown), cmap=NUMBERS, norm=norm, **flat)
     for axis, set_scale in ((view.x, axes.set_xscale), (view.y, axes.set_yscale)):
         if axis.scale == "log":
             set_scale("log")
@@ -446,8 +447,8 @@ def _caption(found: Map, view: _View, sentences: Sequence[str], width: float) ->
     said += [f"{text[0].upper()}{text[1:]}".removesuffix(".") + "." for text in sentences]
     if found.filled is None and not found.computed.all():
         said.append(f"{np.count_nonzero(~found.computed)} of {found.computed.size} points are not computed yet.")
-    whole = " ".join(said).replace(" %", "\u00a0%")  # a number and its per cent stay in one line
-    return textwrap.wrap(whole, round(15.3 * width))
+    text = " ".join(said).replace(" %", "\N{NO-BREAK SPACE}%")
+    return textwrap.wrap(text, round(15.3 * width))
 
 
 def _step(axis: Axis) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 from levilab.errors import UsageError
@@ -57,6 +58,8 @@ def plan_of(request: SweepRequest) -> Plan:
     for name, value in (("duration", request.duration), ("tolerance", request.tolerance)):
         if not 0 < value <= LONGEST_S:
             raise UsageError(name, f"a number above 0 and up to {LONGEST_S:.0e} is expected", value=value)
+    if request.seed and not request.adaptive:
+        raise UsageError("seed", "goes with `adaptive` alone: nothing else of a sweep is left to chance")
     names = tuple(dict.fromkeys(filter(None, (name.strip() for name in request.observe.split(",")))))
     columns_of(names)
     if not names:
@@ -90,12 +93,11 @@ def store_for(
     plan = plan_of(request)
     if path is not None and path.exists():
         return _existing_store(request, plan, path, resume=resume)
-    if request.adaptive:  # an error in its settings leaves no store behind
-        begin_adaptive(Store.create(None, plan), _boundary(plan))
-    store = Store.create(path, with_step(plan, message))
-    if request.adaptive:
-        begin_adaptive(store, _boundary(plan))
-    return store
+    if not request.adaptive:
+        return Store.create(path, with_step(plan, message))
+    begin = partial(begin_adaptive, observable=_boundary(plan))
+    Store.create(None, plan, begin)  # raises what it has to before the step is chosen
+    return Store.create(path, with_step(plan, message), begin)
 
 
 def _existing_store(request: SweepRequest, plan: Plan, path: Path, *, resume: bool) -> Store:

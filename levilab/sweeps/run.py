@@ -10,6 +10,7 @@ from levilab.errors import LevilabError
 from levilab.interruption import interruption_postponed
 from levilab.simulator.compilation import announce_compilation
 from levilab.simulator.ensemble import grid, simulate_many, step_share_of
+from levilab.sweeps.axes import first_error
 from levilab.sweeps.cost import seconds_per_point
 from levilab.sweeps.observables import observe
 from levilab.workers import cluster, processes, results_of, this_process
@@ -67,6 +68,9 @@ def with_step(plan: Plan, message: Callable[[str], None]) -> Plan:
         SceneError, SimulationError: some of the points cannot be simulated.
     """
     with announce_compilation(message):
+        with interruption_postponed():  # a compilation would lose it
+            first = {axis.key: axis.values[:1] for axis in plan.axes}
+            step_share_of(plan.scene, first, min(_FIRST_S, plan.duration_s), tolerance=plan.tolerance)
         over = {axis.key: axis.values for axis in plan.axes} if plan.is_table else _grid(plan)
         share = step_share_of(plan.scene, over, plan.duration_s, tolerance=plan.tolerance, survivors_only=True)
         return replace(plan, step_share=share)
@@ -116,7 +120,7 @@ def run(store: Store, workers: Workers | None = None, progress: Callable[[float]
         ChunksFailed: some could not be computed; the others are done.
         CannotWrite, WorkersLost: what is done so far is in the store.
     """
-    failed: list[tuple[Chunk, Exception]] = []
+    failed: list[tuple[Task, Exception]] = []
     with contextlib.closing(results_of(compute, tasks_of(store), workers or this_process())) as results:
         for done in results:
             if done.result is not None:
@@ -125,19 +129,20 @@ def run(store: Store, workers: Workers | None = None, progress: Callable[[float]
                 if progress is not None:
                     progress(store.done / store.plan.chunk_count)
             elif isinstance(done.error, LevilabError):
-                failed.append((done.task.chunk, done.error))
+                failed.append((done.task, done.error))
                 if len(failed) == MOST_FAILURES:
                     break
             elif done.error is not None:  # a defect of this program
                 raise done.error
     if failed:
-        raise ChunksFailed(_why(failed, store))
+        raise ChunksFailed(_why(failed, store.plan))
 
 
-def _why(failed: list[tuple[Chunk, Exception]], store: Store) -> str:
-    chunk, error = failed[0]
-    first, last = chunk.start, tuple(k - 1 for k in chunk.stop)
-    ends = [store.plan.point(index) for index in (first, last)]
+def _why(failed: list[tuple[Task, Exception]], plan: Plan) -> str:
+    task, error = failed[0]
+    first, last = task.chunk.start, tuple(k - 1 for k in task.chunk.stop)
+    ends = [plan.point(index) for index in (first, last)]
     where = ", ".join(f"{key} from {ends[0][key]} to {ends[1][key]}" for key in ends[0])
-    count = f"{len(failed)} of {store.plan.chunk_count} chunks" if len(failed) > 1 else "a chunk"
-    return f"{count} could not be computed, the first of {where}: {error}; `resume` tries again"
+    count = f"{len(failed)} of {plan.chunk_count} chunks" if len(failed) > 1 else "a chunk"
+    reason = first_error(plan.scene, task.values) or str(error)
+    return f"{count} could not be computed, the first of {where}: {reason}; `resume` tries again"

@@ -9,24 +9,24 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shutil
 import sys
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from levilab.errors import DataError
-from levilab.files import CannotWrite, locked, sync_folder, writing
+from levilab.files import CannotWrite, locked, move, sync_folder, writing
 from levilab.runs.run import utc_now
-from levilab.simulator.keys import SceneError, short_text
+from levilab.simulator.keys import short_text
 from levilab.software import software_versions
 from levilab.sweeps.observables import columns_of
 from levilab.sweeps.plan import Axis, Chunk, Plan, unit_of
 from levilab.sweeps.quantities import quantity_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -71,60 +71,80 @@ class Store:
     group: Any
     path: Path | None
     marks: NDArray[np.uint8] = field(repr=False)
+    _arrays: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @classmethod
-    def create(cls, path: Path | None, plan: Plan) -> Store:
+    def create(cls, path: Path | None, plan: Plan, begin: Callable[[Store], None] | None = None) -> Store:
         """Make a store for a plan.
 
         Args:
             path: of a folder that does not exist; None: in memory.
             plan: what is to be computed.
+            begin: adds to the store what else it must have; whatever ends the process meanwhile leaves no store behind.
 
         Raises:
             CannotWrite: something is there already, or the folder cannot be made.
         """
         import zarr
 
-        if path is not None and path.exists():
+        if path is None:
+            return cls._in(zarr.storage.MemoryStore(), None, plan, begin)
+        if path.exists():
             raise CannotWrite(f"{path} is there already: give another place with `out`, or go on with it by `resume`")
+        part = path.with_name(f".{path.name}.{os.getpid()}.part")
         with writing(f"{path} cannot be made"):
-            if path is not None:
+            try:
                 path.parent.mkdir(parents=True, exist_ok=True)
-            group = zarr.create_group(
-                zarr.storage.MemoryStore() if path is None else str(path),
-                attributes={
-                    "schema": SCHEMA,
-                    "plan": plan.as_table(),
-                    "scene_toml": plan.scene.as_toml(),
-                    "synthetic": True,
-                    "software": software_versions(),
-                    "processor": processor(),
-                    "created_utc": utc_now(),
-                    "command_line": sys.argv,
-                },
-            )
-            for axis in plan.axes:
-                _add_coordinate(group, axis, plan.dimensions[0] if plan.is_table else axis.key)
-            for column in columns_of(plan.observables):
-                group.create_array(
-                    column.name,
-                    shape=plan.shape,
-                    chunks=plan.chunk,
-                    dtype=column.dtype,
-                    fill_value=np.nan if column.dtype.startswith("float") else 0,
-                    dimension_names=plan.dimensions,
-                    attributes=_unit_and_meaning(column.unit, column.meaning),
-                )
+                cls._in(str(part), part, plan, begin)
+                move(part, path)  # refused where another process was quicker
+            finally:
+                shutil.rmtree(part, ignore_errors=True)
+            sync_folder(path.parent)
+        return cls.open(path, writable=True)
+
+    @classmethod
+    def _in(cls, place: Any, path: Path | None, plan: Plan, begin: Callable[[Store], None] | None) -> Store:
+        """Make the group and its arrays in a place where nothing is.  Raises OSError."""
+        import zarr
+
+        group = zarr.create_group(
+            place,
+            attributes={
+                "schema": SCHEMA,
+                "plan": plan.as_table(),
+                "scene_toml": plan.scene.as_toml(),
+                "synthetic": True,
+                "software": software_versions(),
+                "processor": processor(),
+                "created_utc": utc_now(),
+                "command_line": sys.argv,
+            },
+        )
+        for axis in plan.axes:
+            _add_coordinate(group, axis, plan.dimensions[0] if plan.is_table else axis.key)
+        for column in columns_of(plan.observables):
             group.create_array(
-                DONE,
-                shape=(plan.chunk_count,),
-                chunks=(min(MARKS, plan.chunk_count),),
-                dtype="uint8",
-                fill_value=0,
-                dimension_names=("chunk",),
-                attributes=_unit_and_meaning("1", "whether a chunk is written, in the order of their numbers"),
+                column.name,
+                shape=plan.shape,
+                chunks=plan.chunk,
+                dtype=column.dtype,
+                fill_value=np.nan if column.dtype.startswith("float") else 0,
+                dimension_names=plan.dimensions,
+                attributes=_unit_and_meaning(column.unit, column.meaning),
             )
-        return cls(plan, group, path, np.zeros(plan.chunk_count, dtype=np.uint8))
+        group.create_array(
+            DONE,
+            shape=(plan.chunk_count,),
+            chunks=(min(MARKS, plan.chunk_count),),
+            dtype="uint8",
+            fill_value=0,
+            dimension_names=("chunk",),
+            attributes=_unit_and_meaning("1", "whether a chunk is written, in the order of their numbers"),
+        )
+        store = cls(plan, group, path, np.zeros(plan.chunk_count, dtype=np.uint8))
+        if begin is not None:
+            begin(store)
+        return store
 
     @classmethod
     def open(cls, path: Path, *, writable: bool = False) -> Store:
@@ -132,16 +152,27 @@ class Store:
         import zarr
 
         try:
-            group: Any = zarr.open_group(str(path), mode="r+" if writable else "r")
-            if group.attrs.get("schema") != SCHEMA:
-                raise DataError(f"{path}: its schema is {group.attrs.get('schema')!r}, and {SCHEMA!r} is expected")
-            table: Any = group.attrs["plan"]
-            plan = Plan.from_table(table, {axis["key"]: _coordinate(group, axis["key"]) for axis in table["axes"]})
-            return cls(plan, group, path, np.asarray(group[DONE][:]))
-        except (OSError, KeyError, ValueError, TypeError, SceneError) as error:
+            return cls._of(zarr.open_group(str(path), mode="r+" if writable else "r"), path)
+        except DataError:
+            raise
+        except KeyError as error:
+            raise DataError(f"{path}: no whole store of a sweep, {error} is missing; compute the map anew") from error
+        except Exception as error:  # what is damaged shows in errors of many kinds
             raise DataError(
                 f"{path}: no store of a sweep ({error}); give a folder that `levilab sweep` wrote"
             ) from error
+
+    @classmethod
+    def _of(cls, group: Any, path: Path) -> Store:
+        """Return the store of a group.  Raises DataError where it is another group, or not whole."""
+        if group.attrs.get("schema") != SCHEMA:
+            raise DataError(f"{path}: its schema is {group.attrs.get('schema')!r}, and {SCHEMA!r} is expected")
+        table: Any = group.attrs["plan"]
+        plan = Plan.from_table(table, {axis["key"]: _coordinate(group, axis["key"]) for axis in table["axes"]})
+        for column in columns_of(plan.observables):
+            if group[column.name].shape != plan.shape or group[column.name].chunks != plan.chunk:
+                raise DataError(f"{path}: its {column.name} has not the shape of its plan; compute the map anew")
+        return cls(plan, group, path, np.asarray(group[DONE][:]))
 
     @contextlib.contextmanager
     def lock(self) -> Iterator[None]:
@@ -149,7 +180,10 @@ class Store:
         if self.path is None:
             yield
             return
-        with locked(self.path, "another process is computing it; wait for its end"):
+        with (
+            writing(f"{self.path}: its lock cannot be made", "go on where its folder can be written, or in a copy"),
+            locked(self.path, "another process is computing it; wait for its end"),
+        ):
             yield
 
     def notes(self) -> list[str]:
@@ -174,25 +208,21 @@ class Store:
 
     def array(self, name: str) -> Any:
         """Return an array to write into.  Raises CannotWrite where the folder is no longer there."""
-        try:
-            return self.group[name]
-        except KeyError as error:
+        if self.path is not None and not self.path.exists():
             text = f"{self.path}: it was moved or removed meanwhile; where it is now, go on with `resume`"
-            raise CannotWrite(text) from error
+            raise CannotWrite(text)
+        if name not in self._arrays:  # the group reads the description of an array anew each time
+            self._arrays[name] = self.group[name]
+        return self._arrays[name]
 
     def write(self, chunk: Chunk, values: Mapping[str, NDArray[Any]]) -> None:
         """Write a chunk's values, and when they are on the disk its mark.  Raises CannotWrite."""
         with writing(f"{self.path}: cannot be written", "free space, then go on with `resume`"):
             for column in columns_of(self.plan.observables):
-                self._written[column.name][chunk.box] = np.asarray(values[column.name], dtype=column.dtype)
+                self.array(column.name)[chunk.box] = np.asarray(values[column.name], dtype=column.dtype)
             self._sync(chunk)
-            self._written[DONE][chunk.number] = 1
+            self.array(DONE)[chunk.number] = 1
         self.marks[chunk.number] = 1
-
-    @cached_property
-    def _written(self) -> dict[str, Any]:
-        """The arrays that chunks are written into; the group would read each one's description anew."""
-        return {name: self.array(name) for name in (*(one.name for one in columns_of(self.plan.observables)), DONE)}
 
     def _sync(self, chunk: Chunk) -> None:
         """Wait until a chunk's files are on the disk: a power cut must not leave a mark without values."""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import signal
-from multiprocessing.connection import Client
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from support.conversation import Address, say_and_wait
 
 
 def square(number: int) -> int:
@@ -59,14 +59,10 @@ def die_at_three(number: int) -> int:
     return number
 
 
-def wait_for_ever(address: tuple[str, int] | None) -> None:
-    """Say which process this is, and wait until the other side ends the conversation; without an address do nothing."""
-    if address is None:
-        return
-    with Client(address) as conversation:
-        conversation.send(os.getpid())
-        with contextlib.suppress(EOFError, ConnectionError):
-            conversation.recv()
+def wait_for_ever(address: Address | None) -> None:
+    """Say that this process is at work, and wait until the other side ends the conversation; without an address: no."""
+    if address is not None:
+        say_and_wait(address)
 
 
 def surroundings(number: int) -> dict[str, Any]:

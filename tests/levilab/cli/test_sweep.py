@@ -94,6 +94,7 @@ def test_after_ctrl_c_the_printed_command_continues_to_the_same_result(
         (("undriven", "--sweep", "start.spin=18:40:5"), "did you mean start.spin_hz?"),
         (("undriven", "--sweep", SPINS, "--set", "start.spin_hz=20"), "--set has this key, too"),
         (("undriven", "--sweep", SPINS, "--observe", "survive"), "--observe survive: there is no such observable"),
+        (("undriven", "--sweep", SPINS, "--seed", "3"), "--seed: goes with --adaptive alone"),
         (("undriven", "--sweep", SPINS, "--duration", "0"), "--duration 0: a number above 0"),
         (("undriven", "--sweep", SPINS, "--points", "p.csv"), "--points: a table has all axes: leave out --sweep"),
         (("undriven", "--points", "p.csv"), "--points p.csv: cannot be read (No such file or directory)"),

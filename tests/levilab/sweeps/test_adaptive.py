@@ -116,6 +116,22 @@ def test_a_map_that_was_interrupted_goes_on_without_computing_anew(
     assert again.done == asked.chunk_count
 
 
+def test_ctrl_c_costs_only_the_points_under_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    tasks = []
+
+    def interrupted(task: Any) -> dict[str, np.ndarray]:
+        if len(tasks) == 5:
+            raise KeyboardInterrupt
+        tasks.append(task)
+        return made_up(task)
+
+    monkeypatch.setattr(adaptive, "compute_points", interrupted)
+    store = Store.create(None, plan(161, 161, 0.01), begin_adaptive)
+    with pytest.raises(KeyboardInterrupt):
+        run_adaptive(store, this_process())
+    assert np.count_nonzero(store.group["status"][...]) == sum(task.points.size for task in tasks) > 0
+
+
 def test_what_has_no_boundary_cannot_be_refined() -> None:
     asked = plan(5, 5, 0.01)
     with pytest.raises(UsageError, match="adaptive = lifetime_s: a boundary lies between yes and no"):

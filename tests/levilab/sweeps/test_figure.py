@@ -155,3 +155,15 @@ def test_what_is_no_map_has_no_figure() -> None:
         map_figure(a_map(SPIN))
     with pytest.raises(UsageError, match="observe = locked: the map has survived, lifetime_s"):
         map_figure(a_map(SPIN, MASS), "locked")
+
+
+def test_an_error_of_zero_is_drawn_as_the_smallest_and_the_colour_bar_fits() -> None:
+    found = a_map(SPIN, MASS, names=("energy_error",))
+    found.values["energy_error"][...] = np.linspace(1e-3, 9e-3, found.computed.size).reshape(found.computed.shape)
+    found.values["energy_error"][0, 0] = 0.0
+    figure = map_figure(found, "energy_error")
+    cells = figure.axes[0].collections[-1]
+    assert not np.ma.getmaskarray(cells.norm(cells.get_array())).any()
+    bounds = figure.axes[-1].get_tightbbox()
+    assert bounds is not None
+    assert bounds.x1 < figure.bbox.x1

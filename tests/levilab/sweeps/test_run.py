@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -125,6 +126,19 @@ def test_a_chunk_that_fails_is_named_and_the_others_are_kept(plan: Plan, monkeyp
     with pytest.raises(ChunksFailed, match=r"a chunk could not be computed, .*a top was lost in numbers"):
         run(store)
     assert store.marks.tolist() == [1, 0, 1, 1]
+
+
+def test_a_point_that_the_scene_refuses_is_named(tmp_path: Path) -> None:
+    scene, masses = (
+        preset("undriven").changed({"start.place": "equilibrium"}),
+        np.array([0.0250, 0.0251, 0.030, 0.0252]),
+    )
+    axes = Axis("top.mass_kg", masses), Axis("start.spin_hz", np.array([25.0, 30.0]))
+    asked = replace(Plan.of(scene, axes, ("survived",), 0.01), chunk=(4, 1), step_share=0.1)
+    with pytest.raises(
+        ChunksFailed, match=r"2 of 2 chunks .*: at top\.mass_kg = 0\.03, start\.spin_hz = 25.* is invalid"
+    ):
+        run(Store.create(None, asked))
 
 
 def test_what_differs_from_the_plan_of_a_store_is_named(plan: Plan) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -116,7 +117,33 @@ def test_a_store_that_is_moved_while_it_is_written_is_an_error_that_names_it(tmp
         made.write(task.chunk, made_up(task))
 
 
+def test_a_store_whose_marks_are_torn_is_an_error(tmp_path: Path) -> None:
+    run(Store.create(tmp_path / "map.zarr", plan()))
+    (tmp_path / "map.zarr" / "done" / "c" / "0").write_bytes(b"")  # as a power cut may leave a file
+    with pytest.raises(DataError, match="no store of a sweep"):
+        Store.open(tmp_path / "map.zarr")
+
+
 def test_a_folder_that_is_there_is_not_written_over(tmp_path: Path) -> None:
     Store.create(tmp_path / "map.zarr", plan())
     with pytest.raises(CannotWrite, match="is there already"):
         Store.create(tmp_path / "map.zarr", plan())
+
+
+def test_a_store_is_there_whole_or_not_at_all(tmp_path: Path) -> None:
+    def killed(store: Store) -> None:
+        assert not (tmp_path / "map.zarr").exists()
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        Store.create(tmp_path / "map.zarr", plan(), killed)
+    assert list(tmp_path.iterdir()) == []
+    Store.create(tmp_path / "map.zarr", plan())
+    assert [path.name for path in tmp_path.iterdir()] == ["map.zarr"]
+
+
+def test_a_store_that_has_lost_a_column_is_not_gone_on_with(tmp_path: Path) -> None:
+    Store.create(tmp_path / "map.zarr", plan())
+    shutil.rmtree(tmp_path / "map.zarr" / "lifetime_s")
+    with pytest.raises(DataError, match="no whole store of a sweep, 'lifetime_s' is missing"):
+        Store.open(tmp_path / "map.zarr", writable=True)

@@ -7,7 +7,6 @@ import logging
 import signal
 import threading
 from concurrent.futures import Future, ThreadPoolExecutor
-from multiprocessing.connection import Listener
 from typing import TYPE_CHECKING
 
 import pytest
@@ -15,8 +14,8 @@ import pytest
 from levilab.errors import LevilabError, WorkersLost
 from levilab.workers import cluster, results_of
 from support import tasks
+from support.conversation import DEADLINE_S, listening, worker_at_work
 from support.dask_cluster import DaskCluster
-from support.waiting import HANG_GUARD_S
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -42,46 +41,50 @@ def test_a_killed_worker_of_a_cluster_costs_no_bit(tmp_path: Path, capfd: pytest
 def test_a_lost_scheduler_ends_the_work_at_once(capfd: pytest.CaptureFixture[str]) -> None:
     with (
         DaskCluster(workers=1, threads=2) as dask,
-        Listener(("127.0.0.1", 0)) as listener,
+        listening() as server,
         ThreadPoolExecutor(1) as beside,
     ):
         some_came = threading.Event()
 
         def kill_the_scheduler() -> None:
-            with listener.accept() as worker:
-                worker.recv()
-                assert some_came.wait(HANG_GUARD_S)
-                dask.scheduler.kill()
-                dask.scheduler.wait()
+            with contextlib.ExitStack() as one:
+                try:
+                    one.enter_context(worker_at_work(server))
+                    assert some_came.wait(DEADLINE_S)
+                finally:  # if no worker comes, too: results are waited for
+                    dask.scheduler.kill()
+                    dask.scheduler.wait()
 
         killed = beside.submit(kill_the_scheduler)
-        given = [None, None, listener.address, None]
+        given = [None, None, server.getsockname(), None]
         results = results_of(tasks.wait_for_ever, given, cluster(dask.address))
         with contextlib.closing(results):
             assert [next(results).result for _ in range(3)] == [None, None, None]
             some_came.set()
             with pytest.raises(WorkersLost, match=f"the Dask scheduler at {dask.address} is lost"):
                 next(results)
-        killed.result(HANG_GUARD_S)
+        killed.result(2 * DEADLINE_S)
     assert capfd.readouterr().err == ""
 
 
 def test_ctrl_c_leaves_a_cluster_at_once() -> None:
-    with DaskCluster(workers=1) as dask, Listener(("127.0.0.1", 0)) as listener, ThreadPoolExecutor(1) as beside:
+    with DaskCluster(workers=1) as dask, listening() as server, ThreadPoolExecutor(1) as beside:
 
         def interrupt() -> None:
-            with listener.accept() as worker:
-                worker.recv()
-                signal.raise_signal(signal.SIGINT)
-                assert left.result(HANG_GUARD_S)
+            with contextlib.ExitStack() as one:
+                try:
+                    one.enter_context(worker_at_work(server))
+                finally:  # if it does not come, too: results are waited for
+                    signal.raise_signal(signal.SIGINT)
+                assert left.result(DEADLINE_S)
 
         left: Future[bool] = Future()
         ended = beside.submit(interrupt)
-        results = results_of(tasks.wait_for_ever, [listener.address] * 10, cluster(dask.address))
+        results = results_of(tasks.wait_for_ever, [server.getsockname()] * 10, cluster(dask.address))
         with pytest.raises(KeyboardInterrupt), contextlib.closing(results):
             next(results)
         left.set_result(True)  # while the worker is still at work
-        ended.result(HANG_GUARD_S)
+        ended.result(2 * DEADLINE_S)
 
 
 def test_a_cluster_without_workers_says_how_to_start_one() -> None:

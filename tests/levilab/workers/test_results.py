@@ -11,7 +11,6 @@ import subprocess
 import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
-from multiprocessing.connection import Listener
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -19,11 +18,10 @@ import pytest
 from levilab.errors import LevilabError, UsageError, WorkersLost
 from levilab.workers import Workers, packing, processes, results_of, this_process, threads
 from support import tasks
-from support.waiting import HANG_GUARD_S
+from support.conversation import DEADLINE_S, assert_dead, listening, worker_at_work
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from multiprocessing.connection import Connection
     from pathlib import Path
 
 WAYS = {"this process": this_process(), "threads": threads(2), "processes": processes(2)}
@@ -123,33 +121,23 @@ def test_workers_that_always_die_end_the_work() -> None:
         list(results_of(tasks.die_at_three, [3] * 20, processes(1)))
 
 
-def wait_until_at_work(*conversations: Connection) -> list[int]:
-    """The numbers of the processes at the other end."""
-    return [conversation.recv() for conversation in conversations]
-
-
-def wait_until_dead(conversation: Connection) -> None:
-    """The operating system closes the conversations of a process that has ended."""
-    assert conversation.poll(HANG_GUARD_S)
-    with pytest.raises((EOFError, ConnectionError)):
-        conversation.recv()
-
-
 def test_ctrl_c_ends_workers_in_the_middle_of_a_task() -> None:
-    with Listener(("127.0.0.1", 0)) as listener, ThreadPoolExecutor(1) as beside:
+    with listening() as server, ThreadPoolExecutor(1) as beside:
 
         def interrupt() -> None:
-            with listener.accept() as one, listener.accept() as other:
-                wait_until_at_work(one, other)
-                signal.raise_signal(signal.SIGINT)
-                wait_until_dead(one)
-                wait_until_dead(other)
+            with contextlib.ExitStack() as both:
+                try:
+                    workers = [both.enter_context(worker_at_work(server)) for _ in range(2)]
+                finally:  # if they do not come, too: results are waited for
+                    signal.raise_signal(signal.SIGINT)
+                for worker in workers:
+                    assert_dead(worker)
 
         ended = beside.submit(interrupt)
-        results = results_of(tasks.wait_for_ever, [listener.address] * 20, processes(2))
+        results = results_of(tasks.wait_for_ever, [server.getsockname()] * 20, processes(2))
         with pytest.raises(KeyboardInterrupt), contextlib.closing(results):
             next(results)
-        ended.result(HANG_GUARD_S)
+        ended.result(2 * DEADLINE_S)
 
 
 PARENT = """
@@ -160,20 +148,17 @@ list(results_of(wait_for_ever, [{address}] * 2, processes(2)))
 
 
 def test_workers_do_not_outlive_a_killed_parent(tmp_path: Path) -> None:
-    with Listener(("127.0.0.1", 0)) as listener:
+    with listening() as server, contextlib.ExitStack() as both:
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
         script = tmp_path / "script.py"  # without `if __name__ == "__main__"`
-        script.write_text(PARENT.format(address=listener.address), encoding="utf-8")
-        command = [sys.executable, script]
-        with (
-            subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL) as parent,
-            listener.accept() as one,
-            listener.accept() as other,
-        ):
-            wait_until_at_work(one, other)
-            parent.kill()
-            wait_until_dead(one)
-            wait_until_dead(other)
+        script.write_text(PARENT.format(address=server.getsockname()), encoding="utf-8")
+        with subprocess.Popen([sys.executable, script], env=environment, stderr=subprocess.DEVNULL) as parent:
+            try:
+                workers = [both.enter_context(worker_at_work(server)) for _ in range(2)]
+            finally:
+                parent.kill()
+        for worker in workers:
+            assert_dead(worker)
 
 
 def test_a_count_of_workers_below_one_is_refused() -> None:
