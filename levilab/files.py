@@ -162,7 +162,7 @@ def replace_atomically(path: Path, content: str | bytes) -> None:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
-    """Yield a file for what takes the place of another one, whole, when the context ends well.  Raises OSError."""
+    """Yield a file that replaces another one as a whole when the context ends without an error.  Raises OSError."""
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         part.unlink(missing_ok=True)  # of an earlier process of this number

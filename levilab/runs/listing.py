@@ -199,7 +199,7 @@ def _number(table: dict[str, Any], key: str) -> float:
 ROOM_FOR_NOTES = 110
 #: Columns of the list that a narrow terminal has no room for, the first one first.
 DISPENSABLE = ("length", "readings")
-#: So many broken runs are explained below the list.
+#: Most broken runs that are explained below the list.
 MOST_PROBLEMS = 5
 
 
@@ -219,7 +219,7 @@ def print_runs(runs: Sequence[Listed], root: Path) -> None:
     for problem in problems[:MOST_PROBLEMS]:
         console.print(f"[yellow]note:[/yellow] {escape(problem)}")
     if (more := len(problems) - MOST_PROBLEMS) > 0:
-        console.print(f"[yellow]note:[/yellow] and {more} more that cannot be read; levilab runs --json says why")
+        console.print(f"[yellow]note:[/yellow] and {more} more that cannot be read; JSON has the reason for each")
 
 
 def _that_fit(heads: list[str], rows: list[list[str]], width: int) -> tuple[list[str], list[list[str]]]:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 QUANTITIES = ("spin_frequency_hz", "spin_frequency_u_hz")
 #: Limits that differ by more than this part of their mean are none of one top: most likely a spin-down.
 _MOST_SPREAD = 0.25
-#: So many steps in a row do not all go the same way by chance.
+#: Least number of steps in a row that do not all go the same way by chance.
 _FEWEST_STEPS = 4
 #: A number on a line of its own, with a decimal point or comma, and what is read of a file that holds nothing else.
 _NUMBER, _MOST_BYTES = re.compile(r"[+-]?\d+(?:[.,]\d*)?(?:[eE][+-]?\d+)?"), 1 << 20

@@ -1,7 +1,7 @@
 """The table's files: rows are appended to a CSV as they come, and published in the order of the inputs at the end.
 
-Beside the table FILE lies FILE.json: what it was made with, and what its columns mean.  Until it is whole the rows are
-in FILE.part.csv, in the order in which they were finished, so that a process that is killed loses the last row at most.
+Beside the table FILE lies FILE.json: what it was made with, and what its columns mean.  Until it is complete the
+rows are in FILE.part.csv, in the order in which they came, so that a process that is killed loses at most the last row.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 
 SCHEMA = "levilab-table/1"
 CSV, PARQUET = ".csv", ".parquet"
-#: Rows of a row group: so many are in memory while a Parquet file is written.
+#: Rows in memory while a Parquet file is written: those of one row group.
 GROUP = 1000
 _ELSEWHERE = "choose another place with `table`"
 
 
 def check_name(table: Path) -> None:
-    """Raise UsageError for a table that cannot be written: that is said before hours of work, not after."""
+    """Raise UsageError for a table that cannot be written, before hours of work."""
     kind = table.suffix.casefold()
     if kind not in {CSV, PARQUET}:
         raise UsageError("table", "a name that ends in .csv or .parquet is expected", value=table)
@@ -45,7 +45,7 @@ def check_name(table: Path) -> None:
 
 
 class TableFile:
-    """A table under way.
+    """A table that is being written.
 
     Args:
         table: the file that it becomes.
@@ -77,7 +77,7 @@ class TableFile:
         self._lock.close()
 
     def open(self, *, resume: bool) -> Self:
-        """Begin, or go on with the rows of an earlier call.
+        """Begin a table, or continue that of an earlier call.
 
         Args:
             resume: whether rows of an earlier call that was interrupted, or of the whole table, are kept.
@@ -116,7 +116,7 @@ class TableFile:
             raise DataError(what) from error
 
     def add(self, cells: Sequence[Cell]) -> None:
-        """Append a row; it is with the operating system before this returns.  Raises CannotWrite."""
+        """Append a row and hand it to the operating system.  Raises CannotWrite."""
         with writing(f"{self.part}: could not be written", "make room, and go on with `resume`"):
             place = self._file.tell()
             self._file.write(_line([text_of(cell) for cell in cells]))
@@ -161,7 +161,7 @@ class TableFile:
                 yield self._file.readline()
 
     def _write_parquet(self, file: Any, rows: Iterator[bytes]) -> None:
-        """In groups of rows, so that memory does not grow with the table."""
+        """Write a Parquet file in groups of rows, so that memory does not grow with the table."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -183,7 +183,7 @@ class TableFile:
         texts = next(csv.reader([line.decode("utf-8")]))
         return [value_of_text(text, column.kind) for text, column in zip(texts, self._columns, strict=True)]
 
-    # --- what an earlier call left ---
+    # --- rows of an earlier call ---
 
     def _description(self) -> str:
         columns = [{"name": column.name, "kind": column.kind, "meaning": column.meaning} for column in self._columns]
@@ -204,7 +204,7 @@ class TableFile:
             raise UsageError("resume", what)
 
     def _cut_torn_line(self) -> None:
-        """Drop what a killed process left of its last row."""
+        """Remove an incomplete last row, which a killed process left."""
         with self.part.open("r+b") as file:
             whole = 0
             for line in file:
@@ -228,7 +228,7 @@ class TableFile:
         self._file.seek(place)
 
     def _earlier_rows(self) -> Iterator[list[Cell]]:
-        """The rows of the whole table of an earlier call that stand."""
+        """Return the rows of the complete table of an earlier call that are kept."""
         self._must_be_alike(self._about, self.table)
         rows = self._of_parquet() if self.table.suffix.casefold() == PARQUET else self._of_csv()
         return filter(self._stands, rows)

@@ -1,4 +1,4 @@
-"""Many inputs → one table, in parallel; a failure is a row, and ends nothing."""
+"""Many inputs → one table, in parallel; an input that fails has a row with its problem."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ MOST_FAILURES = 10
 
 @dataclass
 class Tally:
-    """How far a table is.
+    """Counts of the inputs of a table.
 
     Attributes:
         total: inputs that were found.
         kept: rows of an earlier call.
-        done: inputs that are dealt with, those of an earlier call included.
+        done: inputs that have an outcome, those of an earlier call included.
         failed: of the rows of this call.
         failures: the first of them, (path, problem).
         left_out: inputs that do not belong into the table.
-        passed_over: why → how many of them; not of files that are of no concern.
+        passed_over: why → how many of them; without files that hold no readings.
         same: rows of this call with the same readings as another one.
     """
 
@@ -153,7 +153,7 @@ def _hash(readings: Path) -> str | None:
 
 
 def _outcome(done: Done[Task, Row | PassedOver]) -> Row | PassedOver:
-    """What came of an input; one that killed its processes has a row that says so."""
+    """Return the outcome of an input; one that killed its processes has a row with that problem."""
     if done.result is not None:
         return done.result
     task = done.task

@@ -30,7 +30,7 @@ def page(tmp_path: Path, undrawn_figures: None) -> str:
     return output.read_text(encoding="utf-8")
 
 
-def test_what_many_runs_share_is_said_once_and_each_unfolds(page: str) -> None:
+def test_facts_that_many_runs_share_stand_there_once(page: str) -> None:
     assert COUNT - 2 > MOST_IN_FULL
     assert page.count("<dt>Status</dt>") == page.count("no instruments recorded") == 1
     assert page.count("<details><summary><strong>") == COUNT - 2

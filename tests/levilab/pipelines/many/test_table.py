@@ -66,7 +66,7 @@ def test_a_run_is_a_row_and_a_broken_one_says_why(runs: Path) -> None:
     assert (rows[3]["status"], rows[3]["synthetic"]) == ("finished", "true")
 
 
-def test_a_row_says_what_the_result_of_the_run_says(runs: Path) -> None:
+def test_a_row_has_the_values_of_the_result_of_its_run(runs: Path) -> None:
     row = rows_of(tabulate(runs))[0]
     folder = runs.parent / row["path"]
     printed = json.loads(command("analyze", "spindown", folder, "--no-save", "--json", cwd=runs).out)
@@ -98,7 +98,7 @@ def test_a_table_that_was_interrupted_goes_on(runs: Path) -> None:
     assert not part.exists()
 
 
-def test_rows_of_hours_are_not_replaced_unasked(runs: Path) -> None:
+def test_rows_of_an_earlier_call_are_never_overwritten(runs: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         tabulate(runs, show=partial(interrupt_after, 3))
     with pytest.raises(UsageError, match="go on with it"):
@@ -109,7 +109,7 @@ def test_rows_of_hours_are_not_replaced_unasked(runs: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["all.csv", "all.parquet"])
-def test_of_runs_that_came_later_only_those_are_analyzed(runs: Path, name: str) -> None:
+def test_resume_of_a_complete_table_analyzes_only_new_runs(runs: Path, name: str) -> None:
     last = max(runs.iterdir())
     shutil.move(last, runs.parent)
     tabulate(runs, name)
@@ -177,7 +177,7 @@ def test_parquet_holds_the_same_numbers_with_their_types(runs: Path) -> None:
     assert (first["synthetic"], first["outliers"], first["best_model"]) == (True, 0, texts[0]["best_model"])
 
 
-def test_a_run_that_kills_its_process_is_a_row_and_no_end(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_that_kills_its_process_has_a_row(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def results(function: Any, tasks: Iterable[Task], *_: Any) -> Iterator[Done[Task, Any]]:
         first, *others = tasks
         yield from (Done(task, function(task)) for task in others)
@@ -190,7 +190,7 @@ def test_a_run_that_kills_its_process_is_a_row_and_no_end(runs: Path, monkeypatc
 
 
 @pytest.mark.parametrize("raised", [MemoryError(), ZeroDivisionError("by zero")])
-def test_what_no_run_should_cause_stands_in_its_row(
+def test_a_defect_of_levilab_becomes_the_problem_of_a_row(
     runs: Path, monkeypatch: pytest.MonkeyPatch, raised: Exception
 ) -> None:
     def analyze(*_: object) -> None:
@@ -215,7 +215,7 @@ def test_every_analysis_fills_its_columns(name: str, sample: str) -> None:
     assert empty == {"problem", "started_utc"}  # which the samples leave out
 
 
-def test_what_does_not_suit_is_passed_over_and_counted(tmp_path: Path) -> None:
+def test_inputs_of_other_analyses_are_passed_over_and_counted(tmp_path: Path) -> None:
     shutil.copytree(SAMPLE_DATA / "trace-laser", tmp_path / "runs" / "trace")
     shutil.copytree(SAMPLE_DATA / "spin-down-1", tmp_path / "runs" / "one")
     shutil.copytree(SAMPLE_DATA / "spin-down-1", tmp_path / "runs" / "two")
@@ -244,7 +244,7 @@ def test_save_writes_a_result_beside_each_run_and_no_figure(runs: Path) -> None:
         (["spindown", "runs", "--cores", "2"], "--cores: goes with --table alone"),
     ],
 )
-def test_wrong_words_are_refused(runs: Path, words: list[str], said: str) -> None:
+def test_wrong_options_are_errors(runs: Path, words: list[str], said: str) -> None:
     ended = command("analyze", *words, cwd=runs.parent)
     assert ended.status == 2
     assert said in ended.err
@@ -274,7 +274,7 @@ def test_ctrl_c_says_where_the_rows_are(runs: Path, monkeypatch: pytest.MonkeyPa
     assert len(rows_of(runs.parent / "t.csv.part.csv")) == 1
 
 
-def test_a_file_of_no_concern_is_passed_over_in_silence(tmp_path: Path) -> None:
+def test_a_file_without_readings_is_passed_over_silently(tmp_path: Path) -> None:
     (tmp_path / "notes.csv").write_text("day,who\n1,me\n2,you\n", encoding="utf-8")
     task = Task(tmp_path / "notes.csv", False, True, "spindown", SPINDOWN.options_from({}), tmp_path)
     assert analyze_one(task) == PassedOver("")
