@@ -107,6 +107,12 @@ def test_a_value_that_a_scene_does_not_allow_is_named_with_its_place(over, messa
         batches(preset("undriven"), over)
 
 
+def test_tops_of_one_kind_are_in_the_order_of_the_map():
+    (batch,) = batches(preset("undriven"), {"name": np.tile(["one", "other"], 3), "start.spin_hz": np.arange(20, 26)})
+    assert batch.where.tolist() == [0, 1, 2, 3, 4, 5]
+    assert (np.diff(batch.starts[:, 15]) > 0).all()
+
+
 def test_lists_of_unequal_lengths_are_refused():
     with pytest.raises(SimulationError, match=r"start\.spin_hz: lists of unequal lengths"):
         batches(preset("undriven"), {"start.spin_hz": [[30.0, 31.0], [32.0]]})
