@@ -34,6 +34,8 @@ Array = NDArray[np.float64]
 
 #: The step of all tops is chosen on a few, simulated one by one: the corners of a map and so many evenly through it.
 PILOTS = 6
+#: If all of those are lost where those that stay up are to decide, so many more are tried, in groups.
+MORE_PILOTS, PILOTS_IN_A_GROUP = 60, 12
 #: How long these are simulated [s]; errors grow with the time, so they get this share of the tolerance.
 PILOT_DURATION = 3.0
 #: The largest part of its longest step that a top takes: runs at four times as much are compared with.
@@ -287,7 +289,28 @@ def _step_share(
 ) -> float:
     """Return the part of its longest step that keeps a top's error within the tolerance, found on a few of them."""
     values = broadcast(over)
-    pilots = sorted(_pilots(next(iter(values.values())).shape if values else (1,)))
+    shape = next(iter(values.values())).shape if values else (1,)
+    shares = _shares_of(scene, values, sorted(_pilots(shape)), duration, tolerance)
+    if survivors_only:
+        for more in _more_pilots(math.prod(shape)):
+            if shares[True]:
+                break
+            shares[True] = _shares_of(scene, values, more, duration, tolerance)[True]
+    lost = [] if survivors_only and shares[True] else shares[False]
+    return min([*shares[True], *lost, LARGEST_SHARE])
+
+
+def _more_pilots(size: int) -> list[list[int]]:
+    """Return groups of flat indices in no step with the axes, which evenly spaced ones may be: all along one edge."""
+    golden = (math.sqrt(5) - 1) / 2
+    spread = [int(size * (golden * (k + 1) % 1.0)) for k in range(min(MORE_PILOTS, size))]
+    return [sorted(set(spread[k : k + PILOTS_IN_A_GROUP])) for k in range(0, len(spread), PILOTS_IN_A_GROUP)]
+
+
+def _shares_of(
+    scene: Scene, values: Mapping[str, NDArray[Any]], pilots: list[int], duration: float, tolerance: float
+) -> dict[bool, list[float]]:
+    """Return the parts of their longest steps that some tops take, of those that stay up and of those that are lost."""
     some = {key: np.array([column.flat[i] for i in pilots], dtype=column.dtype) for key, column in values.items()}
     time = min(duration, PILOT_DURATION)
     shares: dict[bool, list[float]] = {True: [], False: []}
@@ -297,8 +320,7 @@ def _step_share(
             motion = simulate(one, time, tolerance=tolerance * time / duration, rate=None)
             if motion.accuracy.reached:
                 shares[motion.survived].append(motion.accuracy.step / float(longest))
-    lost = [] if survivors_only and shares[True] else shares[False]
-    return min([*shares[True], *lost, LARGEST_SHARE])
+    return shares
 
 
 # --- the motion ---
