@@ -72,7 +72,7 @@ def _whole_figure(summary: Summary) -> Figure:
 
 
 def _has_spectrum(summary: Summary) -> bool:
-    return summary.lines.spectrum is not None and bool(summary.lines.lines)
+    return summary.lines.signal is not None and bool(summary.lines.lines)
 
 
 def _spin_figure(summary: Summary) -> Figure:
