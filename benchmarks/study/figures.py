@@ -270,7 +270,7 @@ def lock(folder: Path, numbers: dict[str, Any]) -> Figure:
         part = abs(math.cos((found.scene.drive.phase_rad - told["phase"]["best_rad"]) / 2))
         for sign in (-1, 1):
             axes.plot(spin + sign * part * half, scale, color="black", linewidth=1.2)
-        vertical = told["modes"]["vertical_hz"]
+        vertical = told["modes"]["own_vertical_hz"]
         for sign in (-1, 1):
             axes.axvline(spin + sign * vertical, color=PURPLE, linestyle="--", linewidth=1.2)
         axes.grid(visible=False)
@@ -317,7 +317,7 @@ def lock(folder: Path, numbers: dict[str, Any]) -> Figure:
             Patch(color=TAN, label="up, not locked"),
             Patch(color=GREY, label="lost"),
             Line2D([], [], color="black", label="above: pendulum's estimate, started at this phase"),
-            Line2D([], [], color=PURPLE, linestyle="--", label="spin ± frequency up and down"),
+            Line2D([], [], color=PURPLE, linestyle="--", label="above: spin ± its own frequency up and down"),
             Line2D([], [], color=ORANGE, label="below: spin (a third, dotted)"),
         ],
         loc="lower center",

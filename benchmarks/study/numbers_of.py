@@ -546,6 +546,7 @@ def by_mode(folder: Path) -> dict[str, Any]:
     answers: dict[str, Any] = {
         "modes_hz": np.sort(stability.modes.real).round(3).tolist(),
         "vertical_hz": stability.vertical,
+        "own_vertical_hz": bounce_hz(scene.changed({"drive.waveform": "off", "start.place": "equilibrium"})),
     }
     for wave in ("sine", "square"):
         found = load(folder, f"modes-{wave}")
