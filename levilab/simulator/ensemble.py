@@ -227,7 +227,7 @@ def grid(axes: Mapping[str, ArrayLike]) -> dict[str, NDArray[Any]]:
 
 
 class _Wanted(NamedTuple):
-    """What the caller of `simulate_many` wants: how long [s], samples a second (0: none) of these columns, errors."""
+    """The request to `simulate_many`: duration [s], samples per second (0: none) of these columns, error estimates."""
 
     duration: float
     sample_rate: float

@@ -28,11 +28,6 @@ _LOW, _HIGH = 0.1, 4.0
 
 WEIGHTLESS = "gravity_m_s2 = 0: without weight there is nothing to float; a number above 0 is expected"
 
-TRANSVERSE = (
-    "top.moment_tilt.1 = 0: the field lifts an upright top by the part of its moment that lies along its axis; "
-    "another number than 0 is expected"
-)
-
 #: A heavier top was most likely given in grams [kg].
 HEAVIEST_KG = 1.0
 
@@ -153,7 +148,8 @@ def modes_at(scene: Scene, height: float, spin_hz: float) -> NDArray[np.complex1
 
 def stability_of(scene: Scene) -> Stability:
     """Windows, equilibria and modes of a scene's top, upright on the axis of its base (a lean of it is left out)."""
-    _check_forces(scene)
+    if scene.gravity_m_s2 == 0:
+        raise SceneError(WEIGHTLESS)
     top, field = top_of(scene), axial_field(scene)
     low, high = _range(scene)
     found = stability.windows(field, top, low, high)
@@ -174,14 +170,6 @@ def stability_of(scene: Scene) -> Stability:
         stability.thesis_limit(field, top, height) if floating else math.nan,
         None if floating else nearest_mass(found, top, field),
     )
-
-
-def _check_forces(scene: Scene) -> None:
-    """Raise SceneError for a top without weight, or without a moment along its axis."""
-    if scene.gravity_m_s2 == 0:
-        raise SceneError(WEIGHTLESS)
-    if scene.top.moment_tilt[1] == 0:
-        raise SceneError(TRANSVERSE)
 
 
 def _range(scene: Scene) -> tuple[float, float]:
@@ -267,13 +255,14 @@ def windows_over(scene: Scene, masses: ArrayLike) -> MassWindows:
     """Return what `stability_of` says of a scene's top, for many masses [kg] at once.
 
     Raises:
-        SceneError: nothing weighs, or nothing can lift.
+        SceneError: nothing weighs.
 
     >>> from levilab.simulator.scene import preset
     >>> windows_over(preset("undriven"), [0.0252, 0.0260]).slowest.round(2)
     array([21.57,   nan])
     """
-    _check_forces(scene)
+    if scene.gravity_m_s2 == 0:
+        raise SceneError(WEIGHTLESS)
     masses = np.atleast_1d(np.asarray(masses, dtype=np.float64))
     top, field = top_of(scene), axial_field(scene)
     heights = floating_heights(scene, masses)
@@ -405,6 +394,11 @@ def _real_roots(cubics: Array) -> Array:
 
 def advice(found: Stability) -> str:
     """Why a top does not float, and which one does."""
+    if found.top.moment == 0:
+        return (
+            "top.moment_tilt.1 = 0: a field lifts an upright top by the part of its moment that lies along its axis; "
+            "another number than 0 is expected"
+        )
     if found.nearest is None:
         return (
             "no top with this moment floats over this base, whatever its mass: "

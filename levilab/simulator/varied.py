@@ -1,7 +1,7 @@
 """Many tops from one scene: varied numbers checked against the scene's own limits, and made ready for the kernels.
 
 The scene is validated once for all tops.  Varied numbers are checked as arrays by the very types of its fields and by
-its rules, and go through the formulas of one top as `Numbers`.  Words, lists and whatever else a key takes are few:
+its rules, and go through the formulas of one top as `Numbers`.  Words, lists and other values are few:
 each of them gets a scene of its own.
 """
 
@@ -125,7 +125,7 @@ def batches(scene: Scene, over: Mapping[str, ArrayLike]) -> list[Batch]:
         columns = {key: numbers(values[key].ravel()[group]) for key in varied}
         for batch in _of_one_scene(scene, sample, values, group, columns):
             found.setdefault((_kind(batch.model), batch.scheme.name), []).append(batch)
-    return [_joined(several) for several in found.values()]
+    return [_join(several) for several in found.values()]
 
 
 # --- values against the scene's limits ---
@@ -314,7 +314,7 @@ def _kind(model: Any) -> Any:
     return type(model).__name__
 
 
-def _joined(several: list[Batch]) -> Batch:
+def _join(several: list[Batch]) -> Batch:
     """Return batches of one kind as one, its tops in the order of the map."""
     if len(several) == 1:
         return several[0]

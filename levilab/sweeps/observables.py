@@ -43,7 +43,7 @@ Need = Literal["ends", "errors", "samples"]
 HEIGHT_RATE_HZ = 100.0
 #: Rates for lines are rounded up to multiples of this [Hz].
 ROUND_HZ = 100.0
-#: Numbers in the samples of points that are simulated together, unless they are fewer than fill the lanes.
+#: Greatest count of numbers in the samples of one call, and least number of points in it, which fills the lanes.
 MOST_NUMBERS, FEWEST = 16_000_000, 32
 
 
@@ -122,7 +122,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "lines": tuple(name for name in OBSERVABLES if name.endswith(("_line_hz", "_line_rad"))),
 }
 
-#: Names that people type: each is a column, or several.
+#: Names for `--observe`: each is a column, or several.
 NAMES = (*(name for name in OBSERVABLES if name not in GROUPS["lines"]), *GROUPS)
 
 
@@ -140,7 +140,7 @@ def columns_of(names: Iterable[str]) -> tuple[Observable, ...]:
 
 
 def check_observables(plan: Plan) -> None:
-    """Refuse to observe what no point of the plan can show.  Raises UsageError."""
+    """Raise UsageError for observables that no point of the plan can have."""
     names = {column.name for column in columns_of(plan.observables)}
     if plan.scene.observed == "spin":
         raise UsageError("observe", "the scene has observed = spin, which has a closed form; take observed = motion")
@@ -166,7 +166,7 @@ def observe(plan: Plan, values: Values) -> dict[str, NDArray[Any]]:
     With the plan's `step_share`, the result of each point depends on its own numbers alone.
 
     Args:
-        plan: its axes are not looked at.
+        plan: its axes are not used.
         values: key → values of these points.
 
     Returns:
@@ -210,7 +210,7 @@ def _ends_of(plan: Plan, values: Values, names: set[str], rate: float | None = N
 
 
 def _ends_and_samples_of(plan: Plan, values: Values, names: set[str]) -> dict[str, NDArray[Any]]:
-    """Return the columns of motions with samples, some points at a time: samples are what takes memory.
+    """Return the columns of motions with samples, some points at a time, because samples take memory.
 
     The rate of a point's samples depends on its own numbers: steps are cut to fit between samples.
     """
