@@ -11,14 +11,16 @@ from matplotlib.colors import LinearSegmentedColormap, ListedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from numbers_of import SCATTER_HZ, THESIS_KG, TOP, load, slow_resonance, swing_hz
+from numbers_of import THESIS_KG, TOP, TRAP_HZ, load, slow_resonance, swing_hz
 from PIL import Image
-from plans import STARTS
+from plans import STARTS, WAVES
+from thesis import THESIS
 
 from levilab.present.style import STYLE, save_png
 from levilab.simulator.equilibrium import stability_of
-from levilab.simulator.scene import preset, with_settings
-from levilab.stability.thesis import MEASURED_HZ, MEASURED_U_HZ, SIMULATED_HZ
+from levilab.simulator.scene import with_settings
+from levilab.sweeps.figure import map_figure
+from levilab.sweeps.store import Store
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 BLUE, GREY, ORANGE, PURPLE, GREEN, TAN = "#0072B2", "#B8B8B8", "#D55E00", "#CC79A7", "#009E73", "#E8C07D"
+MEASURED_HZ, MEASURED_U_HZ, SCATTER_HZ = (THESIS[key] for key in ("measured_hz", "measured_u_hz", "scatter_hz"))
 MARKS = {"IC1": "o", "IC2": "s", "IC3": "D", "IC4": "^"}
 #: Colours of a picture that is kept: a page shows no difference, and it takes half of the room.
 COLOURS = 128
@@ -50,61 +53,18 @@ def cells(axes: Axes, x: Array, y: Array, up: Any, lifetimes: Any) -> Any:
     return greys
 
 
-def published(axes: Axes) -> list[Line2D]:
+def published(axes: Axes) -> None:
     """The thesis's simulated limits at the heights of their starts."""
-    handles = []
     for name, settings in STARTS.items():
         height = 1e2 * with_settings(TOP, list(settings)).start.position_m[2]
         style: dict[str, Any] = {"color": "white", "markeredgecolor": "black", "linestyle": "none", "markersize": 6}
-        axes.plot(SIMULATED_HZ[name], [height + (0.012 if name == "IC4" else 0)] * 2, marker=MARKS[name], **style)
-        handles.append(Line2D([], [], marker=MARKS[name], label=f"thesis {name}, simulated limits", **style))
-    return handles
+        limits_hz = [THESIS["starts"][name][key] for key in ("lower_hz", "upper_hz")]
+        axes.plot(limits_hz, [height + (0.012 if name == "IC4" else 0)] * 2, marker=MARKS[name], **style)
 
 
-def survival_by_height(folder: Path, _: dict[str, Any]) -> Figure:
-    """Spin and height of the start, for six masses."""
-    found = load(folder, "survival")
-    spins, masses, heights = found.axes
-    chosen = (0.0246, 0.02484, 0.02502, 0.02514, 0.02526, 0.02538)
-    figure = Figure(figsize=(10.4, 6.9))
-    panels = figure.subplots(2, 3, sharex=True, sharey=True).ravel()
-    figure.subplots_adjust(0.055, 0.15, 0.92, 0.955, 0.06, 0.14)
-    for axes, mass in zip(panels, chosen, strict=True):
-        k = int(np.argmin(np.abs(masses - mass)))
-        greys = cells(axes, spins, 1e2 * heights, found.up[:, k], found.values["lifetime_s"][:, k])
-        scene = TOP.changed({"top.mass_kg": float(masses[k])})
-        floating = stability_of(scene).floating
-        title = f"{1e3 * masses[k]:.2f} g: floats nowhere"
-        if floating:
-            title = f"{1e3 * masses[k]:.2f} g: floats at {1e2 * floating.height:.2f} cm"
-            for spin in floating.spins[0]:
-                axes.axvline(spin, color=ORANGE, linewidth=1.4)
-            axes.axhline(1e2 * floating.height, color="black", linewidth=0.8, linestyle=":")
-            axes.axvline(slow_resonance(scene), color=PURPLE, linewidth=1.4, linestyle="--")
-        axes.set_title(title, loc="left")
-    handles = published(panels[4])
-    panels[4].axvspan(MEASURED_HZ - MEASURED_U_HZ, MEASURED_HZ + MEASURED_U_HZ, color=GREEN, zorder=3)
-    for axes in panels[3:]:
-        axes.set_xlabel("spin at the start  [Hz]")
-    for axes in panels[::3]:
-        axes.set_ylabel("height of the start  [cm]")
-    bar = figure.colorbar(greys, cax=figure.add_axes((0.935, 0.15, 0.012, 0.805)), ticks=[0.1, 1, 10, 30])
-    bar.ax.set_yticklabels(["0.1", "1", "10", "30"])
-    bar.set_label("lost tops: how long they lasted  [s]")
-    figure.legend(
-        handles=[
-            Patch(color=BLUE, label="still up after 30 s"),
-            Line2D([], [], color=ORANGE, label="window of small motions"),
-            Line2D([], [], color="black", linestyle=":", linewidth=0.8, label="where the top floats"),
-            Line2D([], [], color=PURPLE, linestyle="--", label="resonance of three slow motions"),
-            Patch(color=GREEN, label=f"measured lower limit {MEASURED_HZ} ± {MEASURED_U_HZ} Hz"),
-            *handles,
-        ],
-        loc="lower center",
-        ncols=4,
-        fontsize=8,
-    )
-    return figure
+def as_the_command_draws(folder: Path, name: str, column: str) -> Figure:
+    """What `levilab sweep` draws of a column beside its store."""
+    return map_figure(Store.open(folder / f"{name}.zarr").load(), column)
 
 
 def survival_by_mass(folder: Path, _: dict[str, Any]) -> Figure:
@@ -240,7 +200,7 @@ def limits(folder: Path, numbers: dict[str, Any]) -> Figure:
         place = 1e2 * with_settings(TOP, list(settings)).start.position_m[2]
         left.plot(
             place,
-            SIMULATED_HZ[name][0],
+            THESIS["starts"][name]["lower_hz"],
             marker=MARKS[name],
             color="white",
             markeredgecolor="black",
@@ -294,9 +254,9 @@ def lock(folder: Path, numbers: dict[str, Any]) -> Figure:
     """Tongues of sine and square, the start's phase, and the frequencies that throw the top."""
     told = numbers["locks"]
     figure = Figure(figsize=(9.4, 6.0))
-    spin = preset("driven").start.spin_hz
+    spin = TRAP_HZ
     colours = ListedColormap([GREY, TAN, BLUE])
-    for k, wave in enumerate(("sine", "square")):
+    for k, wave in enumerate(WAVES):
         found = load(folder, f"lock-{wave}")
         axes = figure.add_axes((0.065 + 0.325 * k, 0.58, 0.26, 0.36))
         drives, amplitudes = found.axes
@@ -310,7 +270,7 @@ def lock(folder: Path, numbers: dict[str, Any]) -> Figure:
         part = abs(math.cos((found.scene.drive.phase_rad - told["phase"]["best_rad"]) / 2))
         for sign in (-1, 1):
             axes.plot(spin + sign * part * half, scale, color="black", linewidth=1.2)
-        vertical = told["modes"]["vertical_hz"]
+        vertical = told["modes"]["own_vertical_hz"]
         for sign in (-1, 1):
             axes.axvline(spin + sign * vertical, color=PURPLE, linestyle="--", linewidth=1.2)
         axes.grid(visible=False)
@@ -330,13 +290,14 @@ def lock(folder: Path, numbers: dict[str, Any]) -> Figure:
     axes.set_title("sine of 0.2 mT: the phase decides", loc="left")
     axes.legend(fontsize=8)
     bottom = figure.add_axes((0.1, 0.16, 0.89, 0.25))
-    waves = ("sine", "square")
+    waves = list(WAVES)
     for k, wave in enumerate(waves):
         found = load(folder, f"modes-{wave}")
         what = found.up.astype(int) + (found.values["locked"].astype(bool) & found.up)
-        edges = np.append(found.axes[0] - 0.125, found.axes[0][-1] + 0.125)
+        half_step = (found.axes[0][1] - found.axes[0][0]) / 2
+        edges = np.append(found.axes[0] - half_step, found.axes[0][-1] + half_step)
         bottom.pcolormesh(edges, [k - 0.45, k + 0.45], what[None], cmap=colours, vmin=0, vmax=2, rasterized=True)
-    bottom.set_yticks(range(len(waves)), list(waves))
+    bottom.set_yticks(range(len(waves)), waves)
     modes = [abs(x) for x in told["modes"]["modes_hz"]] + [told["modes"]["vertical_hz"]]
     for mode in modes:
         bottom.axvline(mode, color="black", linewidth=1)
@@ -356,7 +317,7 @@ def lock(folder: Path, numbers: dict[str, Any]) -> Figure:
             Patch(color=TAN, label="up, not locked"),
             Patch(color=GREY, label="lost"),
             Line2D([], [], color="black", label="above: pendulum's estimate, started at this phase"),
-            Line2D([], [], color=PURPLE, linestyle="--", label="spin ± frequency up and down"),
+            Line2D([], [], color=PURPLE, linestyle="--", label="above: spin ± its own frequency up and down"),
             Line2D([], [], color=ORANGE, label="below: spin (a third, dotted)"),
         ],
         loc="lower center",
@@ -367,7 +328,8 @@ def lock(folder: Path, numbers: dict[str, Any]) -> Figure:
 
 
 FIGURES: dict[str, Callable[[Path, dict[str, Any]], Figure]] = {
-    "survival": survival_by_height,
+    "survival": lambda folder, _: as_the_command_draws(folder, "survival", "survived"),
+    "tongue": lambda folder, _: as_the_command_draws(folder, "lock-sine", "locked"),
     "masses": survival_by_mass,
     "edge": edge,
     "limits": limits,

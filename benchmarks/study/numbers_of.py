@@ -7,14 +7,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from plans import CHANGES, NUDGES, RESONANT, STARTS
+from plans import CHANGES, NUDGES, RESONANT, STARTS, WAVES
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from thesis import THESIS
 
 from analysis.stability import sleeping_limit, wobble_resonance
 from levilab.simulator.equilibrium import modes_at, stability_of
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
-from levilab.stability.thesis import MEASURED_HZ, MEASURED_U_HZ, SIMULATED_HZ
 from levilab.sweeps.store import Store
 
 if TYPE_CHECKING:
@@ -30,13 +31,12 @@ if TYPE_CHECKING:
 
 TOP = preset("undriven")
 THESIS_KG = TOP.top.mass_kg
-#: Spins at which the thesis's top falls with drag from 30 Hz [Hz], and the scatter of the measured limits [Hz].
-FALLS_HZ = {"IC1": 21.86, "IC2": 21.65, "IC3": 21.81, "IC4": 22.90}
-SCATTER_HZ = 0.25
 #: Steps [Hz] in which the fine scan is looked at, as multiples of its own.
 MULTIPLES = (200, 100, 40, 20, 10, 4, 2, 1)
 #: The sleeping top's limit is compared for starts that swing at least so far [m], between these heights [m].
 SWINGS_M, COMPARED_M = 0.0007, (0.0692, 0.0756)
+#: Spin at which the driven tops start, and how near to it a drive can lock them [Hz].
+TRAP_HZ, NEAR_HZ = preset("driven").start.spin_hz, 0.4
 #: Points of the map that are kept for tests.
 SPOTS = 24
 #: A place at the end that is known no better was chaotic [m].
@@ -135,6 +135,35 @@ def swing_hz(scene: Scene, amplitude: float, *, wave: str = "sine") -> float:
     return math.sqrt(across * field / (2 * top.inertia_axial_kg_m2)) / (2 * math.pi)
 
 
+def hill_trace(stability: Stability, mass: float, height: float) -> float:
+    """Trace of the motion aside over one bounce of a top that starts at rest at a height [m]; NaN if it never returns.
+
+    The axis follows the field (adiabatic), the motion up and down is given: what remains is Hill's equation, whose
+    solutions stay small if the trace is between -2 and 2.
+    """
+    moment, gravity = abs(stability.top.moment), stability.top.gravity
+
+    def rates(_: float, state: Array) -> list[float]:
+        z, speed, x, along, other, against = state
+        field, slope, bend = stability.field(np.array([z]))[:3, 0]
+        hold = aside_stiffness(moment, field, slope, bend) / mass
+        return [speed, -moment * slope / mass - gravity, along, -hold * x, against, -hold * other]
+
+    upwards = rates(0.0, np.array([height, 0, 0, 0, 0, 0]))[1] > 0
+
+    def returned(time: float, state: Array) -> float:
+        return float(state[1]) if time > 1e-3 else (1.0 if upwards else -1.0)
+
+    returned.direction, returned.terminal = (1 if upwards else -1), True  # type: ignore[attr-defined]
+    bounce = solve_ivp(rates, (0, 2), [height, 0, 1, 0, 0, 1], rtol=1e-8, atol=1e-10, events=returned)
+    return float(bounce.y[2, -1] + bounce.y[5, -1]) if bounce.status == 1 else math.nan
+
+
+def aside_stiffness(moment: float, field: Any, slope: Any, bend: Any) -> Any:
+    """Of |μ||B| sideways, from B, B′, B″ on the axis [N/m]; below zero the field pushes the top aside."""
+    return moment * (slope**2 / 4 - field * bend / 2) / field
+
+
 # --- what is found ---
 
 
@@ -174,7 +203,13 @@ def survival(folder: Path) -> dict[str, Any]:
             f"{spin:g}": extremes(1e2 * heights[up[int(np.argmin(np.abs(spins - spin))), at]])
             for spin in (25, 30, 50, 70, 75, 80)
         },
+        "strict": differ(load(folder, "survival-strict").up, up[:, at]),
     }
+
+
+def differ(strict: Flags, plain: Flags) -> dict[str, int]:
+    """How many tops have another fate with a thousandth of the wanted error."""
+    return {"tops": plain.size, "differ": int(np.sum(strict != plain)), "up": [int(plain.sum()), int(strict.sum())]}
 
 
 def extremes(values: Array) -> list[float]:
@@ -200,7 +235,25 @@ def bounces(folder: Path) -> dict[str, Any]:
         scene = found.scene.changed({key: float(value) for key, value in zip(keys, values, strict=True)})
         motions.append(simulate(scene, 300.0, rate=100.0, tolerance=1e-6))
     calmest = min(motions, key=lambda motion: float(np.hypot(*motion.position[:, :2].T).max()))
+    stability = stability_of(TOP)
+    _, masses, heights = found.axes
+    traces = np.array([[hill_trace(stability, float(mass), float(height)) for height in heights] for mass in masses])
+    for name in ("bounce", "bounce-exact"):
+        up = load(folder, name).up
+        calm = np.broadcast_to(np.abs(traces) < 2, up.shape)
+        answers[name.replace("bounce", "hill")] = {
+            "calm": int(calm.sum()),
+            "calm_up": int(up[calm].sum()),
+            "other": int((~calm).sum()),
+            "other_up": int(up[~calm].sum()),
+        }
+    moment, places = abs(stability.top.moment), calmest.position[:, 2]
+    field, slope, bend = stability.field(places)[:3]
+    push = -moment * slope / (calmest.scene.top.mass_kg * stability.top.gravity)
     answers["example"] = {
+        "push_low": float(push[np.argmin(places)]),
+        "push_high": float(push[np.argmax(places)]),
+        "held_share": float(np.mean(aside_stiffness(moment, field, slope, bend) > 0)),
         "mass_g": 1e3 * calmest.scene.top.mass_kg,
         "spin_hz": calmest.scene.start.spin_hz,
         "start_cm": 1e2 * calmest.scene.start.position_m[2],
@@ -233,6 +286,7 @@ def edge(folder: Path) -> dict[str, Any]:
     errors = ic1.values["position_error_m"]
     blocks = [(float(spins[a]), float(spins[b])) for a, b in intervals(up) if spins[a] > 71]
     return {
+        "resonance_hz": slow_resonance(TOP),
         "beyond_hole_hz": list(max(blocks, key=lambda block: block[1] - block[0])),
         "from_hz": 65.0,
         "to_hz": 83.0,
@@ -252,6 +306,7 @@ def edge(folder: Path) -> dict[str, Any]:
         "chaotic_all": int(np.sum((errors > CHAOTIC_M) & upper)),
         "tops": int(upper.sum()),
         "IC2_hole_300_s_hz": hole(second.axes[0], second.up),
+        "IC2_last_up_300_s_hz": last_up(second),
         "hole_by_height": {
             f"{1e2 * z:.3f}": hole(load(folder, "edge").axes[0], load(folder, "edge").up[:, k])
             for k, z in enumerate(load(folder, "edge").axes[1])
@@ -292,19 +347,17 @@ def starts(folder: Path) -> dict[str, Any]:
         main = max(blocks, key=lambda block: block[1] - block[0])
         after = spins > main[1]
         drag = load(folder, f"{name}-drag").values["fall_spin_hz"]
-        published = SIMULATED_HZ[name]
+        published = THESIS["starts"][name]
         tenth = up[::5]
         found[name] = {
-            "published_hz": list(published),
             "lower_hz": lower_limit(low.axes[0], low.up),
             "all_up_until_hz": main[1],
             "last_up_hz": blocks[-1][1],
             "islands_above": sum(block[0] > main[1] for block in blocks),
             "islands_above_in_steps_of_0.1_hz": sum(bool(spins[::5][a] > main[1]) for a, _ in intervals(tenth)),
             "share_up_between": float(up[after & (spins <= blocks[-1][1])].mean()),
-            "up_beside_published_upper": [nothing_if_nan(x) for x in neighbours(blocks, published[1])],
+            "up_beside_published_upper": [nothing_if_nan(x) for x in neighbours(blocks, published["upper_hz"])],
             "with_drag_hz": [float(np.mean(drag)), float(np.min(drag)), float(np.max(drag))],
-            "with_drag_published_hz": FALLS_HZ[name],
         }
     found["changes"] = {
         name: {
@@ -343,8 +396,8 @@ def falls(folder: Path) -> dict[str, Any]:
     spin = found.values["fall_spin_hz"]
     came = np.isfinite(spin) & (spin < 29)
     answers: dict[str, Any] = {"came_down": int(came.sum()), "tops": int(spin.size), "spin_hz": extremes(spin[came])}
-    for name, width in (("within_se", MEASURED_U_HZ), ("within_scatter", SCATTER_HZ)):
-        here = came & (np.abs(spin - MEASURED_HZ) <= width)
+    for name, width in (("within_se", THESIS["measured_u_hz"]), ("within_scatter", THESIS["scatter_hz"])):
+        here = came & (np.abs(spin - THESIS["measured_hz"]) <= width)
         answers[name] = {
             "share": float(here.sum() / came.sum()),
             "mass_g": extremes(1e3 * masses[here.any(axis=1)]),
@@ -355,6 +408,13 @@ def falls(folder: Path) -> dict[str, Any]:
             [round(1e2 * float(heights[a]), 3), round(1e2 * float(heights[b]), 3)] for a, b in intervals(here[at])
         ]
     at = int(np.argmin(np.abs(masses - THESIS_KG)))
+    floating = stability_of(TOP).floating
+    assert floating is not None
+    off = heights - floating.height
+    answers["scatter_of_starts_mm"] = {
+        str(far): float(np.nanstd(np.where(came[at] & (np.abs(off) <= 1e-3 * far + 1e-9), spin[at], np.nan), ddof=1))
+        for far in (0.5, 1, 1.5, 2)
+    }
     answers["thesis_mass_lowest_hz"] = float(np.nanmin(np.where(came[at], spin[at], np.nan)))
     lowest = np.array(
         [np.nanmin(np.where(c, s, np.nan)) if c.any() else np.nan for c, s in zip(came, spin, strict=True)]
@@ -377,7 +437,13 @@ def resonance(folder: Path) -> list[dict[str, Any]]:
                 "hole_hz": hole(scan.axes[0], scan.up),
             }
         )
+        found[-1]["off_hz"] = beside(found[-1]["hole_hz"], found[-1]["resonance_hz"])
     return found
+
+
+def beside(hole_hz: tuple[float, float] | None, spin: float) -> float | None:
+    """How far a spin is outside a hole [Hz]; None where there is none."""
+    return float(max(hole_hz[0] - spin, spin - hole_hz[1], 0.0)) if hole_hz else None
 
 
 def locks(folder: Path) -> dict[str, Any]:
@@ -390,7 +456,7 @@ def locks(folder: Path) -> dict[str, Any]:
         rows = []
         for k, amplitude in enumerate(amplitudes):
             here = drives[locked[:, k]]
-            near = np.abs(drives - 30.03) < 0.4
+            near = np.abs(drives - TRAP_HZ) < NEAR_HZ
             rows.append(
                 {
                     "amplitude_mt": round(1e3 * float(amplitude), 4),
@@ -411,10 +477,45 @@ def locks(folder: Path) -> dict[str, Any]:
         if a["amplitude_mt"] <= 0.4
     ]
     found["square_over_sine"] = float(np.mean(ratio))
-    found["phase"] = by_phase(folder)
-    found["modes"] = by_mode(folder)
-    found["beat"] = by_beat(folder)
+    for wave in WAVES:
+        plain, strict = load(folder, f"lock-{wave}"), load(folder, f"lock-{wave}-strict")
+        found[wave]["strict"] = differ(strict.up, plain.up) | {
+            "locked_differ": int(np.sum(strict.values["locked"] != plain.values["locked"]))
+        }
+        for name in ("straight", "floating"):
+            near = load(folder, f"lock-{wave}-{name}")
+            found[wave][name] = {
+                "lost": int(np.sum(~near.up)),
+                "tops": near.up.size,
+                "lost_from_mt": first_lost(near.axes[1], near.up),
+            }
+        near = np.abs(plain.axes[0] - TRAP_HZ) < NEAR_HZ
+        found[wave]["lost_from_mt"] = first_lost(plain.axes[1], plain.up[near])
+        found[wave]["swing_at_loss_hz"] = (
+            swing_hz(plain.scene, found[wave]["lost_from_mt"] / 1e3, wave=wave) if found[wave]["lost_from_mt"] else None
+        )
+    drives = load(folder, "lock-sine").axes[0]
+    found |= {"trap_hz": TRAP_HZ, "near_hz": NEAR_HZ, "step_hz": float(drives[1] - drives[0])}
+    found |= {
+        "swing_at_0.4_mt_hz": swing_hz(preset("driven"), 4e-4),
+        "square_over_sine_expected": math.sqrt(4 / math.pi),
+    }
+    found |= {"phase": by_phase(folder), "modes": by_mode(folder), "beat": by_beat(folder)}
+    *light, heavy = found["beat"]
+    found["beat_off_hz"] = {
+        "weak": max(abs(row["shaken_most_hz"] - row["own_hz"]) for row in found["beat"]),
+        "light": max(abs(row["median_off_hz"] - row["own_hz"]) for row in light),
+        "heaviest": heavy["own_hz"] - heavy["median_off_hz"],
+        "upright": heavy["vertical_hz"] - heavy["own_hz"],
+        "straight": max(abs(row["vertical_hz"] - row["straight_hz"]) for row in found["beat"]),
+    }
     return found
+
+
+def first_lost(amplitudes: Array, up: Flags) -> float | None:
+    """The weakest drive with which a tenth of the tops of a map (frequency, amplitude) is lost [mT]."""
+    lost = np.flatnonzero(np.mean(~up, axis=0) >= 0.1)
+    return round(1e3 * float(amplitudes[lost[0]]), 4) if lost.size else None
 
 
 def by_phase(folder: Path) -> dict[str, Any]:
@@ -445,20 +546,30 @@ def by_mode(folder: Path) -> dict[str, Any]:
     answers: dict[str, Any] = {
         "modes_hz": np.sort(stability.modes.real).round(3).tolist(),
         "vertical_hz": stability.vertical,
+        "own_vertical_hz": bounce_hz(scene.changed({"drive.waveform": "off", "start.place": "equilibrium"})),
     }
     for wave in ("sine", "square"):
         found = load(folder, f"modes-{wave}")
         drives = found.axes[0]
+        lost = [[round(float(drives[a]), 3), round(float(drives[b]), 3)] for a, b in intervals(~found.up)]
         answers[wave] = {
-            "lost_hz": [[float(drives[a]), float(drives[b])] for a, b in intervals(~found.up)],
-            "locked_hz": drives[found.values["locked"].astype(bool)].tolist(),
+            "lost_hz": [pair for pair in lost if pair[1] > pair[0]],
+            "lost_alone_hz": [pair[0] for pair in lost if pair[1] == pair[0]],
+            "locked_hz": extremes(drives[found.values["locked"].astype(bool)]),
         }
+    found = load(folder, "modes-sine")
+    answers["thirds"] = []
+    for mode in answers["modes_hz"][2:]:
+        third = mode / 3
+        near = [pair for pair in answers["square"]["lost_hz"] if pair[0] - 0.3 < third < pair[1] + 0.3]
+        beside = np.abs(found.axes[0] - third) < 0.3
+        answers["thirds"].append({"hz": third, "square_lost_hz": near, "sine_lost": int(np.sum(~found.up[beside]))})
     return answers
 
 
 def by_beat(folder: Path) -> list[dict[str, Any]]:
     """How far from the spin a drive throws the top, by mass, against the frequency of the motion up and down."""
-    found = load(folder, "beat")
+    found, weak = load(folder, "beat"), load(folder, "beat-weak")
     drives, masses = found.axes
     rows = []
     for k, mass in enumerate(masses):
@@ -469,18 +580,34 @@ def by_beat(folder: Path) -> list[dict[str, Any]]:
             {
                 "mass_g": 1e3 * float(mass),
                 "vertical_hz": stability_of(scene).vertical,
-                "lost_above_hz": [
-                    [round(float(off[a]), 3), round(float(off[b]), 3)]
-                    for a, b in intervals(~found.up[:, k] & (off > 0))
-                ],
-                "lost_below_hz": [
-                    [round(float(off[a]), 3), round(float(off[b]), 3)]
-                    for a, b in intervals(~found.up[:, k] & (off < 0))
-                ],
+                "own_hz": bounce_hz(scene.changed({"drive.waveform": "off"})),
+                "straight_hz": bounce_hz(straight(scene)),
+                "shaken_most_hz": float(weak.axes[0][np.argmax(weak.values["height_spread_m"][:, k])] - TRAP_HZ),
+                "weak_lost": int(np.sum(~weak.up[:, k])),
+                "lost": int(lost.size),
                 "median_off_hz": float(np.median(lost)) if lost.size else None,
             }
         )
     return rows
+
+
+def straight(scene: Scene) -> Scene:
+    """A top whose moment is as strong along its axis, and not tilted, 0.2 mm above where it floats."""
+    floating = stability_of(scene).floating
+    assert floating is not None
+    start = {"place": "given", "position_m": [0.0, 0.0, floating.height + 2e-4], "velocity_m_s": [0.0, 0.0, 0.0]}
+    settings: dict[str, Any] = {f"start.{key}": value for key, value in start.items()}
+    return scene.changed(settings | {"drive.waveform": "off", "top.moment_tilt": [0.0, scene.top.moment_tilt[1]]})
+
+
+def bounce_hz(scene: Scene, seconds: float = 60.0, rate: float = 50.0) -> float:
+    """The frequency of a simulated top's motion up and down [Hz]: the highest line of its spectrum, to 1/960 Hz."""
+    heights = simulate(scene, seconds, rate=rate, tolerance=1e-6).position[:, 2]
+    padded = 16 * heights.size
+    spectrum = np.abs(np.fft.rfft((heights - heights.mean()) * np.hanning(heights.size), padded))
+    frequencies = np.fft.rfftfreq(padded, 1 / rate)
+    shown = (frequencies > 0.4) & (frequencies < 3)
+    return float(frequencies[shown][np.argmax(spectrum[shown])])
 
 
 def spots(folder: Path) -> dict[str, list[list[Any]]]:
@@ -509,6 +636,7 @@ def spots(folder: Path) -> dict[str, list[list[Any]]]:
 def numbers(folder: Path) -> dict[str, Any]:
     """All of them."""
     return {
+        "thesis": THESIS,
         "survival": survival(folder),
         "bounces": bounces(folder),
         "edge": edge(folder),

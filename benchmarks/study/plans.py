@@ -19,8 +19,10 @@ STARTS: dict[str, tuple[str, ...]] = {
     "IC3": ("start.position_m=[0.003,0,0.0725]", "start.velocity_m_s=[-0.002,0,0.0005]"),
     "IC4": ("start.tilt_rad=0.1",),
 }
-#: Wanted errors of place [m] and axis [rad]; with the second, the longest step is taken.
-TOLERANCE, LONGEST_STEP = 1e-6, 100.0
+#: What `levilab sweep` takes without other options.
+TOLERANCE, DURATION_S, OBSERVED = 1e-6, 30.0, "survived,lifetime_s"
+#: Wanted error of the sweeps that try whether the step matters.
+STRICT = 1e-9
 ON_AXIS = "start.position_m=[0,0,0.071]"
 AT_REST = "start.velocity_m_s=[0,0,0]"
 
@@ -36,19 +38,16 @@ class Sweep:
         duration_s: of each motion.
         observe: names of observables, with commas.
         settings: KEY=VALUE each.
+        tolerance: wanted error of place [m] and axis [rad] of tops that stay up.
     """
 
     name: str
     scene: str
     axes: tuple[str, ...]
-    duration_s: float = 30.0
-    observe: str = "survived,lifetime_s"
+    duration_s: float = DURATION_S
+    observe: str = OBSERVED
     settings: tuple[str, ...] = ()
-
-    @property
-    def tolerance(self) -> float:
-        """A driven top takes the longest step: good where it moves regularly; chaos has no step that is good."""
-        return LONGEST_STEP if self.scene == "driven" else TOLERANCE
+    tolerance: float = TOLERANCE
 
     @property
     def plan(self) -> Plan:
@@ -65,16 +64,13 @@ class Sweep:
 
     @property
     def command(self) -> str:
-        """What makes the same store on the command line."""
-        how = f"--duration {self.duration_s:g} --tolerance {self.tolerance:g}"
+        """What makes the same store on the command line; what `levilab sweep` takes anyway is left out."""
         words = [f"levilab sweep {self.scene}", *(f"--sweep {axis}" for axis in self.axes)]
-        words += [f"--set '{setting}'" for setting in self.settings]
-        return " ".join(
-            [
-                *words,
-                f"--observe {self.observe} {how} --out {self.name}.zarr",
-            ]
-        )
+        words += [f'--set "{setting}"' if "[" in setting else f"--set {setting}" for setting in self.settings]
+        words += [f"--observe {self.observe}"] if self.observe != OBSERVED else []
+        words += [f"--duration {self.duration_s:g}"] if self.duration_s != DURATION_S else []
+        words += [f"--tolerance {self.tolerance:g}"] if self.tolerance != TOLERANCE else []
+        return " ".join([*words, f"--out {self.name}.zarr"])
 
 
 SPINS, UPPER = "start.spin_hz=18:90:145", "start.spin_hz=65:83:1801"
@@ -103,9 +99,20 @@ RESONANT = {
 }
 
 LOCK = "survived,lifetime_s,locked"
+DRIVES, AMPLITUDES = "drive.frequency_hz=28.6:31.4:113", "drive.amplitude_t=0.0001:0.0008:15"
+NEAR, MASSES = "drive.frequency_hz=29.63:30.43:17", "top.mass_kg=0.0241:0.0246:6"
+#: The drive's waveform → settings; the scene driven has a sine.
+WAVES: dict[str, tuple[str, ...]] = {"sine": (), "square": ("drive.waveform=square",)}
 
 SWEEPS: tuple[Sweep, ...] = (
     Sweep("survival", "undriven", (SPINS, "top.mass_kg=0.02418:0.0255:23", "start.position_m.2=0.067:0.085:37")),
+    Sweep(
+        "survival-strict",
+        "undriven",
+        (SPINS, "start.position_m.2=0.067:0.085:37"),
+        settings=("top.mass_kg=0.02526",),
+        tolerance=STRICT,
+    ),
     Sweep("edge", "undriven", ("start.spin_hz=64:84:401", "start.position_m.2=0.069:0.077:33")),
     Sweep("foot", "undriven", ("start.spin_hz=21:24:151", "start.position_m.2=0.068:0.0775:39")),
     *(
@@ -170,42 +177,45 @@ SWEEPS: tuple[Sweep, ...] = (
         )
         for mass, height in RESONANT.items()
     ),
+    *(Sweep(f"lock-{wave}", "driven", (DRIVES, AMPLITUDES), 60.0, LOCK, settings) for wave, settings in WAVES.items()),
     *(
-        Sweep(
-            f"lock-{wave}",
-            "driven",
-            ("drive.frequency_hz=28.6:31.4:57", "drive.amplitude_t=0.0001:0.0008:8"),
-            60.0,
-            LOCK,
-            (f"drive.waveform={wave}",),
-        )
-        for wave in ("sine", "square")
+        Sweep(f"lock-{wave}-strict", "driven", (DRIVES, AMPLITUDES), 60.0, LOCK, settings, STRICT)
+        for wave, settings in WAVES.items()
+    ),
+    *(
+        Sweep(f"lock-{wave}-{name}", "driven", (NEAR, AMPLITUDES), 60.0, LOCK, (*settings, change))
+        for wave, settings in WAVES.items()
+        for name, change in (("straight", "top.moment_tilt=[0,0.97]"), ("floating", "start.place=equilibrium"))
     ),
     Sweep(
         "lock-phase",
         "driven",
-        ("drive.frequency_hz=28.6:31.4:57", "drive.phase_rad=0:5.759586531581287:12"),
+        (DRIVES, "drive.phase_rad=0:5.759586531581287:12"),
         60.0,
         LOCK,
         ("drive.amplitude_t=0.0002",),
     ),
     *(
-        Sweep(
-            f"modes-{wave}",
-            "driven",
-            ("drive.frequency_hz=0.25:60:240",),
-            30.0,
-            LOCK,
-            (f"drive.waveform={wave}", "drive.amplitude_t=0.0002"),
+        Sweep(f"modes-{wave}", "driven", ("drive.frequency_hz=0.1:60:600",), 30.0, LOCK, settings)
+        for wave, settings in (
+            ("sine", ("drive.amplitude_t=0.0002",)),
+            ("square", ("drive.waveform=square", "drive.amplitude_t=0.0002")),
         )
-        for wave in ("sine", "square")
     ),
     Sweep(
         "beat",
         "driven",
-        ("drive.frequency_hz=28:32:81", "top.mass_kg=0.0241:0.0246:6"),
+        ("drive.frequency_hz=28:32:81", MASSES),
         60.0,
         LOCK,
         ("drive.amplitude_t=0.0003", "start.place=equilibrium"),
+    ),
+    Sweep(
+        "beat-weak",
+        "driven",
+        ("drive.frequency_hz=30.53:32.03:76", MASSES),
+        60.0,
+        "survived,height_spread_m",
+        ("drive.amplitude_t=0.00001", "start.place=equilibrium"),
     ),
 )

@@ -34,6 +34,8 @@ Array = NDArray[np.float64]
 
 #: The step of all tops is chosen on a few, simulated one by one: the corners of a map and so many evenly through it.
 PILOTS = 6
+#: If all of those are lost where those that stay up are to decide, so many more are tried, in groups.
+MORE_PILOTS, PILOTS_IN_A_GROUP = 60, 12
 #: How long these are simulated [s]; errors grow with the time, so they get this share of the tolerance.
 PILOT_DURATION = 3.0
 #: The largest part of its longest step that a top takes: runs at four times as much are compared with.
@@ -287,21 +289,47 @@ def _step_share(
 ) -> float:
     """Return the part of its longest step that keeps a top's error within the tolerance, found on a few of them."""
     values = broadcast(over)
-    pilots = sorted(_pilots(next(iter(values.values())).shape if values else (1,)))
+    shape = next(iter(values.values())).shape if values else (1,)
+    shares = _shares_of(scene, values, sorted(_pilots(shape)), duration, tolerance)
+    found = shares.stayed + shares.lost
+    if survivors_only:
+        more = iter(_more_pilots(math.prod(shape)))
+        while not shares.stayed and (pilots := next(more, None)):
+            shares = _shares_of(scene, values, pilots, duration, tolerance)
+        found = shares.stayed or found
+    # no step suits a chaotic top; but if none keeps to the tolerance, it is smaller than the rounding allows
+    return min([*(found or shares.failed), LARGEST_SHARE])
+
+
+class _Shares(NamedTuple):
+    """Parts of their longest steps that tops take: that stay up, that are lost, that do not reach the tolerance."""
+
+    stayed: list[float]
+    lost: list[float]
+    failed: list[float]
+
+
+def _more_pilots(size: int) -> list[list[int]]:
+    """Return groups of flat indices in no step with the axes, which evenly spaced ones may be: all along one edge."""
+    golden = (math.sqrt(5) - 1) / 2
+    spread = [int(size * (golden * (k + 1) % 1.0)) for k in range(min(MORE_PILOTS, size))]
+    return [sorted(set(spread[k : k + PILOTS_IN_A_GROUP])) for k in range(0, len(spread), PILOTS_IN_A_GROUP)]
+
+
+def _shares_of(
+    scene: Scene, values: Mapping[str, NDArray[Any]], pilots: list[int], duration: float, tolerance: float
+) -> _Shares:
+    """Return the parts of their longest steps that some tops take."""
     some = {key: np.array([column.flat[i] for i in pilots], dtype=column.dtype) for key, column in values.items()}
     time = min(duration, PILOT_DURATION)
-    stayed: list[float] = []
-    lost: list[float] = []
-    without_success: list[float] = []
+    found = _Shares([], [], [])
     for batch in batches(scene, some):
         for where, longest in zip(batch.where, batch.longest, strict=True):
             one = scene_at(scene, some, int(where))
             motion = simulate(one, time, tolerance=tolerance * time / duration, rate=None)
-            shares = without_success if not motion.accuracy.reached else stayed if motion.survived else lost
+            shares = found.failed if not motion.accuracy.reached else found.stayed if motion.survived else found.lost
             shares.append(motion.accuracy.step / float(longest))
-    # no step suits a chaotic top; but if none of them keeps to the tolerance, it is smaller than the rounding allows
-    found = stayed if stayed and survivors_only else stayed + lost
-    return min([*(found or without_success), LARGEST_SHARE])
+    return found
 
 
 # --- the motion ---

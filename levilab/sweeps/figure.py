@@ -121,7 +121,7 @@ def map_figure(found: Map, column: str = "survived", notes: Sequence[str] = ()) 
         lines: list[Artist] = []
         for axes, index, theory in zip(panels, view.chosen, _theories(found.plan, view), strict=True):
             _draw_cells(axes, view, _slice(kinds, view, index), _slice(numbers, view, index), norm)
-            lines = _draw_limits(axes, found.plan, view, theory) or lines
+            lines = max(_draw_limits(axes, found.plan, view, theory), lines, key=len)  # not every panel has every line
         _label(panels, view)
         handles = [*_kind_patches(kinds, numbers, column, found.plan), *lines]
         sentences = [*_reading_sentences(found.plan, view, column, lines), *notes]

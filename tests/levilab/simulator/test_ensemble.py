@@ -189,6 +189,17 @@ def test_the_corners_of_a_map_are_among_those_that_choose_the_step(shape, corner
     assert corners <= _pilots(shape)
 
 
+def test_a_map_that_is_lost_along_its_edges_has_the_step_of_tops_inside():
+    # evenly spaced points of these axes lie all at the lowest mass or height: 145 spins are 5 times 29
+    axes = {
+        "start.spin_hz": np.linspace(18, 90, 145),
+        "top.mass_kg": np.linspace(0.02418, 0.0255, 23),
+        "start.position_m.2": np.linspace(0.067, 0.085, 37),
+    }
+    share = step_share_of(UNDRIVEN, grid(axes), 30.0, tolerance=1e-6, survivors_only=True)
+    assert share > 3 * step_share_of(UNDRIVEN, grid(axes), 30.0, tolerance=1e-6)
+
+
 def test_lanes_are_filled_again_so_that_many_early_escapes_cost_little():
     # a thousand tops that fall within 0.3 s around sixteen that stay for 5 s: every one has its own answer
     spins = np.where(np.arange(1016) % 64 == 5, 30.0, 12.0)

@@ -142,6 +142,13 @@ def test_a_third_axis_gives_small_multiples_with_their_values() -> None:
     assert "12 of 16 values of the third axis are shown." in caption(many)
 
 
+def test_the_legend_has_lines_that_the_last_panel_does_not_have() -> None:
+    masses = Axis(MASS.key, np.array([0.0250, 0.0256]))  # the second floats nowhere
+    figure = map_figure(a_map(SPIN, masses, HEIGHT, names=("survived",)))
+    assert len(figure.axes) == 2
+    assert "slowest and fastest spin for small motions (linear)" in legend(figure)
+
+
 def test_points_that_are_not_computed_yet_are_white_and_counted() -> None:
     found = a_map(MASS, SPIN)
     found.computed[:, :5] = False
