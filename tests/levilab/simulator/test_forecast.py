@@ -12,7 +12,7 @@ UNDRIVEN = preset("undriven")
 
 
 def test_random_scenes_end_near_their_tolerance_and_below_their_estimate():
-    # 5 to 60 s, 1e-5 to 1e-10; benchmarks/accuracy.py has 500 scenes: 86, 96 and 88 %
+    # 5 to 60 s, 1e-5 to 1e-10; benchmarks/accuracy.py has 1000 scenes
     draws = (np.random.default_rng([7, number]) for number in range(len(KINDS)))
     tried = [trial(kind, draw) for kind, draw in zip(KINDS, draws, strict=True) for _ in range(8)]
     found = [one for one in tried if one is not None]  # the others have fallen
