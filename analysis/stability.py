@@ -113,8 +113,10 @@ def _conditions(field: AxialField, top: SymmetricTop, z: Array) -> Array:
 def windows(field: AxialField, top: SymmetricTop, low: float, high: float) -> tuple[Window, ...]:
     """The stable heights between low and high [m], for a moment against the field, each with its masses.
 
-    Scanned in HEIGHTS steps, each edge then found to the last digits.
+    Scanned in HEIGHTS steps, each edge then found to the last digits.  Without a moment there are none.
     """
+    if top.moment == 0:
+        return ()
     z = np.linspace(low, high, HEIGHTS)
     inside = np.all(_conditions(field, top, z) > 0, axis=0)
     edges = np.flatnonzero(inside[1:] != inside[:-1])

@@ -36,7 +36,7 @@ FLOOR = 2e-12
 
 @dataclass(frozen=True)
 class Trial:
-    """One scene: what was asked for, the true errors of place [m] and axis [rad], and the estimates."""
+    """One scene: its duration and tolerance, the true errors of place [m] and axis [rad], and the estimates."""
 
     kind: str
     scene: Scene

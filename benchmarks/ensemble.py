@@ -1,4 +1,4 @@
-"""Many tops at once: what a call costs before its kernel runs, corners, samples and windows, in time of the processor.
+"""Many tops at once: calls before their kernel, corners, samples, observables of sweeps and windows; processor time.
 
     python benchmarks/ensemble.py
 
@@ -22,6 +22,9 @@ from levilab.simulator.problem import Problem, integrate, scheme_for
 from levilab.simulator.start import start_of
 from levilab.simulator.stops import stops_between
 from levilab.simulator.varied import batches, broadcast, scene_at
+from levilab.sweeps.observables import observe
+from levilab.sweeps.plan import Axis, Plan
+from levilab.sweeps.run import with_step
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -63,6 +66,13 @@ def one_by_one(scene: Any, over: Any, duration: float, step: float) -> Callable[
     return lambda: [integrate(one, stops_between(0.0, duration, step, one.scene.drive)) for one in problems]
 
 
+def observables(names: str) -> Callable[[], Any]:
+    """Return a call that observes 128 driven tops for 10 s, on one core, with the step of a sweep."""
+    axis = Axis("drive.frequency_hz", np.linspace(29, 31, 128))
+    plan = with_step(Plan.of(DRIVEN, (axis,), tuple(names.split(",")), 10.0), lambda _: None)
+    return lambda: observe(plan, {axis.key: axis.values})
+
+
 def kernel() -> float:
     """Return the nanoseconds of one stage, a drift and a kick, of one top in lanes."""
     (batch,) = batches(UNDRIVEN, {"start.position_m.0": 1e-3 + np.arange(64) * 1e-6})
@@ -91,12 +101,16 @@ def main() -> None:
             "the same, all of the state at 100 Hz": lanes(
                 UNDRIVEN, {"start.spin_hz": np.linspace(25, 40, 256)}, 5.0, 0.01 / 3, rate=100.0
             ),
+            **{
+                f"128 driven tops, 10 s, {names}": observables(names)
+                for names in ("survived", "position_error_m", "height_spread_m", "locked", "lines")
+            },
             "windows of 61 masses": lambda: windows_over(UNDRIVEN, MASSES),
             "the same, one by one": lambda: [stability_of(UNDRIVEN.changed({"top.mass_kg": m})) for m in MASSES],
         }
     )
     for name, seconds in found.items():
-        print(f"{name:40} {1000 * seconds:9.2f} ms")
+        print(f"{name:42} {1000 * seconds:9.2f} ms")
     print(f"a stage of one top in lanes {kernel():.2f} ns")
 
 

@@ -1,4 +1,4 @@
-"""Thousands of runs: made in seconds, and how long levilab takes to list and to analyze them.
+"""Make thousands of runs in seconds, and measure how long levilab takes to list and to analyze them.
 
 ``python benchmarks/many_runs.py make FOLDER 10000`` makes spin-down runs, as an automated bench would in months: the
 folder of one run of the virtual bench, with another start, constant and noise in each, one in a hundred of them broken.
@@ -106,7 +106,7 @@ class Cost:
 
 
 def cost(words: Sequence[str | Path]) -> Cost:
-    """Run `levilab` with some words; the memory of its processes is looked at ten times a second (Linux)."""
+    """Run a `levilab` command; read the memory of its processes ten times a second (Linux)."""
     before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     process = subprocess.Popen(
         [sys.executable, "-m", "levilab", *map(str, words)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
@@ -168,7 +168,7 @@ def measure(counts: Sequence[int]) -> dict[str, object]:
 
 
 def main() -> None:
-    """Do what the command line says."""
+    """Make or measure runs, as the command line says."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     actions = parser.add_subparsers(dest="action", required=True)
     make = actions.add_parser("make", help="make runs")

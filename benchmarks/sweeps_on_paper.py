@@ -1,9 +1,9 @@
-"""What a map of a thousand million points takes on a hundred machines, and what breaks first.
+"""What a map of a thousand million points takes on a hundred machines, and what limits it first.
 
     python benchmarks/sweeps_on_paper.py       # prints its tables and puts them into docs/sweeps-at-scale.md
 
-Nothing of this was run: it is computed from what `sweeps.py` has measured on one small machine (results/sweeps.json),
-and from the assumptions below.
+No such map was computed: the numbers follow from what `sweeps.py` has measured on one small machine
+(results/sweeps.json), and from the assumptions below.
 """
 
 from __future__ import annotations
@@ -82,16 +82,16 @@ class Measured:
 
 @dataclass(frozen=True)
 class Limit:
-    """One thing that may break.
+    """A resource that a sweep may exhaust.
 
     Attributes:
         name: of what is used.
         used: as text.
         of: the capacity, as text.
-        share: of the capacity; above 1 it breaks.
-        points: of the largest map that does not break it; infinite if the map's size does not matter.
+        share: of the capacity; above 1 it is exhausted.
+        points: of the largest map for which it is enough; infinite if the map's size does not matter.
         cores: likewise the most cores.
-        slows: above 1 it does not end the sweep, but slows it down.
+        slows: whether a share above 1 slows the sweep down instead of ending it.
     """
 
     name: str
@@ -156,7 +156,7 @@ def page(found: dict[str, Any]) -> str:
         "|---|---|---|",
         f"| core time of a point | {one.point_s * 1e3:.2g} ms | measured in one process |",
         f"| core time of the map | {core_s / 3600:.3g} hours | × points |",
-        f"| wall time with nothing in the way | {core_s / cores / 60:.3g} minutes | ÷ {cores} cores |",
+        f"| wall time if only the cores limit it | {core_s / cores / 60:.3g} minutes | ÷ {cores} cores |",
         f"| the same on a machine with two cores | {core_s / 2 / 86400:.3g} days | |",
         f"| results in memory | {POINTS * one.point_bytes[0] / 1e9:.3g} GB | measured |",
         f"| results on the disk | {POINTS * one.point_bytes[1] / 1e9:.3g} GB | random numbers, which compress badly |",
@@ -177,7 +177,9 @@ def _table(one: Measured, chunk_s: float) -> list[str]:
     first = limits[0]
     wall = POINTS * one.point_s / cores * max(1.0, *(limit.share for limit in limits if limit.slows))
     allowed = "" if chunk_points <= MOST else f" (now at most {MOST})"
-    verdict = f"First breaks: {first.name}" if first.share > 1 else f"Nothing breaks; the first would be: {first.name}"
+    verdict = (
+        f"First limit: {first.name}" if first.share > 1 else f"No limit is reached; the first would be: {first.name}"
+    )
     text = (
         f"{heading}  {chunk_points} points each{allowed}, {math.ceil(POINTS / chunk_points)} chunks.  A killed parent "
         f"loses at most {_short(cores * chunk_s / 3600)} core hours.  Wall time: {_short(wall / 60)} minutes.  "

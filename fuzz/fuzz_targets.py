@@ -43,7 +43,7 @@ class Target:
 
 # --- instruments ---
 
-#: So many messages of one input are worked on: what takes long does so by its length only.
+#: Greatest number of messages of one input, so that only long messages can take long.
 _MOST_MESSAGES = 40
 
 

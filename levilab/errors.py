@@ -79,7 +79,7 @@ class LeftRange(SimulationError):
 
 
 class WorkersLost(LevilabError):
-    """The processes or machines that were to do the work cannot be reached, or cannot do it; results so far stand."""
+    """Workers cannot be reached or cannot compute; the results so far are kept."""
 
 
 def _short_text(value: object) -> str:

@@ -162,7 +162,7 @@ def replace_atomically(path: Path, content: str | bytes) -> None:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
-    """Yield a file for what takes the place of another one, whole, when the context ends well.  Raises OSError."""
+    """Yield a file that replaces another one as a whole when the context ends without an error.  Raises OSError."""
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         part.unlink(missing_ok=True)  # of an earlier process of this number
@@ -176,6 +176,33 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
         with contextlib.suppress(OSError):
             part.unlink(missing_ok=True)
         raise
+
+
+@contextlib.contextmanager
+def locked(path: Path, busy: str) -> Iterator[None]:
+    """Keep other processes that do the same from writing a file or a folder meanwhile.
+
+    Args:
+        path: of the file or folder; the lock lies beside it.
+        busy: what to say if another process holds the lock, behind the path.
+
+    Raises:
+        CannotWrite: another process holds it.
+        OSError: the lock cannot be made.
+    """
+    from filelock import FileLock, Timeout
+
+    lock = FileLock(path.with_name(f".{path.name}.lock"))
+    try:
+        lock.acquire(blocking=False)
+    except Timeout:
+        raise CannotWrite(f"{path}: {busy}") from None
+    try:
+        yield
+    finally:
+        lock.release()
+        with contextlib.suppress(OSError):
+            os.unlink(lock.lock_file)  # noqa: PTH108 - what it gives is text
 
 
 def sync_folder(folder: Path) -> None:

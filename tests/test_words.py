@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 MANNERED = re.compile(
     r"(?<![a-z])(?:somebody|nobody|everybody|whoever|so[\s#:_]+long[\s#:_]+as|of[\s#:_]+old|all[\s#:_]+the[\s#:_]+same)"
     r"(?![a-z])|\b(?:is|was)[\s#:]+told\b|\bwhat[\s#:]+there[\s#:]+is\b"
+    r"|(?<![a-z])(?:so[\s#:_]+manieth|what[\s#:_]+came[\s#:_]+of|in[\s#:_]+vain|unasked)(?![a-z])"
+    r"|(?<=#: )so (?:many|much|often|long)\b"
 )
 
 #: Where code and pages stand, beside the root itself.
@@ -28,6 +30,8 @@ def mannered(text: str) -> list[str]:
 
     >>> mannered("It waits so long\\n    #: as nobody_listens. # What was\\n# told?  A disbeliever is toldyou.")
     ['so long as', 'nobody', 'was told']
+    >>> mannered("#: So many are kept. Every so manieth, in vain; what_came_of_it")
+    ['so many', 'so manieth', 'in vain', 'what came of']
     """
     return [" ".join(re.split(r"[\s#:_]+", found)) for found in MANNERED.findall(text.lower())]
 

@@ -35,7 +35,7 @@ _FILE_S = 0.25
 
 
 def main() -> int:
-    """Try what is not known yet, and write what came of all."""
+    """Try what is not known yet, and write all outcomes."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--number", type=int, default=200, help="mutations at random")
     parser.add_argument("--seed", type=int, default=11, help="of the choice")
@@ -77,7 +77,7 @@ def main() -> int:
 def _outcome(
     mutation: places.Mutation, name: str, known: dict[str, Any], reached: reach.Reach, asked: argparse.Namespace
 ) -> dict[str, Any] | None:
-    """What came of a mutation, now or before; None where it is not known and not asked for."""
+    """Return the outcome of a mutation, now or before; None where it is unknown and not requested."""
     digest = hashlib.sha256(b"".join((trial.TREE / edit.file).read_bytes() for edit in mutation.edits)).hexdigest()[:16]
     before = known.get(mutation.key)
     wanted = not asked.only or any(word in f"{mutation.file} {name} {mutation.text}" for word in asked.only)

@@ -1,4 +1,4 @@
-"""What came of each mutation, kept from run to run, and the page about it."""
+"""The outcome of each mutation, kept from run to run, and the page about it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ BEGIN, END = "<!-- made by benchmarks/mutants -->\n", "<!-- end -->\n"
 
 @dataclasses.dataclass(frozen=True)
 class Row:
-    """One mutation and what came of it: killed, time-out, survived, equivalent, unreached or gone."""
+    """One mutation and its outcome: killed, time-out, survived, equivalent, unreached or gone."""
 
     kind: str
     room: str

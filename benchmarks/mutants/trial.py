@@ -119,7 +119,7 @@ def _environment() -> dict[str, str]:
 
 
 def _obey(order: dict[str, Any]) -> None:
-    """Run the tests of an order in TREE and write what came of it.
+    """Run the tests of an order in TREE and write the outcome.
 
     The order has the files to collect (`files`), the tests to keep of them in the order in which they run (`tests`;
     None for all), and whether to note the lines that each test reaches (`reach`).

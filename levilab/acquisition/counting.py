@@ -21,7 +21,7 @@ S = TypeVar("S", bound=CounterSettings)
 _HIGHEST_SHARE, _LEAST_LOSS_PER_S, _HALVING_S = 1.05, 1e-3, 100.0
 #: Two counts of one spin, seconds apart, agree this well (drag takes 0.3 %/s, noise is 0.1 %).
 _SAME_SHARE = 0.03
-#: So many readings are kept to compare a new one with: the last one, and two in case that it was a miscount.
+#: Number of readings that a new one is compared with: the last one, and two in case that it was a miscount.
 _KEPT = 3
 #: A fallen top rattles: after so many times without a credible count it is taken for fallen; after so many counts in a
 #: row that are too high, for another one.

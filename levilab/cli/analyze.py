@@ -274,14 +274,17 @@ def _command(options: Sequence[str]) -> Callable[..., None]:
             Path | None,
             typer.Option(
                 metavar="FILE",
-                help="Of many runs: analyze each by itself, in parallel, and write a row for each, .csv or .parquet.",
+                help="For many runs: analyze each by itself, in parallel, and write a row for each, .csv or .parquet.",
             ),
         ] = None,
         cores: Annotated[
-            int | None, typer.Option(metavar="N", min=1, help="Of --table.", show_default="all of them")
+            int | None, typer.Option(metavar="N", min=1, help="Processes for --table.", show_default="all of them")
         ] = None,
         resume: Annotated[
-            bool, typer.Option("--resume", help="Keep the rows of an earlier --table, and analyze the other runs.")
+            bool,
+            typer.Option(
+                "--resume", help="Keep the rows of an earlier --table; analyze what is new, changed or failed."
+            ),
         ] = False,
         as_json: Json = False,
         **given: Any,
@@ -352,12 +355,12 @@ def _analyze(
 
 
 def _advise_on_many(paths: Sequence[Path]) -> None:
-    """Name --table where there are so many runs that all together take long."""
+    """Print a note on --table before an analysis of very many runs."""
     from levilab.runs.run import find_runs
 
     if (count := sum(len(find_runs(path)) for path in paths if path.is_dir())) >= MANY_RUNS:
         advice = "--table FILE.csv writes a row for each by itself, in parallel, and goes on where it was interrupted"
-        message(f"{count} runs are analyzed together, in one process, which holds them all; {advice}")
+        message(f"{count} runs are analyzed together, in one process, with all readings in memory; {advice}")
 
 
 class Writing(NamedTuple):
@@ -369,9 +372,9 @@ class Writing(NamedTuple):
     save: bool
 
 
-#: So often a line says how far a table is where no bar can be seen [s].
+#: Interval between lines of progress where standard error is no terminal [s].
 LINE_EVERY_S = 30.0
-#: From so many runs on a plain analysis is not what is wanted, most often.
+#: From this number of runs on, an analysis without --table begins with a note on it.
 MANY_RUNS = 500
 
 

@@ -33,7 +33,7 @@ def message(text: str) -> None:
 
 @contextlib.contextmanager
 def interruptible(what_is_left: str | Callable[[], str]) -> Iterator[None]:
-    """Ctrl-C ends the command with one line, which says what is left."""
+    """End the command with one line at Ctrl-C; the line says what is left."""
     try:
         yield
     except KeyboardInterrupt:

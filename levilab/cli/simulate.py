@@ -36,7 +36,8 @@ def simulate(
         float,
         typer.Option(
             metavar="X",
-            help="Wanted error at the end, of the place in m and of the axis in rad.  The step is chosen for it.",
+            help="Error that is accepted at the end, of the place in m and of the axis in rad.  The step is chosen for "
+            "it; the error may be far smaller.",
         ),
     ] = 1e-7,
     rate: Annotated[float, typer.Option(metavar="HZ", help="States per second that are written.")] = 100.0,

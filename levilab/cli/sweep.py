@@ -15,7 +15,7 @@ from levilab.errors import DataError, UsageError, WorkersLost
 if TYPE_CHECKING:
     from levilab.sweeps.store import Store
 
-#: So often a line says how far the work is where no bar can be seen [s].
+#: Interval between lines of progress where standard error is no terminal [s].
 LINE_EVERY_S = 60.0
 
 
@@ -24,7 +24,7 @@ def sweep(
         str,
         typer.Argument(
             metavar="SCENE|STORE",
-            help="What is swept: undriven, friction, tilted, driven, loose-washers, precession, spindown, or a file.  "
+            help="The scene: undriven, friction, tilted, driven, loose-washers, precession, spindown, or a file.  "
             "Or the store of a sweep, NAME.zarr, which is shown, and with --resume continued.",
         ),
     ],
@@ -62,7 +62,7 @@ def sweep(
     ] = None,
     settings: Settings = None,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="Of the points that --adaptive checks at random.", show_default="0")
+        int | None, typer.Option(min=0, help="Seed of the points that --adaptive checks at random.", show_default="0")
     ] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="STORE.zarr", help="Where the results go.", show_default="NAME.zarr")
@@ -80,13 +80,11 @@ def sweep(
         bool,
         typer.Option(
             "--adaptive",
-            help="Compute points along the boundary of survival (or of what is observed and yes or no), fill in the "
-            "rest, and say what that may have missed.",
+            help="Compute points along the boundary of survival (or of the first observable that is yes or no), "
+            "fill in the rest, and say what that may have missed.",
         ),
     ] = False,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with a store that is there, where it was interrupted.")
-    ] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue a store that was interrupted.")] = False,
     as_json: Json = False,
 ) -> None:
     """Map a scene over its parameters."""
@@ -97,18 +95,18 @@ def sweep(
     if scheduler is not None and cores is not None:
         raise UsageError("cores", "a cluster has its own workers: leave it out, or leave out `scheduler`")
     shown = _is_store(scene)
-    store = _opened(Path(scene), given, resume=resume) if shown else _begun(scene, given, resume=resume)
+    store = _open_store(Path(scene), given, resume=resume) if shown else _begin_store(scene, given, resume=resume)
     if resume or not shown:
-        _computed(store, cores, scheduler)
-    _shown(store, as_json=as_json)
+        _compute(store, cores, scheduler)
+    _show(store, as_json=as_json)
 
 
 def _is_store(scene: str) -> bool:
     return Path(scene).suffix == ".zarr" or (Path(scene) / "zarr.json").exists()
 
 
-def _opened(path: Path, given: dict[str, Any], *, resume: bool) -> Store:
-    """The store of a path, which says itself what is computed."""
+def _open_store(path: Path, given: dict[str, Any], *, resume: bool) -> Store:
+    """Open the store of a path; its plan determines what is computed."""
     if wrong := [name for name, value in given.items() if value is not None]:
         raise UsageError(wrong[0], f"{path} has its own: leave it out, or name a scene for another sweep")
     from levilab.sweeps.store import Store
@@ -118,8 +116,8 @@ def _opened(path: Path, given: dict[str, Any], *, resume: bool) -> Store:
     return Store.open(path, writable=resume)
 
 
-def _begun(name: str, given: dict[str, Any], *, resume: bool) -> Store:
-    """A new store, or the one that is there if it has the same plan."""
+def _begin_store(name: str, given: dict[str, Any], *, resume: bool) -> Store:
+    """Return a new store, or the existing one if it has the same plan."""
     from levilab.cli.simulate import chosen_scene
 
     scene = chosen_scene(name, given["settings"])
@@ -132,8 +130,8 @@ def _begun(name: str, given: dict[str, Any], *, resume: bool) -> Store:
         return store_for(request, out, message, resume=resume)
 
 
-def _computed(store: Store, cores: int | None, scheduler: str | None) -> None:
-    """Compute what is missing."""
+def _compute(store: Store, cores: int | None, scheduler: str | None) -> None:
+    """Compute the chunks that are missing."""
     from levilab.present.progress import ShareBar
     from levilab.simulator.compilation import announce_compilation
     from levilab.sweeps.adaptive import is_adaptive, run_adaptive
@@ -148,13 +146,13 @@ def _computed(store: Store, cores: int | None, scheduler: str | None) -> None:
     for note in store.notes():
         message(f"note: {note}")
 
-    def kept() -> str:
+    def what_is_kept() -> str:
         done = "what was computed is" if is_adaptive(store) else f"{store.done} of {total} chunks are"
         return f"{done} kept in {store.path}; go on with: levilab sweep {store.path} --resume"
 
     workers = workers_for(store.plan, cores, scheduler)
     bar = ShareBar(f"{store.plan.size} points", first=store.done / total, line_every=LINE_EVERY_S)
-    with interruptible(kept), store.locked(), contextlib.closing(bar):
+    with interruptible(what_is_kept), store.lock(), contextlib.closing(bar):
         with announce_compilation(message):
             compile_for(store.plan)
         try:
@@ -163,16 +161,16 @@ def _computed(store: Store, cores: int | None, scheduler: str | None) -> None:
             else:
                 run(store, workers, bar)
         except WorkersLost as lost:
-            raise WorkersLost(f"{lost}; {kept()}") from lost
+            raise WorkersLost(f"{lost}; {what_is_kept()}") from lost
 
 
-def _shown(store: Store, *, as_json: bool) -> None:
+def _show(store: Store, *, as_json: bool) -> None:
     """Print the summary and draw the figures."""
     from levilab.sweeps.adaptive import report_in
     from levilab.sweeps.summary import as_document, summarise
 
     summary, report = summarise(store), report_in(store)
-    pictures = _drawn(store)
+    pictures = _draw(store)
     if as_json:
         figures = [str(picture) for picture in pictures]
         print_json(as_document(summary) | {"adaptive": report, "store": str(store.path), "figures": figures})
@@ -194,7 +192,7 @@ def _shown(store: Store, *, as_json: bool) -> None:
         message(f"{summary.points} of {store.plan.size} points are known; levilab sweep {store.path} --resume goes on")
 
 
-def _drawn(store: Store) -> list[Path]:
+def _draw(store: Store) -> list[Path]:
     """Draw a figure of each column beside the store, where the plan is a map."""
     from levilab.sweeps.drawing import draw_figures
 

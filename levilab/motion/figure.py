@@ -29,8 +29,8 @@ BLUE, RED, GREEN, PINK = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 PIECES = 1500
 #: A path of more points than these is no clearer.
 MOST_POINTS = 30_000
-#: So many lines are named, in so many rows above the highest; a row's height and the gap between names in parts of the
-#: panel's height and width, and what the rows take of it.
+#: Most lines with a name, most rows of names above the highest line; a row's height and the gap between names, in parts
+#: of the panel's height and width.
 MOST_NAMED, ROWS, _ROW, _GAP = 10, 4, 0.072, 0.008
 _NAMES_SHARE = 0.31
 _FONT = 7.5
@@ -72,7 +72,7 @@ def _whole_figure(summary: Summary) -> Figure:
 
 
 def _has_spectrum(summary: Summary) -> bool:
-    return summary.lines.spectrum is not None and bool(summary.lines.lines)
+    return summary.lines.signal is not None and bool(summary.lines.lines)
 
 
 def _spin_figure(summary: Summary) -> Figure:

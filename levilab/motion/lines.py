@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.lines import FEWEST, LOBE, amplitude_spectrum, spectral_lines
+from analysis.lines import FEWEST, LOBE, amplitude_spectrum, lines_of_signals
 from levilab.motion.lock import keeps_phase
+from levilab.simulator.energy import spin_of
 from levilab.simulator.equilibrium import modes_at
+from levilab.simulator.kernels.motion import TIME, N, R
 
 if TYPE_CHECKING:
-    from analysis.lines import Line
+    from collections.abc import Sequence
+
+    from analysis.lines import Line, Signal
     from levilab.simulator.scene import Scene
     from levilab.simulator.trajectory import Trajectory
 
@@ -58,13 +63,18 @@ class AxisLines:
         resolution: closer lines are not distinguished [Hz].
         until: end of the time from which they come [s]; before the motion's end if that is longer than LONGEST_S, or if
             the spin changes so much that the lines would wander.
-        spectrum: frequencies [Hz] and amplitudes [rad]; None where there is none.
+        signal: from which they come, and its samples per second [Hz]; None where there is none.
     """
 
     lines: tuple[NamedLine, ...] = ()
     resolution: float = math.inf
     until: float = 0.0
-    spectrum: tuple[Array, Array] | None = None
+    signal: tuple[Signal, float] | None = None
+
+    @cached_property
+    def spectrum(self) -> tuple[Array, Array] | None:
+        """Frequencies [Hz] and amplitudes [rad]; None where there is none."""
+        return None if self.signal is None else amplitude_spectrum(*self.signal)
 
 
 def rate_for(scene: Scene) -> float:
@@ -76,45 +86,75 @@ def rate_for(scene: Scene) -> float:
 
 def lines_of(motion: Trajectory) -> AxisLines:
     """Find the lines of a motion that is sampled evenly, except for its last sample."""
-    time, axis = motion.time[:-1], motion.axis[:-1]
-    if time.size < FEWEST or time[-1] - time[0] < SHORTEST_S or motion.scene.observed == "spin":
-        return AxisLines()
+    return lines_of_many([(motion.scene, motion.states)])[0]
+
+
+def lines_of_many(motions: Sequence[tuple[Scene, Array]]) -> list[AxisLines]:
+    """Find the lines of motions: scene and states, shape (n, 18), sampled evenly except for the last.
+
+    Those of one length go through the transform side by side; what is found in a motion depends on it alone.
+    """
+    found = [AxisLines()] * len(motions)
+    alike: dict[tuple[int, float], list[tuple[int, Signal, Array]]] = {}
+    for i, (scene, states) in enumerate(motions):
+        signal, rate, spin = _signal_of(scene, states)
+        if signal.size:
+            alike.setdefault((signal.size, rate), []).append((i, signal, spin))
+    for (n, rate), several in alike.items():
+        signals = np.array([signal for _, signal, _ in several])
+        for (i, signal, spin), lines in zip(
+            several, lines_of_signals(signals, rate, most=MOST, weakest=WEAKEST), strict=True
+        ):
+            named = _name_lines(lines.lines, *motions[i], spin, lines.resolution)
+            found[i] = AxisLines(named, lines.resolution, n / rate, (signal, rate))
+    return found
+
+
+def _signal_of(scene: Scene, states: Array) -> tuple[Signal, float, Array]:
+    """Return n_x + i n_y of the time whose lines are looked for, its samples per second [Hz], and all spins [Hz].
+
+    The signal is empty where no line can be found.
+    """
+    nothing, time = np.empty(0, dtype=np.complex128), states[:-1, TIME]
+    if time.size < FEWEST or time[-1] - time[0] < SHORTEST_S or scene.observed == "spin":
+        return nothing, 0.0, np.empty(0)
     rate = (time.size - 1) / float(time[-1] - time[0])
-    if rate < rate_for(motion.scene) / 2:  # too few samples: lines would be seen at other frequencies than their own
-        return AxisLines()
-    n = max(round(min(_steady_time(motion), LONGEST_S) * rate), FEWEST)
-    signal = (axis[:, 0] + 1j * axis[:, 1])[:n]
-    found = spectral_lines(signal, rate, most=MOST, weakest=WEAKEST)
-    named = _name_lines(found.lines, motion, found.resolution)
-    return AxisLines(named, found.resolution, len(signal) / rate, amplitude_spectrum(signal, rate))
+    if rate < rate_for(scene) / 2:  # too few samples: lines would be seen at other frequencies than their own
+        return nothing, 0.0, np.empty(0)
+    spin = spin_of(scene, states) / (2 * np.pi)
+    n = max(round(min(_steady_time(scene, states[:, TIME], spin), LONGEST_S) * rate), FEWEST)
+    axis = states[:-1, N][:n]
+    return axis[:, 0] + 1j * axis[:, 1], rate, spin
 
 
 def _flatness(scene: Scene) -> float:
     return scene.top.inertia_axial_kg_m2 / scene.top.inertia_transverse_kg_m2
 
 
-def _steady_time(motion: Trajectory) -> float:
+def _steady_time(scene: Scene, time: Array, spin: Array) -> float:
     """Return the time from the start in which no line wanders farther than the resolution [s].
 
     The nutation's frequency is I₃/I₁ times the spin.  At a chirp c it moves by c I₃/I₁ T in a time T, and the
     resolution is LOBE/T.  A spin that swings to and fro, as that of a locked top, counts as steady: its lines have
     sidebands.
     """
-    time, spin = motion.time, motion.spin_hz
     if time.size < 3 or time[-1] == time[0]:
         return float(time[-1])
-    chirp, level = np.polyfit(time - time[0], spin, 1)
-    swing = float(np.std(spin - chirp * (time - time[0]) - level))
+    away = time - time.mean()
+    chirp = float((away * spin).sum() / (away * away).sum())
+    swing = float(np.std(spin - chirp * away))
     if abs(chirp) * (time[-1] - time[0]) < 4 * swing or chirp == 0:
         return float(time[-1])
-    return math.sqrt(LOBE / (abs(chirp) * _flatness(motion.scene)))
+    return math.sqrt(LOBE / (abs(chirp) * _flatness(scene)))
 
 
 # --- names ---
 
 
-def _name_lines(lines: tuple[Line, ...], motion: Trajectory, resolution: float) -> tuple[NamedLine, ...]:
-    expected = _expected_lines(motion)
+def _name_lines(
+    lines: tuple[Line, ...], scene: Scene, states: Array, spin: Array, resolution: float
+) -> tuple[NamedLine, ...]:
+    expected = _expected_lines(scene, states, spin)
     names: dict[int, str] = {}
     for what, place in expected.items():
         width = resolution / 2 if what == "drive" else NEAR_HZ + NEAR_SHARE * abs(place)
@@ -136,22 +176,18 @@ def _name_lines(lines: tuple[Line, ...], motion: Trajectory, resolution: float) 
     )
 
 
-def _expected_lines(motion: Trajectory) -> dict[str, float]:
+def _expected_lines(scene: Scene, states: Array, spin: Array) -> dict[str, float]:
     """Return name → frequency [Hz] by the theory of small motions: drive, wobble of a tilted moment, four modes."""
-    scene = motion.scene
     places: dict[str, float] = {}
     if scene.drive.waveform != "off" and scene.drive.amplitude_t > 0:
         places["drive"] = math.copysign(scene.drive.frequency_hz, scene.start.spin_hz)
-    spin = float(motion.spin_hz.mean())
-    if not scene.top.aligned and not keeps_phase(scene, motion.states):  # otherwise the wobble is the drive's line
-        places["wobble, once a turn"] = spin
-    return places | _modes(motion)
+    if not scene.top.aligned and not keeps_phase(scene, states):  # otherwise the wobble is the drive's line
+        places["wobble, once a turn"] = float(spin.mean())
+    return places | _modes(scene, float(np.mean(states[:, R.stop - 1])), float(spin[0]))
 
 
-def _modes(motion: Trajectory) -> dict[str, float]:
-    """Return the modes of small motions about the mean height; none if they are not stable."""
-    scene = motion.scene
-    height, spin = float(np.mean(motion.position[:, 2])), float(motion.spin_hz[0])
+def _modes(scene: Scene, height: float, spin: float) -> dict[str, float]:
+    """Return the modes [Hz] of small motions about a mean height [m] at a spin [Hz]; none if they are not stable."""
     modes = modes_at(scene, height, spin)
     if np.abs(modes.imag).max() > 1e-6 * np.abs(modes).max():
         return {}  # the lines are other than these

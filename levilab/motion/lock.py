@@ -1,9 +1,9 @@
-"""Is a top locked to its drive?  By the angle of its body behind the drive, which must not slip by a turn.
+"""Whether a top is locked to its drive: the angle of its body behind the drive must not slip by a turn.
 
-The mean of the spin would not do: it is the drive's frequency for a locked top, but near it for a top that slips once
-in a while, too; and a locked top's spin swings about the drive, by some tenths of a hertz.  The angle by which the body
-turns behind the drive is that of a pendulum: while it swings, it stays within less than one turn; when it slips, it
-does not.  The azimuth of the axis will not do either, it is not defined at θ = 0.
+The mean of the spin does not decide it: it is the drive's frequency for a locked top, and nearly that for a top that
+slips now and then; and a locked top's spin swings about the drive's, by some tenths of a hertz.  The angle by which
+the body turns behind the drive is that of a pendulum: while it swings, it stays within less than one turn; when it
+slips, it does not.  The azimuth of the axis does not decide it either: it is not defined at θ = 0.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: The part of the motion, at its end, in which the top must not slip: before, it may be caught.
+#: The part of the motion, at its end, in which the top must not slip; before, the drive may still catch it.
 LAST_SHARE = 0.5
-#: That part must be as long, for a lock to be told from a slow slip: slips of 1/SHORTEST_S and faster are seen [s].
+#: Least duration of that part [s]: slips of 1/SHORTEST_S and faster are distinguished from a lock.
 SHORTEST_S = 5.0
-#: Samples per second from which the angle is followed; between two of them the spin says how often the body turned.
+#: Samples per second of the angle; between two of them the spin gives the number of turns.
 RATE_HZ = 50.0
 
 

@@ -33,7 +33,7 @@ FIGURE = "motion.png"
 
 #: States at most: 300 MB of them.
 MOST_STATES = 2_000_000
-#: So much is simulated to have the kernels compiled, or brought from the disk, before the clock starts [s].
+#: Duration that is simulated before the clock starts, so that the kernels are compiled or read from the disk [s].
 _FIRST_S = 1e-3
 #: Rows in one block of states.csv.
 _ROWS = 1000
@@ -72,12 +72,12 @@ class SimulationRequest:
 
 @dataclass(frozen=True)
 class Simulation:
-    """What came of it.
+    """The results of a simulation.
 
     Attributes:
         summary: of the motion, with all its samples.
         folder: the run folder, if there is one.
-        samples_per_state: every so manieth sample is a state that was asked for.
+        samples_per_state: each state of the request is one of this number of samples.
     """
 
     summary: Summary
@@ -186,7 +186,7 @@ def _write(summary: Summary, factor: int, writer: RunWriter) -> None:
 
 
 def kept_rows(motion: Trajectory, factor: int) -> np.ndarray[Any, np.dtype[np.intp]]:
-    """Every so manieth sample, and the last one, which is the end."""
+    """Return each n-th sample, and the last one, which is the end."""
     return np.unique(np.append(np.arange(0, len(motion.time) - 1, factor), len(motion.time) - 1))
 
 

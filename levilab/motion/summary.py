@@ -141,7 +141,7 @@ def _why_no_lines(motion: Trajectory, lines: AxisLines) -> str:
     end, states = float(motion.time[-1]), motion.time.size
     if motion.scene.observed == "spin":
         return "the spin alone is simulated, and the lines are those of the axis"
-    if lines.spectrum is not None:
+    if lines.signal is not None:
         return "the axis stands still"
     if (states - 1) < end * rate_for(motion.scene) / 2:
         return f"{states} states in {end:.3g} s are too few for a spectrum"

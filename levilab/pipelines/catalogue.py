@@ -59,7 +59,7 @@ if TYPE_CHECKING:
 
 #: Starts of runs that the terminal shows; the report has all.
 MOST_STARTS = 6
-#: So many warnings that are like an earlier one are counted, and not said.
+#: From this number on, warnings that are like an earlier one are only counted.
 MANY_ALIKE = 3
 
 

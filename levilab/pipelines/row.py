@@ -1,4 +1,4 @@
-"""One input as a row of a table of many: which columns an analysis gives it, and what stands in them.
+"""The columns that an analysis has in a table of many runs, and the values in them.
 
 A column is read from the input's part of result.json, so that the table and the result say the same.
 """
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-#: What stands in a column: a float, a whole number, true or false, text.
+#: The type of a column: a float, a whole number, true or false, text.
 Kind = Literal["number", "count", "truth", "text"]
 
 Cell = str | float | int | bool | None
@@ -41,10 +41,10 @@ class Column:
     read: Callable[[Mapping[str, Any]], Any]
 
 
-def named(name: str, unit: str) -> str:
+def name_with_unit(name: str, unit: str) -> str:
     """A quantity's name with its unit.
 
-    >>> named("newton_c2_u", "1/rad"), named("slope", "1")
+    >>> name_with_unit("newton_c2_u", "1/rad"), name_with_unit("slope", "1")
     ('newton_c2_u_per_rad', 'slope')
     """
     return f"{name}_{_ENDS[unit]}".removesuffix("_")
@@ -66,15 +66,15 @@ def estimate(
     """
     find = read or (lambda part: part["values"].get(name))
     return (
-        Column(named(name, unit), "number", meaning, lambda part: (find(part) or {}).get("value")),
-        Column(named(f"{name}_u", unit), "number", f"its standard uncertainty ({meaning})",
+        Column(name_with_unit(name, unit), "number", meaning, lambda part: (find(part) or {}).get("value")),
+        Column(name_with_unit(f"{name}_u", unit), "number", f"its standard uncertainty ({meaning})",
                lambda part: (find(part) or {}).get("u")),
     )  # fmt: skip
 
 
 def value(name: str, unit: str, meaning: str, *, kind: Kind = "number") -> Column:
     """The column of a value that has no uncertainty."""
-    return Column(named(name, unit), kind, meaning, lambda part: (part["values"].get(name) or {}).get("value"))
+    return Column(name_with_unit(name, unit), kind, meaning, lambda part: (part["values"].get(name) or {}).get("value"))
 
 
 def entry(name: str, kind: Kind, meaning: str, key: str = "") -> Column:
@@ -88,7 +88,7 @@ def entry(name: str, kind: Kind, meaning: str, key: str = "") -> Column:
 
 
 def plain(found: Any, kind: Kind) -> Cell:
-    """A value as it stands in a table: a plain one of Python, a text in one line, None where there is none."""
+    """Return a value as a plain one of Python, a text in one line, None where there is no value."""
     if found is None:
         return None
     if kind == "text":

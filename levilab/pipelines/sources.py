@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 from collections import Counter
 from contextlib import contextmanager
@@ -44,6 +45,10 @@ class Readings(Protocol):
     @property
     def warnings(self) -> tuple[str, ...]:
         """What to know before using them."""
+
+    @property
+    def fingerprint(self) -> float:
+        """A number that the same readings share but for 1e-8 of it, and few others."""
 
     def __len__(self) -> int: ...
 
@@ -165,17 +170,25 @@ def collect(paths: Sequence[Path], needs: Needs[R], options: Callable[[Path], In
     return Found(_with_short_names(_without_copies(found, warnings)), tuple(warnings), tuple(remarks))
 
 
+#: Logarithms of fingerprints that are alike differ by less: those of the same readings are in neighbouring cells.
+_CELL = 1e-8
+
+
 def _without_copies(found: Sequence[Source[R]], warnings: list[str]) -> list[Source[R]]:
     """Copies of the same readings are no runs of their own: they would pass for agreement."""
-    kept: dict[int, list[Source[R]]] = {}
+    kept: list[Source[R]] = []
+    cells: dict[tuple[int, int], list[Source[R]]] = {}  # of thousands not each is compared with each
     for source in found:
-        alike = kept.setdefault(len(source.readings), [])
-        first = next((other for other in alike if other.readings.same_as(source.readings)), None)
+        length, size = len(source.readings), source.readings.fingerprint
+        cell = math.floor(math.log(size) / _CELL) if size > 0 else 0
+        near = [other for k in (cell - 1, cell, cell + 1) for other in cells.get((length, k), ())]
+        first = next((other for other in near if other.readings.same_as(source.readings)), None)
         if first is None:
-            alike.append(source)
+            kept.append(source)
+            cells.setdefault((length, cell), []).append(source)
         elif first.data.resolve() != source.data.resolve():
             warnings.append(f"{source.path}: holds the same readings as {first.path}, counted once")
-    return [source for source in found if any(source is one for one in kept[len(source.readings)])]
+    return kept
 
 
 def _with_short_names(sources: Sequence[Source[R]]) -> tuple[Source[R], ...]:

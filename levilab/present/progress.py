@@ -117,7 +117,7 @@ def to_stderr() -> Display:
 
 
 def time_in_words(seconds: float) -> str:
-    """Return a time that is not known well, in whole seconds, minutes, hours or days.
+    """Return an estimated time in whole seconds, minutes, hours or days.
 
     >>> [time_in_words(seconds) for seconds in (0.2, 47, 130, 4000, 40_000, 400_000)]
     ['1 s', '47 s', '2 min', '1 h 7 min', '11 h', '5 days']
@@ -140,7 +140,7 @@ class ShareBar:
     Args:
         description: of the work.
         first: the share that was done before.
-        line_every: print a line so often [s] where no bar can be seen, as in the log of a batch system; None: never.
+        line_every: interval between lines [s] where standard error is no terminal, as in a log; None: no lines.
     """
 
     def __init__(self, description: str, *, first: float = 0.0, line_every: float | None = None) -> None:

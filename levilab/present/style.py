@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 
 from levilab.files import replace_atomically
+from levilab.present.numbers import short_name
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -29,6 +30,8 @@ STYLE: Any = {
     "svg.hashsalt": "levilab",
     "axes.formatter.use_mathtext": True,
 }
+#: One a run, as long as there are so few.
+MARKERS = "osD^vP*X"
 
 
 def as_png(figure: Figure) -> bytes:
@@ -55,6 +58,25 @@ def for_notebooks(figure: Figure) -> Figure:
     """Let a notebook show the figure as a picture, whether pyplot is imported there or not; returns the figure."""
     vars(figure)["_repr_png_"] = partial(as_png, figure)
     return figure
+
+
+def label_of_run(name: str, k: int, total: int, alone: str) -> str | None:
+    """What the legend says of the k-th of several runs: its name, where each has a marker of its own.
+
+    Args:
+        name: of the run.
+        k: from 0.
+        total: runs of the figure.
+        alone: what it says of a run without others.
+
+    >>> label_of_run("20261120T101500Z-limit-7f3a", 0, 8, "a top"), label_of_run("one", 0, 100, "a top")
+    ('limit-7f3a', '100 runs: a top')
+    """
+    if total == 1:
+        return alone
+    if total <= len(MARKERS):
+        return short_name(name).replace("$", r"\$").replace("_", " ")  # matplotlib reads both
+    return None if k else f"{total} runs: {alone}"
 
 
 def row(figure: Figure, bottom: float, height: float, n: int = 1, gap: float = 0.0) -> list[Axes]:

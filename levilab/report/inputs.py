@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from levilab.pipelines.sources import Source
     from levilab.runs.run import RunRecord
 
-#: What is known, as "Counter", and that in words.
+#: The name of a fact, such as "Counter", and the fact in words.
 Fact = tuple[str, tuple[str, ...]]
 
 #: Events printed in the page; more stay in the run folder.
@@ -59,18 +59,18 @@ class Input:
 
     @property
     def heading(self) -> str:
-        """What tells it from others: how it ended, unless that was well, and how much was read."""
+        """Its status unless that is finished, and the number of its readings."""
         facts = dict(self.facts)
         texts = [*facts.get("Status", ()), *facts.get("Readings", ())[:1]]
         return "; ".join(text for text in texts if text != "finished")
 
     def without(self, common: Sequence[Fact]) -> Input:
-        """The same without the facts that are said elsewhere."""
+        """Return the input without the facts that all inputs share."""
         return replace(self, facts=tuple(fact for fact in self.facts if fact not in common))
 
 
 def in_common(inputs: Sequence[Input]) -> tuple[Fact, ...]:
-    """The facts that hold for all inputs alike."""
+    """Return the facts that all inputs share."""
     first, *others = inputs
     return tuple(fact for fact in first.facts if all(fact in other.facts for other in others))
 

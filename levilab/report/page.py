@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
 #: Inputs that a message names at most.
 MOST_NAMES = 4
-#: Of more inputs the page is an overview: what they have in common is said once, each by itself can be unfolded, and
-#: the figure is made of pixels, which are a tenth of so many lines.
+#: With more inputs the page is an overview: facts that all share stand there once, the section of each can be opened,
+#: and the figure is a PNG, a tenth as large as an SVG of so many lines.
 MOST_IN_FULL = 12
 
 
@@ -90,12 +90,12 @@ def _without_result(results: Results) -> Iterator[str]:
     }
     if lacking:
         yield (
-            f"no result lies beside {_listed([*lacking])}: analyzed for the page; if levilab analyze wrote one "
+            f"no result lies beside {_list_in_words([*lacking])}: analyzed for the page; if levilab analyze wrote one "
             "elsewhere (`out`), give that folder or file"
         )
 
 
-def _listed(names: Sequence[str]) -> str:
+def _list_in_words(names: Sequence[str]) -> str:
     """The names, or the first of them."""
     more = len(names) - MOST_NAMES
     return ", ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
@@ -110,7 +110,7 @@ class Section:
         count: of its inputs, in words.
         banner: which of them are synthetic, where that matters here.
         figure: as an address of data.
-        warnings: those that are alike together.
+        warnings: in groups of similar ones.
     """
 
     part: ReportPart
@@ -195,9 +195,9 @@ def _banner(sources: Sequence[Source[Any]], *, mixed: bool = False) -> tuple[str
     below = "How each was made stands below, under its name."
     if len(made_up) == total:
         return "SYNTHETIC.", f"None of these {total} runs came from a real bench. {below}"
-    said = f"{len(made_up)} of {total} runs did not come from a real bench ({_listed(made_up)})."
+    said = f"{len(made_up)} of {total} runs did not come from a real bench ({_list_in_words(made_up)})."
     if not mixed and files:
-        said = f"Of {counted(sources)} {len(made_up)} did not come from a real bench ({_listed(made_up)})."
+        said = f"Of {counted(sources)} {len(made_up)} did not come from a real bench ({_list_in_words(made_up)})."
         return "SYNTHETIC IN PART.", f"{said} A data file does not say where it is from. {below}"
     if not mixed:
         return "REAL AND SYNTHETIC RUNS.", f"{said} {below}"

@@ -6,6 +6,7 @@ import math
 import os
 import stat
 from dataclasses import dataclass
+from operator import methodcaller
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -114,13 +115,13 @@ def _load(folder: Path) -> Run | None:
 def _content(path: str) -> bytes | None:
     """What is in a file; None where it is no file, as a pipe, which would be waited for, or a long one."""
     try:
-        if not stat.S_ISREG(os.stat(path).st_mode):  # noqa: PTH116 - of ten thousand folders
+        about = os.stat(path)  # noqa: PTH116 - of ten thousand folders
+        if not stat.S_ISREG(about.st_mode) or about.st_size >= _GLANCED_BYTES:
             return None
         with open(path, "rb", buffering=0) as stream:  # noqa: PTH123 - likewise
-            content = stream.read(_GLANCED_BYTES)
+            return stream.read(about.st_size)
     except OSError:
         return None
-    return content if content is not None and len(content) < _GLANCED_BYTES else None
 
 
 class _Rows(NamedTuple):
@@ -141,6 +142,7 @@ def _read(run: Run) -> _Rows:
     return _Rows(len(frame), length, "record" in frame)
 
 
+_COMMAS = methodcaller("count", b",")
 #: The bytes of numbers as this program writes them.
 _PLAIN = b"0123456789+-.,eE\n"
 
@@ -159,11 +161,11 @@ def _glance(run: Run) -> _Rows | None:
         or len(set(titles)) < len(titles)
         or not lines
         or body.translate(None, _PLAIN)
-        or any(line.count(b",") != commas for line in lines)
+        or set(map(_COMMAS, lines)) != {commas}
     ):
         return None
     try:
-        numbers = [float(number) for number in b",".join(lines).split(b",")]
+        numbers = [*map(float, b",".join(lines).split(b","))]
     except ValueError:  # an empty field, which is a missed reading, or a damaged line
         return None
     if not (min(numbers) > -NO_READING and max(numbers) < NO_READING):
@@ -197,7 +199,7 @@ def _number(table: dict[str, Any], key: str) -> float:
 ROOM_FOR_NOTES = 110
 #: Columns of the list that a narrow terminal has no room for, the first one first.
 DISPENSABLE = ("length", "readings")
-#: So many broken runs are explained below the list.
+#: Most broken runs that are explained below the list.
 MOST_PROBLEMS = 5
 
 
@@ -217,7 +219,7 @@ def print_runs(runs: Sequence[Listed], root: Path) -> None:
     for problem in problems[:MOST_PROBLEMS]:
         console.print(f"[yellow]note:[/yellow] {escape(problem)}")
     if (more := len(problems) - MOST_PROBLEMS) > 0:
-        console.print(f"[yellow]note:[/yellow] and {more} more that cannot be read; levilab runs --json says why")
+        console.print(f"[yellow]note:[/yellow] and {more} more that cannot be read; JSON has the reason for each")
 
 
 def _that_fit(heads: list[str], rows: list[list[str]], width: int) -> tuple[list[str], list[list[str]]]:

@@ -178,7 +178,12 @@ def _check_forwards(scene: Scene, duration: float) -> None:
 
 
 def step_share_of(
-    scene: Scene, over: Mapping[str, ArrayLike], duration: float = 30.0, *, tolerance: float = 1e-7
+    scene: Scene,
+    over: Mapping[str, ArrayLike],
+    duration: float = 30.0,
+    *,
+    tolerance: float = 1e-7,
+    survivors_only: bool = False,
 ) -> float:
     """Choose the step of a whole map on a few of its tops, so that it can be computed in any parts.
 
@@ -187,6 +192,8 @@ def step_share_of(
         over: as for `simulate_many`, of the whole map; `grid` gives that of axes.  What broadcasts takes no memory.
         duration: of each motion [s].
         tolerance: wanted error of place [m] and axis [rad] at the end.
+        survivors_only: whether the tolerance is that of tops that stay up alone.  A top that is thrown out tumbles, and
+            its axis has a larger error at the same step; the time of its fall is hardly touched (decision 0018).
 
     Returns:
         The part of its own longest step that a top takes: an argument of `simulate_many`.
@@ -202,7 +209,7 @@ def step_share_of(
     """
     check(duration=duration, tolerance=tolerance, rate=None, step=None)
     _check_forwards(scene, duration)
-    return _step_share(scene, over, duration, tolerance)
+    return _step_share(scene, over, duration, tolerance, survivors_only=survivors_only)
 
 
 def grid(axes: Mapping[str, ArrayLike]) -> dict[str, NDArray[Any]]:
@@ -218,7 +225,7 @@ def grid(axes: Mapping[str, ArrayLike]) -> dict[str, NDArray[Any]]:
 
 
 class _Wanted(NamedTuple):
-    """What the caller of `simulate_many` wants: how long [s], samples a second (0: none) of these columns, errors."""
+    """The request to `simulate_many`: duration [s], samples per second (0: none) of these columns, error estimates."""
 
     duration: float
     sample_rate: float
@@ -275,19 +282,23 @@ def _pilots(shape: tuple[int, ...]) -> set[int]:
     return {int(i) for i in flat} | {round(i) for i in np.linspace(0, size - 1, PILOTS)}
 
 
-def _step_share(scene: Scene, over: Mapping[str, ArrayLike], duration: float, tolerance: float) -> float:
+def _step_share(
+    scene: Scene, over: Mapping[str, ArrayLike], duration: float, tolerance: float, *, survivors_only: bool = False
+) -> float:
     """Return the part of its longest step that keeps a top's error within the tolerance, found on a few of them."""
     values = broadcast(over)
     pilots = sorted(_pilots(next(iter(values.values())).shape if values else (1,)))
     some = {key: np.array([column.flat[i] for i in pilots], dtype=column.dtype) for key, column in values.items()}
-    time, shares = min(duration, PILOT_DURATION), []
+    time = min(duration, PILOT_DURATION)
+    shares: dict[bool, list[float]] = {True: [], False: []}
     for batch in batches(scene, some):
         for where, longest in zip(batch.where, batch.longest, strict=True):
             one = scene_at(scene, some, int(where))
             motion = simulate(one, time, tolerance=tolerance * time / duration, rate=None)
             if motion.accuracy.reached:
-                shares.append(motion.accuracy.step / float(longest))
-    return min([*shares, LARGEST_SHARE])
+                shares[motion.survived].append(motion.accuracy.step / float(longest))
+    lost = [] if survivors_only and shares[True] else shares[False]
+    return min([*shares[True], *lost, LARGEST_SHARE])
 
 
 # --- the motion ---

@@ -394,6 +394,11 @@ def _real_roots(cubics: Array) -> Array:
 
 def advice(found: Stability) -> str:
     """Why a top does not float, and which one does."""
+    if found.top.moment == 0:
+        return (
+            "top.moment_tilt.1 = 0: a field lifts an upright top by the part of its moment that lies along its axis; "
+            "another number than 0 is expected"
+        )
     if found.nearest is None:
         return (
             "no top with this moment floats over this base, whatever its mass: "

@@ -60,7 +60,7 @@ def at_the_crossing(after: Array, lengths: Array, escape: Limits, moved: Callabl
         low, high = np.where(margin > 0, time, low), np.where(margin > 0, high, time)
         newton = time + margin / (_margin_rates(states, height))
         better = np.where((newton > low) & (newton < high), newton, (low + high) / 2)
-        # a top that is there stays, however long others take: its result is its own, whatever is beside it
+        # a top at its crossing is not changed any more, so that its result does not depend on the others
         found |= np.abs(better - time) <= 1e-15 * lengths
         if np.all(found):
             break

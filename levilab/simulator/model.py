@@ -13,7 +13,7 @@ from levilab.simulator.field import field_of
 from levilab.simulator.kernels import braking
 from levilab.simulator.kernels.loads import Aligned, Disc, Leaning, PiecewiseLinear, Sine, Tilted, Upright
 from levilab.simulator.kernels.motion import Body, Loose, Model, Rigid
-from levilab.simulator.numbers import cos, sin
+from levilab.simulator.numbers import cos, hypot, largest, sin
 
 if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
@@ -121,11 +121,19 @@ def _loose_drag(scene: Scene) -> braking.WasherDragFlow:
     )
 
 
+def unit_vector(direction: Any) -> tuple[Any, Any, Any]:
+    """Return three numbers that are not all 0, scaled to a vector of length 1."""
+    size = largest(*map(abs, direction))  # first, so that no square over- or underflows
+    x, y, z = (part / size for part in direction)
+    length = hypot(x, y, z)
+    return x / length, y / length, z / length
+
+
 def _drive(scene: Scene) -> Any:
     drive = scene.drive
     if drive.waveform == "off" or drive.amplitude_t == 0:
         return None
-    x, y, z = (_moment(scene) * drive.amplitude_t * part for part in drive.unit_direction)
+    x, y, z = (_moment(scene) * drive.amplitude_t * part for part in unit_vector(drive.direction))
     if drive.waveform == "sine":
         return Sine((x, y, z), drive.frequency_hz, drive.phase_rad / (2 * math.pi))
     return PiecewiseLinear((x, y, z))

@@ -73,13 +73,16 @@ def uniform(number: Any) -> Any:
     return number[0].item()
 
 
+def _any(values: Any) -> bool:
+    return any(isinstance(value, Numbers) for value in values)
+
+
 def _of_each(function: Callable[..., float]) -> Callable[..., Any]:
     """Return a function of `math` that takes Numbers, too: numpy's own differ from it in the last bit."""
-    each = np.frompyfunc(function, 1, 1) if function is not math.hypot else np.frompyfunc(function, 2, 1)
 
     def apply(*values: Any) -> Any:
-        if any(isinstance(value, Numbers) for value in values):
-            return numbers(each(*values))
+        if _any(values):
+            return numbers(np.frompyfunc(function, len(values), 1)(*values))
         return function(*values)
 
     return apply
@@ -117,10 +120,6 @@ def length(vector: Any) -> Any:
     """The length of a vector of three numbers."""
     x, y, z = vector
     return sqrt(x * x + y * y + z * z)
-
-
-def _any(values: Any) -> bool:
-    return any(isinstance(value, Numbers) for value in values)
 
 
 def row(*values: Any) -> Any:

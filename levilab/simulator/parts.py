@@ -176,14 +176,6 @@ class Drive(Part):
     direction: Direction = (0.0, 1.0, 0.0)
     off_s: Never = None
 
-    @property
-    def unit_direction(self) -> tuple[float, float, float]:
-        """The direction, of length 1."""
-        largest = max(map(abs, self.direction))  # first, so that no square over- or underflows
-        x, y, z = (part / largest for part in self.direction)
-        length = math.hypot(x, y, z)
-        return x / length, y / length, z / length
-
 
 class Start(Part):
     """How the motion begins: IC1 of the thesis.  place "equilibrium": at rest where the top floats.

@@ -84,8 +84,7 @@ class Problem:
 def scheme_for(name: str | None, model: Any) -> Scheme:
     """Return the scheme of that name, or the best one for the model.
 
-    Drag on a top whose spin the field changes allows no Nyström composition.  A stop brings part of the error of
-    `levitron-6` back, and a drive with corners has many stops (docs/speed.md).
+    Drag on a top whose spin the field changes allows no Nyström composition.
 
     Args:
         name: of SCHEMES; None: the best one.

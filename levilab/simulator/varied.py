@@ -1,7 +1,7 @@
 """Many tops from one scene: varied numbers checked against the scene's own limits, and made ready for the kernels.
 
 The scene is validated once for all tops.  Varied numbers are checked as arrays by the very types of its fields and by
-its rules, and go through the formulas of one top as `Numbers`.  Words, lists and whatever else a key takes are few:
+its rules, and go through the formulas of one top as `Numbers`.  Words, lists and other values are few:
 each of them gets a scene of its own.
 """
 
@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
-from levilab.errors import SimulationError
+from levilab.errors import LevilabError, SimulationError
 from levilab.settings import in_one_line
 from levilab.simulator.accuracy import longest_step
+from levilab.simulator.field import FieldError
 from levilab.simulator.kernels.loads import Disc
 from levilab.simulator.kernels.motion import R
 from levilab.simulator.kernels.pieces import FIRST, HEIGHT, JOB_SIZE, OFF, OFFSET, RADIUS, RATE, SECOND, STEEP, TURNS
@@ -79,7 +80,7 @@ _COLUMNS = ("where", "starts", "numbers", "runs", "longest", "inertias", "transv
 
 def broadcast(over: Mapping[str, ArrayLike]) -> Values:
     """Broadcast the values of all keys to one shape, without copies.  Raises SimulationError."""
-    arrays = {key: np.asarray(values) for key, values in over.items()}
+    arrays = {key: _array(key, values) for key, values in over.items()}
     try:
         return dict(zip(arrays, np.broadcast_arrays(*arrays.values()), strict=True))
     except ValueError:
@@ -87,6 +88,14 @@ def broadcast(over: Mapping[str, ArrayLike]) -> Values:
         raise SimulationError(
             f"these values do not fit together: {shapes}; shapes that broadcast are expected"
         ) from None
+
+
+def _array(key: str, values: ArrayLike) -> NDArray[Any]:
+    """Return the values of a key as an array.  Raises SimulationError."""
+    try:
+        return np.asarray(values)
+    except ValueError:
+        raise SimulationError(f"{key}: lists of unequal lengths; an array of any one shape is expected") from None
 
 
 def scene_at(scene: Scene, values: Values, where: int) -> Scene:
@@ -116,7 +125,7 @@ def batches(scene: Scene, over: Mapping[str, ArrayLike]) -> list[Batch]:
         columns = {key: numbers(values[key].ravel()[group]) for key in varied}
         for batch in _of_one_scene(scene, sample, values, group, columns):
             found.setdefault((_kind(batch.model), batch.scheme.name), []).append(batch)
-    return [_joined(several) for several in found.values()]
+    return [_join(several) for several in found.values()]
 
 
 # --- values against the scene's limits ---
@@ -211,8 +220,13 @@ def _of_one_scene(
     def ready(which: Indices) -> tuple[Any, ...]:
         try:
             return _ready(view(which))
-        except SceneError as error:  # a top that floats nowhere
-            raise SceneError(f"{error}{_index(values, int(group[which[0]]))}") from error
+        except (SceneError, FieldError):  # a top that floats nowhere, a base that is too thin: said by its own scene
+            where = int(group[which[0]])
+            try:
+                _ready(scene_at(scene, values, where))
+            except LevilabError as error:
+                raise SceneError(f"{error}{_index(values, where)}") from error
+            raise  # pragma: no cover - its own scene says it first
 
     for which, (model, fewer, start, scheme, runs, longest, other) in split(np.arange(group.size), ready):
         n = which.size
@@ -257,7 +271,9 @@ def _rows(n: int, columns: list[Any]) -> Array:
 
 
 def _ready(scene: Scene) -> tuple[Any, ...]:
-    """Return what a kernel needs of a scene whose numbers may be those of many tops."""
+    """Return what a kernel needs of a scene whose numbers may be those of many tops.  Raises SceneError."""
+    if scene.observed == "spin":
+        raise SceneError("observed = spin: the spin alone has a closed form; many at once need observed = motion")
     start = start_of(scene)
     place = tuple(start[..., i] for i in range(R.stop))
     model = model_of(scene, place)
@@ -298,7 +314,7 @@ def _kind(model: Any) -> Any:
     return type(model).__name__
 
 
-def _joined(several: list[Batch]) -> Batch:
+def _join(several: list[Batch]) -> Batch:
     """Return batches of one kind as one, its tops in the order of the map."""
     if len(several) == 1:
         return several[0]

@@ -1,8 +1,8 @@
-"""A map that is refined along its boundary, in a store: points go out round by round, and each has a mark.
+"""Compute a map that is refined along its boundary, round by round, in a store with a mark for each point.
 
-The mark of a point says whether it was computed or filled in.  Marks are written after values, chunk by chunk, so that
-what ends the process costs the last points at most; to go on, the refinement is run again from its beginning and finds
-its answers in the store.
+The mark of a point says whether it was computed or filled in.  Marks are written after values, chunk by chunk.  If the
+process is killed, at most the last points are lost: to continue, the refinement runs again from its beginning, and the
+values in the store answer its questions.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ if TYPE_CHECKING:
     from levilab.sweeps.store import Store
     from levilab.workers import Done, Workers
 
-#: Attributes of the store: what was asked for, and what came of it.
+#: Attributes of the store: the settings of the refinement, and its report.
 ASKED, FOUND = "adaptive", "refined"
-#: Points of a task: enough to fill the lanes; a round is cut into about so many tasks; and no task has more.
+#: Least points of a task, which fill the lanes; tasks of a round, about; most points of a task.
 FEWEST, MANY, MOST = 64, 64, 4096
-#: After so many new points the store is written, or at the end of a round [points].
+#: The store is written after this number of new points, and at the end of a round.
 KEPT = 20_000
 
 
@@ -78,7 +78,7 @@ def begin_adaptive(store: Store, observable: str = "survived", *, stride: int = 
     columns = {column.name: column for column in columns_of(plan.observables)}
     if observable not in columns or columns[observable].dtype != "bool":
         flags = " or ".join(name for name, one in OBSERVABLES.items() if one.dtype == "bool")
-        expected = f"a boundary is one of a yes or no: `observe` must have {flags}, and this must be it"
+        expected = f"a boundary lies between yes and no, and this is neither: add {flags} to `observe`"
         raise UsageError("adaptive", expected, value=observable)
     if stride < 2 or stride & (stride - 1):
         raise UsageError("stride", "a power of 2 is expected, such as 8", value=stride)
@@ -106,7 +106,7 @@ def is_adaptive(store: Store) -> bool:
 
 
 def run_adaptive(store: Store, executor: Workers, progress: Callable[[float], None] | None = None) -> dict[str, Any]:
-    """Compute what an adaptive store lacks; what is there already is not computed again.
+    """Compute the points that an adaptive store lacks.
 
     Returns:
         What was computed and what may have been missed, as `report_of` does.
@@ -132,8 +132,8 @@ def run_adaptive(store: Store, executor: Workers, progress: Callable[[float], No
 class _Feed:
     """Tasks of one round after another, so that all rounds share one pool.
 
-    It runs dry at the end of a round.  `results_of` asks again after the last result of the round was taken, when the
-    next round's tasks are there.
+    It is empty at the end of a round.  `results_of` requests a task again after the caller has taken the last result of
+    the round; then the tasks of the next round have been added.
     """
 
     def __init__(self) -> None:
@@ -150,7 +150,7 @@ class _Feed:
 
 @dataclass
 class _Run:
-    """Values and marks in memory, and where they go.
+    """Values and marks in memory, and the store for them.
 
     Attributes:
         store: where values and marks are kept.
@@ -223,8 +223,8 @@ class _Run:
             for number in np.unique(np.ravel_multi_index(blocks, plan.grid)):
                 box = plan.chunk_of(int(number)).box
                 for name, values in self.columns.items():
-                    self.store.group[name][box] = values[box]
-                self.store.group[STATUS][box] = self.status[box]
+                    self.store.array(name)[box] = values[box]
+                self.store.array(STATUS)[box] = self.status[box]
         self.unwritten = []
 
     def finish(self, found: Refined) -> dict[str, Any]:
@@ -236,7 +236,7 @@ class _Run:
         self.write()
         with _writing(store):
             store.group.attrs[FOUND] = report
-            store.group[DONE][...] = 1
+            store.array(DONE)[...] = 1
         store.marks[...] = 1
         return report
 
@@ -276,7 +276,7 @@ def in_words(report: dict[str, Any], plan: Plan) -> list[str]:
         for stride, axis in zip(report["strides"], plan.axes, strict=True)
     )
     share, limit = f"{100 * report['saved']:.0f} %", f"{100 * report['most_wrong_share']:.2g} %"
-    checked = f"{count} of those filled in were checked at random: {wrong} were wrong"
+    checked = f"{count} of those filled in were checked at random: {wrong} {'was' if wrong == 1 else 'were'} wrong"
     sure = (
         f"with {100 * report['confidence']:.0f} % confidence at most {report['most_wrong']} ({limit}) of the "
         f"{report['filled']} filled in are wrong: {judge['wrong']} of {judge['computed']} were in the last check"

@@ -1,4 +1,4 @@
-"""The axes of a sweep from KEY=FROM:TO:N or from a table of points; what the scene refuses is said before any work."""
+"""The axes of a sweep from KEY=FROM:TO:N or from a table of points, checked in the scene before any simulation."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 
     from levilab.simulator.scene import Scene
 
-#: Dimensions of a map: more can neither be drawn nor afforded.
+#: Dimensions of a map: one with more can neither be drawn nor computed in reasonable time.
 MOST_AXES = 3
-#: Values of one key, which are kept in memory.
+#: Greatest number of values of one key, which are kept in memory.
 MOST_VALUES = 10_000_000
-#: So many values of an axis, or rows of a table, are tried in the scene before the work begins, besides the corners.
+#: Number of values of an axis, or rows of a table, that are tried in the scene before the work, besides the corners.
 TRIED = 200
 _EXPECTED = "KEY=FROM:TO:N is expected, such as start.spin_hz=18:40:23, or KEY=FROM:TO:N:log"
 
@@ -153,11 +153,11 @@ def _column(cells: Sequence[str], *, decimal_comma: bool) -> np.ndarray[Any, np.
         return np.array(cells)
 
 
-# --- what the scene says ---
+# --- checks in the scene ---
 
 
 def check_axes(scene: Scene, axes: Sequence[Axis], settings: Iterable[str] = ()) -> None:
-    """Raise UsageError for axes that the scene does not have or refuses, or that change nothing in it.
+    """Raise UsageError for axes that the scene does not have, that are invalid in it, or that change nothing anywhere.
 
     Args:
         scene: with its settings.
@@ -176,8 +176,12 @@ def check_axes(scene: Scene, axes: Sequence[Axis], settings: Iterable[str] = ())
         if axis.key in settings:
             raise UsageError(name, "`settings` has this key, too: leave one of them out", value=axis.key)
         _check_key(scene, axis, name)
-    for values in _tried(axes):
-        _try(scene, values, name)
+    idle = {axis.key: "" for axis in axes}
+    for values in _points_to_try(axes):
+        here = _without_effect(_scene_with(scene, values, name), idle)
+        idle = {key: here[key] for key in idle if key in here}
+    for key, why in idle.items():
+        raise UsageError(name, f"it changes nothing, since {why}", value=key)
 
 
 def _check_key(scene: Scene, axis: Axis, name: str) -> None:
@@ -217,6 +221,10 @@ def _value_of(scene: Scene, axis: Axis, name: str) -> Any:
             at = at[part]
         elif isinstance(at, list) and part.isdecimal() and int(part) < len(at):
             at = at[int(part)]
+        elif isinstance(at, list):
+            whole = axis.key.rpartition(".")[0]
+            parts = ", ".join(f"{whole}.{k}" for k in range(len(at)))
+            raise UsageError(name, f"{whole} has {len(at)} numbers: sweep one of them, {parts}", value=axis.key)
         else:
             raise UsageError(name, "there is no such number in the scene", value=axis.key)
     if isinstance(at, dict):
@@ -224,7 +232,7 @@ def _value_of(scene: Scene, axis: Axis, name: str) -> Any:
     return at
 
 
-def _tried(axes: Sequence[Axis]) -> Iterator[dict[str, Any]]:
+def _points_to_try(axes: Sequence[Axis]) -> Iterator[dict[str, Any]]:
     """Yield points at which the scene is tried: the corners, and some on the way along each axis."""
     if axes[0].scale == "table":
         count = len(axes[0].values)
@@ -242,21 +250,28 @@ def _tried(axes: Sequence[Axis]) -> Iterator[dict[str, Any]]:
             yield {other.key: float(other.values[0]) for other in axes} | {axis.key: float(axis.values[k])}
 
 
-def _try(scene: Scene, values: dict[str, Any], name: str) -> None:
-    """Raise UsageError where the scene refuses these values, or where one of them has no effect in it."""
-    at = ", ".join(f"{key} = {short_text(value)}" for key, value in values.items())
+def _scene_with(scene: Scene, values: dict[str, Any], name: str) -> Scene:
+    """Return the scene with these values.  Raises UsageError where they are invalid in it."""
     try:
         changed = scene.changed(values)
         start_of(changed)
     except (SceneError, SimulationError) as error:
-        raise UsageError(name, f"at {at} the scene is refused: {error}") from error
-    for key in values:
+        at = ", ".join(f"{key} = {short_text(value)}" for key, value in values.items())
+        raise UsageError(name, f"at {at} the scene is invalid: {error}") from error
+    return changed
+
+
+def _without_effect(scene: Scene, keys: Iterable[str]) -> dict[str, str]:
+    """Return the keys that have no effect in a scene, each with the reason."""
+    found = {}
+    for key in keys:
         table, _, part = key.partition(".")
         for switch in SWITCHES:
-            if table == switch.table and part.split(".")[0] in switch.keys and switch.is_off(changed):
-                raise UsageError(name, f"at {at} it changes nothing, since {switch.why}", value=key)
-        if changed.start.place == "equilibrium" and key.startswith(("start.position_m", "start.velocity_m_s")):
-            raise UsageError(name, "it changes nothing, since start.place = equilibrium", value=key)
+            if table == switch.table and part.split(".")[0] in switch.keys and switch.is_off(scene):
+                found[key] = switch.why
+        if scene.start.place == "equilibrium" and key.startswith(("start.position_m", "start.velocity_m_s")):
+            found[key] = "start.place = equilibrium"
+    return found
 
 
 def _plain(value: Any) -> Any:
@@ -269,10 +284,11 @@ def in_words(axis: Axis) -> str:
     >>> in_words(parse_axis("top.mass_kg=0.025:0.0255:11"))
     'top.mass_kg from 0.025 to 0.0255 kg, 11 values'
     """
-    count = f"{len(axis.values)} values"
+    count = "1 value" if len(axis.values) == 1 else f"{len(axis.values)} values"
     if axis.values.dtype.kind != "f":
         return f"{axis.key}: {', '.join(sorted(set(axis.values.tolist())))}; {count}"
     unit = unit_of(axis.key)
     spaced = ", logarithmic" if axis.scale == "log" else ""
-    ends = f"from {axis.values.min():g} to {axis.values.max():g}"
+    least, most = axis.values.min(), axis.values.max()
+    ends = f"from {least:g} to {most:g}" if most > least else f"{least:g}"
     return f"{axis.key} {ends}{'' if unit == '1' else ' ' + unit}, {count}{spaced}"

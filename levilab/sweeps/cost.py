@@ -1,4 +1,4 @@
-"""How long a plan takes, roughly: it decides how the plan is cut, never what comes out."""
+"""Rough cost of a plan, which determines the size of its chunks and no result."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 
 #: Seconds of motion that one core does in a second, with samples on the way, and with the lines in them.
 SAMPLED, WITH_LINES = 1.2e4, 300.0
-#: So many times longer takes a field of higher order, or the exact one, and a magnet that is a disc.
+#: Factors of the time for a field of higher order or the exact one, and for a magnet that is a disc.
 HIGHER_FIELD, DISC = 8.0, 400.0
-#: What a top takes before its motion begins [s].
+#: Time for each top before its motion begins [s].
 OVERHEAD_S = 1e-5
 
 

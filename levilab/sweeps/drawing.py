@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from levilab.sweeps.store import Store
 
-#: A map with more points is not drawn: it would be read whole, and shows no more than a part of it does.
+#: A map with more points is not drawn: it would have to be in memory, and a picture cannot show so many.
 MOST_POINTS = 20_000_000
 
 

@@ -1,4 +1,4 @@
-"""A map → its figure: what was found, the windows that theory gives, the thesis's limits, and what all of it means.
+"""A map → its figure: cells, the windows of the theory, the thesis's limits, and a text that explains them.
 
 Blue is up and grey is lost, paler where a point was filled in; lines over the map have a white rim, and differ in their
 dashes as well as in colour.
@@ -51,9 +51,9 @@ LOGARITHMIC = {"energy_error", "position_error_m"}
 NAN_IS_UP = {"lifetime_s", "fall_spin_hz"}
 #: Columns in which NaN says that the top was lost.
 NAN_IS_LOST = {"height_spread_m"}
-#: The most small multiples, how many beside each other, and the most cells along a side that a picture can show.
+#: Most small multiples, most of them in a row, and most cells along a side of a picture.
 MOST_PANELS, PANELS_IN_A_ROW, MOST_CELLS = 12, 4, 1600
-#: A window that changes along an axis is found for so many of its values.
+#: Number of values of an axis at which a window that changes along it is computed.
 CURVE_POINTS = 61
 RIM = [withStroke(linewidth=3.2, foreground="white")]
 DASHED: Any = {"color": "black", "linewidth": 1, "linestyle": "dashed"}
@@ -145,7 +145,7 @@ def has_figure(plan: Plan) -> bool:
     return not plan.is_table and 2 <= len(plan.axes) <= 3 and min(plan.shape) > 1
 
 
-# --- what goes where ---
+# --- arrangement ---
 
 
 def _view_of(plan: Plan) -> _View:
@@ -355,7 +355,7 @@ def _draw_adiabatic(axes: Axes, theory: _Theory, view: _View) -> list[Artist]:
 
 
 def _draw_rim(axes: Axes, *, x: float | None = None, y: float | None = None) -> None:
-    """Draw what sets a line with dashes off from the cells below it."""
+    """Draw a white line below one with dashes, so that it can be seen on all cells."""
     style: Any = {"color": "white", "linewidth": 2.6}
     if x is not None:
         axes.axvline(x, **style)
@@ -446,7 +446,8 @@ def _caption(found: Map, view: _View, sentences: Sequence[str], width: float) ->
     said += [f"{text[0].upper()}{text[1:]}".removesuffix(".") + "." for text in sentences]
     if found.filled is None and not found.computed.all():
         said.append(f"{np.count_nonzero(~found.computed)} of {found.computed.size} points are not computed yet.")
-    return textwrap.wrap(" ".join(said), round(15.3 * width))
+    whole = " ".join(said).replace(" %", "\u00a0%")  # a number and its per cent stay in one line
+    return textwrap.wrap(whole, round(15.3 * width))
 
 
 def _step(axis: Axis) -> str:

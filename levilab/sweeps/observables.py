@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from levilab.errors import UsageError
-from levilab.motion.lines import lines_of, rate_for
+from levilab.motion.lines import lines_of_many, rate_for
 from levilab.motion.lock import LAST_SHARE, RATE_HZ, SHORTEST_S, can_lock, is_locked
 from levilab.motion.summary import changing_energy
 from levilab.simulator.energy import energy
@@ -22,7 +22,6 @@ from levilab.simulator.kernels.motion import STATE_SIZE, TIME
 from levilab.simulator.keys import nearest
 from levilab.simulator.model import model_of
 from levilab.simulator.start import start_of
-from levilab.simulator.trajectory import Accuracy, Trajectory
 from levilab.simulator.varied import broadcast, scene_at
 
 if TYPE_CHECKING:
@@ -44,7 +43,7 @@ Need = Literal["ends", "errors", "samples"]
 HEIGHT_RATE_HZ = 100.0
 #: Rates for lines are rounded up to multiples of this [Hz].
 ROUND_HZ = 100.0
-#: Numbers in the samples of points that are simulated together, unless they are fewer than fill the lanes.
+#: Greatest count of numbers in the samples of one call, and least number of points in it, which fills the lanes.
 MOST_NUMBERS, FEWEST = 16_000_000, 32
 
 
@@ -123,7 +122,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "lines": tuple(name for name in OBSERVABLES if name.endswith(("_line_hz", "_line_rad"))),
 }
 
-#: Names that people type: each is a column, or several.
+#: Names for `--observe`: each is a column, or several.
 NAMES = (*(name for name in OBSERVABLES if name not in GROUPS["lines"]), *GROUPS)
 
 
@@ -141,7 +140,7 @@ def columns_of(names: Iterable[str]) -> tuple[Observable, ...]:
 
 
 def check_observables(plan: Plan) -> None:
-    """Refuse to observe what no point of the plan can show.  Raises UsageError."""
+    """Raise UsageError for observables that no point of the plan can have."""
     names = {column.name for column in columns_of(plan.observables)}
     if plan.scene.observed == "spin":
         raise UsageError("observe", "the scene has observed = spin, which has a closed form; take observed = motion")
@@ -167,7 +166,7 @@ def observe(plan: Plan, values: Values) -> dict[str, NDArray[Any]]:
     With the plan's `step_share`, the result of each point depends on its own numbers alone.
 
     Args:
-        plan: its axes are not looked at.
+        plan: its axes are not used.
         values: key → values of these points.
 
     Returns:
@@ -206,13 +205,12 @@ def _ends_of(plan: Plan, values: Values, names: set[str], rate: float | None = N
         errors = [_energy_error(scene_at(plan.scene, ends.values, i), states[i]) for i in range(size)]
         found["energy_error"] = np.reshape(errors, shape)
     if rate:
-        rows = [_observe_samples(scene_at(plan.scene, ends.values, i), ends, i, names) for i in range(size)]
-        found |= {name: np.reshape([row[name] for row in rows], shape) for name in rows[0]}
+        found |= {name: np.reshape(column, shape) for name, column in _columns_of_samples(ends, names).items()}
     return found
 
 
 def _ends_and_samples_of(plan: Plan, values: Values, names: set[str]) -> dict[str, NDArray[Any]]:
-    """Return the columns of motions with samples, some points at a time: samples are what takes memory.
+    """Return the columns of motions with samples, some points at a time, because samples take memory.
 
     The rate of a point's samples depends on its own numbers: steps are cut to fit between samples.
     """
@@ -248,20 +246,31 @@ def _energy_error(scene: Scene, end: NDArray[np.float64]) -> float:
     return abs(float(last - first)) / (abs(float(first)) or 1.0)
 
 
-def _observe_samples(scene: Scene, ends: Ensemble, where: int, names: set[str]) -> dict[str, Any]:
-    """Return the columns of one motion that need its samples."""
-    samples = ends.samples.reshape(-1, *ends.samples.shape[-2:])[where]
-    end, survived = ends.states.reshape(-1, STATE_SIZE)[where], bool(ends.survived.flat[where])
-    states = np.vstack([samples[ends.sample_times < end[TIME] * (1 - 1e-12)], end])
-    row: dict[str, Any] = {}
+def _columns_of_samples(ends: Ensemble, names: set[str]) -> dict[str, list[Any]]:
+    """Return the columns of motions that need their samples, each in the order of the flat map."""
+    motions = [_motion_of(ends, i) for i in range(ends.survived.size)]
+    survived = ends.survived.ravel().tolist()
+    columns: dict[str, list[Any]] = {}
     if "height_spread_m" in names:
-        row["height_spread_m"] = np.ptp(states[:, 2]) if survived else math.nan
+        columns["height_spread_m"] = [
+            np.ptp(states[:, 2]) if up else math.nan for (_, states), up in zip(motions, survived, strict=True)
+        ]
     if "locked" in names:
-        row["locked"] = bool(is_locked(scene, states, survived=survived))
+        columns["locked"] = [
+            bool(is_locked(scene, states, survived=up)) for (scene, states), up in zip(motions, survived, strict=True)
+        ]
     if names & set(GROUPS["lines"]):
-        unknown = Accuracy(math.nan, math.nan, math.nan, "", math.nan, 0)
-        row |= _line_columns(lines_of(Trajectory(scene, states, model_of(scene, states[0, :3]), unknown)))
-    return row
+        rows = [_line_columns(lines) for lines in lines_of_many(motions)]
+        columns |= {name: [row[name] for row in rows] for name in GROUPS["lines"]}
+    return columns
+
+
+def _motion_of(ends: Ensemble, where: int) -> tuple[Scene, NDArray[np.float64]]:
+    """Return scene and states of one motion: its samples, and its end."""
+    samples = ends.samples.reshape(-1, *ends.samples.shape[-2:])[where]
+    end = ends.states.reshape(-1, STATE_SIZE)[where]
+    states = np.vstack([samples[ends.sample_times < end[TIME] * (1 - 1e-12)], end])
+    return scene_at(ends.scene, ends.values, where), states
 
 
 def _line_columns(found: AxisLines) -> dict[str, float]:

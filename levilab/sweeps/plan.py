@@ -1,7 +1,7 @@
 """A plan: at which values of a scene's keys motions are simulated, and how the work is cut into chunks.
 
-The chunks follow from the plan alone, never from the machine: what a chunk yields is a function of the plan and of its
-own values, so that it does not matter who computes it, when, and beside what.
+The chunks follow from the plan alone, never from the machine.  The results of a chunk are a function of the plan and of
+its own values, so that they do not depend on the process that computes it, on the time, or on other chunks.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ Scale = Literal["linear", "log", "table"]
 ROWS = "point"
 #: A chunk takes about this long on one core [s] ...
 CHUNK_S = 2.0
-#: ... unless it had fewer points than fill the lanes, or more than a window of chunks may hold in memory.
+#: ... unless it then had fewer points than fill the lanes, or more than fit into memory with a window of chunks.
 FEWEST, MOST = 64, 65_536
-#: Seconds of motion that one core simulates in a second, side by side in lanes: the order of magnitude suffices.
+#: Seconds of motion that one core simulates in a second, in lanes; the order of magnitude suffices.
 QUICKLY = 1e5
-#: A plan has about so many chunks or more, where each has enough points: the cores end together, and progress shows.
+#: A plan has at least about MANY_CHUNKS chunks, if each has ENOUGH points: then all cores end at about the same time.
 MANY_CHUNKS, ENOUGH = 64, 256
 
 
@@ -49,7 +49,7 @@ class Axis:
     scale: Scale = "linear"
 
     def as_table(self) -> dict[str, Any]:
-        """What tells it from another axis, in a size that does not grow with the values."""
+        """Return what distinguishes it from another axis, in a size that does not grow with the values."""
         table = {"key": self.key, "unit": unit_of(self.key), "scale": self.scale, "points": len(self.values)}
         if self.scale == "table":
             return table | {"sha256": _digest(self.values)}
@@ -61,7 +61,7 @@ def _digest(values: NDArray[Any]) -> str:
     return hashlib.sha256(plain).hexdigest()
 
 
-#: How a key ends → its unit; the first that fits.
+#: The ending of a key → its unit; the first that matches.
 _UNITS = (
     ("_kg_m2", "kg m^2"), ("_a_m2", "A m^2"), ("_m_s2", "m/s^2"), ("_n_m_s", "N m s"), ("_m_s", "m/s"), ("_t_m", "T m"),
     ("_hz", "Hz"), ("_kg", "kg"), ("_rad", "rad"), ("_m", "m"), ("_t", "T"), ("_s", "s"),
@@ -69,7 +69,7 @@ _UNITS = (
 
 
 def unit_of(key: str) -> str:
-    """Return the unit that a key's name says, "1" where it says none.
+    """Return the unit at the end of a key, "1" where there is none.
 
     >>> unit_of("start.spin_hz"), unit_of("start.position_m.2"), unit_of("base.strength_t_m"), unit_of("drag.law")
     ('Hz', 'm', 'T m', '1')

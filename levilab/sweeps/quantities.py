@@ -1,4 +1,4 @@
-"""How the quantities of a map are shown to people: names, and units with the prefixes of a laboratory."""
+"""Names of the quantities of a map for figures and tables, and units with the prefixes of a laboratory."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def quantity_of(name: str) -> Quantity:
 
 
 def step_in_words(key: str, values: NDArray[Any], count: int = 1, *, logarithmic: bool = False) -> str:
-    """Return so many steps of an axis in words.
+    """Return a number of steps of an axis in words.
 
     >>> import numpy as np
     >>> step_in_words("start.spin_hz", np.linspace(20, 30, 21), 8)

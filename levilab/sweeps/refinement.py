@@ -1,6 +1,6 @@
 """A yes/no map from a part of its points: along its boundary all of them, elsewhere a coarse grid and an audit.
 
-A bisection would follow one boundary and walk past islands: survival is not monotone near the upper edge.  Here
+A bisection would follow one boundary and miss islands: survival is not monotone near the upper edge.  Here
 
 1. every point of a coarse grid is computed;
 2. a cell of the grid is *open* if its corners, or those of a neighbour, differ.  The points of a grid twice as fine are
@@ -9,9 +9,9 @@ A bisection would follow one boundary and walk past islands: survival is not mon
    which one point was seen is followed to its end, and every step across a boundary of the map has computed points on
    either side;
 4. an *audit* computes points chosen at random among those filled in.  Where one is wrong, its cell and the neighbours
-   are searched, and its island is followed.  A second audit, of as many points, judges what is left.
+   are computed at half the spacing, and its island as in 3.  A second audit, of as many points, gives the upper limit.
 
-What may be missed is an island that no computed point fell on.  An island that holds a box of `stride` points along
+Only an island on which no computed point lies may be missed.  An island that holds a box of `stride` points along
 every axis holds a point of the coarse grid, and is sure to be seen.
 """
 
@@ -43,14 +43,14 @@ class Question(NamedTuple):
     until: float
 
 
-#: Asks for points, is sent their values in the same order, and returns the refined map.
+#: Yields questions for points, receives their values in the same order, and returns the refined map.
 Refinement = Generator[Question, Flags, "Refined"]
 
-#: The coarse grid has every so manieth point of the full one.
+#: The coarse grid has every STRIDEth point of the full one, along each axis.
 STRIDE = 8
 #: Points of each audit: if none of 300 is wrong, fewer than 1 % of all are (with 95 %).
 AUDIT = 300
-#: How sure the upper limit is.
+#: Confidence of the upper limit.
 CONFIDENCE = 0.95
 
 
@@ -93,7 +93,7 @@ class Refined:
         values: shape of the map.
         computed: likewise; what was not computed was filled in.
         strides: of the coarse grid, along each axis [points].
-        audits: the first searches, the second judges.
+        audits: the first finds islands, the second gives the upper limit.
     """
 
     values: Flags
@@ -126,8 +126,8 @@ class Refined:
 def refine(shape: Sequence[int], *, stride: int = STRIDE, audit: int = AUDIT, seed: int = 0) -> Refinement:
     """Refine a yes/no map along its boundary.
 
-    A generator that asks for points and is sent their values; what it asks for depends on the values alone, so that
-    points that are known already need not be computed again.
+    A generator that yields questions for points and receives their values.  The questions depend on the values alone,
+    so that points with known values need not be computed again.
 
     Args:
         shape: of the map.
@@ -165,7 +165,7 @@ def refine(shape: Sequence[int], *, stride: int = STRIDE, audit: int = AUDIT, se
 
 
 class _State(NamedTuple):
-    """What is known: values, filled in or computed; which are computed; the axes with neighbours."""
+    """Values, filled in or computed; which of them are computed; the axes along which points have neighbours."""
 
     values: Flags
     computed: Flags
@@ -204,7 +204,7 @@ def _power_below(n: int) -> int:
 
 
 def _every(step: int, n: int) -> Points:
-    """Return every so manieth of n points, and the last one."""
+    """Return each step-th of n points, and the last one."""
     return np.unique(np.append(np.arange(0, n, step), n - 1)).astype(np.intp)
 
 

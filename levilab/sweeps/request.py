@@ -1,4 +1,4 @@
-"""What is asked of a sweep → a plan, and a store to compute it in: a new one, or one that is there."""
+"""The request for a sweep → its plan, and its store: a new one, or an existing one."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SweepRequest:
-    """What is asked of a sweep.
+    """A request for a sweep.
 
     Attributes:
         scene: with its settings.
@@ -35,7 +35,7 @@ class SweepRequest:
         observe: names of what is observed, with commas between them.
         duration: of each motion [s].
         tolerance: wanted error of place [m] and axis [rad].
-        seed: of what is random.
+        seed: of the random choices.
         adaptive: whether points are computed along a boundary alone.
     """
 
@@ -78,9 +78,9 @@ def store_for(
     """Return the store of a request, ready to be computed.
 
     Args:
-        request: what is asked.
+        request: for the sweep.
         path: of its folder; None: in memory.
-        message: called with what takes a moment.
+        message: called with a line before something that takes a moment.
         resume: go on with the store that is there, if one is.
 
     Raises:
@@ -89,8 +89,8 @@ def store_for(
     """
     plan = plan_of(request)
     if path is not None and path.exists():
-        return _going_on(request, plan, path, resume=resume)
-    if request.adaptive:  # what it refuses leaves no store behind
+        return _existing_store(request, plan, path, resume=resume)
+    if request.adaptive:  # an error in its settings leaves no store behind
         begin_adaptive(Store.create(None, plan), _boundary(plan))
     store = Store.create(path, with_step(plan, message))
     if request.adaptive:
@@ -98,7 +98,7 @@ def store_for(
     return store
 
 
-def _going_on(request: SweepRequest, plan: Plan, path: Path, *, resume: bool) -> Store:
+def _existing_store(request: SweepRequest, plan: Plan, path: Path, *, resume: bool) -> Store:
     there = f"it is there already: levilab sweep {path} shows it, `resume` goes on with it; or take another place"
     if not resume and not (path / "zarr.json").exists():
         raise UsageError("out", "it is there already, and no store of a sweep: take another place", value=path)

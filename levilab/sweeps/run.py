@@ -1,4 +1,4 @@
-"""The run of a sweep: chunks go out, results come back in any order, and each is written as it comes."""
+"""Run a sweep: workers compute chunks in any order, and this process writes each result as it comes."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from levilab.sweeps.store import Store
     from levilab.workers import Workers
 
-#: What one core computes so quickly [s] is not worth the start of other processes.
+#: A plan that one core computes in this time [s] is computed without starting other processes.
 QUICK_S = 4.0
-#: A sweep ends when so many chunks have failed: the others would, too.
+#: A sweep ends after this number of failed chunks: the others would probably fail, too.
 MOST_FAILURES = 20
-#: So much is simulated to have the kernels compiled before workers need them [s].
+#: Duration that is simulated in order to compile the kernels before workers need them [s].
 _FIRST_S = 1e-3
 
 
@@ -61,14 +61,15 @@ def with_step(plan: Plan, message: Callable[[str], None]) -> Plan:
 
     Args:
         plan: without a step.
-        message: called with what takes a moment.
+        message: called with a line before something that takes a moment.
 
     Raises:
         SceneError, SimulationError: some of the points cannot be simulated.
     """
     with announce_compilation(message):
         over = {axis.key: axis.values for axis in plan.axes} if plan.is_table else _grid(plan)
-        return replace(plan, step_share=step_share_of(plan.scene, over, plan.duration_s, tolerance=plan.tolerance))
+        share = step_share_of(plan.scene, over, plan.duration_s, tolerance=plan.tolerance, survivors_only=True)
+        return replace(plan, step_share=share)
 
 
 def _grid(plan: Plan) -> dict[str, NDArray[Any]]:
@@ -83,13 +84,13 @@ def compile_for(plan: Plan) -> None:
 
 
 def tasks_of(store: Store) -> Iterator[Task]:
-    """Yield the tasks that are left, made as they are asked for."""
+    """Yield the tasks that are left; each is made when it is requested."""
     light = store.plan.without_values()
     return (Task(light, chunk, store.plan.values_of(chunk)) for chunk in store.missing())
 
 
 def workers_for(plan: Plan, count: int | None = None, scheduler: str | None = None) -> Workers:
-    """Return where a plan is computed: on a cluster, in this process if it is quick, else in several.
+    """Return the workers for a plan: a cluster, this process if that is quick enough, else several processes.
 
     Args:
         plan: decides whether other processes are worth their start.

@@ -9,6 +9,7 @@ import numpy as np
 
 from levilab.errors import UsageError
 from levilab.files import CannotWrite, replace_atomically, writing
+from levilab.settings import hint_about
 from levilab.simulator.equilibrium import HEAVIEST_KG, stability_of
 from levilab.sweeps.cost import cut
 from levilab.sweeps.plan import Axis, Plan
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 #: Tops that a map may have: some minutes of 30 s each.
 MOST_TOPS = 250_000
-#: A top outside of the window can take this long to be lost [s].
+#: Tops outside of the window may stay up for this time [s].
 SHORT_S = 10.0
 USUAL_SPINS = (18.0, 90.0, 145)
 MASS, SPIN = "top.mass_kg", "start.spin_hz"
@@ -44,11 +45,13 @@ def span_of(name: str, text: str) -> Span:
     >>> span_of("spins", "20:30:0.5")
     (20.0, 30.0, 21)
     """
-    expected = "LOW:HIGH:STEP is expected, such as 20:30:0.5"
+    example, unit = ("0.0250:0.0254:2e-5", "kg") if name == "masses" else ("20:30:0.5", "Hz")
+    expected = f"LOW:HIGH:STEP is expected, such as {example}"
     try:
         low, high, step = map(float, text.split(":"))
     except ValueError:
-        raise UsageError(name, expected, value=text) from None
+        hints = (hint_about(part, f"which is {unit}") for part in text.split(":"))
+        raise UsageError(name, expected + next(filter(None, hints), ""), value=text) from None
     if not (all(map(math.isfinite, (low, high, step))) and step > 0 and high >= low + step):
         raise UsageError(name, f"{expected}, with HIGH at least one STEP above LOW", value=text)
     steps = (high - low) / step * (1 + 1e-9)  # rounding must not lose the last one
@@ -106,7 +109,7 @@ def _check(spins: Span, masses: Span) -> None:
 
 
 def notes_of(plan: Plan) -> tuple[str, ...]:
-    """Return what to mind."""
+    """Return notes on a map that is easily misread."""
     if plan.duration_s >= SHORT_S:
         return ()
     reason = f"{plan.duration_s:g} s are short: tops outside of the window may only last a while"

@@ -1,8 +1,8 @@
-"""Where the results of a sweep are kept: a group of Zarr v3, in a folder or in memory.
+"""The store of the results of a sweep: a group of Zarr v3, in a folder or in memory.
 
 Each column is an array whose chunks are those of the plan, each axis a coordinate, and `done` marks the chunks that are
-written.  The process that made the plan is the only one that writes: a chunk's values first, then its mark, so that
-whatever ends the process costs at most the chunks that have no mark.
+written.  Only one process writes: a chunk's values first, then its mark.  If the process is killed, only chunks
+without a mark are lost.
 """
 
 from __future__ import annotations
@@ -11,13 +11,12 @@ import contextlib
 import os
 import sys
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from levilab.errors import DataError
-from levilab.files import CannotWrite, sync_folder, writing
+from levilab.files import CannotWrite, locked, sync_folder, writing
 from levilab.runs.run import utc_now
 from levilab.simulator.keys import SceneError, short_text
 from levilab.software import software_versions
@@ -27,6 +26,7 @@ from levilab.sweeps.quantities import quantity_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -34,7 +34,7 @@ SCHEMA = "levilab-sweep/1"
 DONE = "done"
 #: Of an adaptive map: an array with a mark for each point.
 STATUS, COMPUTED, FILLED = "status", 1, 2
-#: Marks that share a file.
+#: Number of marks in one file.
 MARKS = 4096
 
 
@@ -112,7 +112,7 @@ class Store:
                     dtype=column.dtype,
                     fill_value=np.nan if column.dtype.startswith("float") else 0,
                     dimension_names=plan.dimensions,
-                    attributes=_described(column.unit, column.meaning),
+                    attributes=_unit_and_meaning(column.unit, column.meaning),
                 )
             group.create_array(
                 DONE,
@@ -121,7 +121,7 @@ class Store:
                 dtype="uint8",
                 fill_value=0,
                 dimension_names=("chunk",),
-                attributes=_described("1", "whether a chunk is written, in the order of their numbers"),
+                attributes=_unit_and_meaning("1", "whether a chunk is written, in the order of their numbers"),
             )
         return cls(plan, group, path, np.zeros(plan.chunk_count, dtype=np.uint8))
 
@@ -143,27 +143,16 @@ class Store:
             ) from error
 
     @contextlib.contextmanager
-    def locked(self) -> Iterator[None]:
+    def lock(self) -> Iterator[None]:
         """Keep other processes from writing into the store.  Raises CannotWrite where one does already."""
-        from filelock import FileLock, Timeout
-
         if self.path is None:
             yield
             return
-        lock = FileLock(self.path.with_name(f".{self.path.name}.lock"))
-        try:
-            lock.acquire(blocking=False)
-        except Timeout:
-            raise CannotWrite(f"{self.path}: another process is computing it; wait for its end") from None
-        try:
+        with locked(self.path, "another process is computing it; wait for its end"):
             yield
-        finally:
-            lock.release()
-            with contextlib.suppress(OSError):
-                Path(lock.lock_file).unlink(missing_ok=True)
 
     def notes(self) -> list[str]:
-        """Return what differs here from where the store was begun, if results may differ in their last bits for it."""
+        """Return the differences in software and processor since the store was begun that may change the last bits."""
         begun, software = dict(self.group.attrs), software_versions()
         versions = [(name, begun["software"].get(name), software[name]) for name in ("levilab", "numpy", "numba")]
         other = [f"{name} {now} instead of {then}" for name, then, now in versions if now != then]
@@ -182,13 +171,21 @@ class Store:
         """Yield the chunks that are not done, one after another."""
         return (self.plan.chunk_of(number) for number in range(self.plan.chunk_count) if not self.marks[number])
 
+    def array(self, name: str) -> Any:
+        """Return an array to write into.  Raises CannotWrite where the folder is no longer there."""
+        try:
+            return self.group[name]
+        except KeyError as error:
+            text = f"{self.path}: it was moved or removed meanwhile; where it is now, go on with `resume`"
+            raise CannotWrite(text) from error
+
     def write(self, chunk: Chunk, values: Mapping[str, NDArray[Any]]) -> None:
         """Write a chunk's values, and when they are on the disk its mark.  Raises CannotWrite."""
         with writing(f"{self.path}: cannot be written", "free space, then go on with `resume`"):
             for column in columns_of(self.plan.observables):
-                self.group[column.name][chunk.box] = np.asarray(values[column.name], dtype=column.dtype)
+                self.array(column.name)[chunk.box] = np.asarray(values[column.name], dtype=column.dtype)
             self._sync(chunk)
-            self.group[DONE][chunk.number] = 1
+            self.array(DONE)[chunk.number] = 1
         self.marks[chunk.number] = 1
 
     def _sync(self, chunk: Chunk) -> None:
@@ -203,7 +200,7 @@ class Store:
                     os.fsync(open_file.fileno())
                 sync_folder(file.parent)
 
-    def known(self, chunk: Chunk) -> NDArray[np.bool_]:
+    def known_points(self, chunk: Chunk) -> NDArray[np.bool_]:
         """Return which points of a chunk are computed, or filled in."""
         if STATUS not in self.group:
             return np.full(chunk.shape, bool(self.marks[chunk.number]))
@@ -226,7 +223,7 @@ class Store:
         return Map(plan, values, status == COMPUTED, status == FILLED)
 
     def _array(self, name: str, box: Any) -> NDArray[Any]:
-        """Return part of an array.  Raises DataError where its files are not what they were."""
+        """Return part of an array.  Raises DataError where its files are damaged or missing."""
         try:
             return np.asarray(self.group[name][box])
         except Exception as error:  # libraries that decompress have errors of many kinds
@@ -248,7 +245,7 @@ def processor() -> dict[str, str]:
 
 
 def differences(there: Plan, asked: Plan) -> list[str]:
-    """Return what a plan that is asked for has otherwise than the one of a store, a sentence each."""
+    """Return the differences between the plan of a store and the one of a request, a sentence for each."""
     own, other = (dict(_leaves(plan)) for plan in (there, asked))
     return [
         f"{key} is {short_text(own.get(key, 'missing'))} there and {short_text(other.get(key, 'missing'))} here"
@@ -258,7 +255,7 @@ def differences(there: Plan, asked: Plan) -> list[str]:
 
 
 def _leaves(plan: Plan) -> Iterator[tuple[str, Any]]:
-    """Yield all that makes a plan, by name; its chunks and its step follow from that."""
+    """Yield the independent parts of a plan, by name; its chunks and its step follow from them."""
     table = plan.as_table()
     for axis in table["axes"]:
         yield f"the axis {axis['key']}", ", ".join(str(value) for key, value in axis.items() if key != "key")
@@ -270,8 +267,8 @@ def _leaves(plan: Plan) -> Iterator[tuple[str, Any]]:
         yield from inner.items()
 
 
-def _described(unit: str, meaning: str) -> dict[str, Any]:
-    """Unit and meaning; xarray and others look for them by the names of the CF conventions, too."""
+def _unit_and_meaning(unit: str, meaning: str) -> dict[str, Any]:
+    """Return the attributes of an array, also with the names of the CF conventions that xarray and others use."""
     return {"unit": unit, "meaning": meaning, "units": unit, "long_name": meaning}
 
 
@@ -280,7 +277,7 @@ def _add_coordinate(group: Any, axis: Axis, dimension: str) -> None:
     values, words = axis.values, None
     if values.dtype.kind == "U":
         words, values = np.unique(values, return_inverse=True)
-    attributes = _described(unit_of(axis.key), quantity_of(axis.key).name) | {"scale": axis.scale}
+    attributes = _unit_and_meaning(unit_of(axis.key), quantity_of(axis.key).name) | {"scale": axis.scale}
     coordinate = group.create_array(
         axis.key,
         shape=values.shape,

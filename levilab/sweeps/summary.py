@@ -1,4 +1,4 @@
-"""A store in a few numbers, read chunk by chunk, so that memory does not grow with the map."""
+"""The summary of a store, computed chunk by chunk, so that memory does not grow with the map."""
 
 from __future__ import annotations
 
@@ -51,22 +51,22 @@ class Summary:
 
 
 def summarise(store: Store) -> Summary:
-    """Return the summary of what a store holds so far."""
+    """Return the summary of the points that a store has so far."""
     plan = store.plan
     parts: dict[str, list[tuple[int, float, float, float]]] = {one.name: [] for one in columns_of(plan.observables)}
     points = 0
     for chunk in plan.chunks():
-        known = store.known(chunk)
+        known = store.known_points(chunk)
         points += int(np.count_nonzero(known))
         for name, values in store.read(chunk).items() if np.any(known) else ():
             numbers = values[known & np.isfinite(values)].astype(np.float64)
             if numbers.size:
                 parts[name].append((numbers.size, numbers.min(), float(numbers.sum()), numbers.max()))
-    columns = tuple(_joined(column, parts[column.name]) for column in columns_of(plan.observables))
+    columns = tuple(_join(column, parts[column.name]) for column in columns_of(plan.observables))
     return Summary(plan, points, store.done, columns)
 
 
-def _joined(column: Observable, parts: list[tuple[int, float, float, float]]) -> ColumnSummary:
+def _join(column: Observable, parts: list[tuple[int, float, float, float]]) -> ColumnSummary:
     if not parts:
         return ColumnSummary(column, 0, math.nan, math.nan, math.nan)
     counts, least, sums, greatest = zip(*parts, strict=True)

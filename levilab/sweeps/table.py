@@ -1,4 +1,4 @@
-"""The tables that a sweep prints: what was asked, each column in numbers, and the points where they are few."""
+"""The tables that a sweep prints: its axes, each column in numbers, and the points where they are few."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FEW_POINTS = 40
 def headline(summary: Summary) -> str:
     """Return what was swept, in a line."""
     plan = summary.plan
-    size = f"{' × '.join(map(str, plan.shape))} points" if len(plan.shape) > 1 else f"{plan.size} points"
+    size = f"{' × '.join(map(str, plan.shape))} point{'s' if plan.size > 1 else ''}"
     done = "" if summary.points == plan.size else f", {summary.points} of them computed"
     return f"{plan.scene.name or 'the scene'}: {size}{done}, each up to {plan.duration_s:g} s"
 

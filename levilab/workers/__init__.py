@@ -1,10 +1,10 @@
-"""Many independent tasks, done where there is room: in this process, in threads, in processes, on a cluster.
+"""Compute many independent tasks: in this process, in threads, in processes, or on a cluster.
 
     with contextlib.closing(results_of(function, tasks, processes(4))) as results:
         for done in results:
             ...
 
-`results_of` gives results back as they come and survives workers that die.  Whatever runs the tasks is behind
+`results_of` yields results as they come and survives workers that die.  All executors have the interface of
 `concurrent.futures.Executor`, so that `mpi4py.futures` or the executor of a batch system fits (`Workers`).
 """
 

@@ -1,7 +1,7 @@
-"""A Dask cluster that runs already: its scheduler is given, its workers are where they are.
+"""Workers of an existing Dask cluster, whose scheduler has a known address.
 
-Dask does a dead worker's tasks again on others by itself.  What it would wait for in vain is an error here: a
-scheduler that is lost, a cluster without workers, workers that have other software.
+Dask submits a dead worker's tasks to other workers by itself.  Where it would wait for ever, an error is raised here:
+for a lost scheduler, for a cluster without workers, and for workers with other software.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from levilab.workers.ways import Workers
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-#: How long a scheduler may take to answer when it is first spoken to [s].
+#: Longest time for the first answer of a scheduler [s].
 ANSWER_S = 10.0
-#: How long it may take while it is at work, and a cluster may be without workers [s].
+#: Longest time for a later answer, and for a cluster to be without workers [s].
 PATIENCE_S = 60.0
-#: How often the scheduler is asked for its workers while no result comes [s].
+#: Interval between requests for the number of workers while no result comes [s].
 ASK_EVERY_S = 5.0
-#: How long this client may take to say goodbye [s].
+#: Longest time for closing the connection [s].
 GOODBYE_S = 0.5
 
 
@@ -60,7 +60,7 @@ class Cluster(Executor):
         self._scheduler, self._patience_s = scheduler, patience_s
         self._restore_logging = _silence()
         try:
-            self._client = self._connected()
+            self._client = self._connect()
             self._pool = self._client.get_executor(pure=False)
             self.count = 0
             self._seen_workers = self._asked = time.monotonic()
@@ -69,24 +69,35 @@ class Cluster(Executor):
             self._restore_logging()
             raise
 
-    def _connected(self) -> Any:
+    def _connect(self) -> Any:
         try:
             from distributed.client import Client
+            from distributed.comm.addressing import get_address_host_port
         except ImportError as error:
             raise LevilabError(
-                "a Dask cluster is spoken to by distributed, which is not installed: pip install 'levilab[cluster]'"
+                "a Dask cluster needs the library distributed, which is not installed: pip install 'levilab[cluster]'"
             ) from error
         is_file = Path(self._scheduler).suffix == ".json"
         if is_file and not Path(self._scheduler).is_file():
             raise LevilabError(f"{self._scheduler}: no such file; `dask scheduler --scheduler-file` writes it")
         place = {"scheduler_file": self._scheduler} if is_file else {"address": self._scheduler}
+        if not is_file:  # distributed itself would say so after 20 s, with a traceback
+            try:
+                get_address_host_port(self._scheduler)
+            except ValueError as error:
+                expected = "a name with its port is expected, such as tcp://10.0.0.1:8786"
+                raise WorkersLost(
+                    f"{self._scheduler} is no address of a Dask scheduler ({error}): {expected}"
+                ) from error
         try:
-            # another version of a library that results depend on is an error of its own, when a worker has it
+            # different versions of libraries that results depend on are an error of `packing`, which names them
             with warnings.catch_warnings(action="ignore"):
                 connect: Any = Client
                 return connect(**place, timeout=ANSWER_S, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
-            text = f"no Dask scheduler answers at {self._scheduler}: start one (`dask scheduler`), give its address"
+            text = (
+                f"no Dask scheduler answers at {self._scheduler}: start one (`dask scheduler`), or correct the address"
+            )
             raise WorkersLost(text) from error
 
     def _wait_for_workers(self) -> None:
@@ -97,23 +108,23 @@ class Cluster(Executor):
     def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
         """Submit a task.  Raises WorkersLost if the scheduler is lost."""
         if self._client.status != "running":
-            raise self._lost()
+            raise self._lost_scheduler()
         future: Future[Any] = self._pool.submit(function, *arguments, **named)
         return future
 
     def check(self) -> None:
         """Raise WorkersLost if the scheduler is lost, or has been without workers for long."""
         if self._client.status != "running":
-            raise self._lost()
+            raise self._lost_scheduler()
         if time.monotonic() > self._asked + ASK_EVERY_S:
             self._ask()
 
     def _ask(self) -> None:
-        """Ask the scheduler for its workers."""
+        """Request the number of workers from the scheduler.  Raises WorkersLost."""
         try:
             threads = self._client.sync(self._client.scheduler.ncores, callback_timeout=PATIENCE_S)
         except (OSError, TimeoutError) as error:
-            raise self._lost() from error
+            raise self._lost_scheduler() from error
         self._asked = time.monotonic()
         self.count = sum(threads.values())
         if self.count:
@@ -125,26 +136,26 @@ class Cluster(Executor):
                 f"(`dask worker {self._scheduler}`)"
             )
 
-    def _lost(self) -> WorkersLost:
+    def _lost_scheduler(self) -> WorkersLost:
         return WorkersLost(
             f"the Dask scheduler at {self._scheduler} is lost, with what was under way: start it and its workers anew"
         )
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: FBT001, FBT002
-        """Leave, after all is done if `wait`."""
+        """Close the connection, if `wait` after all tasks are done."""
         if wait and not cancel_futures:
             self._pool.shutdown()
         self.end_at_once()
 
     def end_at_once(self) -> None:
-        """Leave; the scheduler forgets what waits, and the workers end what they do."""
+        """Close the connection; the scheduler then drops waiting tasks, and workers finish those that they compute."""
         with contextlib.suppress(OSError, TimeoutError, AssertionError, RuntimeError):
             self._client.close(timeout=GOODBYE_S)
         self._restore_logging()
 
 
 def _silence() -> Callable[[], None]:
-    """Silence Dask's loggers, to which a dead worker or scheduler is worth a traceback.  Returns what undoes it."""
+    """Silence Dask's loggers, which write a traceback for a dead worker.  Returns a function that undoes it."""
     with contextlib.suppress(ImportError):
         import distributed  # noqa: F401 - gives its loggers their levels
     names = ("distributed", "tornado", "asyncio")

@@ -1,6 +1,6 @@
-"""A call on its way to another process and back: pickled here, so that what fails on the way names its task.
+"""Pickle calls for other processes and their outcomes, so that an error in pickling belongs to its task.
 
-An executor pickles by itself, but if a worker cannot unpickle a call, it dies and takes a whole pool with it.
+An executor pickles by itself, but if a worker cannot unpickle a call, the worker dies and breaks the whole pool.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ LIBRARIES = ("levilab", "Python", "numpy", "numba", "llvmlite")
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a call.
+    """The outcome of a call.
 
     Attributes:
         result: what the function returned.
@@ -56,10 +56,10 @@ def call_here(function: Callable[[Any], Any], task: Any) -> Outcome:
         return Outcome(error=error)
 
 
-def packed(function: Callable[[Any], Any]) -> Callable[[Any], tuple[Callable[..., bytes], bytes, bytes]]:
-    """Return what turns a task into what a worker is given: a function of this module and two pickles.
+def call_packer(function: Callable[[Any], Any]) -> Callable[[Any], tuple[Callable[..., bytes], bytes, bytes]]:
+    """Return a function that turns a task into the arguments of `submit`: a function of this module and two pickles.
 
-    The worker returns a pickle, too: `unpacked` makes an outcome of it.
+    The worker returns a pickle, too: `unpack` makes an outcome of it.
 
     Raises:
         LevilabError: the function or a task cannot be pickled.
@@ -70,11 +70,11 @@ def packed(function: Callable[[Any], Any]) -> Callable[[Any], tuple[Callable[...
             f"the function {getattr(inner, '__name__', inner)} stands in the script that runs, which other processes "
             "do not run again: put it into a module of its own, and import it"
         )
-    head = pickle.dumps(({name: version_of(name) for name in LIBRARIES}, _pickled(function, "function")))
-    return lambda task: (call_there, head, _pickled(task, "task"))
+    head = pickle.dumps(({name: version_of(name) for name in LIBRARIES}, _pickle(function, "function")))
+    return lambda task: (call_there, head, _pickle(task, "task"))
 
 
-def _pickled(thing: Any, what: str) -> bytes:
+def _pickle(thing: Any, what: str) -> bytes:
     try:
         return pickle.dumps(thing)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
@@ -85,7 +85,7 @@ def _pickled(thing: Any, what: str) -> bytes:
 
 
 def call_there(head: bytes, task: bytes) -> bytes:
-    """Call a packed function with a packed task and pack what came of it; this runs in the worker."""
+    """Call a pickled function with a pickled task and pickle the outcome; this runs in the worker."""
     try:
         function = _function(head)
         argument = pickle.loads(task)
@@ -98,13 +98,13 @@ def call_there(head: bytes, task: bytes) -> bytes:
     if outcome.error is not None:
         outcome = Outcome(error=_that_travels(outcome.error))
     try:
-        return _pickled(outcome, "result")
+        return _pickle(outcome, "result")
     except LevilabError as error:
         return pickle.dumps(Outcome(error=error))
 
 
-def unpacked(answer: Outcome | bytes) -> Outcome:
-    """Return the outcome of a call, made here or there."""
+def unpack(answer: Outcome | bytes) -> Outcome:
+    """Return the outcome of a call in this process or in another one."""
     if isinstance(answer, Outcome):
         return answer
     outcome: Outcome = pickle.loads(answer)

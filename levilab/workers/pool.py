@@ -1,6 +1,6 @@
-"""A pool of processes on this machine, which Ctrl-C ends at once and which outlive no parent.
+"""A pool of processes on this machine: Ctrl-C ends them at once, and they end when their parent dies.
 
-Every system starts them in the same way, "spawn": a fresh interpreter.  Three things differ from what Python does:
+On every system they start with a new interpreter ("spawn").  Three things differ from Python's own pool:
 they do not run the main script again (one without ``if __name__ == "__main__"`` would break the pool), Ctrl-C is left
 to the parent, and each has one thread for linear algebra, because there is a process for each core.
 """
@@ -41,7 +41,7 @@ class Pool(ProcessPoolExecutor):
         super().__init__(count, mp_context=_Context(), initializer=_begin)
 
     def end_at_once(self) -> None:
-        """End all worker processes, whatever they do."""
+        """End all worker processes at once, in the middle of their tasks."""
         self.shutdown(wait=False, cancel_futures=True)
         for process in multiprocessing.active_children():
             if isinstance(process, _Worker):
@@ -49,7 +49,7 @@ class Pool(ProcessPoolExecutor):
 
 
 class _Worker(SpawnProcess):
-    """A worker process; what it inherits is arranged while it is started."""
+    """A worker process; its environment is set while it is started, and restored in the parent afterwards."""
 
     def start(self) -> None:
         with _one_thread_each(), _without_main(), interruption_blocked():
@@ -86,7 +86,7 @@ def _without_main() -> Iterator[None]:
 
 
 def _begin() -> None:
-    """Prepare a worker process, in it."""
+    """Prepare a worker process; this runs in it."""
     ignore_interruption()
     threading.Thread(target=_end_with_the_parent, daemon=True).start()
 

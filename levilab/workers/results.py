@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from levilab.errors import WorkersLost
-from levilab.workers.packing import Outcome, call_here, packed, unpacked
+from levilab.workers.packing import Outcome, call_here, call_packer, unpack
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable, Iterator
@@ -21,14 +21,15 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 R = TypeVar("R")
 
-#: What came of a call, here or packed by a worker.
+#: The future of a call: an outcome of this process, or the pickled one of a worker.
 _Future = Future[Outcome | bytes]
 
-#: A task that was under way so often when a pool broke is done alone, at the end.  If that breaks too, it is an error.
+#: A task that was under way in this number of broken pools is computed alone, at the end; if it breaks that one, too,
+#: it is an error.
 MAX_BREAKS_IN_COMPANY = 2
-#: So many pools in a row may break before one of them has given a result.
+#: Greatest number of broken pools in a row without a result.
 MAX_FRUITLESS_POOLS = 5
-#: How often a waiting caller wakes up [s]: on Windows Ctrl-C does not end a wait.
+#: Interval at which a waiting caller wakes up [s]: on Windows Ctrl-C does not end a wait.
 WAKE_UP_S = 0.25
 
 
@@ -52,10 +53,10 @@ def results_of(
 ) -> Generator[Done[T, R]]:
     """Yield the results of tasks as they come, in any order.
 
-    What the function raises is given back with its task and ends nothing else.  If a worker process dies, the others
-    are started anew, and only what was under way is done again.  A task that was under way whenever workers died, the
-    last time alone, is given back as an error.  Ctrl-C ends what is under way; so does a caller that wants no more and
-    closes the iterator (`contextlib.closing`), which Python by itself may do late.
+    An exception of the function is returned with its task; the other tasks continue.  If a worker process dies, all are
+    started anew, and only the tasks that were under way are computed again.  A task that was under way whenever workers
+    died, the last time alone, is returned as an error.  Ctrl-C ends the tasks under way; so does a caller that closes
+    the iterator (`contextlib.closing`), which Python by itself may do late.
 
     Args:
         function: pure, so that it may be done again; at the head of a module if it is done elsewhere.
@@ -72,11 +73,11 @@ def results_of(
     [1, 2, 3]
     """
     queued = _Queue(iter(tasks))
-    call = packed(function) if executor.elsewhere else lambda task: (call_here, function, task)
+    call = call_packer(function) if executor.elsewhere else lambda task: (call_here, function, task)
     fruitless = 0
     while True:
         try:
-            with _opened(executor) as pool:
+            with _open(executor) as pool:
                 for done in _results_of_one_pool(queued, call, pool, executor, window):
                     fruitless = 0
                     yield done
@@ -92,7 +93,7 @@ def results_of(
 
 
 @contextlib.contextmanager
-def _opened(executor: Workers) -> Iterator[Executor]:
+def _open(executor: Workers) -> Iterator[Executor]:
     pool = executor.open()
     try:
         yield pool
@@ -216,7 +217,7 @@ def _outcome_of(future: _Future, pool: Executor, executor: Workers) -> Outcome |
         raise WorkersLost(f"the {executor.name} gave up what they were to do: start them anew")
     error = future.exception()
     if error is None:
-        outcome = unpacked(future.result())
+        outcome = unpack(future.result())
         if outcome.unusable:
             raise WorkersLost(f"one of the {executor.name} {outcome.unusable}: install the same on all machines")
         return outcome

@@ -1,4 +1,4 @@
-"""Where tasks are done: in this process, in threads, in processes, or by any executor that a caller opens."""
+"""Kinds of workers: this process, threads, processes, or any executor of a caller."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def _no_death(_: BaseException) -> bool:
 
 @dataclass(frozen=True)
 class Workers:
-    """How an executor is opened and left.  `Workers(MPIPoolExecutor, count=100)` is one of a caller's own.
+    """How an executor is opened and ended.  `Workers(MPIPoolExecutor, count=100)` is an example for a caller's own one.
 
     Attributes:
         open: opens an executor; called again where one is broken.
@@ -40,7 +40,7 @@ class Workers:
         end_at_once: leaves the executor without waiting for what is under way.
         check: called now and then while no result comes; raises WorkersLost where none will come.
         count_now: asks an open executor for its count, where that may change; None: it stays.
-        is_death: whether an error of a future says that the process died which did the task, while others go on.
+        is_death: whether an error of a future means that the process of the task died while other processes continue.
     """
 
     open: Callable[[], Executor]
@@ -59,7 +59,7 @@ class Workers:
 
 
 def this_process() -> Workers:
-    """One task after the other, in this thread: nothing to start, nothing to pickle."""
+    """Compute one task after the other in this thread; nothing is started or pickled."""
     return Workers(_InThisThread, name="this process", elsewhere=False, in_flight=1)
 
 
@@ -72,7 +72,7 @@ def threads(count: int | None = None) -> Workers:
     Raises:
         UsageError: the count makes no sense.
     """
-    number = _checked(count)
+    number = _count_of(count)
     return Workers(partial(ThreadPoolExecutor, number), number, "threads", elsewhere=False)
 
 
@@ -85,7 +85,7 @@ def processes(count: int | None = None) -> Workers:
     Raises:
         UsageError: the count makes no sense.
     """
-    number = min(_checked(count), MAX_PROCESSES)
+    number = min(_count_of(count), MAX_PROCESSES)
     return Workers(partial(Pool, number), number, "worker processes", end_at_once=Pool.end_at_once)
 
 
@@ -96,7 +96,7 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-def _checked(count: int | None) -> int:
+def _count_of(count: int | None) -> int:
     if count is not None and count < 1:
         raise UsageError("workers", "a number from 1 on is expected", value=count)
     return cores() if count is None else count

@@ -128,7 +128,7 @@ class SpinScene:
         return later[(number - 1) % len(later)] if number and later else self.fall_hz
 
 
-#: So many later tops have a spin of their own at which they fall; then these repeat.
+#: Number of later tops with different spins at which they fall; then these repeat.
 _SERIES = 100
 
 

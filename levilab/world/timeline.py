@@ -16,7 +16,7 @@ T = TypeVar("T")
 
 Array = NDArray[np.float64]
 
-#: So many items are dropped at once: what is behind it in the list has to be moved.
+#: Number of items that are dropped at once, because the items behind them in the list have to be moved.
 _AT_ONCE = 1000
 
 

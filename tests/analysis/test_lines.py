@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from analysis import lines as module
 from analysis.errors import NotFinite, TooFewReadings
-from analysis.lines import ABOVE_NOISE, amplitude_spectrum, spectral_lines
+from analysis.lines import ABOVE_NOISE, amplitude_spectrum, lines_of_signals, spectral_lines
 
 
 def signal(lines: list[tuple[float, float, float]], n: int = 8000, rate: float = 200.0) -> np.ndarray:
@@ -60,6 +61,23 @@ def test_two_lines_in_one_bin_are_not_told_as_two() -> None:
     found = spectral_lines(signal([(7.30, 1.0, 0.0), (7.308, 0.9, 0.0)]), 200.0, weakest=0.5)
     assert found.resolution == pytest.approx(2 / 40)
     assert len(found.lines) == 1
+
+
+def test_a_signal_has_the_same_bits_alone_and_among_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(1)
+    signals = np.array([signal(LEVITRON[: k % 8], n=503) + 1e-5 * rng.normal(size=503) for k in range(19)])
+    alone = [spectral_lines(one, 200.0) for one in signals]
+    for together in (1, 503 * 7, 10**6):
+        monkeypatch.setattr(module, "TOGETHER", together)
+        assert lines_of_signals(signals, 200.0) == alone
+
+
+def test_the_shape_that_is_taken_away_is_the_transform_of_a_wave() -> None:
+    n, bins = 100, np.arange(100)
+    for offset in (0.0, 1e-13, 0.37, -0.5):
+        wave = np.exp(2j * np.pi * (7 + offset) * np.arange(n) / n) * (1 - np.cos(2 * np.pi * np.arange(n) / n)) / n
+        shape = module._shape(np.array(offset), bins - 7, n) * np.exp(1j * np.pi * offset)
+        assert shape == pytest.approx(np.fft.fft(wave), abs=1e-14)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -1,7 +1,7 @@
 """A virtual bench behind real sockets on loopback, and clients to it: pyvisa-py's, and bare sockets.
 
 Nothing here depends on how busy the machine is: what is waited for happens, however late, and a hang guard ends a test
-that waits in vain.
+that would wait for ever.
 """
 
 import contextlib

@@ -533,7 +533,7 @@ class Pair:
         self.driver.identity()
 
     def _come_into_step(self):
-        """A line has no clear; names that were waited for in vain, and come after all, are known by their form."""
+        """A line has no clear; names that come after the wait for them has ended are recognised by their form."""
         self.driver.transport.timeout = 10 * SHORT  # names that never come are waited for once so long
         for _ in range(10):
             try:

@@ -80,7 +80,7 @@ class LakeShoreGaussmeter(ScpiInstrument):
     RANGES_T: ClassVar[Mapping[str, tuple[float, ...]]]
     #: RDGMODE for steady fields.
     _STEADY: ClassVar[str]
-    #: So many readings are tried while the unit changes.
+    #: Most readings that are tried while the unit changes.
     _MOST_UNITS = 3
 
     unit = _UNIT

@@ -26,7 +26,7 @@ Codes = NDArray[np.uint8]
 PIECE = 250_000
 #: The coarsest look of the trigger at the signal [s]: a pulse of 3 % of a turn at 60 Hz lasts 0.5 ms.
 COARSEST = 50e-6
-#: So many looks are as fine as the record wants; a signal too fast for the coarse ones has triggered by then.
+#: Number of looks that is as fine as the record; a signal too fast for the coarse ones has triggered by then.
 _FINE_LOOKS = 100_000
 
 

@@ -38,7 +38,7 @@ _MOST_POINTS = 1000
 _LOOKS, _LOCKED_WITHIN_HZ, _MOST_LOOKS = 3, 0.25, 12
 #: Shortest and longest gate, in parts of `gate_s`, and longest pause before one, in periods of the drive.
 _GATES, _PAUSES = (0.75, 1.25), 4.0
-#: So many gates of the laser with a count make a reading.
+#: Least number of the laser's gates with a count in a reading.
 _FEWEST_COUNTS = 3
 #: No count is better than that: the resolution of the counters over a second [Hz].
 _LEAST_U_HZ = 1e-7

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 #: A signal that moves by fewer codes than this is none: nothing is plugged in, or it is far too small for the scale.
 _FEWEST_CODES = 3
-#: So many divisions from its middle a scope records and triggers: the DS1000Z 5, others more.
+#: Divisions from its middle in which a scope records and triggers: 5 for the DS1000Z, more for others.
 _HALF_SCREEN = 5
 #: Added where the oscilloscope refuses a setting (manuals of the DS1000Z, :CHANnel<n>:OFFSet, and of the DSO-X 1000).
 _OFFSETS = (

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def run_and_tell(*, only: str | None, quick: bool, out: Path | None, as_json: bool) -> None:
-    """The whole command.  Raises CannotWrite, and UsageError for a part that is none."""
+    """The whole command.  Raises CannotWrite, and UsageError for an unknown part."""
     if only is not None and only not in PARTS:
         raise UsageError("only", f"{', '.join(PARTS[:-1])} or {PARTS[-1]} is expected", value=only)
     if only and out:
@@ -45,7 +45,7 @@ def run_and_tell(*, only: str | None, quick: bool, out: Path | None, as_json: bo
 
 
 def print_comparison(found: Comparison) -> None:
-    """All tables of what was measured."""
+    """Print all tables of the measurement."""
     console = terminal()
     if found.points:
         print_kernels(console, found)
@@ -58,7 +58,7 @@ def print_comparison(found: Comparison) -> None:
 
 
 def print_kernels(console: Terminal, found: Comparison) -> None:
-    """Points, ratios, and the kernels' share of the processor's peak."""
+    """Print points, ratios, and the kernels' share of the processor's peak."""
     numbers = ("error \\[cm]", "simulated s per s")
     title = "One top, 5 s of the scene undriven, one core: kernels at fixed steps, without an error estimate"
     points = new_table(title, "method", "setting", *numbers, numbers=numbers)
@@ -82,7 +82,7 @@ def print_kernels(console: Terminal, found: Comparison) -> None:
 
 
 def print_called(console: Terminal, cases: Iterable[Case]) -> None:
-    """`simulate` and `simulate_many` against heyoka, and DOP853, at the same achieved error."""
+    """Print `simulate` and `simulate_many` against heyoka, and DOP853, at the same achieved error."""
     columns = ("levilab", "heyoka", "ratio", "aim", "DOP853")
     shown = new_table(
         "As called, with error estimate or step control: simulated s per s at the same achieved error",
@@ -98,7 +98,7 @@ def print_called(console: Terminal, cases: Iterable[Case]) -> None:
 
 
 def print_overheads(console: Terminal, overheads: Iterable[Overhead]) -> None:
-    """What calls take in Python."""
+    """Print the time of calls outside of compiled code."""
     columns = ("in Python", "aim", "whole call")
     shown = new_table("Time of a call", "", *columns, numbers=columns)
     for o in overheads:

@@ -57,6 +57,11 @@ class FieldReadings:
     def __len__(self) -> int:
         return len(self.height)
 
+    @property
+    def fingerprint(self) -> float:
+        """The greatest flux density [T]."""
+        return float(np.abs(self.flux_density).max())
+
     def same_as(self, other: FieldReadings) -> bool:
         """Whether heights and flux densities are the same, but for the rounding of another unit in the file."""
         pairs = ((self.height, other.height), (self.flux_density, other.flux_density))

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from levilab.pipelines.limit.analysis import LOWER_EDGE, RESONANCE, UPPER_EDGE
-from levilab.present.numbers import short_name, with_uncertainty
-from levilab.present.style import STYLE
+from levilab.present.numbers import with_uncertainty
+from levilab.present.style import MARKERS, STYLE, label_of_run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: One a run; colours of Okabe and Ito that theory does not have.
-_MARKERS = "osD^vP*X"
+#: Of runs: colours of Okabe and Ito that theory does not have.
 _COLOURS = ("#0072B2", "#009E73", "#56B4E9", "#E69F00", "#F0E442", "#000000")
 _MEAN = "#000000"
 _THEORY = {LOWER_EDGE: ("#D55E00", "--"), UPPER_EDGE: ("#D55E00", "--"), RESONANCE: ("#CC79A7", ":")}
@@ -100,19 +99,18 @@ def _draw_run(axes: Axes, analysis: LimitAnalysis, group: Limits, k: int, start:
     limit, u = source.readings.limit, source.readings.u
     colour = _COLOURS[k % len(_COLOURS)]
     several = len(group.runs) > 1
-    name = short_name(source.name).replace("$", r"\$").replace("_", " ")
     axes.errorbar(
         np.arange(start, start + len(limit)),
         limit,
         u,
         color=colour,
-        marker=_MARKERS[k % len(_MARKERS)],
+        marker=MARKERS[k % len(MARKERS)],
         linestyle="none",
         markersize=5,
         elinewidth=0.9,
         capsize=2,
         zorder=3,
-        label=name if several else "a top" + " ± u" * (u is not None),
+        label=label_of_run(source.name, k, len(group.runs), "a top" + " ± u" * (u is not None)),
     )
     if several:
         axes.plot([start - 0.4, start + len(limit) - 0.6], [limit.mean()] * 2, color=colour, linewidth=1.2)
@@ -166,7 +164,7 @@ def _draw_distribution(axes: Axes, analysis: LimitAnalysis, group: Limits) -> No
     s = float(np.std(limits, ddof=1)) if len(limits) >= _FEWEST else 0.0
     axes.tick_params(labelleft=False)
     axes.set_xlabel("tops")
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.xaxis.set_major_locator(MaxNLocator(4, integer=True))
     if s == 0:
         axes.text(0.5, 0.5, "too few for\na distribution" if len(limits) < _FEWEST else "all alike", ha="center",
                   va="center", fontsize=8, color="0.35", transform=axes.transAxes)  # fmt: skip

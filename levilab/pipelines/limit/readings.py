@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 QUANTITIES = ("spin_frequency_hz", "spin_frequency_u_hz")
 #: Limits that differ by more than this part of their mean are none of one top: most likely a spin-down.
 _MOST_SPREAD = 0.25
-#: So many steps in a row do not all go the same way by chance.
+#: Least number of steps in a row that do not all go the same way by chance.
 _FEWEST_STEPS = 4
 #: A number on a line of its own, with a decimal point or comma, and what is read of a file that holds nothing else.
 _NUMBER, _MOST_BYTES = re.compile(r"[+-]?\d+(?:[.,]\d*)?(?:[eE][+-]?\d+)?"), 1 << 20
@@ -51,6 +51,11 @@ class LimitReadings:
 
     def __len__(self) -> int:
         return len(self.limit)
+
+    @property
+    def fingerprint(self) -> float:
+        """The greatest limit [Hz]."""
+        return float(np.abs(self.limit).max())
 
     def same_as(self, other: LimitReadings) -> bool:
         """Whether these are the same limits, but for the rounding of another unit in the file."""

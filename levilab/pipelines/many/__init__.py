@@ -1,1 +1,1 @@
-"""Many inputs by one analysis: a row each in one table, whatever becomes of the others."""
+"""Many inputs by one analysis: a table with a row for each."""

@@ -1,7 +1,7 @@
 """The table's files: rows are appended to a CSV as they come, and published in the order of the inputs at the end.
 
-Beside the table FILE lies FILE.json: what it was made with, and what its columns mean.  Until it is whole the rows are
-in FILE.part.csv, in the order in which they were finished, so that a process that is killed loses the last row at most.
+Beside the table FILE lies FILE.json: what it was made with, and what its columns mean.  Until it is complete the
+rows are in FILE.part.csv, in the order in which they came, so that a process that is killed loses at most the last row.
 """
 
 from __future__ import annotations
@@ -9,12 +9,14 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
+from contextlib import ExitStack
 from importlib.util import find_spec
 from itertools import islice
 from typing import TYPE_CHECKING, Any, Self
 
 from levilab.errors import DataError, UsageError
-from levilab.files import parse_json, replace_atomically, replacing, writing
+from levilab.files import locked, parse_json, replace_atomically, replacing, writing
 from levilab.pipelines.row import text_of, value_of_text
 
 if TYPE_CHECKING:
@@ -25,13 +27,13 @@ if TYPE_CHECKING:
 
 SCHEMA = "levilab-table/1"
 CSV, PARQUET = ".csv", ".parquet"
-#: Rows of a row group: so many are in memory while a Parquet file is written.
+#: Rows in memory while a Parquet file is written: those of one row group.
 GROUP = 1000
 _ELSEWHERE = "choose another place with `table`"
 
 
 def check_name(table: Path) -> None:
-    """Raise UsageError for a table that cannot be written: that is said before hours of work, not after."""
+    """Raise UsageError for a table that cannot be written, before hours of work."""
     kind = table.suffix.casefold()
     if kind not in {CSV, PARQUET}:
         raise UsageError("table", "a name that ends in .csv or .parquet is expected", value=table)
@@ -43,7 +45,7 @@ def check_name(table: Path) -> None:
 
 
 class TableFile:
-    """A table under way.
+    """A table that is being written.
 
     Args:
         table: the file that it becomes.
@@ -59,6 +61,7 @@ class TableFile:
         self._columns = tuple(columns)
         self._made_with = made_with
         self._places: dict[str, int] = {}
+        self._lock = ExitStack()
 
     def __len__(self) -> int:
         return len(self._places)
@@ -71,44 +74,67 @@ class TableFile:
 
     def __exit__(self, *_: object) -> None:
         self._file.close()
+        self._lock.close()
 
     def open(self, *, resume: bool) -> Self:
-        """Begin, or go on with the rows of an earlier call.
+        """Begin a table, or continue that of an earlier call.
 
         Args:
             resume: whether rows of an earlier call that was interrupted, or of the whole table, are kept.
 
         Raises:
             UsageError: rows of an earlier call were not asked for, or were made with other options.
-            CannotWrite: the place cannot be written to.
+            CannotWrite: the place cannot be written to, or another process writes there.
         """
-        there = self.part.exists()
-        if there and not resume:
-            what = f"{self.part} holds runs of an analysis that was interrupted: go on with it (`resume`), or remove it"
-            raise UsageError("table", what, value=self.table)
-        with writing(f"{self.table}: could not be written", _ELSEWHERE):
+        with writing(f"{self.table}: could not be written", _ELSEWHERE), ExitStack() as until_failure:
             self.table.parent.mkdir(parents=True, exist_ok=True)
-            if there and resume:
+            until_failure.enter_context(locked(self.table, "another process is writing it; wait for its end"))
+            if not self.part.exists():
+                self._begin(self._earlier_rows() if resume and self.table.exists() else iter(()))
+            elif resume:
                 self._must_be_alike(self._about_part, self.part)
                 self._cut_torn_line()
                 self._file = self.part.open("r+b")
                 self._find_rows()
             else:
-                earlier = self._earlier_rows() if resume and self.table.exists() else iter(())
-                replace_atomically(self._about_part, self._description())
-                self._file = self.part.open("x+b")
-                self._file.write(_line([column.name for column in self._columns]))
-                for cells in earlier:
-                    self.add(cells)
+                left = f"{self.part} holds runs of an analysis that was interrupted"
+                raise UsageError("table", f"{left}: go on with it (`resume`), or remove it", value=self.table)
+            self._lock = until_failure.pop_all()
         return self
 
+    def _begin(self, earlier: Iterable[Sequence[Cell]]) -> None:
+        replace_atomically(self._about_part, self._description())
+        self._file = self.part.open("x+b")
+        self._file.write(_line([column.name for column in self._columns]))
+        try:
+            for cells in earlier:
+                self.add(cells)
+        except (ValueError, csv.Error) as error:  # those of Arrow are ValueErrors, too
+            self._file.close()
+            self._remove_part()
+            what = f"{self.table}: is damaged ({error}): start anew, without `resume`"
+            raise DataError(what) from error
+
     def add(self, cells: Sequence[Cell]) -> None:
-        """Append a row; it is with the operating system before this returns.  Raises CannotWrite."""
+        """Append a row and hand it to the operating system.  Raises CannotWrite."""
         with writing(f"{self.part}: could not be written", "make room, and go on with `resume`"):
             place = self._file.tell()
             self._file.write(_line([text_of(cell) for cell in cells]))
             self._file.flush()
         self._places[str(cells[0])] = place
+
+    def sha256(self, path: str) -> str:
+        """The hash of the readings that the row of a path was made of; empty for a path without a row."""
+        if (place := self._places.get(path)) is None:
+            return ""
+        self._file.seek(place)
+        found = self._values(self._file.readline())[self._index("readings_sha256")]
+        self._file.seek(0, os.SEEK_END)
+        return str(found)
+
+    def forget(self, path: str) -> None:
+        """Leave the row of a path out of the table, unless another one is added."""
+        del self._places[path]
 
     def publish(self, paths: Iterable[str]) -> None:
         """Write the table, its rows in the order of the paths, those without a row passed over.  Raises CannotWrite."""
@@ -122,8 +148,11 @@ class TableFile:
                     file.writelines(rows)
             replace_atomically(self._about, self._description())
             self._file.close()
-            self._about_part.unlink()
-            self.part.unlink()
+            self._remove_part()
+
+    def _remove_part(self) -> None:
+        self._about_part.unlink()
+        self.part.unlink()
 
     def _rows(self, paths: Iterable[str]) -> Iterator[bytes]:
         for path in paths:
@@ -132,7 +161,7 @@ class TableFile:
                 yield self._file.readline()
 
     def _write_parquet(self, file: Any, rows: Iterator[bytes]) -> None:
-        """In groups of rows, so that memory does not grow with the table."""
+        """Write a Parquet file in groups of rows, so that memory does not grow with the table."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -154,7 +183,7 @@ class TableFile:
         texts = next(csv.reader([line.decode("utf-8")]))
         return [value_of_text(text, column.kind) for text, column in zip(texts, self._columns, strict=True)]
 
-    # --- what an earlier call left ---
+    # --- rows of an earlier call ---
 
     def _description(self) -> str:
         columns = [{"name": column.name, "kind": column.kind, "meaning": column.meaning} for column in self._columns]
@@ -175,7 +204,7 @@ class TableFile:
             raise UsageError("resume", what)
 
     def _cut_torn_line(self) -> None:
-        """Drop what a killed process left of its last row."""
+        """Remove an incomplete last row, which a killed process left."""
         with self.part.open("r+b") as file:
             whole = 0
             for line in file:
@@ -186,23 +215,30 @@ class TableFile:
             file.truncate(whole)
 
     def _find_rows(self) -> None:
-        """Note where each path's row begins, and stand at the end."""
+        """Note where the row of each path begins, if it stands, and go to the end."""
         place = len(self._file.readline())
         for line in self._file:
             try:
                 values = self._values(line)
             except (ValueError, csv.Error, StopIteration) as error:
                 raise DataError(f"{self.part}: a row is damaged ({error}): remove the file and start anew") from error
-            self._places[str(values[0])] = place
+            if self._stands(values):
+                self._places[str(values[0])] = place
             place += len(line)
         self._file.seek(place)
 
     def _earlier_rows(self) -> Iterator[list[Cell]]:
-        """The rows of the whole table of an earlier call, but for runs that were not at their end then."""
+        """Return the rows of the complete table of an earlier call that are kept."""
         self._must_be_alike(self._about, self.table)
-        status = [column.name for column in self._columns].index("status")
         rows = self._of_parquet() if self.table.suffix.casefold() == PARQUET else self._of_csv()
-        return (cells for cells in rows if cells[status] != "running")
+        return filter(self._stands, rows)
+
+    def _stands(self, cells: Sequence[Cell]) -> bool:
+        """Whether a row is to be kept: a run that failed, or was not at its end, is analyzed anew."""
+        return cells[self._index("status")] != "running" and cells[self._index("problem")] is None
+
+    def _index(self, column: str) -> int:
+        return [one.name for one in self._columns].index(column)
 
     def _of_csv(self) -> Iterator[list[Cell]]:
         with self.table.open("rb") as file:

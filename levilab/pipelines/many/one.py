@@ -62,28 +62,28 @@ class PassedOver:
     """An input that does not belong into the table.
 
     Attributes:
-        why: as "a trace run"; empty for a file that is of no concern.
+        why: such as "a trace run"; empty for a file that holds no readings.
     """
 
     why: str
 
 
-def _given(name: str, kind: Kind, meaning: str) -> Column:
+def _input_column(name: str, kind: Kind, meaning: str) -> Column:
     return Column(name, kind, meaning, lambda about: about.get(name))
 
 
-#: What the table says of each input beside the analysis, before its columns and after them.
+#: The columns of the input itself, before and after those of the analysis.
 HEAD = (
-    _given("path", "text", "run folder or data file, from the table's folder"),
-    _given("started_utc", "text", "when the run began, as in run.json"),
-    _given("experiment", "text", "of the run"),
-    _given("status", "text", "finished, interrupted, failed, or running when it was analyzed"),
-    _given("synthetic", "truth", "whether any of it was simulated or made up; empty for a data file"),
-    _given("readings_sha256", "text", "of the file with the readings"),
+    _input_column("path", "text", "run folder or data file, from the table's folder"),
+    _input_column("started_utc", "text", "when the run began, as in run.json"),
+    _input_column("experiment", "text", "of the run"),
+    _input_column("status", "text", "finished, interrupted, failed, or running when it was analyzed"),
+    _input_column("synthetic", "truth", "whether any of it was simulated or made up; empty for a data file"),
+    _input_column("readings_sha256", "text", "of the file with the readings"),
 )
 TAIL = (
-    _given("warnings", "count", "warnings that levilab analyze gives for the input by itself"),
-    _given("problem", "text", "why it could not be analyzed; the analysis's columns are empty then"),
+    _input_column("warnings", "count", "warnings that levilab analyze gives for the input by itself"),
+    _input_column("problem", "text", "why it could not be analyzed; the analysis's columns are empty then"),
 )
 
 
@@ -92,13 +92,24 @@ def columns_of(analysis: Analysis[Any]) -> tuple[Column, ...]:
     return (*HEAD, *analysis.row, *TAIL)
 
 
+def name_of(path: Path, folder: Path) -> str:
+    r"""The path of an input from a folder, as it is but for line breaks and the like, which are escaped.
+
+    >>> from pathlib import Path
+    >>> name_of(Path("runs/two\n  lines"), Path())
+    'runs/two\\n  lines'
+    """
+    text = relative(path, folder)
+    return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+
+
 def analyze_one(task: Task) -> Row | PassedOver:
-    """Analyze one input by itself; what is wrong with it stands in its row, and raises nothing."""
+    """Analyze one input by itself; an error becomes the problem of its row."""
     analysis = ANALYSES[task.analysis]
-    about: dict[str, Any] = {"path": relative(task.path, task.folder)}
+    about: dict[str, Any] = {"path": name_of(task.path, task.folder)}
     part: dict[str, Any] | None = None
     try:
-        if task.is_run and (passed_over := _look(task, analysis, about)):
+        if task.is_run and (passed_over := _read_record(task, analysis, about)):
             return passed_over
         part = _analyze(task, analysis, about)
     except DoesNotSuit as error:
@@ -115,19 +126,21 @@ def analyze_one(task: Task) -> Row | PassedOver:
 
 
 def row(analysis: Analysis[Any], about: dict[str, Any], part: dict[str, Any] | None) -> Row:
-    """The row from what is known of the input, and from its part of result.json, None where there is none."""
+    """Return the row from facts about the input, and from its part of result.json; None where there is no result."""
     if problem := about.get("problem", ""):
         about["problem"] = problem = " ".join(unquoted(problem).split())
+    path, *others = HEAD
     cells = (
-        *(plain(column.read(about), column.kind) for column in HEAD),
+        path.read(about),  # as it is: two names may differ in their spaces
+        *(plain(column.read(about), column.kind) for column in others),
         *(None if part is None else plain(column.read(part), column.kind) for column in analysis.row),
         *(plain(column.read(about), column.kind) for column in TAIL),
     )
     return Row(cells, problem, about.get("readings_sha256"))
 
 
-def _look(task: Task, analysis: Analysis[Any], about: dict[str, Any]) -> PassedOver | None:
-    """Note what run.json says; return what keeps a run out of the table.  Raises DataError."""
+def _read_record(task: Task, analysis: Analysis[Any], about: dict[str, Any]) -> PassedOver | None:
+    """Copy facts from run.json, and return the reason if the run does not belong into the table.  Raises DataError."""
     run = Run.load(task.path)
     about |= {
         "started_utc": run.record.started_utc,

@@ -1,4 +1,4 @@
-"""Many inputs → one table, in parallel; a failure is a row, and ends nothing."""
+"""Many inputs → one table, in parallel; an input that fails has a row with its problem."""
 
 from __future__ import annotations
 
@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 from levilab.errors import DataError, NoneUsable
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.many.file import TableFile, check_name
-from levilab.pipelines.many.one import PassedOver, Row, Task, analyze_one, columns_of, row
-from levilab.pipelines.result import relative
-from levilab.pipelines.sources import data_files
+from levilab.pipelines.many.one import PassedOver, Row, Task, analyze_one, columns_of, name_of, row
+from levilab.pipelines.sources import data_files, sha256_of
 from levilab.runs.run import RECORD, find_run, run_folders
 from levilab.software import software_versions
 from levilab.workers import processes, results_of, this_process
@@ -31,16 +30,16 @@ MOST_FAILURES = 10
 
 @dataclass
 class Tally:
-    """How far a table is.
+    """Counts of the inputs of a table.
 
     Attributes:
         total: inputs that were found.
         kept: rows of an earlier call.
-        done: inputs that are dealt with, those of an earlier call included.
+        done: inputs that have an outcome, those of an earlier call included.
         failed: of the rows of this call.
         failures: the first of them, (path, problem).
         left_out: inputs that do not belong into the table.
-        passed_over: why → how many of them; not of files that are of no concern.
+        passed_over: why → how many of them; without files that hold no readings.
         same: rows of this call with the same readings as another one.
     """
 
@@ -96,7 +95,8 @@ def write_table(
         given: options by their names.
         table: the file, which ends in .csv or .parquet.
         cores: processes that analyze, 1: this one alone; None: one for each core.
-        resume: whether rows of an earlier call are kept, and only the other inputs analyzed.
+        resume: whether rows of an earlier call are kept, if their readings are the same still, and only the inputs that
+            failed, have changed or are new are analyzed.
         save: whether a result.json, without its figure, is written beside each input.
         show: called after each input.
 
@@ -108,10 +108,9 @@ def write_table(
     check_name(table)
     options = analysis.options_from(given)
     folder = table.parent
-    found = [*inputs(paths)]
+    found = {name_of(Path(path), folder): (path, is_run, searched) for path, is_run, searched in inputs(paths)}
     if not found:
         raise NoneUsable(f"{paths[0]}: holds no run and no data file; name run folders, or a folder with some of them")
-    names = [relative(Path(path), folder) for path, _, _ in found]
     made_with = {
         "analysis": analysis.name,
         "settings": analysis.result.settings(options).model_dump(mode="json", by_alias=True),
@@ -119,11 +118,18 @@ def write_table(
     }
     tally = Tally(len(found))
     with TableFile(table, columns_of(analysis), made_with).open(resume=resume) as file:
-        tally.kept = tally.done = sum(name in file for name in names)
+        for name, (path, is_run, _) in found.items():
+            if name not in file:
+                continue
+            if _hash(Path(path, analysis.needs.data) if is_run else Path(path)) == file.sha256(name):
+                tally.kept += 1
+                tally.done += 1
+            else:  # its readings are others now
+                file.forget(name)
         show(tally)
         tasks = (
             Task(Path(path), is_run, searched, analysis.name, options, folder, save)
-            for name, (path, is_run, searched) in zip(names, found, strict=True)
+            for name, (path, is_run, searched) in found.items()
             if name not in file
         )
         workers = this_process() if cores == 1 or tally.total - tally.done <= 1 else processes(cores)
@@ -134,32 +140,36 @@ def write_table(
                     file.add(outcome.cells)
                 tally.count(outcome)
                 show(tally)
-        file.publish(names)
+        file.publish(found)
     return tally
 
 
+def _hash(readings: Path) -> str | None:
+    """The hash of a file; None if it cannot be read any more."""
+    try:
+        return sha256_of(readings)
+    except DataError:
+        return None
+
+
 def _outcome(done: Done[Task, Row | PassedOver]) -> Row | PassedOver:
-    """What came of an input; one that killed its processes has a row that says so."""
+    """Return the outcome of an input; one that killed its processes has a row with that problem."""
     if done.result is not None:
         return done.result
     task = done.task
-    about = {"path": relative(task.path, task.folder), "problem": f"its analysis ended its process: {done.error}"}
+    about = {"path": name_of(task.path, task.folder), "problem": f"its analysis ended its process: {done.error}"}
     return row(ANALYSES[task.analysis], about, None)
 
 
 def inputs(paths: Sequence[Path]) -> Iterator[tuple[str, bool, bool]]:
-    """Each input once, with whether it is a run and whether a search found it: in the order of the paths, by name.
+    """Each input, with whether it is a run and whether a search found it: in the order of the paths, by name.
 
     As text: a Path takes a kilobyte.  Raises DataError for a path that does not exist.
     """
-    seen = set()
     for path in map(find_run, paths):
         if not path.exists():
             raise DataError(f"{path}: there is no such file or folder")
-        for found in _below(path):
-            if found[0] not in seen:
-                seen.add(found[0])
-                yield found
+        yield from _below(path)
 
 
 def _below(path: Path) -> Iterator[tuple[str, bool, bool]]:

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from analysis.numbers import digits
 from levilab.pipelines.precession.analysis import intercept_of, slope_of
-from levilab.present.numbers import plain, short_name, without_unit
-from levilab.present.style import STYLE, row
+from levilab.present.numbers import plain, without_unit
+from levilab.present.style import MARKERS, STYLE, label_of_run, row
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: One a run, as long as there are so few.
-MARKERS = "osD^vP*X"
 #: Okabe and Ito's colours: the line, the median line, points left out.
 LINE, ROBUST, OUT = "#0072B2", "#E69F00", "#D55E00"
 #: More points have no bars.
@@ -71,10 +69,8 @@ def _draw_line(axes: Axes, analysis: PrecessionAnalysis) -> None:
     margin = 0.05 * (high - low)
     axes.set_ylim(low - margin, high + margin)
     for k, (run, source) in enumerate(zip(analysis.runs, analysis.sources, strict=True)):
-        several = len(analysis.runs) > 1
-        _draw_points(
-            axes, run.fit, k, run.fit.column("precession"), label=short_name(source.name) if several else "points"
-        )
+        name = label_of_run(source.name, k, len(analysis.runs), "points")
+        _draw_points(axes, run.fit, k, run.fit.column("precession"), label=name)
         _draw_left_out(axes, run.fit)
     axes.set(xlabel="frequency of the drive ν$_d$  [Hz]", ylabel="precession that was counted ν$_p$  [Hz]")
     made_up = sum(source.synthetic for source in analysis.sources)

@@ -67,6 +67,11 @@ class Readings:
     def __len__(self) -> int:
         return len(self.drive)
 
+    @property
+    def fingerprint(self) -> float:
+        """The fastest precession [Hz]."""
+        return float(np.abs(self.precession).max())
+
     def same_as(self, other: Readings) -> bool:
         """Whether these are the same points, but for the rounding of another unit in the file."""
         pairs = ((self.drive, other.drive), (self.precession, other.precession))

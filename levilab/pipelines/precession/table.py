@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from analysis.uncertainty import Estimate
 from levilab.pipelines.precession.analysis import at_most, intercept_of, slope_of
-from levilab.present.numbers import column, plain, signed, without_unit
+from levilab.present.numbers import column, plain, short_name, signed, without_unit
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def lines_table(analysis: PrecessionAnalysis) -> Table:
     rows = []
     if total > 1:
         for run, source in zip(analysis.runs, analysis.sources, strict=True):
-            rows.append(Row((f"{source.name}: {line_name(run.fit)}", *_line_cells(run.fit))))
+            rows.append(Row((f"{short_name(source.name)}: {line_name(run.fit)}", *_line_cells(run.fit))))
     together = "together" if total > 1 else "best"
     rows.append(
         Row(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import zlib
 from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -42,6 +44,11 @@ class Records:
 
     def __len__(self) -> int:
         return sum(waveform.count for waveform in self.waveforms) + (len(self.pulses.times) if self.pulses else 0)
+
+    @property
+    def fingerprint(self) -> float:
+        """A number made of the path."""
+        return float(zlib.crc32(os.fsencode(self.origin.resolve())))
 
     def same_as(self, other: Records) -> bool:
         """Whether it is the same input: nothing is averaged, so a copy by another name does no harm."""

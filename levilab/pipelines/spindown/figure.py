@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
@@ -116,19 +117,28 @@ def _draw_by_run(axes: Axes, analysis: SpinDownAnalysis) -> None:
     value, u = (
         np.array([np.nan if x is None else x for x in of]) for of in zip(*((f.value, f.u) for f in found), strict=True)
     )
+    power = _power_of_ten(value)
+    value, u = value / 10.0**power, u / 10.0**power
     number = np.arange(1, len(found) + 1)
     colour = SHOWN_LAWS[best.name].colour
     if mean.value is not None:
         if mean.scatter is not None:
-            axes.axhspan(mean.value - mean.scatter, mean.value + mean.scatter, color="black", alpha=0.12, linewidth=0)
-        axes.axhline(mean.value, color=colour, linewidth=1.2)
+            ends = ((mean.value + side * mean.scatter) / 10.0**power for side in (-1, 1))
+            axes.axhspan(*ends, color="black", alpha=0.12, linewidth=0)
+        axes.axhline(mean.value / 10.0**power, color=colour, linewidth=1.2)
     few = len(found) <= MOST_BARS
     axes.errorbar(number, value, u if few else None, color=colour, linestyle="none", marker="o",
                   markersize=3 if few else 1.5, elinewidth=0.8)  # fmt: skip
     unit = in_words(mean.unit).replace("^−½", "$^{−1/2}$").replace("^(1−n)", "$^{1−n}$")
-    axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 4), useMathText=True)
-    axes.set(xlabel="run, in the order of the table", ylabel=f"{SYMBOLS[name]}  [{unit}]")
+    times = f"$10^{{{power}}}$ ".replace("-", "−") if power else ""
+    axes.set(xlabel="run, in the order of the table", ylabel=f"{SYMBOLS[name]}  [{times}{unit}]")
     axes.set_title(f"{SYMBOLS[name]} of the {best.name} law run by run; grey: ±s", loc="left", fontsize=11)
+
+
+def _power_of_ten(values: Array) -> int:
+    """The power of ten for an axis's label: written above the axis, it would push the title out of the figure."""
+    largest = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
+    return math.floor(math.log10(largest)) if largest > 0 and not 0.01 <= largest < 1e4 else 0
 
 
 def _run_label(analysis: SpinDownAnalysis, k: int) -> str | None:

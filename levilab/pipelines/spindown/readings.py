@@ -50,6 +50,11 @@ class Readings:
     def __len__(self) -> int:
         return len(self.time)
 
+    @property
+    def fingerprint(self) -> float:
+        """The greatest spin frequency [Hz]."""
+        return float(np.abs(self.frequency).max())
+
     def same_as(self, other: "Readings") -> bool:
         """Whether time and frequency are the same, but for the rounding of another unit in the file."""
         pairs = ((self.time, other.time), (self.frequency, other.frequency))

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 #: Readings printed in the page; more stay in the run folder.  They stand in blocks side by side.
 MOST_READINGS, BLOCK = 200, 10
-#: Falls that are told; of more the range is.
+#: Most falls that are listed; of more the range is given.
 MOST_FALLS = 8
 #: The event that says when the top fell.
 FELL = "fell"

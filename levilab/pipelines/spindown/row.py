@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from analysis.spindown.drag import LAWS, DragLaw
-from levilab.pipelines.row import Column, entry, estimate, named, value
+from levilab.pipelines.row import Column, entry, estimate, name_with_unit, value
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -38,7 +38,7 @@ def _of_law(law: DragLaw) -> Iterator[Column]:
     for name, unit, meaning in _STATISTICS:
         heading = "delta_aicc" if name == "difference" else name
         read = _statistic(law.name, name)
-        yield Column(named(f"{law.name}_{heading}", unit), "number", f"of the law {law.name}: {meaning}", read)
+        yield Column(name_with_unit(f"{law.name}_{heading}", unit), "number", f"of the law {law.name}: {meaning}", read)
 
 
 SPINDOWN_ROW = (

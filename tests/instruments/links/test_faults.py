@@ -204,7 +204,7 @@ def test_faults_one_after_the_other_never_give_a_wrong_number(box, what):
 # --- the same at the servers, with other people's client ---
 
 #: How long an answer is waited for that cannot come [s].
-IN_VAIN = 0.05
+UNANSWERED_S = 0.05
 LOST = {"disconnected", "away for 5 s"}
 #: What differs from READING.  pyvisa-py waits on at a bare socket that was closed; over HiSLIP it does not end a
 #: message at a line feed, so what comes behind one is seen; a lock holds back questions, not an answer on its way,
@@ -232,11 +232,11 @@ class StandingClock(VirtualClock):
 class PatientLink(VisaTransport):
     """Waits as long as it takes, but briefly for a reading that cannot come before the test lets time pass."""
 
-    in_vain = False
+    is_silent = False
 
     def query(self, message, *, patience=0.0):
-        brief = self.in_vain and message == "READ?"
-        return super().query(message, patience=IN_VAIN - self.timeout if brief else patience)
+        brief = self.is_silent and message == "READ?"
+        return super().query(message, patience=UNANSWERED_S - self.timeout if brief else patience)
 
 
 def received_before_the_end(sock, timeout, receive=pyvisa_py.protocols.rpc._recvrecord, **more):
@@ -279,7 +279,7 @@ def test_a_fault_over_a_server_raises_and_the_next_answer_is_right(way, what, mo
         expected = SERVED.get((way, what), READING[what])
         if isinstance(expected, tuple):
             error, message = expected
-            box.transport.in_vain = error is NoAnswer
+            box.transport.is_silent = error is NoAnswer
             with pytest.raises(error, match=message.partition(" within")[0]) as caught:
                 box.reading()
             assert caught.value.address == box.transport.address
@@ -292,7 +292,7 @@ def test_a_fault_over_a_server_raises_and_the_next_answer_is_right(way, what, mo
         if what in LOST:
             box.clock.sleep(AWAY)
             box.transport.reopen()
-        box.transport.in_vain = False
+        box.transport.is_silent = False
         box.forget_errors()
         for _ in range(3):
             assert box.level == 1.5

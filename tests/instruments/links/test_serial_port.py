@@ -143,7 +143,7 @@ def test_an_instrument_that_was_off_is_found_when_it_is_on(bench, clock):
         assert clock.now() - before < 0.1  # in step again
 
 
-def test_what_came_unasked_is_dropped_before_a_question(slow, clock):
+def test_bytes_without_a_question_are_dropped_before_the_next_question(slow, clock):
     slow.write("LIST?")
     clock.sleep(1.0)
     assert slow.query("*IDN?") == IDENTITY

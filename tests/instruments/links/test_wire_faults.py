@@ -123,7 +123,7 @@ def excuse(pair):
             if reason := excuse_of_a_message(pair, struck):
                 return reason
         elif struck.what == "late":
-            pass  # the program has waited in vain: what comes then is dropped
+            pass  # the program has waited too long: what comes then is dropped
         elif head := re.match(rb"[^#\n]{0,16}#\d", struck.honest):
             if len(struck.arrived) == len(struck.honest) and struck.arrived[: head.end()] == head[0]:
                 return "bytes of a block become others, and a block has no check"

@@ -57,7 +57,7 @@ def test_json_has_the_plan_and_each_column_in_numbers(shown: tuple[Path, str]) -
     assert found["figures"] == ["map.zarr.survived.png"]
 
 
-def test_ctrl_c_says_what_is_kept_and_what_goes_on_and_that_yields_the_same(
+def test_after_ctrl_c_the_printed_command_continues_to_the_same_result(
     shown: tuple[Path, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     calls, compute = [], run_module.compute
@@ -103,7 +103,7 @@ def test_ctrl_c_says_what_is_kept_and_what_goes_on_and_that_yields_the_same(
         ),
     ],
 )
-def test_a_mistake_is_answered_before_anything_is_computed(
+def test_a_wrong_option_is_an_error_before_anything_is_computed(
     words: tuple[str, ...], said: str, shown: tuple[Path, str], tmp_path: Path
 ) -> None:
     shutil.copytree(shown[0] / "map.zarr", tmp_path / "map.zarr")

@@ -69,7 +69,7 @@ def test_the_angle_of_the_body_is_that_of_a_turn_about_the_vertical() -> None:
     assert body_angle(states) == pytest.approx(angles, abs=1e-15)
 
 
-def test_what_is_lost_too_short_or_has_no_drive_is_not_called_locked() -> None:
+def test_a_lost_top_a_short_motion_and_no_drive_are_not_locked() -> None:
     motion = driven(30.0)
     assert is_locked(motion.scene, motion.states, survived=False) is False
     assert locked(driven(30.0, duration=9.0)) is None

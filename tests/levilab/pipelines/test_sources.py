@@ -12,8 +12,9 @@ import pytest
 
 from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.sources import sha256_of
-from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
+from levilab.pipelines.sources import collect, sha256_of
+from levilab.pipelines.spindown.analysis import NEEDS, SpinDownOptions, analyze_spindowns
+from levilab.pipelines.spindown.readings import Readings
 from support.spin_downs import spin_down_csv
 
 if TYPE_CHECKING:
@@ -112,3 +113,17 @@ def test_the_digest_of_a_file_is_that_of_the_standard(tmp_path):
     (tmp_path / "readings.csv").write_bytes(b"abc")
     # FIPS 180-4, the example of one block
     assert sha256_of(tmp_path / "readings.csv") == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+
+
+def test_of_many_runs_few_are_compared_with_each_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = spin_down_csv(tmp_path / "0.csv")
+    head, *lines = first.read_text(encoding="utf-8").splitlines()
+    for k in range(1, 30):
+        rows = [f"{time},{float(f) * (1 + k / 1000)!r},{u}" for time, f, u in (line.split(",") for line in lines)]
+        (tmp_path / f"{k}.csv").write_text("\n".join([head, *rows, ""]), encoding="utf-8")
+    shutil.copy(first, tmp_path / "copy.csv")
+    compared: list[int] = []
+    compare = Readings.same_as
+    monkeypatch.setattr(Readings, "same_as", lambda *two: compared.append(1) or compare(*two))
+    found = collect([tmp_path], NEEDS, lambda _: SpinDownOptions())
+    assert (len(found.sources), len(found.warnings), len(compared)) == (30, 1, 1)

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 import pytest
 
 from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.limit.figure import limit_figure
 from levilab.report.page import MOST_IN_FULL, write_report
 from many_runs import make_runs
+from support.paths import SAMPLE_DATA
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -28,7 +30,7 @@ def page(tmp_path: Path, undrawn_figures: None) -> str:
     return output.read_text(encoding="utf-8")
 
 
-def test_what_many_runs_share_is_said_once_and_each_unfolds(page: str) -> None:
+def test_facts_that_many_runs_share_stand_there_once(page: str) -> None:
     assert COUNT - 2 > MOST_IN_FULL
     assert page.count("<dt>Status</dt>") == page.count("no instruments recorded") == 1
     assert page.count("<details><summary><strong>") == COUNT - 2
@@ -46,3 +48,14 @@ def test_warnings_that_are_alike_stand_together(tmp_path: Path) -> None:
     torn = [alike for alike in found.grouped_warnings if "cut off" in alike[0]]
     assert [len(alike) for alike in torn] == [4]
     assert sorted(text for alike in found.grouped_warnings for text in alike) == sorted(found.all_warnings)
+
+
+def test_of_many_runs_a_legend_does_not_name_each(tmp_path: Path) -> None:
+    limits = (SAMPLE_DATA / "upper-limits" / "readings.csv").read_text(encoding="utf-8")
+    for k in range(9):
+        (tmp_path / f"{k}.csv").write_text(limits.replace(",69.513,", f",{69.5 + k / 100},"), encoding="utf-8")
+    found = ANALYSES["limit"].analyze([tmp_path], ANALYSES["limit"].options_from({}))
+    legend = limit_figure(found).axes[0].get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts() if "runs" in text.get_text()] == ["9 runs: a top ± u"]
+    assert len(legend.get_texts()) < len(found.sources)

@@ -49,11 +49,11 @@ def test_of_many_broken_runs_the_first_are_explained(tmp_path: Path, monkeypatch
     runs = [replace(RUN, path=str(tmp_path / RUN.path), problem=f"problem {k}") for k in range(MOST_PROBLEMS + 3)]
     notes = [line for line in shown(monkeypatch, tmp_path, runs, 120) if line.startswith("note:")]
     assert notes[0] == "note: problem 0"
-    assert notes[-1] == "note: and 3 more that cannot be read; levilab runs --json says why"
+    assert notes[-1] == "note: and 3 more that cannot be read; JSON has the reason for each"
     assert len(notes) == MOST_PROBLEMS + 1
 
 
-def test_the_quick_look_says_what_loading_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_fast_reader_finds_the_same_as_loading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folders = make_runs(tmp_path, 8, broken=2)
     for folder, change in zip(
         folders[::2], ('"seed": -1', '"seed": NaN', '"status": "running"', '"seed": 3'), strict=True

@@ -75,6 +75,15 @@ def test_the_linear_window_agrees_with_simulated_small_motions():
     assert alive == [False, True, True, False]
 
 
+def test_a_moment_across_the_axis_lifts_nothing():
+    across = UNDRIVEN.changed({"top.moment_tilt": [0.1, 0.0], "start.place": "equilibrium"})
+    with pytest.raises(SceneError, match=r"top\.moment_tilt\.1 = 0: a field lifts"):
+        floating_height(across)
+    found, over_masses = stability_of(across), windows_over(across, [0.025])
+    assert (found.windows, found.equilibria, over_masses.adiabatic) == ((), (), ())
+    assert np.isnan(over_masses.heights).all()
+
+
 def test_a_mass_that_cannot_float_is_named_in_grams():
     assert advice(stability_of(UNDRIVEN.changed({"top.mass_kg": 0.0255}))).startswith("a top of 25.5 g does not float")
     asked = advice(stability_of(UNDRIVEN.changed({"top.mass_kg": 25.26})))

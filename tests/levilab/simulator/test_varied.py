@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from levilab.errors import SimulationError
 from levilab.simulator import SceneError
 from levilab.simulator.accuracy import longest_step
 from levilab.simulator.field import flux_density
@@ -31,6 +32,7 @@ VARIED = {
         "drag.coefficient": np.repeat([0.0, 1e-3, 4e-3, 2e-2], 5), "drag.law": np.tile(["newton", "disc"], 10),
         "drive.frequency_hz": RANDOM.uniform(20, 40, 20), "drive.amplitude_t": np.tile([0, 1e-4, 2e-4, 5e-4], 5),
         "drive.phase_rad": RANDOM.uniform(0, 6, 20), "gravity_m_s2": RANDOM.uniform(9, 10, 20),
+        "drive.direction.0": np.repeat([0.0, -1e-3, 3.0, 1e200], 5), "drive.direction.2": RANDOM.uniform(-2, 2, 20),
     }),
     "the base": (preset("undriven"), {
         "base.strength_t_m": RANDOM.uniform(1e-3, 2e-3, 20), "base.inner_radius_m": RANDOM.uniform(0.02, 0.03, 20),
@@ -94,13 +96,20 @@ def test_a_field_at_many_places_has_the_bits_of_each():
         ({"base.field": ["exact", "paraxial-3"]}, r"base\.field = 'paraxial-3'.* \(index 1 of the values\)"),
         ({"top.mass_kg": [True, False]}, r"top\.mass_kg = 'False': .*number"),
         ({"start.place": "equilibrium", "top.mass_kg": [0.025, 0.05]}, r"= 0\.05: .*does not float.* \(index 1 of"),
+        ({"base.thickness_m": [0.01, 1e-7]}, r"^thickness = 1e-07 m: .*at least 1e-05 m, .* \(index 1 of the values\)"),
         ({"top.mas_kg": [0.025, 0.05]}, r"there is no key top\.mas_kg"),
         ({"top": [1.0, 2.0]}, r"top = 1\.0: a table is expected"),
+        ({"observed": ["motion", "spin"]}, r"observed = spin: .*need observed = motion \(index 1 of the values\)"),
     ],
 )
 def test_a_value_that_a_scene_does_not_allow_is_named_with_its_place(over, message):
     with pytest.raises(SceneError, match=message):
         batches(preset("undriven"), over)
+
+
+def test_lists_of_unequal_lengths_are_refused():
+    with pytest.raises(SimulationError, match=r"start\.spin_hz: lists of unequal lengths"):
+        batches(preset("undriven"), {"start.spin_hz": [[30.0, 31.0], [32.0]]})
 
 
 def test_a_thousand_tops_are_not_a_thousand_scenes(monkeypatch):

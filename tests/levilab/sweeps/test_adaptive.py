@@ -118,9 +118,9 @@ def test_a_map_that_was_interrupted_goes_on_without_computing_anew(
 
 def test_what_has_no_boundary_cannot_be_refined() -> None:
     asked = plan(5, 5, 0.01)
-    with pytest.raises(UsageError, match="adaptive = lifetime_s: a boundary is one of a yes or no"):
+    with pytest.raises(UsageError, match="adaptive = lifetime_s: a boundary lies between yes and no"):
         begin_adaptive(Store.create(None, asked), "lifetime_s")
-    with pytest.raises(UsageError, match="`observe` must have survived or locked"):
+    with pytest.raises(UsageError, match="this is neither: add survived or locked to `observe`"):
         begin_adaptive(Store.create(None, asked), "locked")
     with pytest.raises(UsageError, match="stride = 6: a power of 2"):
         begin_adaptive(Store.create(None, asked), stride=6)

@@ -48,11 +48,12 @@ def test_a_text_that_is_no_axis_is_refused_with_what_is_expected(text: str, said
         (("start.spin=18:40:5",), "did you mean start.spin_hz?"),
         (("start=18:40:5",), "sweep one of its keys, place,"),
         (("start.position_m=1:2:5",), "start.position_m.0, start.position_m.1"),
-        (("start.position_m.3=1:2:5",), "no such number"),
+        (("start.position_m.3=1:2:5",), "start.position_m has 3 numbers: sweep one of them, start.position_m.0"),
+        (("top.mass_kg.0=1:2:5",), "no such number"),
         (("drive.waveform=1:2:5",), "it takes words, now off"),
         (("description=1:2:5",), "the same for a whole map"),
         (("drive.frequency_hz=29:31:5",), "it changes nothing, since drive.waveform = off"),
-        (("top.mass_kg=-1:1:5",), "top.mass_kg = -1.0 the scene is refused"),
+        (("top.mass_kg=-1:1:5",), "top.mass_kg = -1.0 the scene is invalid"),
         (("top.moment_a_m2=-1:1:5",), "any number but 0 is expected"),
         (("start.position_m.2=-0.01:0.07:2", "start.spin_hz=20:30:3"), "a height (the third number) above the base"),
         (("start.spin_hz=18:40:5", "start.spin_hz=18:40:5"), "each key is swept once"),
@@ -63,7 +64,7 @@ def test_a_text_that_is_no_axis_is_refused_with_what_is_expected(text: str, said
         ),
     ],
 )
-def test_axes_that_the_scene_lacks_or_refuses_are_named(axes: tuple[str, ...], said: str) -> None:
+def test_axes_that_the_scene_lacks_or_that_are_invalid_are_named(axes: tuple[str, ...], said: str) -> None:
     with pytest.raises(UsageError) as refused:
         check_axes(preset("undriven"), tuple(map(parse_axis, axes)), {"start.velocity_m_s.0"})
     assert said in refused.value.text
@@ -96,6 +97,16 @@ def test_a_table_of_points_may_be_of_commas_semicolons_or_tabs(text: str, tmp_pa
     assert (spin.key, spin.values.tolist(), spin.scale) == ("start.spin_hz", [20.0, 25.5], "table")
     assert waveform.values.tolist() == ["sine", "square"]
     check_axes(preset("driven"), (spin, waveform))
+
+
+def test_a_key_without_effect_at_some_points_alone_is_an_axis(tmp_path: Path) -> None:
+    table = read_points(points(tmp_path, "drive.waveform,drive.amplitude_t\nsine,4e-4\noff,0\n"))
+    check_axes(preset("driven"), table)
+    with pytest.raises(UsageError, match=r"it changes nothing, since drive\.waveform = off"):
+        check_axes(preset("driven"), read_points(points(tmp_path, "drive.waveform,drive.amplitude_t\noff,0\noff,1\n")))
+    check_axes(
+        preset("undriven"), [parse_axis("washers.inertia_kg_m2=0:1e-9:3"), parse_axis("washers.drag_share=0:1:3")]
+    )
 
 
 @pytest.mark.parametrize(

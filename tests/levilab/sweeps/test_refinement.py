@@ -60,7 +60,7 @@ def test_the_missed_points_are_within_the_limit_in_95_of_100_maps() -> None:
     assert missed > 60  # small islands are missed: there was something to limit
 
 
-def test_the_judge_alone_keeps_what_it_promises() -> None:
+def test_the_limit_of_the_second_audit_alone_holds_in_95_percent() -> None:
     # one confined to its own audit, with no repair on its side: 3 standard errors of a share of 95 % in 2000 trials
     random = np.random.default_rng(3)
     found = random.hypergeometric(40, 1960, 200, size=2000)
@@ -81,7 +81,7 @@ def test_where_all_was_audited_the_limit_is_what_was_wrong() -> None:
     assert Audit(0, 0, 0).most_wrong == 0
 
 
-def test_a_second_refinement_asks_for_the_same_points_whatever_is_known() -> None:
+def test_a_second_refinement_asks_for_the_same_points() -> None:
     values = islands(4)
     asked: list[list[bytes]] = []
     for _ in range(2):
@@ -103,7 +103,7 @@ def test_maps_of_every_shape_are_refined_to_their_end(shape: tuple[int, ...]) ->
     assert np.array_equal(found.values, values)
 
 
-def test_a_map_of_one_value_is_little_work() -> None:
+def test_a_map_of_one_value_needs_few_points() -> None:
     found = refined(np.ones((200, 200), dtype=np.bool_))
     assert found.computed.sum() == 26 * 26 + 2 * AUDIT
     assert found.most_wrong_share < 0.01

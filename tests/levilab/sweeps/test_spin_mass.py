@@ -63,6 +63,10 @@ def test_spans_are_read_and_what_is_none_is_reported() -> None:
 def test_a_span_that_is_none_is_refused_with_what_one_looks_like(text: str) -> None:
     with pytest.raises(UsageError, match=r"spins = .*: LOW:HIGH:STEP is expected, such as 20:30:0\.5"):
         span_of("spins", text)
+    with pytest.raises(
+        UsageError, match=r"such as 0\.0250:0\.0254:2e-5; write the number without its unit, which is kg"
+    ):
+        span_of("masses", "25g:26g:1g")
 
 
 def test_a_map_of_too_many_tops_or_of_no_masses_is_refused() -> None:

@@ -86,9 +86,9 @@ def test_values_are_on_the_disk_before_their_mark(tmp_path: Path, monkeypatch: p
 def test_two_processes_cannot_write_into_one_store(tmp_path: Path) -> None:
     made = Store.create(tmp_path / "map.zarr", plan())
     second = Store.open(tmp_path / "map.zarr", writable=True)
-    with made.locked(), pytest.raises(CannotWrite, match="another process is computing it"), second.locked():
+    with made.lock(), pytest.raises(CannotWrite, match="another process is computing it"), second.lock():
         pass
-    with second.locked():
+    with second.lock():
         pass
     assert [path.name for path in tmp_path.iterdir()] == ["map.zarr"]
 
@@ -106,6 +106,14 @@ def test_a_store_that_is_damaged_is_an_error_that_names_it(tmp_path: Path) -> No
         Store.open(tmp_path / "map.zarr")
     with pytest.raises(DataError, match="no store of a sweep"):
         Store.open(tmp_path / "nothing")
+
+
+def test_a_store_that_is_moved_while_it_is_written_is_an_error_that_names_it(tmp_path: Path) -> None:
+    made = Store.create(tmp_path / "map.zarr", plan())
+    (tmp_path / "map.zarr").rename(tmp_path / "elsewhere.zarr")
+    task = next(tasks_of(made))
+    with pytest.raises(CannotWrite, match=r"map\.zarr: it was moved or removed meanwhile"):
+        made.write(task.chunk, made_up(task))
 
 
 def test_a_folder_that_is_there_is_not_written_over(tmp_path: Path) -> None:

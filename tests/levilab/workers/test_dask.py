@@ -89,7 +89,7 @@ def test_a_cluster_without_workers_says_how_to_start_one() -> None:
         list(results_of(tasks.square, [1], cluster(dask.address, patience_s=0)))
 
 
-@pytest.mark.parametrize("address", ["nowhere.json", "tcp://127.0.0.1:1", "gopher://127.0.0.1:1"])
+@pytest.mark.parametrize("address", ["nowhere.json", "tcp://127.0.0.1:1", "gopher://127.0.0.1:1", "cluster"])
 def test_a_wrong_address_of_a_scheduler_is_an_error_in_one_line(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("levilab.workers.dask.ANSWER_S", 0.2)
     with pytest.raises(LevilabError) as raised:

@@ -73,7 +73,7 @@ def test_an_executor_that_gives_up_its_tasks_ends_the_work() -> None:
         list(results_of(tasks.square, [1], Workers(GivesUp, name="batch jobs")))
 
 
-def test_a_worker_leaves_ctrl_c_alone_and_has_one_thread() -> None:
+def test_a_worker_ignores_ctrl_c_and_has_one_thread() -> None:
     [done] = results_of(tasks.surroundings, [0], processes(1))
     assert done.result == {"interrupted": False, "threads": "1", "main": None}
 

@@ -52,7 +52,7 @@ def measure_calls(
     In ROUNDS, of which each point keeps its best.  What a contender prepares for a subject serves all durations and
     rounds.
     """
-    prepared = cache(Contender.prepared)
+    prepared = cache(Contender.call_for)
     best: dict[tuple[int, Contender, float], Point] = {}
     rounds = 1 if quick else ROUNDS
     for number in range(rounds):

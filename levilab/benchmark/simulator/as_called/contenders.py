@@ -1,4 +1,4 @@
-"""Who takes part: each integrator as its users call it, with its own step control."""
+"""The contenders: each integrator as its users call it, with its own step control."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ class Contender:
         """Whether its package is there."""
         return find_spec(self.package) is not None
 
-    def prepared(self, subject: Any, tolerance: float) -> Call:
-        """Return what is timed."""
+    def call_for(self, subject: Any, tolerance: float) -> Call:
+        """Return the call that is timed."""
         return self.prepare(subject, tolerance)
 
 

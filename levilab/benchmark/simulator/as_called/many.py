@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 DURATION = 5.0
 SPINS_HZ, MASSES_KG = np.linspace(26.0, 36.0, 40), np.linspace(0.0252, 0.0253, 25)
 SIZE = SPINS_HZ.size * MASSES_KG.size
-#: Which tops have a reference.
+#: Indices of the tops that have a reference.
 COMPARED = np.linspace(0, SIZE - 1, 20).round().astype(int)
 
 

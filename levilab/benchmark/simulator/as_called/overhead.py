@@ -1,4 +1,4 @@
-"""What a call takes beside its compiled code: checks, the model, the search for a step, the result."""
+"""The time of a call outside of compiled code: checks, the model, the search for a step, the result."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Overhead:
 def watched_kernels() -> Iterator[list[Kernel]]:
     """Yield a list that every call from the simulator into compiled code is written to.
 
-    The compiled functions that its modules call are replaced meanwhile by ones that look at the clock.
+    The compiled functions that its modules call are replaced meanwhile by ones that read the clock.
     """
     calls: list[Kernel] = []
 

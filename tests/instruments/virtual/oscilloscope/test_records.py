@@ -67,7 +67,7 @@ def test_a_short_record_does_not_make_the_trigger_look_at_every_nanosecond():
     assert max(looks) <= 1_000_000
 
 
-def test_a_scope_that_ran_for_an_hour_in_vain_does_not_look_twice():
+def test_a_scope_that_ran_for_an_hour_without_a_trigger_does_not_look_twice():
     looks = []
 
     def watched(start, step, n):

@@ -147,7 +147,7 @@ def test_what_a_client_sent_before_it_left_is_worked_on(loop, instrument, way, o
     assert instrument.device.settings["level"] == 7
 
 
-def test_a_client_of_hislip_that_waits_for_a_lock_in_vain_is_let_go(loop, instrument):
+def test_a_client_of_hislip_that_gets_no_lock_in_time_is_let_go(loop, instrument):
     async def leave_locked_out():
         holder = Link(instrument)
         await holder.lock(None, 0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import shutil
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -11,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import pyarrow.parquet as pq
 import pytest
 
-from levilab.errors import UsageError, WorkersLost
+from levilab.errors import DataError, UsageError, WorkersLost
+from levilab.files import CannotWrite, locked
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.many import table as many
 from levilab.pipelines.many.one import PassedOver, Row, Task, analyze_one, columns_of
@@ -64,7 +66,7 @@ def test_a_run_is_a_row_and_a_broken_one_says_why(runs: Path) -> None:
     assert (rows[3]["status"], rows[3]["synthetic"]) == ("finished", "true")
 
 
-def test_a_row_says_what_the_result_of_the_run_says(runs: Path) -> None:
+def test_a_row_has_the_values_of_the_result_of_its_run(runs: Path) -> None:
     row = rows_of(tabulate(runs))[0]
     folder = runs.parent / row["path"]
     printed = json.loads(command("analyze", "spindown", folder, "--no-save", "--json", cwd=runs).out)
@@ -92,11 +94,11 @@ def test_a_table_that_was_interrupted_goes_on(runs: Path) -> None:
         file.write(b"runs/torn,2026")  # as after a kill under way
     seen: list[int] = []
     assert tabulate(runs, resume=True, show=lambda tally: seen.append(tally.done)).read_bytes() == whole
-    assert seen == [*range(3, COUNT + 1)]
+    assert seen == [*range(2, COUNT + 1)]  # of the three, one had failed, and is tried again
     assert not part.exists()
 
 
-def test_rows_of_hours_are_not_replaced_unasked(runs: Path) -> None:
+def test_rows_of_an_earlier_call_are_never_overwritten(runs: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         tabulate(runs, show=partial(interrupt_after, 3))
     with pytest.raises(UsageError, match="go on with it"):
@@ -107,18 +109,63 @@ def test_rows_of_hours_are_not_replaced_unasked(runs: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["all.csv", "all.parquet"])
-def test_of_runs_that_came_later_only_those_are_analyzed(runs: Path, name: str) -> None:
+def test_resume_of_a_complete_table_analyzes_only_new_runs(runs: Path, name: str) -> None:
     last = max(runs.iterdir())
     shutil.move(last, runs.parent)
     tabulate(runs, name)
     shutil.move(runs.parent / last.name, last)
     seen: list[int] = []
     grown = tabulate(runs, name, resume=True, show=lambda tally: seen.append(tally.done))
-    assert seen == [COUNT - 1, COUNT]
+    assert seen == [*range(COUNT // 2, COUNT + 1)]  # those that failed are tried again
     if name.endswith(".csv"):
         assert grown.read_bytes() == tabulate(runs, "anew.csv").read_bytes()
     else:
         assert pq.read_table(grown).equals(pq.read_table(tabulate(runs, "anew.parquet")))
+
+
+def test_of_a_whole_table_only_what_changed_is_done_again(runs: Path) -> None:
+    tabulate(runs)
+    changed, mended, *_ = sorted(runs.iterdir())
+    shutil.copy(changed / "run.json", mended)
+    readings = changed / "readings.csv"
+    readings.write_bytes(readings.read_bytes().replace(b",0.03", b",0.06"))
+    seen: list[Tally] = []
+    rows = rows_of(tabulate(runs, resume=True, show=seen.append))
+    assert seen[-1].kept == COUNT // 2 - 1
+    assert not rows[1]["problem"]
+    assert rows_of(tabulate(runs, "anew.csv")) == rows
+
+
+@pytest.mark.parametrize("name", ["all.csv", "all.parquet"])
+def test_a_table_that_is_damaged_is_refused_and_left_alone(runs: Path, name: str) -> None:
+    table = tabulate(runs, name)
+    damaged = table.read_bytes()[:900] + b"\n"
+    table.write_bytes(damaged)
+    with pytest.raises(DataError, match=rf"{name}: is damaged \(.*\): start anew"):
+        tabulate(runs, name, resume=True)
+    assert table.read_bytes() == damaged
+    assert sorted(file.name for file in runs.parent.glob("*all.*")) == [name, f"{name}.json"]
+
+
+def test_two_processes_do_not_write_one_table(runs: Path) -> None:
+    with locked(runs.parent / "all.csv", "busy"), pytest.raises(CannotWrite, match="another process is writing it"):
+        tabulate(runs)
+    assert not [*runs.parent.glob("*all.csv*")]
+    tabulate(runs)
+    assert sorted(file.name for file in runs.parent.glob("*all.csv*")) == ["all.csv", "all.csv.json"]
+
+
+def test_a_name_of_any_letters_is_a_row_and_one_alone(tmp_path: Path) -> None:
+    names = ["a  b", "a b", 'c,"d" é'] + ["two\nlines"] * (os.name == "posix")
+    for name in names:
+        shutil.copytree(SAMPLE_DATA / "spin-down-1", tmp_path / "runs" / name)
+    table = tmp_path / "t.csv"
+    both = [tmp_path / "runs", tmp_path / "runs" / ".." / "runs"]
+    tally = write_table(SPINDOWN, both, {}, table, cores=1)
+    found = [row["path"].removeprefix("runs/") for row in rows_of(table)]
+    assert sorted(found) == sorted(name.replace("\n", "\\n") for name in names)
+    assert tally.total == tally.rows == len(names)
+    assert write_table(SPINDOWN, both, {}, table, cores=1, resume=True).kept == len(names)
 
 
 def test_parquet_holds_the_same_numbers_with_their_types(runs: Path) -> None:
@@ -130,7 +177,7 @@ def test_parquet_holds_the_same_numbers_with_their_types(runs: Path) -> None:
     assert (first["synthetic"], first["outliers"], first["best_model"]) == (True, 0, texts[0]["best_model"])
 
 
-def test_a_run_that_kills_its_process_is_a_row_and_no_end(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_that_kills_its_process_has_a_row(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def results(function: Any, tasks: Iterable[Task], *_: Any) -> Iterator[Done[Task, Any]]:
         first, *others = tasks
         yield from (Done(task, function(task)) for task in others)
@@ -143,7 +190,7 @@ def test_a_run_that_kills_its_process_is_a_row_and_no_end(runs: Path, monkeypatc
 
 
 @pytest.mark.parametrize("raised", [MemoryError(), ZeroDivisionError("by zero")])
-def test_what_no_run_should_cause_stands_in_its_row(
+def test_a_defect_of_levilab_becomes_the_problem_of_a_row(
     runs: Path, monkeypatch: pytest.MonkeyPatch, raised: Exception
 ) -> None:
     def analyze(*_: object) -> None:
@@ -168,7 +215,7 @@ def test_every_analysis_fills_its_columns(name: str, sample: str) -> None:
     assert empty == {"problem", "started_utc"}  # which the samples leave out
 
 
-def test_what_does_not_suit_is_passed_over_and_counted(tmp_path: Path) -> None:
+def test_inputs_of_other_analyses_are_passed_over_and_counted(tmp_path: Path) -> None:
     shutil.copytree(SAMPLE_DATA / "trace-laser", tmp_path / "runs" / "trace")
     shutil.copytree(SAMPLE_DATA / "spin-down-1", tmp_path / "runs" / "one")
     shutil.copytree(SAMPLE_DATA / "spin-down-1", tmp_path / "runs" / "two")
@@ -197,7 +244,7 @@ def test_save_writes_a_result_beside_each_run_and_no_figure(runs: Path) -> None:
         (["spindown", "runs", "--cores", "2"], "--cores: goes with --table alone"),
     ],
 )
-def test_wrong_words_are_refused(runs: Path, words: list[str], said: str) -> None:
+def test_wrong_options_are_errors(runs: Path, words: list[str], said: str) -> None:
     ended = command("analyze", *words, cwd=runs.parent)
     assert ended.status == 2
     assert said in ended.err
@@ -227,7 +274,7 @@ def test_ctrl_c_says_where_the_rows_are(runs: Path, monkeypatch: pytest.MonkeyPa
     assert len(rows_of(runs.parent / "t.csv.part.csv")) == 1
 
 
-def test_a_file_of_no_concern_is_passed_over_in_silence(tmp_path: Path) -> None:
+def test_a_file_without_readings_is_passed_over_silently(tmp_path: Path) -> None:
     (tmp_path / "notes.csv").write_text("day,who\n1,me\n2,you\n", encoding="utf-8")
     task = Task(tmp_path / "notes.csv", False, True, "spindown", SPINDOWN.options_from({}), tmp_path)
     assert analyze_one(task) == PassedOver("")
