@@ -14,9 +14,9 @@ UNDRIVEN = preset("undriven")
 def test_random_scenes_end_near_their_tolerance_and_below_their_estimate():
     # 5 to 60 s, 1e-5 to 1e-10; benchmarks/accuracy.py has 1000 scenes
     draws = (np.random.default_rng([7, number]) for number in range(len(KINDS)))
-    tried = [trial(kind, draw) for kind, draw in zip(KINDS, draws, strict=True) for _ in range(8)]
+    tried = [trial(kind, draw) for kind, draw in zip(KINDS, draws, strict=True) for _ in range(4)]
     found = [one for one in tried if one is not None]  # the others have fallen
-    assert len(found) >= 30
+    assert len(found) >= 15
     assert np.mean([one.is_sharp for one in found]) >= 0.7
     assert np.mean([one.is_honest for one in found]) >= 0.9
     assert np.mean([one.tries == 1 for one in found]) >= 0.7
