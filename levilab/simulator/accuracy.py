@@ -30,9 +30,9 @@ def turning_rate(model: Model, start: Array) -> Any:
 
     A tumbling top turns faster than its angular momentum at the start says: the field's torque adds about √(|μ|B/I₁).
     """
-    stiffness = length(np.moveaxis(flux_density(model.field, start[..., R]), -1, 0))  # |μ|B [J]
+    stiffness = length(flux_density(model.field, start[..., R]).T)  # |μ|B [J]
     inverse = model.body.inverse_transverse
-    return length(np.moveaxis(start[..., L], -1, 0)) * inverse + sqrt(stiffness * inverse)
+    return length(start[..., L].T) * inverse + sqrt(stiffness * inverse)
 
 
 def rounding_error(scheme: Scheme, steps: int, end: Array) -> tuple[float, float]:

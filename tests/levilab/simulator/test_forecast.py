@@ -12,11 +12,11 @@ UNDRIVEN = preset("undriven")
 
 
 def test_random_scenes_end_near_their_tolerance_and_below_their_estimate():
-    # 5 to 60 s, 1e-5 to 1e-10; benchmarks/accuracy.py has 500 scenes: 86, 96 and 88 %
+    # 5 to 60 s, 1e-5 to 1e-10; benchmarks/accuracy.py has 1000 scenes
     draws = (np.random.default_rng([7, number]) for number in range(len(KINDS)))
-    tried = [trial(kind, draw) for kind, draw in zip(KINDS, draws, strict=True) for _ in range(8)]
+    tried = [trial(kind, draw) for kind, draw in zip(KINDS, draws, strict=True) for _ in range(4)]
     found = [one for one in tried if one is not None]  # the others have fallen
-    assert len(found) >= 30
+    assert len(found) >= 15
     assert np.mean([one.is_sharp for one in found]) >= 0.7
     assert np.mean([one.is_honest for one in found]) >= 0.9
     assert np.mean([one.tries == 1 for one in found]) >= 0.7
@@ -65,7 +65,7 @@ def test_where_the_law_may_not_hold_the_careful_way_is_taken(changes, monkeypatc
     assert np.linalg.norm(motion.axis[-1] - exact.axis[-1]) <= motion.accuracy.axis + exact.accuracy.axis
 
 
-@pytest.mark.parametrize("duration", [10.0, 12.0])
+@pytest.mark.parametrize("duration", [9.0, 10.0, 12.0])
 def test_where_neighbours_part_exponentially_the_estimate_grows_with_the_error(duration):
     # at the edge of the upper limit; from the pilot run alone it would be 50 times too small after 12 s
     chaotic = UNDRIVEN.changed({"top.mass_kg": 0.02527, "start.spin_hz": 70.75})

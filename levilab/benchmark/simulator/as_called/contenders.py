@@ -88,7 +88,7 @@ def _dop853(motion: Motion, tolerance: float) -> Call:
 #: heyoka's time does not hold the building of its integrator, which it compiles: users use it again.  That of
 #: `simulate` holds everything but the first call's compiling.
 CONTENDERS = (
-    Contender("simulate", "levilab", (1e-5, 1e-6, 1e-7, 3e-8, 1e-8, 1e-9, 1e-10, 3e-11, 1e-11), _simulate),
+    Contender("simulate", "levilab", (1e-4, 3e-5, 1e-5, 1e-6, 1e-7, 3e-8, 1e-8, 1e-9, 1e-10, 3e-11, 1e-11), _simulate),
     Contender("heyoka", "heyoka", tuple(10.0**-k for k in range(3, 13)), taylor.caller),
     Contender("scipy DOP853", "scipy", (1e-6, 1e-8, 1e-10, 1e-12), _dop853, rounds=1),
 )
