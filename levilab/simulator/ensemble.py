@@ -137,6 +137,7 @@ def simulate_many(
     """
     check(duration=duration, tolerance=tolerance, rate=rate, step=step)
     _check_forwards(scene, duration)
+    _check_above_0(step_share=step_share, cores=cores)
     values = broadcast(over)
     shape = next(iter(values.values())).shape if values else (1,)
     groups = batches(scene, over)
@@ -177,6 +178,13 @@ def _check_forwards(scene: Scene, duration: float) -> None:
         raise SimulationError(f"duration = {duration} s: many at once go forwards only")
     if scene.observed == "spin":
         raise SceneError("observed = spin: the spin alone has a closed form; many at once need observed = motion")
+
+
+def _check_above_0(**given: float | None) -> None:
+    """Raise SimulationError for a number that is given and not above 0."""
+    for name, value in given.items():
+        if value is not None and not 0 < value < math.inf:
+            raise SimulationError(f"{name} = {value}: a number above 0 is expected")
 
 
 def step_share_of(

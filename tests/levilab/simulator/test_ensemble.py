@@ -221,7 +221,10 @@ def test_a_wrong_key_is_named():
         simulate_many(UNDRIVEN, {"top.mass": np.array([0.025])}, 1.0)
 
 
-@pytest.mark.parametrize(("name", "value"), [("duration", np.nan), ("duration", -1.0), ("tolerance", 0.0)])
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("duration", np.nan), ("duration", -1.0), ("tolerance", 0.0), ("step_share", -1.0), ("cores", 0)],
+)
 def test_numbers_that_make_no_sense_are_refused_by_name(name, value):
     with pytest.raises(SimulationError, match=name):
         simulate_many(UNDRIVEN, {"start.spin_hz": np.array([30.0])}, **({"duration": 1.0} | {name: value}))
