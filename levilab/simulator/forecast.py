@@ -45,9 +45,9 @@ SHORTEST_S = 1.0
 #: The pilot run takes a fifth of a short motion, within these bounds [s], and a thirtieth of a long one: about one turn
 #: of the slow sideways mode, and many of the precession.
 PILOT_SHARE_OF_SHORT, PILOT_S, PILOT_SHARE = 1 / 5, (1.0, 2.0), 1 / 30
-#: In so many blocks, at whose ends the two runs are compared.
+#: Blocks of a pilot run, at whose ends the two runs are compared.
 BLOCKS = 16
-#: The other of the two runs has steps so many times as long, or as short where they would be too long.
+#: Ratio of the steps of both runs: the other has the longer ones, or the shorter where the longer would be too long.
 STEP_RATIO = 1.4
 #: The longest step, and that of the other run, as the angle [rad] by which the axis turns meanwhile: from 1.3 times as
 #: much on a scheme is no longer stable.
@@ -58,25 +58,25 @@ LONGEST_TURN, LONGEST_TURN_COMPARED = 7.5, 8.2
 TYPICAL_RATES = {"undriven": 5e-12, "sine": 1.3e-10, "corners": 3e-11, "any split": 6e-11}
 
 #: The share of the tolerance that the error is to have, by forecast, without a drive and with one, where the estimate
-#: is surer; what is forecast may be so many times as much; the share that the estimate is to have in a second try.
+#: is surer; how far a forecast may lie above it (a factor); the share that the estimate is to have in a second try.
 AIM, AIM_DRIVEN, MOST, AIM_AGAIN = 0.16, 0.35, 1.4, 0.6
 #: Above this ratio of steps error ∝ stepᵖ is not trusted, and another pilot run is made.
 MOST_EXTRAPOLATION = 1.8
 #: Pilot runs, and runs of the whole motion, at most; then the careful way is taken.
 MOST_PILOTS, MOST_TRIES = 3, 2
 
-#: Estimates are so many times what is forecast for place and axis, and what two runs of all of the motion give.
+#: Safety factors of the estimates: of a forecast, for place and axis, and of a comparison of two whole runs.
 SAFETY, SAFETY_COMPARED = (8.0, 3.5), 2.0
 #: Mean squares of the differences in the later and the earlier half of a run differ by 7 where the error grows in
 #: proportion to the time.  Above this, in the pilot run or in the last seconds, neighbours may part exponentially: all
 #: of the motion is run twice.
 MOST_GROWTH = 10.0
-#: So many times as many as in the pilot run are the blocks of the last seconds: in fewer the place's error may grow as
-#: the square of the time, by 14 to 31.
+#: Ratio of the blocks of the last seconds to those of the pilot run: in fewer the place's error may grow as the square of
+#: the time, by 14 to 31.
 LAST_BLOCKS = 2
 #: Shorter motions [s] are not checked at the end.
 SHORTEST_TO_CHECK_S = 8.0
-#: The tolerance is so many times the error by rounding at least.
+#: Least ratio of the tolerance to the error by rounding.
 LEAST_OF_ROUNDING = 50.0
 #: The rate of an error is at least this share of the differences over the time: a small one may be chance.
 LEAST_RATE_SHARE = 0.2
@@ -141,7 +141,7 @@ class Cells:
     Attributes:
         stops: their ends, shape (n + 1,), and the drive in each.
         length: of a cell [s]; some may be shorter.
-        block: so many cells make a block, at whose ends two runs are compared.
+        block: number of cells in a block, at whose end two runs are compared.
     """
 
     stops: Stops
@@ -233,7 +233,7 @@ def trend_of(states: Array, every: int, others: Array, factor: float) -> Trend |
         states: of the one at its stops, shape (n, 18).
         every: how many stops of the one there are to one of the other.
         others: of the other at its stops, shape (k, 18).
-        factor: the differences are so many times the error.
+        factor: ratio of the differences to the error.
 
     Returns:
         The trend; None where runs are too short to show one.

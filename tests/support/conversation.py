@@ -1,45 +1,67 @@
-"""Worker processes that speak to their test over a socket, and are waited for with a deadline that fails the test."""
+"""A transport with a script: driver tests as conversations, in the style of PyMeasure's ``expected_protocol``."""
 
 from __future__ import annotations
 
 import contextlib
-import socket
-from typing import TYPE_CHECKING
+from collections import deque
+from typing import TYPE_CHECKING, TypeVar
+
+from instruments.errors import NoAnswer
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
-#: What a test of workers waits for takes a second or two: the start of a process, or its end [s].
-DEADLINE_S = 180.0
-Address = tuple[str, int]
+D = TypeVar("D")
+
+#: In the place of what was sent: a device clear.  In the place of what was answered: nothing, to a question.
+CLEAR, SILENCE = "<device clear>", "<silence>"
+NO_ERROR = ("SYST:ERR?", '+0,"No error"')
+
+Line = tuple[str, str | None]
+
+
+class Script:
+    """A Transport that expects these lines, sent and answered (None: a command, not a question).
+
+    waited: the patience of every question [s].
+    """
+
+    def __init__(self, lines: tuple[Line, ...]) -> None:
+        self.address, self.timeout = "SCRIPT::INSTR", 2.0
+        self.left, self.waited, self.closed = deque(lines), list[float](), False
+
+    def write(self, message: str) -> None:
+        assert self._next(message) is None, f"{message!r} was sent, but its answer not waited for"
+
+    def query(self, message: str, *, patience: float = 0.0) -> str:
+        answer = self._next(message)
+        assert answer is not None, f"{message!r} is a command, but an answer was waited for"
+        self.waited.append(patience)
+        if answer == SILENCE:
+            raise NoAnswer(self.address, message, self.timeout + patience)
+        return answer
+
+    def clear(self) -> None:
+        self._next(CLEAR)
+
+    def close(self) -> None:
+        self.closed = True
+
+    def _next(self, message: str) -> str | None:
+        assert self.left, f"{message!r} was sent after the end of the script"
+        expected, answer = self.left.popleft()
+        assert message == expected
+        return answer
+
+
+def accepted(*commands: str) -> list[Line]:
+    """The lines of commands that the instrument takes without an error."""
+    return [line for command in commands for line in ((command, None), NO_ERROR)]
 
 
 @contextlib.contextmanager
-def listening() -> Iterator[socket.socket]:
-    """Yield a socket to which workers speak; `accept` raises TimeoutError where none comes."""
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        server.settimeout(DEADLINE_S)
-        yield server
-
-
-@contextlib.contextmanager
-def worker_at_work(server: socket.socket) -> Iterator[socket.socket]:
-    """Yield the conversation with the next worker that has begun its task.  Raises TimeoutError."""
-    conversation, _ = server.accept()
-    with conversation:
-        conversation.settimeout(DEADLINE_S)
-        assert conversation.recv(1) == b"!"
-        yield conversation
-
-
-def assert_dead(conversation: socket.socket) -> None:
-    """Fail unless the process at the other end has ended: the operating system closes its conversations then."""
-    with contextlib.suppress(ConnectionError):
-        assert conversation.recv(1) == b""
-
-
-def say_and_wait(address: Address) -> None:
-    """Say that this process is at work, and wait until the other side ends the conversation."""
-    with contextlib.suppress(ConnectionError), socket.create_connection(address) as conversation:
-        conversation.sendall(b"!")
-        conversation.recv(1)
+def conversation(driver: Callable[[Script], D], *lines: Line) -> Iterator[D]:
+    """A driver whose instrument says these lines; all of them must have been said in the end."""
+    script = Script(lines)
+    yield driver(script)
+    assert not script.left, f"never sent: {[sent for sent, _ in script.left]}"

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from support.conversation import Address, say_and_wait
+from support.worker_sockets import Address, say_and_wait
 
 
 def square(number: int) -> int:

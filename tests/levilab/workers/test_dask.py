@@ -14,7 +14,7 @@ import pytest
 from levilab.errors import LevilabError, WorkersLost
 from levilab.workers import cluster, results_of
 from support import tasks
-from support.conversation import DEADLINE_S, listening, worker_at_work
+from support.worker_sockets import DEADLINE_S, listening, worker_at_work
 from support.dask_cluster import DaskCluster
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ import pytest
 from levilab.errors import LevilabError, UsageError, WorkersLost
 from levilab.workers import Workers, packing, processes, results_of, this_process, threads
 from support import tasks
-from support.conversation import DEADLINE_S, assert_dead, listening, worker_at_work
+from support.worker_sockets import DEADLINE_S, assert_dead, listening, worker_at_work
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
