@@ -71,8 +71,8 @@ SAFETY, SAFETY_COMPARED = (8.0, 3.5), 2.0
 #: proportion to the time.  Above this, in the pilot run or in the last seconds, neighbours may part exponentially: all
 #: of the motion is run twice.
 MOST_GROWTH = 10.0
-#: Ratio of the blocks of the last seconds to those of the pilot run: in fewer the place's error may grow as the square of
-#: the time, by 14 to 31.
+#: Ratio of the blocks of the last seconds to those of the pilot run: in fewer the place's error may grow as the square
+#: of the time, by 14 to 31.
 LAST_BLOCKS = 2
 #: Shorter motions [s] are not checked at the end.
 SHORTEST_TO_CHECK_S = 8.0

@@ -14,8 +14,8 @@ import pytest
 from levilab.errors import LevilabError, WorkersLost
 from levilab.workers import cluster, results_of
 from support import tasks
-from support.worker_sockets import DEADLINE_S, listening, worker_at_work
 from support.dask_cluster import DaskCluster
+from support.worker_sockets import DEADLINE_S, listening, worker_at_work
 
 if TYPE_CHECKING:
     from pathlib import Path
