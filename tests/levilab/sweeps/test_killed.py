@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import multiprocessing
 import re
+from functools import partial
 from typing import TYPE_CHECKING
 
 from levilab.sweeps.run import run
 from levilab.sweeps.store import Store
-from levilab.workers import processes
+from levilab.workers import processes, results_of
 from support.commands import command
 from support.dask_cluster import DaskCluster
 
@@ -17,10 +18,10 @@ if TYPE_CHECKING:
 
     import pytest
 
-#: A map of 16 chunks, each of which takes longer than its values take to be written.
+#: A map of 16 chunks.
 SWEEP = (
     "sweep", "undriven", "--sweep", "start.spin_hz=18:24:64", "--sweep", "top.mass_kg=0.0250:0.0254:64",
-    "--duration", "10", "--observe", "survived,lifetime_s,position_error_m", "--out", "map.zarr",
+    "--duration", "0.3", "--observe", "survived,lifetime_s,position_error_m", "--out", "map.zarr",
 )  # fmt: skip
 
 
@@ -41,6 +42,8 @@ def test_killed_workers_and_a_killed_scheduler_change_no_bit(tmp_path: Path, mon
                 kill_after[len(written)].kill()
 
         patched.setattr(Store, "write", write_and_kill)
+        # four chunks are under way at most, so that the scheduler dies before all are submitted, however quick they are
+        patched.setattr("levilab.sweeps.run.results_of", partial(results_of, window=4))
         ended = command(*SWEEP, "--scheduler", dask.address, cwd=tmp_path)
 
     line = ended.err.splitlines()[-1]
