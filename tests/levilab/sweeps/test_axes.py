@@ -54,6 +54,7 @@ def test_a_text_that_is_no_axis_is_refused_with_what_is_expected(text: str, said
         (("description=1:2:5",), "the same for a whole map"),
         (("drive.frequency_hz=29:31:5",), "it changes nothing, since drive.waveform = off"),
         (("top.mass_kg=-1:1:5",), "top.mass_kg = -1.0 the scene is invalid"),
+        (("top.mass_kg=25:26:4",), "Were grams meant?  25 g are 0.025"),
         (("top.moment_a_m2=-1:1:5",), "any number but 0 is expected"),
         (("start.position_m.2=-0.01:0.07:2", "start.spin_hz=20:30:3"), "a height (the third number) above the base"),
         (("start.spin_hz=18:40:5", "start.spin_hz=18:40:5"), "each key is swept once"),
