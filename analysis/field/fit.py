@@ -44,7 +44,6 @@ UNITS: Mapping[str, str] = {
     "outer_radius": "m",
 }
 PARAMETERS = tuple(UNITS)
-_RADII = ("inner_radius", "outer_radius")
 #: Strength, origin, thickness and background are four unknowns: fewer heights do not test the model.
 FEWEST_HEIGHTS = 4
 #: Heights closer than this count as one [m]: no stand is set more exactly.

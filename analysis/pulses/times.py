@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -157,8 +157,3 @@ def correlated(fit: Fit, what: str) -> tuple[Finding, ...]:
     else:
         return ()
     return (Finding("correlated", text),)
-
-
-def with_notes(found: SpinFrequency, *notes: Finding) -> SpinFrequency:
-    """The same with further findings."""
-    return replace(found, notes=(*notes, *found.notes))

@@ -113,7 +113,7 @@ def survival_by_mass(folder: Path, _: dict[str, Any]) -> Figure:
 
 def edge(folder: Path, numbers: dict[str, Any]) -> Figure:
     """The upper edge closely, how the number of islands grows, and what is chance."""
-    found, told = load(folder, "edge"), numbers["edge"]
+    found, shown = load(folder, "edge"), numbers["edge"]
     figure = Figure(figsize=(11, 4.8))
     axes = figure.add_axes((0.055, 0.2, 0.5, 0.72))
     spins, heights = found.axes
@@ -143,24 +143,24 @@ def edge(folder: Path, numbers: dict[str, Any]) -> Figure:
         fontsize=7.5,
     )
     count = figure.add_axes((0.625, 0.6, 0.31, 0.32))
-    steps = [one["step_hz"] for one in told["counts"]]
-    count.loglog(steps, [one["islands"] for one in told["counts"]], "o-", color=BLUE)
+    steps = [one["step_hz"] for one in shown["counts"]]
+    count.loglog(steps, [one["islands"] for one in shown["counts"]], "o-", color=BLUE)
     count.set_yticks([3, 10, 30, 100], ["3", "10", "30", "100"])
     count.minorticks_off()
     count.set(xlabel="step of the scan  [Hz]", ylabel="islands")
-    count.set_title(f"IC1, 65 to 83 Hz: islands grow as step$^{{-{told['count_exponent']:.2f}}}$", loc="left")
+    count.set_title(f"IC1, 65 to 83 Hz: islands grow as step$^{{-{shown['count_exponent']:.2f}}}$", loc="left")
     share = count.twinx()
-    share.semilogx(steps, [100 * one["share_up"] for one in told["counts"]], "s--", color=ORANGE, markersize=4)
+    share.semilogx(steps, [100 * one["share_up"] for one in shown["counts"]], "s--", color=ORANGE, markersize=4)
     share.set_ylim(0, 100)
     share.set_ylabel("share up  [%]", color=ORANGE)
     share.grid(visible=False)
     chance = figure.add_axes((0.625, 0.13, 0.155, 0.32))
-    flips = {float(n): 100 * f / told["nudge_tops"] for n, f in told["flips_of_nudge_m"].items()}
+    flips = {float(n): 100 * f / shown["nudge_tops"] for n, f in shown["flips_of_nudge_m"].items()}
     chance.semilogx(list(flips), list(flips.values()), "o-", color=BLUE)
     chance.set(xlabel="start moved by  [m]", ylabel="fate changed  [%]")
     chance.set_title("sensitivity", loc="left")
     longer = figure.add_axes((0.845, 0.13, 0.14, 0.32))
-    after = told["share_up_after_s"]
+    after = shown["share_up_after_s"]
     longer.semilogx([float(t) for t in after], [100 * s for s in after.values()], "o-", color=BLUE)
     longer.set(xlabel="duration  [s]", ylabel="share up  [%]", ylim=(0, 100))
     longer.set_title("patience", loc="left")
@@ -175,14 +175,14 @@ def published_handles() -> list[Line2D]:
 
 def limits(folder: Path, numbers: dict[str, Any]) -> Figure:
     """The lower limit by height, with its reason; and where a top with drag falls."""
-    told = numbers["foot"]
+    shown = numbers["foot"]
     figure = Figure(figsize=(11, 5))
     left, right = figure.add_axes((0.06, 0.29, 0.41, 0.64)), figure.add_axes((0.55, 0.29, 0.43, 0.64))
-    height = np.array(told["height_cm"])
+    height = np.array(shown["height_cm"])
     left.axhspan(MEASURED_HZ - MEASURED_U_HZ, MEASURED_HZ + MEASURED_U_HZ, color=GREEN, alpha=0.35, linewidth=0)
     left.plot(
         height,
-        np.array(told["limit_hz"], dtype=float),
+        np.array(shown["limit_hz"], dtype=float),
         "o",
         color=BLUE,
         markersize=4,
@@ -190,12 +190,12 @@ def limits(folder: Path, numbers: dict[str, Any]) -> Figure:
     )
     left.plot(
         height,
-        np.array(told["sleeping_hz"], dtype=float),
+        np.array(shown["sleeping_hz"], dtype=float),
         color="black",
         linewidth=1,
         label="sleeping top's limit where it swings deepest",
     )
-    left.axhline(told["window_hz"][0], color=ORANGE, linewidth=1.4, label="lower edge of the window of small motions")
+    left.axhline(shown["window_hz"][0], color=ORANGE, linewidth=1.4, label="lower edge of the window of small motions")
     for name, settings in STARTS.items():
         place = 1e2 * with_settings(TOP, list(settings)).start.position_m[2]
         left.plot(
@@ -252,7 +252,7 @@ def limits(folder: Path, numbers: dict[str, Any]) -> Figure:
 
 def lock(folder: Path, numbers: dict[str, Any]) -> Figure:
     """Tongues of sine and square, the start's phase, and the frequencies that throw the top."""
-    told = numbers["locks"]
+    shown = numbers["locks"]
     figure = Figure(figsize=(9.4, 6.0))
     spin = TRAP_HZ
     colours = ListedColormap([GREY, TAN, BLUE])
@@ -267,10 +267,10 @@ def lock(folder: Path, numbers: dict[str, Any]) -> Figure:
         field = np.linspace(0, amplitudes[-1], 200)
         scale = 1e3 * field
         half = np.array([2 * swing_hz(found.scene, float(b), wave=wave) for b in field])
-        part = abs(math.cos((found.scene.drive.phase_rad - told["phase"]["best_rad"]) / 2))
+        part = abs(math.cos((found.scene.drive.phase_rad - shown["phase"]["best_rad"]) / 2))
         for sign in (-1, 1):
             axes.plot(spin + sign * part * half, scale, color="black", linewidth=1.2)
-        vertical = told["modes"]["own_vertical_hz"]
+        vertical = shown["modes"]["own_vertical_hz"]
         for sign in (-1, 1):
             axes.axvline(spin + sign * vertical, color=PURPLE, linestyle="--", linewidth=1.2)
         axes.grid(visible=False)
@@ -282,7 +282,7 @@ def lock(folder: Path, numbers: dict[str, Any]) -> Figure:
         )
         axes.set_title(f"{wave}, spin at the start {spin} Hz", loc="left")
     axes = figure.add_axes((0.72, 0.58, 0.27, 0.36))
-    phase = told["phase"]
+    phase = shown["phase"]
     turns = np.array(phase["phase_rad"]) / (2 * np.pi)
     axes.plot(turns, phase["width_hz"], "o", color=BLUE, label="simulated")
     axes.plot(turns, phase["expected_hz"], color="black", linewidth=1, label="pendulum")
@@ -298,7 +298,7 @@ def lock(folder: Path, numbers: dict[str, Any]) -> Figure:
         edges = np.append(found.axes[0] - half_step, found.axes[0][-1] + half_step)
         bottom.pcolormesh(edges, [k - 0.45, k + 0.45], what[None], cmap=colours, vmin=0, vmax=2, rasterized=True)
     bottom.set_yticks(range(len(waves)), waves)
-    modes = [abs(x) for x in told["modes"]["modes_hz"]] + [told["modes"]["vertical_hz"]]
+    modes = [abs(x) for x in shown["modes"]["modes_hz"]] + [shown["modes"]["vertical_hz"]]
     for mode in modes:
         bottom.axvline(mode, color="black", linewidth=1)
         if mode > 5:

@@ -135,9 +135,8 @@ def simulate_many(
     >>> simulate_many(preset("undriven"), {"start.spin_hz": spins}, 5.0).survived
     array([False,  True,  True])
     """
-    check(duration=duration, tolerance=tolerance, rate=rate, step=step)
+    check(duration=duration, tolerance=tolerance, rate=rate, step=step, step_share=step_share, cores=cores)
     _check_forwards(scene, duration)
-    _check_above_0(step_share=step_share, cores=cores)
     values = broadcast(over)
     shape = next(iter(values.values())).shape if values else (1,)
     groups = batches(scene, over)
@@ -180,13 +179,6 @@ def _check_forwards(scene: Scene, duration: float) -> None:
         raise SceneError("observed = spin: the spin alone has a closed form; many at once need observed = motion")
 
 
-def _check_above_0(**given: float | None) -> None:
-    """Raise SimulationError for a number that is given and not above 0."""
-    for name, value in given.items():
-        if value is not None and not 0 < value < math.inf:
-            raise SimulationError(f"{name} = {value}: a number above 0 is expected")
-
-
 def step_share_of(
     scene: Scene,
     over: Mapping[str, ArrayLike],
@@ -217,7 +209,7 @@ def step_share_of(
     >>> 0 < step_share_of(preset("undriven"), grid(axes), 1.0, tolerance=1e-6) <= 1
     True
     """
-    check(duration=duration, tolerance=tolerance, rate=None, step=None)
+    check(duration=duration, tolerance=tolerance)
     _check_forwards(scene, duration)
     return _step_share(scene, over, duration, tolerance, survivors_only=survivors_only)
 
@@ -394,7 +386,7 @@ def _limits(some: Batch) -> tuple[Array, Array]:
 
 
 def runs_of(some: Batch, durations: ArrayLike, steps: Array) -> Array:
-    """Return the runs of tops that last so long, with steps no longer than these [s]."""
+    """Return the runs of tops for these durations, with steps no longer than these [s]."""
     runs = some.runs.copy()
     runs[:, DURATION], runs[:, STEP] = durations, steps
     return runs

@@ -333,7 +333,7 @@ def _first_windows(
     """Return the first window of spin [Hz] with four real modes of each top, shape (n,) each.
 
     The quartic x⁴ − βs x³ + c x² − δs x + e of `stability.quartic` depends on the spin s so that its discriminant is a
-    cubic in s².  Its positive roots bound the windows; in each of them one spin tells whether the modes are real.
+    cubic in s².  Between two of its positive roots the modes are real at every spin or at none, so one spin decides.
     """
     tilt, sideways, both = top.stiffness(field, heights)
     p, half = -tilt / top.transverse, -sideways / masses

@@ -221,7 +221,7 @@ class Trend:
     growth: float
 
     def at(self, time: float) -> tuple[float, float]:
-        """Return the errors of place [m] and axis [rad] so long [s] after the start."""
+        """Return the errors of place [m] and axis [rad] at a time [s] after the start."""
         place, axis = (math.sqrt(a + b * time * time) for a, b in zip(self.offset2, self.rate2, strict=True))
         return place, axis
 

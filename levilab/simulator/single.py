@@ -137,11 +137,11 @@ def simulate(
     return Trajectory(scene, run.states, model, accuracy, run.fell, run.events)
 
 
-def check(*, duration: float, tolerance: float, rate: float | None, step: float | None) -> None:
-    """Raise SimulationError, with the quantity's name, for a number that makes no sense."""
+def check(*, duration: float, **positive: float | None) -> None:
+    """Raise SimulationError, with the quantity's name, for a number that makes no sense; None is none."""
     if not 0 < abs(duration) <= LONGEST_S:
         raise SimulationError(f"duration = {duration} s: a time other than 0 and up to {LONGEST_S:.0e} s is expected")
-    for name, value in (("tolerance", tolerance), ("rate", rate), ("step", step)):
+    for name, value in positive.items():
         if value is not None and not (math.isfinite(value) and value > 0):
             raise SimulationError(f"{name} = {value}: a number above 0 is expected")
 

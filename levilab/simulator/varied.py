@@ -335,7 +335,7 @@ def _runs(scene: Scene, model: Any) -> list[Any]:
 
 
 def _kind(model: Any) -> Any:
-    """Return what tells models apart that need kernels of their own: types, and arrays that all lanes share."""
+    """Return a key that differs where models need different kernels: their types, and arrays that all lanes share."""
     if isinstance(model, np.ndarray):
         return model.tobytes()
     if isinstance(model, tuple):

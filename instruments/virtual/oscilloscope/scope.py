@@ -42,8 +42,6 @@ _SLOPES: dict[str, tuple[float, ...]] = {
     "ALT": (1.0, -1.0),
     "WINDOW": (1.0, -1.0),
 }
-#: What would end a string or a message.
-_NOT_IN_LABELS = dict.fromkeys(map(ord, "\"';\n"))
 
 
 class VirtualOscilloscope(VirtualInstrument):

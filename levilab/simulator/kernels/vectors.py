@@ -36,7 +36,7 @@ _COSC: tuple[float, ...] = tuple((-1) ** k / math.factorial(2 * k + 2) for k in 
 def rotation(square: float) -> tuple[float, float]:
     """Sin(x)/x and (1 − cos x)/x² from x² ≤ 4: eight terms, error 2e-10 at 2, 3e-15 at 1, and rounding below.
 
-    An error in x¹⁶, at steps so long that the scheme's own, in x⁶ or x⁸, is a thousand times larger.  No square root,
+    An error in x¹⁶, at steps where the scheme's own, in x⁶ or x⁸, is a thousand times larger.  No square root,
     no division by a small angle, and the terms pair up so that few wait for each other.
     """
     s, c, t, t2 = _SINC, _COSC, square, square * square

@@ -127,3 +127,13 @@ def test_of_many_runs_few_are_compared_with_each_other(tmp_path: Path, monkeypat
     monkeypatch.setattr(Readings, "same_as", lambda *two: compared.append(1) or compare(*two))
     found = collect([tmp_path], NEEDS, lambda _: SpinDownOptions())
     assert (len(found.sources), len(found.warnings), len(compared)) == (30, 1, 1)
+
+
+def test_a_copy_whose_fingerprint_is_rounded_otherwise_is_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copy(spin_down_csv(tmp_path / "0.csv"), tmp_path / "copy.csv")
+    fingerprints = iter([1.0, 1.0 - 5e-9])  # on both sides of a cell's edge
+    monkeypatch.setattr(Readings, "fingerprint", property(lambda _: next(fingerprints)))
+    found = collect([tmp_path], NEEDS, lambda _: SpinDownOptions())
+    assert (len(found.sources), len(found.warnings)) == (1, 1)

@@ -26,7 +26,7 @@ def plan() -> Plan:
 
 
 def made_up(task) -> dict[str, np.ndarray]:
-    """Values that tell each point from every other."""
+    """Values that differ at every point."""
     spin, mass = np.broadcast_arrays(task.values["start.spin_hz"], task.values["top.mass_kg"])
     return {"survived": spin > 20, "lifetime_s": spin + mass}
 

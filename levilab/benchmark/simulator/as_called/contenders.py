@@ -18,7 +18,7 @@ from levilab.simulator.single import simulate
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    #: Integrates for so long [s] and returns the place at the end, shape (3,) or (n, 3) [m].
+    #: Integrates for a duration [s] and returns the place at the end, shape (3,) or (n, 3) [m].
     Call = Callable[[float], Array]
 
 
