@@ -4,7 +4,7 @@ BIN    := .venv/bin
 DEMO   := demo
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test quick explore fuzz mutants lint all-pythons wheel peers bench clean
+.PHONY: help setup demo test quick explore fuzz mutants lint all-pythons wheel peers site bench clean
 
 help:  ## list the targets
 	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -62,6 +62,9 @@ wheel: setup  ## build the wheel into dist/ and try it in a clean environment, b
 
 peers: setup  ## other people's drivers, in an environment of their own, on the virtual bench
 	$(BIN)/nox --session peers
+
+site: setup  ## the pages as a site in build/site, in an environment of its own; a warning or a dead link is an error
+	$(BIN)/nox --session site
 
 bench: setup  ## speed, as ratios within one run (a few minutes); the kept results are in docs/speed.md
 	$(BIN)/python benchmarks/spindown.py

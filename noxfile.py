@@ -82,3 +82,13 @@ def unpacked_source(session: nox.Session, package: str) -> Path:
         with tarfile.open(source.with_name(f"{source.name}.tar.gz")) as archive:
             archive.extractall(folder, filter="data")
     return source
+
+
+@nox.session
+def site(session: nox.Session) -> None:
+    """The pages as a site in build/site; a warning is an error, and no page asks another host for anything."""
+    session.install("--editable", ".[docs]", "--constraint", str(CONSTRAINTS))
+    session.run(
+        "sphinx-build", "--fail-on-warning", "--keep-going", "--jobs", "2", "docs", "build/site", *session.posargs
+    )
+    session.run("python", "docs/building/requests.py", "build/site")

@@ -43,26 +43,52 @@ def test_python_in_the_pages_prints_what_it_says(page: str, code: str, tmp_path:
     assert shown.getvalue().splitlines() == re.findall(r"print\(.*\)  # (.*)", code)
 
 
-def commands() -> dict[str, list[str]]:
-    """Page → every levilab command that it shows, in order, once."""
-    found: dict[str, list[str]] = {}
-    for page, block in blocks("sh"):
-        lines = [line.split("  #")[0].strip() for line in block.splitlines()]
-        found.setdefault(page, []).extend(line for line in lines if line.startswith("levilab ") and ".csv" not in line)
-    return {page: list(dict.fromkeys(lines)) for page, lines in found.items() if lines}
+def steps() -> dict[str, list[tuple[str, str]]]:
+    """Page → (command, what the page shows of its output), in order, each once; "" where it shows nothing.
+
+    Blocks of ``sh`` are commands alone.  In a block of ``console`` a command stands after ``$``, above its output.
+    """
+    found: dict[str, list[tuple[str, str]]] = {}
+    for page in PAGES:
+        text, steps = page.read_text(encoding="utf-8"), found.setdefault(page.relative_to(ROOT).as_posix(), [])
+        for language, block in re.findall(r"```(sh|console)\n(.*?)```", text, re.DOTALL):
+            if language == "sh":
+                lines = [line.split("  #")[0].strip() for line in block.splitlines()]
+                steps += [(line, "") for line in lines if line.startswith("levilab ") and ".csv" not in line]
+            else:
+                steps += re.findall(r"^\$ (levilab .*)\n((?:(?!\$ ).*\n)*)", block, re.MULTILINE)
+    return {page: list(dict.fromkeys(steps)) for page, steps in found.items() if steps}
 
 
-@pytest.mark.parametrize("page", commands())
+def as_pattern(shown: str) -> str:
+    """What a page shows of an output; ``…`` stands for any text in a line, alone on a line for any lines."""
+    lines = [
+        r"(?:.*\n)*" if line == "…" else re.escape(line).replace("…", ".*") + r" *\n" for line in shown.splitlines()
+    ]
+    return "".join(lines) + r"\Z"
+
+
+@pytest.mark.parametrize("page", steps())
 def test_the_commands_of_a_page_work_one_after_another(tmp_path: Path, page: str) -> None:
     shutil.copytree(ROOT / "sample_data", tmp_path / "sample_data")
-    for line in commands()[page]:
+    for line, shown in steps()[page]:
         ended = command(*shlex.split(line)[1:], cwd=tmp_path)
         assert ended.status == 0, (line, ended.err)
+        if shown:
+            written = ended.err + ended.out  # progress comes before results
+            assert re.match(as_pattern(shown), written), (line, shown, written)
 
 
 def test_the_readme_and_the_first_steps_show_commands() -> None:
-    assert len(commands()["README.md"]) >= 5
-    assert len(commands()["first-steps.md"]) >= 3
+    assert len(steps()["README.md"]) >= 5
+    assert len(steps()["docs/first-steps.md"]) >= 3
+
+
+@pytest.mark.parametrize(("shown", "matches"), [
+    ("a\nc\n", False), ("a\nb\nc\n", True), ("…\nc\n", True), ("a\n…\n", True), ("a…\nb\nc\n", True), ("…\nb\n", False),
+])  # fmt: skip
+def test_an_output_is_compared_with_what_a_page_shows_of_it(shown: str, matches: bool) -> None:
+    assert bool(re.match(as_pattern(shown), "a\nb\nc\n")) is matches
 
 
 def test_make_demo_and_make_test_stand_at_the_top_of_the_readme_and_in_the_makefile() -> None:

@@ -1,0 +1,1 @@
+"""What Sphinx does to the pages beside its own work."""

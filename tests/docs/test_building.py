@@ -1,0 +1,66 @@
+"""What is done to the pages when they become a site; the site itself is built by `make site`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+import typer.main
+
+from building.commands import reference
+from building.docstrings import as_markup
+from building.outside_pages import lead_to_site
+from building.requests import loaded_from_elsewhere
+from levilab.cli.main import app
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def test_the_page_of_commands_has_each_command_with_its_options() -> None:
+    text = reference()
+    group = typer.main.get_command(app)
+    assert [name for name in group.commands if f"\n## `levilab {name}`\n" not in text] == []  # type: ignore[attr-defined]
+    assert "### `levilab acquire spin`" in text
+    assert "`--tolerance X`\n: Error that is accepted" in text
+
+
+@pytest.mark.parametrize(("page", "written", "led"), [
+    ("first-steps", "[a](../README.md)", "[a](index.md)"),
+    ("experiments/field", "[a](../../sample_data/README.md#x)", "[a](../sample-data.md#x)"),
+    ("data", "[a](../sample_data/device.toml)", "[a](../sample_data/device.toml)"),
+    ("data", "[a](speed.md#b)", "[a](speed.md#b)"),
+    ("instruments/index", "[a](../../CONTRIBUTING.md)", "[a](../contributing.md)"),
+    ("instruments/index", "[a](../README.md)", "[a](../README.md)"),
+])  # fmt: skip
+def test_links_that_leave_the_pages_lead_to_the_site(page: str, written: str, led: str) -> None:
+    assert lead_to_site(written, page) == led
+
+
+def test_an_indented_block_of_a_docstring_is_code_and_doctests_stay() -> None:
+    assert as_markup(["As:", "", "    run()", "As:", "", "    >>> 1"]) == [
+        "As::",
+        "",
+        "    run()",
+        "As:",
+        "",
+        "    >>> 1",
+    ]
+    assert as_markup(["of `Error`s"]) == ["of `Error`\\ s"]
+
+
+@pytest.mark.parametrize(("text", "found"), [
+    ('<script src="https://cdn.example/x.js"></script>', ["https://cdn.example/x.js"]),
+    ('<link rel="stylesheet" href="//fonts.example/a.css">', ["//fonts.example/a.css"]),
+    ('<img src="_images/a.png"><a href="https://example.org">there</a>', []),
+])  # fmt: skip
+def test_what_a_page_loads_from_elsewhere_is_found(tmp_path: Path, text: str, found: list[str]) -> None:
+    (tmp_path / "page.html").write_text(text, encoding="utf-8")
+    assert [address for _, address in loaded_from_elsewhere(tmp_path)] == found
+
+
+def test_a_font_from_elsewhere_in_a_style_sheet_is_found(tmp_path: Path) -> None:
+    (tmp_path / "a.css").write_text(
+        '@import "https://fonts.example/a.css"; b { background: url(a.png) }', encoding="utf-8"
+    )
+    assert loaded_from_elsewhere(tmp_path) == [("a.css", "https://fonts.example/a.css")]
