@@ -203,9 +203,9 @@ export function buildCamera(THREE, parts, aspect) {
 /** Put a camera back to where buildCamera has it, for a picture of this shape. */
 export function placeCamera(THREE, camera, parts, aspect) {
   const {reach, top} = parts.view, bottom = parts.base.bottom;
-  const target = new THREE.Vector3(0, 0, (0.5 * (top + bottom)) * CM);
+  const target = new THREE.Vector3(0, 0, (0.48 * top + 0.52 * bottom) * CM);
   const half = Math.tan(camera.fov / 2 * TURN / 360);
-  const distance = Math.max((0.62 * (top - bottom) + 0.12 * reach) / half, 1.12 * reach / (half * aspect) + reach) * CM;
+  const distance = Math.max((0.62 * (top - bottom) + 0.16 * reach) / half, 1.1 * reach / (half * aspect) + reach) * CM;
   const elevation = 0.33, azimuth = -1.25;
   camera.aspect = aspect;
   camera.position.set(
