@@ -15,7 +15,7 @@ import numpy as np
 
 from levilab.errors import LevilabError
 from levilab.motion.animation.paint import Painter, Pose, font
-from levilab.motion.animation.parts import parts_of
+from levilab.motion.animation.parts import COLOURS, parts_of
 from levilab.motion.animation.poses import matrices
 from levilab.motion.animation.words import readout, speed_in_words
 
@@ -38,8 +38,9 @@ class Film:
     """How a film is drawn.
 
     Attributes:
-        poses: one for each picture.
-        speed: of the film, as a part of the real one.
+        poses: some for each picture.
+        every: how many for each, so that the path is smooth where the top is fast.
+        speed: of the film, as a part of the real one; None for a single picture.
         pictures_per_s: of the film.
         size: width and height [pixels].
         trail_s: as much of the path is drawn [s of the motion].
@@ -47,14 +48,21 @@ class Film:
     """
 
     poses: Poses
-    speed: float
+    speed: float | None
     pictures_per_s: float
     size: tuple[int, int]
+    every: int = 1
     trail_s: float = 0.5
     theme: str = "light"
 
+    @property
+    def pictures(self) -> range:
+        """The poses of its pictures; the last one is that of the end."""
+        last = len(self.poses.times) - 1
+        return range(last % self.every, last + 1, self.every)
 
-#: Colours of a GIF.
+
+#: Colours of a GIF, beside those of the scene's parts as they are without light.
 _COLOURS = 96
 
 
@@ -62,18 +70,14 @@ def as_gif(film: Film, progress: Progress) -> bytes:
     """Encode a film as a GIF that begins again at its end; all its pictures share one table of colours."""
     from PIL import Image
 
-    count = len(film.poses.times)
-    draw = _artist(film)
-    samples = [draw(k) for k in sorted({0, count // 3, 2 * count // 3, count - 1})]
-    sheet = Image.new("RGB", (film.size[0] * len(samples), film.size[1]))
-    for k, sample in enumerate(samples):
-        sheet.paste(sample, (k * film.size[0], 0))
-    table = sheet.quantize(_COLOURS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    shown, draw = film.pictures, _artist(film)
+    samples = [draw(shown[k * (len(shown) - 1) // 3]) for k in range(4)]
+    table = _table_of_colours(samples, film.theme)
 
     def pictures() -> Iterator[Image]:
-        for k in range(count):
+        for done, k in enumerate(shown, 1):
             yield draw(k).quantize(palette=table, dither=Image.Dither.NONE)
-            progress((k + 1) / count)
+            progress(done / len(shown))
 
     buffer, frames = io.BytesIO(), pictures()
     next(frames).save(
@@ -81,6 +85,21 @@ def as_gif(film: Film, progress: Progress) -> bytes:
         disposal=1, optimize=False,
     )  # fmt: skip
     return buffer.getvalue()
+
+
+def _table_of_colours(samples: list[Image], theme: str) -> Image:
+    """An image whose palette has the colours of some pictures, and of small parts that would else lose theirs."""
+    from PIL import Image
+
+    width, height = samples[0].size
+    sheet = Image.new("RGB", (width * len(samples), height))
+    for k, sample in enumerate(samples):
+        sheet.paste(sample, (k * width, 0))
+    found = sheet.quantize(_COLOURS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE).getpalette() or []
+    of_parts = [value for text in COLOURS[theme].values() for value in bytes.fromhex(text[1:])]
+    table = Image.new("P", (1, 1))
+    table.putpalette(found[: 3 * _COLOURS] + of_parts)
+    return table
 
 
 def check_encoder() -> None:
@@ -103,7 +122,7 @@ def as_mp4(film: Film, progress: Progress) -> bytes:
     check_encoder()
     import imageio_ffmpeg
 
-    count, draw = len(film.poses.times), _artist(film)
+    shown, draw = film.pictures, _artist(film)
     with tempfile.TemporaryDirectory(prefix="levilab-") as folder:
         path = Path(folder, "film.mp4")
         encoder = imageio_ffmpeg.write_frames(
@@ -112,9 +131,9 @@ def as_mp4(film: Film, progress: Progress) -> bytes:
         )  # fmt: skip
         with contextlib.closing(encoder):
             encoder.send(None)
-            for k in range(count):
+            for done, k in enumerate(shown, 1):
                 encoder.send(np.asarray(draw(k)).tobytes())
-                progress((k + 1) / count)
+                progress(done / len(shown))
         return path.read_bytes()
 
 
@@ -154,11 +173,10 @@ class _Words:
 
     def __init__(self, film: Film, painter: Painter) -> None:
         self._film, self._colours = film, painter.colours
-        width, _ = film.size
-        self._small, self._large = font(width / 36), font(width / 26)
-        self._line = width / 25
+        self._unit = min(film.size)
+        self._small, self._large = font(self._unit / 36), font(self._unit / 26)
+        self._line = self._unit / 25
         self._inset = _Inset(film)
-        self._drive = film.poses.scene.drive.waveform != "off"
 
     def write(self, picture: Image, k: int) -> None:
         """Write the numbers of the k-th pose, and draw the path up to then."""
@@ -171,11 +189,12 @@ class _Words:
         while len(name) > 4 and pen.textlength(name, self._large) > 0.56 * picture.width:
             name = f"{name[:-2]}…"
         pen.text((edge, 0.8 * edge), name, text, self._large)
-        pen.text((edge, 0.8 * edge + 1.5 * line), f"simulated, {speed_in_words(self._film.speed)}", faint, self._small)
+        how = "simulated" if self._film.speed is None else f"simulated, {speed_in_words(self._film.speed)}"
+        pen.text((edge, 0.8 * edge + 1.5 * line), how, faint, self._small)
         for row, (label, value) in enumerate(readout(self._film.poses, k)):
             y = 0.8 * edge + (3.2 + 1.2 * row) * line
             pen.text((edge, y), label, faint, self._small)
-            pen.text((edge + 0.29 * picture.width, y), value, text, self._small, anchor="ra")
+            pen.text((edge + 0.29 * self._unit, y), value, text, self._small, anchor="ra")
         self._inset.draw(pen, k, self._colours, self._small)
 
 
@@ -183,9 +202,9 @@ class _Inset:
     """The path of the centre of mass from above, in a corner, with its scale."""
 
     def __init__(self, film: Film) -> None:
-        width = film.size[0]
-        self._size = 0.24 * width
-        self._left, self._top = width - self._size - width / 25, width / 20
+        unit = min(film.size)
+        self._size = 0.24 * unit
+        self._left, self._top = film.size[0] - self._size - unit / 25, 0.075 * unit
         flat = film.poses.positions[:, :2]
         self._middle = (flat.min(axis=0) + flat.max(axis=0)) / 2
         span = max(float(np.ptp(flat, axis=0).max()), 1e-6)
@@ -207,7 +226,7 @@ class _Inset:
         y = top + size + size / 11
         pen.line((left + size - length, y, left + size, y), fill=colours["text"], width=2)
         pen.text((left + size, y + 3), in_mm(self._bar), colours["faint"], small, anchor="ra")
-        pen.text((left + size / 20, top + size / 28), "from above", colours["faint"], small)
+        pen.text((left, top - size / 20), "from above", colours["faint"], small, anchor="ls")
 
 
 def nice_length(length: float) -> float:

@@ -24,8 +24,8 @@ import numpy as np
 
 from levilab.errors import LevilabError, UsageError
 from levilab.motion.animation.film import Film, in_mm, nice_length, still
-from levilab.motion.animation.parts import parts_of
-from levilab.motion.animation.words import speed_in_words
+from levilab.motion.animation.parts import COLOURS, parts_of
+from levilab.motion.animation.words import short_speed, speed_in_words
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
@@ -113,7 +113,8 @@ def as_page(page: Page) -> bytes:
     alt = _alt(page)
     middle = len(poses.times) // 2
     stills = {
-        theme: still(Film(poses, page.speed, 20.0, (640, 640), _TRAIL_S, theme), middle) for theme in ("light", "dark")
+        theme: still(Film(poses, None, 20.0, (800, 550), trail_s=_TRAIL_S, theme=theme), middle)
+        for theme in ("light", "dark")
     }
     readings = _readings(poses)
     text = environment.get_template("page.html.j2").render(
@@ -123,7 +124,7 @@ def as_page(page: Page) -> bytes:
         still_light=_data_address(stills["light"]),
         still_dark=_data_address(stills["dark"]),
         readings=readings,
-        speeds=[(speed_in_words(speed), speed) for speed in sorted({*_SPEEDS, page.speed}, reverse=True)],
+        speeds=[(short_speed(speed), speed) for speed in sorted({*_SPEEDS, page.speed}, reverse=True)],
         speed=page.speed,
         legend=_legend(poses),
         numbers=_numbers(page),
@@ -227,13 +228,13 @@ def _legend(poses: Poses) -> list[tuple[str, str]]:
         ("base", "the base, a ring magnet"),
         ("faint", "straight down to the top's shadow"),
     ]
-    return [*found, ("drive", "the drive's field, as an arrow over the base")] if "drive" in columns_of(poses) else found
+    return (
+        [*found, ("drive", "the drive's field, as an arrow over the base")] if "drive" in columns_of(poses) else found
+    )
 
 
 def _swatches(poses: Poses) -> str:
     """The colours of the legend, by day and by night."""
-    from levilab.motion.animation.parts import COLOURS
-
     names = [name for name, _ in _legend(poses)]
     rules = {
         theme: "".join(f".colour-{name} span{{background:{COLOURS[theme][name]}}}" for name in names)
@@ -255,7 +256,7 @@ def _numbers(page: Page) -> list[tuple[str, str]]:
         ("tilt", f"{tilts.min():.1f} to {tilts.max():.1f}° of the axis against the base's"),
         ("spin", f"{poses.spins.min():.2f} to {poses.spins.max():.2f} Hz"),
         ("mass", f"{1000 * scene.top.mass_kg:.4g} g"),
-        ("moment", f"{scene.top.moment_a_m2:.4g} A m²"),
+        ("moment", f"{scene.top.moment_a_m2:.4g} A m²".replace("-", "−")),
         ("base", f"{100 * scene.base.inner_radius_m:.3g} to {100 * scene.base.outer_radius_m:.3g} cm radius"),
     ]
     if "drive" in columns_of(poses):

@@ -295,9 +295,7 @@ class Painter:
             self._draw_polygon(pen, polygon @ lean.T + pose.position, lean @ normal, surface.colour)
         for mark, turns in solid.marks:
             turn = pose.matrix @ _about_z(pose.slip) if turns == "washers" else pose.matrix
-            self._draw_facets(
-                pen, _Surface(mark.corners @ turn.T + pose.position, mark.normals @ turn.T, mark.colour)
-            )
+            self._draw_facets(pen, _Surface(mark.corners @ turn.T + pose.position, mark.normals @ turn.T, mark.colour))
         if is_stem:
             self._draw_spin(pen, pose, lean, front=True)
 
@@ -327,7 +325,7 @@ class Painter:
             facing = order[facing[order]]
         corners = self._camera.project(surface.corners[facing])
         for polygon, colour in zip(
-            corners.reshape(len(corners), -1).tolist(), self._lit(surface.normals[facing], surface.colour), strict=True
+            corners.reshape(len(corners), 8).tolist(), self._lit(surface.normals[facing], surface.colour), strict=True
         ):
             pen.polygon(polygon, fill=tuple(colour))
 

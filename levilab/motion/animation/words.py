@@ -23,6 +23,15 @@ def speed_in_words(speed: float) -> str:
     return f"1/{whole} of real speed" if math.isclose(whole * speed, 1, rel_tol=1e-6) else f"{speed:g} of real speed"
 
 
+def short_speed(speed: float) -> str:
+    """A film's speed in a list of them.
+
+    >>> [short_speed(x) for x in (0.05, 1.0, 0.3)]
+    ['1/20', '1', '0.3']
+    """
+    return speed_in_words(speed).removesuffix(" of real speed") if speed < 1 else f"{speed:g}"
+
+
 def readout(poses: Poses, k: int) -> list[tuple[str, str]]:
     """Names and values of what is read at the k-th pose."""
     rows = [
