@@ -23,9 +23,13 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from PIL.Image import Image
+    from PIL.ImageDraw import ImageDraw
+    from PIL.ImageFont import FreeTypeFont, ImageFont
 
+    from levilab.motion.animation.paint import Colour
     from levilab.motion.animation.poses import Poses
 
+    BaseFont = FreeTypeFont | ImageFont
     Progress = Callable[[float], None]
 
 
@@ -68,7 +72,7 @@ _COLOURS = 96
 
 def as_gif(film: Film, progress: Progress) -> bytes:
     """Encode a film as a GIF that begins again at its end; all its pictures share one table of colours."""
-    from PIL import Image
+    from PIL.Image import Dither
 
     shown, draw = film.pictures, _artist(film)
     samples = [draw(shown[k * (len(shown) - 1) // 3]) for k in range(4)]
@@ -76,7 +80,7 @@ def as_gif(film: Film, progress: Progress) -> bytes:
 
     def pictures() -> Iterator[Image]:
         for done, k in enumerate(shown, 1):
-            yield draw(k).quantize(palette=table, dither=Image.Dither.NONE)
+            yield draw(k).quantize(palette=table, dither=Dither.NONE)
             progress(done / len(shown))
 
     buffer, frames = io.BytesIO(), pictures()
@@ -106,8 +110,8 @@ def check_encoder() -> None:
     """Raise MissingEncoder where no MP4 can be encoded."""
     if find_spec("imageio_ffmpeg") is None:
         raise MissingEncoder(
-            "an animation as .mp4 needs imageio-ffmpeg, which is not installed: pip install 'levilab[video]', or name a "
-            "file that ends in .gif or .html"
+            "an animation as .mp4 needs imageio-ffmpeg, which is not installed: pip install 'levilab[video]', "
+            "or name a file that ends in .gif or .html"
         )
 
 
@@ -213,10 +217,7 @@ class _Inset:
         centre = np.array([self._left + self._size / 2, self._top + self._size / 2])
         self._path = (flat - self._middle) * np.array([1, -1]) * self._pixels_per_m + centre
 
-    def draw(self, pen: object, k: int, colours: dict[str, tuple[int, int, int]], small: object) -> None:
-        from PIL.ImageDraw import ImageDraw
-
-        assert isinstance(pen, ImageDraw)
+    def draw(self, pen: ImageDraw, k: int, colours: dict[str, Colour], small: BaseFont) -> None:
         left, top, size = self._left, self._top, self._size
         pen.rectangle((left, top, left + size, top + size), fill=colours["background"], outline=colours["ground"])
         pen.line(self._path[: k + 1].ravel().tolist() or [0, 0], fill=colours["path"], width=1)

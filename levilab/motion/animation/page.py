@@ -100,7 +100,6 @@ def as_page(page: Page) -> bytes:
         UsageError: the page would be larger than LARGEST.
     """
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
-    from markupsafe import Markup
 
     three = read_three()
     files = {name: _text(name) for name in ("page.css", "player.js", "top.js")}
@@ -130,14 +129,14 @@ def as_page(page: Page) -> bytes:
         numbers=_numbers(page),
         version=software_versions().get("levilab", ""),
         licence=_licence(three),
-        style=Markup(files["page.css"] + _swatches(poses)),
+        style=files["page.css"] + _swatches(poses),
         style_hash=_hash(files["page.css"] + _swatches(poses)),
-        script=Markup(files["player.js"]),
+        script=files["player.js"],
         script_hash=_hash(files["player.js"]),
-        data=Markup(_json(_data(page, alt, readings))),
-        poses=Markup(_numbers_as_text(poses)),
-        three=Markup(base64.b64encode(gzip.compress(three, 9, mtime=0)).decode("ascii")),
-        top=Markup(files["top.js"]),
+        data=_json(_data(page, alt, readings)),
+        poses=_numbers_as_text(poses),
+        three=base64.b64encode(gzip.compress(three, 9, mtime=0)).decode("ascii"),
+        top=files["top.js"],
     )
     content = text.encode("utf-8")
     if len(content) > LARGEST:
@@ -208,9 +207,10 @@ def _span(poses: Poses) -> str:
 
 def _alt(page: Page) -> str:
     poses = page.poses
+    height, tilt = 100 * poses.positions[:, 2].mean(), math.degrees(poses.tilts.max())
     return (
-        f"A spinning top with a magnet, a disc and a stem floats {100 * poses.positions[:, 2].mean():.1f} cm above a ring "
-        f"magnet, {_span(poses)}; its axis wobbles by up to {math.degrees(poses.tilts.max()):.1f} degrees"
+        f"A spinning top with a magnet, a disc and a stem, on average {height:.1f} cm above a ring magnet, "
+        f"{_span(poses)}; its axis leans by up to {tilt:.1f} degrees"
     )
 
 

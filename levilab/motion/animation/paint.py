@@ -13,6 +13,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from PIL.ImageFont import FreeTypeFont, ImageFont
 
 Array = NDArray[np.float64]
+Places = NDArray[np.intp]
 Colour = tuple[int, int, int]
 
 #: Facets around a part of the top, and around the base.
@@ -137,7 +139,7 @@ class Painter:
 
     def picture(self, pose: Pose) -> Image:
         """Draw the top over its base, without words."""
-        from PIL import Image, ImageDraw
+        from PIL import ImageDraw
 
         image = self._ground.copy()
         self._draw_shadow(image, pose)
@@ -152,7 +154,7 @@ class Painter:
         if not inside:
             self._draw_drive(pen, pose)
             self._draw_top(pen, pose)
-        return image.resize(self.size, Image.Resampling.BOX, reducing_gap=None)
+        return image.reduce(_FINER)
 
     def where(self, point: Sequence[float]) -> tuple[float, float]:
         """Where a point [m] lies in the picture [pixels]."""
@@ -190,10 +192,12 @@ class Painter:
             self._draw_facets(ImageDraw.Draw(layer), surface, self._order_of_ring(surface))
             halves.append(layer)
         boxes = [half.getbbox() for half in halves]
-        box = tuple(int(f(b[k] for b in boxes if b)) for k, f in enumerate((min, min, max, max)))
-        return halves[0].crop(box), halves[1].crop(box), (box[0], box[1])
+        left, upper = (min(box[k] for box in boxes if box) for k in (0, 1))
+        right, lower = (max(box[k] for box in boxes if box) for k in (2, 3))
+        box = (left, upper, right, lower)
+        return halves[0].crop(box), halves[1].crop(box), (left, upper)
 
-    def _order_of_ring(self, surface: _Surface) -> Array:
+    def _order_of_ring(self, surface: _Surface) -> Places:
         away = np.linalg.norm(surface.corners.mean(axis=1) - self._camera.place, axis=1)
         return np.argsort(-away, kind="stable")
 
@@ -318,7 +322,7 @@ class Painter:
 
     # --- facets ---
 
-    def _draw_facets(self, pen: ImageDraw, surface: _Surface, order: Array | None = None) -> None:
+    def _draw_facets(self, pen: ImageDraw, surface: _Surface, order: Places | None = None) -> None:
         towards = self._camera.place - surface.corners.mean(axis=1)
         facing = np.einsum("ij,ij->i", towards, surface.normals) > 0
         if order is not None:
@@ -351,7 +355,7 @@ class Painter:
             for (r, z), sign in ((sides[0], -1.0), (sides[-1], 1.0)):
                 caps.append((_circle(r, z, _AROUND), np.array([0.0, 0.0, sign])))
             marks = [
-                (_Surface(*_patch(mark), self.colours[mark["colour"]]), mark["turns"])
+                (_Surface(*_patch(mark), colour=self.colours[mark["colour"]]), mark["turns"])
                 for mark in self.parts["marks"]
                 if mark["part"] == part["name"]
             ]
@@ -364,14 +368,16 @@ class Painter:
 # --- shapes ---
 
 
-def _revolve(outline: Sequence[Sequence[float]], around: int, start: float = 0.0, width: float = 2 * math.pi) -> Any:
+def _revolve(
+    outline: Sequence[Sequence[float]], around: int, start: float = 0.0, width: float = 2 * math.pi
+) -> tuple[Array, Array]:
     """The facets that an outline of points (radius, height) sweeps about z: corners (n, 4, 3), normals (n, 3)."""
     angles = start + width * np.arange(around + 1) / around
     ring = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     middle = start + width * (np.arange(around) + 0.5) / around
     facing = np.stack([np.cos(middle), np.sin(middle)], axis=1)
     corners, normals = [], []
-    for (r0, z0), (r1, z1) in zip(outline, outline[1:], strict=False):
+    for (r0, z0), (r1, z1) in pairwise(outline):
         low = np.column_stack([r0 * ring, np.full(around + 1, z0)])
         high = np.column_stack([r1 * ring, np.full(around + 1, z1)])
         corners.append(np.stack([low[:-1], low[1:], high[1:], high[:-1]], axis=1))
@@ -381,7 +387,7 @@ def _revolve(outline: Sequence[Sequence[float]], around: int, start: float = 0.0
     return np.concatenate(corners), np.concatenate(normals)
 
 
-def _patch(mark: dict[str, Any]) -> Any:
+def _patch(mark: dict[str, Any]) -> tuple[Array, Array]:
     """The facets of a mark, a little outside of its part."""
     outline = np.array(mark["outline"])
     steps = np.diff(outline, axis=0)

@@ -111,7 +111,7 @@
       slip: pose.slip / 2 / Math.PI, drive: pose.drive * data.drive_mt,
     };
     for (const [name, digits] of data.readings) {
-      by(`read-${name}`).textContent = read[name].toFixed(digits).replace("-", "−");
+      by(`read-${name}`).textContent = read[name].toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
     }
     if (document.activeElement !== by("scrub") || playing) by("scrub").value = steps;
     by("scrub").setAttribute("aria-valuetext", `${read.time.toFixed(3)} s`);

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -201,12 +201,12 @@ def turn_rate(motion: Trajectory) -> float:
 def matrices(quaternions: Array) -> Array:
     """Return the turns as matrices, shape (n, 3, 3)."""
     x, y, z, w = quaternions.T
-    rows: list[list[Any]] = [
+    rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
         [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
     ]
-    return np.moveaxis(np.array(rows), -1, 0)
+    return np.asarray(np.moveaxis(np.array(rows), -1, 0), dtype=np.float64)
 
 
 __all__ = ["Poses", "drive_share", "matrices", "poses_of", "quaternions_of", "turn_rate"]

@@ -11,6 +11,7 @@ from levilab.files import replace_atomically, writing
 from levilab.motion.animation.film import Film, as_gif, as_mp4, check_encoder
 from levilab.motion.animation.page import FEWEST_A_TURN, POSES_A_TURN, Page, as_page, columns_of, most_poses, read_three
 from levilab.motion.animation.poses import poses_of, turn_rate
+from levilab.simulator.compilation import announce_compilation
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -107,14 +108,16 @@ def check_request(request: AnimationRequest, scene: Scene, duration: float) -> N
         raise UsageError(
             "animate", "the scene has no motion: observed = spin; take observed = motion", value=request.path
         )
-    start, stop = request.start or 0.0, duration if request.stop is None else request.stop
-    if not 0 <= start < duration:
+    first = request.start or 0.0
+    if not 0 <= first < duration:
         raise UsageError(
-            "animate_from", f"a time from 0 and below the duration of {duration:g} s is expected", value=start
+            "animate_from", f"a time from 0 and below the duration of {duration:g} s is expected", value=first
         )
-    if not start < stop <= duration:
+    if request.stop is not None and not first < request.stop <= duration:
         raise UsageError(
-            "animate_to", f"a time above {start:g} s and up to the duration of {duration:g} s is expected", value=stop
+            "animate_to",
+            f"a time above {first:g} s and up to the duration of {duration:g} s is expected",
+            value=request.stop,
         )
     speed = chosen.speed if request.speed is None else request.speed
     if not _SLOWEST <= speed <= _FASTEST:
@@ -123,7 +126,8 @@ def check_request(request: AnimationRequest, scene: Scene, duration: float) -> N
             f"a number from {_SLOWEST:g} to {_FASTEST:g} is expected, as 0.05 for a twentieth of the real speed",
             value=speed,
         )
-    if chosen.encode and request.stop is not None:
+    if chosen.encode:
+        start, stop = _span(request, duration)
         _check_pictures(chosen, stop - start, speed)
     chosen.check()
 
@@ -134,8 +138,8 @@ def _check_pictures(chosen: _Format, span: float, speed: float) -> None:
         longest = _MOST_PICTURES / chosen.pictures_per_s * speed
         raise UsageError(
             "animate_to",
-            f"{span:.4g} s at speed {speed:g} are {pictures:.0f} pictures, at most {_MOST_PICTURES} are drawn: choose a "
-            f"span of at most {longest:.3g} s, or a higher `animate_speed`",
+            f"{span:.4g} s at speed {speed:g} are {pictures:.0f} pictures, at most {_MOST_PICTURES} are drawn: "
+            f"choose a span of at most {longest:.3g} s, or a higher `animate_speed`",
         )
 
 
@@ -158,16 +162,21 @@ def animate(
         CannotWrite: the file cannot be written.
     """
     chosen = request.format
-    start, stop = _span(request, summary.motion)
+    if request.start is not None and request.start >= summary.end:
+        raise UsageError("animate_from", f"the top was lost after {summary.end:.4g} s already", value=request.start)
+    start, stop = _span(request, summary.end, fell=summary.motion.fell is not None)
     speed = chosen.speed if request.speed is None else request.speed
     progress = progress or (lambda _: None)
     if chosen.encode is None:
-        poses = poses_of(summary.motion, start, stop, _count_for_page(summary.motion, start, stop))
-        content = as_page(Page(poses, summary, speed))
+        count = _count_for_page(summary.motion, start, stop)
     else:
         _check_pictures(chosen, stop - start, speed)
-        count = max(round((stop - start) / speed * chosen.pictures_per_s), 1)
-        poses = poses_of(summary.motion, start, stop, _POSES_A_PICTURE * count)
+        count = _POSES_A_PICTURE * max(round((stop - start) / speed * chosen.pictures_per_s), 1)
+    with announce_compilation(message):
+        poses = poses_of(summary.motion, start, stop, count)
+    if chosen.encode is None:
+        content = as_page(Page(poses, summary, speed))
+    else:
         if note := _stroboscopic(turn_rate(summary.motion), speed, chosen.pictures_per_s):
             message(note)
         content = chosen.encode(Film(poses, speed, chosen.pictures_per_s, chosen.size, _POSES_A_PICTURE), progress)
@@ -177,15 +186,13 @@ def animate(
     return request.path
 
 
-def _span(request: AnimationRequest, motion: Trajectory) -> tuple[float, float]:
-    """From where to where [s]: what is asked for, up to the fall."""
-    end, usual = float(motion.time[-1]), request.format.span_s
-    if request.start is not None and request.start >= end:
-        raise UsageError("animate_from", f"the top was lost after {end:.4g} s already", value=request.start)
+def _span(request: AnimationRequest, end: float, *, fell: bool = False) -> tuple[float, float]:
+    """From where to where [s]: what is asked for, of a motion up to this end; the last seconds of one that fell."""
+    usual = request.format.span_s
     stop = end if request.stop is None else min(request.stop, end)
     if request.start is not None:
         return request.start, stop if request.stop is not None else min(request.start + usual, end)
-    if request.stop is not None or motion.fell is not None:
+    if request.stop is not None or fell:
         return max(stop - usual, 0.0), stop
     return 0.0, min(usual, end)
 
@@ -208,9 +215,9 @@ def _stroboscopic(turns: float, speed: float, pictures_per_s: float) -> str:
     """What to know of a film that shows too few pictures of a turn; empty for others."""
     if turns * speed * _PICTURES_A_TURN <= pictures_per_s:
         return ""
-    slower = pictures_per_s / turns / _PICTURES_A_TURN
+    seen, slower = pictures_per_s / turns / speed, pictures_per_s / turns / _PICTURES_A_TURN
     digits = 10.0 ** math.floor(math.log10(slower))
     return (
-        f"note: the film has {pictures_per_s / turns / speed:.1f} pictures of each turn, so the top seems to turn slowly, "
-        f"to stand or to turn backwards; with `animate_speed` = {math.floor(slower / digits) * digits:.1g} it does not"
+        f"note: the film has {seen:.1f} pictures of each turn, so the top seems to turn slowly, to stand or to turn "
+        f"backwards; with `animate_speed` = {math.floor(slower / digits) * digits:.1g} it does not"
     )

@@ -36,10 +36,19 @@ def readout(poses: Poses, k: int) -> list[tuple[str, str]]:
     """Names and values of what is read at the k-th pose."""
     rows = [
         ("time", f"{poses.times[k]:.3f} s"),
-        ("height", f"{100 * poses.positions[k, 2]:.2f} cm"),
+        ("height", f"{number(100 * poses.positions[k, 2], 2)} cm"),
         ("tilt", f"{math.degrees(poses.tilts[k]):.1f}°"),
-        ("spin", f"{poses.spins[k]:.2f} Hz".replace("-", "−")),
+        ("spin", f"{number(poses.spins[k], 2)} Hz"),
     ]
     if poses.scene.washers.inertia_kg_m2 > 0:
-        rows.append(("slip", f"{poses.slips[k] / (2 * math.pi):.2f} turns".replace("-", "−")))
+        rows.append(("slip", f"{number(poses.slips[k] / (2 * math.pi), 2)} turns"))
     return rows
+
+
+def number(value: float, digits: int) -> str:
+    """A number with so many digits after the point; a zero has no sign.
+
+    >>> number(-0.254, 2), number(-0.001, 2)
+    ('−0.25', '0.00')
+    """
+    return f"{round(float(value), digits) + 0.0:.{digits}f}".replace("-", "−")
