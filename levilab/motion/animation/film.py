@@ -76,7 +76,7 @@ def as_gif(film: Film, progress: Progress) -> bytes:
 
     shown, draw = film.pictures, _artist(film)
     samples = [draw(shown[k * (len(shown) - 1) // 3]) for k in range(4)]
-    table = _table_of_colours(samples, film.theme)
+    table = table_of_colours(samples, film.theme)
 
     def pictures() -> Iterator[Image]:
         for done, k in enumerate(shown, 1):
@@ -91,7 +91,7 @@ def as_gif(film: Film, progress: Progress) -> bytes:
     return buffer.getvalue()
 
 
-def _table_of_colours(samples: list[Image], theme: str) -> Image:
+def table_of_colours(samples: list[Image], theme: str) -> Image:
     """An image whose palette has the colours of some pictures, and of small parts that would else lose theirs."""
     from PIL import Image
 

@@ -23,12 +23,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from levilab.errors import LevilabError, UsageError
-from levilab.motion.animation.film import Film, in_mm, nice_length, still
+from levilab.motion.animation.film import Film, in_mm, nice_length, still, table_of_colours
 from levilab.motion.animation.parts import COLOURS, parts_of
 from levilab.motion.animation.words import short_speed, speed_in_words
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
+    from PIL.Image import Image
+
     from levilab.motion.animation.poses import Poses
     from levilab.motion.summary import Summary
 
@@ -42,7 +44,7 @@ _BYTES_PER_NUMBER = 4 * 4 / 3
 _SPEEDS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
 #: Poses a turn: so many make a slerp between two of them as good as the motion, and no fewer than FEWEST.
 POSES_A_TURN, FEWEST_A_TURN = 16, 12
-#: So much of the path of the axis is drawn [s of the motion].
+#: Length of the axis' path that is drawn [s of the motion].
 _TRAIL_S = 0.5
 
 
@@ -120,8 +122,8 @@ def as_page(page: Page) -> bytes:
         title=title,
         lead=f"A Levitron as computed by levilab, {_span(poses)}, at first at {speed_in_words(page.speed)}.",
         alt=alt,
-        still_light=_data_address(stills["light"]),
-        still_dark=_data_address(stills["dark"]),
+        still_light=_data_address(stills["light"], "light"),
+        still_dark=_data_address(stills["dark"], "dark"),
         readings=readings,
         speeds=[(short_speed(speed), speed) for speed in sorted({*_SPEEDS, page.speed}, reverse=True)],
         speed=page.speed,
@@ -280,7 +282,7 @@ def _licence(three: bytes) -> str:
     return ". ".join(line for line in lines if line and not line.startswith("@")) + "."
 
 
-def _data_address(picture: Any) -> str:
+def _data_address(picture: Image, theme: str) -> str:
     buffer = io.BytesIO()
-    picture.quantize(128).save(buffer, "PNG", optimize=True)
+    picture.quantize(palette=table_of_colours([picture], theme)).save(buffer, "PNG", optimize=True)
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")

@@ -129,7 +129,7 @@ def _state_at(motion: Trajectory, time: float) -> Array:
     if late > 1e-9:
         state = simulate(scene, late, tolerance=TOLERANCE, rate=None, start=state).states[-1].copy()
     state[TIME] = time
-    return state
+    return np.asarray(state)
 
 
 def _across(arm: Array, axis: Array) -> Array:
