@@ -16,7 +16,7 @@ import numpy as np
 from levilab.errors import LevilabError
 from levilab.motion.animation.paint import Painter, Pose, font
 from levilab.motion.animation.parts import COLOURS, parts_of
-from levilab.motion.animation.poses import matrices
+from levilab.motion.animation.poses import height_for_camera, matrices
 from levilab.motion.animation.words import readout, speed_in_words
 
 if TYPE_CHECKING:
@@ -148,7 +148,7 @@ def still(film: Film, k: int, *, with_words: bool = True) -> Image:
 
 def _artist(film: Film, *, with_words: bool = True) -> Callable[[int], Image]:
     """A function that draws the k-th picture."""
-    poses, parts = film.poses, parts_of(film.poses.scene)
+    poses, parts = film.poses, parts_of(film.poses.scene, height_for_camera(film.poses))
     painter = Painter(parts, film.size, film.theme)
     turns = matrices(poses.quaternions)
     ends = poses.positions + parts["axis"]["up"] * poses.axes

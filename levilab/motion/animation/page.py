@@ -25,6 +25,7 @@ import numpy as np
 from levilab.errors import LevilabError, UsageError
 from levilab.motion.animation.film import Film, in_mm, nice_length, still, table_of_colours
 from levilab.motion.animation.parts import COLOURS, parts_of
+from levilab.motion.animation.poses import height_for_camera
 from levilab.motion.animation.words import short_speed, speed_in_words
 from levilab.software import software_versions
 
@@ -183,7 +184,7 @@ def _data(page: Page, alt: str, readings: list[tuple[str, str, int]]) -> dict[st
         "columns": columns_of(poses),
         "count": len(poses.times),
         "drive_mt": 1000 * poses.scene.drive.amplitude_t,
-        "parts": parts_of(poses.scene),
+        "parts": parts_of(poses.scene, height_for_camera(poses)),
         "readings": [(name, digits) for name, _, digits in readings],
         "start": float(poses.times[0]),
         "step": float(poses.times[1] - poses.times[0]),

@@ -40,8 +40,9 @@ _VIEW_RAD, _ELEVATION, _AZIMUTH = math.radians(26), 0.33, -1.25
 #: Towards the lights, how bright they are, and the light from everywhere.
 _LIGHTS = ((np.array([-0.35, -0.46, 0.82]), 0.55), (np.array([0.57, 0.71, 0.42]), 0.12))
 _EVERYWHERE = 0.50
-#: A mark lies by so much outside of its part [m].
-_OUT_M = 0.00012
+#: As parts of the base's reach: how far a mark lies outside of its part; how far the drive's arrow is above the base,
+#: its length, its thickness; and how much wider a shadow is by height.
+_OUT, _ARROW, _SOFTER = 0.0022, (0.073, 0.44, 0.022), 0.22
 
 
 @dataclass(frozen=True)
@@ -132,6 +133,7 @@ class Painter:
     def __init__(self, parts: dict[str, Any], size: tuple[int, int], theme: str = "light") -> None:
         self.parts, self.size = parts, size
         self.colours: dict[str, Colour] = {key: _rgb(text) for key, text in parts["colours"][theme].items()}
+        self._reach: float = parts["view"]["reach"]
         self._camera = _camera(parts, size)
         self._solids = self._make_solids()
         points = [point for part in parts["parts"] for point in part["outline"]]
@@ -207,7 +209,7 @@ class Painter:
         """Of light from straight above: softer, the higher the top."""
         x, y, z = pose.position
         bottom = self.parts["base"]["bottom"]
-        radius = self._widest * (1.2 + 4.0 * max(z - bottom, 0.0))
+        radius = self._widest * (1.2 + _SOFTER / self._reach * max(z - bottom, 0.0))
         edge = self._camera.project(_circle(radius, bottom, 48) + np.array([x, y, 0.0]))
         low, high = np.floor(edge.min(axis=0)).astype(int), np.ceil(edge.max(axis=0)).astype(int)
         width, height = (int(n) for n in np.maximum(high - low, 1))
@@ -232,9 +234,10 @@ class Painter:
         direction = self.parts["drive"]
         if direction is None or abs(pose.drive) < 0.02:
             return
-        start = np.array([0.0, 0.0, self.parts["base"]["top"] + 0.004])
-        tip = start + 0.024 * pose.drive * np.array(direction)
-        self._draw_arrow(pen, np.array([start, tip]), self.colours["drive"], 0.0012)
+        above, length, thick = (share * self._reach for share in _ARROW)
+        start = np.array([0.0, 0.0, self.parts["base"]["top"] + above])
+        tip = start + length * pose.drive * np.array(direction)
+        self._draw_arrow(pen, np.array([start, tip]), self.colours["drive"], thick)
 
     def _draw_arrow(self, pen: ImageDraw, points: Array, colour: Colour, thick: float) -> None:
         """A line along points [m] with a head at its end."""
@@ -355,7 +358,7 @@ class Painter:
             for (r, z), sign in ((sides[0], -1.0), (sides[-1], 1.0)):
                 caps.append((_circle(r, z, _AROUND), np.array([0.0, 0.0, sign])))
             marks = [
-                (_Surface(*_patch(mark), colour=self.colours[mark["colour"]]), mark["turns"])
+                (_Surface(*_patch(mark, _OUT * self._reach), colour=self.colours[mark["colour"]]), mark["turns"])
                 for mark in self.parts["marks"]
                 if mark["part"] == part["name"]
             ]
@@ -387,12 +390,12 @@ def _revolve(
     return np.concatenate(corners), np.concatenate(normals)
 
 
-def _patch(mark: dict[str, Any]) -> tuple[Array, Array]:
+def _patch(mark: dict[str, Any], out: float) -> tuple[Array, Array]:
     """The facets of a mark, a little outside of its part."""
     outline = np.array(mark["outline"])
     steps = np.diff(outline, axis=0)
     outwards = np.stack([steps[:, 1], -steps[:, 0]], axis=1) / np.linalg.norm(steps, axis=1)[:, None]
-    moved = outline + _OUT_M * np.vstack([outwards[:1], outwards[:-1] + outwards[1:], outwards[-1:]])
+    moved = outline + out * np.vstack([outwards[:1], outwards[:-1] + outwards[1:], outwards[-1:]])
     return _revolve(moved.tolist(), 6, mark["azimuth"] - mark["width"] / 2, mark["width"])
 
 

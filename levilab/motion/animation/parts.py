@@ -37,17 +37,20 @@ COLOURS: dict[str, dict[str, str]] = {
 _USUAL_THICKNESS = 0.2
 #: The axis is drawn so far beyond the centre of mass, in radii of the magnet: up, and down.
 _AXIS_UP, _AXIS_DOWN = 3.2, 0.9
+#: Where a top floats unless more is known, in outer radii of the base.
+_FLOATS = 1.33
 #: Widths of the tape and of the mark on the disc [rad].
 _TAPE_RAD, _MARK_RAD = 0.42, 0.20
 
 Outline = list[list[float]]
 
 
-def parts_of(scene: Scene) -> dict[str, Any]:
+def parts_of(scene: Scene, height: float | None = None) -> dict[str, Any]:
     """Describe the top and the base of a scene.
 
     Args:
         scene: with the magnet's and the base's sizes; whether washers are loose, and whether a drive is on.
+        height: of the top, for the camera [m]; None: about where the scene's top starts.
 
     Returns:
         A table for JSON, lengths in [m], angles in [rad], in the top's frame (z along its axis, x along the transverse
@@ -66,7 +69,7 @@ def parts_of(scene: Scene) -> dict[str, Any]:
     radius, half = scene.top.magnet_radius_m, scene.top.magnet_height_m / 2
     loose = scene.washers.inertia_kg_m2 > 0
     parts = _parts(radius, half)
-    base = _base(scene)
+    base, height = _base(scene), _usual_height(scene) if height is None else height
     return {
         "parts": parts,
         "marks": _marks(radius, half, loose=loose),
@@ -76,8 +79,8 @@ def parts_of(scene: Scene) -> dict[str, Any]:
         "drive": _direction(scene),
         "view": {
             "reach": max(base["outer"], 2 * radius),
-            "top": _height(scene) + _AXIS_UP * radius,
-            "floats": [0.0, 0.0, _height(scene)],
+            "top": height + _AXIS_UP * radius,
+            "floats": [0.0, 0.0, height],
         },
         "colours": COLOURS,
     }
@@ -157,6 +160,6 @@ def _direction(scene: Scene) -> list[float] | None:
     return [part / length for part in scene.drive.direction]
 
 
-def _height(scene: Scene) -> float:
-    """Where the top starts [m]; where it floats needs more than a picture asks for, and lies near to this."""
-    return scene.start.position_m[2]
+def _usual_height(scene: Scene) -> float:
+    """Near to where the top starts [m]; where it floats is not computed for a picture, and is a matter of the base."""
+    return scene.start.position_m[2] if scene.start.place == "given" else _FLOATS * scene.base.outer_radius_m

@@ -193,6 +193,11 @@ def drive_share(drive: Drive, times: Array) -> Array:
     return np.where(times < (math.inf if drive.off_s is None else drive.off_s), share, 0.0)
 
 
+def height_for_camera(poses: Poses) -> float:
+    """Return a height that keeps the top in the picture [m], near to its highest: it falls rather than rises."""
+    return float(np.quantile(poses.positions[:, 2], 0.9))
+
+
 def turn_rate(motion: Trajectory) -> float:
     """Return the fastest that a part of the top turns during a motion [Hz]."""
     return float(max(np.abs(motion.spin_hz).max(), np.abs(motion.washer_spin_hz).max()))
@@ -209,4 +214,4 @@ def matrices(quaternions: Array) -> Array:
     return np.asarray(np.moveaxis(np.array(rows), -1, 0), dtype=np.float64)
 
 
-__all__ = ["Poses", "drive_share", "matrices", "poses_of", "quaternions_of", "turn_rate"]
+__all__ = ["Poses", "drive_share", "height_for_camera", "matrices", "poses_of", "quaternions_of", "turn_rate"]

@@ -1,14 +1,15 @@
 // The top over its base in three dimensions, from the description that parts.py makes of a scene.
 //
 // Used by the page of an animation and by the live view.  It imports nothing: three.js is handed over, so that it may
-// come from anywhere.  Lengths come in metres and are drawn in centimetres; z is up, as in the simulator.
+// come from anywhere.  Lengths come in metres; z is up, as in the simulator.  A base of the usual size is drawn in
+// centimetres, and another one as large, so that lines, cameras and shadows suit bases and tops of any size.
 //
 //     const view = buildScene(THREE, parts, "light");          // parts: what parts_of(scene) made; or "dark"
 //     const camera = buildCamera(THREE, parts, width / height);
 //     view.setPose([x, y, z], [qx, qy, qz, qw], {washers: 0.1, drive: 0.5});
 //     renderer.render(view.scene, camera);
 
-const CM = 100;             // drawn units in a metre
+const REACH = 5.5;          // drawn units from the axis to the base's rim
 const TURN = 2 * Math.PI;
 const RIBBON = 0.028;       // half of the path's width
 const AROUND = 96;          // facets around a part
@@ -28,7 +29,7 @@ const AROUND = 96;          // facets around a part
  *   axisEnd(position, quaternion): where the end of the drawn axis is then [m]; dispose(): free the graphics' memory.
  */
 export function buildScene(THREE, parts, theme = "light") {
-  const scene = new THREE.Scene();
+  const scale = scaleOf(parts), scene = new THREE.Scene();
   const paints = [];        // [material, key of the colours]
   const paint = (key, options = {}) => {
     const material = new THREE.MeshStandardMaterial({roughness: 0.55, metalness: 0.05, ...options});
@@ -52,17 +53,17 @@ export function buildScene(THREE, parts, theme = "light") {
 
   // the ground, the base on it, and the top's shadow between them
   const {inner, outer, bottom, top: upper, edge} = parts.base;
-  const ground = new THREE.Mesh(new THREE.CircleGeometry(2.1 * outer * CM, AROUND), plain("ground"));
-  ground.position.z = bottom * CM - 0.02;
+  const ground = new THREE.Mesh(new THREE.CircleGeometry(2.1 * outer * scale, AROUND), plain("ground"));
+  ground.position.z = bottom * scale - 0.02;
   const base = new THREE.Group();
-  base.add(new THREE.Mesh(revolve(THREE, [
+  base.add(new THREE.Mesh(revolve(THREE, scale, [
     [inner + edge, bottom], [outer - edge, bottom], [outer, bottom + edge], [outer, upper - edge],
     [outer - edge, upper], [inner + edge, upper], [inner, upper - edge], [inner, bottom + edge], [inner + edge, bottom],
   ]), paint("base", {roughness: 0.42, metalness: 0.25})));
   const shade = shadowTexture(THREE);
   const shadow = new THREE.Mesh(
     new THREE.CircleGeometry(1, 48), new THREE.MeshBasicMaterial({map: shade, transparent: true, depthWrite: false}));
-  shadow.position.z = bottom * CM + 0.04;
+  shadow.position.z = bottom * scale + 0.04;
   paints.push([shadow.material, "shadow"]);
   scene.add(ground, base, shadow);
 
@@ -72,10 +73,10 @@ export function buildScene(THREE, parts, theme = "light") {
   const groups = {top, washers};
   for (const part of parts.parts) {
     const shiny = part.colour === "washers" ? {roughness: 0.35, metalness: 0.15} : {};
-    groups[part.turns].add(new THREE.Mesh(revolve(THREE, part.outline), paint(part.colour, shiny)));
+    groups[part.turns].add(new THREE.Mesh(revolve(THREE, scale, part.outline), paint(part.colour, shiny)));
   }
   for (const mark of parts.marks) {
-    const geometry = revolve(THREE, mark.outline, mark.azimuth - mark.width / 2, mark.width, 0.00012);
+    const geometry = revolve(THREE, scale, mark.outline, mark.azimuth - mark.width / 2, mark.width, 0.012 / scale);
     groups[mark.turns].add(new THREE.Mesh(geometry, paint(mark.colour, {side: THREE.DoubleSide, roughness: 0.8})));
   }
   scene.add(top);
@@ -83,13 +84,13 @@ export function buildScene(THREE, parts, theme = "light") {
   // the axis, a line through it all; the arrow of the spin, which leans with the axis and does not turn with the top
   const leaning = new THREE.Group();
   const {up, down} = parts.axis;
-  const axis = new THREE.Mesh(new THREE.CylinderGeometry(0.022, 0.022, (up + down) * CM, 8), plain("axis"));
+  const axis = new THREE.Mesh(new THREE.CylinderGeometry(0.022, 0.022, (up + down) * scale, 8), plain("axis"));
   axis.rotation.x = Math.PI / 2;
-  axis.position.z = (up - down) / 2 * CM;
+  axis.position.z = (up - down) / 2 * scale;
   const end = new THREE.Mesh(new THREE.SphereGeometry(0.075, 16, 12), plain("path"));
-  end.position.z = up * CM;
-  const spin = spinArrow(THREE, parts.spin.radius * CM, plain("spin"));
-  spin.position.z = parts.spin.height * CM;
+  end.position.z = up * scale;
+  const spin = spinArrow(THREE, parts.spin.radius * scale, plain("spin"));
+  spin.position.z = parts.spin.height * scale;
   leaning.add(axis, end, spin);
   scene.add(leaning);
 
@@ -110,7 +111,7 @@ export function buildScene(THREE, parts, theme = "light") {
   // the drive's field: an arrow under the top that grows and shrinks
   const drive = parts.drive ? driveArrow(THREE, parts.drive, plain("drive")) : null;
   if (drive) {
-    drive.position.z = (upper + 0.004) * CM;
+    drive.position.z = upper * scale + 0.4;
     scene.add(drive);
   }
 
@@ -126,15 +127,15 @@ export function buildScene(THREE, parts, theme = "light") {
     },
 
     setPose(position, quaternion, {washers: slipped = 0, drive: share = 0} = {}) {
-      top.position.set(position[0] * CM, position[1] * CM, position[2] * CM);
+      top.position.set(position[0] * scale, position[1] * scale, position[2] * scale);
       top.quaternion.set(...quaternion);
       washers.rotation.z = slipped;
       leaning.position.copy(top.position);
       leaning.quaternion.setFromUnitVectors(upright, along(quaternion));
-      const from = bottom * CM, height = Math.max(top.position.z + lowest * CM - from, 0.01);
+      const from = bottom * scale, height = Math.max(top.position.z + lowest * scale - from, 0.01);
       plumb.position.set(top.position.x, top.position.y, from + height / 2);
       plumb.scale.y = height;
-      const radius = widest * CM * (1.2 + 0.04 * height);  // the higher, the softer
+      const radius = widest * scale * (1.2 + 0.04 * height);  // the higher, the softer
       shadow.position.x = top.position.x;
       shadow.position.y = top.position.y;
       shadow.scale.set(radius, radius, 1);
@@ -146,7 +147,7 @@ export function buildScene(THREE, parts, theme = "light") {
       if (!geometry.index || geometry.getAttribute("position").count < 2 * count) makeRibbon(THREE, geometry, 2 * count);
       const places = geometry.getAttribute("position"), colours = geometry.getAttribute("color");
       for (let k = 0; k < count; k += 1) {
-        const x = points[3 * k] * CM, y = points[3 * k + 1] * CM, z = points[3 * k + 2] * CM, share = (k + 1) / count;
+        const x = points[3 * k] * scale, y = points[3 * k + 1] * scale, z = points[3 * k + 2] * scale, share = (k + 1) / count;
         places.setXYZ(2 * k, x, y, z - RIBBON);
         places.setXYZ(2 * k + 1, x, y, z + RIBBON);
         colours.setW(2 * k, share);
@@ -192,6 +193,11 @@ export function buildScene(THREE, parts, theme = "light") {
   return view;
 }
 
+/** Drawn units in a metre. */
+function scaleOf(parts) {
+  return REACH / parts.view.reach;
+}
+
 /**
  * A camera from which the base and the whole axis are seen, and where it looks at, for OrbitControls' target.
  *
@@ -207,10 +213,10 @@ export function buildCamera(THREE, parts, aspect) {
 
 /** Put a camera back to where buildCamera has it, for a picture of this shape. */
 export function placeCamera(THREE, camera, parts, aspect) {
-  const {reach, top} = parts.view, bottom = parts.base.bottom;
-  const target = new THREE.Vector3(0, 0, (0.48 * top + 0.52 * bottom) * CM);
+  const {reach, top} = parts.view, bottom = parts.base.bottom, scale = scaleOf(parts);
+  const target = new THREE.Vector3(0, 0, (0.48 * top + 0.52 * bottom) * scale);
   const half = Math.tan(camera.fov / 2 * TURN / 360);
-  const distance = Math.max((0.62 * (top - bottom) + 0.16 * reach) / half, 1.1 * reach / (half * aspect) + reach) * CM;
+  const distance = Math.max((0.62 * (top - bottom) + 0.16 * reach) / half, 1.1 * reach / (half * aspect) + reach) * scale;
   const elevation = 0.33, azimuth = -1.25;
   camera.aspect = aspect;
   camera.position.set(
@@ -227,7 +233,7 @@ export function placeCamera(THREE, camera, parts, aspect) {
  *
  * @param {number} from, width the piece of a turn [rad]; by how much it stands `out` of the outline [m].
  */
-function revolve(THREE, outline, from = 0, width = TURN, out = 0) {
+function revolve(THREE, scale, outline, from = 0, width = TURN, out = 0) {
   const places = [], normals = [], faces = [];
   const steps = Math.max(2, Math.ceil(AROUND * width / TURN));
   for (let k = 0; k + 1 < outline.length; k += 1) {
@@ -239,8 +245,8 @@ function revolve(THREE, outline, from = 0, width = TURN, out = 0) {
     for (let step = 0; step <= steps; step += 1) {
       const angle = from + width * step / steps, x = Math.cos(angle), y = Math.sin(angle);
       for (const [r, z] of [[r0, z0], [r1, z1]]) {
-        const radius = (r + out * across) * CM;
-        places.push(radius * x, radius * y, (z + out * along) * CM);
+        const radius = (r + out * across) * scale;
+        places.push(radius * x, radius * y, (z + out * along) * scale);
         normals.push(across * x, across * y, along);
       }
       const here = first + 2 * step;

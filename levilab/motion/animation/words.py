@@ -42,6 +42,8 @@ def readout(poses: Poses, k: int) -> list[tuple[str, str]]:
     ]
     if poses.scene.washers.inertia_kg_m2 > 0:
         rows.append(("slip", f"{number(poses.slips[k] / (2 * math.pi), 2)} turns"))
+    if poses.scene.drive.waveform != "off":
+        rows.append(("drive", f"{number(1000 * poses.scene.drive.amplitude_t * poses.drive[k], 2)} mT"))
     return rows
 
 
