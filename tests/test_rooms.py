@@ -18,8 +18,9 @@ if TYPE_CHECKING:
 
 #: What takes so long to load that it is imported where it is used: at least 10 ms, or not everywhere installed.
 HEAVY = {
-    "RigolWFM", "dask", "distributed", "filelock", "grp", "heyoka", "jinja2", "llvmlite", "lmfit", "matplotlib",
-    "numba", "pandas", "pyarrow", "pyvisa", "rich", "scipy", "serial", "typst", "uncertainties", "zarr",
+    "PIL", "RigolWFM", "dask", "distributed", "filelock", "grp", "heyoka", "imageio_ffmpeg", "jinja2", "llvmlite",
+    "lmfit", "matplotlib", "nicegui", "numba", "pandas", "playwright", "pyarrow", "pyvisa", "rich", "scipy", "serial",
+    "typst", "uncertainties", "zarr",
 }  # fmt: skip
 
 

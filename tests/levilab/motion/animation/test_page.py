@@ -1,0 +1,193 @@
+"""The page of an animation in a browser: it draws, plays, obeys keys, and stays whole whatever a scene is called."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import io
+import re
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from levilab.motion.animation.page import LARGEST, Page, as_page, columns_of, most_poses
+from levilab.motion.animation.poses import poses_of
+from levilab.motion.summary import summarise
+from levilab.simulator.scene import preset
+from levilab.simulator.single import simulate
+from support.browser import PHONE, watch
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    import playwright.sync_api as pw
+
+pytest.importorskip("nicegui", reason="three.js comes out of it: pip install 'levilab[live]'")
+
+HOSTILE = "</script><img src=x onerror=alert(1)>{{ 7 * 7 }}<!--"
+#: Small, since a processor draws it.
+WINDOW = {"width": 640, "height": 700}
+
+
+@pytest.fixture(scope="module")
+def page_of_top() -> Page:
+    scene = preset("loose-washers").changed({"name": HOSTILE, "description": f"{HOSTILE} \u2028 '\""})
+    motion = simulate(scene, 1.0, rate=480.0)
+    return Page(poses_of(motion, 0.0, 1.0, 480), summarise(motion, 1.0, 100.0, 0.1), 0.1)
+
+
+@pytest.fixture(scope="module")
+def path(page_of_top: Page, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("page") / "top.html"
+    place.write_bytes(as_page(page_of_top))
+    return place
+
+
+@pytest.fixture(scope="module")
+def opened(browser: pw.Browser, path: Path) -> Iterator[pw.Page]:
+    """One page for the tests that change nothing for good; it does not start by itself."""
+    with watch(browser, viewport=WINDOW, reduced_motion="reduce") as page:
+        page.goto(path.as_uri())
+        page.wait_for_selector("#stage[data-drawn]")
+        yield page
+
+
+def canvas(page: pw.Page) -> np.ndarray:
+    """The pixels of the picture."""
+    pixels = page.locator("#stage > canvas").screenshot()
+    return np.asarray(Image.open(io.BytesIO(pixels)).convert("RGB"), dtype=int)
+
+
+def seek(page: pw.Page, share: float) -> None:
+    drawn = page.locator("#stage").get_attribute("data-drawn")
+    page.locator("#scrub").evaluate(
+        "(s, share) => { s.value = share * s.max; s.dispatchEvent(new Event('input')) }", share
+    )
+    page.wait_for_function("before => document.getElementById('stage').dataset.drawn > Number(before)", arg=drawn)
+
+
+def read(page: pw.Page, name: str) -> float:
+    return float(page.locator(f"#read-{name}").inner_text().replace("−", "-"))
+
+
+def test_it_is_small_and_has_the_same_bytes_each_time(page_of_top: Page, path: Path) -> None:
+    content = path.read_bytes()
+    assert content == as_page(page_of_top)
+    assert len(content) < LARGEST
+    assert "MIT" in (text := content.decode())
+    assert "Three.js Authors" in text
+    # what is not the poses leaves the room for them that is counted with
+    poses = len(page_of_top.poses.times) * len(columns_of(page_of_top.poses)) * 16 / 3
+    assert len(content) - poses < LARGEST - most_poses(10) * 10 * 16 / 3
+
+
+def test_only_what_has_its_hash_may_run(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    policy = re.search(r'Content-Security-Policy" content="([^"]*)"', text)
+    assert policy
+    allowed = html.unescape(policy[1])
+    assert allowed.startswith("default-src 'none'; script-src 'sha256-")
+    assert "unsafe" not in allowed
+    for tag in ("style", "script"):
+        (inside,) = re.findall(rf"<{tag}>(.*?)</{tag}>", text, re.DOTALL)
+        digest = base64.b64encode(hashlib.sha256(inside.encode()).digest()).decode()
+        assert f"'sha256-{digest}'" in allowed
+    assert HOSTILE not in text
+    assert len(re.findall(r"</script", text)) == 5  # data, poses, three, top and the player
+
+
+def test_it_draws_and_the_picture_changes_with_the_time(opened: pw.Page) -> None:
+    seek(opened, 0.1)
+    first = canvas(opened)
+    assert first.std() > 20  # not blank
+    seek(opened, 0.505)
+    assert (np.abs(canvas(opened) - first).sum(axis=2) > 60).sum() > 200
+
+
+def test_it_reads_what_the_poses_are(opened: pw.Page, page_of_top: Page) -> None:
+    poses = page_of_top.poses
+    seek(opened, 0.5)
+    k = 240
+    assert read(opened, "time") == pytest.approx(poses.times[k], abs=6e-4)
+    assert read(opened, "height") == pytest.approx(100 * poses.positions[k, 2], abs=6e-3)
+    assert read(opened, "tilt") == pytest.approx(np.degrees(poses.tilts[k]), abs=0.06)
+    assert read(opened, "spin") == pytest.approx(poses.spins[k], abs=6e-3)
+    assert read(opened, "slip") == pytest.approx(poses.slips[k] / 2 / np.pi, abs=6e-3)
+    assert read(opened, "drive") == pytest.approx(0.4 * poses.drive[k], abs=6e-3)
+
+
+def test_a_scenes_name_is_text(opened: pw.Page) -> None:
+    assert opened.locator("h1").inner_text() == f"Levitron: {HOSTILE}"
+    assert opened.locator("img").count() == 0
+    assert "simulation" in opened.locator(".badge").inner_text()
+    assert HOSTILE in opened.locator("table").inner_text()
+
+
+def test_it_stands_still_where_less_motion_is_wanted_until_it_is_played(opened: pw.Page) -> None:
+    seek(opened, 0.2)
+    play = opened.get_by_role("button", name="Play")
+    assert play.is_visible()
+    play.click()
+    start = read(opened, "time")
+    opened.wait_for_function(
+        "start => Number(document.getElementById('read-time').textContent) > start + 0.01", arg=start
+    )
+    opened.get_by_role("button", name="Pause").click()
+    assert play.is_visible()
+
+
+def test_keys_play_step_change_the_speed_and_turn_the_view(opened: pw.Page) -> None:
+    opened.locator("body").evaluate("() => document.activeElement.blur()")
+    seek(opened, 0.4)
+    step = 1 / 480
+    before = read(opened, "time")
+    for key, after in ((".", before + step), (",", before), ("Home", 0.0), ("End", 1.0)):
+        opened.keyboard.press(key)
+        opened.wait_for_function(
+            "t => Math.abs(Number(document.getElementById('read-time').textContent) - t) < 2e-3", arg=after
+        )
+    opened.keyboard.press("[")
+    assert opened.locator("#speed").input_value() == "0.05"
+    opened.keyboard.press("]")
+    assert opened.locator("#speed").input_value() == "0.1"
+    opened.keyboard.press("p")
+    assert not opened.get_by_label("Path").is_checked()
+    opened.keyboard.press("p")
+    seek(opened, 0.3)
+    seen = canvas(opened)
+    opened.locator("#stage > canvas").focus()
+    opened.keyboard.press("ArrowUp")
+    opened.keyboard.press("ArrowUp")
+    opened.wait_for_timeout(200)
+    turned = canvas(opened)
+    opened.keyboard.press("r")
+    opened.wait_for_timeout(200)
+    inner = (slice(8, -8), slice(8, -8))  # without the line around what has the focus
+    assert (np.abs(turned - seen)[inner].sum(axis=2) > 60).sum() > 1000
+    assert (np.abs(canvas(opened) - seen)[inner].sum(axis=2) > 60).sum() < 100
+
+
+def test_on_a_telephone_in_the_dark_nothing_is_wider_than_the_screen(
+    watched: Callable[..., pw.Page], path: Path
+) -> None:
+    page = watched(viewport=PHONE, color_scheme="dark", has_touch=True)
+    page.goto(path.as_uri())
+    page.wait_for_selector("#stage[data-drawn]")
+    # it begins by itself
+    page.wait_for_function("() => Number(document.getElementById('read-time').textContent) > 0")
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+    assert canvas(page)[-20:, :20].mean() < 60
+
+
+def test_without_script_there_are_a_picture_and_the_numbers(watched: Callable[..., pw.Page], path: Path) -> None:
+    page = watched(viewport=WINDOW, java_script_enabled=False)
+    page.goto(path.as_uri())
+    assert page.locator("#still img").is_visible()
+    assert page.locator("#still img").evaluate("image => image.naturalWidth") == 800
+    assert not page.locator("#controls").is_visible()
+    assert page.locator("noscript p").is_visible()  # get_by_text leaves it out
+    assert page.get_by_role("row", name="height").is_visible()
