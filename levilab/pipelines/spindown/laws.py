@@ -37,26 +37,24 @@ class ShownLaw:
 
     Attributes:
         equation: as a figure's label.
-        colour: the same in every figure.
         straight: None if nothing is.
     """
 
     equation: str
-    colour: str
     straight: StraightLine | None = None
 
 
 #: By the names of `analysis.spindown.drag.LAWS`, in their order.
-#: Okabe and Ito's colours: distinct to the colour-blind, too.
+#: Their colours are in `levilab.present.looks`.
 SHOWN_LAWS = MappingProxyType({
-    "stokes": ShownLaw("ω̇ = −C₁ω", "#0072B2", StraightLine("ln ω", "ln ω   (ω in rad/s)", np.log)),
-    "newton": ShownLaw("ω̇ = −C₂ω²", "#D55E00", StraightLine("1/ω", "1/ω  [s/rad]", lambda omega: 1 / omega)),
+    "stokes": ShownLaw("ω̇ = −C₁ω", StraightLine("ln ω", "ln ω   (ω in rad/s)", np.log)),
+    "newton": ShownLaw("ω̇ = −C₂ω²", StraightLine("1/ω", "1/ω  [s/rad]", lambda omega: 1 / omega)),
     "disc": ShownLaw(
-        "ω̇ = −Cω$^{3/2}$", "#009E73",
+        "ω̇ = −Cω$^{3/2}$",
         StraightLine("ω^−½", "ω$^{−1/2}$  [(s/rad)$^{1/2}$]", lambda omega: omega**-0.5),
     ),
-    "mixed": ShownLaw("ω̇ = −C₁ω − C₂ω²", "#CC79A7"),
-    "power": ShownLaw("ω̇ = −cωⁿ", "#E69F00"),
+    "mixed": ShownLaw("ω̇ = −C₁ω − C₂ω²"),
+    "power": ShownLaw("ω̇ = −cωⁿ"),
 })  # fmt: skip
 
 #: The laws' parameters in the field's letters.
