@@ -12,6 +12,8 @@ UNITS = {
     "s": "s", "hz": "Hz", "v": "V", "vpp": "Vpp", "ohm": "Ω", "t": "T", "m": "m", "a": "A", "k": "K", "db": "dB",
     "kg": "kg",
 }  # fmt: skip
+#: The end of a key of a rate, whose unit is of two words.
+_RATE = "_hz_per_s"
 #: Instruments say infinite as 9.9e37 (SCPI-99 volume 1, §7.2.1.4).
 INFINITE = 9e37
 #: What makes up a generator's drive; the other settings are named one by one.
@@ -43,9 +45,19 @@ def setting_in_words(key: str, value: Any) -> str:
 
     >>> setting_in_words("load_ohm", 9.9e37)
     'load high impedance'
+    >>> setting_in_words("creep_hz_per_s", 0.1), setting_in_words("shows", ["tape", "laser"])
+    ('creep 0.1 Hz/s', 'shows tape, laser')
     """
-    name, _, unit = key.rpartition("_")
-    return f"{(name if unit in UNITS and name else key).replace('_', ' ')} {value_in_words(key, value)}"
+    name, unit = _split(key)
+    return f"{(name if unit else key).replace('_', ' ')} {value_in_words(key, value)}"
+
+
+def _split(key: str) -> tuple[str, str]:
+    """The name in a key, and the unit that the key ends in; empty where it ends in none."""
+    if key.endswith(_RATE) and key != _RATE:
+        return key.removesuffix(_RATE), "Hz/s"
+    name, _, last = key.rpartition("_")
+    return name, UNITS.get(last, "") if name else ""
 
 
 def value_in_words(key: str, value: Any) -> str:
@@ -59,9 +71,9 @@ def value_in_words(key: str, value: Any) -> str:
     if isinstance(value, bool):
         return "on" if value else "off"
     if not isinstance(value, int | float):
-        return "not known" if value is None else str(value)
-    name, _, last = key.rpartition("_")
-    unit = UNITS.get(last, "") if name else ""
+        several = value if isinstance(value, list | tuple) else ("not known" if value is None else str(value),)
+        return ", ".join(one if isinstance(one, str) else value_in_words(key, one) for one in several)
+    _, unit = _split(key)
     if abs(value) >= INFINITE:
         return "high impedance" if unit == "Ω" else "infinite"
     if unit in _OF_THE_LAB and _OF_THE_LAB[unit][0] <= abs(value) < _OF_THE_LAB[unit][1]:
