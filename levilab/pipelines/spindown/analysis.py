@@ -67,7 +67,7 @@ class SpinDownAnalysis(Analyzed[Readings, SpinDown, Combined, SpinDownOptions]):
 
     def about_all(self) -> Iterable[str]:
         """What to know of the means, and of the laws that are not excluded."""
-        return (*map(_with_symbols, self.combined.warnings), *self._of_laws(self.combined.fits))
+        return map(_with_symbols, (*self.combined.warnings, *self._of_laws(self.combined.fits)))
 
     def about_run(self, run: SpinDown) -> Iterable[str]:
         """What to know of one run."""
