@@ -6,6 +6,7 @@ import gc
 import hashlib
 import inspect
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -170,7 +171,9 @@ def test_a_notebook_shows_a_result_escaped_and_with_its_figure(tmp_path: Path) -
     result = levilab.analyze(folder)
     html = result._repr_html_()
     assert "&lt;script&gt;alert(1)" in html
-    assert 'src="data:image/svg+xml;base64,' in html
+    assert "<figure id=" in html
+    assert "<svg " in html
+    html = re.sub(r' xmlns(:xlink)?="http://www.w3.org/[^"]*"', "", html)  # names of SVG, which nothing fetches
     assert not any(text in html for text in ("<script", "http://", "https://", "@import", "<link"))
     assert "&lt;script&gt;" in levilab.load(folder)._repr_html_()
     assert "<script" not in levilab.load(folder)._repr_html_()

@@ -15,6 +15,7 @@ from levilab.pipelines.catalogue import ANALYSES, analyze_suiting, save
 from levilab.pipelines.limit.analysis import LOWER_EDGE, RESONANCE, UPPER_EDGE, LimitOptions, analyze_limits
 from levilab.pipelines.limit.report import limit_part
 from levilab.pipelines.limit.table import limit_tables
+from levilab.present.document.blocks import Listing
 from levilab.report.page import write_report
 from support.spin_downs import spin_down_csv
 
@@ -147,9 +148,11 @@ def test_a_repetition_far_off_is_numbered_among_all_and_the_page_shows_200(tmp_p
     of_all, of_second = (text for text in analysis.all_warnings if "not belong to the others" in text)
     assert of_all.startswith("repetition 14 does not")
     assert of_second.startswith("two.csv: repetition 4 does not")
-    one, two = (part.context for part in limit_part(analysis).inputs)
-    assert (one["shown"], two["shown"], two["count"]) == (10, 200, 240)
-    assert [len(block.rows) for block in two["blocks"]] == 20 * [10]
+    one, two = (part.blocks[0] for part in limit_part(analysis).inputs)
+    assert isinstance(one, Listing)
+    assert isinstance(two, Listing)
+    assert (len(one.table.rows), len(two.table.rows)) == (10, 200)
+    assert two.note == "The first 200 of 240; all of them are in the data."
 
 
 def test_upper_limits_that_do_not_scatter_are_no_better_than_a_step(sample_data: Path, tmp_path: Path) -> None:
