@@ -80,7 +80,7 @@ LOOKS = MappingProxyType({
     # where tops float
     "floats": Look(GREEN, _SOLID, "s"),
     "to set": Look(ORANGE, _DASHED, "D"),
-    "theory": Look(ORANGE, _DASHED),
+    "theory": Look(ORANGE, _SOLID),
     "up": Look(BLUE, _SOLID, "o"),
     "lost": Look(PALE, _SOLID, "x", "////"),
 })  # fmt: skip
