@@ -1,0 +1,100 @@
+"""A document → one HTML page with everything in it: nothing is fetched when it is opened."""
+
+from __future__ import annotations
+
+import base64
+import json
+from functools import cache
+from hashlib import sha256
+from importlib.resources import files
+from typing import TYPE_CHECKING
+
+from levilab.present.document.blocks import Section
+from levilab.report.html.blocks import Writer
+from levilab.report.html.elements import Html, element, joined, words
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from levilab.present.document.blocks import Block, Document
+
+
+def page_of(document: Document) -> str:
+    """The whole page; the same document always has the same text."""
+    writer = Writer()
+    body = joined(
+        [
+            element("header", _head(document, writer)),
+            "\n",
+            writer.blocks(document.blocks, level=2),
+            element("footer", words(document.footer)) if document.footer else "",
+        ]
+    )
+    head = joined([
+        element("meta", charset="utf-8"),
+        element("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        element("meta", http_equiv="Content-Security-Policy", content=_policy()),
+        element("title", f"levilab: {document.subject or document.title}"),
+        element("style", Html(style())),
+    ])  # fmt: skip
+    scripts = (_island(writer), element("script", Html(script()))) if writer.is_alive else ()
+    page = element("html", element("head", head), "\n",
+                   element("body", element("main", body), *scripts, class_="levilab"), lang="en")  # fmt: skip
+    return f"<!DOCTYPE html>\n{page.markup}\n"
+
+
+def fragment_of(blocks: Iterable[Block], prefix: str = "") -> str:
+    """Blocks as a part of a page that is not ours, such as a notebook: without script, and with a style of its own.
+
+    Args:
+        blocks: in their order.
+        prefix: of all ids, which differs from that of other fragments in the page; it begins with a letter.
+    """
+    scoped = Html(f".levilab-part {{\n{style()}\n}}")  # a sheet inside of a selector reaches nothing else of the page
+    body = element("main", Writer(prefix).blocks(blocks, level=2), class_="levilab")
+    return element("div", element("style", scoped), body, class_="levilab-part").markup
+
+
+def _head(document: Document, writer: Writer) -> list[Html]:
+    banner = writer.blocks([document.banner], level=2) if document.banner else joined([])
+    lead = element("p", words(document.lead), class_="lead") if document.lead else joined([])
+    return [element("h1", words(document.title)), lead, banner, _contents(document)]
+
+
+def _contents(document: Document) -> Html:
+    """Links to the sections of the first depth."""
+    sections = [block for block in document.blocks if isinstance(block, Section) and block.anchor]
+    if not document.contents or not sections:
+        return joined([])
+    writer = Writer()
+    links = [element("a", words(one.title), href=f"#{writer.new_id(one.anchor)}") for one in sections]
+    return element("nav", links, aria_label="Contents")
+
+
+def _island(writer: Writer) -> Html:
+    """The texts of the points, as data that no browser takes for markup or runs."""
+    text = json.dumps(writer.points, ensure_ascii=False, sort_keys=True).replace("<", "\\u003c").replace("&", "\\u0026")
+    return element("script", Html(text), type="application/json", id="points")
+
+
+@cache
+def _policy() -> str:
+    """Nothing is loaded, and no script runs but our own, by its hash."""
+    hashes = [base64.b64encode(sha256(text.encode()).digest()).decode() for text in (script(), style())]
+    return (
+        f"default-src 'none'; base-uri 'none'; form-action 'none'; img-src data:; script-src 'sha256-{hashes[0]}'; "
+        # attributes alone, which figures have on each line; the second is for browsers that do not know the others
+        f"style-src-elem 'sha256-{hashes[1]}'; style-src-attr 'unsafe-inline'; style-src 'unsafe-inline'"
+    )
+
+
+@cache
+def style() -> str:
+    """The page's style sheet."""
+    return files("levilab.report.html").joinpath("style.css").read_text(encoding="utf-8")
+
+
+@cache
+def script() -> str:
+    """The page's script."""
+    return files("levilab.report.html").joinpath("script.js").read_text(encoding="utf-8")
