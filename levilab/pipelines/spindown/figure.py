@@ -345,7 +345,7 @@ def _draw_residuals(figure: Figure, top: float, analysis: SpinDownAnalysis, unit
         axes.locator_params(nbins=4)
         axes.set_title(name, loc="left", color=LOOKS[name].colour, fontsize=8, fontweight="bold", pad=3)
         if own:
-            axes.set_title("own scale", loc="right", color="black", fontsize=SMALL - 0.5, fontstyle="italic", pad=3)
+            axes.set_title("own scale", loc="right", color="black", fontsize=SMALL, fontstyle="italic", pad=3)
             axes.set_facecolor("#F4F4F4")
         if place == 0:
             axes.set_ylabel(f"residual  [{unit.symbol}]")
