@@ -189,7 +189,7 @@ def _draw_outliers(axes: Axes, analysis: SpinDownAnalysis, k: int) -> None:
         for i in range(min(len(shown), _MOST_NAMED) if share else 0):
             text = f"{nu[shown[i]]:.4g} Hz"
             axes.annotate(
-                text, (t[shown[i]], y[i]), (7, -1.5), textcoords="offset points", color=look.colour, fontsize=SMALL
+                text, (t[shown[i]], y[i]), (7, -1.5), textcoords="offset points", color=look.of_text, fontsize=SMALL
             )
 
 
@@ -343,7 +343,7 @@ def _draw_residuals(figure: Figure, top: float, analysis: SpinDownAnalysis, unit
         axes.set(ylim=(-most, most), xlabel="time  [s]")
         axes.tick_params(labelsize=SMALL)
         axes.locator_params(nbins=4)
-        axes.set_title(name, loc="left", color=LOOKS[name].colour, fontsize=8, fontweight="bold", pad=3)
+        axes.set_title(name, loc="left", color=LOOKS[name].of_text, fontsize=8, fontweight="bold", pad=3)
         if own:
             axes.set_title("own scale", loc="right", color="black", fontsize=SMALL, fontstyle="italic", pad=3)
             axes.set_facecolor("#F4F4F4")
@@ -385,7 +385,7 @@ def _draw_straight_lines(figure: Figure, top: float, analysis: SpinDownAnalysis)
         strips.append(strip)
         _draw_straight(above, strip, analysis, straight.transform, law)
         above.set_ylabel(straight.axis, fontsize=8)
-        above.set_title(f"straight if {law} holds", color=LOOKS[law].colour, fontsize=8, fontweight="bold", pad=3)
+        above.set_title(f"straight if {law} holds", color=LOOKS[law].of_text, fontsize=8, fontweight="bold", pad=3)
         for axes in (above, strip):
             axes.tick_params(labelsize=SMALL)
         above.tick_params(labelbottom=False)
