@@ -27,7 +27,6 @@ from levilab.present.drawing import (
     synthetic_mark,
     write,
 )
-from levilab.present.drawing import Label as NamedLine
 from levilab.present.looks import GREY, LOOKS, MARKERS
 from levilab.present.numbers import in_words, short_name
 from levilab.present.style import STYLE, WIDE
@@ -286,8 +285,8 @@ def _draw_differences(axes: Axes, analysis: SpinDownAnalysis, unit: _Unit) -> No
         axes.plot(t, difference, linewidth=1.3, zorder=2.6, **LOOKS[name].as_line)
         where = "" if np.abs(difference).max() <= most else f", to {_signed(difference)} Hz"
         said = _note(analysis, name)[2:] + (", 2 u shaded" if name == best and u is not None else "")
-        ends.append(NamedLine(float(difference[-1]), f"{name}: {said or 'not excluded'}{where}", LOOKS[name].colour))
-    _name_laws(axes, [end for end in ends if math.isfinite(end.y)])
+        ends.append((float(difference[-1]), name, f"{name}: {said or 'not excluded'}{where}"))
+    _name_laws(axes, [end for end in ends if math.isfinite(end[0])])
     of = "" if several == 1 else f"; curves of {'the longest run' if several > 1 else 'the run'}"
     axes.set_title(f"Readings and laws less the best law{of}", pad=3)
 
@@ -298,12 +297,12 @@ def _signed(difference: Array) -> str:
     return f"{'−' if farthest < 0 else '+'}{digits(abs(farthest))}"
 
 
-def _name_laws(axes: Axes, ends: list[NamedLine]) -> None:
-    """A piece of each law's line and its name beside the panel, in the order of the lines' ends."""
-    order = sorted(ends, key=lambda end: -end.y)
-    handles = [Line2D([], [], linewidth=1.3, **LOOKS[end.text.partition(":")[0]].as_line) for end in order]
+def _name_laws(axes: Axes, ends: list[tuple[float, str, str]]) -> None:
+    """A piece of each law's line beside the panel, in the order of the lines' ends: (end, law, what is said of it)."""
+    order = sorted(ends, key=lambda end: -end[0])
+    handles = [Line2D([], [], linewidth=1.3, **LOOKS[law].as_line) for _, law, _ in order]
     axes.legend(
-        handles, [end.text for end in order], loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=SMALL,
+        handles, [said for _, _, said in order], loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=SMALL,
         handlelength=2.6, borderaxespad=0, labelspacing=0.9,
     )  # fmt: skip
 
