@@ -145,56 +145,6 @@ def run_look(k: int, total: int) -> Look:
     return Look(GREY, marker="o")
 
 
-@dataclass(frozen=True)
-class Label:
-    """A name to be written beside a line's end: at a height in the axis's units."""
-
-    y: float
-    text: str
-    colour: str
-
-
-def labels_at_right(axes: Axes, labels: Sequence[Label], *, x: float = 1.012, size: float = 8.0) -> None:
-    """Write names to the right of a panel, each at its line's end or as near as the others leave room.
-
-    Args:
-        axes: with its final limits and scale.
-        labels: in any order; those of lines that end beyond the panel stand at its edge.
-        x: where they begin, in parts of the panel's width.
-        size: of the letters [pt].
-    """
-    high = axes.get_position().height * axes.get_figure(root=True).get_size_inches()[1]  # type: ignore[union-attr]
-    apart = 1.3 * size / 72 / high
-    places = np.clip([_share(axes, label.y) for label in labels], 0.0, 1.0)
-    order = np.argsort(places, kind="stable")
-    for k, y in zip(order, spread(places[order], apart), strict=True):
-        label = labels[k]
-        axes.text(x, y, label.text, transform=axes.transAxes, color=label.colour, fontsize=size, va="center")
-
-
-def spread(places: Array, apart: float) -> Array:
-    """Move rising places as little as it takes to be so far apart, about the middle of each crowd.
-
-    >>> spread(np.array([0.0, 0.1, 0.1, 0.9]), 0.2).round(2).tolist()
-    [-0.13, 0.07, 0.27, 0.9]
-    """
-    crowds: list[tuple[float, int]] = []  # middle, and how many
-    for place in places:
-        crowds.append((float(place), 1))
-        while len(crowds) > 1:
-            (below, m), (above, n) = crowds[-2:]
-            if above - below >= apart * (m + n) / 2 - 1e-12:
-                break
-            crowds[-2:] = [((m * below + n * above) / (m + n), m + n)]
-    return np.concatenate([middle + apart * (np.arange(n) - (n - 1) / 2) for middle, n in crowds])
-
-
-def _share(axes: Axes, y: float) -> float:
-    """A height in the axis's units as a part of the panel's height."""
-    at = axes.transData.transform((axes.get_xlim()[0], y))
-    return float(axes.transAxes.inverted().transform(at)[1])
-
-
 def limits_about(values: ArrayLike, margin: float = 0.06, least: float = 0.0) -> tuple[float, float]:
     """Limits of an axis that hold all finite values, with a margin, and are no nearer to each other than `least`.
 

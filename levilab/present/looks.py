@@ -41,6 +41,17 @@ class Look:
         return {"color": self.colour, "linestyle": self.line}
 
     @property
+    def of_text(self) -> str:
+        """The colour for letters: darker where it takes that to stand out from white as 4.5 to 1 (WCAG 2.2, 1.4.3)."""
+        rgb = [int(self.colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+        for _ in range(20):
+            linear = [x / 12.92 if x <= 0.04045 else ((x + 0.055) / 1.055) ** 2.4 for x in rgb]
+            if 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2] <= 1.05 / 4.5 - 0.05:
+                break
+            rgb = [0.95 * x for x in rgb]
+        return "#" + "".join(f"{round(255 * x):02X}" for x in rgb)
+
+    @property
     def as_points(self) -> dict[str, Any]:
         """What `Axes.plot` takes for points without a line."""
         face = "white" if self.marker in "osD^v" else self.colour
@@ -80,7 +91,7 @@ LOOKS = MappingProxyType({
     # where tops float
     "floats": Look(GREEN, _SOLID, "s"),
     "to set": Look(ORANGE, _DASHED, "D"),
-    "theory": Look(ORANGE, _DASHED),
+    "theory": Look(ORANGE, _SOLID),
     "up": Look(BLUE, _SOLID, "o"),
     "lost": Look(PALE, _SOLID, "x", "////"),
 })  # fmt: skip

@@ -92,7 +92,7 @@ def as_svg(figure: Figure, prefix: str = "", title: str = "", description: str =
 _COMMENT = re.compile(r"\s*<!--.*?-->", re.DOTALL)
 _RULE = re.compile(r"\s*<defs>\s*<style type=\"text/css\">\*\{[^}]*\}</style>\s*</defs>")
 _IDS = re.compile(r"(\sid=\"|href=\"#|url\(#)")
-#: Places in points, with more digits than a hundredth of a point, which no eye sees and which make half of the text.
+#: Places in points, with more digits than a hundredth of a point, which no eye sees.
 _PLACES = re.compile(r"\s(?:d|x|y)=\"[^\"]*\"")
 _DIGITS = re.compile(r"(\.\d\d)\d+")
 _PREFIX = re.compile(r"[A-Za-z][A-Za-z0-9_-]*|")

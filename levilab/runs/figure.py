@@ -7,13 +7,18 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from levilab.present.style import STYLE
+from levilab.present.drawing import headline, panel
+from levilab.present.looks import LOOKS
+from levilab.present.style import STYLE, WIDE
+from levilab.present.words import UNITS
 
 if TYPE_CHECKING:
     import pandas as pd
 
 #: Inches.
-_WIDTH, _HEIGHT, _MARGIN = 8.0, 1.9, 0.7
+_LEFT, _WIDTH, _HEIGHT, _PITCH, _TOP, _BOTTOM = 0.95, 5.9, 1.35, 1.55, 0.5, 0.55
+#: Letters of a quantity beside which its unit finds no room.
+_LONG = 16
 #: What the readings are drawn against: the first of these that they have, else their number.
 _AGAINST = ("height_m", "time_s")
 
@@ -29,16 +34,33 @@ def readings_figure(frame: pd.DataFrame, title: str) -> Figure:
     ours = [name for name in map(str, frame.columns) if name not in _AGAINST and "_u_" not in name]
     names = ours or [name for name in map(str, frame.columns) if name != against]
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(_WIDTH, _MARGIN + _HEIGHT * max(len(names), 1)), layout="constrained")
-        panels = figure.subplots(max(len(names), 1), 1, sharex=True, squeeze=False)[:, 0]
+        figure = Figure(figsize=(WIDE, _TOP + _PITCH * (max(len(names), 1) - 1) + _HEIGHT + _BOTTOM))
+        headline(figure, title.replace("\\", "\\\\").replace("$", r"\$"))
+        panels = [panel(figure, _LEFT, _TOP + _PITCH * k, _WIDTH, _HEIGHT) for k in range(max(len(names), 1))]
         x = frame[against] if against else frame.index + 1
-        for panel, name in zip(panels, names, strict=False):
+        colour = LOOKS["readings"].colour
+        for axes, name in zip(panels, names, strict=False):
             u = _uncertainty(frame, name)
-            panel.errorbar(x, frame[name], yerr=u, fmt=".", color="#0072B2", elinewidth=1, capsize=0)
-            panel.set_ylabel(name)
-        panels[-1].set_xlabel(against or "reading")
-        figure.suptitle(title, fontsize=10)
+            if u is not None:
+                axes.errorbar(x, frame[name], yerr=u, fmt="none", color=colour, elinewidth=0.8)
+            axes.plot(x, frame[name], ".", color=colour, gid=f"readings-{name}")
+            axes.set_ylabel(_axis(name), fontsize=8)
+            axes.set_xlim(panels[0].get_xlim())
+            axes.tick_params(labelbottom=axes is panels[-1])
+        panels[-1].set_xlabel(_axis(against) if against else "reading")
     return figure
+
+
+def _axis(column: str) -> str:
+    r"""A column's name for an axis: its quantity in words, its unit in brackets.
+
+    >>> _axis("time_s"), _axis("precession_frequency_hz"), _axis("remark")
+    ('time  [s]', 'precession frequency\n[Hz]', 'remark')
+    """
+    quantity, _, unit = column.rpartition("_")
+    if unit not in UNITS or not quantity:
+        return column.replace("_", " ")
+    return f"{quantity.replace('_', ' ')}{'  ' if len(quantity) < _LONG else chr(10)}[{UNITS[unit]}]"
 
 
 def _uncertainty(frame: pd.DataFrame, name: str) -> pd.Series | None:

@@ -1,7 +1,7 @@
 """A map → its figure: cells, the windows of the theory, the thesis's limits, and a text that explains them.
 
-Blue is up and grey is lost, paler where a point was filled in; lines over the map have a white rim, and differ in their
-dashes as well as in colour.
+Blue is up and hatched grey is lost, paler where a point was filled in; lines over the map have a white rim, and
+differ in their dashes as well as in colour.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -22,7 +23,9 @@ from matplotlib.patheffects import withStroke
 from levilab.errors import UsageError
 from levilab.motion.lock import LAST_SHARE
 from levilab.motion.summary import changing_energy
-from levilab.present.style import STYLE
+from levilab.present.drawing import SMALL, headline
+from levilab.present.looks import LOOKS, PURPLE
+from levilab.present.style import STYLE, WIDE
 from levilab.simulator.equilibrium import stability_of, windows_over
 from levilab.stability.thesis import HIGHEST_HZ, MEASURED_HZ, MEASURED_U_HZ, SIMULATED_HZ, is_thesis_device
 from levilab.sweeps.quantities import quantity_of, step_in_words
@@ -42,8 +45,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 SPIN, MASS, HEIGHT, DRIVE = "start.spin_hz", "top.mass_kg", "start.position_m.2", "drive.frequency_hz"
-ORANGE, PURPLE = "#D55E00", "#7A1F5C"
-#: Numbers, from few to many; blue stays for the tops that are up.
+#: Numbers, from few to many, darker to lighter all the way; blue stays for the tops that are up.
 NUMBERS = "YlOrBr_r"
 #: Columns whose values spread over decades.
 LOGARITHMIC = {"energy_error", "position_error_m"}
@@ -52,32 +54,34 @@ NAN_IS_UP = {"lifetime_s", "fall_spin_hz"}
 #: Columns in which NaN says that the top was lost.
 NAN_IS_LOST = {"height_spread_m"}
 #: Most small multiples, most of them in a row, and most cells along a side of a picture.
-MOST_PANELS, PANELS_IN_A_ROW, MOST_CELLS = 12, 4, 1600
+MOST_PANELS, PANELS_IN_A_ROW, MOST_CELLS = 12, 3, 1600
 #: Number of values of an axis at which a window that changes along it is computed.
 CURVE_POINTS = 61
+_HATCH = "#9A9A9A"
 RIM = [withStroke(linewidth=3.2, foreground="white")]
 DASHED: Any = {"color": "black", "linewidth": 1, "linestyle": "dashed"}
 #: Where panels begin and end, as shares of the width: a colour bar fits beside them.
-LEFT, RIGHT = 0.095, 0.86
+LEFT, RIGHT = 0.095, 0.845
 
 
 @dataclass(frozen=True)
 class _Kind:
-    """A kind of cell: its colour, and what it means."""
+    """A kind of cell: its colour, what it means, and its hatch, for print without colours."""
 
     colour: str
     meaning: str
+    hatch: str = ""
 
 
 UP, UP_FILLED, LOST, LOST_FILLED, MISSING, NONE, SLIPS = range(7)
 KINDS = {
-    UP: _Kind("#0072B2", "still up"),
+    UP: _Kind(LOOKS["up"].colour, "still up"),
     UP_FILLED: _Kind("#6AA5CF", "filled in: still up"),
-    LOST: _Kind("#D0D0D0", "lost before"),
-    LOST_FILLED: _Kind("#EFEFEF", "filled in: lost before"),
+    LOST: _Kind(LOOKS["lost"].colour, "lost before", LOOKS["lost"].hatch),
+    LOST_FILLED: _Kind("#F5F5F5", "filled in: lost before", LOOKS["lost"].hatch),
     MISSING: _Kind("#FFFFFF", "not computed"),
     NONE: _Kind("#F7F7F7", "has no such value"),
-    SLIPS: _Kind("#D9A441", "up, but not locked"),
+    SLIPS: _Kind("#D9A441", "up, but not locked", "..."),
 }
 
 
@@ -116,26 +120,27 @@ def map_figure(found: Map, column: str = "survived", notes: Sequence[str] = ()) 
     kinds, numbers = _cells(found, column)
     norm = _norm(numbers, column)
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(8.0, 6.0) if len(view.chosen) == 1 else (10.0, 6.0))
+        figure = Figure(figsize=(WIDE, 6.0))
         panels = [figure.add_subplot() for _ in view.chosen]
         lines: list[Artist] = []
         for axes, index, theory in zip(panels, view.chosen, _theories(found.plan, view), strict=True):
             _draw_cells(axes, view, _slice(kinds, view, index), _slice(numbers, view, index), norm)
+            _hatch(axes, view, np.where(np.isnan(_slice(numbers, view, index)), _slice(kinds, view, index), UP))
             lines = max(_draw_limits(axes, found.plan, view, theory), lines, key=len)  # not every panel has every line
         _label(panels, view)
         handles = [*_kind_patches(kinds, numbers, column, found.plan), *lines]
         sentences = [*_reading_sentences(found.plan, view, column, lines), *notes]
         caption = _caption(found, view, sentences, figure.get_figwidth())
-        box = _place(figure, panels, head=0.45 + 0.17 * -(-len(handles) // 2), foot=0.62 + 0.145 * len(caption))
+        box = _place(figure, panels, head=0.5 + 0.155 * -(-len(handles) // 2), foot=0.62 + 0.145 * len(caption))
         if norm is not None:
             _draw_colour_bar(figure, box, norm, column)
         top = figure.get_figheight()
-        figure.text(LEFT, 1 - 0.28 / top, _headline(found, column), fontsize=11)
+        headline(figure, _headline(found, column), "SYNTHETIC")
         figure.legend(
-            handles=handles, loc="upper left", bbox_to_anchor=(LEFT - 0.01, 1 - 0.34 / top), ncols=2, fontsize=7.5,
+            handles=handles, loc="upper left", bbox_to_anchor=(LEFT - 0.01, 1 - 0.44 / top), ncols=2, fontsize=SMALL,
             labelspacing=0.4,
         )  # fmt: skip
-        style: Any = {"fontsize": 7.5, "color": "#404040", "va": "top", "linespacing": 1.35}
+        style: Any = {"fontsize": SMALL, "color": "#404040", "va": "top", "linespacing": 1.35}
         figure.text(LEFT, (0.12 + 0.145 * len(caption)) / top, "\n".join(caption), **style)
     return figure
 
@@ -172,7 +177,7 @@ def _place(figure: Figure, panels: list[Axes], *, head: float, foot: float) -> t
     """
     columns = min(len(panels), PANELS_IN_A_ROW)
     rows = -(-len(panels) // columns)
-    panel, gap, between = (4.2, 0.0, 0.0) if len(panels) == 1 else (2.1, 0.62, 0.03)
+    panel, gap, between = (3.6, 0.0, 0.0) if len(panels) == 1 else (1.5, 0.62, 0.04)
     above = 0.2 if len(panels) == 1 else 0.42
     height = head + above + rows * panel + (rows - 1) * gap + foot
     figure.set_figheight(height)
@@ -249,6 +254,20 @@ def _draw_cells(axes: Axes, view: _View, kinds: NDArray[Any], numbers: Array, no
             set_scale("log")
     axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
     axes.grid(visible=False)
+
+
+def _hatch(axes: Axes, view: _View, kinds: NDArray[Any]) -> None:
+    """Hatch the cells whose kind has a hatch, neighbours of a row as one piece."""
+    x, y = _edges(view.x), _edges(view.y)
+    for kind in (kind for kind, one in KINDS.items() if one.hatch and np.any(kinds == kind)):
+        pieces = []
+        for row, bottom, top in zip(kinds == kind, y[:-1], y[1:], strict=True):
+            ends = np.flatnonzero(np.diff(np.concatenate([[False], row, [False]])))
+            pieces += [[(x[a], bottom), (x[b], bottom), (x[b], top), (x[a], top)] for a, b in ends.reshape(-1, 2)]
+        axes.add_collection(
+            PolyCollection(pieces, facecolor="none", edgecolor=_HATCH, hatch=KINDS[kind].hatch, linewidth=0),
+            autolim=False,
+        )
 
 
 # --- lines over the cells ---
@@ -329,10 +348,18 @@ def _draw_window(axes: Axes, theory: _Theory) -> list[Artist]:
     """Draw the slowest and the fastest spin of small motions, of either sense."""
     if np.all(np.isnan(theory.low)):
         return []
-    style: Any = {"color": ORANGE, "linewidth": 1.6, "path_effects": RIM, "scalex": False, "scaley": False}
+    style: Any = {**LOOKS["theory"].as_line, "linewidth": 1.6, "path_effects": RIM, "scalex": False, "scaley": False}
     for edge in (theory.low, theory.high, -theory.low, -theory.high):
         axes.plot(edge, theory.places, **style)
-    return [Line2D([], [], color=ORANGE, linewidth=1.6, label="slowest and fastest spin for small motions (linear)")]
+    return [
+        Line2D(
+            [],
+            [],
+            linewidth=1.6,
+            **LOOKS["theory"].as_line,
+            label="slowest and fastest spin for small motions (linear)",
+        )
+    ]
 
 
 def _draw_adiabatic(axes: Axes, theory: _Theory, view: _View) -> list[Artist]:
@@ -403,7 +430,11 @@ def _label(panels: list[Axes], view: _View) -> None:
             axes.tick_params(labelleft=False)
         if view.panels is not None:
             quantity = quantity_of(view.panels.key)
-            axes.set_title(f"{quantity.name} {quantity.text(view.panels.values[view.chosen[k]])}", loc="left", pad=9)
+            text = f"{quantity.name} {quantity.text(view.panels.values[view.chosen[k]])}"
+            axes.set_title(text, loc="left", fontsize=SMALL, pad=8)
+            axes.tick_params(labelsize=SMALL)
+            if view.x.scale != "log":
+                axes.locator_params(axis="x", nbins=4)
 
 
 def _draw_colour_bar(figure: Figure, box: tuple[float, float, float], norm: Normalize, column: str) -> None:
@@ -423,7 +454,10 @@ def _kind_patches(kinds: NDArray[Any], numbers: Array, column: str, plan: Plan) 
             meanings[LOST] = "lost"
     drawn = [kind for kind in KINDS if np.any((kinds == kind) & np.isnan(numbers))]
     return [
-        Patch(facecolor=KINDS[kind].colour, edgecolor="#999999", linewidth=0.5, label=meanings[kind]) for kind in drawn
+        Patch(
+            facecolor=KINDS[kind].colour, edgecolor=_HATCH, linewidth=0.5, hatch=KINDS[kind].hatch, label=meanings[kind]
+        )
+        for kind in drawn
     ]
 
 
@@ -448,7 +482,7 @@ def _caption(found: Map, view: _View, sentences: Sequence[str], width: float) ->
     if found.filled is None and not found.computed.all():
         said.append(f"{np.count_nonzero(~found.computed)} of {found.computed.size} points are not computed yet.")
     text = " ".join(said).replace(" %", "\N{NO-BREAK SPACE}%")
-    return textwrap.wrap(text, round(15.3 * width))
+    return textwrap.wrap(text, round(15.6 * width))
 
 
 def _step(axis: Axis) -> str:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from levilab.benchmark.estimators.study import AIMS, OURS
-from levilab.present.style import STYLE
+from levilab.present.drawing import SMALL, headline, panel
+from levilab.present.looks import BLACK, BLUE, GREEN, PURPLE, SKY, VERMILION
+from levilab.present.style import STYLE, WIDE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,26 +20,24 @@ if TYPE_CHECKING:
 
 #: Methods: colour, marker, line.
 LINES = {
-    "default": ("#0072B2", "o", "-"),
-    "fast": ("#56B4E9", "s", "-"),
-    "maximum likelihood": ("#009E73", "^", "--"),
-    "FFT peak, interpolated": ("#D55E00", "o", "-"),
-    "autocorrelation": ("#CC79A7", "s", "-"),
-    "find_peaks, mean period": ("#333333", "^", "-"),
+    "default": (BLUE, "o", "-"),
+    "fast": (SKY, "s", "-"),
+    "maximum likelihood": (GREEN, "^", "--"),
+    "FFT peak, interpolated": (VERMILION, "o", "-"),
+    "autocorrelation": (PURPLE, "s", "-"),
+    "find_peaks, mean period": (BLACK, "^", "-"),
 }
 
 
 def estimators_figure(found: Study) -> Figure:
     """Three panels: RMSE over the bound, speed, and coverage of the hard cases."""
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(11, 5.2))
-        errors = figure.add_axes((0.06, 0.11, 0.33, 0.76))
-        speeds = figure.add_axes((0.45, 0.11, 0.16, 0.76))
-        hard = figure.add_axes((0.80, 0.11, 0.18, 0.76))
-        _errors(errors, found)
-        _speeds(speeds, found)
-        _hard(hard, found.hard)
-        figure.text(0.06, 0.945, _title(found), fontsize=11)
+        rows = len(found.hard)
+        figure = Figure(figsize=(WIDE, 4.6 + 0.17 * rows))
+        headline(figure, _title(found))
+        _errors(panel(figure, 0.65, 0.55, 3.3, 2.2), found)
+        _speeds(panel(figure, 5.45, 0.55, 1.45, 2.2), found)
+        _hard(panel(figure, 2.35, 4.05, 4.5, 0.1 + 0.17 * rows), found.hard)
     return figure
 
 
@@ -58,7 +58,7 @@ def _errors(axes: Axes, found: Study) -> None:
             )  # fmt: skip
     axes.axhline(1, color="black", linewidth=0.8)
     axes.set(xlabel="signal to noise A/σ  [dB]", ylabel="RMSE / Cramér–Rao bound")
-    axes.legend(loc="lower center", fontsize=8, bbox_to_anchor=(0.5, 0.13), ncols=2)
+    axes.legend(loc="upper left", fontsize=SMALL, bbox_to_anchor=(-0.1, -0.2), ncols=2, borderaxespad=0)
 
 
 def _speeds(axes: Axes, found: Study) -> None:
@@ -68,27 +68,27 @@ def _speeds(axes: Axes, found: Study) -> None:
         colour, marker, _ = LINES[name]
         values = [1e-6 * s.samples_per_s for s in found.scores if s.name == name and s.samples_per_s]
         axes.plot([min(values), max(values)], [row, row], color=colour, marker=marker, markersize=5)
-        place: dict[str, Any] = {
-            "xytext": (0, 7),
-            "textcoords": "offset points",
-            "ha": "right" if max(values) > 100 else "center",
-        }
-        axes.annotate(name, (max(values), row), fontsize=8, color=colour, **place)
         if name in aims:
             axes.plot([1e-6 * aims[name]], [row], color="black", marker="|", markersize=12, linestyle="")
     axes.set_xscale("log")
-    axes.set(xlabel="MS/s of one core (bar: aim)", yticks=[], ylim=(-0.6, len(names) - 0.3))
+    axes.set(xlabel="MS/s of one core; bar: aim", ylim=(-0.6, len(names) - 0.4))
+    axes.set_yticks(range(len(names)), list(reversed(names)), fontsize=SMALL)
+    axes.tick_params(axis="y", which="minor", left=False)
 
 
 def _hard(axes: Axes, scores: tuple[Score, ...]) -> None:
-    axes.axvspan(63, 73, color="#0072B2", alpha=0.12, linewidth=0)
+    axes.axvspan(63, 73, color=BLUE, alpha=0.12, linewidth=0)
     for row, score in enumerate(reversed(scores)):
         if score.coverage is not None:
             axes.errorbar(
                 100 * score.coverage, row, xerr=100 * score.coverage_error,
-                color="#D55E00" if score.failures else "#0072B2", marker="o", markersize=4, linewidth=1,
+                color=VERMILION if score.failures else BLUE, marker="s" if score.failures else "o", linewidth=1,
             )  # fmt: skip
     axes.set_yticks(
-        range(len(scores)), [s.name + (f" ({s.failures} failed)" if s.failures else "") for s in reversed(scores)]
+        range(len(scores)),
+        [s.name + (f" ({s.failures} failed)" if s.failures else "") for s in reversed(scores)],
+        fontsize=SMALL,
     )
-    axes.set(xlabel="1σ intervals that\nhold the truth [%]", xlim=(55, 81))
+    axes.tick_params(axis="y", which="minor", left=False)
+    axes.set_title("The default on hard cases; shaded: as wanted", fontsize=8)
+    axes.set(xlabel="1σ intervals that hold the truth  [%]", xlim=(55, 81), ylim=(-0.8, len(scores) - 0.2))

@@ -2,46 +2,45 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from levilab.present.style import STYLE
+from levilab.present.drawing import SMALL, headline, panel
+from levilab.present.looks import BLACK, BLUE, GREEN, GREY, PURPLE, SKY, VERMILION
+from levilab.present.style import STYLE, WIDE
 
 if TYPE_CHECKING:
     from levilab.benchmark.simulator.work_precision import Comparison
 
-#: Methods that are drawn: colour, marker, line, name beside the line.
+#: Methods that are drawn: colour, marker, line, name in the legend.
 LINES = {
-    "levitron-6, lanes": ("#0072B2", "s", "-", "levilab, many at once"),
-    "levitron-6": ("#0072B2", "o", "-", "levilab, order 6"),
-    "blanes-moan-6": ("#56B4E9", "s", "--", "levilab, Blanes and Moan's 6"),
-    "kahan-li-8": ("#56B4E9", "o", "-", "levilab, order 8"),
-    "blanes-moan-4": ("#56B4E9", "^", "--", "levilab, order 4"),
-    "strang": ("#56B4E9", "v", ":", "levilab, order 2"),
-    "heyoka batch": ("#D55E00", "s", "-", "heyoka, batch"),
-    "heyoka": ("#D55E00", "o", "-", "heyoka"),
-    "scipy DOP853": ("#009E73", "o", "-", "scipy DOP853"),
-    "scipy LSODA": ("#CC79A7", "o", "-", "LSODA"),
-    "scipy RK45": ("#009E73", "^", "--", "RK45"),
-    "scipy Radau": ("#999999", "^", "--", "Radau"),
-    "scipy BDF": ("#333333", "o", "-", "BDF in Euler angles"),
+    "levitron-6, lanes": (BLUE, "s", "-", "levilab, many at once"),
+    "levitron-6": (BLUE, "o", "-", "levilab, order 6"),
+    "blanes-moan-6": (SKY, "s", "--", "levilab, Blanes and Moan's 6"),
+    "kahan-li-8": (SKY, "o", "-", "levilab, order 8"),
+    "blanes-moan-4": (SKY, "^", "--", "levilab, order 4"),
+    "strang": (SKY, "v", ":", "levilab, order 2"),
+    "heyoka batch": (VERMILION, "s", "-", "heyoka, batch"),
+    "heyoka": (VERMILION, "o", "-", "heyoka"),
+    "scipy DOP853": (GREEN, "o", "-", "scipy DOP853"),
+    "scipy LSODA": (PURPLE, "o", "-", "LSODA"),
+    "scipy RK45": (GREEN, "^", "--", "RK45"),
+    "scipy Radau": (GREY, "^", "--", "Radau"),
+    "scipy BDF": (BLACK, "o", "-", "BDF in Euler angles"),
 }
-#: Lines that end at a larger error [cm] have their name there, not at the right.
-BESIDE = 3e-9
-TITLE = "One top of the scene undriven; levilab's kernels at fixed steps, without an error estimate: higher is faster"
+TITLE = "Speed against error of one top, scene undriven: levilab's kernels at fixed steps, without an error estimate"
 #: Errors that are drawn [cm].
 RANGE = (1e-1, 3e-12)
 
 
 def work_precision_figure(found: Comparison) -> Figure:
-    """Error at the end falling to the right, speed upwards; each method's name at its tightest point."""
+    """Error at the end falling to the right, speed upwards; the names beside, fastest first."""
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(10, 6.5))
-        axes = figure.add_axes((0.08, 0.09, 0.70, 0.83))
-        labels = []
+        figure = Figure(figsize=(WIDE, 4.1))
+        headline(figure, TITLE)
+        axes = panel(figure, 0.75, 0.55, 4.2, 3.0)
         for method, (colour, marker, line, name) in LINES.items():
             points = sorted(
                 (100 * p.error, p.speed)
@@ -49,21 +48,20 @@ def work_precision_figure(found: Comparison) -> Figure:
                 if p.method == method and RANGE[1] < 100 * p.error < RANGE[0]
                 and (method != "heyoka batch" or p.setting.endswith(_lanes(found)))
             )  # fmt: skip
-            if not points:
-                continue
-            errors, speeds = zip(*points, strict=True)
-            axes.loglog(errors, speeds, color=colour, marker=marker, linestyle=line, markersize=4, linewidth=1.3)
-            if errors[0] > BESIDE:
-                axes.annotate(
-                    name, (errors[0], speeds[0]), xytext=(6, -4), textcoords="offset points", color=colour, fontsize=9
-                )
-            else:
-                labels.append((speeds[0], errors[0], name, colour))
+            if points:
+                errors, speeds = zip(*points, strict=True)
+                axes.loglog(errors, speeds, color=colour, marker=marker, linestyle=line, label=name)
         axes.set_xlim(*RANGE)
-        axes.set(xlabel="error of the place after 5 s  [cm]", ylabel="simulated seconds per second of one core")
-        axes.grid(visible=True, which="major", alpha=0.3)
-        _write(axes, labels)
-        figure.text(0.08, 0.955, TITLE, fontsize=11)
+        axes.set(xlabel="error of the place after 5 s  [cm]; smaller to the right",
+                 ylabel="simulated seconds per second of one core")  # fmt: skip
+        axes.grid(visible=True, which="major")
+        handles, names = axes.get_legend_handles_labels()
+        order = sorted(range(len(names)), key=lambda k: -max(handles[k].get_ydata()))
+        axes.legend(
+            [handles[k] for k in order], [names[k] for k in order], loc="upper left", bbox_to_anchor=(1.02, 1.0),
+            fontsize=SMALL, borderaxespad=0, labelspacing=0.6,
+        )  # fmt: skip
+        axes.text(1.04, 0.0, "higher is faster", transform=axes.transAxes, fontsize=SMALL)
     return figure
 
 
@@ -71,20 +69,3 @@ def _lanes(found: Comparison) -> str:
     """The batch size of heyoka that is fastest."""
     batch = [p for p in found.points if p.method == "heyoka batch"]
     return max(batch, key=lambda p: p.speed).setting.partition(", ")[2] if batch else ""
-
-
-def _write(axes: mpl.axes.Axes, labels: list[tuple[float, float, str, str]]) -> None:
-    """Names at the right, in the order of the lines' ends, not nearer to each other than a line of writing."""
-    low, high = axes.get_ylim()
-
-    def place(speed: float) -> float:
-        return math.log(speed / low) / math.log(high / low)
-
-    apart, last = 0.038, -1.0
-    for speed, error, name, colour in sorted(labels):
-        at = max(place(speed), last + apart)
-        last = at
-        axes.annotate(
-            name, (error, speed), xytext=(1.015, at), textcoords="axes fraction", color=colour, fontsize=9, va="center",
-            arrowprops={"arrowstyle": "-", "color": colour, "alpha": 0.25, "linewidth": 0.7},
-        )  # fmt: skip

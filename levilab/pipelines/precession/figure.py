@@ -150,7 +150,7 @@ def _draw_left_out(axes: Axes, fit: SweepFit) -> None:
         last = point.drive > float(fit.column("drive").mean())
         axes.annotate(
             text, (point.drive, y), (-8 if last else 8, -3), textcoords="offset points", fontsize=SMALL,
-            color=LOOKS["left out"].colour, ha="right" if last else "left", zorder=5,
+            color=LOOKS["left out"].of_text, ha="right" if last else "left", zorder=5,
         )  # fmt: skip
 
 

@@ -27,7 +27,6 @@ from levilab.present.drawing import (
     synthetic_mark,
     write,
 )
-from levilab.present.drawing import Label as NamedLine
 from levilab.present.looks import GREY, LOOKS, MARKERS
 from levilab.present.numbers import in_words, short_name
 from levilab.present.style import STYLE, WIDE
@@ -189,7 +188,7 @@ def _draw_outliers(axes: Axes, analysis: SpinDownAnalysis, k: int) -> None:
         for i in range(min(len(shown), _MOST_NAMED) if share else 0):
             text = f"{nu[shown[i]]:.4g} Hz"
             axes.annotate(
-                text, (t[shown[i]], y[i]), (7, -1.5), textcoords="offset points", color=look.colour, fontsize=SMALL
+                text, (t[shown[i]], y[i]), (7, -1.5), textcoords="offset points", color=look.of_text, fontsize=SMALL
             )
 
 
@@ -286,8 +285,8 @@ def _draw_differences(axes: Axes, analysis: SpinDownAnalysis, unit: _Unit) -> No
         axes.plot(t, difference, linewidth=1.3, zorder=2.6, **LOOKS[name].as_line)
         where = "" if np.abs(difference).max() <= most else f", to {_signed(difference)} Hz"
         said = _note(analysis, name)[2:] + (", 2 u shaded" if name == best and u is not None else "")
-        ends.append(NamedLine(float(difference[-1]), f"{name}: {said or 'not excluded'}{where}", LOOKS[name].colour))
-    _name_laws(axes, [end for end in ends if math.isfinite(end.y)])
+        ends.append((float(difference[-1]), name, f"{name}: {said or 'not excluded'}{where}"))
+    _name_laws(axes, [end for end in ends if math.isfinite(end[0])])
     of = "" if several == 1 else f"; curves of {'the longest run' if several > 1 else 'the run'}"
     axes.set_title(f"Readings and laws less the best law{of}", pad=3)
 
@@ -298,12 +297,12 @@ def _signed(difference: Array) -> str:
     return f"{'−' if farthest < 0 else '+'}{digits(abs(farthest))}"
 
 
-def _name_laws(axes: Axes, ends: list[NamedLine]) -> None:
-    """A piece of each law's line and its name beside the panel, in the order of the lines' ends."""
-    order = sorted(ends, key=lambda end: -end.y)
-    handles = [Line2D([], [], linewidth=1.3, **LOOKS[end.text.partition(":")[0]].as_line) for end in order]
+def _name_laws(axes: Axes, ends: list[tuple[float, str, str]]) -> None:
+    """A piece of each law's line beside the panel, in the order of the lines' ends: (end, law, what is said of it)."""
+    order = sorted(ends, key=lambda end: -end[0])
+    handles = [Line2D([], [], linewidth=1.3, **LOOKS[law].as_line) for _, law, _ in order]
     axes.legend(
-        handles, [end.text for end in order], loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=SMALL,
+        handles, [said for _, _, said in order], loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=SMALL,
         handlelength=2.6, borderaxespad=0, labelspacing=0.9,
     )  # fmt: skip
 
@@ -343,9 +342,9 @@ def _draw_residuals(figure: Figure, top: float, analysis: SpinDownAnalysis, unit
         axes.set(ylim=(-most, most), xlabel="time  [s]")
         axes.tick_params(labelsize=SMALL)
         axes.locator_params(nbins=4)
-        axes.set_title(name, loc="left", color=LOOKS[name].colour, fontsize=8, fontweight="bold", pad=3)
+        axes.set_title(name, loc="left", color=LOOKS[name].of_text, fontsize=8, fontweight="bold", pad=3)
         if own:
-            axes.set_title("own scale", loc="right", color="black", fontsize=SMALL - 0.5, fontstyle="italic", pad=3)
+            axes.set_title("own scale", loc="right", color="black", fontsize=SMALL, fontstyle="italic", pad=3)
             axes.set_facecolor("#F4F4F4")
         if place == 0:
             axes.set_ylabel(f"residual  [{unit.symbol}]")
@@ -385,7 +384,7 @@ def _draw_straight_lines(figure: Figure, top: float, analysis: SpinDownAnalysis)
         strips.append(strip)
         _draw_straight(above, strip, analysis, straight.transform, law)
         above.set_ylabel(straight.axis, fontsize=8)
-        above.set_title(f"straight if {law} holds", color=LOOKS[law].colour, fontsize=8, fontweight="bold", pad=3)
+        above.set_title(f"straight if {law} holds", color=LOOKS[law].of_text, fontsize=8, fontweight="bold", pad=3)
         for axes in (above, strip):
             axes.tick_params(labelsize=SMALL)
         above.tick_params(labelbottom=False)

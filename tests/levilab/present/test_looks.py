@@ -74,3 +74,9 @@ def test_things_of_one_figure_differ_in_form_or_in_grey() -> None:
 def test_a_line_on_white_is_dark_enough_to_be_seen() -> None:
     pale = {name: round(in_grey(look.colour)) for name, look in LOOKS.items() if in_grey(look.colour) > 75}
     assert set(pale) <= {"lost"}  # an area, with a hatch
+
+
+def test_letters_stand_out_from_white() -> None:
+    contrast = {name: 1.05 / (float(TO_XYZ[1] @ linear(look.of_text)) + 0.05) for name, look in LOOKS.items()}
+    assert min(contrast.values()) >= 4.49  # of colours in 256 steps
+    assert LOOKS["readings"].of_text == "#000000"

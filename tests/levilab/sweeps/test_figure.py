@@ -9,10 +9,12 @@ import pytest
 from matplotlib.colors import to_rgb
 
 from levilab.errors import UsageError
+from levilab.present.looks import LOOKS
 from levilab.simulator.scene import Scene, preset
 from levilab.sweeps.figure import KINDS, MOST_PANELS, map_figure
 from levilab.sweeps.plan import Axis, Plan
 from levilab.sweeps.store import Map
+from support.figures import faults
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -56,7 +58,11 @@ def test_spin_and_mass_have_both_windows_and_the_limits_of_the_thesis() -> None:
     assert {21.86, 61.0} <= upright_lines(figure)
     level = {round(float(line.get_ydata()[0]), 2) for line in axes.lines if list(line.get_xdata()) == [0, 1]}
     assert level == {24.74, 25.48}  # PHYSICS: masses from 24.742 to 25.485 g float
-    curves = [line for line in axes.lines if line.get_color() == "#D55E00" and not np.isnan(line.get_xdata()).all()]
+    curves = [
+        line
+        for line in axes.lines
+        if line.get_color() == LOOKS["theory"].colour and not np.isnan(line.get_xdata()).all()
+    ]
     edges = [np.interp(25.26, line.get_ydata(), line.get_xdata()) for line in curves[:2]]
     assert edges == pytest.approx([21.65, 80.6], abs=0.1)  # PHYSICS: at 7.30 cm, where 25.26 g float
     assert legend(figure)[:2] == ["still up after 10 s", "lost before"]
@@ -81,17 +87,20 @@ def test_every_text_lies_inside_of_the_picture_and_off_the_map() -> None:
     fine = Axis(MASS.key, np.linspace(0.0248, 0.0252, 9))  # its ticks have two decimals
     for found in (a_map(fine, SPIN, adaptive=True), a_map(SPIN, fine, HEIGHT)):
         figure = map_figure(found, "lifetime_s", notes=["a sentence of a map that was refined " * 8])
-        figure.draw_without_rendering()
-        width, height = figure.get_size_inches() * figure.dpi
+        assert faults(figure) == []
         panels = [panel.get_window_extent() for panel in figure.axes]
         labels = [axis.label for panel in figure.axes for axis in (panel.xaxis, panel.yaxis)]
         for artist in [*figure.texts, *figure.legends, *labels]:
-            box = artist.get_window_extent()
-            assert box.x0 >= 0
-            assert box.y0 >= 0
-            assert box.x1 <= width
-            assert box.y1 <= height
-            assert not any(box.overlaps(panel) for panel in panels), artist
+            assert not any(artist.get_window_extent().overlaps(panel) for panel in panels), artist
+
+
+def test_lost_tops_are_hatched_and_only_these() -> None:
+    found = a_map(MASS, SPIN)
+    (axes,) = map_figure(found).axes
+    (hatched,) = [one for one in axes.collections if one.get_hatch()]
+    lost = ~found.values["survived"]
+    widths = [np.ptp(path.vertices[:, 0]) for path in hatched.get_paths()]
+    assert sum(widths) == pytest.approx(2.0 * np.count_nonzero(lost))  # a cell spans 2 Hz
 
 
 def test_filled_points_are_paler_and_the_report_is_below() -> None:

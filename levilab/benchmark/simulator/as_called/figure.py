@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from levilab.present.style import STYLE
+from levilab.present.drawing import SMALL, headline, panel, write
+from levilab.present.looks import BLUE, GREEN, GREY, VERMILION
+from levilab.present.style import STYLE, WIDE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,47 +22,50 @@ if TYPE_CHECKING:
 
 #: Methods that are drawn: colour, marker, line, name in the legend.
 LINES: dict[str, tuple[str, str, Any, str]] = {
-    "simulate": ("#0072B2", "o", "-", "levilab, simulate"),
-    "simulate_many": ("#0072B2", "s", "-", "levilab, simulate_many"),
-    "heyoka": ("#D55E00", "o", "-", "heyoka"),
-    "heyoka batch, 4 lanes": ("#D55E00", "s", "--", "heyoka, batches of 4"),
-    "heyoka batch, 8 lanes": ("#D55E00", "s", "-", "heyoka, batches of 8"),
-    "scipy DOP853": ("#009E73", "o", "-", "scipy, DOP853"),
+    "simulate": (BLUE, "o", "-", "levilab, simulate"),
+    "simulate_many": (BLUE, "s", "-", "levilab, simulate_many"),
+    "heyoka": (VERMILION, "o", "-", "heyoka"),
+    "heyoka batch, 4 lanes": (VERMILION, "s", "--", "heyoka, batches of 4"),
+    "heyoka batch, 8 lanes": (VERMILION, "s", "-", "heyoka, batches of 8"),
+    "scipy DOP853": (GREEN, "o", "-", "scipy, DOP853"),
 }
 #: Errors [cm] and speeds that are drawn.
 ERRORS, SPEEDS = (1e-3, 3e-12), (10.0, 1e6)
+#: From the top of the figure to its panels, and from a row to the next [inch].
+_TOP, _DOWN = 0.95, 2.05
 NOTES = (
-    "Each point is one setting of a tolerance;\n"
-    "further right is better, higher is faster.\n"
-    "levilab estimates its error in the same\n"
-    "call, the others control their steps.\n\n"
-    "Dashed: errors of 10⁻⁶ and 10⁻⁹ cm, with\n"
-    "levilab's speed over heyoka's at that\n"
-    "error, and the ratio that is aimed at."
+    "A point: one tolerance.\n"
+    "Right: better; up: faster.\n"
+    "levilab estimates its error\n"
+    "in the same call, others\n"
+    "control their steps.\n\n"
+    "Dashed: 10⁻⁶ and 10⁻⁹ cm,\n"
+    "with levilab's speed over\n"
+    "heyoka's and the aim."
 )
 
 
 def as_called_figure(cases: Sequence[Case]) -> Figure:
-    """Durations below each other, motions beside each other, the ensemble with the legend at the right."""
+    """Durations below each other, motions beside each other, and below them the ensemble and the legend."""
+    single = [case for case in cases if case.task.tops == 1]
+    names = list(dict.fromkeys(case.task.name for case in single))
+    durations = list(dict.fromkeys(case.task.duration for case in single))
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(13, 6.8))
-        single = [case for case in cases if case.task.tops == 1]
-        names = list(dict.fromkeys(case.task.name for case in single))
-        durations = list(dict.fromkeys(case.task.duration for case in single))
+        figure = Figure(figsize=(WIDE, _TOP + _DOWN * (len(durations) + 1) - 0.25))
+        headline(figure, "As called: simulate and its peers at the errors that they achieve")
         for case in cases:
             alone = case.task.tops == 1
-            column = names.index(case.task.name) if alone else len(names)
-            row = durations.index(case.task.duration) if alone else 0
-            axes = figure.add_axes((0.055 + 0.19 * column, 0.53 - 0.445 * row, 0.165, 0.36))
+            column = names.index(case.task.name) if alone else 0
+            row = durations.index(case.task.duration) if alone else len(durations)
+            axes = panel(figure, 0.75 + 1.58 * column, _TOP + _DOWN * row, 1.4, 1.25)
             _draw(axes, case)
             if column == 0:
-                axes.set_ylabel("simulated seconds per second\nof one core")
+                axes.set_ylabel("simulated s per s", fontsize=8)
             else:
                 axes.tick_params(labelleft=False)
-            if not alone or row == len(durations) - 1:
-                axes.set_xlabel("error of the place at the end  [cm]")
-        _explain(figure, cases)
-        figure.text(0.055, 0.955, "As called: simulate and its peers at the errors that they achieve", fontsize=11)
+            if row >= len(durations) - 1:
+                axes.set_xlabel("error at the end  [cm]", fontsize=8)
+        _explain(figure, cases, _TOP + _DOWN * len(durations))
     return figure
 
 
@@ -77,12 +82,14 @@ def _draw(axes: Axes, case: Case) -> None:
         errors, speeds = zip(*points, strict=True)
         axes.loglog(errors, speeds, color=colour, marker=marker, linestyle=line, markersize=3.5, linewidth=1.2)
     for ratio in case.ratios:
-        axes.axvline(100 * ratio.error, color="#666666", linestyle="--", linewidth=0.8)
+        axes.axvline(100 * ratio.error, color=GREY, linestyle="--", linewidth=0.8)
         axes.annotate(
-            _label(ratio), (100 * ratio.error, SPEEDS[1]), xytext=(4, -3), textcoords="offset points",
-            va="top", fontsize=8.5, color="#333333",
+            _label(ratio), (100 * ratio.error, SPEEDS[1]), xytext=(0, 2), textcoords="offset points",
+            va="bottom", ha="center", fontsize=SMALL,
         )  # fmt: skip
-    axes.set(xlim=ERRORS, ylim=SPEEDS, title=f"{case.task.name}, {case.task.duration:g} s")
+    axes.set(xlim=ERRORS, ylim=SPEEDS)
+    axes.set_title(f"{case.task.name}, {case.task.duration:g} s", pad=24 if case.ratios else None, fontsize=8)
+    axes.tick_params(labelsize=SMALL)
 
 
 def _label(ratio: Ratio) -> str:
@@ -90,7 +97,7 @@ def _label(ratio: Ratio) -> str:
     return f"{value}\naim {ratio.aim:g}"
 
 
-def _explain(figure: Figure, cases: Sequence[Case]) -> None:
+def _explain(figure: Figure, cases: Sequence[Case], top: float) -> None:
     """The legend and what the panels show."""
     drawn = {point.method for case in cases for point in case.points}
     handles = [
@@ -98,5 +105,6 @@ def _explain(figure: Figure, cases: Sequence[Case]) -> None:
         for method, (colour, marker, line, name) in LINES.items()
         if method.partition(",")[0] in drawn
     ]
-    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.805, 0.45))
-    figure.text(0.808, 0.25, NOTES, va="top", fontsize=8, linespacing=1.35)
+    place = (2.6 / WIDE, 1 - top / figure.get_figheight())
+    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=place, fontsize=SMALL, borderaxespad=0)
+    write(figure, 4.6, top, NOTES, fontsize=SMALL, linespacing=1.35)

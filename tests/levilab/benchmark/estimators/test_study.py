@@ -11,6 +11,7 @@ from levilab.benchmark.estimators.command import print_study
 from levilab.benchmark.estimators.figure import estimators_figure
 from levilab.benchmark.estimators.peers import PEERS
 from levilab.benchmark.estimators.traces import HARD, RATE, Case, make
+from support.figures import faults
 
 
 @pytest.fixture(scope="module")
@@ -67,6 +68,7 @@ def test_the_table_and_the_figure_show_every_method(small, capsys):
     print_study(small)
     shown = capsys.readouterr().out
     figure = estimators_figure(small)
+    assert faults(figure) == []
     labels = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
     assert labels == [*study.OURS, *PEERS]
     assert all(name in shown for name in labels)

@@ -23,6 +23,7 @@ from levilab.present.terminal import Terminal
 from levilab.simulator.ensemble import simulate_many
 from levilab.simulator.single import simulate
 from levilab.simulator.stops import kinks
+from support.figures import faults
 from support.paths import GOLDEN
 
 SINE = next(task for task in TASKS if task.name == "sine" and task.duration == 60)
@@ -183,7 +184,8 @@ def test_the_document_has_the_calls_with_units():
 def test_the_figure_has_a_panel_for_each_motion_and_says_its_ratios():
     figure = as_called_figure([CASE])
     (axes,) = figure.axes
-    assert axes.get_title() == "sine, 60 s"
+    assert axes.get_title("left") == "sine, 60 s"
+    assert faults(figure) == []
     assert [text.get_text() for text in axes.texts] == ["8×\naim 5", "–\naim 3"]
 
 

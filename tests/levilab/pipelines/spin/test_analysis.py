@@ -301,7 +301,7 @@ def test_residuals_from_a_third_degree_have_no_bend_left(what: str, tmp_path: Pa
     third = np.polynomial.Polynomial.fit(at, residuals, 3)
     assert np.ptp(third(at)) < 40  # µs: twice the noise of one pulse, and 8 of its standard errors at an end
     assert residuals.std() < 30
-    assert panel.get_title(loc="left").endswith("from a fit of the third degree")
+    assert panel.get_title(loc="left").endswith("fit of third degree")
 
 
 def test_the_frequencies_of_a_mock_run_scatter_about_the_disc_law_as_u_says(tmp_path: Path) -> None:
