@@ -10,7 +10,9 @@ from analysis.spindown.combine import Combined, combine, tilt_demanded
 from analysis.spindown.fit import SpinDown, fit_spin_down
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
+from levilab.pipelines.budget import gate_of
 from levilab.pipelines.sources import InputOptions, Needs
+from levilab.pipelines.spindown.budget import EXPERIMENT, budget_of_all, budget_of_run
 from levilab.pipelines.spindown.readings import Readings, read_run_readings, read_spin_file
 
 if TYPE_CHECKING:
@@ -45,6 +47,7 @@ class SpinDownOptions(InputOptions):
         bootstrap_samples, seed: of the bootstrap, where it is asked for.
         tilt: whether the count holds the tilt of the top's moment, auto: where readings demand it, and what they may
             hide of it is in u.
+        clock_u: of the counter's clock, relative; budgets say what it does, it is in no u.
     """
 
     reading_u: float | None = None
@@ -53,6 +56,7 @@ class SpinDownOptions(InputOptions):
     tilt: Tilt = "auto"
     bootstrap_samples: int = 1000
     seed: int = 0
+    clock_u: float | None = None
 
 
 class SpinDownAnalysis(Analyzed[Readings, SpinDown, Combined, SpinDownOptions]):
@@ -99,6 +103,7 @@ def fit_source(source: Source[Readings], options: SpinDownOptions, *, tilt: bool
             keep_outliers=options.keep_outliers,
             tilt=_TILTED[options.tilt] if tilt is None else tilt,
             driven=readings.driven,
+            gate=gate_of(source, EXPERIMENT),
         )
     except AnalysisError as error:
         raise DataError(f"{source.data}: {error}") from error
@@ -126,6 +131,8 @@ METHOD = Method(
     mixed="a mean over both says nothing about a real top",
     refit=fit_with_tilt,
     refit_text="the runs show a tilt of the top together, not each by itself",
+    budget_of_run=budget_of_run,
+    budget_of_all=budget_of_all,
 )
 
 

@@ -207,6 +207,7 @@ class SettingsPart(Settings):
     keep_outliers: bool
     tilt: Literal["auto", "none", "fitted"] = "auto"
     bootstrap: BootstrapPart | None
+    clock_u: float | None = Field(default=None, gt=0)
 
     @classmethod
     def of(cls, options: InputOptions, **more: Any) -> Self:
