@@ -12,7 +12,7 @@ from analysis.residuals import Correlation
 from analysis.spindown.combine import Combined, CombinedLaw, Mean
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import SpinDown
-from analysis.spindown.lawfit import LawFit
+from analysis.spindown.lawfit import LawFit, Parts
 from analysis.spindown.selection import Statistics
 from analysis.spindown.tilt import PARAMETERS, counted
 from analysis.spindown.verdict import Verdict
@@ -74,7 +74,7 @@ class FitPart(Part):
 class ModelPart(Part):
     """One drag law, fitted to one run or, without a start, over several.
 
-    shared_u: by parameter, the part of its u that all runs of one top share.
+    shared_u: by parameter, the part of its u that all runs of one top share; u_parts: by parameter, what u is made of.
     """
 
     name: str
@@ -86,6 +86,7 @@ class ModelPart(Part):
     linearised: dict[str, Value] | None = None
     scatter: dict[str, float | None] | None = None
     shared_u: dict[str, float] | None = None
+    u_parts: dict[str, Parts] | None = None
 
     @model_validator(mode="after")
     def _is_a_law(self) -> Self:
@@ -302,6 +303,7 @@ def _model(fit: LawFit) -> dict[str, Any]:
         "statistics": _some(fit.statistics, StatisticsPart),
         "fit": _some(fit.statistics, FitPart) | {"solution": fit.solution.tolist()},
         "shared_u": dict(fit.shared_u),
+        "u_parts": {name: asdict(parts) for name, parts in fit.parts.items()},
         "warnings": list(fit.warnings),
     } | ({"linearised": values_of(fit.linearised)} if fit.linearised else {})
 
@@ -424,6 +426,7 @@ def _law_fit(
         solution=solution,
         reference=(reference.frequency_hz, reference.time_s),
         shared_u={name: model.shared_u[name] for name in names if name in model.shared_u} if model.shared_u else {},
+        parts=dict(model.u_parts or {}),
     )
 
 
