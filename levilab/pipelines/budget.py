@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from analysis.budget import Component, u_of_limit
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from instruments.time_bases import TIME_BASES
+from levilab.present.document.blocks import Bullets, Details, Note, Paragraph, Tabular
 from levilab.present.numbers import in_words, with_uncertainty
 from levilab.present.tables import Row, Table, table
 
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
 
     from analysis.budget import Budget
     from levilab.pipelines.sources import Source
+    from levilab.present.document.blocks import Block
 
 #: A row of unknown size says what so much of it would add (relative).
 _TEN_PPM = 1e-5
@@ -110,7 +113,7 @@ def budget_table(budget: Budget, shown: Mapping[str, str] | None = None) -> Tabl
 def title_of(budget: Budget, shown: Mapping[str, str] | None = None) -> str:
     """The result, with its uncertainty."""
     name = (shown or {}).get(budget.quantity, budget.quantity.replace("_", " "))
-    of = f", {budget.model} law" if budget.model else ""
+    of = f" ({budget.model})" if budget.model else ""
     return f"{name} = {with_uncertainty(Estimate(budget.value, budget.u, budget.unit))}{of}"
 
 
@@ -172,6 +175,32 @@ def in_a_sentence(budget: Budget, shown: Mapping[str, str] | None = None) -> str
         texts.append(f"Not known: {_and([one.source for one in clocks])}; an error of 10⁻⁵ would add {size}.")
     texts += [f"Not known: {one.source}; it takes {one.remedy}." for one in unknown if one not in clocks]
     return " ".join(texts)
+
+
+def budget_blocks(budgets: Sequence[Budget], shown: Mapping[str, str] | None = None) -> tuple[Block, ...]:
+    """Each budget as a table with what dominates it in a sentence, then where the numbers come from; empty of none.
+
+    Args:
+        budgets: of the results.
+        shown: quantity → its symbol.
+    """
+    blocks: list[Block] = []
+    for budget in budgets:
+        name = re.sub(r"[^a-z0-9]+", "-", f"budget-{budget.model}-{budget.quantity}".casefold())
+        blocks.append(Tabular(name, budget_table(budget, shown), first_column_wraps=True))
+        blocks.append(Paragraph(in_a_sentence(budget, shown)))
+    notes = notes_of(budgets)
+    if notes:
+        blocks.append(Details("Where these uncertainties come from", (Bullets(tuple(notes)), Note(EXPLAINED))))
+    return tuple(blocks)
+
+
+#: What the columns and rows of a budget mean.
+EXPLAINED = (
+    "Type A is evaluated from a scatter that was seen, type B from anything else (GUM). The sensitivity is the change of "
+    "the result with the input, and what a row adds to u is the sensitivity times the u of the input; squares add up "
+    "to u². What is not in u is common to all readings and runs, so that no repetition shows it."
+)
 
 
 def notes_of(budgets: Sequence[Budget]) -> list[str]:

@@ -14,6 +14,7 @@ from analysis.limits import Comparison, Sample, Statistics, combine, compare, ne
 from analysis.numbers import digits
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
+from levilab.pipelines.limit.budget import budget_of_all, budget_of_run
 from levilab.pipelines.limit.readings import LimitReadings, read_limit_file, read_limit_run
 from levilab.pipelines.sources import InputOptions, Needs
 from levilab.present.numbers import with_uncertainty
@@ -51,9 +52,11 @@ class LimitOptions(InputOptions):
 
     Attributes:
         reading_u: of every limit [Hz], in the place of what the data say.
+        clock_u: of the counter's clock, relative; budgets say what it does, it is in no u.
     """
 
     reading_u: float | None = None
+    clock_u: float | None = None
 
 
 @dataclass(frozen=True)
@@ -331,7 +334,15 @@ def warnings_of(statistics: Statistics) -> list[str]:
     return texts
 
 
-METHOD = Method(needs=NEEDS, kind=LimitAnalysis, options=LimitOptions, fit=limits_of, combine=together)
+METHOD = Method(
+    needs=NEEDS,
+    kind=LimitAnalysis,
+    options=LimitOptions,
+    fit=limits_of,
+    combine=together,
+    budget_of_run=budget_of_run,
+    budget_of_all=budget_of_all,
+)
 
 
 def analyze_limits(paths: Sequence[Path], options: LimitOptions) -> LimitAnalysis:

@@ -85,6 +85,7 @@ class SettingsPart(Settings):
     """How the limits were analyzed."""
 
     reading_u: float | None = Field(gt=0, alias="reading_u_hz")
+    clock_u: float | None = Field(default=None, gt=0)
 
 
 class LimitResult(Result):

@@ -16,6 +16,7 @@ from analysis.precession.sweep import EXCLUDED_P, Sweep, SweepFit, fit_sweep
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
+from levilab.pipelines.precession.budget import budget_of_all, budget_of_run
 from levilab.pipelines.precession.readings import Readings, read_sweep_file, read_sweep_run
 from levilab.pipelines.sources import InputOptions, Needs
 from levilab.present.numbers import plain, with_uncertainty
@@ -48,11 +49,13 @@ class PrecessionOptions(InputOptions):
         reading_u: of every count of the precession [Hz], in the place of what the data say.
         keep_outliers: points that miscounted are kept.
         orthogonal: the uncertainty of the drive's frequency counts, too.
+        clock_u: of the counter's clock, relative; budgets say what it does, it is in no u.
     """
 
     reading_u: float | None = None
     keep_outliers: bool = False
     orthogonal: bool = False
+    clock_u: float | None = None
 
 
 #: A record that is kept at the moment of a reading is that reading's [s].
@@ -181,6 +184,8 @@ METHOD = Method(
     fit=fit_source,
     combine=lambda _, runs, options: combine(runs, options),
     mixed="a line through both says nothing about a real top",
+    budget_of_run=budget_of_run,
+    budget_of_all=budget_of_all,
 )
 
 

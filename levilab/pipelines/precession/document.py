@@ -103,6 +103,7 @@ class SettingsPart(Settings):
     reading_u: float | None = Field(gt=0, alias="reading_u_hz")
     orthogonal: bool
     keep_outliers: bool
+    clock_u: float | None = Field(default=None, gt=0)
 
 
 class PrecessionResult(Result, _WithLine):

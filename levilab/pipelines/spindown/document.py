@@ -426,7 +426,7 @@ def _law_fit(
         solution=solution,
         reference=(reference.frequency_hz, reference.time_s),
         shared_u={name: model.shared_u[name] for name in names if name in model.shared_u} if model.shared_u else {},
-        parts=dict(model.u_parts or {}),
+        parts={name: model.u_parts[name] for name in names if name in model.u_parts} if model.u_parts else {},
     )
 
 
