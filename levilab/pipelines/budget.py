@@ -27,7 +27,9 @@ _TEN_PPM = 1e-5
 _LEAST_SHARE = 0.001
 
 
-def time_base(source: Source[Any], kind: str, sensitivity: float, given: float | None) -> Component:
+def time_base(
+    source: Source[Any], kind: str, sensitivity: float, given: float | None, *, what: str = ""
+) -> Component:
     """The row of an instrument's clock, which no repetition shows, so that it is in no u.
 
     Args:
@@ -35,8 +37,9 @@ def time_base(source: Source[Any], kind: str, sensitivity: float, given: float |
         kind: of the instrument, as run.json has it: "counter".
         sensitivity: of the result to a relative error of the clock.
         given: relative standard uncertainty, as given to the analysis.
+        what: the row in words; empty: the time base of the instrument.
     """
-    what = f"time base of the {kind}"
+    what = what or f"time base of the {kind}"
     about = source.run.record.instruments.get(kind) if source.run else None
     driver = str((about or {}).get("driver", ""))
     known = TIME_BASES.get(driver)

@@ -31,8 +31,8 @@ def budget_of_run(source: Source[Records], run: SpinRun, options: SpinOptions) -
         if name not in run.parts or estimate.value is None or not estimate.u:
             continue
         rows = [*_of_pulses(run, name, run.parts[name], estimate), *_of_the_rest(run, name, run.parts[name], estimate)]
-        if options.clock_u is not None or not source.readings.pulses or source.run:
-            rows.append(time_base(source, "oscilloscope", by_clock * estimate.value, options.clock_u))
+        what = "" if source.run else "clock of the recording"
+        rows.append(time_base(source, "oscilloscope", by_clock * estimate.value, options.clock_u, what=what))
         made.append(Budget(name, estimate.value, estimate.u, estimate.unit, tuple(rows)))
     return tuple(made)
 
