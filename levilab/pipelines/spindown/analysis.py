@@ -35,7 +35,7 @@ NEEDS = Needs(
 
 #: Whether the count holds the tilt of the top's moment.
 Tilt = Literal["auto", "none", "fitted"]
-_TILTED: dict[Tilt, bool | None] = {"auto": None, "none": False, "fitted": True}
+TILTED: dict[Tilt, bool | None] = {"auto": None, "none": False, "fitted": True}
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ def fit_source(source: Source[Readings], options: SpinDownOptions, *, tilt: bool
             bootstrap_samples=options.bootstrap_samples,
             seed=options.seed,
             keep_outliers=options.keep_outliers,
-            tilt=_TILTED[options.tilt] if tilt is None else tilt,
+            tilt=TILTED[options.tilt] if tilt is None else tilt,
             driven=readings.driven,
             gate=gate_of(source, EXPERIMENT),
         )
