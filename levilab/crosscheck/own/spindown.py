@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     Array = np.ndarray[tuple[int], np.dtype[np.float64]]
 
 #: Processor time of one run's fits, with stated uncertainties and without [s].
-_COST_S, _COST_WITHOUT_U_S = 0.045, 0.11
+_COST_S, _COST_WITHOUT_U_S = 0.065, 0.12
 #: The exponent of a law of one power.
 _EXPONENTS = {"stokes": 1.0, "disc": 1.5, "newton": 2.0}
 
@@ -86,7 +86,7 @@ def own(found: SpinDownAnalysis) -> Own:
     cost = sum(_COST_WITHOUT_U_S if run.u is None else _COST_S for run in runs)
     hidden = not any(run.has_tilt for run in found.runs) and any(run.tilt is None for run in runs)
     more = (
-        ("u holds what a tilt that noise hides would do; these readings have none, so the pulls scatter less than 1",)
+        ("here u holds what a tilt that noise hides would do; what was made up has none, so the pulls scatter by less than 1",)
         if hidden
         else ()
     )

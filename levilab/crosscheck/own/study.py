@@ -34,7 +34,7 @@ OWN: Mapping[str, Callable[[Any], Own]] = MappingProxyType({
 #: How many trials are made where no number is asked for.
 TRIALS = 200
 #: A report makes as many as fit into so much processor time, and none where these would be too few to say anything.
-REPORT_S, FEWEST = 2.0, 40
+REPORT_S, FEWEST = 2.0, 25
 
 
 @dataclass(frozen=True)
@@ -222,3 +222,14 @@ def own_blocks(found: OwnCheck, shown: Mapping[str, str] | None = None) -> tuple
         Tabular(f"crosscheck-{found.analysis}", own_table(found, shown)),
         Note(note),
     )
+
+
+def quick_check(
+    analysis: str, found: Analyzed[Any, Any, Any, Any], settings: Mapping[str, Any]
+) -> OwnCheck | None:
+    """As many trials as a report has time for; None where these would be too few, or the result has no trials."""
+    try:
+        count = trials_of_report(OWN[analysis](found))
+    except (LevilabError, AnalysisError):
+        return None
+    return check_own(analysis, found, settings, count) if count else None
