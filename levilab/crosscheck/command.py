@@ -62,7 +62,7 @@ def check_like(names: Sequence[str], paths: Sequence[Path], trials: int | None) 
     for analysis, result in found:
         progress = ShareBar(f"cross-checking {analysis.name}")
         try:
-            settings = analysis.result.settings(result.options).model_dump(mode="json", by_alias=True)
+            settings = analysis.settings_of(result)
             done.append((check_own(analysis.name, result, settings, trials or TRIALS, progress), result.place))
         finally:
             progress.close()

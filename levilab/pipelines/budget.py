@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from analysis.budget import Component, u_of_limit
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from analysis.budget import Budget
+    from levilab.pipelines.analyzed import Analyzed
     from levilab.pipelines.sources import Source
     from levilab.present.document.blocks import Block
 
@@ -27,9 +29,7 @@ _TEN_PPM = 1e-5
 _LEAST_SHARE = 0.001
 
 
-def time_base(
-    source: Source[Any], kind: str, sensitivity: float, given: float | None, *, what: str = ""
-) -> Component:
+def time_base(source: Source[Any], kind: str, sensitivity: float, given: float | None, *, what: str = "") -> Component:
     """The row of an instrument's clock, which no repetition shows, so that it is in no u.
 
     Args:
@@ -90,6 +90,9 @@ def setting_of(source: Source[Any], experiment: str, name: str) -> float | None:
 
 # --- how people are shown it ---------------------------------------------------------------------------
 
+#: Unit of results → the one in which people of this laboratory read it, and how many of them make one.
+_SHOWN_UNITS = {"T m": ("mT cm", 1e5), "m": ("mm", 1e3), "T": ("mT", 1e3)}
+
 #: Heads of the table, of which the numbers stand to the right.
 HEADS = ("source", "type", "u of it", "sensitivity", "adds to u", "share of u²")
 #: Unit of a sensitivity where the input has no unit, or the result.
@@ -103,6 +106,7 @@ def budget_table(budget: Budget, shown: Mapping[str, str] | None = None) -> Tabl
         budget: of one result.
         shown: quantity → its symbol; by default its name.
     """
+    budget = _in_shown_units(budget)
     unit = in_words(budget.unit)
     rows = [Row(_cells(budget, one)) for one in budget.included]
     rows.append(Row(("combined: u", "", "", "", _number(budget.u, unit), "100 %"), "together"))
@@ -111,6 +115,17 @@ def budget_table(budget: Budget, shown: Mapping[str, str] | None = None) -> Tabl
     if any(one.contribution for one in left_out):
         rows.append(Row(("u with all of it", "", "", "", _number(budget.u_with_all, unit), ""), "together"))
     return table(title_of(budget, shown), HEADS, rows, numbers=HEADS[2:])
+
+
+def _in_shown_units(budget: Budget) -> Budget:
+    """The same in the units that people read."""
+    unit, factor = _SHOWN_UNITS.get(budget.unit, (budget.unit, 1.0))
+    rows = []
+    for one in budget.components:
+        of_input, times = _SHOWN_UNITS.get(one.unit, (one.unit, 1.0))
+        u = None if one.u is None else one.u * times
+        rows.append(replace(one, u=u, unit=of_input, sensitivity=one.sensitivity * factor / times))
+    return replace(budget, value=budget.value * factor, u=budget.u * factor, unit=unit, components=tuple(rows))
 
 
 def title_of(budget: Budget, shown: Mapping[str, str] | None = None) -> str:
@@ -160,6 +175,7 @@ def _percent(share: float | None) -> str:
 def in_a_sentence(budget: Budget, shown: Mapping[str, str] | None = None) -> str:
     """What dominates u of a result, what would make it smaller, and what it does not contain."""
     name = (shown or {}).get(budget.quantity, budget.quantity.replace("_", " "))
+    budget = _in_shown_units(budget)
     largest, texts = budget.largest, []
     if largest is not None:
         text = f"{_percent(budget.share(largest))} of u² of {name} comes from: {largest.source}"
@@ -180,16 +196,45 @@ def in_a_sentence(budget: Budget, shown: Mapping[str, str] | None = None) -> str
     return " ".join(texts)
 
 
-def budget_blocks(budgets: Sequence[Budget], shown: Mapping[str, str] | None = None) -> tuple[Block, ...]:
+def budgets_of_result(found: Analyzed[Any, Any, Any, Any], shown: Mapping[str, str] | None = None) -> tuple[Block, ...]:
+    """The budgets of what was found: of all inputs together, and of each.
+
+    Args:
+        found: by an analysis.
+        shown: quantity → its symbol.
+    """
+    of_each = [
+        (source.name, origin.budget)
+        for source, origin in zip(found.sources, found.origins, strict=True)
+        if len(found.sources) > 1 and origin.budget
+    ]
+    each = [
+        Details(
+            f"{name} by itself", budget_blocks(budget, shown, name), on_paper="whole" if len(of_each) < _MANY else "out"
+        )
+        for name, budget in of_each[:_MOST_RUNS]
+    ]
+    if not found.budget and not each:
+        return (Paragraph("The result was written before budgets were kept with it: levilab analyze makes them."),)
+    return (*budget_blocks(found.budget, shown), *each)
+
+
+#: From so many runs on their budgets are not printed on paper; and so many are in a report.
+_MANY, _MOST_RUNS = 3, 12
+
+
+def budget_blocks(budgets: Sequence[Budget], shown: Mapping[str, str] | None = None, of: str = "") -> tuple[Block, ...]:
     """Each budget as a table with what dominates it in a sentence, then where the numbers come from; empty of none.
 
     Args:
         budgets: of the results.
         shown: quantity → its symbol.
+        of: the input, for the names of tables; empty for all of them together.
     """
     blocks: list[Block] = []
     for budget in budgets:
-        name = re.sub(r"[^a-z0-9]+", "-", f"budget-{budget.model}-{budget.quantity}".casefold())
+        words = " ".join(filter(None, ("budget", of, budget.model, budget.quantity)))
+        name = re.sub(r"[^a-z0-9]+", "-", words.casefold()).strip("-")
         blocks.append(Tabular(name, budget_table(budget, shown), first_column_wraps=True))
         blocks.append(Paragraph(in_a_sentence(budget, shown)))
     notes = notes_of(budgets)

@@ -51,7 +51,9 @@ def _samples(random: np.random.Generator, found: LimitAnalysis, group: Limits) -
     made = []
     for k in group.runs:
         n = len(found.sources[k].readings)
-        limits = (statistics.mean.value or 0.0) + between * random.standard_normal() + scatter * random.standard_normal(n)
+        limits = (
+            (statistics.mean.value or 0.0) + between * random.standard_normal() + scatter * random.standard_normal(n)
+        )
         if step:
             limits = (np.floor((limits - origin) / step) + 0.5) * step + origin
         made.append(Sample(limits, None, np.full(n, step) if step else None))

@@ -86,7 +86,9 @@ def own(found: SpinDownAnalysis) -> Own:
     cost = sum(_COST_WITHOUT_U_S if run.u is None else _COST_S for run in runs)
     hidden = not any(run.has_tilt for run in found.runs) and any(run.tilt is None for run in runs)
     more = (
-        ("here u holds what a tilt that noise hides would do; what was made up has none, so the pulls scatter by less than 1",)
+        (
+            "here u holds what a tilt that noise hides would do; what was made up has none, so the pulls scatter by less than 1",
+        )
         if hidden
         else ()
     )

@@ -224,9 +224,7 @@ def own_blocks(found: OwnCheck, shown: Mapping[str, str] | None = None) -> tuple
     )
 
 
-def quick_check(
-    analysis: str, found: Analyzed[Any, Any, Any, Any], settings: Mapping[str, Any]
-) -> OwnCheck | None:
+def quick_check(analysis: str, found: Analyzed[Any, Any, Any, Any], settings: Mapping[str, Any]) -> OwnCheck | None:
     """As many trials as a report has time for; None where these would be too few, or the result has no trials."""
     try:
         count = trials_of_report(OWN[analysis](found))

@@ -73,7 +73,11 @@ def _input(source: Source[FieldReadings], scan: FieldScan, part: UPart) -> tuple
         return prior.u, UNITS[part.name], "before the scan, common to all readings"
     readings = source.readings
     if part.name == "heights" and readings.height_u is not None:
-        return float(np.sqrt(np.mean(readings.height_u**2))), "m", "each height by itself, by the slope of the field there"
+        return (
+            float(np.sqrt(np.mean(readings.height_u**2))),
+            "m",
+            "each height by itself, by the slope of the field there",
+        )
     if part.name == "readings":
         if readings.u is None:
             return None, "", "their scatter about the fit"
@@ -101,12 +105,14 @@ def budget_of_all(analysis: FieldAnalysis) -> tuple[Budget, ...]:
     """Of the means over several scans: what is common to them is no smaller than in one."""
     of_runs = [{budget.quantity: budget for budget in origin.budget or ()} for origin in analysis.origins]
     return tuple(
-        _of_mean(analysis, name, [one[name] for one in of_runs]) for name in SHOWN if all(name in one for one in of_runs)
+        _of_mean(analysis, name, [one[name] for one in of_runs])
+        for name in SHOWN
+        if all(name in one for one in of_runs)
     )
 
 
 def _of_mean(analysis: FieldAnalysis, name: str, budgets: Sequence[Budget]) -> Budget:
-    """u of a mean is that of one scan, in the square mean, or s/√N where the scans scatter more."""
+    """U of a mean is that of one scan, in the square mean, or s/√N where the scans scatter more."""
     mean, n = analysis.values[name], len(budgets)
     u = mean.u or 0.0
     own = math.sqrt(sum(one.u**2 for one in budgets) / n)

@@ -45,9 +45,21 @@ def _of_pulses(run: SpinRun, name: str, parts: UParts, estimate: Estimate) -> It
     whole = parts.pulses
     if bound is None:
         note = f"{spin.pulses} pulses, each {digits(1e3 * spin.scatter)} ms from its place"
-        yield Component("scatter", "scatter of the pulses' times", "A", spin.scatter, "s", whole / spin.scatter,
-                        note=note, remedy=longer) if spin.scatter > 0 else _direct(  # fmt: skip
-            "scatter", "scatter of the pulses' times", whole, estimate, note, longer
+        yield (
+            Component(
+                "scatter",
+                "scatter of the pulses' times",
+                "A",
+                spin.scatter,
+                "s",
+                whole / spin.scatter,
+                note=note,
+                remedy=longer,
+            )
+            if spin.scatter > 0
+            else _direct(  # fmt: skip
+                "scatter", "scatter of the pulses' times", whole, estimate, note, longer
+            )
         )
         return
     noise = min(bound, whole)
@@ -83,7 +95,9 @@ def _of_the_rest(run: SpinRun, name: str, parts: UParts, estimate: Estimate) -> 
                       "shorter windows", "B", included=False)  # fmt: skip
     if parts.step > 0:
         note = "from a straight line through times that lost digits when they were printed"
-        yield _direct("step", "sampling interval", parts.step, estimate, note, "a file with its interval in the header", "B")
+        yield _direct(
+            "step", "sampling interval", parts.step, estimate, note, "a file with its interval in the header", "B"
+        )
 
 
 def _bend(spin: SpinFrequency) -> float:

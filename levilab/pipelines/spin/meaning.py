@@ -56,4 +56,6 @@ def _sentences(run: SpinRun) -> Iterator[str]:
     if spin.bound and frequency.u:
         ratio = frequency.u / spin.bound
         text = f"The uncertainty is {digits(ratio)} times the least that any method could reach with such noise"
-        yield f"{text}." if ratio < _AT_BOUND else f"{text}: the pulses themselves scatter, or the samples lie far apart."
+        yield (
+            f"{text}." if ratio < _AT_BOUND else f"{text}: the pulses themselves scatter, or the samples lie far apart."
+        )

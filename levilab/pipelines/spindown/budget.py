@@ -185,7 +185,7 @@ def budget_of_all(analysis: SpinDownAnalysis) -> tuple[Budget, ...]:
 
 
 def _budget_of_mean(analysis: SpinDownAnalysis, law: str, name: str, mean: Mean) -> Budget | None:
-    """u of a mean: what the runs scatter, or no less than their own uncertainties leave; and what they share."""
+    """U of a mean: what the runs scatter, or no less than their own uncertainties leave; and what they share."""
     fits = [run.fit(law) for run in analysis.runs]
     n = mean.degrees_of_freedom + 1
     if mean.value is None or not mean.u or mean.scatter is None or n != len(fits):

@@ -10,7 +10,7 @@ import numpy as np
 
 from analysis.numbers import digits
 from analysis.spindown.drag import LAWS
-from levilab.pipelines.spindown.laws import SYMBOLS
+from levilab.pipelines.spindown.laws import SHOWN_LAWS, SYMBOLS
 from levilab.present.numbers import plain, with_uncertainty
 
 if TYPE_CHECKING:
@@ -19,14 +19,6 @@ if TYPE_CHECKING:
     from analysis.uncertainty import Estimate
     from levilab.pipelines.spindown.analysis import SpinDownAnalysis
 
-#: Law → the drag that it is of.
-_DRAGS: Mapping[str, str] = MappingProxyType({
-    "stokes": "in proportion to the spin, as that of a slow, viscous flow (Stokes)",
-    "newton": "in proportion to the square of the spin, as that of air thrown about (Newton)",
-    "disc": "of a laminar rotating disc: the air beside it is thrown outward in a thin layer (von Kármán)",
-    "mixed": "of two parts, one in proportion to the spin and one to its square",
-    "power": "in proportion to a power of the spin that the readings choose",
-})  # fmt: skip
 #: Laws of one power, and the power.
 _POWERS: Mapping[str, float] = MappingProxyType({"stokes": 1.0, "disc": 1.5, "newton": 2.0})
 #: C₃/₂ of a bare disc as large as the thesis's top in laminar air, without a free parameter (PHYSICS.md §5) [SI].
@@ -54,7 +46,7 @@ def _law(analysis: SpinDownAnalysis) -> Iterator[str]:
         return
     left = f"it leaves {digits(1e3 * stats.rms_residual)} mHz a reading"
     if verdict.decided:
-        yield f"The {best} law describes the readings; {left}. The drag is {_DRAGS[best]}."
+        yield f"The {best} law describes the readings; {left}. {SHOWN_LAWS[best].meaning}"
         return
     others = [name for name in verdict.indistinguishable if name != best]
     beside = f" as well as {_and(others)}" if others else ""
@@ -76,7 +68,9 @@ def _loss(analysis: SpinDownAnalysis) -> Iterator[str]:
     reference, duration = fit.reference
     spins = np.array([float(run.frequency[0]), float(run.frequency[-1])])
     loss = LAWS[fit.name].slowing(spins / reference, fit.solution) * reference / duration
-    first, last = (f"{digits(float(each))} Hz a second at {spin:.3g} Hz" for each, spin in zip(loss, spins, strict=True))
+    first, last = (
+        f"{digits(float(each))} Hz a second at {spin:.3g} Hz" for each, spin in zip(loss, spins, strict=True)
+    )
     which = "In the first run the" if len(analysis.runs) > 1 else "The"
     yield f"{which} top loses {first}, and {last}."
 
