@@ -1,7 +1,7 @@
 """Uncertainty budgets: what the standard uncertainty of a result is made of, row by row.
 
-A row is an input quantity with its standard uncertainty, and how much of it arrives at the result: |c|·u, where c is the
-sensitivity, the change of the result with the input (JCGM 100:2008 (GUM) §5.1.2).  Rows are uncorrelated, so their
+A row is an input quantity with its standard uncertainty, and how much of it arrives at the result: |c|·u, where c is
+the sensitivity, the change of the result with the input (JCGM 100:2008 (GUM) §5.1.2).  Rows are uncorrelated, so their
 squares add up.  What u of a result does not contain is a row, too, and said to be none of its parts: a time base, for
 instance, is common to all readings and to all runs, and no repetition shows it.
 """

@@ -339,7 +339,7 @@ def fit_law(
         shared_u={
             name: abs(float(part)) for name, part in zip(law.parameters, shared, strict=True) if np.isfinite(part)
         },
-        parts=_parts(found, slopes, independent, by_readings, of_tilt, gate),
+        parts=_parts(found, slopes, (independent, by_readings, of_tilt), gate),
     )
 
 
@@ -384,19 +384,16 @@ def _uncertainties(found: Solution, slopes: Array, rho: float) -> tuple[Array | 
     return wide, grown, independent
 
 
-def _parts(
-    found: Solution, slopes: Array, independent: Array, by_readings: Array, of_tilt: Array, gate: float | None
-) -> dict[str, Parts]:
+def _parts(found: Solution, slopes: Array, sizes: tuple[Array, Array, Array], gate: float | None) -> dict[str, Parts]:
     """What the uncertainties of the parameters are made of.
 
     Args:
         found: the solution.
         slopes: of the textbook parameters, shape (p, p).
-        independent: u for independent noise, shape (p,).
-        by_readings: u with correlated noise, shape (p,).
-        of_tilt: what a tilt adds to that, shape (p,).
+        sizes: u for independent noise, u with correlated noise, and what a tilt adds to that, shape (p,) each.
         gate: of a reading [s].
     """
+    independent, by_readings, of_tilt = sizes
     h = found.curvature.covariance
     if h is None or not np.isfinite(by_readings).all():
         return {}
@@ -412,7 +409,7 @@ def _parts(
         moved = None if gate is None else _moved_by_gate(found, slopes, gate)
     rows = np.array([scatter, excess, more, prior, of_tilt]).T
     return {
-        name: Parts(*map(float, row), None if moved is None or not np.isfinite(moved[k]) else float(moved[k]))
+        name: Parts(*row.tolist(), gate=None if moved is None or not np.isfinite(moved[k]) else float(moved[k]))
         for k, (name, row) in enumerate(zip(found.law.parameters, rows, strict=True))
         if np.isfinite(row).all()
     }

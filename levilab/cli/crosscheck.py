@@ -19,8 +19,8 @@ def crosscheck(
         list[Path] | None,
         typer.Option(
             metavar="RUN",
-            help="Make up readings with the fitted values, times, scatter and number of runs of this result, instead of "
-            "worlds at random; repeat it for several runs.  Writes crosscheck.json beside the result, for the report.",
+            help="Make up readings with the values, times, scatter and number of runs of this result, not worlds at "
+            "random; repeat it for several runs.  Writes crosscheck.json beside the result, for the report.",
         ),
     ] = None,
     trials: Annotated[
@@ -40,16 +40,7 @@ def crosscheck(
     if like:
         if seed is not None:
             raise UsageError("seed", "does not go with `like`: its trials follow from the readings")
-        of_results = command.check_like(subjects or [], like, trials)
-        written = command.store_like(of_results, out)
-        if as_json:
-            result(command.like_as_json(of_results))
-        else:
-            command.print_like(of_results)
-        for path in written:
-            message(f"wrote {path}")
-        if not all(one.holds for one, _ in of_results):
-            raise typer.Exit(exit_codes.FAILED)
+        _like(like, subjects or [], trials, out, as_json=as_json)
         return
     checked = command.check(subjects or [], trials, seed or 0)
     if as_json:
@@ -60,4 +51,20 @@ def crosscheck(
         for path in command.write(checked, out):
             message(f"wrote {path}")
     if not all(one.holds for one in checked):
+        raise typer.Exit(exit_codes.FAILED)
+
+
+def _like(paths: list[Path], names: list[str], trials: int | None, out: Path | None, *, as_json: bool) -> None:
+    """The trials with the parameters of results, stored beside these."""
+    from levilab.crosscheck import command
+
+    checked = command.check_like(names, paths, trials)
+    written = command.store_like(checked, out)
+    if as_json:
+        result(command.like_as_json(checked))
+    else:
+        command.print_like(checked)
+    for path in written:
+        message(f"wrote {path}")
+    if not all(one.holds for one, _ in checked):
         raise typer.Exit(exit_codes.FAILED)

@@ -176,6 +176,7 @@ class Method(Generic[S, R, Opt, A]):
         options: Opt,
         one: Callable[[Source[S]], tuple[Source[S], R, Origin[Opt]]],
         recall: Callable[[Sequence[R]], Any] | None = None,
+        *,
         budget: tuple[Budget, ...] = (),
     ) -> A:
         """All inputs, each by itself and together.  Raises DataError.

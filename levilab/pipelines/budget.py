@@ -245,7 +245,8 @@ def budget_blocks(budgets: Sequence[Budget], shown: Mapping[str, str] | None = N
 
 #: What the columns and rows of a budget mean.
 EXPLAINED = (
-    "Type A is evaluated from a scatter that was seen, type B from anything else (GUM). The sensitivity is the change of "
+    "Type A is evaluated from a scatter that was seen, type B from anything else (GUM). The sensitivity "
+    "is the change of "
     "the result with the input, and what a row adds to u is the sensitivity times the u of the input; squares add up "
     "to u². What is not in u is common to all readings and runs, so that no repetition shows it."
 )

@@ -166,7 +166,7 @@ class Document(Generic[S, R, Opt, A, D]):
                 looked.options,
                 lambda source: self._restored(source, whole.of(source)),
                 lambda runs: whole.restore(lambda: self.combined(whole.result, runs, numbers)),
-                budgets_of(whole.result.budget),
+                budget=budgets_of(whole.result.budget),
             )
         return self.method.gather(
             looked.paths, found, looked.options, lambda source: self._recalled(source, archive, given)

@@ -48,7 +48,7 @@ def own(found: FieldAnalysis) -> Own:
 
     which = "the first scan" if len(found.runs) > 1 else "the scan"
     return Own(
-        about=f"{which} anew from the fitted base: calliper, zero, scale and heights drawn by their u, readings by theirs",
+        about=f"{which} anew from the fitted base: calliper, zero, scale, heights and readings drawn by their u",
         trial=trial,
         cost_s=_COST_S,
     )

@@ -34,7 +34,7 @@ def own(found: LimitAnalysis) -> Own:
         )
 
     return Own(
-        about="limits drawn from a normal law, of as many tops and runs, with this scatter and these steps of the drive",
+        about="limits of as many tops and runs from a normal law, with this scatter and these steps of the drive",
         trial=trial,
         cost_s=_COST_S * max(len(groups), 1),
         more=("with few tops u is itself uncertain: pulls follow Student's law, and fewer than 68 % lie within 1 u",),

@@ -40,7 +40,7 @@ def own(found: PrecessionAnalysis) -> Own:
         )
 
     return Own(
-        about=f"{drive.size} points on the fitted line, at these frequencies of the drive, with the scatter of these points",
+        about=f"{drive.size} points on the fitted line, at these frequencies of the drive, with their scatter",
         trial=trial,
         cost_s=_COST_S,
         hypothesis="the true line",

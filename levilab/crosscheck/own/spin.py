@@ -38,7 +38,9 @@ def own(found: SpinAnalysis) -> Own:
     about = f"a record of {n} samples with {turns} pulses of this spin and slope, with this noise and jitter"
     code = run.code or 0.0
     return Own(
-        about, lambda random: _of_trace(random, spin, rate, n, options.method, code), _COST_S + n * _COST_OF_SAMPLE_S
+        about,
+        lambda random: _of_trace(random, spin, rate, n, method=options.method, code=code),
+        _COST_S + n * _COST_OF_SAMPLE_S,
     )
 
 
@@ -88,7 +90,9 @@ def _of_times(random: np.random.Generator, spin: SpinFrequency) -> Trial:
     return _compared(spin_of_times(times).under_drag(), spin)
 
 
-def _of_trace(random: np.random.Generator, spin: SpinFrequency, rate: float, n: int, method: str, code: float) -> Trial:
+def _of_trace(
+    random: np.random.Generator, spin: SpinFrequency, rate: float, n: int, *, method: str, code: float
+) -> Trial:
     """Gaussian pulses of unit height, as wide as the bound of the result says of such noise."""
     assert spin.bound is not None
     assert spin.snr_db is not None

@@ -14,8 +14,7 @@ from analysis.spindown.fit import fit_spin_down, is_correlated
 from analysis.spindown.tilt import counted
 from levilab.crosscheck.own.model import Own, Trial, pull
 from levilab.pipelines.budget import gate_of
-from levilab.pipelines.spindown.analysis import TILTED
-from levilab.pipelines.spindown.budget import EXPERIMENT
+from levilab.pipelines.spindown.analysis import EXPERIMENT, TILTED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -86,9 +85,7 @@ def own(found: SpinDownAnalysis) -> Own:
     cost = sum(_COST_WITHOUT_U_S if run.u is None else _COST_S for run in runs)
     hidden = not any(run.has_tilt for run in found.runs) and any(run.tilt is None for run in runs)
     more = (
-        (
-            "here u holds what a tilt that noise hides would do; what was made up has none, so the pulls scatter by less than 1",
-        )
+        ("here u holds what a tilt that noise hides would do; what was made up has none, so the pulls scatter less",)
         if hidden
         else ()
     )

@@ -13,7 +13,6 @@ from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
-from levilab.pipelines.field.budget import budget_of_all, budget_of_run
 from levilab.pipelines.field.device import FieldOptions, known_of, known_top, usual
 from levilab.pipelines.field.quantities import SHOWN
 from levilab.pipelines.field.readings import FieldReadings, read_scan_file, read_scan_run
@@ -132,8 +131,6 @@ METHOD = Method(
     options=FieldOptions,
     fit=analyze_source,
     mixed="a mean over both says nothing about a real base",
-    budget_of_run=budget_of_run,
-    budget_of_all=budget_of_all,
 )
 
 

@@ -31,7 +31,7 @@ _WORDS = {
     "gain": ("calibration of the probe: its scale", "a calibrated probe, or a reference magnet"),
     "origin": ("height of the base on the scale", "the zero of the heights measured again"),
     "thickness": ("thickness by the calliper", "a better calliper"),
-    "background": ("zero of the probe and the earth's field", "the probe zeroed in its chamber, and the base taken away"),
+    "background": ("zero of the probe and the earth's field", "the probe zeroed in its chamber, and the base away"),
     "inner_radius": ("inner radius by the calliper", "a better calliper"),
     "outer_radius": ("outer radius by the calliper", "a better calliper"),
 }  # fmt: skip

@@ -14,7 +14,6 @@ from analysis.limits import Comparison, Sample, Statistics, combine, compare, ne
 from analysis.numbers import digits
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
-from levilab.pipelines.limit.budget import budget_of_all, budget_of_run
 from levilab.pipelines.limit.readings import LimitReadings, read_limit_file, read_limit_run
 from levilab.pipelines.sources import InputOptions, Needs
 from levilab.present.numbers import with_uncertainty
@@ -340,8 +339,6 @@ METHOD = Method(
     options=LimitOptions,
     fit=limits_of,
     combine=together,
-    budget_of_run=budget_of_run,
-    budget_of_all=budget_of_all,
 )
 
 

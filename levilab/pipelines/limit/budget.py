@@ -58,7 +58,7 @@ def _rows(sources: Sequence[Source[LimitReadings]], limits: Limits) -> Iterator[
         rounding = u_of_step(printed)
         if 0 < rounding < each and not step:
             yield Component("resolution", "last digit of the limits", "B", rounding, "Hz", 1 / root,
-                            note=f"steps of {printed:g} Hz; a part of what the tops scatter", remedy="more digits")  # fmt: skip
+                            note=f"steps of {printed:g} Hz; a part of the scatter", remedy="more digits")  # fmt: skip
             each = rest(each, rounding)
         yield Component("scatter", "scatter from top to top", "A", each, "Hz", 1 / root,
                         note=_about_scatter(limits), remedy=_more(limits))  # fmt: skip

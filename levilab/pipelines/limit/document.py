@@ -11,6 +11,7 @@ from pydantic import Field
 from analysis.limits import Comparison, Statistics
 from levilab.pipelines.document import Document, Settings, number, value_of, values_of
 from levilab.pipelines.limit.analysis import METHOD, Conditions, Device, LimitAnalysis, Limits, Which
+from levilab.pipelines.limit.budget import budget_of_all, budget_of_run
 from levilab.pipelines.result import Part, Result, RunPart, Value
 
 if TYPE_CHECKING:
@@ -205,5 +206,10 @@ def _restored(part: _WithLimits, values: Mapping[str, Value], runs: int = 1) -> 
 
 
 DOCUMENT = Document(
-    method=METHOD, result=LimitResult, entries=_entries, run_entries=_run_entries, run=_run, combined=_groups
+    method=replace(METHOD, budget_of_run=budget_of_run, budget_of_all=budget_of_all),
+    result=LimitResult,
+    entries=_entries,
+    run_entries=_run_entries,
+    run=_run,
+    combined=_groups,
 )

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 #: The limit → why there is one.
 _WHY = MappingProxyType({
     "lower": "below it the top spins too slowly to be upright, and the field turns it over",
-    "upper": "above it the top is so stiff that its axis no longer follows the field, or the drive cannot take it along",
+    "upper": "above it the top is so stiff that its axis no longer follows the field, or the drive "
+    "cannot take it along",
 })  # fmt: skip
 #: The mean of ten lower limits in the thesis [Hz], with its standard error.
 _THESIS, _THESIS_U = 21.86, 0.08
@@ -38,7 +39,8 @@ def _sentences(group: Limits) -> Iterator[str]:
         return
     ratio = found.scatter.value / mean.u
     yield (
-        f"One top is lost {digits(found.scatter.value)} Hz from another, so a single one may be off by that much; the mean "
+        f"One top is lost {digits(found.scatter.value)} Hz from another, so a single one may be off by "
+        "that much; the mean "
         f"of {found.n} is {digits(ratio)} times as good."
     )
     if group.which == "lower":
@@ -47,4 +49,6 @@ def _sentences(group: Limits) -> Iterator[str]:
         if abs(off) < 2 * u:
             yield f"The thesis's ten tops have {_THESIS:g}(8) Hz, which agrees."
         else:
-            yield f"The thesis's ten tops have {_THESIS:g}(8) Hz, {digits(abs(off) / u)} u from it: another top, or mass."
+            yield (
+                f"The thesis's ten tops have {_THESIS:g}(8) Hz, {digits(abs(off) / u)} u from it: another top, or mass."
+            )

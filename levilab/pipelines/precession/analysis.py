@@ -16,7 +16,6 @@ from analysis.precession.sweep import EXCLUDED_P, Sweep, SweepFit, fit_sweep
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
-from levilab.pipelines.precession.budget import budget_of_all, budget_of_run
 from levilab.pipelines.precession.readings import Readings, read_sweep_file, read_sweep_run
 from levilab.pipelines.sources import InputOptions, Needs
 from levilab.present.numbers import plain, with_uncertainty
@@ -184,8 +183,6 @@ METHOD = Method(
     fit=fit_source,
     combine=lambda _, runs, options: combine(runs, options),
     mixed="a line through both says nothing about a real top",
-    budget_of_run=budget_of_run,
-    budget_of_all=budget_of_all,
 )
 
 

@@ -101,7 +101,7 @@ def _of_points(
         note = f"steps of {step:g} Hz, {'a part of what a point scatters' if is_part else 'more than the u of a point'}"
         yield Component("resolution", "last digit of the counts", "B", rounding, "Hz", sensitivity,
                         included=is_part, note=note, remedy="more digits")  # fmt: skip
-    what, kind, note = _what_points(fit, options, stated=stated)
+    what, kind, note = _what_points(options, stated=stated)
     own = rest(each, rounding) if is_part else each
     yield Component("scatter", what, kind, own, "Hz", sensitivity, note=note, remedy=_better(source, fit))
     if of_drive > 0:
@@ -118,7 +118,7 @@ def _unit(fit: SweepFit, whole: float) -> str:
     return "1" if whole == fit.line.u_slope else "Hz"
 
 
-def _what_points(fit: SweepFit, options: PrecessionOptions, *, stated: bool) -> tuple[str, str, str]:
+def _what_points(options: PrecessionOptions, *, stated: bool) -> tuple[str, str, str]:
     """What the scatter is called, its type, and where its size comes from."""
     if not stated:
         return "scatter of the points", "A", "standard deviation about the line"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -21,6 +21,7 @@ from levilab.pipelines.precession.analysis import (
     slope_of,
     verdict,
 )
+from levilab.pipelines.precession.budget import budget_of_all, budget_of_run
 from levilab.pipelines.result import Part, Result, RunPart, Value
 
 if TYPE_CHECKING:
@@ -214,5 +215,10 @@ def _run(part: PrecessionPart, source: Source[Readings], _: object) -> Precessio
 
 
 DOCUMENT = Document(
-    method=METHOD, result=PrecessionResult, entries=_entries, run_entries=_run_entries, run=_run, combined=_combined
+    method=replace(METHOD, budget_of_run=budget_of_run, budget_of_all=budget_of_all),
+    result=PrecessionResult,
+    entries=_entries,
+    run_entries=_run_entries,
+    run=_run,
+    combined=_combined,
 )

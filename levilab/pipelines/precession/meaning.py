@@ -33,7 +33,8 @@ def _sentences(fit: SweepFit) -> Iterator[str]:
         return
     if fit.locked:
         yield (
-            f"Each time the drive turns, the stem cuts the beam once: slope {slope} and intercept agree with 1 and 0, as "
+            f"Each time the drive turns, the stem cuts the beam once: slope {slope} and intercept agree "
+            "with 1 and 0, as "
             f"of a top that is locked to its drive (p = {plain(fit.p_locked, 2)})."
         )
     else:
@@ -47,13 +48,15 @@ def _sentences(fit: SweepFit) -> Iterator[str]:
         yield f"The slope of {THESIS_SLOPE:g} that the thesis gives lies {digits(away)} u away from this one."
     else:
         yield (
-            f"The slope of {THESIS_SLOPE:g} that the thesis gives lies within {digits(away)} u: these points do not tell "
+            f"The slope of {THESIS_SLOPE:g} that the thesis gives lies within {digits(away)} u: these "
+            "points do not tell "
             "it from a locked top's."
         )
     if fit.spin_offset is not None and fit.u_spin_offset:
         off = abs(fit.spin_offset)
-        agrees = off < _DIFFERS * fit.u_spin_offset
-        yield (
-            f"The spin that was counted is the drive's frequency to {digits(1e3 * max(off, fit.u_spin_offset))} mHz: "
-            f"{'the tape turns with the top' if agrees else 'is the tape on a washer that slips, or does the top swing?'}."
-        ).replace("?.", "?")
+        follows = off < _DIFFERS * fit.u_spin_offset
+        why = (
+            "the tape turns with the top." if follows else "is the tape on a washer that slips, or does the top swing?"
+        )
+        size = digits(1e3 * max(off, fit.u_spin_offset))
+        yield f"The spin that was counted is the drive's frequency to {size} mHz: {why}"

@@ -14,7 +14,6 @@ from analysis.pulses import Finding, phases, spin_of_times, spin_of_trace, track
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.sources import InputOptions, Needs
-from levilab.pipelines.spin.budget import budget_of_run
 from levilab.pipelines.spin.readings import Records, read_spin_file, read_spin_run
 from levilab.present.numbers import with_uncertainty
 from levilab.runs.traces import INDEX
@@ -172,7 +171,6 @@ METHOD = Method(
     fit=spin_of_source,
     of_files=frozenset({"columns", "rate"}),  # a run may have records of several channels
     passes_over=True,
-    budget_of_run=budget_of_run,
 )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from analysis.budget import Budget, Component, rest
 from analysis.numbers import digits
@@ -45,22 +45,11 @@ def _of_pulses(run: SpinRun, name: str, parts: UParts, estimate: Estimate) -> It
     whole = parts.pulses
     if bound is None:
         note = f"{spin.pulses} pulses, each {digits(1e3 * spin.scatter)} ms from its place"
-        yield (
-            Component(
-                "scatter",
-                "scatter of the pulses' times",
-                "A",
-                spin.scatter,
-                "s",
-                whole / spin.scatter,
-                note=note,
-                remedy=longer,
-            )
-            if spin.scatter > 0
-            else _direct(  # fmt: skip
-                "scatter", "scatter of the pulses' times", whole, estimate, note, longer
-            )
-        )
+        what = "scatter of the pulses' times"
+        if spin.scatter > 0:
+            yield Component("scatter", what, "A", spin.scatter, "s", whole / spin.scatter, note=note, remedy=longer)
+        else:
+            yield _direct("scatter", what, whole, estimate, note, longer)
         return
     noise = min(bound, whole)
     if run.code is not None and run.code > 0:
@@ -110,9 +99,16 @@ def _bend(spin: SpinFrequency) -> float:
     return n * chirp**2 / frequency * span**2 / 40
 
 
-def _direct(
-    row: str, what: str, part: float, estimate: Estimate, note: str, remedy: str, kind: str = "A", *,
+def _direct(  # noqa: PLR0917 - the fields of a row
+    row: str,
+    what: str,
+    part: float,
+    estimate: Estimate,
+    note: str,
+    remedy: str,
+    kind: Literal["A", "B"] = "A",
+    *,
     included: bool = True,
-) -> Component:  # fmt: skip
+) -> Component:
     """A row whose size is known in the result's own unit alone."""
-    return Component(row, what, "A" if kind == "A" else "B", part, estimate.unit, 1.0, included, note, remedy)
+    return Component(row, what, kind, part, estimate.unit, 1.0, included, note, remedy)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
@@ -13,6 +13,7 @@ from analysis.uncertainty import Estimate
 from levilab.pipelines.document import Document, Settings, number
 from levilab.pipelines.result import Part, Result, RunPart, Value
 from levilab.pipelines.spin.analysis import METHOD, Series, SpinAnalysis, SpinRun, UParts
+from levilab.pipelines.spin.budget import budget_of_run
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -194,4 +195,10 @@ def _estimate(value: Value) -> Estimate:
     return Estimate(value.value, value.u, "turns")
 
 
-DOCUMENT = Document(method=METHOD, result=SpinResult, entries=_entries, run_entries=_run_entries, run=_run)
+DOCUMENT = Document(
+    method=replace(METHOD, budget_of_run=budget_of_run),
+    result=SpinResult,
+    entries=_entries,
+    run_entries=_run_entries,
+    run=_run,
+)

@@ -43,7 +43,10 @@ def _sentences(run: SpinRun) -> Iterator[str]:
     share = chirp.value / frequency.value
     if abs(chirp.value) < _SEEN * chirp.u:
         most = (abs(chirp.value) + 2 * chirp.u) / frequency.value
-        yield f"Whether it gets slower this record does not show; it loses or gains less than {digits(100 * most)} % a second."
+        yield (
+            "Whether it gets slower this record does not show; it loses or gains less than "
+            f"{digits(100 * most)} % a second."
+        )
     elif share > 0:
         yield f"It gains {digits(100 * share)} % of its spin a second: something drives it."
     elif _AIR[0] < -share < _AIR[1]:

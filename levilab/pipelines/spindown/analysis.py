@@ -12,7 +12,6 @@ from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.budget import gate_of
 from levilab.pipelines.sources import InputOptions, Needs
-from levilab.pipelines.spindown.budget import EXPERIMENT, budget_of_all, budget_of_run
 from levilab.pipelines.spindown.readings import Readings, read_run_readings, read_spin_file
 
 if TYPE_CHECKING:
@@ -24,10 +23,12 @@ if TYPE_CHECKING:
     from levilab.pipelines.sources import Source
 
 SPINDOWN = "spindown"
+#: The experiment whose runs it takes, and whose settings say how the readings were counted.
+EXPERIMENT = "spin"
 #: The runs and files that suit.
 NEEDS = Needs(
     analysis=SPINDOWN,
-    experiments=frozenset({"spin"}),
+    experiments=frozenset({EXPERIMENT}),
     read_file=read_spin_file,
     read_run=read_run_readings,
 )
@@ -131,8 +132,6 @@ METHOD = Method(
     mixed="a mean over both says nothing about a real top",
     refit=fit_with_tilt,
     refit_text="the runs show a tilt of the top together, not each by itself",
-    budget_of_run=budget_of_run,
-    budget_of_all=budget_of_all,
 )
 
 

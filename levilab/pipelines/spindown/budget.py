@@ -11,6 +11,7 @@ import numpy as np
 from analysis.budget import Budget, Component, printed_step, rest, u_of_step
 from analysis.numbers import digits
 from levilab.pipelines.budget import bench_clock, gate_of, setting_of, time_base
+from levilab.pipelines.spindown.analysis import EXPERIMENT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions
     from levilab.pipelines.spindown.readings import Readings
 
-EXPERIMENT = "spin"
 #: The law whose exponent is a result beside the constants of the best one.
 _POWER, _EXPONENT = "power", "exponent"
 #: c of the power law depends exponentially on the exponent: known no better than to itself, it has no budget.
@@ -151,7 +151,7 @@ def _by_clocks(fit: LawFit, name: str) -> tuple[float, float]:
     return -order, -1.0
 
 
-def _direct(
+def _direct(  # noqa: PLR0917 - the fields of a row
     row: str, what: str, part: float, unit: str, note: str, remedy: str, *, kind: Literal["A", "B"] = "B"
 ) -> Component:
     """A row whose size is known in the result's own unit alone."""
@@ -191,7 +191,7 @@ def _budget_of_mean(analysis: SpinDownAnalysis, law: str, name: str, mean: Mean)
     if mean.value is None or not mean.u or mean.scatter is None or n != len(fits):
         return None
     shared = float(np.mean([fit.shared_u.get(name, 0.0) for fit in fits]))
-    by_runs, by_scatter = rest(mean.u, shared), mean.scatter / math.sqrt(n)
+    by_runs = rest(mean.u, shared)
     own = [rest(u, fit.shared_u.get(name, 0.0)) for fit in fits if (u := fit.parameters[name].u)]
     of_readings = float(np.linalg.norm(own)) / n
     remedy = f"more runs: it takes {_TO_HALVE * n} instead of {n} to halve it"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
@@ -20,6 +20,7 @@ from levilab.formats.table import FEWEST
 from levilab.pipelines.document import Document, Settings, number, value_of, values_of
 from levilab.pipelines.result import Part, Result, RunPart, Value
 from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis, SpinDownOptions
+from levilab.pipelines.spindown.budget import budget_of_all, budget_of_run
 from levilab.pipelines.spindown.laws import SHOWN_LAWS
 from levilab.pipelines.spindown.readings import EARLIEST_S, HIGHEST_HZ, SLOWEST_HZ
 
@@ -449,7 +450,7 @@ def _verdict_of(part: _WithLaws) -> Verdict:
 
 
 DOCUMENT = Document(
-    method=METHOD,
+    method=replace(METHOD, budget_of_run=budget_of_run, budget_of_all=budget_of_all),
     result=SpinDownResult,
     entries=_entries,
     run_entries=_run_entries,
