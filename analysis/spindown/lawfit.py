@@ -409,10 +409,15 @@ def _parts(found: Solution, slopes: Array, sizes: tuple[Array, Array, Array], ga
         moved = None if gate is None else _moved_by_gate(found, slopes, gate)
     rows = np.array([scatter, excess, more, prior, of_tilt]).T
     return {
-        name: Parts(*row.tolist(), gate=None if moved is None or not np.isfinite(moved[k]) else float(moved[k]))
+        name: _part(row, None if moved is None or not np.isfinite(moved[k]) else float(moved[k]))
         for k, (name, row) in enumerate(zip(found.law.parameters, rows, strict=True))
         if np.isfinite(row).all()
     }
+
+
+def _part(row: Array, gate: float | None) -> Parts:
+    scatter, excess, correlation, beforehand, tilt = row.tolist()
+    return Parts(scatter, excess, correlation, beforehand, tilt, gate)
 
 
 def _moved_by_gate(found: Solution, slopes: Array, gate: float) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from analysis.field.ring import on_axis
 from levilab.crosscheck.own.model import Own, Trial, pull
 
 if TYPE_CHECKING:
-    from analysis.field.fit import FieldScan
+    from analysis.field.fit import FieldScan, Known
     from levilab.pipelines.field.analysis import FieldAnalysis
 
 #: Processor time of a trial, for each scan [s].
@@ -54,9 +54,9 @@ def own(found: FieldAnalysis) -> Own:
     )
 
 
-def _known(random: np.random.Generator, scan: FieldScan) -> object:
+def _known(random: np.random.Generator, scan: FieldScan) -> Known:
     """What calliper and data sheet would have said of the fitted base."""
-    said = {
+    said: dict[str, Any] = {
         name: Prior(float(scan.values[k]) + prior.u * random.standard_normal(), prior.u)
         for k, name in enumerate(PARAMETERS)
         if (prior := scan.known.prior(name))

@@ -14,10 +14,12 @@ from levilab.crosscheck.own.model import Own, Trial, pull
 from levilab.crosscheck.subject import TrialFailed
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from analysis.pulses import SpinFrequency
     from levilab.pipelines.spin.analysis import SpinAnalysis
 
-    Array = np.ndarray[tuple[int], np.dtype[np.float64]]
+    Array = NDArray[np.float64]
 
 #: Processor time of a trial and of a sample of it [s].
 _COST_S, _COST_OF_SAMPLE_S = 0.004, 8e-8

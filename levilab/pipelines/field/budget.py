@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -57,7 +57,7 @@ def budget_of_run(source: Source[FieldReadings], run: FieldRun, _: FieldOptions)
 def _row(source: Source[FieldReadings], scan: FieldScan, unit: str, part: UPart) -> Component:
     """A part as a row: by the input's own u where it has one."""
     what, remedy = _WORDS[part.name]
-    kind = "A" if part.name in _TYPE_A else "B"
+    kind: Literal["A", "B"] = "A" if part.name in _TYPE_A else "B"
     u, unit_u, note = _input(source, scan, part)
     if u is None:
         return Component(part.name, what, kind, abs(part.size), unit, 1.0, note=note, remedy=remedy)

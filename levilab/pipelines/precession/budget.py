@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -118,7 +118,7 @@ def _unit(fit: SweepFit, whole: float) -> str:
     return "1" if whole == fit.line.u_slope else "Hz"
 
 
-def _what_points(options: PrecessionOptions, *, stated: bool) -> tuple[str, str, str]:
+def _what_points(options: PrecessionOptions, *, stated: bool) -> tuple[str, Literal["A", "B"], str]:
     """What the scatter is called, its type, and where its size comes from."""
     if not stated:
         return "scatter of the points", "A", "standard deviation about the line"

@@ -176,7 +176,8 @@ def _run(part: SpinPart, *_: object) -> SpinRun:
     columns = (series.time_s, series.frequency_hz, series.frequency_u_hz)
     time, frequency, u = (np.array(column, dtype=np.float64) for column in columns)
     phases = tuple((phase.kind, phase.start_s, phase.end_s) for phase in series.phases)
-    parts = {name: part.u_parts[name] for name in ("frequency", "chirp") if name in part.u_parts}
+    order: tuple[str, ...] = ("frequency", "chirp")
+    parts = {name: part.u_parts[name] for name in order if name in part.u_parts}
     return SpinRun(spin, Series(time, frequency, u, phases, series.of), notes, parts, part.code)
 
 
