@@ -107,7 +107,7 @@ def _of_trace(
     width = min(max(width, _NARROWEST), _WIDEST)
     by_noise = spin.bound * math.sqrt(spin.pulses / 12) * span / frequency
     jitter = rest(spin.scatter, by_noise)
-    times = (np.arange(n) - (n - 1) / 2) / rate
+    times = np.asarray((np.arange(n) - (n - 1) / 2) / rate, dtype=np.float64)
     phase = _phase(spin, times)
     turn = np.rint(phase).astype(np.int64)
     moved = jitter * frequency * random.standard_normal(int(np.ptp(turn)) + 1)
