@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from analysis.numbers import digits
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 #: Values of a series printed in the page; more stay in result.json.
 MOST_VALUES = 40
+#: A series with more values has none that answers to the pointer.
+MOST_POINTS = 300
 
 
 def spin_part(analysis: SpinAnalysis) -> ReportPart:
@@ -45,7 +48,7 @@ def spin_part(analysis: SpinAnalysis) -> ReportPart:
             points=_points(analysis),
         ),
         runs_title="The pulses",
-        runs=(Tabular("spin-pulses", pulse_table(analysis), _PULSES, first_column_wraps=True),),
+        runs=(Tabular("spin-pulses", replace(pulse_table(analysis), title=""), _PULSES, first_column_wraps=True),),
         inputs=tuple(
             InputPart(_in_words(source, run), origin.text, in_a_sentence(run), _series(source, run))
             for source, run, origin in zip(analysis.sources, analysis.runs, analysis.origins, strict=True)
@@ -77,14 +80,10 @@ def _series(source: Source[Records], run: SpinRun) -> tuple[Block, ...]:
 
 
 def _points(analysis: SpinAnalysis) -> tuple[Points, ...]:
-    """What each value of the frequency against time answers."""
-    return tuple(
-        Points(
-            f"readings-{k}",
-            tuple(
-                f"t = {digits(float(t), 6)} s\nν = {with_uncertainty(Estimate(float(nu), float(u), 'Hz'))}"
-                for t, nu, u in zip(run.series.time, run.series.frequency, run.series.u, strict=True)
-            ),
-        )
-        for k, run in enumerate(analysis.runs)
+    """What each value of the frequency against time answers; the figure has it for the first input."""
+    series = analysis.runs[0].series
+    texts = (
+        f"t = {digits(float(t), 6)} s\nν = {with_uncertainty(Estimate(float(nu), float(u), 'Hz'))}"
+        for t, nu, u in zip(series.time, series.frequency, series.u, strict=True)
     )
+    return (Points("readings-series", tuple(texts)),) if len(series) <= MOST_POINTS else ()
