@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from levilab.pipelines.sources import Source
     from levilab.present.document.blocks import Block
 
+#: No gate is longer [s]; what another program wrote beyond is none.
+_LONGEST_GATE_S = 1e4
 #: A row of unknown size says what so much of it would add (relative).
 _TEN_PPM = 1e-5
 #: Shares of u² below this are shown as such.
@@ -41,7 +43,7 @@ def time_base(source: Source[Any], kind: str, sensitivity: float, given: float |
     """
     what = what or f"time base of the {kind}"
     about = source.run.record.instruments.get(kind) if source.run else None
-    driver = str((about or {}).get("driver", ""))
+    driver = str((about or {}).get("driver", ""))[:40]
     known = TIME_BASES.get(driver)
     remedy = "a reference of 10 MHz at the instrument's input, or a comparison with one"
     if given is not None:
@@ -78,7 +80,7 @@ def gate_of(source: Source[Any], experiment: str) -> float | None:
     """The counter's gate [s], where a run says it."""
     settings = source.run.record.configuration.get(experiment) if source.run else None
     gate = settings.get("gate_s") if isinstance(settings, dict) else None
-    return float(gate) if isinstance(gate, int | float) and gate > 0 else None
+    return float(gate) if isinstance(gate, int | float) and 0 < gate < _LONGEST_GATE_S else None
 
 
 def setting_of(source: Source[Any], experiment: str, name: str) -> float | None:

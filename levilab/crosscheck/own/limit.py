@@ -24,10 +24,9 @@ def own(found: LimitAnalysis) -> Own:
     def trial(random: np.random.Generator) -> Trial:
         if not groups:
             raise TrialFailed("a single limit has no scatter to make others by")
-        several = len(groups) > 1
         return Trial(
             [
-                pull(f"{group.which} mean" if several else "mean", combine(_samples(random, found, group)).mean, truth)
+                pull(_name(group, groups), combine(_samples(random, found, group)).mean, truth)
                 for group in groups
                 if (truth := group.statistics.mean.value) is not None
             ]
@@ -37,8 +36,12 @@ def own(found: LimitAnalysis) -> Own:
         about="limits of as many tops and runs from a normal law, with this scatter and these steps of the drive",
         trial=trial,
         cost_s=_COST_S * max(len(groups), 1),
-        more=("with few tops u is itself uncertain: pulls follow Student's law, and fewer than 68 % lie within 1 u",),
+        freedom={_name(group, groups): round(min(group.statistics.freedom, 1e6)) for group in groups},
     )
+
+
+def _name(group: Limits, groups: list[Limits]) -> str:
+    return "mean" if len(groups) == 1 else f"{group.which} mean"
 
 
 def _samples(random: np.random.Generator, found: LimitAnalysis, group: Limits) -> list[Sample]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from levilab.crosscheck.subject import Pull, TrialFailed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     import numpy as np
 
@@ -41,6 +41,8 @@ class Own:
         law: that is true in the trials; empty where none competes.
         hypothesis: what the analysis tests and may exclude, in words; empty for nothing.
         expected_share: of the trials in which chance excludes it.
+        freedom: quantity → degrees of freedom of its u, where that rests on a scatter of few values: its pulls follow
+            Student's law.
         more: what to know of the pulls.
     """
 
@@ -50,7 +52,8 @@ class Own:
     law: str = ""
     hypothesis: str = ""
     expected_share: float = 0.0
-    more: tuple[str, ...] = field(default=())
+    freedom: Mapping[str, int] = field(default_factory=dict)
+    more: tuple[str, ...] = ()
 
 
 def pull(quantity: str, found: Estimate | None, truth: float) -> Pull:

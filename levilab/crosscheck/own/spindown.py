@@ -25,8 +25,10 @@ if TYPE_CHECKING:
 
     Array = np.ndarray[tuple[int], np.dtype[np.float64]]
 
-#: Processor time of one run's fits, with stated uncertainties and without [s].
-_COST_S, _COST_WITHOUT_U_S = 0.065, 0.12
+#: Processor time of one run's fits [s].
+_COST_S = 0.065
+#: Runs that scatter by so many times what their readings leave give u from their scatter alone.
+_SCATTERS = 1.5
 #: The exponent of a law of one power.
 _EXPONENTS = {"stokes": 1.0, "disc": 1.5, "newton": 2.0}
 
@@ -82,7 +84,6 @@ def own(found: SpinDownAnalysis) -> Own:
     constants = [name for name in LAWS[law].constants if name != "exponent"]
     spread = _between(found, law, constants)
     several = len(runs) > 1
-    cost = sum(_COST_WITHOUT_U_S if run.u is None else _COST_S for run in runs)
     hidden = not any(run.has_tilt for run in found.runs) and any(run.tilt is None for run in runs)
     more = (
         ("here u holds what a tilt that noise hides would do; what was made up has none, so the pulls scatter less",)
@@ -94,8 +95,9 @@ def own(found: SpinDownAnalysis) -> Own:
         + ("constants that differ from run to run as these do, " if several else "")
         + "with the times, scatter, correlation, gate and digits of the readings",
         trial=lambda random: _trial(random, runs, law, constants, spread),
-        cost_s=cost,
+        cost_s=_COST_S * len(runs),
         law=law,
+        freedom=_freedom(found, law, constants),
         more=more,
     )
 
@@ -135,6 +137,17 @@ def _between(found: SpinDownAnalysis, law: str, constants: Sequence[str]) -> lis
         variance = 0.0 if mean.scatter is None else mean.scatter**2 - float(np.mean(np.square(own_u)))
         spread.append(float(np.sqrt(max(variance, 0.0))) / abs(mean.value) if mean.value else 0.0)
     return spread
+
+
+def _freedom(found: SpinDownAnalysis, law: str, constants: Sequence[str]) -> dict[str, int]:
+    """Degrees of freedom of the means whose u comes from the scatter of the runs."""
+    freedom = {}
+    for name in constants:
+        mean = found.combined.fit(law).constants[name]
+        own_u = [run.fit(law).parameters[name].u or 0.0 for run in found.runs]
+        if mean.scatter is not None and mean.scatter > _SCATTERS * float(np.sqrt(np.mean(np.square(own_u)))):
+            freedom[name] = mean.degrees_of_freedom
+    return freedom
 
 
 def _trial(

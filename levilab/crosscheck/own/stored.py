@@ -54,6 +54,7 @@ class CheckPart(Part):
     hypothesis: str
     expected_share: float
     failures: dict[str, int]
+    freedom: dict[str, int] = Field(default_factory=dict)
     more: tuple[str, ...]
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from analysis.errors import AnalysisError
 from levilab.crosscheck.own import field, limit, precession, spin, spindown
-from levilab.crosscheck.study import COVERAGE, Spread, by_reason, spreads_of
+from levilab.crosscheck.study import CHANCE, COVERAGE, Spread, by_reason, spreads_of
 from levilab.errors import LevilabError
 from levilab.present.document.blocks import Note, Paragraph, Tabular
 from levilab.present.tables import Table, table
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 OWN: Mapping[str, Callable[[Any], Own]] = MappingProxyType({
     "spindown": spindown.own, "precession": precession.own, "spin": spin.own, "field": field.own, "limit": limit.own,
 })  # fmt: skip
+#: Up to so many degrees of freedom a standard deviation of pulls says nothing; from so many on u is as if known.
+_LONG_TAILS, _MANY = 8, 30
 #: How many trials are made where no number is asked for.
 TRIALS = 200
 #: A report makes as many as fit into so much processor time, and none where these would be too few to say anything.
@@ -53,6 +55,7 @@ class OwnCheck:
         excluded, tested: in how many trials the analysis excluded what is true, of how many that tested it.
         hypothesis, expected_share: what that is where it is no law, and the share that chance excludes.
         failures: why trials came to no estimate → how often.
+        freedom: quantity → degrees of freedom of its u, where these are few.
         more: what to know of the pulls.
     """
 
@@ -70,6 +73,7 @@ class OwnCheck:
     hypothesis: str
     expected_share: float
     failures: Mapping[str, int]
+    freedom: Mapping[str, int]
     more: tuple[str, ...] = ()
 
     @property
@@ -78,19 +82,41 @@ class OwnCheck:
 
         Uncertainties that are too large are no error here: a hidden tilt is in them, and in no reading that is made up.
         """
-        return bool(self.spreads) and all(holds(spread) for spread in self.spreads)
+        return bool(self.spreads) and all(map(self.is_right, self.spreads))
+
+    def is_right(self, spread: Spread) -> bool:
+        """Whether the pulls of one quantity are as wanted."""
+        return holds(spread, self.freedom.get(spread.quantity))
 
 
-def holds(spread: Spread) -> bool:
-    """Whether pulls have no bias and scatter by no more than wanted, with room for chance."""
+def wanted_coverage(freedom: int | None) -> float:
+    """Share of true values within 1 u, where u rests on a scatter with so many degrees of freedom (Student's t).
+
+    >>> round(wanted_coverage(None), 3), round(wanted_coverage(3), 3)
+    (0.683, 0.609)
+    """
+    if freedom is None:
+        return COVERAGE
+    from scipy.special import stdtr
+
+    return float(2 * stdtr(freedom, 1.0) - 1)
+
+
+def holds(spread: Spread, freedom: int | None = None) -> bool:
+    """Whether pulls have no bias and scatter by no more than wanted, with room for chance.
+
+    With few degrees of freedom they have long tails, and their standard deviation says nothing: what lies within 1 u
+    does.
+    """
     if spread.n < 2:
         return True
-    of_chance = 3.0
-    few = of_chance * math.sqrt(COVERAGE * (1 - COVERAGE) / spread.n)
+    wanted = wanted_coverage(freedom)
+    few = CHANCE * math.sqrt(wanted * (1 - wanted) / spread.n)
+    scatter = 1.0 if freedom is None else math.sqrt(freedom / (freedom - 2)) if freedom > _LONG_TAILS else math.inf
     return (
-        abs(spread.mean) <= 0.1 + of_chance / math.sqrt(spread.n)
-        and spread.deviation <= 1.1 + of_chance / math.sqrt(2 * spread.n)
-        and spread.coverage >= COVERAGE - 0.05 - few
+        abs(spread.mean) <= 0.1 + CHANCE * max(spread.deviation, 1.0) / math.sqrt(spread.n)
+        and spread.deviation <= scatter * (1.1 + CHANCE / math.sqrt(2 * spread.n))
+        and spread.coverage >= wanted - 0.05 - few
     )
 
 
@@ -150,6 +176,7 @@ def check_own(
         hypothesis=subject.hypothesis,
         expected_share=subject.expected_share,
         failures=by_reason(failures),
+        freedom=subject.freedom,
         more=subject.more,
     )
 
@@ -174,7 +201,7 @@ def own_table(found: OwnCheck, shown: Mapping[str, str] | None = None) -> Table:
             f"{one.mean:+.2f} ± {1 / math.sqrt(one.n):.2f}".replace("-", "−"),
             "–" if math.isnan(one.deviation) else f"{one.deviation:.2f} ± {1 / math.sqrt(2 * one.n):.2f}",
             f"{100 * one.coverage:.0f} ± {100 * math.sqrt(COVERAGE * (1 - COVERAGE) / one.n):.0f} %",
-            "yes" if holds(one) else "NO",
+            "yes" if found.is_right(one) else "NO",
         )
         for one in found.spreads
     ]
@@ -189,7 +216,7 @@ def in_words(found: OwnCheck) -> str:
     elif found.holds:
         texts.append("Values and uncertainties of this analysis are right for readings such as these.")
     else:
-        wrong = ", ".join(one.quantity.replace("_", " ") for one in found.spreads if not holds(one))
+        wrong = ", ".join(one.quantity.replace("_", " ") for one in found.spreads if not found.is_right(one))
         texts.append(f"For readings such as these the analysis is not right in {wrong}: trust its u the less.")
     if found.law and found.laws:
         n, again = sum(found.laws.values()), found.laws.get(found.law, 0)
@@ -205,6 +232,10 @@ def in_words(found: OwnCheck) -> str:
             f"The test excludes {found.hypothesis} in {found.excluded} of {found.tested} trials; chance alone "
             f"does so in {chance:.0f} ± {math.sqrt(chance * (1 - found.expected_share)):.0f}."
         )
+    few = {n for n in found.freedom.values() if n < _MANY}
+    if few:
+        share = f"{100 * wanted_coverage(min(few)):.0f} %"
+        texts.append(f"As u comes from the scatter of few values, {share} within 1 u are right (Student's t).")
     texts += [f"{text[0].upper()}{text[1:]}." for text in found.more]
     texts += [f"{count} trials came to no estimate: {reason}." for reason, count in found.failures.items()]
     return " ".join(texts)
