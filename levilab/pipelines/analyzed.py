@@ -145,7 +145,7 @@ class Method(Generic[S, R, Opt, A]):
         refit: number of each input to analyze once more, for what only all together show → what is found then.
         refit_text: why, in words.
         budget_of_run: what the uncertainties of one input's numbers are made of.
-        budget_of_all: the same of all together, from what was found of each; of one input it is that of the input.
+        budget_of_all: those of all inputs together, from what was found of each; of one input they are its own.
     """
 
     needs: Needs[Any]

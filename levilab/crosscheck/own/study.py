@@ -1,4 +1,4 @@
-"""Trials with the parameters of a result: what came of them, as JSON, a table and blocks of a report.
+"""Trials with the parameters of a result: their outcome as JSON, a table and blocks of a report.
 
 The random numbers follow from the readings' hashes, so that the same result has the same trials.
 """
@@ -41,7 +41,7 @@ REPORT_S, FEWEST = 2.0, 25
 
 @dataclass(frozen=True)
 class OwnCheck:
-    """What came of the trials.
+    """The outcome of the trials.
 
     Attributes:
         analysis: its name.

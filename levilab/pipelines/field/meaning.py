@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from analysis.field.ring import on_axis
 from analysis.numbers import digits
 from levilab.pipelines.field.quantities import SHOWN
@@ -24,8 +26,6 @@ def meaning(analysis: FieldAnalysis) -> tuple[str, ...]:
 
 
 def _sentences(analysis: FieldAnalysis) -> Iterator[str]:
-    import numpy as np
-
     scan = analysis.runs[0].scan
     strength = analysis.values["strength"]
     if not strength.value or not strength.u:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from levilab.pipelines.limit.readings import LimitReadings
     from levilab.pipelines.sources import Source
 
-#: So many times as many tops halve what scatters from one to the next.
+#: Four times as many tops halve what scatters from one to the next.
 _TO_HALVE = 4
 
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 EXPERIMENT = "precession"
 #: Relative uncertainties of the drive's frequency that differ by less than this are those of one clock.
 _ONE_CLOCK = 1e-3
-#: So many times as many points of the same range halve u.
+#: Four times as many points of the same range halve u.
 _TO_HALVE = 4
 
 

@@ -145,7 +145,7 @@ class SpinAnalysis(Analyzed[Records, SpinRun, None, SpinOptions]):
         return (f"{note.text} ({note.name})" for note in run.notes)
 
 
-#: So many samples show the steps of a converter; closer numbers than this part of their range are rounding.
+#: Number of samples that show the steps of a converter; closer numbers than this part of their range are rounding.
 _MOST_FOR_STEP, _ROUNDING = 20_000, 1e-7
 #: The text describes so many inputs at most.
 MOST_SENTENCES = 4

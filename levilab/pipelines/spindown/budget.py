@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 _POWER, _EXPONENT = "power", "exponent"
 #: c of the power law depends exponentially on the exponent: known no better than to itself, it has no budget.
 _NOT_DETERMINED = 1.0
-#: So much longer a gate is proposed, as far as it fits between two readings.
+#: The longer gate that is proposed, as a factor, and as the part of the time between two readings.
 _LONGER, _MOST_OF_INTERVAL = 10.0, 0.8
-#: So many times as many runs halve what scatters from one to the next.
+#: Four times as many runs halve what scatters from one to the next.
 _TO_HALVE = 4
 
 
