@@ -74,8 +74,8 @@ class Input:
         return Section(self.name, (Facts(self.facts), *self.blocks))
 
     def folded(self) -> Details:
-        """The input as one of many: on a screen it can be opened, on paper it stands there in full."""
-        return Details(self.name, (Facts(self.facts), *self.blocks), more=self.more)
+        """The input as one of many: on a screen it can be opened, on paper it is one line, or it would fill a book."""
+        return Details(self.name, (Facts(self.facts), *self.blocks), more=self.more, on_paper="summary")
 
 
 def in_common(inputs: Sequence[Input]) -> tuple[Fact, ...]:
@@ -202,7 +202,11 @@ def _conditions(record: RunRecord) -> tuple[str, ...]:
     if not isinstance(settings, dict):
         return ()
     said = _IN_DRIVE if _drive(record) else frozenset()
-    others = [setting_in_words(key, settings[key]) for key in sorted(settings) if key not in said]
+    others = [
+        setting_in_words(key, settings[key])
+        for key in sorted(settings)
+        if key not in said and settings[key] is not None
+    ]
     return (", ".join(others),) if others else ()
 
 

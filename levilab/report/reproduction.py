@@ -7,7 +7,7 @@ from dataclasses import fields
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
-from levilab.present.document.blocks import Code, Details, Fact, Facts, Paragraph, Section, Tabular
+from levilab.present.document.blocks import Code, Details, Fact, Facts, Note, Paragraph, Section, Tabular
 from levilab.present.tables import table
 from levilab.software import software_versions
 
@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 _MOST_NAMED = 12
 #: Options of analyses that the command line gives as they are.
 SAME_IN_COMMANDS = (
-    "channel", "rate", "reading_u", "uncertainty", "bootstrap_samples", "seed", "keep_outliers", "tilt", "method",
-    "orthogonal",
+    "channel", "rate", "reading_u", "uncertainty", "keep_outliers", "tilt", "method", "orthogonal"
 )  # fmt: skip
 
 
@@ -38,6 +37,7 @@ def reproduction(results: Sequence[tuple[Analysis[Any], Any]]) -> Section:
         (
             Paragraph("The same data, commands and versions give the same numbers, and this report byte for byte."),
             Code("\n".join(_commands(results, sources))),
+            *_others(results),
             *inputs,
             Facts((Fact("Versions here", (_versions(software_versions()),)),)),
         ),
@@ -76,11 +76,17 @@ def _options(options: Any) -> tuple[str, ...]:
     return tuple(typed)
 
 
-def other_options(options: Any) -> tuple[str, ...]:
-    """Names of options that are not at their defaults and that `SAME_IN_COMMANDS` lacks."""
+def _others(results: Sequence[tuple[Analysis[Any], Any]]) -> tuple[Note, ...]:
+    """The names of options that are no plain words, such as a file of the top's sizes."""
+    options = [origin.options for _, found in results for origin in found.origins]
+    names = sorted({name for one in options for name in _given(one)} - {*SAME_IN_COMMANDS, "guess"})
+    return (Note(f"Besides, these options were given: {', '.join(names)}."),) if names else ()
+
+
+def _given(options: Any) -> list[str]:
+    """Names of the options that are not at their defaults."""
     usual = type(options)()
-    given = (field.name for field in fields(options) if getattr(options, field.name) != getattr(usual, field.name))
-    return tuple(name for name in given if name not in {*SAME_IN_COMMANDS, "guess"})
+    return [field.name for field in fields(options) if getattr(options, field.name) != getattr(usual, field.name)]
 
 
 def _data(sources: Sequence[Source[Any]]) -> Tabular:
