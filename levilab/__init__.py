@@ -131,6 +131,7 @@ def analyze(
     height_m: float | None = None,
     height_u_m: float | None = None,
     free_radii: bool = False,
+    clock_u: float | None = None,
 ) -> AnalysisResult:
     """Analyze runs, data files or DataFrames.  Nothing is written; `save(folder)` of the result does.
 
@@ -156,6 +157,7 @@ def analyze(
         height_m: where the top was seen to float [m]; its moment follows, if its mass is known (field).
         height_u_m: standard uncertainty of it [m]; by default that of the scan's heights (field).
         free_radii: let the scan move the radii, within what the calliper says (field).
+        clock_u: relative standard uncertainty of the clock that counts or samples, for the budgets (all but field).
 
     Returns:
         The result: `values`, `verdict`, `warnings`, `summary()`, `to_dataframe()`, `plot()`, `save(folder)`.
@@ -185,6 +187,7 @@ def analyze(
             "height_m": height_m,
             "height_u_m": height_u_m,
             "free_radii": free_radii,
+            "clock_u": clock_u,
         },
     )
 

@@ -487,6 +487,66 @@ def _whole_covariance(jacobian: Array, free: Array, moved: list[int], known: Kno
     return whole
 
 
+@dataclass(frozen=True)
+class UPart:
+    """A part of the u of a parameter; the squares of all parts add up to u².
+
+    Attributes:
+        name: "readings" and "heights", what each reading has of its own; "excess", by as much they scatter beyond that;
+            "gain", the scale of the instrument; else the parameter that calliper or data sheet give.
+        size: of the part, in the unit of the parameter, with the sign in which the parameter follows the input.
+    """
+
+    name: str
+    size: float
+
+
+def parts_of(scan: FieldScan, height_u: ArrayLike | float) -> dict[str, tuple[UPart, ...]]:
+    """What u of each parameter is made of.
+
+    The covariance of the fit is H = (Σ s sᵀ/σ² + Σ p pᵀ)⁻¹ = H (Σ s sᵀ u_b²/σ⁴ + Σ s sᵀ (B′u_z)²/σ⁴ + Σ p pᵀ) H: a sum
+    of what readings, heights and each of the priors leave.
+
+    Args:
+        scan: the fit.
+        height_u: standard uncertainty of each height, in the order of `scan.height` [m].
+    """
+    problem = _Problem(scan.height, scan.flux_density, None, np.zeros_like(scan.height), scan.known, scan.fitted)
+    moved, values = problem.indices, scan.values
+    jacobian = problem.weighted(values, scan.u)
+    h = curvature(jacobian[moved]).covariance
+    if h is None:
+        return {}
+    factor, _ = _misfit(scan.statistics)
+    n = len(scan.height)
+    gain = np.zeros((6, n + len(problem.priors())))  # of each parameter, by each residual of unit variance
+    gain[moved] = h @ jacobian[moved]
+    of_height = np.abs(on_axis(scan.ring, scan.height)[1] * np.broadcast_to(height_u, scan.height.shape)) / scan.u
+    of_height = np.minimum(of_height, 1.0)
+    sizes: dict[str, Array] = {
+        "readings": np.linalg.norm(gain[:, :n] * np.sqrt(1 - of_height**2), axis=1),
+        "heights": np.linalg.norm(gain[:, :n] * of_height, axis=1),
+    }
+    for column, (index, _) in enumerate(problem.priors(), n):
+        sizes[PARAMETERS[index]] = gain[:, column]
+    whole = np.zeros((6, 6))
+    whole[np.ix_(moved, moved)] = h
+    sizes["excess"] = np.sqrt(np.diagonal(whole) * (factor - 1))
+    for k, name in enumerate(PARAMETERS):
+        prior = scan.known.prior(name)
+        if k not in moved and prior and prior.u > 0:
+            shift = np.zeros(6)
+            shift[moved] = -(h * factor) @ (jacobian[moved] @ jacobian[k])
+            shift[k] = 1.0
+            sizes[name] = prior.u * shift
+    sizes["gain"] = np.zeros(6)
+    sizes["gain"][0] = scan.known.gain_u * values[0]
+    return {
+        name: tuple(UPart(part, float(size[k])) for part, size in sizes.items() if size[k])
+        for k, name in enumerate(PARAMETERS)
+    }
+
+
 _WORDS = {
     "origin": "origin", "thickness": "thickness", "inner_radius": "inner radius", "outer_radius": "outer radius",
     "background": "background",

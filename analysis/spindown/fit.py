@@ -102,6 +102,7 @@ def fit_spin_down(
     keep_outliers: bool = False,
     tilt: bool | None = None,
     driven: bool = False,
+    gate: float | None = None,
 ) -> SpinDown:
     """Fits drag laws to one spin-down by weighted least squares of the spin frequency itself.
 
@@ -118,6 +119,7 @@ def fit_spin_down(
         tilt: whether the count has the top's tilt (see `analysis.spindown.tilt`); None: if the readings demand it, and
             else the uncertainties hold what a hidden one would do (see `analysis.spindown.hidden`); False: it has none.
         driven: whether a drive brought the top to its spin; it nutates more then.
+        gate: over which each reading is a mean [s]; None: not known.  The fits say what it does, and are not changed.
 
     Raises:
         AnalysisError: readings or names that cannot be used, see `readings.checked` and `UnknownName`.
@@ -154,6 +156,7 @@ def fit_spin_down(
             rho=rho,
             plain=plain[name] if name in tilted else None,
             hidden=None if tilt is False or name in tilted else _hidden(found, rho, wobble),
+            gate=gate,
         )
         for name, found in best.items()
     }

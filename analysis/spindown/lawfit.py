@@ -41,6 +41,27 @@ class HiddenTilt:
     shared: Array
 
 
+@dataclass(frozen=True)
+class Parts:
+    """What u of a parameter is made of: the squares of the first five add up to u².
+
+    Attributes:
+        scatter: of independent readings: by their u where it was given, else by what they scatter about the law.
+        excess: by as much they scatter more than their u says.
+        correlation: of neighbouring readings.
+        beforehand: what was known of the tilt's parameters before the readings, where they are fitted.
+        tilt: what the model of the tilt leaves open, or what one that noise hides would do.
+        gate: by as much the mean over a gate moves the parameter, with its sign; no part of u.  None: no gate is known.
+    """
+
+    scatter: float
+    excess: float
+    correlation: float
+    beforehand: float
+    tilt: float
+    gate: float | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class LawFit:
     """One drag law fitted to one run.
@@ -58,6 +79,7 @@ class LawFit:
         solution: the same parameters, dimensionless (see `analysis.spindown.drag`, and `tilt.counted`).
         reference: their units, spin frequency [Hz] and time [s].
         shared_u: by parameter, the part of its u that is the same for all runs of one top, with one sign.
+        parts: by parameter, what u is made of; empty where u is undefined, and of results that were read back.
     """
 
     name: str
@@ -71,6 +93,7 @@ class LawFit:
     solution: Array
     reference: tuple[float, float]
     shared_u: Mapping[str, float] = field(default_factory=dict)
+    parts: Mapping[str, "Parts"] = field(default_factory=dict)
 
     @property
     def law(self) -> DragLaw:
@@ -258,6 +281,7 @@ def fit_law(
     rho: float = 0.0,
     plain: Solution | None = None,
     hidden: HiddenTilt | None = None,
+    gate: float | None = None,
 ) -> LawFit:
     """The solution in textbook constants, with uncertainties and statistics.
 
@@ -269,20 +293,23 @@ def fit_law(
         rho: correlation of neighbouring readings' noise.
         plain: the same law without the count's tilt, where `found` has it.
         hidden: a tilt that the readings may hide, which is to be in the uncertainties.
+        gate: over which each reading is a mean [s]; None: not known.
     """
     law, readings = found.law, found.readings
     values, slopes = law.natural(found.q, readings.reference_hz, readings.duration)
     stats = found.statistics
     covariance, u, independent = _uncertainties(found, slopes, rho)
     intervals = _INTERVALS[uncertainty](found, values, independent, samples, seed)
+    by_readings, of_tilt = u, np.zeros(len(values))
     shared = np.zeros(len(values))
     if plain is not None:
         shared = _unknown_part(values, _natural(plain))
         covariance, u = None if covariance is None else covariance + np.outer(shared, shared), np.hypot(u, shared)
+        of_tilt = np.abs(shared)
     if hidden is not None:
         more, u_more = propagate(hidden.spread, slopes)
         covariance = None if covariance is None or more is None else covariance + more
-        u, shared = np.hypot(u, u_more), propagate(hidden.shared, slopes)[1]
+        u, shared, of_tilt = np.hypot(u, u_more), propagate(hidden.shared, slopes)[1], u_more
     intervals = [
         _stretched(interval, float(value), float(wide / own) if own > 0 else 1.0)
         for interval, value, wide, own in zip(intervals, values, u, independent, strict=True)
@@ -312,6 +339,7 @@ def fit_law(
         shared_u={
             name: abs(float(part)) for name, part in zip(law.parameters, shared, strict=True) if np.isfinite(part)
         },
+        parts=_parts(found, slopes, (independent, by_readings, of_tilt), gate),
     )
 
 
@@ -354,6 +382,53 @@ def _uncertainties(found: Solution, slopes: Array, rho: float) -> tuple[Array | 
         ratio = np.divide(grown, u, out=np.ones_like(u), where=u > 0)
         wide = wide * np.outer(ratio, ratio)
     return wide, grown, independent
+
+
+def _parts(found: Solution, slopes: Array, sizes: tuple[Array, Array, Array], gate: float | None) -> dict[str, Parts]:
+    """What the uncertainties of the parameters are made of.
+
+    Args:
+        found: the solution.
+        slopes: of the textbook parameters, shape (p, p).
+        sizes: u for independent noise, u with correlated noise, and what a tilt adds to that, shape (p,) each.
+        gate: of a reading [s].
+    """
+    independent, by_readings, of_tilt = sizes
+    h = found.curvature.covariance
+    if h is None or not np.isfinite(by_readings).all():
+        return {}
+    known = h @ found.expected[0]
+    prior = propagate(known @ known.T, slopes)[1] if known.size else np.zeros(len(slopes))
+    enlarged = found.statistics.inflation if found.readings.sigma_known else 1.0
+    variance = _variance(found, float(found.degrees_of_freedom), correlated=False) or 0.0
+    with np.errstate(over="ignore", invalid="ignore"):
+        prior = np.minimum(prior * np.sqrt(variance), independent)
+        scatter = np.sqrt(independent**2 - prior**2) / np.sqrt(enlarged)
+        excess = scatter * np.sqrt(enlarged - 1)
+        more = np.sqrt(np.maximum(by_readings**2 - independent**2, 0.0))
+        moved = None if gate is None else _moved_by_gate(found, slopes, gate)
+    rows = np.array([scatter, excess, more, prior, of_tilt]).T
+    return {
+        name: _part(row, None if moved is None or not np.isfinite(moved[k]) else float(moved[k]))
+        for k, (name, row) in enumerate(zip(found.law.parameters, rows, strict=True))
+        if np.isfinite(row).all()
+    }
+
+
+def _part(row: Array, gate: float | None) -> Parts:
+    scatter, excess, correlation, beforehand, tilt = row.tolist()
+    return Parts(scatter, excess, correlation, beforehand, tilt, gate)
+
+
+def _moved_by_gate(found: Solution, slopes: Array, gate: float) -> Array:
+    """By how much means over a gate [s] move the parameters, shape (p,): Simpson's rule gives ν″T²/24."""
+    readings = found.readings
+    half = min(gate / readings.duration / 2, 0.5)
+    middle = np.clip(readings.tau, half, 1 - half)
+    before, here, after = (found.law.spin(tau, found.q) for tau in (middle - half, middle, middle + half))
+    bias = (before + after - 2 * here) / 6 * readings.weight
+    assert found.curvature.covariance is not None
+    return np.asarray(slopes @ (found.curvature.covariance @ (found.slopes @ bias)))
 
 
 def _unknown_part(values: Array, plain: Array) -> Array:

@@ -206,6 +206,18 @@ OPTIONS = {
         read=_metres("height_u", 0.0),
         to="height_u_m",
     ),
+    "clock_u": Option(
+        Annotated[
+            float | None,
+            typer.Option(
+                "--clock-u",
+                metavar="PART",
+                help="Relative standard uncertainty of the clock that counts or samples, as 2e-6, from its manual; the "
+                "budgets show what it does.",
+            ),
+        ],
+        read=_positive("clock_u", "a relative standard uncertainty above 0 is expected, such as 2e-6"),
+    ),
     "free_radii": Option(
         Annotated[
             bool,
@@ -229,12 +241,12 @@ _EACH = "each"
 COMMANDS = {
     "spindown": Command(
         "Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude.",
-        ("columns", "channel", "rate", "reading_u", "uncertainty", "keep_outliers", "tilt"),
+        ("columns", "channel", "rate", "reading_u", "uncertainty", "keep_outliers", "tilt", "clock_u"),
     ),
     "spin": Command(
         "Spin frequency and chirp from traces of a detector (WAV, scopes' CSV, .npy), lists of pulse times, runs with "
         "traces.",
-        ("columns", "channel", "rate", "method"),
+        ("columns", "channel", "rate", "method", "clock_u"),
     ),
     "field": Command(
         "The base from a Hall scan: strength, origin, thickness; heights, masses and spins of tops that float.",
@@ -242,15 +254,15 @@ COMMANDS = {
     ),
     "precession": Command(
         "Precession against drive: slope and intercept, tested against a locked top, and what 1.05 would take.",
-        ("columns", "reading_u", "keep_outliers", "orthogonal"),
+        ("columns", "reading_u", "keep_outliers", "orthogonal", "clock_u"),
     ),
     "limit": Command(
         "Limits of the spin, lower and upper: mean, scatter, trend and outliers, beside the window of the top.",
-        ("columns", "reading_u"),
+        ("columns", "reading_u", "clock_u"),
     ),
     _EACH: Command(
         "Each analysis that suits the runs or data files; --json prints a list where several suit.",
-        ("columns", "channel", "rate", "reading_u", "uncertainty", "keep_outliers", "tilt", "method"),
+        ("columns", "channel", "rate", "reading_u", "uncertainty", "keep_outliers", "tilt", "method", "clock_u"),
     ),
 }
 

@@ -22,6 +22,13 @@ def report(
     rate: Rate = None,
     reading_u: ReadingU = None,
     keep_outliers: KeepOutliers = False,
+    crosscheck: Annotated[
+        bool,
+        typer.Option(
+            "--crosscheck/--no-crosscheck",
+            help="Make a cross-check with the result's own parameters where none is stored and it takes 2 s at most.",
+        ),
+    ] = True,
 ) -> None:
     """Write the report."""
     from levilab.report.page import write_report
@@ -36,7 +43,10 @@ def report(
     }
     app = context.find_root().command
     with interruptible("no report is written"):
-        written = write_report(paths, output, analysis_options(given), lambda text: message(with_options(text, app)))
+        options = analysis_options(given)
+        written = write_report(
+            paths, output, options, lambda text: message(with_options(text, app)), crosscheck=crosscheck
+        )
     result(f"the report is in {written}")
 
 

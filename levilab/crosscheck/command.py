@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
 from levilab.crosscheck.catalogue import SUBJECTS
+from levilab.crosscheck.own.stored import SCHEMA, as_part, store
+from levilab.crosscheck.own.study import OWN, TRIALS, check_own, in_words, own_table
 from levilab.crosscheck.study import as_document, crosscheck
 from levilab.crosscheck.table import crosscheck_table, failures_in_words
 from levilab.errors import UsageError
 from levilab.files import replace_atomically, writing
+from levilab.pipelines.catalogue import ANALYSES, recall_suiting
 from levilab.present.progress import ShareBar
 from levilab.present.terminal import draw, terminal
 
@@ -19,7 +23,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from levilab.crosscheck.own.study import OwnCheck
     from levilab.crosscheck.study import Checked
+    from levilab.pipelines.result import Place
 
 JSON, FIGURE = "crosscheck.json", "crosscheck.png"
 
@@ -38,6 +44,54 @@ def check(names: Sequence[str], trials: int | None, seed: int) -> list[Checked]:
         finally:
             progress.close()
     return found
+
+
+def check_like(names: Sequence[str], paths: Sequence[Path], trials: int | None) -> list[tuple[OwnCheck, Place]]:
+    """The trials with the parameters of results, and where each result lies; of analyses that are named, or of all.
+
+    Raises UsageError for a name that is unknown, DataError for what cannot be analyzed.
+    """
+    for name in names:
+        if name not in OWN:
+            raise UsageError("subject", f"with `like` known are {', '.join(OWN)}", value=name)
+    if names:
+        found = [(ANALYSES[name], ANALYSES[name].recall(paths, ANALYSES[name].options_from({}))) for name in names]
+    else:
+        found = recall_suiting(paths, {})
+    done = []
+    for analysis, result in found:
+        progress = ShareBar(f"cross-checking {analysis.name}")
+        try:
+            settings = analysis.settings_of(result)
+            done.append((check_own(analysis.name, result, settings, trials or TRIALS, progress), result.place))
+        finally:
+            progress.close()
+    return done
+
+
+def like_as_json(checked: Sequence[tuple[OwnCheck, Place]]) -> str:
+    """What was found, as a document."""
+    parts = [as_part(one).model_dump(mode="json") for one, _ in checked]
+    return json.dumps({"schema": SCHEMA, "checks": parts}, indent=2, allow_nan=False)
+
+
+def print_like(checked: Sequence[tuple[OwnCheck, Place]]) -> None:
+    """The table of each result, and what it says."""
+    console = terminal()
+    for one, _ in checked:
+        console.print(draw(replace(own_table(one), title=f"{one.analysis}: pulls, (estimate − truth)/u")))
+        console.print(escape(in_words(one)))
+
+
+def store_like(checked: Sequence[tuple[OwnCheck, Place]], out: Path | None) -> list[Path]:
+    """Write crosscheck.json beside each result, or into a folder; returns the files.  Raises CannotWrite."""
+    files = []
+    for one, place in checked:
+        there = replace(place, folder=out) if out else place
+        with writing(f"{there.folder}: the result cannot be written"):
+            there.folder.mkdir(parents=True, exist_ok=True)
+        files.append(store([one], there))
+    return list(dict.fromkeys(files))
 
 
 def as_json(checked: Sequence[Checked]) -> str:

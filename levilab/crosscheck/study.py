@@ -102,7 +102,7 @@ def crosscheck(subject: Subject, trials: int, seed: int, progress: Callable[[flo
             except (LevilabError, InstrumentError) as error:
                 failures.append(str(error).replace(folder, ""))
         progress((k + 1) / trials)
-    return Checked(subject, trials, seed, tuple(_spreads(pulls)), by_reason(failures))
+    return Checked(subject, trials, seed, tuple(spreads_of(pulls)), by_reason(failures))
 
 
 def by_reason(texts: Sequence[str]) -> dict[str, int]:
@@ -127,7 +127,8 @@ def _range(numbers: Sequence[str]) -> str:
     return least if least == most else f"{least} to {most}"
 
 
-def _spreads(pulls: Sequence[Pull]) -> Iterable[Spread]:
+def spreads_of(pulls: Sequence[Pull]) -> Iterable[Spread]:
+    """The pulls of each quantity."""
     for quantity in dict.fromkeys(pull.quantity for pull in pulls):
         some = [pull for pull in pulls if pull.quantity == quantity]
         relative = np.median([pull.u / abs(pull.estimate) if pull.estimate else math.nan for pull in some])

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
     from pathlib import Path
 
+    from analysis.budget import Budget
     from levilab.pipelines.sources import Found
 
 #: Readings of an input, what is found of it, of all together; options of the analysis.
@@ -35,10 +36,13 @@ class Origin(Generic[Opt]):
     Attributes:
         options: how they were made.
         text: for people.
+        budget: what the uncertainties of the input's numbers are made of; None: to be worked out from what was found,
+            empty: the result that was read holds none.
     """
 
     options: Opt
     text: str = NOW
+    budget: tuple[Budget, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,7 @@ class Analyzed(Generic[S, R, T, Opt]):
         warnings: about the inputs.
         remarks: what does not belong to the analysis, and is no cause for a warning.
         origins: one per source.
+        budget: what the uncertainties of the numbers of all together are made of; empty where that is not known.
     """
 
     sources: tuple[Source[S], ...]
@@ -64,6 +69,7 @@ class Analyzed(Generic[S, R, T, Opt]):
     warnings: tuple[str, ...]
     remarks: tuple[str, ...]
     origins: tuple[Origin[Opt], ...]
+    budget: tuple[Budget, ...] = ()
 
     @property
     def output_folder(self) -> Path:
@@ -138,6 +144,8 @@ class Method(Generic[S, R, Opt, A]):
         passes_over: whether of several inputs one that cannot be used is passed over with a warning.
         refit: number of each input to analyze once more, for what only all together show → what is found then.
         refit_text: why, in words.
+        budget_of_run: what the uncertainties of one input's numbers are made of.
+        budget_of_all: those of all inputs together, from what was found of each; of one input they are its own.
     """
 
     needs: Needs[Any]
@@ -150,6 +158,8 @@ class Method(Generic[S, R, Opt, A]):
     passes_over: bool = False
     refit: Callable[[Sequence[Source[S]], Sequence[R], Sequence[Opt]], Mapping[int, R]] = lambda *_: {}
     refit_text: str = ""
+    budget_of_run: Callable[[Source[S], R, Opt], tuple[Budget, ...]] = lambda *_: ()
+    budget_of_all: Callable[[A], tuple[Budget, ...]] = lambda _: ()
 
     def analyze(self, paths: Sequence[Path], options: Opt) -> A:
         """What is found of the inputs at the paths.  Raises DataError for what cannot be used; it names the file."""
@@ -166,6 +176,8 @@ class Method(Generic[S, R, Opt, A]):
         options: Opt,
         one: Callable[[Source[S]], tuple[Source[S], R, Origin[Opt]]],
         recall: Callable[[Sequence[R]], Any] | None = None,
+        *,
+        budget: tuple[Budget, ...] = (),
     ) -> A:
         """All inputs, each by itself and together.  Raises DataError.
 
@@ -175,16 +187,20 @@ class Method(Generic[S, R, Opt, A]):
             options: as they were given.
             one: from one input to what is found of it.
             recall: from what is found of each to what was found of all together; None where it is not known.
+            budget: that of all together, which goes with `recall`.
         """
         done, warnings = self._each(found.sources, one)
         sources, runs, origins = (list(column) for column in zip(*done, strict=True))
         if recall is None:
             for k, run in self.refit(sources, runs, [origin.options for origin in origins]).items():
-                runs[k] = run
+                runs[k], origins[k] = run, replace(origins[k], budget=None)
                 if origins[k].text != NOW:
                     origins[k] = replace(origins[k], text=f"{FOR_THIS_PAGE}: {self.refit_text}")
         used = origins[0].options if all(origin.options == origins[0].options for origin in origins) else options
-        return self.kind(
+        for k, (source, run, origin) in enumerate(zip(sources, runs, origins, strict=True)):
+            if origin.budget is None:
+                origins[k] = replace(origin, budget=self.budget_of_run(source, run, origin.options))
+        found_of_all = self.kind(
             sources=tuple(sources),
             runs=tuple(runs),
             combined=recall(runs) if recall else self.combine(sources, runs, used),
@@ -193,7 +209,12 @@ class Method(Generic[S, R, Opt, A]):
             warnings=(*found.warnings, *warnings, *self.about_inputs(sources, used)),
             remarks=found.remarks,
             origins=tuple(origins),
+            budget=budget,
         )
+        if recall is not None:
+            return found_of_all
+        of_all = (origins[0].budget or ()) if len(origins) == 1 else self.budget_of_all(found_of_all)
+        return replace(found_of_all, budget=of_all)
 
     def _each(
         self, sources: Sequence[Source[S]], one: Callable[[Source[S]], tuple[Source[S], R, Origin[Opt]]]

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Generic
 
 from levilab.errors import DataError, DoesNotSuit, NoneUsable, unquoted
 from levilab.pipelines.analyzed import A
+from levilab.pipelines.budget import budgets_of_result
 from levilab.pipelines.field.columns import field_columns
 from levilab.pipelines.field.document import DOCUMENT as FIELD
+from levilab.pipelines.field.quantities import SHOWN
 from levilab.pipelines.field.report import field_part
 from levilab.pipelines.field.row import FIELD_ROW
 from levilab.pipelines.field.table import field_tables
@@ -34,6 +36,7 @@ from levilab.pipelines.spin.row import SPIN_ROW
 from levilab.pipelines.spin.table import spin_tables
 from levilab.pipelines.spindown.columns import spindown_columns
 from levilab.pipelines.spindown.document import DOCUMENT as SPINDOWN
+from levilab.pipelines.spindown.laws import SYMBOLS
 from levilab.pipelines.spindown.report import spindown_part
 from levilab.pipelines.spindown.row import SPINDOWN_ROW
 from levilab.pipelines.spindown.table import spindown_tables
@@ -53,6 +56,7 @@ if TYPE_CHECKING:
     from levilab.pipelines.result import Written
     from levilab.pipelines.row import Column
     from levilab.pipelines.sources import InputOptions, Needs, Source
+    from levilab.present.document.blocks import Block
     from levilab.present.style import Figure
     from levilab.present.tables import Table
     from levilab.runs.run import Run
@@ -73,6 +77,7 @@ class Analysis(Generic[A]):
         part: of a report.
         columns: the readings of each input as columns of a table, with residuals.
         row: the columns that an input has as one row of a table of many.
+        symbols: of its quantities, for people.
 
     Its figure is in `levilab.pipelines.figures`.
     """
@@ -82,6 +87,7 @@ class Analysis(Generic[A]):
     part: Callable[[A], ReportPart]
     columns: Callable[[A], Iterable[Mapping[str, np.ndarray]]]
     row: tuple[Column, ...] = ()
+    symbols: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def needs(self) -> Needs[Any]:
@@ -112,6 +118,15 @@ class Analysis(Generic[A]):
         content: dict[str, Any] = self.result.of(found, Place(folder)).as_dict()
         return content
 
+    def settings_of(self, found: A) -> dict[str, Any]:
+        """How it was analyzed, as result.json has it."""
+        settings: dict[str, Any] = self.result.settings(found.options).model_dump(mode="json", by_alias=True)
+        return settings
+
+    def budgets(self, found: A) -> tuple[Block, ...]:
+        """What the uncertainties of its numbers are made of, as blocks of a document."""
+        return budgets_of_result(found, self.symbols)
+
     def figure(self, found: A) -> Figure:
         """The figure."""
         from levilab.pipelines.figures import FIGURES  # with matplotlib
@@ -132,10 +147,13 @@ class Analysis(Generic[A]):
         return as_svg(self.figure(found))
 
 
+#: What a scan's quantities are called.
+FIELD_WORDS = MappingProxyType({name: one.words for name, one in SHOWN.items()})
+
 _TABLE: tuple[Analysis[Any], ...] = (
-    Analysis(SPINDOWN, spindown_tables, spindown_part, spindown_columns, SPINDOWN_ROW),
+    Analysis(SPINDOWN, spindown_tables, spindown_part, spindown_columns, SPINDOWN_ROW, SYMBOLS),
     Analysis(SPIN, spin_tables, spin_part, spin_columns, SPIN_ROW),
-    Analysis(FIELD, field_tables, field_part, field_columns, FIELD_ROW),
+    Analysis(FIELD, field_tables, field_part, field_columns, FIELD_ROW, FIELD_WORDS),
     Analysis(LIMIT, limit_tables, limit_part, limit_columns, LIMIT_ROW),
     Analysis(PRECESSION, precession_tables, precession_part, precession_columns, PRECESSION_ROW),
 )

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, PlainSerializer
 from levilab.errors import unquoted
 from levilab.files import finite
 from levilab.pipelines.analyzed import FOR_THIS_PAGE, A, Method, Opt, Origin, R, S
-from levilab.pipelines.result import SCHEMA, Archive, Earlier, Part, Result, relative
+from levilab.pipelines.result import SCHEMA, Archive, BudgetPart, Earlier, Part, Result, budgets_of, relative
 from levilab.pipelines.sources import collect
 from levilab.runs.run import find_run
 from levilab.software import software_versions
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
+    from analysis.budget import Budget
     from analysis.uncertainty import Estimate
     from levilab.pipelines.result import Place
     from levilab.pipelines.sources import Found, InputOptions, Source
@@ -110,15 +111,16 @@ class Document(Generic[S, R, Opt, A, D]):
             "values": {},
             "models": [],
             "runs": [
-                self._part(source, run, place.folder) for source, run in zip(found.sources, found.runs, strict=True)
+                self._part(source, run, origin, place.folder)
+                for source, run, origin in zip(found.sources, found.runs, found.origins, strict=True)
             ],
             "warnings": [unquoted(text) for text in found.all_warnings],
         }
-        return self.result.model_validate(finite(document | self.entries(found)))
+        return self.result.model_validate(finite(document | _budget(found.budget) | self.entries(found)))
 
-    def _part(self, source: Source[S], run: R, folder: Path) -> dict[str, Any]:
+    def _part(self, source: Source[S], run: R, origin: Origin[Opt], folder: Path) -> dict[str, Any]:
         head = {"path": relative(source.path, folder), "synthetic": source.synthetic, "values": {}, "models": []}
-        own = self.run_entries(source, run)
+        own = self.run_entries(source, run) | _budget(origin.budget or ())
         return head | own | {"warnings": [unquoted(text) for text in (*source.warnings, *own.get("warnings", ()))]}
 
     def settings(self, options: Opt) -> Settings:
@@ -164,6 +166,7 @@ class Document(Generic[S, R, Opt, A, D]):
                 looked.options,
                 lambda source: self._restored(source, whole.of(source)),
                 lambda runs: whole.restore(lambda: self.combined(whole.result, runs, numbers)),
+                budget=budgets_of(whole.result.budget),
             )
         return self.method.gather(
             looked.paths, found, looked.options, lambda source: self._recalled(source, archive, given)
@@ -202,7 +205,12 @@ class Document(Generic[S, R, Opt, A, D]):
         """One input as it was found; its warnings are those of that time."""
         options, part = self._options(earlier), earlier.part
         run = earlier.restore(lambda: self.run(part, source, options))
-        return replace(source, warnings=part.warnings), run, Origin(options, earlier.text)
+        return replace(source, warnings=part.warnings), run, Origin(options, earlier.text, budgets_of(part.budget))
+
+
+def _budget(budgets: Sequence[Budget]) -> dict[str, Any]:
+    """The entry of budgets, where there are any."""
+    return {"budget": [BudgetPart.of(one).model_dump() for one in budgets]} if budgets else {}
 
 
 def values_of(estimates: Mapping[str, Estimate]) -> dict[str, dict[str, Any]]:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import os
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from analysis.budget import Budget, Component
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.files import parse_json, replace_atomically, writing
@@ -67,6 +68,50 @@ class Input(Part):
     sha256: str
 
 
+class ComponentPart(Part):
+    """A row of a budget; see `analysis.budget.Component`."""
+
+    name: str
+    source: str
+    kind: Literal["A", "B"]
+    u: float | None = Field(ge=0)
+    unit: str
+    sensitivity: float
+    contribution: float | None = Field(ge=0)
+    included: bool
+    note: str
+    remedy: str
+
+
+class BudgetPart(Part):
+    """What u of a quantity is made of; see `analysis.budget.Budget`."""
+
+    quantity: str
+    model: str
+    value: float
+    u: float = Field(ge=0)
+    u_with_all: float = Field(ge=0)
+    unit: str
+    components: tuple[ComponentPart, ...]
+
+    @classmethod
+    def of(cls, budget: Budget) -> Self:
+        """From a budget."""
+        rows = [asdict(one) | {"contribution": one.contribution} for one in budget.components]
+        return cls.model_validate(asdict(budget) | {"u_with_all": budget.u_with_all, "components": rows})
+
+    @property
+    def budget(self) -> Budget:
+        """The budget, but for what follows from the rest of it."""
+        rows = (Component(**one.model_dump(exclude={"contribution"})) for one in self.components)
+        return Budget(self.quantity, self.value, self.u, self.unit, tuple(rows), self.model)
+
+
+def budgets_of(parts: Sequence[BudgetPart]) -> tuple[Budget, ...]:
+    """The budgets that a result holds; none, if an earlier version wrote it."""
+    return tuple(one.budget for one in parts)
+
+
 class RunPart(Part):
     """One input by itself."""
 
@@ -74,6 +119,7 @@ class RunPart(Part):
     synthetic: bool
     values: dict[str, Value]
     warnings: tuple[str, ...]
+    budget: tuple[BudgetPart, ...] = ()
 
 
 class Result(Part):
@@ -88,6 +134,7 @@ class Result(Part):
     values: dict[str, Value]
     runs: tuple[Any, ...]
     warnings: tuple[str, ...]
+    budget: tuple[BudgetPart, ...] = ()
 
     @model_validator(mode="after")
     def _one_run_an_input(self) -> Self:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from levilab.pipelines.sources import Source
     from levilab.present.document.blocks import Block
     from levilab.report.inputs import Input
+    from levilab.report.supplements import Supplement
 
     Results = Sequence[tuple[Analysis[Any], Any]]
 
@@ -40,12 +41,15 @@ MOST_NAMES = 4
 MOST_IN_FULL = 12
 
 
-def document_of(results: Results, others: Sequence[Section] = ()) -> Document:
+def document_of(
+    results: Results, others: Sequence[Section] = (), supplements: Sequence[Supplement] = SUPPLEMENTS
+) -> Document:
     """The report.
 
     Args:
         results: of measurements: analyses with what they found.
         others: sections of inputs that are no measurement; at least one of the two has something in it.
+        supplements: what it says of each analysis beyond its own part.
     """
     parts = [analysis.part(found) for analysis, found in results]
     alone = len(results) == 1 and not others
@@ -53,7 +57,7 @@ def document_of(results: Results, others: Sequence[Section] = ()) -> Document:
     banner = _document_banner(results, sources, others)
     blocks: list[Block] = []
     for (analysis, found), part in zip(results, parts, strict=True):
-        own = blocks_of_part(analysis, found, part, deeper=not alone)
+        own = blocks_of_part(analysis, found, part, deeper=not alone, supplements=supplements)
         blocks += own if alone else [_of_one_analysis(found, part, own, first=not blocks)]
     blocks += others
     if results:
@@ -70,7 +74,14 @@ def document_of(results: Results, others: Sequence[Section] = ()) -> Document:
     )
 
 
-def blocks_of_part(analysis: Analysis[A], found: A, part: ReportPart, *, deeper: bool = False) -> list[Block]:
+def blocks_of_part(
+    analysis: Analysis[A],
+    found: A,
+    part: ReportPart,
+    *,
+    deeper: bool = False,
+    supplements: Sequence[Supplement] = SUPPLEMENTS,
+) -> list[Block]:
     """What one analysis found: warnings, result, figure, what else is known, run by run.
 
     Args:
@@ -78,6 +89,7 @@ def blocks_of_part(analysis: Analysis[A], found: A, part: ReportPart, *, deeper:
         found: what it found.
         part: its words.
         deeper: whether sections stand below a heading of the analysis, and need no links of their own.
+        supplements: what it says beyond the part.
     """
 
     def section(title: str, anchor: str, *blocks: Block) -> Section:
@@ -86,12 +98,12 @@ def blocks_of_part(analysis: Analysis[A], found: A, part: ReportPart, *, deeper:
     groups = tuple(tuple(map(unquoted, alike)) for alike in found.grouped_warnings)
     count = sum(map(len, groups))
     warnings = [section(f"{count} warning{'s' * (count > 1)}", "warnings", Warnings(groups))] if groups else []
-    supplements = (block for supplement in SUPPLEMENTS for block in supplement(analysis, found))
+    more = (block for supplement in supplements for block in supplement(analysis, found))
     return [
         *warnings,
         section("Result", "result", Verdict(part.verdict), *part.result),
         section("Figure", "figure", picture_of(analysis, found, part)),
-        *supplements,
+        *more,
         section(part.runs_title, "runs", *part.runs),
     ]
 

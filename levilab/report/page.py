@@ -16,6 +16,7 @@ from levilab.pipelines.document import NO_RESULT
 from levilab.report.document import document_of, list_in_words, notebook_blocks
 from levilab.report.html.page import fragment_of, page_of
 from levilab.report.kinds import KINDS
+from levilab.report.supplements import SUPPLEMENTS, WITH_TRIALS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -39,6 +40,8 @@ def write_report(
     output: Path,
     given: Mapping[str, Any] | None = None,
     tell: Callable[[str], None] | None = None,
+    *,
+    crosscheck: bool = False,
 ) -> Path:
     """Report what was found of the inputs at the paths; what has no result yet is analyzed, and nothing is stored.
 
@@ -48,6 +51,7 @@ def write_report(
         given: options by their names; those at their defaults count as not given, see
             `levilab.pipelines.document.Document.look`.
         tell: called with what lies there and is not in the report, and with what has no result.
+        crosscheck: whether one is made where none lies beside the result and it takes two seconds at most.
 
     Returns:
         The file.
@@ -63,7 +67,7 @@ def write_report(
         raise UnknownFormat("output", expected, value=output)
     others, left = _of_other_kinds(paths)
     results = _results(left, given or {}, tell, needed=not others)
-    content = form(document_of(results, others))
+    content = form(document_of(results, others, WITH_TRIALS if crosscheck else SUPPLEMENTS))
     with writing(f"{output}: could not be written", "choose another place with `output`"):
         output.parent.mkdir(parents=True, exist_ok=True)
         replace_atomically(output, content)

@@ -4,12 +4,51 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from levilab.crosscheck.own.stored import read_own
+from levilab.crosscheck.own.study import OWN, own_blocks, quick_check
+from levilab.present.document.blocks import Paragraph, Section
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from levilab.pipelines.catalogue import Analysis
     from levilab.present.document.blocks import Block
 
+    Supplement = Callable[[Analysis[Any], Any], tuple[Block, ...]]
+
+
+def budget(analysis: Analysis[Any], found: Any) -> tuple[Block, ...]:
+    """What the uncertainties are made of."""
+    lead = "What u of each result is made of, what would make it smaller, and what it does not contain."
+    return (Section("Uncertainty budget", analysis.budgets(found), anchor="budget", lead=lead),)
+
+
+def stored_trials(analysis: Analysis[Any], found: Any) -> tuple[Block, ...]:
+    """The cross-check that `levilab crosscheck --like` made of this result."""
+    settings = analysis.settings_of(found)
+    known = read_own(found.place, analysis.name, [source.sha256 for source in found.sources], settings)
+    return () if known is None else (_section(*own_blocks(known, analysis.symbols)),)
+
+
+def trials(analysis: Analysis[Any], found: Any) -> tuple[Block, ...]:
+    """The same; where there is none a shorter one, if that takes two seconds at most."""
+    stored = stored_trials(analysis, found)
+    if stored or analysis.name not in OWN:
+        return stored
+    made = quick_check(analysis.name, found, analysis.settings_of(found))
+    if made is not None:
+        return (_section(*own_blocks(made, analysis.symbols)),)
+    advice = f"levilab crosscheck {analysis.name} --like"
+    return (_section(Paragraph(f"Not made: it takes longer than a report. `{advice}` with these inputs makes it.")),)
+
+
+def _section(*blocks: Block) -> Section:
+    lead = "Readings made up with these values, times and scatters, through the same analysis: is it right here?"
+    return Section("Cross-check with these parameters", blocks, anchor="crosscheck", lead=lead)
+
+
 #: An analysis and what it found → blocks that stand between its figure and the part run by run; none where there is
 #: nothing to say.  In this order.
-SUPPLEMENTS: tuple[Callable[[Analysis[Any], Any], tuple[Block, ...]], ...] = ()
+SUPPLEMENTS: tuple[Supplement, ...] = (budget, stored_trials)
+#: The same with a cross-check where there is none yet.
+WITH_TRIALS: tuple[Supplement, ...] = (budget, trials)

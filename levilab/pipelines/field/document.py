@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
@@ -15,6 +16,7 @@ from levilab.errors import unquoted
 from levilab.formats.device import Device  # noqa: TC001 - pydantic reads it
 from levilab.pipelines.document import Document, Settings, value_of, values_of
 from levilab.pipelines.field.analysis import METHOD, FieldAnalysis, FieldRun, Mean
+from levilab.pipelines.field.budget import budget_of_all, budget_of_run
 from levilab.pipelines.result import Part, Result, RunPart, Value
 
 if TYPE_CHECKING:
@@ -241,4 +243,10 @@ def _known_top(part: TopPart) -> KnownTop:
     )  # fmt: skip
 
 
-DOCUMENT = Document(method=METHOD, result=FieldResult, entries=_entries, run_entries=_run_entries, run=_run)
+DOCUMENT = Document(
+    method=replace(METHOD, budget_of_run=budget_of_run, budget_of_all=budget_of_all),
+    result=FieldResult,
+    entries=_entries,
+    run_entries=_run_entries,
+    run=_run,
+)

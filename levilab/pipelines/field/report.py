@@ -6,9 +6,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from analysis.uncertainty import Estimate
+from levilab.pipelines.field.meaning import meaning
 from levilab.pipelines.field.table import base_table, by_run_table, follows_table, scans_table
 from levilab.pipelines.part import FigureText, InputPart, ReportPart, first_of
-from levilab.present.document.blocks import Listing, Note, Points, Section, Tabular
+from levilab.present.document.blocks import Listing, Note, Paragraph, Points, Section, Tabular
 from levilab.present.numbers import off, short_name, signed, with_uncertainty
 from levilab.present.tables import table
 
@@ -30,6 +31,7 @@ def field_part(analysis: FieldAnalysis) -> ReportPart:
         lead=f"{sum(run.scan.statistics.n for run in analysis.runs)} heights measured",
         verdict=analysis.text,
         result=(
+            Paragraph(" ".join(meaning(analysis)), "What it means."),
             Tabular("field-follows", follows_table(analysis.values), f"{_FOLLOWS}{means}"),
             Tabular("field-scans", scans_table(analysis), _SCANS, first_column_wraps=True),
         ),

@@ -51,9 +51,11 @@ class LimitOptions(InputOptions):
 
     Attributes:
         reading_u: of every limit [Hz], in the place of what the data say.
+        clock_u: of the counter's clock, relative; budgets say what it does, it is in no u.
     """
 
     reading_u: float | None = None
+    clock_u: float | None = None
 
 
 @dataclass(frozen=True)
@@ -331,7 +333,13 @@ def warnings_of(statistics: Statistics) -> list[str]:
     return texts
 
 
-METHOD = Method(needs=NEEDS, kind=LimitAnalysis, options=LimitOptions, fit=limits_of, combine=together)
+METHOD = Method(
+    needs=NEEDS,
+    kind=LimitAnalysis,
+    options=LimitOptions,
+    fit=limits_of,
+    combine=together,
+)
 
 
 def analyze_limits(paths: Sequence[Path], options: LimitOptions) -> LimitAnalysis:

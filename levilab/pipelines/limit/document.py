@@ -11,6 +11,7 @@ from pydantic import Field
 from analysis.limits import Comparison, Statistics
 from levilab.pipelines.document import Document, Settings, number, value_of, values_of
 from levilab.pipelines.limit.analysis import METHOD, Conditions, Device, LimitAnalysis, Limits, Which
+from levilab.pipelines.limit.budget import budget_of_all, budget_of_run
 from levilab.pipelines.result import Part, Result, RunPart, Value
 
 if TYPE_CHECKING:
@@ -85,6 +86,7 @@ class SettingsPart(Settings):
     """How the limits were analyzed."""
 
     reading_u: float | None = Field(gt=0, alias="reading_u_hz")
+    clock_u: float | None = Field(default=None, gt=0)
 
 
 class LimitResult(Result):
@@ -204,5 +206,10 @@ def _restored(part: _WithLimits, values: Mapping[str, Value], runs: int = 1) -> 
 
 
 DOCUMENT = Document(
-    method=METHOD, result=LimitResult, entries=_entries, run_entries=_run_entries, run=_run, combined=_groups
+    method=replace(METHOD, budget_of_run=budget_of_run, budget_of_all=budget_of_all),
+    result=LimitResult,
+    entries=_entries,
+    run_entries=_run_entries,
+    run=_run,
+    combined=_groups,
 )

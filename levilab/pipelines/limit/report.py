@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
+from levilab.pipelines.limit.meaning import meaning
 from levilab.pipelines.limit.table import runs_table, theory_table
 from levilab.pipelines.part import FigureText, InputPart, ReportPart, first_of
 from levilab.present.document.blocks import Listing, Paragraph, Points, Tabular
@@ -29,7 +30,10 @@ def limit_part(analysis: LimitAnalysis) -> ReportPart:
         heading="Limits of the spin of a levitated top",
         lead=f"{n} tops",
         verdict=analysis.text,
-        result=(Tabular("limit-statistics", runs_table(analysis), _STATISTICS, first_column_wraps=True),),
+        result=(
+            Paragraph(" ".join(meaning(analysis)), "What it means."),
+            Tabular("limit-statistics", runs_table(analysis), _STATISTICS, first_column_wraps=True),
+        ),
         figure=FigureText(
             title="Limits of the spin.",
             caption=(

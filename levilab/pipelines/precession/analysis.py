@@ -48,11 +48,13 @@ class PrecessionOptions(InputOptions):
         reading_u: of every count of the precession [Hz], in the place of what the data say.
         keep_outliers: points that miscounted are kept.
         orthogonal: the uncertainty of the drive's frequency counts, too.
+        clock_u: of the counter's clock, relative; budgets say what it does, it is in no u.
     """
 
     reading_u: float | None = None
     keep_outliers: bool = False
     orthogonal: bool = False
+    clock_u: float | None = None
 
 
 #: A record that is kept at the moment of a reading is that reading's [s].

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -21,6 +21,7 @@ from levilab.pipelines.precession.analysis import (
     slope_of,
     verdict,
 )
+from levilab.pipelines.precession.budget import budget_of_all, budget_of_run
 from levilab.pipelines.result import Part, Result, RunPart, Value
 
 if TYPE_CHECKING:
@@ -103,6 +104,7 @@ class SettingsPart(Settings):
     reading_u: float | None = Field(gt=0, alias="reading_u_hz")
     orthogonal: bool
     keep_outliers: bool
+    clock_u: float | None = Field(default=None, gt=0)
 
 
 class PrecessionResult(Result, _WithLine):
@@ -213,5 +215,10 @@ def _run(part: PrecessionPart, source: Source[Readings], _: object) -> Precessio
 
 
 DOCUMENT = Document(
-    method=METHOD, result=PrecessionResult, entries=_entries, run_entries=_run_entries, run=_run, combined=_combined
+    method=replace(METHOD, budget_of_run=budget_of_run, budget_of_all=budget_of_all),
+    result=PrecessionResult,
+    entries=_entries,
+    run_entries=_run_entries,
+    run=_run,
+    combined=_combined,
 )

@@ -11,6 +11,7 @@ from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.pipelines.part import FigureText, InputPart, ReportPart, first_of
 from levilab.pipelines.precession.analysis import verdict
+from levilab.pipelines.precession.meaning import meaning
 from levilab.pipelines.precession.table import coherence_table, lines_table, points_table, power_table
 from levilab.present.clock import with_clock
 from levilab.present.document.blocks import Note, Paragraph, Points, Tabular
@@ -36,6 +37,7 @@ def precession_part(analysis: PrecessionAnalysis) -> ReportPart:
         lead=f"{analysis.combined.line.n} points used",
         verdict=analysis.text,
         result=(
+            Paragraph(" ".join(meaning(analysis)), "What it means."),
             Tabular("precession-lines", lines_table(analysis), _LINES, first_column_wraps=True),
             *_power(analysis),
         ),

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from analysis.budget import rest
 from analysis.errors import AnalysisError
 from analysis.pulses import Finding, phases, spin_of_times, spin_of_trace, track_of_blocks, track_of_times
 from levilab.errors import DataError
@@ -50,9 +51,13 @@ WINDOW_S = 2.0
 
 @dataclass(frozen=True)
 class SpinOptions(InputOptions):
-    """How pulses are found, see `analysis.pulses.spin_of_trace`."""
+    """How pulses are found, see `analysis.pulses.spin_of_trace`.
+
+    clock_u: of the clock of the oscilloscope or sound card, relative; budgets say what it does, it is in no u.
+    """
 
     method: Literal["auto", "edges", "matched", "likelihood"] = "auto"
+    clock_u: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +82,21 @@ class Series:
         return len(self.time)
 
 
+@dataclass(frozen=True)
+class UParts:
+    """What u of a frequency, or of its slope, is made of; the squares add up.
+
+    Attributes:
+        pulses: of the places of the pulses.
+        drag: how the slope changes meanwhile.
+        step: of the sampling interval, where it comes from rounded times.
+    """
+
+    pulses: float
+    drag: float = 0.0
+    step: float = 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class SpinRun:
     """One input.
@@ -85,11 +105,15 @@ class SpinRun:
         spin: its frequency; of a long record or of several, that of the window or record in the middle.
         series: all of them.
         notes: findings.
+        parts: "frequency", "chirp" → what u of it is made of; empty where that is not known.
+        code: one step of the oscilloscope's or sound card's numbers over the noise of a sample; None: not known.
     """
 
     spin: SpinFrequency
     series: Series
     notes: tuple[Finding, ...]
+    parts: Mapping[str, UParts] = field(default_factory=dict)
+    code: float | None = None
 
 
 class SpinAnalysis(Analyzed[Records, SpinRun, None, SpinOptions]):
@@ -121,6 +145,8 @@ class SpinAnalysis(Analyzed[Records, SpinRun, None, SpinOptions]):
         return (f"{note.text} ({note.name})" for note in run.notes)
 
 
+#: Number of samples that show the steps of a converter; closer numbers than this part of their range are rounding.
+_MOST_FOR_STEP, _ROUNDING = 20_000, 1e-7
 #: The text describes so many inputs at most.
 MOST_SENTENCES = 4
 
@@ -158,15 +184,19 @@ def analyze_spins(paths: Sequence[Path], options: SpinOptions) -> SpinAnalysis:
 
 def _of_times(times: Array) -> SpinRun:
     if times[-1] - times[0] <= LONGEST_WHOLE_S:
-        return _of_one(spin_of_times(times).under_drag())
+        spin = spin_of_times(times)
+        dragged = spin.under_drag()
+        return replace(_of_one(dragged), parts=parts_of(spin, dragged, dragged))
     return _of_track(track_of_times(times, window=WINDOW_S))
 
 
 def _of_waveform(waveform: Waveform, channel: str, options: SpinOptions) -> SpinRun:
     if waveform.duration <= LONGEST_WHOLE_S:
         samples = waveform.samples(channel)
-        spin = spin_of_trace(samples, waveform.rate, start=waveform.start, method=options.method).under_drag()
-        return _of_one(_with_rate(spin, waveform))
+        spin = spin_of_trace(samples, waveform.rate, start=waveform.start, method=options.method)
+        dragged = spin.under_drag()
+        found = _with_rate(dragged, waveform)
+        return replace(_of_one(found), parts=parts_of(spin, dragged, found), code=_code(samples, found))
     blocks = waveform.blocks(channel)
     return _of_track(
         track_of_blocks(blocks, waveform.rate, start=waveform.start, window=WINDOW_S, method=options.method)
@@ -184,13 +214,15 @@ def _with_rate(spin: SpinFrequency, waveform: Waveform) -> SpinFrequency:
 def _of_several(records: Records, options: SpinOptions) -> SpinRun:
     """A spin for each record of a run; what has no pulses is left out with a note, unless none has."""
     spins: list[SpinFrequency] = []
+    parts: list[tuple[Mapping[str, UParts], float | None]] = []
     numbers: list[int] = []  # of the records that gave them
     missed: AnalysisError | None = None
     for number, waveform in enumerate(records.waveforms, 1):
         try:
             samples = waveform.samples()
             spin = spin_of_trace(samples, waveform.rate, start=waveform.start, method=options.method)
-            spins.append(spin.under_drag())
+            spins.append(dragged := spin.under_drag())
+            parts.append((parts_of(spin, dragged, dragged), _code(samples, dragged)))
             numbers.append(number)
         except AnalysisError as error:
             missed = error
@@ -204,7 +236,28 @@ def _of_several(records: Records, options: SpinOptions) -> SpinRun:
         left_out = all_of_them - len(spins)
         text = f"{left_out} of {all_of_them} records are left out, the last of them for this: {missed}"
         notes = (*notes, Finding("no-pulses", text))
-    return SpinRun(spins[len(spins) // 2], series, notes)
+    return SpinRun(spins[len(spins) // 2], series, notes, *parts[len(spins) // 2])
+
+
+def parts_of(plain: SpinFrequency, dragged: SpinFrequency, found: SpinFrequency) -> dict[str, UParts]:
+    """What the uncertainties are made of, from those without drag, with drag, and with the sampling interval, too."""
+    parts = {}
+    for name in ("frequency", "chirp"):
+        sizes = [getattr(one, name).u for one in (plain, dragged, found)]
+        if all(size is not None and math.isfinite(size) for size in sizes):
+            pulses, more, whole = sizes
+            parts[name] = UParts(pulses, rest(more, pulses), rest(whole, more))
+    return parts
+
+
+def _code(samples: Array, spin: SpinFrequency) -> float | None:
+    """One step of the numbers of a record over the noise of a sample; None where that is not known."""
+    some = np.unique(samples[:_MOST_FOR_STEP])
+    if spin.snr_db is None or some.size < 2:
+        return None
+    height = float(some[-1] - some[0])  # of a pulse, and of noise on either side: no less than the pulse
+    step = float(np.diff(some).min())
+    return step / (height * 10 ** (-spin.snr_db / 20)) if step > _ROUNDING * height else None
 
 
 def _with_start(series: Series, u_s: float) -> Series:
@@ -238,7 +291,8 @@ def _of_one(spin: SpinFrequency) -> SpinRun:
 def _of_track(track: Track) -> SpinRun:
     middle = int(np.abs(track.time - 0.5 * (track.time[0] + track.time[-1])).argmin())
     series = Series(track.time, track.frequency, track.u, tuple(map(_phase, phases(track))), of="window")
-    return SpinRun(track.spins[middle], series, track.notes)
+    spin = track.spins[middle]
+    return SpinRun(spin, series, track.notes, parts_of(spin, spin, spin))
 
 
 def _phase(phase: Phase) -> tuple[str, float, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
@@ -11,7 +12,8 @@ from analysis.pulses import Finding, SpinFrequency
 from analysis.uncertainty import Estimate
 from levilab.pipelines.document import Document, Settings, number
 from levilab.pipelines.result import Part, Result, RunPart, Value
-from levilab.pipelines.spin.analysis import METHOD, Series, SpinAnalysis, SpinRun
+from levilab.pipelines.spin.analysis import METHOD, Series, SpinAnalysis, SpinRun, UParts
+from levilab.pipelines.spin.budget import budget_of_run
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -74,6 +76,8 @@ class SpinPart(RunPart):
     doubled: int = Field(ge=0)
     series: SeriesPart
     notes: tuple[NotePart, ...]
+    u_parts: dict[str, UParts] = Field(default_factory=dict)
+    code: float | None = None
 
     @model_validator(mode="after")
     def _is_whole(self) -> Self:
@@ -90,6 +94,7 @@ class SettingsPart(Settings):
     channel: str | None
     rate: float | None = Field(gt=0, alias="rate_hz")
     method: Literal["auto", "edges", "matched", "likelihood"]
+    clock_u: float | None = Field(default=None, gt=0)
 
 
 class SpinResult(Result):
@@ -141,6 +146,8 @@ def _run_entries(_: Source[Records], run: SpinRun) -> dict[str, Any]:
             "phases": [{"kind": kind, "start_s": start, "end_s": end} for kind, start, end in series.phases],
         },
         "notes": [{"name": note.name, "text": note.text} for note in run.notes],
+        "u_parts": {name: asdict(parts) for name, parts in run.parts.items()},
+        "code": run.code,
     }
 
 
@@ -169,7 +176,9 @@ def _run(part: SpinPart, *_: object) -> SpinRun:
     columns = (series.time_s, series.frequency_hz, series.frequency_u_hz)
     time, frequency, u = (np.array(column, dtype=np.float64) for column in columns)
     phases = tuple((phase.kind, phase.start_s, phase.end_s) for phase in series.phases)
-    return SpinRun(spin, Series(time, frequency, u, phases, series.of), notes)
+    order: tuple[str, ...] = ("frequency", "chirp")
+    parts = {name: part.u_parts[name] for name in order if name in part.u_parts}
+    return SpinRun(spin, Series(time, frequency, u, phases, series.of), notes, parts, part.code)
 
 
 def _correlations(values: Mapping[str, Value]) -> tuple[float, float, float]:
@@ -187,4 +196,10 @@ def _estimate(value: Value) -> Estimate:
     return Estimate(value.value, value.u, "turns")
 
 
-DOCUMENT = Document(method=METHOD, result=SpinResult, entries=_entries, run_entries=_run_entries, run=_run)
+DOCUMENT = Document(
+    method=replace(METHOD, budget_of_run=budget_of_run),
+    result=SpinResult,
+    entries=_entries,
+    run_entries=_run_entries,
+    run=_run,
+)

@@ -9,8 +9,9 @@ from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.pipelines.part import FigureText, InputPart, ReportPart
 from levilab.pipelines.spin.analysis import in_a_sentence
+from levilab.pipelines.spin.meaning import meaning
 from levilab.pipelines.spin.table import frequency_table, pulse_table, series_table
-from levilab.present.document.blocks import Listing, Points, Tabular
+from levilab.present.document.blocks import Listing, Paragraph, Points, Tabular
 from levilab.present.numbers import with_uncertainty
 
 if TYPE_CHECKING:
@@ -33,7 +34,10 @@ def spin_part(analysis: SpinAnalysis) -> ReportPart:
         heading="Spin frequency of a top",
         lead=f"{total} pulses used",
         verdict=analysis.text,
-        result=(Tabular("spin-frequencies", frequency_table(analysis), _FREQUENCIES, first_column_wraps=True),),
+        result=(
+            Paragraph(" ".join(meaning(analysis)), "What it means."),
+            Tabular("spin-frequencies", frequency_table(analysis), _FREQUENCIES, first_column_wraps=True),
+        ),
         figure=FigureText(
             title="Spin frequency.",
             caption=(

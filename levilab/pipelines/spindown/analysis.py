@@ -11,6 +11,7 @@ from analysis.spindown.combine import Combined, combine, tilt_demanded
 from analysis.spindown.fit import SpinDown, fit_spin_down
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
+from levilab.pipelines.budget import gate_of
 from levilab.pipelines.sources import InputOptions, Needs
 from levilab.pipelines.spindown.laws import SYMBOLS
 from levilab.pipelines.spindown.readings import Readings, read_run_readings, read_spin_file
@@ -24,10 +25,12 @@ if TYPE_CHECKING:
     from levilab.pipelines.sources import Source
 
 SPINDOWN = "spindown"
+#: The experiment whose runs it takes, and whose settings say how the readings were counted.
+EXPERIMENT = "spin"
 #: The runs and files that suit.
 NEEDS = Needs(
     analysis=SPINDOWN,
-    experiments=frozenset({"spin"}),
+    experiments=frozenset({EXPERIMENT}),
     read_file=read_spin_file,
     read_run=read_run_readings,
 )
@@ -35,7 +38,7 @@ NEEDS = Needs(
 
 #: Whether the count holds the tilt of the top's moment.
 Tilt = Literal["auto", "none", "fitted"]
-_TILTED: dict[Tilt, bool | None] = {"auto": None, "none": False, "fitted": True}
+TILTED: dict[Tilt, bool | None] = {"auto": None, "none": False, "fitted": True}
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,7 @@ class SpinDownOptions(InputOptions):
         bootstrap_samples, seed: of the bootstrap, where it is asked for.
         tilt: whether the count holds the tilt of the top's moment, auto: where readings demand it, and what they may
             hide of it is in u.
+        clock_u: of the counter's clock, relative; budgets say what it does, it is in no u.
     """
 
     reading_u: float | None = None
@@ -55,6 +59,7 @@ class SpinDownOptions(InputOptions):
     tilt: Tilt = "auto"
     bootstrap_samples: int = 1000
     seed: int = 0
+    clock_u: float | None = None
 
 
 class SpinDownAnalysis(Analyzed[Readings, SpinDown, Combined, SpinDownOptions]):
@@ -108,8 +113,9 @@ def fit_source(source: Source[Readings], options: SpinDownOptions, *, tilt: bool
             bootstrap_samples=options.bootstrap_samples,
             seed=options.seed,
             keep_outliers=options.keep_outliers,
-            tilt=_TILTED[options.tilt] if tilt is None else tilt,
+            tilt=TILTED[options.tilt] if tilt is None else tilt,
             driven=readings.driven,
+            gate=gate_of(source, EXPERIMENT),
         )
     except AnalysisError as error:
         raise DataError(f"{source.data}: {error}") from error

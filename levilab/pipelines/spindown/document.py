@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
@@ -12,7 +12,7 @@ from analysis.residuals import Correlation
 from analysis.spindown.combine import Combined, CombinedLaw, Mean
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import SpinDown
-from analysis.spindown.lawfit import LawFit
+from analysis.spindown.lawfit import LawFit, Parts
 from analysis.spindown.selection import Statistics
 from analysis.spindown.tilt import PARAMETERS, counted
 from analysis.spindown.verdict import Verdict
@@ -20,6 +20,7 @@ from levilab.formats.table import FEWEST
 from levilab.pipelines.document import Document, Settings, number, value_of, values_of
 from levilab.pipelines.result import Part, Result, RunPart, Value
 from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis, SpinDownOptions
+from levilab.pipelines.spindown.budget import budget_of_all, budget_of_run
 from levilab.pipelines.spindown.laws import SHOWN_LAWS
 from levilab.pipelines.spindown.readings import EARLIEST_S, HIGHEST_HZ, SLOWEST_HZ
 
@@ -74,7 +75,7 @@ class FitPart(Part):
 class ModelPart(Part):
     """One drag law, fitted to one run or, without a start, over several.
 
-    shared_u: by parameter, the part of its u that all runs of one top share.
+    shared_u: by parameter, the part of its u that all runs of one top share; u_parts: by parameter, what u is made of.
     """
 
     name: str
@@ -86,6 +87,7 @@ class ModelPart(Part):
     linearised: dict[str, Value] | None = None
     scatter: dict[str, float | None] | None = None
     shared_u: dict[str, float] | None = None
+    u_parts: dict[str, Parts] | None = None
 
     @model_validator(mode="after")
     def _is_a_law(self) -> Self:
@@ -207,6 +209,7 @@ class SettingsPart(Settings):
     keep_outliers: bool
     tilt: Literal["auto", "none", "fitted"] = "auto"
     bootstrap: BootstrapPart | None
+    clock_u: float | None = Field(default=None, gt=0)
 
     @classmethod
     def of(cls, options: InputOptions, **more: Any) -> Self:
@@ -301,6 +304,7 @@ def _model(fit: LawFit) -> dict[str, Any]:
         "statistics": _some(fit.statistics, StatisticsPart),
         "fit": _some(fit.statistics, FitPart) | {"solution": fit.solution.tolist()},
         "shared_u": dict(fit.shared_u),
+        "u_parts": {name: asdict(parts) for name, parts in fit.parts.items()},
         "warnings": list(fit.warnings),
     } | ({"linearised": values_of(fit.linearised)} if fit.linearised else {})
 
@@ -423,6 +427,7 @@ def _law_fit(
         solution=solution,
         reference=(reference.frequency_hz, reference.time_s),
         shared_u={name: model.shared_u[name] for name in names if name in model.shared_u} if model.shared_u else {},
+        parts={name: model.u_parts[name] for name in names if name in model.u_parts} if model.u_parts else {},
     )
 
 
@@ -445,7 +450,7 @@ def _verdict_of(part: _WithLaws) -> Verdict:
 
 
 DOCUMENT = Document(
-    method=METHOD,
+    method=replace(METHOD, budget_of_run=budget_of_run, budget_of_all=budget_of_all),
     result=SpinDownResult,
     entries=_entries,
     run_entries=_run_entries,

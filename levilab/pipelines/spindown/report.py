@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.pipelines.part import FigureText, InputPart, ReportPart, first_of
-from levilab.pipelines.spindown.laws import SHOWN_LAWS, SYMBOLS
+from levilab.pipelines.spindown.laws import SYMBOLS
+from levilab.pipelines.spindown.meaning import meaning
 from levilab.pipelines.spindown.table import (
     QUALITY_IN_WORDS,
     count_table,
@@ -82,19 +83,8 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
 
 
 def _meaning(analysis: SpinDownAnalysis) -> tuple[Paragraph, ...]:
-    """What takes the spin by the best law, and how fast."""
-    combined, first = analysis.combined, analysis.runs[0]
-    if not combined.verdict.describes:
-        text = "No law that was tried describes these readings, so none of their constants is a property of the top."
-        return (Paragraph(text, "What it means."),)
-    law, fit = SHOWN_LAWS[combined.best], first.fit(combined.best)
-    start, end = (float(nu) for nu in fit.spin_frequency([first.time[0], first.time[-1]]))
-    lost = (
-        f"In {'the first run' if len(analysis.runs) > 1 else 'these readings'} the spin falls from {start:.2f} Hz to "
-        f"{end:.2f} Hz in {first.time[-1] - first.time[0]:.0f} s, by {100 * (1 - end / start):.0f} %."
-    )
-    rank = "" if combined.verdict.decided else " It fits best, but is not the only law that fits."
-    return (Paragraph(f"{law.meaning}{rank} {lost}", f"What the {combined.best} law means."),)
+    """What takes the spin by the best law, how fast, and what the constants say."""
+    return (Paragraph(" ".join(meaning(analysis)), "What it means."),)
 
 
 def _falls(analysis: SpinDownAnalysis) -> tuple[Paragraph, ...]:

@@ -1,0 +1,69 @@
+"""What is made up of a result, and what comes of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from levilab.crosscheck.subject import Pull, TrialFailed
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    import numpy as np
+
+    from analysis.uncertainty import Estimate
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One set of readings that was made up and analyzed.
+
+    Attributes:
+        pulls: of the quantities.
+        law: that the analysis favours; empty where no laws compete.
+        excluded: whether the analysis excludes what is true; None where it tests nothing.
+    """
+
+    pulls: list[Pull]
+    law: str = ""
+    excluded: bool | None = None
+
+
+@dataclass(frozen=True)
+class Own:
+    """A result as a subject of trials.
+
+    Attributes:
+        about: what is made up, in words.
+        trial: from a source of random numbers to a trial; raises TrialFailed, or an error of the analysis.
+        cost_s: processor time of a trial on an ordinary computer, as measured [s]; it decides how many a report makes.
+        law: that is true in the trials; empty where none competes.
+        hypothesis: what the analysis tests and may exclude, in words; empty for nothing.
+        expected_share: of the trials in which chance excludes it.
+        freedom: quantity → degrees of freedom of its u, where that rests on a scatter of few values: its pulls follow
+            Student's law.
+        more: what to know of the pulls.
+    """
+
+    about: str
+    trial: Callable[[np.random.Generator], Trial]
+    cost_s: float
+    law: str = ""
+    hypothesis: str = ""
+    expected_share: float = 0.0
+    freedom: Mapping[str, int] = field(default_factory=dict)
+    more: tuple[str, ...] = ()
+
+
+def pull(quantity: str, found: Estimate | None, truth: float) -> Pull:
+    """The pull of an estimate.  Raises TrialFailed where it has no value or no uncertainty."""
+    if found is None or found.value is None or not found.u:
+        raise TrialFailed(f"{quantity}: the analysis gives no value with an uncertainty")
+    return Pull(quantity, found.value, found.u, truth)
+
+
+def one_of(found: Any) -> Any:
+    """The only run of an analysis."""
+    (run,) = found.runs
+    return run

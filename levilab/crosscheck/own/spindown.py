@@ -1,0 +1,198 @@
+"""Spin-downs with the fitted constants, times, scatter, correlation, gates and number of runs of a result."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from analysis.budget import printed_step
+from analysis.spindown.combine import combine
+from analysis.spindown.drag import LAWS
+from analysis.spindown.fit import fit_spin_down, is_correlated
+from analysis.spindown.tilt import counted
+from levilab.crosscheck.own.model import Own, Trial, pull
+from levilab.pipelines.budget import gate_of
+from levilab.pipelines.spindown.analysis import EXPERIMENT, TILTED
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from analysis.spindown.fit import SpinDown
+    from analysis.spindown.lawfit import LawFit
+    from levilab.pipelines.spindown.analysis import SpinDownAnalysis
+
+    Array = np.ndarray[tuple[int], np.dtype[np.float64]]
+
+#: Processor time of one run's fits [s].
+_COST_S = 0.065
+#: Runs that scatter by so many times what their readings leave give u from their scatter alone.
+_SCATTERS = 1.5
+#: The exponent of a law of one power.
+_EXPONENTS = {"stokes": 1.0, "disc": 1.5, "newton": 2.0}
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """A run as its trials are made.
+
+    Attributes:
+        time, u: of the readings [s], [Hz], shape (n,); u is None where it is not stated.
+        fit: the law that is true.
+        noise: standard deviation of a reading, shape (n,) [Hz].
+        rho: correlation of neighbours.
+        step: last digit of the readings [Hz]; 0: they are not rounded.
+        gate: of the counter [s]; 0: not known.
+        tilt, driven: as the analysis had them.
+    """
+
+    time: Array
+    u: Array | None
+    fit: LawFit
+    noise: Array
+    rho: float
+    step: float
+    gate: float
+    tilt: bool | None
+    driven: bool
+
+    def readings(self, random: np.random.Generator, factors: Sequence[float]) -> Array:
+        """Made-up readings, the constants multiplied by factors, shape (n,) [Hz]."""
+        return _rounded(self.curve(factors) + self.noise * _noise(random, len(self.time), self.rho), self.step)
+
+    def curve(self, factors: Sequence[float]) -> Array:
+        """The mean over the gate of what the counter counts, shape (n,) [Hz]."""
+        frequency, duration = self.fit.reference
+        solution = self.fit.solution.copy()
+        solution[1 : 1 + len(factors)] *= factors
+        tau = (self.time - self.fit.start_time) / duration
+        half = min(self.gate / duration / 2, 0.5)
+        middle = np.clip(tau, half, 1 - half)
+
+        def at(times: Array) -> Array:
+            return np.asarray(counted(LAWS[self.fit.name], times, solution))
+
+        bias = (at(middle - half) + at(middle + half) - 2 * at(middle)) / 6 if half else 0.0
+        return np.asarray(frequency * (at(tau) + bias))
+
+
+def own(found: SpinDownAnalysis) -> Own:
+    """The trials of spin-downs: all runs anew in each."""
+    law = found.combined.best
+    runs = [_run(found, k, run.fit(law), run) for k, run in enumerate(found.runs)]
+    constants = [name for name in LAWS[law].constants if name != "exponent"]
+    spread = _between(found, law, constants)
+    several = len(runs) > 1
+    hidden = not any(run.has_tilt for run in found.runs) and any(run.tilt is None for run in runs)
+    more = (
+        ("here u holds what a tilt that noise hides would do; what was made up has none, so the pulls scatter less",)
+        if hidden
+        else ()
+    )
+    return Own(
+        about=f"{len(runs)} spin-down{'s' * several} by the {law} law, "
+        + ("constants that differ from run to run as these do, " if several else "")
+        + "with the times, scatter, correlation, gate and digits of the readings",
+        trial=lambda random: _trial(random, runs, law, constants, spread),
+        cost_s=_COST_S * len(runs),
+        law=law,
+        freedom=_freedom(found, law, constants),
+        more=more,
+    )
+
+
+def _run(found: SpinDownAnalysis, k: int, fit: LawFit, run: SpinDown) -> _Run:
+    source, options = found.sources[k], found.origins[k].options
+    step = printed_step(source.readings.frequency.tolist())
+    noise = _scatter(fit, run)
+    return _Run(
+        time=run.time,
+        u=run.u,
+        fit=fit,
+        noise=np.sqrt(np.maximum(noise**2 - (step or 0.0) ** 2 / 12, 0.0)),
+        rho=max(run.correlation.value, 0.0) if run.correlation and is_correlated(run.correlation) else 0.0,
+        step=step or 0.0,
+        gate=gate_of(source, EXPERIMENT) or 0.0,
+        tilt=True if fit.has_tilt else TILTED[options.tilt],
+        driven=source.readings.driven,
+    )
+
+
+def _scatter(fit: LawFit, run: SpinDown) -> Array:
+    """Standard deviation of each reading, shape (n,) [Hz]: as stated, or more where they scatter more."""
+    stats = fit.statistics
+    if run.u is not None:
+        return np.asarray(run.u * np.sqrt(stats.inflation))
+    return np.full(len(run.time), np.sqrt(stats.rss / max(stats.degrees_of_freedom, 1)))
+
+
+def _between(found: SpinDownAnalysis, law: str, constants: Sequence[str]) -> list[float]:
+    """Relative standard deviation of each constant from run to run beyond what the readings of each leave."""
+    means = found.combined.fit(law).constants
+    spread = []
+    for name in constants:
+        mean = means[name]
+        own_u = [fit.parameters[name].u or 0.0 for fit in (run.fit(law) for run in found.runs)]
+        variance = 0.0 if mean.scatter is None else mean.scatter**2 - float(np.mean(np.square(own_u)))
+        spread.append(float(np.sqrt(max(variance, 0.0))) / abs(mean.value) if mean.value else 0.0)
+    return spread
+
+
+def _freedom(found: SpinDownAnalysis, law: str, constants: Sequence[str]) -> dict[str, int]:
+    """Degrees of freedom of the means whose u comes from the scatter of the runs."""
+    freedom = {}
+    for name in constants:
+        mean = found.combined.fit(law).constants[name]
+        own_u = [run.fit(law).parameters[name].u or 0.0 for run in found.runs]
+        if mean.scatter is not None and mean.scatter > _SCATTERS * float(np.sqrt(np.mean(np.square(own_u)))):
+            freedom[name] = mean.degrees_of_freedom
+    return freedom
+
+
+def _trial(
+    random: np.random.Generator, runs: Sequence[_Run], law: str, constants: Sequence[str], spread: Sequence[float]
+) -> Trial:
+    """All runs made up and analyzed."""
+    several = len(runs) > 1
+    means = [float(np.mean([run.fit.parameters[name].value or 0.0 for run in runs])) for name in constants]
+    fits = []
+    for run in runs:
+        # of several runs each has a constant of its own about the mean; of one it is the fitted one
+        truths = [mean * (1 + s * random.standard_normal()) for mean, s in zip(means, spread, strict=True)]
+        factors = [
+            truth / (run.fit.parameters[name].value or truth) if several else 1.0
+            for name, truth in zip(constants, truths, strict=True)
+        ]
+        readings = run.readings(random, factors)
+        fits.append(fit_spin_down(run.time, readings, run.u, tilt=run.tilt, driven=run.driven, gate=run.gate or None))
+    together = combine(fits)
+    found = together.fit(law).constants if several else fits[0].fit(law).parameters
+    pulls = [pull(name, found[name], mean) for name, mean in zip(constants, means, strict=True) if name != "c"]
+    if not several:
+        truth = runs[0].fit.parameters["start_frequency"].value or 0.0
+        pulls.append(pull("start_frequency", found["start_frequency"], truth))
+    exponent = _EXPONENTS.get(law)
+    if law == "power":
+        exponent = float(np.mean([run.fit.parameters["exponent"].value or 0.0 for run in runs]))
+    if exponent is not None:
+        of_power = together.fit("power").constants if several else fits[0].fit("power").parameters
+        pulls.append(pull("exponent", of_power["exponent"], exponent))
+    return Trial(pulls, law=together.best, excluded=law in {name for name, _ in together.verdict.excluded})
+
+
+def _noise(random: np.random.Generator, n: int, rho: float) -> Array:
+    """Noise of unit variance whose neighbours have a correlation, shape (n,)."""
+    news = random.standard_normal(n)
+    if rho <= 0:
+        return np.asarray(news)
+    noise = np.empty(n)
+    noise[0] = news[0]
+    root = float(np.sqrt(1 - rho**2))
+    for k in range(1, n):
+        noise[k] = rho * noise[k - 1] + root * news[k]
+    return noise
+
+
+def _rounded(values: Array, step: float) -> Array:
+    return np.asarray(np.round(values / step) * step) if step else values

@@ -1,0 +1,264 @@
+"""Trials with the parameters of a result: their outcome as JSON, a table and blocks of a report.
+
+The random numbers follow from the readings' hashes, so that the same result has the same trials.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from analysis.errors import AnalysisError
+from levilab.crosscheck.own import field, limit, precession, spin, spindown
+from levilab.crosscheck.study import CHANCE, COVERAGE, Spread, by_reason, spreads_of
+from levilab.errors import LevilabError
+from levilab.present.document.blocks import Note, Paragraph, Tabular
+from levilab.present.tables import Table, table
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from levilab.crosscheck.own.model import Own
+    from levilab.pipelines.analyzed import Analyzed
+    from levilab.present.document.blocks import Block
+
+#: Analysis → its result as a subject of trials.
+OWN: Mapping[str, Callable[[Any], Own]] = MappingProxyType({
+    "spindown": spindown.own, "precession": precession.own, "spin": spin.own, "field": field.own, "limit": limit.own,
+})  # fmt: skip
+#: Up to so many degrees of freedom a standard deviation of pulls says nothing; from so many on u is as if known.
+_LONG_TAILS, _MANY = 8, 30
+#: How many trials are made where no number is asked for.
+TRIALS = 200
+#: A report makes as many as fit into so much processor time, and none where these would be too few to say anything.
+REPORT_S, FEWEST = 2.0, 25
+
+
+@dataclass(frozen=True)
+class OwnCheck:
+    """The outcome of the trials.
+
+    Attributes:
+        analysis: its name.
+        inputs: sha256 of the readings, in the order of the inputs.
+        settings: of the analysis, as result.json has them.
+        about: what was made up.
+        trials, seed: how many, and of the random numbers.
+        spreads: of the pulls, one a quantity.
+        law: that was true; empty where none competes.
+        laws: law → how often it was favoured.
+        excluded, tested: in how many trials the analysis excluded what is true, of how many that tested it.
+        hypothesis, expected_share: what that is where it is no law, and the share that chance excludes.
+        failures: why trials came to no estimate → how often.
+        freedom: quantity → degrees of freedom of its u, where these are few.
+        more: what to know of the pulls.
+    """
+
+    analysis: str
+    inputs: tuple[str, ...]
+    settings: Mapping[str, Any]
+    about: str
+    trials: int
+    seed: int
+    spreads: tuple[Spread, ...]
+    law: str
+    laws: Mapping[str, int]
+    excluded: int
+    tested: int
+    hypothesis: str
+    expected_share: float
+    failures: Mapping[str, int]
+    freedom: Mapping[str, int]
+    more: tuple[str, ...] = ()
+
+    @property
+    def holds(self) -> bool:
+        """Whether estimates and uncertainties are right: pulls without bias that scatter by no more than wanted.
+
+        Uncertainties that are too large are no error here: a hidden tilt is in them, and in no reading that is made up.
+        """
+        return bool(self.spreads) and all(map(self.is_right, self.spreads))
+
+    def is_right(self, spread: Spread) -> bool:
+        """Whether the pulls of one quantity are as wanted."""
+        return holds(spread, self.freedom.get(spread.quantity))
+
+
+def wanted_coverage(freedom: int | None) -> float:
+    """Share of true values within 1 u, where u rests on a scatter with so many degrees of freedom (Student's t).
+
+    >>> round(wanted_coverage(None), 3), round(wanted_coverage(3), 3)
+    (0.683, 0.609)
+    """
+    if freedom is None:
+        return COVERAGE
+    from scipy.special import stdtr
+
+    return float(2 * stdtr(freedom, 1.0) - 1)
+
+
+def holds(spread: Spread, freedom: int | None = None) -> bool:
+    """Whether pulls have no bias and scatter by no more than wanted, with room for chance.
+
+    With few degrees of freedom they have long tails, and their standard deviation says nothing: what lies within 1 u
+    does.
+    """
+    if spread.n < 2:
+        return True
+    wanted = wanted_coverage(freedom)
+    few = CHANCE * math.sqrt(wanted * (1 - wanted) / spread.n)
+    scatter = 1.0 if freedom is None else math.sqrt(freedom / (freedom - 2)) if freedom > _LONG_TAILS else math.inf
+    return (
+        abs(spread.mean) <= 0.1 + CHANCE * max(spread.deviation, 1.0) / math.sqrt(spread.n)
+        and spread.deviation <= scatter * (1.1 + CHANCE / math.sqrt(2 * spread.n))
+        and spread.coverage >= wanted - 0.05 - few
+    )
+
+
+def seed_of(analysis: str, inputs: Sequence[str]) -> int:
+    """Of the random numbers, from the readings."""
+    digest = hashlib.sha256("\n".join([analysis, *inputs]).encode()).digest()
+    return int.from_bytes(digest[:6], "big")
+
+
+def trials_of_report(subject: Own) -> int:
+    """How many trials a report makes of its own accord; 0 where there is no time for enough of them."""
+    count = min(TRIALS, int(REPORT_S / subject.cost_s))
+    return count if count >= FEWEST else 0
+
+
+def check_own(
+    analysis: str,
+    found: Analyzed[Any, Any, Any, Any],
+    settings: Mapping[str, Any],
+    trials: int = TRIALS,
+    progress: Callable[[float], None] = lambda _: None,
+) -> OwnCheck:
+    """Make the trials of a result.
+
+    Args:
+        analysis: its name.
+        found: what it found.
+        settings: of the analysis, as result.json has them.
+        trials: how many.
+        progress: called with the share that is done.
+    """
+    subject = OWN[analysis](found)
+    inputs = tuple(source.sha256 for source in found.sources)
+    seed = seed_of(analysis, inputs)
+    done, failures = [], []
+    for k in range(trials):
+        try:
+            with np.errstate(all="ignore"):
+                done.append(subject.trial(np.random.default_rng((seed, k))))
+        except (LevilabError, AnalysisError) as error:
+            failures.append(str(error))
+        progress((k + 1) / trials)
+    laws = [trial.law for trial in done if trial.law]
+    tested = [trial.excluded for trial in done if trial.excluded is not None]
+    return OwnCheck(
+        analysis=analysis,
+        inputs=inputs,
+        settings=settings,
+        about=subject.about,
+        trials=trials,
+        seed=seed,
+        spreads=tuple(spreads_of([pull for trial in done for pull in trial.pulls])),
+        law=subject.law,
+        laws={law: laws.count(law) for law in sorted(set(laws), key=lambda one: (-laws.count(one), one))},
+        excluded=sum(tested),
+        tested=len(tested),
+        hypothesis=subject.hypothesis,
+        expected_share=subject.expected_share,
+        failures=by_reason(failures),
+        freedom=subject.freedom,
+        more=subject.more,
+    )
+
+
+# --- how people are shown it ---------------------------------------------------------------------------
+
+_NUMBERS = ("trials", "mean pull", "s.d. of pulls", "within 1 u")
+
+
+def own_table(found: OwnCheck, shown: Mapping[str, str] | None = None) -> Table:
+    """A row a quantity; behind ± stands what chance leaves to so many trials, one standard error.
+
+    Args:
+        found: the trials.
+        shown: quantity → its symbol.
+    """
+    names = shown or {}
+    rows = [
+        (
+            names.get(one.quantity, one.quantity.replace("_", " ")),
+            str(one.n),
+            f"{one.mean:+.2f} ± {1 / math.sqrt(one.n):.2f}".replace("-", "−"),
+            "–" if math.isnan(one.deviation) else f"{one.deviation:.2f} ± {1 / math.sqrt(2 * one.n):.2f}",
+            f"{100 * one.coverage:.0f} ± {100 * math.sqrt(COVERAGE * (1 - COVERAGE) / one.n):.0f} %",
+            "yes" if found.is_right(one) else "NO",
+        )
+        for one in found.spreads
+    ]
+    return table("", ("quantity", *_NUMBERS, "as wanted"), rows, numbers=_NUMBERS)
+
+
+def in_words(found: OwnCheck) -> str:
+    """What the trials say."""
+    texts = [f"{found.trials} times anew: {found.about}."]
+    if not found.spreads:
+        texts.append("No trial came to an estimate.")
+    elif found.holds:
+        texts.append("Values and uncertainties of this analysis are right for readings such as these.")
+    else:
+        wrong = ", ".join(one.quantity.replace("_", " ") for one in found.spreads if not found.is_right(one))
+        texts.append(f"For readings such as these the analysis is not right in {wrong}: trust its u the less.")
+    if found.law and found.laws:
+        n, again = sum(found.laws.values()), found.laws.get(found.law, 0)
+        others = ", ".join(f"{law} {count} times" for law, count in found.laws.items() if law != found.law)
+        texts.append(
+            f"The {found.law} law, which is true there, is the best one in {again} of {n} trials"
+            + (f" (else {others})" if others else "")
+            + f", and is excluded in {found.excluded}."
+        )
+    elif found.hypothesis and found.tested:
+        chance = found.expected_share * found.tested
+        texts.append(
+            f"The test excludes {found.hypothesis} in {found.excluded} of {found.tested} trials; chance alone "
+            f"does so in {chance:.0f} ± {math.sqrt(chance * (1 - found.expected_share)):.0f}."
+        )
+    few = {n for n in found.freedom.values() if n < _MANY}
+    if few:
+        share = f"{100 * wanted_coverage(min(few)):.0f} %"
+        texts.append(f"As u comes from the scatter of few values, {share} within 1 u are right (Student's t).")
+    texts += [f"{text[0].upper()}{text[1:]}." for text in found.more]
+    texts += [f"{count} trials came to no estimate: {reason}." for reason, count in found.failures.items()]
+    return " ".join(texts)
+
+
+def own_blocks(found: OwnCheck, shown: Mapping[str, str] | None = None) -> tuple[Block, ...]:
+    """The trials as blocks of a report."""
+    note = (
+        "A pull is (estimate − truth)/u; wanted are a mean of 0, a standard deviation of 1, and 68 % within 1 u. "
+        "Behind ± stands what chance leaves to so many trials, one standard error; smaller deviations mean that u is "
+        "on the safe side."
+    )
+    return (
+        Paragraph(in_words(found)),
+        Tabular(f"crosscheck-{found.analysis}", own_table(found, shown)),
+        Note(note),
+    )
+
+
+def quick_check(analysis: str, found: Analyzed[Any, Any, Any, Any], settings: Mapping[str, Any]) -> OwnCheck | None:
+    """As many trials as a report has time for; None where these would be too few, or the result has no trials."""
+    try:
+        count = trials_of_report(OWN[analysis](found))
+    except (LevilabError, AnalysisError):
+        return None
+    return check_own(analysis, found, settings, count) if count else None

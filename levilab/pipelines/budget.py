@@ -1,0 +1,264 @@
+"""Uncertainty budgets of results: the rows that analyses share, and how people are shown a budget."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from analysis.budget import Component, u_of_limit
+from analysis.numbers import digits
+from analysis.uncertainty import Estimate
+from instruments.time_bases import TIME_BASES
+from levilab.present.document.blocks import Bullets, Details, Note, Paragraph, Tabular
+from levilab.present.numbers import in_words, with_uncertainty
+from levilab.present.tables import Row, Table, table
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
+
+    from analysis.budget import Budget
+    from levilab.pipelines.analyzed import Analyzed
+    from levilab.pipelines.sources import Source
+    from levilab.present.document.blocks import Block
+
+#: No gate is longer [s]; what another program wrote beyond is none.
+_LONGEST_GATE_S = 1e4
+#: A row of unknown size says what so much of it would add (relative).
+_TEN_PPM = 1e-5
+#: Shares of u² below this are shown as such.
+_LEAST_SHARE = 0.001
+
+
+def time_base(source: Source[Any], kind: str, sensitivity: float, given: float | None, *, what: str = "") -> Component:
+    """The row of an instrument's clock, which no repetition shows, so that it is in no u.
+
+    Args:
+        source: the input.
+        kind: of the instrument, as run.json has it: "counter".
+        sensitivity: of the result to a relative error of the clock.
+        given: relative standard uncertainty, as given to the analysis.
+        what: the row in words; empty: the time base of the instrument.
+    """
+    what = what or f"time base of the {kind}"
+    about = source.run.record.instruments.get(kind) if source.run else None
+    driver = str((about or {}).get("driver", ""))[:40]
+    known = TIME_BASES.get(driver)
+    remedy = "a reference of 10 MHz at the instrument's input, or a comparison with one"
+    if given is not None:
+        u, note = given, "as given to the analysis"
+    elif known:
+        u = u_of_limit(known.limit)
+        note = (
+            f"±{known.limit * 1e6:g}×10⁻⁶ when new, even over that range, and {known.per_year * 1e6:g}×10⁻⁶ more "
+            f"each year ({known.source})"
+        )
+    elif about:
+        u, note = None, f"not known for {driver or 'this instrument'}: give it with `clock_u`, from its manual"
+    else:
+        u, note = None, "no instrument is recorded: give it with `clock_u`, from the manual"
+    return Component("time_base", what, "B", u, "1", sensitivity, included=False, note=note, remedy=remedy)
+
+
+def bench_clock(sensitivity: float) -> Component:
+    """The row of the clock by which readings have their times; see `time_base`."""
+    return Component(
+        "bench_clock",
+        "clock of the readings' times",
+        "B",
+        None,
+        "1",
+        sensitivity,
+        included=False,
+        note="that of the computer, whose rate is not known; one that is set by the network is right to 10⁻⁶ or so",
+        remedy="a computer whose clock is set by the network",
+    )
+
+
+def gate_of(source: Source[Any], experiment: str) -> float | None:
+    """The counter's gate [s], where a run says it."""
+    settings = source.run.record.configuration.get(experiment) if source.run else None
+    gate = settings.get("gate_s") if isinstance(settings, dict) else None
+    return float(gate) if isinstance(gate, int | float) and 0 < gate < _LONGEST_GATE_S else None
+
+
+def setting_of(source: Source[Any], experiment: str, name: str) -> float | None:
+    """A setting of the run's experiment, where that is a number."""
+    settings = source.run.record.configuration.get(experiment) if source.run else None
+    value = settings.get(name) if isinstance(settings, dict) else None
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
+
+
+# --- how people are shown it ---------------------------------------------------------------------------
+
+#: Unit of results → the one in which people of this laboratory read it, and how many of them make one.
+_SHOWN_UNITS = {"T m": ("mT cm", 1e5), "m": ("mm", 1e3), "T": ("mT", 1e3)}
+
+#: Heads of the table, of which the numbers stand to the right.
+HEADS = ("source", "type", "u of it", "sensitivity", "adds to u", "share of u²")
+#: Unit of a sensitivity where the input has no unit, or the result.
+_NO_UNIT = "1"
+
+
+def budget_table(budget: Budget, shown: Mapping[str, str] | None = None) -> Table:
+    """A row for each component: what u is made of, u, and what it does not contain.
+
+    Args:
+        budget: of one result.
+        shown: quantity → its symbol; by default its name.
+    """
+    budget = _in_shown_units(budget)
+    unit = in_words(budget.unit)
+    rows = [Row(_cells(budget, one)) for one in budget.included]
+    rows.append(Row(("combined: u", "", "", "", _number(budget.u, unit), "100 %"), "together"))
+    left_out = budget.left_out
+    rows += [Row((f"{cells[0]} (not in u)", *cells[1:])) for one in left_out if (cells := _cells(budget, one))]
+    if any(one.contribution for one in left_out):
+        rows.append(Row(("u with all of it", "", "", "", _number(budget.u_with_all, unit), ""), "together"))
+    return table(title_of(budget, shown), HEADS, rows, numbers=HEADS[2:])
+
+
+def _in_shown_units(budget: Budget) -> Budget:
+    """The same in the units that people read."""
+    unit, factor = _SHOWN_UNITS.get(budget.unit, (budget.unit, 1.0))
+    rows = []
+    for one in budget.components:
+        of_input, times = _SHOWN_UNITS.get(one.unit, (one.unit, 1.0))
+        u = None if one.u is None else one.u * times
+        rows.append(replace(one, u=u, unit=of_input, sensitivity=one.sensitivity * factor / times))
+    return replace(budget, value=budget.value * factor, u=budget.u * factor, unit=unit, components=tuple(rows))
+
+
+def title_of(budget: Budget, shown: Mapping[str, str] | None = None) -> str:
+    """The result, with its uncertainty."""
+    name = (shown or {}).get(budget.quantity, budget.quantity.replace("_", " "))
+    of = f" ({budget.model})" if budget.model else ""
+    return f"{name} = {with_uncertainty(Estimate(budget.value, budget.u, budget.unit))}{of}"
+
+
+def _cells(budget: Budget, one: Component) -> tuple[str, ...]:
+    share = budget.share(one)
+    return (
+        one.source,
+        one.kind,
+        "not known" if one.u is None else _number(one.u, in_words(one.unit)),
+        _number(abs(one.sensitivity), _ratio(budget.unit, one.unit)),
+        "—" if one.contribution is None else _number(one.contribution, in_words(budget.unit)),
+        _percent(share) if one.included else "",
+    )
+
+
+def _number(value: float, unit: str) -> str:
+    """Two digits: no uncertainty is known better."""
+    return f"{digits(value)} {unit}".strip()
+
+
+def _ratio(above: str, below: str) -> str:
+    """The unit of a sensitivity."""
+    if above == below:
+        return ""
+    if below == _NO_UNIT:
+        return in_words(above)
+    return f"per {in_words(below)}" if above == _NO_UNIT else f"{in_words(above)} per {in_words(below)}"
+
+
+def _percent(share: float | None) -> str:
+    """A share of u².
+
+    >>> _percent(0.9312), _percent(0.00002), _percent(None)
+    ('93 %', '< 0.1 %', '—')
+    """
+    if share is None:
+        return "—"
+    return "< 0.1 %" if share < _LEAST_SHARE else f"{digits(100 * share, 2)} %"
+
+
+def in_a_sentence(budget: Budget, shown: Mapping[str, str] | None = None) -> str:
+    """What dominates u of a result, what would make it smaller, and what it does not contain."""
+    name = (shown or {}).get(budget.quantity, budget.quantity.replace("_", " "))
+    budget = _in_shown_units(budget)
+    largest, texts = budget.largest, []
+    if largest is not None:
+        text = f"{_percent(budget.share(largest))} of u² of {name} comes from: {largest.source}"
+        texts.append(f"{text}. It gets smaller with {largest.remedy}." if largest.remedy else f"{text}.")
+    known = [one for one in budget.left_out if one.contribution]
+    if known and not budget.misses_nothing:
+        whole = _number(budget.u_with_all, in_words(budget.unit))
+        texts.append(f"Not in u: {_and([one.source for one in known])}; with all of it u is {whole}.")
+    elif known:
+        texts.append(f"Not in u, and negligible: {_and([one.source for one in known])}.")
+    unknown = [one for one in budget.left_out if one.u is None and one.sensitivity]
+    clocks = [one for one in unknown if one.unit == _NO_UNIT]
+    if clocks:
+        most = max(abs(one.sensitivity) for one in clocks) * _TEN_PPM
+        size = "less than 1 % of u" if most < 0.01 * budget.u else _number(most, in_words(budget.unit))
+        texts.append(f"Not known: {_and([one.source for one in clocks])}; an error of 10⁻⁵ would add {size}.")
+    texts += [f"Not known: {one.source}; it takes {one.remedy}." for one in unknown if one not in clocks]
+    return " ".join(texts)
+
+
+def budgets_of_result(found: Analyzed[Any, Any, Any, Any], shown: Mapping[str, str] | None = None) -> tuple[Block, ...]:
+    """The budgets of what was found: of all inputs together, and of each.
+
+    Args:
+        found: by an analysis.
+        shown: quantity → its symbol.
+    """
+    of_each = [
+        (source.name, origin.budget)
+        for source, origin in zip(found.sources, found.origins, strict=True)
+        if len(found.sources) > 1 and origin.budget
+    ]
+    each = [
+        Details(
+            f"{name} by itself", budget_blocks(budget, shown, name), on_paper="whole" if len(of_each) < _MANY else "out"
+        )
+        for name, budget in of_each[:_MOST_RUNS]
+    ]
+    if not found.budget and not each:
+        return (Paragraph("The result was written before budgets were kept with it: levilab analyze makes them."),)
+    return (*budget_blocks(found.budget, shown), *each)
+
+
+#: From so many runs on their budgets are not printed on paper; and so many are in a report.
+_MANY, _MOST_RUNS = 3, 12
+
+
+def budget_blocks(budgets: Sequence[Budget], shown: Mapping[str, str] | None = None, of: str = "") -> tuple[Block, ...]:
+    """Each budget as a table with what dominates it in a sentence, then where the numbers come from; empty of none.
+
+    Args:
+        budgets: of the results.
+        shown: quantity → its symbol.
+        of: the input, for the names of tables; empty for all of them together.
+    """
+    blocks: list[Block] = []
+    for budget in budgets:
+        words = " ".join(filter(None, ("budget", of, budget.model, budget.quantity)))
+        name = re.sub(r"[^a-z0-9]+", "-", words.casefold()).strip("-")
+        blocks.append(Tabular(name, budget_table(budget, shown), first_column_wraps=True))
+        blocks.append(Paragraph(in_a_sentence(budget, shown)))
+    notes = notes_of(budgets)
+    if notes:
+        blocks.append(Details("Where these uncertainties come from", (Bullets(tuple(notes)), Note(EXPLAINED))))
+    return tuple(blocks)
+
+
+#: What the columns and rows of a budget mean.
+EXPLAINED = (
+    "Type A is evaluated from a scatter that was seen, type B from anything else (GUM). The sensitivity "
+    "is the change of "
+    "the result with the input, and what a row adds to u is the sensitivity times the u of the input; squares add up "
+    "to u². What is not in u is common to all readings and runs, so that no repetition shows it."
+)
+
+
+def notes_of(budgets: Sequence[Budget]) -> list[str]:
+    """Where the numbers of the rows come from, each once."""
+    said = (f"{one.source}: {one.note}" for budget in budgets for one in budget.components if one.note)
+    return list(dict.fromkeys(said))
+
+
+def _and(words: Sequence[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

@@ -1,0 +1,84 @@
+"""What the standard error of a mean limit is made of."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from analysis.budget import Budget, Component, printed_step, rest, u_of_step
+from analysis.numbers import digits
+from levilab.pipelines.budget import time_base
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from levilab.pipelines.limit.analysis import LimitAnalysis, LimitOptions, Limits
+    from levilab.pipelines.limit.readings import LimitReadings
+    from levilab.pipelines.sources import Source
+
+#: Four times as many tops halve what scatters from one to the next.
+_TO_HALVE = 4
+
+
+def budget_of_run(source: Source[LimitReadings], run: Limits, options: LimitOptions) -> tuple[Budget, ...]:
+    """Of the mean of one run."""
+    return _budgets([source], run, options)
+
+
+def budget_of_all(analysis: LimitAnalysis) -> tuple[Budget, ...]:
+    """Of the means of all conditions."""
+    return tuple(
+        budget
+        for group in analysis.groups
+        for budget in _budgets([analysis.sources[k] for k in group.runs], group, analysis.options)
+    )
+
+
+def _budgets(sources: Sequence[Source[LimitReadings]], limits: Limits, options: LimitOptions) -> tuple[Budget, ...]:
+    mean = limits.statistics.mean
+    if mean.value is None or not mean.u:
+        return ()
+    rows = (*_rows(sources, limits), time_base(sources[0], "counter", mean.value, options.clock_u))
+    return (Budget("mean", mean.value, mean.u, mean.unit, rows, limits.which),)
+
+
+def _rows(sources: Sequence[Source[LimitReadings]], limits: Limits) -> Iterator[Component]:
+    found = limits.statistics
+    whole = found.mean.u or 0.0
+    if found.scatter is None:
+        yield Component("reading", "the limit by itself", "B", whole, "Hz", 1.0,
+                        note="of a single top: its scatter is not known", remedy="more tops")  # fmt: skip
+        return
+    step = min(found.step, whole)
+    by_tops = rest(whole, step)
+    if by_tops > 0:
+        root = math.sqrt(found.n)
+        each = by_tops * root
+        printed = printed_step([float(limit) for source in sources for limit in source.readings.limit]) or 0.0
+        rounding = u_of_step(printed)
+        if 0 < rounding < each and not step:
+            yield Component("resolution", "last digit of the limits", "B", rounding, "Hz", 1 / root,
+                            note=f"steps of {printed:g} Hz; a part of the scatter", remedy="more digits")  # fmt: skip
+            each = rest(each, rounding)
+        yield Component("scatter", "scatter from top to top", "A", each, "Hz", 1 / root,
+                        note=_about_scatter(limits), remedy=_more(limits))  # fmt: skip
+    if step > 0:
+        note = "the drive goes on in steps, the same for all tops, and each limit lies somewhere within one"
+        yield Component("step", "steps of the drive", "B", step, "Hz", 1.0, note=note,
+                        remedy="smaller steps (limit.creep_hz_per_s, limit.interval_s)")  # fmt: skip
+
+
+def _more(limits: Limits) -> str:
+    found = limits.statistics
+    if found.between and found.between.value:
+        return f"more runs: the {found.runs} differ by more than their tops"
+    return f"more tops: it takes {_TO_HALVE * found.n} instead of {found.n} to halve it"
+
+
+def _about_scatter(limits: Limits) -> str:
+    found = limits.statistics
+    scatter = (found.scatter.value or 0.0) if found.scatter else 0.0
+    text = f"standard deviation of one top from another {digits(scatter)} Hz, of {found.n} tops"
+    if found.between and found.between.value:
+        text += f"; {found.runs} runs differ by {digits(found.between.value)} Hz beyond that, which is in it"
+    return f"{text}; what the counter and the moment of the fall leave to each limit is part of it"

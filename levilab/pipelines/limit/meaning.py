@@ -1,0 +1,54 @@
+"""What limits of the spin mean, in sentences that a student understands."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from analysis.numbers import digits
+from levilab.present.numbers import with_uncertainty
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from levilab.pipelines.limit.analysis import LimitAnalysis, Limits
+
+#: The limit → why there is one.
+_WHY = MappingProxyType({
+    "lower": "below it the top spins too slowly to be upright, and the field turns it over",
+    "upper": "above it the top is so stiff that its axis no longer follows the field, or the drive "
+    "cannot take it along",
+})  # fmt: skip
+#: The mean of ten lower limits in the thesis [Hz], with its standard error.
+_THESIS, _THESIS_U = 21.86, 0.08
+
+
+def meaning(analysis: LimitAnalysis) -> tuple[str, ...]:
+    """The sentences, of each of the conditions."""
+    return tuple(text for group in analysis.groups for text in _sentences(group))
+
+
+def _sentences(group: Limits) -> Iterator[str]:
+    found = group.statistics
+    mean = found.mean
+    if mean.value is None:
+        return
+    yield f"The {group.which} limit is {with_uncertainty(mean)}: {_WHY[group.which]}."
+    if found.scatter is None or not found.scatter.value or not mean.u:
+        yield "How far another top's limit lies from that one top does not say."
+        return
+    ratio = found.scatter.value / mean.u
+    yield (
+        f"One top is lost {digits(found.scatter.value)} Hz from another, so a single one may be off by "
+        "that much; the mean "
+        f"of {found.n} is {digits(ratio)} times as good."
+    )
+    if group.which == "lower":
+        off = mean.value - _THESIS
+        u = (mean.u**2 + _THESIS_U**2) ** 0.5
+        if abs(off) < 2 * u:
+            yield f"The thesis's ten tops have {_THESIS:g}(8) Hz, which agrees."
+        else:
+            yield (
+                f"The thesis's ten tops have {_THESIS:g}(8) Hz, {digits(abs(off) / u)} u from it: another top, or mass."
+            )

@@ -1,0 +1,114 @@
+"""What the uncertainties of a spin frequency and of its slope are made of."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Literal
+
+from analysis.budget import Budget, Component, rest
+from analysis.numbers import digits
+from analysis.pulses.result import UNDER_DRAG, UNDER_DRIVE
+from levilab.pipelines.budget import time_base
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from analysis.pulses import SpinFrequency
+    from analysis.uncertainty import Estimate
+    from levilab.pipelines.sources import Source
+    from levilab.pipelines.spin.analysis import SpinOptions, SpinRun, UParts
+    from levilab.pipelines.spin.readings import Records
+
+#: Powers of the record's length by which u falls, with as much noise, and pulses as often.
+_BY_LENGTH = {"frequency": "√8", "chirp": "√32"}
+
+
+def budget_of_run(source: Source[Records], run: SpinRun, options: SpinOptions) -> tuple[Budget, ...]:
+    """Of frequency and slope of one record; of a long one or of several, of the window or record in the middle."""
+    made = []
+    for name, by_clock in (("frequency", 1.0), ("chirp", 2.0)):
+        estimate: Estimate = getattr(run.spin, name)
+        if name not in run.parts or estimate.value is None or not estimate.u:
+            continue
+        rows = [*_of_pulses(run, name, run.parts[name], estimate), *_of_the_rest(run, name, run.parts[name], estimate)]
+        what = "" if source.run else "clock of the recording"
+        rows.append(time_base(source, "oscilloscope", by_clock * estimate.value, options.clock_u, what=what))
+        made.append(Budget(name, estimate.value, estimate.u, estimate.unit, tuple(rows)))
+    return tuple(made)
+
+
+def _of_pulses(run: SpinRun, name: str, parts: UParts, estimate: Estimate) -> Iterator[Component]:
+    """What the places of the pulses leave: noise of the samples, which bounds it, and what they scatter beyond."""
+    spin = run.spin
+    longer = f"a record twice as long (u falls by {_BY_LENGTH[name]})"
+    bound = _bound(spin, name)
+    whole = parts.pulses
+    if bound is None:
+        note = f"{spin.pulses} pulses, each {digits(1e3 * spin.scatter)} ms from its place"
+        what = "scatter of the pulses' times"
+        if spin.scatter > 0:
+            yield Component("scatter", what, "A", spin.scatter, "s", whole / spin.scatter, note=note, remedy=longer)
+        else:
+            yield _direct("scatter", what, whole, estimate, note, longer)
+        return
+    noise = min(bound, whole)
+    if run.code is not None and run.code > 0:
+        of_codes = noise * min(run.code / math.sqrt(12), 1.0)
+        note = f"one step of its numbers is {digits(run.code)} times the noise of a sample, in which it is contained"
+        yield _direct("resolution", "bits of the oscilloscope", of_codes, estimate, note, "a finer vertical scale", "B")
+        noise = rest(noise, of_codes)
+    note = "the Cramér–Rao bound of a train of such pulses: no method does better"
+    yield _direct("noise", "noise of the samples", noise, estimate, note, f"more light, or {longer}")
+    beyond = rest(whole, min(bound, whole))
+    if beyond > 0:
+        note = "jitter of the pulses, neighbours that are alike, and few pulses to see both by"
+        yield _direct("jitter", "scatter of the pulses beyond the noise", beyond, estimate, note, longer)
+
+
+def _bound(spin: SpinFrequency, name: str) -> float | None:
+    """The Cramér–Rao bound of a frequency [Hz], and of a slope [Hz/s]: √60/T times as large."""
+    if spin.bound is None or not spin.frequency.value:
+        return None
+    span = (spin.pulses + spin.missing - 1) / spin.frequency.value
+    return spin.bound if name == "frequency" else spin.bound * math.sqrt(60) / span
+
+
+def _of_the_rest(run: SpinRun, name: str, parts: UParts, estimate: Estimate) -> Iterator[Component]:
+    """How the slope changes, and what the file says of its sampling interval."""
+    if parts.drag > 0:
+        note = "the frequency is taken where a drag in proportion to ω^(1.5 ± 0.5), or an even drive, leaves it"
+        yield _direct("drag", "law by which the slope changes", parts.drag, estimate, note, "a shorter record", "B")
+    elif run.series.of == "window" and name == "frequency" and run.spin.bend is None:
+        note = "ν″T²/40 of a window; its values are not corrected for it"
+        yield _direct("drag", "change of the slope within a window", abs(_bend(run.spin)), estimate, note,
+                      "shorter windows", "B", included=False)  # fmt: skip
+    if parts.step > 0:
+        note = "from a straight line through times that lost digits when they were printed"
+        yield _direct(
+            "step", "sampling interval", parts.step, estimate, note, "a file with its interval in the header", "B"
+        )
+
+
+def _bend(spin: SpinFrequency) -> float:
+    """By how much a parabola of the phase gives too high a frequency [Hz]."""
+    frequency, chirp = spin.frequency.value, spin.chirp.value
+    if not frequency or not chirp:
+        return 0.0
+    span = (spin.pulses + spin.missing - 1) / frequency
+    n = UNDER_DRAG if chirp < 0 else UNDER_DRIVE
+    return n * chirp**2 / frequency * span**2 / 40
+
+
+def _direct(  # noqa: PLR0917 - the fields of a row
+    row: str,
+    what: str,
+    part: float,
+    estimate: Estimate,
+    note: str,
+    remedy: str,
+    kind: Literal["A", "B"] = "A",
+    *,
+    included: bool = True,
+) -> Component:
+    """A row whose size is known in the result's own unit alone."""
+    return Component(row, what, kind, part, estimate.unit, 1.0, included, note, remedy)

@@ -1,0 +1,237 @@
+"""What the uncertainties of a spin-down's constants are made of."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from analysis.budget import Budget, Component, printed_step, rest, u_of_step
+from analysis.numbers import digits
+from levilab.pipelines.budget import bench_clock, gate_of, setting_of, time_base
+from levilab.pipelines.spindown.analysis import EXPERIMENT
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from analysis.spindown.combine import Mean
+    from analysis.spindown.fit import SpinDown
+    from analysis.spindown.lawfit import LawFit, Parts
+    from analysis.uncertainty import Estimate
+    from levilab.pipelines.sources import Source
+    from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions
+    from levilab.pipelines.spindown.readings import Readings
+
+#: The law whose exponent is a result beside the constants of the best one.
+_POWER, _EXPONENT = "power", "exponent"
+#: c of the power law depends exponentially on the exponent: known no better than to itself, it has no budget.
+_NOT_DETERMINED = 1.0
+#: The longer gate that is proposed, as a factor, and as the part of the time between two readings.
+_LONGER, _MOST_OF_INTERVAL = 10.0, 0.8
+#: Four times as many runs halve what scatters from one to the next.
+_TO_HALVE = 4
+
+
+# --- one run -------------------------------------------------------------------------------------------
+
+
+def budget_of_run(source: Source[Readings], run: SpinDown, options: SpinDownOptions) -> tuple[Budget, ...]:
+    """Of the parameters of the best law, and of the exponent."""
+    return tuple(
+        Budget(name, estimate.value, estimate.u, estimate.unit, tuple(_rows(source, run, fit, name, options)), fit.name)
+        for fit, name in _wanted(run)
+        if (estimate := fit.parameters[name]).value is not None and estimate.u and name in fit.parts
+    )
+
+
+def _wanted(run: SpinDown) -> list[tuple[LawFit, str]]:
+    best = run.fit(run.best)
+    wanted = [(best, name) for name in best.parameters if _is_determined(best, name)]
+    others = [fit for fit in run.fits if fit.name == _POWER and fit is not best]
+    return wanted + [(fit, _EXPONENT) for fit in others]
+
+
+def _is_determined(fit: LawFit, name: str) -> bool:
+    value, u = fit.parameters[name].value, fit.parameters[name].u
+    return name != "c" or (value is not None and u is not None and u < _NOT_DETERMINED * abs(value))
+
+
+def _rows(
+    source: Source[Readings], run: SpinDown, fit: LawFit, name: str, options: SpinDownOptions
+) -> Iterator[Component]:
+    estimate, parts = fit.parameters[name], fit.parts[name]
+    yield from _of_readings(source, run, fit, name, options)
+    yield from _of_model(fit, parts, estimate)
+    gate = gate_of(source, EXPERIMENT)
+    if gate is not None and parts.gate is not None:
+        note = f"the mean over {gate:g} s is higher than the spin in the middle; not corrected"
+        yield Component(
+            "gate", "gate: a mean over a falling spin", "B", gate**2, "s²", parts.gate / gate**2,
+            included=False, note=note, remedy="a shorter gate",
+        )  # fmt: skip
+    if name in fit.law.constants and name != _EXPONENT:
+        note = "one run says nothing of it; the thesis's four differ by 2 %, of which the u of each explains a tenth"
+        yield Component(
+            "runs", "scatter from run to run", "A", None, estimate.unit, 1.0,
+            included=False, note=note, remedy="several runs",
+        )  # fmt: skip
+    by_counter, by_times = _by_clocks(fit, name)
+    value = estimate.value or 0.0
+    if by_counter:
+        yield time_base(source, "counter", by_counter * value, options.clock_u)
+    if by_times:
+        yield bench_clock(by_times * value)
+
+
+def _of_readings(
+    source: Source[Readings], run: SpinDown, fit: LawFit, name: str, options: SpinDownOptions
+) -> Iterator[Component]:
+    """What the readings scatter, the digits in which they are read, and what comes on top of that."""
+    parts, unit, stated = fit.parts[name], fit.parameters[name].unit, run.u is not None
+    if run.u is not None:
+        each = float(np.sqrt(np.mean(run.u**2)))
+        what, note = "readings, by their stated u", "as given to the analysis" if options.reading_u else ""
+    else:
+        each = math.sqrt(fit.statistics.rss / max(fit.statistics.degrees_of_freedom, 1))
+        what, note = "scatter of the readings", "standard deviation about the law"
+    if not each > 0:
+        return
+    sensitivity = parts.scatter / each
+    step = printed_step(run.frequency.tolist()) or 0.0
+    rounding, is_part = u_of_step(step), u_of_step(step) < each
+    if rounding > 0:
+        within = "a part of what a reading scatters" if is_part else "more than the u of a reading"
+        yield Component(
+            "resolution", "last digit of the readings", "B", rounding, "Hz", sensitivity,
+            included=is_part, note=f"steps of {step:g} Hz, {within}", remedy="more digits",
+        )  # fmt: skip
+    own = rest(each, rounding) if is_part else each
+    remedy = _better_readings(source)
+    yield Component("scatter", what, "B" if stated else "A", own, "Hz", sensitivity, note=note, remedy=remedy)
+    if parts.excess > 0:
+        note = f"χ²/dof = {digits(fit.statistics.reduced_chi_square or 0.0)}"
+        remedy = "finding what the law, or the stated u, leaves out"
+        yield _direct("excess", "scatter beyond the stated u", parts.excess, unit, note, remedy, kind="A")
+    if parts.correlation > 0:
+        found = run.correlation
+        note = f"ρ = {found.value:.2f} ± {found.u:.2f} between neighbours" if found else ""
+        yield _direct(
+            "correlation", "correlation of neighbouring readings", parts.correlation, unit, note,
+            "a calmer top, or more runs", kind="A",
+        )  # fmt: skip
+
+
+def _of_model(fit: LawFit, parts: Parts, estimate: Estimate) -> Iterator[Component]:
+    """What the tilt of the top's moment leaves open, fitted or hidden."""
+    if parts.beforehand > 0:
+        note = "resonance and nutation are known beforehand only so well"
+        yield _direct("beforehand", "what is known of the wobble", parts.beforehand, estimate.unit, note, "")
+    if parts.tilt > 0:
+        what, note = "tilt that noise hides", "what a tilt of the moment would change, by its probability"
+        if fit.has_tilt:
+            what, note = "model of the tilt", "a twentieth of what the tilt changes, 0.15 of the tilt itself"
+        remedy = "less noise in the readings, and readings until the top falls"
+        yield _direct("tilt", what, parts.tilt, estimate.unit, note, remedy)
+
+
+def _by_clocks(fit: LawFit, name: str) -> tuple[float, float]:
+    """Relative change of a parameter with the rates of the counter's clock and of that of the times.
+
+    Where all frequencies are multiplied by 1 + ε and all times by 1 + η, C of ω̇ = −Cωⁿ is by (1 + ε)^(1 − n)/(1 + η).
+    """
+    if name in {"start_frequency", "resonance", "wobble"}:
+        return 1.0, 0.0
+    constants = fit.law.constants
+    if name not in constants or name == _EXPONENT:
+        return 0.0, 0.0
+    exponent = fit.parameters[_EXPONENT].value if _EXPONENT in constants else None
+    order = fit.law.orders[constants.index(name)] if fit.law.orders else (exponent or 1.0) - 1
+    return -order, -1.0
+
+
+def _direct(  # noqa: PLR0917 - the fields of a row
+    row: str, what: str, part: float, unit: str, note: str, remedy: str, *, kind: Literal["A", "B"] = "B"
+) -> Component:
+    """A row whose size is known in the result's own unit alone."""
+    return Component(row, what, kind, part, unit, 1.0, note=note, remedy=remedy)
+
+
+def _better_readings(source: Source[Readings]) -> str:
+    """What would make the readings better, as the end of a sentence."""
+    gate, interval = gate_of(source, EXPERIMENT), setting_of(source, EXPERIMENT, "interval_s")
+    if gate is None or not interval:
+        return "more readings in the same time, or a longer gate"
+    longer = min(_LONGER * gate, _MOST_OF_INTERVAL * interval)
+    if longer < 2 * gate:
+        return f"more runs: their mean over N is better by √N (the gate, {gate:g} s, can hardly be longer)"
+    return f"a gate of {longer:g} s instead of {gate:g} s, where single pulses scatter, or by more runs"
+
+
+# --- several runs --------------------------------------------------------------------------------------
+
+
+def budget_of_all(analysis: SpinDownAnalysis) -> tuple[Budget, ...]:
+    """Of the means over several runs, from the budgets of each."""
+    combined = analysis.combined
+    best = combined.fit(combined.best)
+    wanted = [(best.name, name, mean) for name, mean in best.constants.items() if name != "c"]
+    if best.name != _POWER:
+        power = next((fit for fit in combined.fits if fit.name == _POWER), None)
+        wanted += [(_POWER, _EXPONENT, power.constants[_EXPONENT])] if power else []
+    made = (_budget_of_mean(analysis, law, name, mean) for law, name, mean in wanted)
+    return tuple(one for one in made if one)
+
+
+def _budget_of_mean(analysis: SpinDownAnalysis, law: str, name: str, mean: Mean) -> Budget | None:
+    """U of a mean: what the runs scatter, or no less than their own uncertainties leave; and what they share."""
+    fits = [run.fit(law) for run in analysis.runs]
+    n = mean.degrees_of_freedom + 1
+    if mean.value is None or not mean.u or mean.scatter is None or n != len(fits):
+        return None
+    shared = float(np.mean([fit.shared_u.get(name, 0.0) for fit in fits]))
+    by_runs = rest(mean.u, shared)
+    own = [rest(u, fit.shared_u.get(name, 0.0)) for fit in fits if (u := fit.parameters[name].u)]
+    of_readings = float(np.linalg.norm(own)) / n
+    remedy = f"more runs: it takes {_TO_HALVE * n} instead of {n} to halve it"
+    rows: list[Component] = []
+    if of_readings >= by_runs * (1 - 1e-9):
+        note = f"the runs scatter by no more ({digits(mean.scatter)}) than their readings explain"
+        rows.append(
+            Component("runs", "readings of the runs", "A", of_readings * math.sqrt(n), mean.unit, 1 / math.sqrt(n),
+                      note=note, remedy=remedy)
+        )  # fmt: skip
+    else:
+        note = (
+            f"standard deviation of one run from another, {n} runs; the readings of each are part of it and alone "
+            f"would leave {digits(of_readings)} to the mean"
+        )
+        rows.append(
+            Component("runs", "scatter between the runs", "A", mean.scatter, mean.unit, by_runs / mean.scatter,
+                      note=note, remedy=remedy)
+        )  # fmt: skip
+    if shared > 0:
+        note = "the same in all runs of one top, so that no number of them makes it smaller"
+        rows.append(_direct("tilt", "tilt that all runs share", shared, mean.unit, note, "less noise in the readings"))
+    return Budget(name, mean.value, mean.u, mean.unit, (*rows, *_systematic(analysis, law, name, mean)), law)
+
+
+def _systematic(analysis: SpinDownAnalysis, law: str, name: str, mean: Mean) -> Iterator[Component]:
+    """What is common to all runs and in no u."""
+    source, fit = analysis.sources[0], analysis.runs[0].fit(law)
+    of_runs = [_row(origin.budget or (), law, name, "gate") for origin in analysis.origins]
+    gates = [one for one in of_runs if one and one.u]
+    if gates and len(gates) == len(of_runs):
+        u = float(np.mean([one.u for one in gates]))
+        yield replace(gates[0], u=u, sensitivity=float(np.mean([one.contribution for one in gates])) / u)
+    by_counter, by_times = _by_clocks(fit, name)
+    if by_counter:
+        yield time_base(source, "counter", by_counter * (mean.value or 0.0), analysis.options.clock_u)
+    if by_times:
+        yield bench_clock(by_times * (mean.value or 0.0))
+
+
+def _row(budgets: Sequence[Budget], law: str, name: str, row: str) -> Component | None:
+    found = (one for one in budgets if (one.model, one.quantity) == (law, name))
+    return next((row_ for one in found for row_ in one.components if row_.name == row), None)

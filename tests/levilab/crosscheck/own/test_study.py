@@ -1,0 +1,115 @@
+"""The cross-check with a result's own parameters: right for right analyses, the same each time, kept beside the run."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from levilab.crosscheck.own.model import Own, Trial
+from levilab.crosscheck.own.stored import as_part, file_of, read_own, restored, store
+from levilab.crosscheck.own.study import OWN, check_own, holds, in_words, own_table, seed_of, trials_of_report
+from levilab.crosscheck.study import Spread
+from levilab.errors import DataError
+from levilab.pipelines.catalogue import ANALYSES
+from support.paths import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+CHEAP = {"precession": ("precession-sweep",), "limit": ("upper-limits",), "spin": ("trace-tape",)}
+
+
+def result(name: str, *paths: Path) -> Any:
+    row = ANALYSES[name]
+    return row.analyze(list(paths), row.options_from({}))
+
+
+@pytest.mark.parametrize("name", CHEAP)
+def test_estimates_and_uncertainties_are_right_for_the_samples(sample_data: Path, name: str):
+    found = check_own(name, result(name, *(sample_data / part for part in CHEAP[name])), {}, 150)
+    assert found.holds, in_words(found)
+    assert {one.n for one in found.spreads} == {150}
+    assert not found.failures
+
+
+@pytest.fixture(scope="module")
+def runs() -> Any:
+    return result("spindown", ROOT / "sample_data/spin-down-1", ROOT / "sample_data/spin-down-2")
+
+
+def test_a_mean_of_several_runs_has_trials_that_differ_as_the_runs_do(runs: Any):
+    own = OWN["spindown"](runs)
+    assert own.law == "disc"
+    means = [own.trial(np.random.default_rng(k)) for k in range(6)]
+    c = np.array([trial.pulls[0].estimate for trial in means])
+    u = runs.combined.fit("disc").constants["c32"].u
+    assert np.std(c, ddof=1) > 0.3 * u  # each run's own readings would give a twelfth
+    assert all(trial.law for trial in means)
+    assert trials_of_report(own) == 0  # a report has no time for them
+
+
+def test_one_spin_down_and_one_scan_come_to_their_own_values(sample_data: Path):
+    spin_down = check_own("spindown", result("spindown", sample_data / "spin-down-3"), {}, 6)
+    assert [one.quantity for one in spin_down.spreads] == ["c32", "start_frequency", "exponent"]
+    assert spin_down.laws.get("disc", 0) >= 3
+    assert spin_down.excluded == 0
+    scan = check_own("field", result("field", sample_data / "field-scan"), {}, 12)
+    assert [one.quantity for one in scan.spreads] == ["strength", "origin", "thickness", "background"]
+    assert max(abs(value) for one in [*spin_down.spreads, *scan.spreads] for value in one.pulls) < 5
+
+
+def test_the_same_readings_have_the_same_trials_and_others_have_others(sample_data: Path):
+    found = result("limit", sample_data / "lower-limits")
+    assert check_own("limit", found, {}, 20) == check_own("limit", found, {}, 20)
+    assert seed_of("limit", ["a"]) != seed_of("limit", ["b"])
+
+
+def spread(mean: float, deviation: float, n: int = 400) -> Spread:
+    z = np.random.default_rng(5).standard_normal(n)
+    return Spread("x", tuple(mean + deviation * (z - z.mean()) / z.std(ddof=1)), 0.1)
+
+
+def test_a_bias_and_a_u_that_is_too_small_are_noticed_and_a_u_too_large_is_not():
+    assert holds(spread(0.0, 1.0))
+    assert not holds(spread(0.4, 1.0))
+    assert not holds(spread(0.0, 1.4))
+    assert holds(spread(0.0, 0.5))
+
+
+def test_a_wrong_analysis_is_named(monkeypatch: pytest.MonkeyPatch, sample_data: Path):
+    def off(random: np.random.Generator) -> Trial:
+        trial = real.trial(random)
+        return Trial([replace(one, u=one.u / 2) for one in trial.pulls])
+
+    found = result("limit", sample_data / "lower-limits")
+    real = OWN["limit"](found)
+    monkeypatch.setattr("levilab.crosscheck.own.study.OWN", {"limit": lambda _: Own("wrong", off, 0.001)})
+    checked = check_own("limit", found, {}, 100)
+    assert not checked.holds
+    assert "not right in mean" in in_words(checked)
+    assert own_table(checked).rows[0].cells[-1] == "NO"
+
+
+def test_trials_are_kept_beside_the_run_and_read_for_just_this_result(sample_data: Path, tmp_path: Path):
+    shutil.copytree(sample_data / "lower-limits", tmp_path / "run")
+    row, found = ANALYSES["limit"], result("limit", tmp_path / "run")
+    settings = row.settings_of(found)
+    checked = check_own("limit", found, settings, 10)
+    store([checked], found.place)
+    file = file_of(found.place)
+    assert file == tmp_path / "run" / "crosscheck.json"
+    assert json.loads(file.read_text(encoding="utf-8"))["schema"] == "levilab-crosscheck-own/1"
+    inputs = list(checked.inputs)
+    assert read_own(found.place, "limit", inputs, settings) == checked == restored(as_part(checked))
+    assert read_own(found.place, "limit", ["other readings"], settings) is None
+    assert read_own(found.place, "limit", inputs, settings | {"reading_u_hz": 0.1}) is None
+    file.write_text('{"schema": "levilab-crosscheck-own/1", "checks": [{}]}', encoding="utf-8")
+    with pytest.raises(DataError, match=r"crosscheck\.json.*--like"):
+        read_own(found.place, "limit", inputs, settings)
+    file.write_text('{"schema": "levilab-crosscheck/1"}', encoding="utf-8")  # of `levilab crosscheck --out`
+    assert read_own(found.place, "limit", inputs, settings) is None

@@ -1,0 +1,221 @@
+"""Budgets of the results: they add up to u, they are kept with the result, and each row acts as it says."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from analysis.spindown.drag import LAWS, spin
+from levilab.pipelines.budget import budget_blocks, budget_table, budgets_of_result, in_a_sentence
+from levilab.pipelines.catalogue import ANALYSES, save
+from levilab.present.document.blocks import Details, Paragraph, Tabular
+from support.paths import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from analysis.budget import Budget, Component
+
+CASES = {
+    "one spin-down": ("spindown", ("spin-down-1",)),
+    "four spin-downs": ("spindown", ("spin-down-1", "spin-down-2", "spin-down-3", "spin-down-4")),
+    "records": ("spin", ("trace-tape",)),
+    "pulse times": ("spin", ("scope-files/pulse-times.txt",)),
+    "a sound": ("spin", ("scope-files/recording.wav",)),
+    "rounded times": ("spin", ("scope-files/rigol-ds1000e.csv",)),
+    "a sweep": ("precession", ("precession-sweep",)),
+    "a scan": ("field", ("field-scan",)),
+    "lower limits": ("limit", ("lower-limits",)),
+    "upper limits": ("limit", ("upper-limits",)),
+}
+
+
+def analyzed(name: str, paths: list[Path], **given: Any) -> Any:
+    row = ANALYSES[name]
+    return row.analyze(paths, row.options_from(given))
+
+
+@pytest.fixture(scope="module")
+def found() -> dict[str, Any]:
+    return {
+        case: analyzed(name, [ROOT / "sample_data" / part for part in parts]) for case, (name, parts) in CASES.items()
+    }
+
+
+def row_of(budget: Budget, name: str) -> Component:
+    (row,) = [one for one in budget.components if one.name == name]
+    return row
+
+
+def of(budgets: Any, quantity: str) -> Budget:
+    (budget,) = [one for one in budgets if one.quantity == quantity]
+    return budget
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_rows_of_every_budget_add_up_to_the_u_of_the_result(found: dict[str, Any], case: str):
+    budgets = [one for origin in found[case].origins for one in origin.budget] + list(found[case].budget)
+    assert budgets
+    for budget in budgets:
+        assert budget.closes, (budget.quantity, budget.combined / budget.u - 1)
+        assert budget.u > 0
+        assert all(row.contribution is None or np.isfinite(row.contribution) for row in budget.components)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_budget_is_of_the_value_that_the_result_has(found: dict[str, Any], case: str, tmp_path: Path):
+    name, _ = CASES[case]
+    document = ANALYSES[name].document(found[case], tmp_path)
+    values = document["values"] or document["runs"][0]["values"]
+    for budget in document["budget"] if "budget" in document else document["runs"][0]["budget"]:
+        if budget["quantity"] in values:
+            assert budget["value"] == values[budget["quantity"]]["value"]
+            assert budget["u"] == values[budget["quantity"]]["u"]
+
+
+@pytest.mark.parametrize("case", ["four spin-downs", "records", "a sweep", "a scan", "upper limits"])
+def test_a_result_that_is_read_back_has_the_same_budgets(sample_data: Path, tmp_path: Path, case: str):
+    name, parts = CASES[case]
+    for part in parts:
+        shutil.copytree(sample_data / part, tmp_path / "runs" / part)
+    row, paths = ANALYSES[name], [tmp_path / "runs"]
+    before = row.analyze(paths, row.options_from({}))
+    save(row, before, with_figure=False)
+    after = row.recall(paths, row.options_from({}))
+    assert after.budget == before.budget
+    assert [origin.budget for origin in after.origins] == [origin.budget for origin in before.origins]
+
+
+def test_a_result_without_budgets_is_read_and_says_how_to_get_them(sample_data: Path, tmp_path: Path):
+    shutil.copytree(sample_data / "field-scan", tmp_path / "run")
+    row = ANALYSES["field"]
+    save(row, row.analyze([tmp_path / "run"], row.options_from({})), with_figure=False)
+    file = tmp_path / "run" / "result.json"
+    data = json.loads(file.read_text(encoding="utf-8"))
+    del data["budget"], data["runs"][0]["budget"]
+    file.write_text(json.dumps(data), encoding="utf-8")
+    old = row.recall([tmp_path / "run"], row.options_from({}))
+    assert old.budget == ()
+    assert "levilab analyze" in budgets_of_result(old)[0].text
+
+
+# --- each row acts as it says --------------------------------------------------------------------------
+
+
+def spin_down_file(folder: Path, name: str, *, frequency: float = 1.0, time: float = 1.0, decimals: int = 12) -> Path:
+    t = np.arange(0.0, 200.0, 10.0)
+    nu = spin("disc", t, 40.0, 2.34e-4) + 0.003 * np.random.default_rng(2).standard_normal(len(t))
+    lines = [f"{time * a:.9f},{frequency * b:.{decimals}f}" for a, b in zip(t, nu, strict=True)]
+    path = folder / name
+    path.write_text("\n".join(["time_s,spin_frequency_hz", *lines]) + "\n", encoding="utf-8")
+    return path
+
+
+def test_a_clock_that_is_wrong_moves_each_constant_by_its_row(tmp_path: Path):
+    off = 1e-4
+    plain, fast, late = (
+        analyzed("spindown", [spin_down_file(tmp_path, f"{k}.csv", frequency=f, time=t)], tilt="none", clock_u=off)
+        for k, (f, t) in enumerate([(1.0, 1.0), (1 + off, 1.0), (1.0, 1 + off)])
+    )
+    budgets = plain.budget
+    for law in ("disc", "newton", "stokes"):
+        for name in LAWS[law].parameters:
+            values = [one.runs[0].fit(law).parameters[name].value for one in (plain, fast, late)]
+            if law != "disc":
+                continue
+            clock = of(budgets, name)
+            row = row_of(clock, "time_base")
+            assert not row.included
+            assert values[1] - values[0] == pytest.approx(row.sensitivity * off, rel=1e-3)
+            if name == "c32":
+                bench = row_of(clock, "bench_clock")
+                assert values[2] - values[0] == pytest.approx(bench.sensitivity * off, rel=1e-3)
+
+
+def test_the_last_digit_is_part_of_the_scatter_and_no_more(tmp_path: Path):
+    fine, coarse = (
+        analyzed("spindown", [spin_down_file(tmp_path, f"{d}.csv", decimals=d)], tilt="none").budget for d in (12, 2)
+    )
+    assert not [one for one in of(fine, "c32").components if one.name == "resolution"]
+    row, budget = row_of(of(coarse, "c32"), "resolution"), of(coarse, "c32")
+    assert row.u == pytest.approx(0.01 / 12**0.5)
+    assert 0.2 < budget.share(row) < 1.0  # 2.9 mHz of 4 to 5
+    assert budget.closes
+
+
+def test_runs_that_differ_have_their_scatter_as_the_largest_row(found: dict[str, Any]):
+    budget = of(found["four spin-downs"].budget, "c32")
+    assert budget.largest is row_of(budget, "runs")
+    assert budget.share(budget.largest) > 0.9
+    assert "16 instead of 4" in in_a_sentence(budget)
+
+
+def test_one_run_does_not_hide_that_runs_differ(found: dict[str, Any]):
+    row = row_of(of(found["one spin-down"].budget, "c32"), "runs")
+    assert (row.u, row.included) == (None, False)
+    assert "several runs" in in_a_sentence(of(found["one spin-down"].budget, "c32"))
+
+
+def test_a_scope_of_a_known_make_has_its_clock_as_a_row(found: dict[str, Any]):
+    row = row_of(of(found["records"].origins[0].budget, "frequency"), "time_base")
+    assert row.u == pytest.approx(25e-6 / 3**0.5)
+    assert not row.included
+    assert "Rigol" in row.note
+
+
+def test_a_clock_that_was_not_stated_is_not_known_rather_than_right(found: dict[str, Any]):
+    budget = of(found["a sound"].budget, "frequency")
+    assert row_of(budget, "time_base").u is None
+    assert "Not known: clock of the recording" in in_a_sentence(budget)
+
+
+def test_the_clocks_of_a_sweep_are_a_factor_of_its_slope(found: dict[str, Any]):
+    row = row_of(of(found["a sweep"].budget, "slope"), "clocks")
+    assert (row.u, row.included) == (pytest.approx(2e-5), False)
+
+
+@pytest.mark.parametrize("with_u", [True, False])
+@pytest.mark.parametrize("orthogonal", [True, False])
+def test_a_line_closes_whatever_is_known_of_its_points(tmp_path: Path, with_u: bool, orthogonal: bool):
+    random, x = np.random.default_rng(3), np.linspace(28, 44, 9)
+    y = x + 0.02 * random.standard_normal(9)
+    lines = [f"{a},{b:.4f}" + (",0.004,0.01" if with_u else "") for a, b in zip(x, y, strict=True)]
+    head = "drive_frequency_hz,precession_frequency_hz" + (
+        ",precession_frequency_u_hz,drive_frequency_u_hz" if with_u else ""
+    )
+    path = tmp_path / "sweep.csv"
+    path.write_text("\n".join([head, *lines]) + "\n", encoding="utf-8")
+    budgets = analyzed("precession", [path], orthogonal=orthogonal).budget
+    assert [budget.quantity for budget in budgets] == ["slope", "intercept"]
+    assert all(budget.closes for budget in budgets)
+    names = {one.name for one in budgets[0].included}
+    assert ("drive" in names) == orthogonal
+    assert ("excess" in names) == with_u  # the points scatter by more than their u either way
+
+
+# --- how people are shown it ---------------------------------------------------------------------------
+
+
+def test_a_table_has_u_between_what_is_in_it_and_what_is_not(found: dict[str, Any]):
+    table = budget_table(of(found["four spin-downs"].budget, "c32"))
+    sources = [row.cells[0] for row in table.rows]
+    middle = sources.index("combined: u")
+    assert not any("(not in u)" in text for text in sources[:middle])
+    assert all("(not in u)" in text for text in sources[middle + 1 :] if text != "u with all of it")
+
+
+def test_a_field_is_shown_in_the_units_of_the_laboratory(found: dict[str, Any]):
+    table = budget_table(of(found["a scan"].budget, "strength"))
+    assert "mT cm" in table.title
+    assert any("mm" in row.cells[2] for row in table.rows)
+
+
+def test_budgets_are_blocks_with_a_sentence_each_and_their_origins(found: dict[str, Any]):
+    budgets = found["a sweep"].budget
+    blocks = budget_blocks(budgets)
+    assert [type(block) for block in blocks] == [Tabular, Paragraph, Tabular, Paragraph, Details]
+    assert len({block.name for block in blocks if isinstance(block, Tabular)}) == 2
