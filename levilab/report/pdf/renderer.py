@@ -46,7 +46,9 @@ LONGEST_WORD = 24
 #: Characters of the title in the head of each page.
 SHORT_TITLE = 90
 #: Sections from which on a document has an outline, and entries up to which it has those of the second depth.
-OUTLINED, MOST_ENTRIES = 6, 45
+OUTLINED, MOST_ENTRIES = 6, 20
+#: Height over width from which a figure may leave its place in the text for the top of a page.
+TALL = 0.62
 #: Of alike warnings so many are printed like the first.
 FEW_ALIKE = 3
 #: What no PDF may contain: code points that are no characters, and those for private use, which no font has.
@@ -112,8 +114,8 @@ class _Drawing:
         """Blocks as data; what is not printed is left out."""
         return [drawn for block in blocks if (drawn := _BLOCKS[type(block)](block, self)) is not None]
 
-    def figure(self, picture: Picture) -> tuple[str, str]:
-        """Draw a figure; the name of its file, and its format."""
+    def figure(self, picture: Picture) -> Drawn:
+        """Draw a figure; the name of its file, its format, and whether it is tall."""
         from levilab.present.style import as_pdf as figure_as_pdf  # with matplotlib
         from levilab.present.style import as_png
 
@@ -121,7 +123,8 @@ class _Drawing:
         kind, data = ("png", as_png(drawn, dpi=200)) if picture.raster else ("pdf", figure_as_pdf(drawn))
         name = f"figure-{len(self.files) + 1}.json"
         self.files[name] = json.dumps([*data], separators=(",", ":")).encode()
-        return name, kind
+        width, height = drawn.get_size_inches()
+        return {"file": name, "format": kind, "tall": bool(height > TALL * width)}
 
 
 def _content(document: Document, date: datetime | None, drawing: _Drawing) -> Drawn:
@@ -292,15 +295,12 @@ def _row(row: Row) -> Drawn:
 
 
 def _picture(block: Picture, drawing: _Drawing) -> Drawn:
-    file, kind = drawing.figure(block)
-    return {
+    return drawing.figure(block) | {
         "kind": "picture",
         "title": _text(block.title),
         "stop": "" if block.title.endswith((".", "?", "!")) else ".",
         "caption": _text(block.caption),
         "alt": _plain(block.alt),
-        "file": file,
-        "format": kind,
     }
 
 
