@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from levilab.present.style import Figure
     from levilab.simulator.scene import Scene
 
-EXPERIMENT = "simulate"
 #: Motions that took longer to compute are not computed again for a figure [s].
 LONGEST_S = 10.0
 NUMBERS = ("quantity", "value", "unit")
@@ -69,9 +68,46 @@ def motion_section(run: Run) -> Section:
     return Section(f"Simulated motion: {name}", tuple(blocks), "motion", run.folder.name, new_page=True)
 
 
-def is_motion(run: Run) -> bool:
-    """Whether a run folder holds a simulated motion."""
-    return run.record.experiment == EXPERIMENT
+def motions_overview(runs: Sequence[Run]) -> Section:
+    """One section of many simulated motions: a row for each, no figures."""
+    heads = ("run", "scene", "how it ended", "up for [s]", "spin at the end [Hz]")
+    rows, unusable = [], []
+    for run in runs:
+        try:
+            found = _document(run)
+        except DataError as error:
+            unusable.append((str(error),))
+            continue
+        fell = found.get("fell")
+        ended = str(fell.get("text", "fell")) if isinstance(fell, dict) else "stayed up"
+        numbers = (_digits(found, "end_s", 4), _digits(found, "spin_end_hz", 5))
+        rows.append((run.folder.name, str(found.get("scene") or "—"), ended, *numbers))
+    shown = Tabular("motions", table("", heads, rows, numbers=heads[3:]), first_column_wraps=True)
+    note = Note("A report of up to twelve simulated motions has a chapter with figure, lines and accuracy for each.")
+    warnings = [Warnings(tuple(unusable))] if unusable else []
+    return Section(f"{len(runs)} simulated motions", (SYNTHETIC, *warnings, shown, note), "motions", new_page=True)
+
+
+def motion_values(runs: Sequence[Run]) -> tuple[tuple[str, ...], tuple[tuple[str | float | bool | None, ...], ...]]:
+    """Heads and rows of a table for programs: what run.json says of each motion in single numbers and words."""
+    found = [(run, document) for run in runs if (document := _document_or_none(run))]
+    plain_keys = {
+        key: None
+        for _, document in found
+        for key, value in document.items()
+        if value is None or isinstance(value, str | int | float)
+    }
+    rows = [(run.folder.name, True, *map(document.get, plain_keys)) for run, document in found]
+    return ("input", "synthetic", *plain_keys), tuple(
+        tuple(None if isinstance(cell, dict | list) else cell for cell in row) for row in rows
+    )
+
+
+def _document_or_none(run: Run) -> Mapping[str, Any] | None:
+    try:
+        return _document(run)
+    except DataError:
+        return None
 
 
 def _document(run: Run) -> Mapping[str, Any]:
@@ -135,7 +171,9 @@ def _numbers(found: Mapping[str, Any], scene: Scene) -> Iterator[tuple[str, str,
     change = found.get("energy_change_relative")
     if isinstance(change, int | float):
         conserved = found.get("energy_conserved")
-        name = "error of the energy, which is conserved" if conserved else "change of the energy, which drag or drive make"
+        name = (
+            "error of the energy, which is conserved" if conserved else "change of the energy, which drag or drive make"
+        )
         yield name, plain(change, 2), "of itself"
 
 
@@ -165,17 +203,17 @@ def _lines(found: Mapping[str, Any]) -> Iterator[Block]:
 
 def _accuracy(found: Mapping[str, Any]) -> Iterator[Fact]:
     reached = "reached" if found.get("tolerance_reached") else "NOT reached"
-    yield Fact("Asked for", (f"an error of at most {_digits(found, 'tolerance', 1)} at the end, in m and in rad: {reached}",))
+    yield Fact(
+        "Asked for", (f"an error of at most {_digits(found, 'tolerance', 1)} at the end, in m and in rad: {reached}",)
+    )
     position, axis = (_digits(found, key, 1) for key in ("position_error_m", "axis_error_rad"))
     yield Fact("Estimated", (f"{position} m of the place, {axis} rad of the axis, at the end",))
     if steps := found.get("steps"):
         step = found.get("step_s")
         size = f" of at most {plain(1e3 * step)} ms" if isinstance(step, int | float) else ""
         yield Fact("Integrated", (f"{steps} steps{size} by {found.get('scheme', 'a scheme that is not recorded')}",))
-    yield Fact(
-        "Cost",
-        (f"{_digits(found, 'computing_time_s')} s on that machine, {_digits(found, 'times_real_time', 2)} times real time",),
-    )
+    took, speed = _digits(found, "computing_time_s"), _digits(found, "times_real_time", 2)
+    yield Fact("Cost", (f"{took} s on that machine, {speed} times as fast as the top itself",))
 
 
 def _digits(found: Mapping[str, Any], key: str, count: int = 3) -> str:

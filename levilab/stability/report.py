@@ -18,19 +18,6 @@ if TYPE_CHECKING:
     from levilab.present.document.blocks import Block
     from levilab.simulator.scene import Scene
 
-SCHEMA = "levilab-stability/1"
-
-
-def is_stability(path: Path) -> bool:
-    """Whether a file is the document of `levilab stability --json`."""
-    if path.suffix != ".json" or not path.is_file():
-        return False
-    try:
-        found = parse_json(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False
-    return isinstance(found, dict) and found.get("schema") == SCHEMA
-
 
 def stability_section(path: Path) -> Section:
     """The section of such a file.  Raises DataError for one that is damaged."""

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from levilab.motion.report import SYNTHETIC, command_in_words, scene_blocks
 from levilab.present.document.blocks import (
@@ -40,6 +43,8 @@ if TYPE_CHECKING:
 MOST_FIGURES = 6
 #: A table of points has at most so many rows.
 MOST_ROWS = 500
+#: A store of more points is read from itself, by programs that read Zarr.
+MOST_IN_A_TABLE = 100_000
 
 
 def sweep_section(path: Path) -> Section:
@@ -63,10 +68,25 @@ def sweep_section(path: Path) -> Section:
     return Section(f"Sweep: {name}", tuple(blocks), "sweep", path.name, new_page=True)
 
 
-def started(path: Path) -> str | None:
-    """When a store was made, as its attributes have it.  Raises DataError."""
-    created = Store.open(path).group.attrs.get("created_utc")
-    return str(created) if created else None
+def sweep_values(path: Path) -> tuple[tuple[str, ...], tuple[tuple[Any, ...], ...]] | None:
+    """Heads and rows of a table for programs: the points that are computed; None for a store of too many."""
+    store = Store.open(path)
+    plan = store.plan
+    if plan.size > MOST_IN_A_TABLE:
+        return None
+    found = store.load()
+    heads = ("synthetic", *(axis.key for axis in plan.axes), *found.values)
+    rows = []
+    for index in np.argwhere(found.computed):
+        place = tuple(index.tolist())
+        rows.append((True, *plan.point(place).values(), *(_cell(values[place]) for values in found.values.values())))
+    return heads, tuple(rows)
+
+
+def _cell(value: Any) -> Any:
+    """A value as Python's own; None for one that is not defined."""
+    plain = value.item()
+    return None if isinstance(plain, float) and not math.isfinite(plain) else plain
 
 
 def _warnings(store: Store, summary: Summary) -> Iterator[Warnings]:

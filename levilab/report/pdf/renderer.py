@@ -9,6 +9,7 @@ import json
 import re
 from dataclasses import dataclass, field
 from importlib import resources
+from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -34,7 +35,7 @@ from levilab.present.document.blocks import (
 from levilab.present.document.typesetting import typeset
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
     from datetime import datetime
 
     from levilab.present.document.blocks import Block, Document
@@ -45,10 +46,12 @@ TEMPLATE = "report.typ"
 LONGEST_WORD = 24
 #: Characters of the title in the head of each page.
 SHORT_TITLE = 90
-#: Sections from which on a document has an outline, and entries up to which it has those of the second depth.
-OUTLINED, MOST_ENTRIES = 6, 20
+#: Entries up to which an outline has those of the second depth.
+MOST_ENTRIES = 20
 #: Height over width from which a figure may leave its place in the text for the top of a page.
 TALL = 0.62
+#: Height over the width of the text beyond which a figure with its caption does not fit on a page.
+TALLEST = 1.2
 #: Of alike warnings so many are printed like the first.
 FEW_ALIKE = 3
 #: What no PDF may contain: code points that are no characters, and those for private use, which no font has.
@@ -63,27 +66,26 @@ class NoTypst(LevilabError):
     """The library that sets PDF is not installed."""
 
 
-def as_pdf(document: Document, date: datetime | None = None) -> bytes:
-    """A document as PDF; the same bytes for the same document.
+def check_typst() -> None:
+    """Raise NoTypst if PDF cannot be set here."""
+    if find_spec("typst") is None:
+        raise NoTypst(
+            'a PDF is set by typst, which is not installed: pip install "levilab[pdf]", or name the report report.html'
+        )
 
-    Args:
-        document: the blocks.
-        date: of the data, in the file's properties; None: it has none there.
+
+def as_pdf(document: Document) -> bytes:
+    """A document as PDF; the same bytes for the same document.
 
     Raises:
         NoTypst: the extra `pdf` is not installed.
     """
-    try:
-        import typst
-    except ImportError as error:
-        raise NoTypst(
-            "PDF is set by typst, which is not installed: install it with "
-            'pip install "levilab[pdf]", or write the report as report.html'
-        ) from error
+    check_typst()
+    import typst
     from matplotlib import get_data_path  # its fonts, which come with it, have what typst's own fonts lack
 
     pdf: bytes = typst.compile(
-        files_of(document, date),
+        files_of(document),
         format="pdf",
         font_paths=[Path(get_data_path()) / "fonts" / "ttf"],
         ignore_system_fonts=True,
@@ -91,10 +93,10 @@ def as_pdf(document: Document, date: datetime | None = None) -> bytes:
     return pdf
 
 
-def files_of(document: Document, date: datetime | None = None) -> dict[str, bytes]:
+def files_of(document: Document) -> dict[str, bytes]:
     """The files that typst sets: the template, the document as data, the figures."""
     drawing = _Drawing()
-    content = _content(document, date, drawing)
+    content = _content(document, drawing)
     template = (resources.files("levilab.report.pdf") / TEMPLATE).read_bytes()
     data = json.dumps(content, allow_nan=False, ensure_ascii=True, sort_keys=True).encode()
     return {"main.typ": template, "document.json": data, **drawing.files}
@@ -114,8 +116,13 @@ class _Drawing:
         """Blocks as data; what is not printed is left out."""
         return [drawn for block in blocks if (drawn := _BLOCKS[type(block)](block, self)) is not None]
 
-    def figure(self, picture: Picture) -> Drawn:
-        """Draw a figure; the name of its file, its format, and whether it is tall."""
+    def figure(self, picture: Picture, *, floats: bool = True) -> Drawn:
+        """Draw a figure: the name of its file, its format, its width, and whether it may leave its place.
+
+        Args:
+            picture: the block.
+            floats: whether there is text that can stand in its place.
+        """
         from levilab.present.style import as_pdf as figure_as_pdf  # with matplotlib
         from levilab.present.style import as_png
 
@@ -124,10 +131,16 @@ class _Drawing:
         name = f"figure-{len(self.files) + 1}.json"
         self.files[name] = json.dumps([*data], separators=(",", ":")).encode()
         width, height = drawn.get_size_inches()
-        return {"file": name, "format": kind, "tall": bool(height > TALL * width)}
+        shape = float(height / width)
+        return {
+            "file": name,
+            "format": kind,
+            "floats": floats and shape > TALL,
+            "width": min(100.0, 100 * TALLEST / shape),
+        }
 
 
-def _content(document: Document, date: datetime | None, drawing: _Drawing) -> Drawn:
+def _content(document: Document, drawing: _Drawing) -> Drawn:
     title = _plain(document.title)
     count = next((k for k, block in enumerate(document.blocks) if isinstance(block, Section)), len(document.blocks))
     first, rest = document.blocks[:count], document.blocks[count:]
@@ -135,11 +148,12 @@ def _content(document: Document, date: datetime | None, drawing: _Drawing) -> Dr
         "title": title,
         "short": _text(title if len(title) <= SHORT_TITLE else f"{title[: SHORT_TITLE - 1]}…"),
         "heading": _text(document.title),
-        "date": None if date is None else _date(date),
+        "date": None if document.date is None else _date(document.date),
         "lead": _text(document.lead),
         "banner": None if document.banner is None else _banner(document.banner, drawing),
         "mark": _text(document.banner.lead.rstrip(".")) if document.banner else "",
         "before": drawing.blocks(first),
+        "short_verdicts": [*_in_short(rest)],
         "outline": _outline_depth(document),
         "blocks": drawing.blocks(rest),
         "footer": _text(document.footer),
@@ -147,12 +161,29 @@ def _content(document: Document, date: datetime | None, drawing: _Drawing) -> Dr
 
 
 def _outline_depth(document: Document) -> int:
-    """How deep the outline goes; 0: a document so short has none."""
+    """How deep the outline goes; 0: none is asked for.  The template leaves it out of a document of few pages."""
     sections = [block for block in document.blocks if isinstance(block, Section)]
-    inner = sum(isinstance(block, Section) for section in sections for block in section.blocks)
-    if not document.contents and len(sections) + inner < OUTLINED:
+    if not document.contents:
         return 0
+    inner = sum(isinstance(block, Section) for section in sections for block in section.blocks)
     return 2 if len(sections) + inner <= MOST_ENTRIES else 1
+
+
+def _in_short(blocks: Iterable[Block]) -> Iterator[Drawn]:
+    """What each chapter says, for the first page of a report of several: its verdict, and how many warnings it has."""
+    chapters = [(block, [*_all_in(block)]) for block in blocks if isinstance(block, Section) and block.new_page]
+    for chapter, inner in chapters if len(chapters) > 1 else ():
+        verdict = next((one.text for one in inner if isinstance(one, Verdict)), "")
+        count = sum(len(group) for one in inner if isinstance(one, Warnings) for group in one.groups)
+        if verdict or count:
+            warnings = f"{count} warning{'s' * (count > 1)}" if count else ""
+            yield {"title": _text(chapter.title), "verdict": _text(verdict), "warnings": warnings}
+
+
+def _all_in(block: Block) -> Iterator[Block]:
+    yield block
+    for inner in block.blocks if isinstance(block, Section) else ():
+        yield from _all_in(inner)
 
 
 def _date(date: datetime) -> dict[str, int]:
@@ -229,12 +260,14 @@ def _fixed(text: str) -> Text:
 
 
 def _section(block: Section, drawing: _Drawing) -> Drawn:
+    # a heading does not stay behind alone when its only figure leaves
+    alone = len(block.blocks) == 1 and isinstance(block.blocks[0], Picture)
     return {
         "kind": "section",
         "title": _text(block.title),
         "lead": _text(block.lead),
         "page": block.new_page,
-        "blocks": drawing.blocks(block.blocks),
+        "blocks": [_picture(block.blocks[0], drawing, floats=False)] if alone else drawing.blocks(block.blocks),
     }
 
 
@@ -274,18 +307,21 @@ def _fact(fact: Fact) -> Drawn:
 
 
 def _tabular(block: Tabular, _: _Drawing) -> Drawn:
-    return {"kind": "tabular", **_table(block.table), "note": _text(block.note)}
+    names = block.table.heads[:1] if block.first_column_wraps else ()
+    return {"kind": "tabular", **_table(block.table, {*block.wraps, *names}), "note": _text(block.note)}
 
 
 def _listing(block: Listing, _: _Drawing) -> Drawn:
     return {"kind": "listing", **_table(block.table), "note": _text(block.note), "piece": block.rows_in_a_piece}
 
 
-def _table(table: Table) -> Drawn:
+def _table(table: Table, wraps: Collection[str] = ()) -> Drawn:
+    """A table: which of its columns are numbers, and which of the others are folded."""
     return {
         "title": _text(table.title),
         "heads": [_lines(head) for head in table.heads],
         "numbers": [k in table.numbers for k in range(len(table.heads))],
+        "wraps": [head in wraps for head in table.heads],
         "rows": [_row(row) for row in table.rows],
     }
 
@@ -294,8 +330,8 @@ def _row(row: Row) -> Drawn:
     return {"kind": row.kind, "cells": [_lines(cell) for cell in row.cells]}
 
 
-def _picture(block: Picture, drawing: _Drawing) -> Drawn:
-    return drawing.figure(block) | {
+def _picture(block: Picture, drawing: _Drawing, *, floats: bool = True) -> Drawn:
+    return drawing.figure(block, floats=floats) | {
         "kind": "picture",
         "title": _text(block.title),
         "stop": "" if block.title.endswith((".", "?", "!")) else ".",

@@ -1,4 +1,4 @@
-"""The folder of tables beside a report: what is in it, writing it, and taking away what an earlier report left there."""
+"""The folder of tables beside a report: what is in it, writing it, taking away what an earlier report left there."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from levilab.files import replace_atomically, writing
 from levilab.present.document.blocks import Banner, Details, Section, Tabular
-from levilab.report.tables.latex import as_latex
+from levilab.report.tables.latex import as_latex, title_of
 from levilab.report.tables.values import Values, as_csv
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def _latex_files(document: Document) -> Iterator[tuple[str, tuple[str, str]]]:
     for block, mark in _tables_in(document.blocks, document.banner.lead if document.banner else ""):
         name = names.new(block.name)
         latex = as_latex(name, block.table, note=block.note, mark=mark)
-        yield f"{name}.tex", (block.table.title or "as the report shows it", latex)
+        yield f"{name}.tex", (block.table.title or title_of(block.name), latex)
 
 
 def _tables_in(blocks: Sequence[Block], mark: str) -> Iterator[tuple[Tabular, str]]:

@@ -6,7 +6,6 @@ a character that LaTeX's own fonts lack is spelled as `levilab.present.character
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING
 
 from levilab.present.characters import for_encoding, printable
@@ -53,7 +52,7 @@ def as_latex(name: str, table: Table, *, note: str = "", mark: str = "") -> str:
         note: small print below it.
         mark: before the caption, such as "SYNTHETIC.".
     """
-    caption = " ".join(filter(None, (escaped(mark), escaped(table.title or "Table"))))
+    caption = " ".join(filter(None, (escaped(mark), escaped(table.title or title_of(name)))))
     head = [rf"{_row(table.heads, bold=True)} \\", r"\midrule"] if any(table.heads) else []
     lines = [
         "% levilab report --tables; in the preamble: \\usepackage{booktabs}",
@@ -71,6 +70,15 @@ def as_latex(name: str, table: Table, *, note: str = "", mark: str = "") -> str:
         r"\end{table}",
     ]
     return "\n".join(lines) + "\n"
+
+
+def title_of(name: str) -> str:
+    """What a table without a title is called, by its name.
+
+    >>> title_of("spindown-laws")
+    'Spindown laws'
+    """
+    return name.replace("-", " ").capitalize()
 
 
 def _alignments(table: Table) -> Iterable[str]:

@@ -107,7 +107,15 @@ def _of_part(name: str, part: Mapping[str, Any]) -> Iterator[tuple[Cell, ...]]:
     synthetic = bool(part["synthetic"])
     for model, quantity, found in _values_in(part):
         low, high = found.get("interval_68") or (None, None)
-        cells = (found.get("value"), found.get("u"), found.get("unit"), low, high, found.get("scatter"), found.get("runs"))
+        cells = (
+            found.get("value"),
+            found.get("u"),
+            found.get("unit"),
+            low,
+            high,
+            found.get("scatter"),
+            found.get("runs"),
+        )
         yield name, synthetic, model, quantity, *cells
 
 
