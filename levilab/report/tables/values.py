@@ -6,6 +6,7 @@ import csv
 import io
 import re
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from levilab.pipelines.row import Column, plain, text_of
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 #: A spreadsheet takes a text that begins with one of these for a formula.
 _FORMULA = re.compile(r"\s*[=+\-@\t\r]")
+#: Units of residuals by the name of the analysis.
+RESIDUALS = MappingProxyType({"spindown": "Hz", "precession": "Hz", "field": "T"})
 #: The first columns of both kinds of tables.
 INPUT, SYNTHETIC = "input", "synthetic"
 
@@ -97,38 +100,31 @@ def _by_input(analysis: Analysis[Any], document: Mapping[str, Any], names: Seque
 
 
 def _quantities(document: Mapping[str, Any], names: Sequence[str]) -> Iterator[tuple[Cell, ...]]:
+    analysis = str(document["analysis"])
     if len(names) > 1:
-        yield from _of_part("all together", document)
+        yield from _of_part("all together", analysis, document)
     for name, part in zip(names, document["runs"], strict=True):
-        yield from _of_part(name, part)
+        yield from _of_part(name, analysis, part)
 
 
-def _of_part(name: str, part: Mapping[str, Any]) -> Iterator[tuple[Cell, ...]]:
+def _of_part(name: str, analysis: str, part: Mapping[str, Any]) -> Iterator[tuple[Cell, ...]]:
     synthetic = bool(part["synthetic"])
-    for model, quantity, found in _values_in(part):
+    for model, quantity, found in _values_in(part, analysis):
         low, high = found.get("interval_68") or (None, None)
-        cells = (
-            found.get("value"),
-            found.get("u"),
-            found.get("unit"),
-            low,
-            high,
-            found.get("scatter"),
-            found.get("runs"),
-        )
-        yield name, synthetic, model, quantity, *cells
+        value, u, unit = (found.get(key) for key in ("value", "u", "unit"))
+        yield name, synthetic, model, quantity, value, u, unit, low, high, found.get("scatter"), found.get("runs")
 
 
-def _values_in(part: Mapping[str, Any]) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
-    """Model, name and value of each quantity."""
+def _values_in(part: Mapping[str, Any], analysis: str) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
+    """Model, name and value of each quantity; values without a model come first."""
     for name, value in part["values"].items():
         yield "", name, value
-    for model in part["models"]:
+    for model in part.get("models") or ():
         for name, value in model["parameters"].items():
             yield model["name"], name, value
         for name, value in (model.get("linearised") or {}).items():
             yield model["name"], f"{name}_linearised", value
-        statistics = model.get("statistics") or {}
-        for name, value in statistics.items():
-            if value is not None:
-                yield model["name"], name, {"value": value, "unit": "Hz" if name == "rms_residual" else "1"}
+        for name, value in (model.get("statistics") or {}).items():
+            unit = RESIDUALS.get(analysis) if name == "rms_residual" else "1"
+            if unit and value is not None:
+                yield model["name"], name, {"value": value, "unit": unit}
