@@ -153,7 +153,7 @@ def _content(document: Document, drawing: _Drawing) -> Drawn:
         "banner": None if document.banner is None else _banner(document.banner, drawing),
         "mark": _text(document.banner.lead.rstrip(".")) if document.banner else "",
         "before": drawing.blocks(first),
-        "short_verdicts": [*_in_short(rest)],
+        "chapters": [*_in_short(rest)],
         "outline": _outline_depth(document),
         "blocks": drawing.blocks(rest),
         "footer": _text(document.footer),
@@ -170,14 +170,14 @@ def _outline_depth(document: Document) -> int:
 
 
 def _in_short(blocks: Iterable[Block]) -> Iterator[Drawn]:
-    """What each chapter says, for the first page of a report of several: its verdict, and how many warnings it has."""
-    chapters = [(block, [*_all_in(block)]) for block in blocks if isinstance(block, Section) and block.new_page]
-    for chapter, inner in chapters if len(chapters) > 1 else ():
+    """Each chapter for the first page of a report of several: its verdict, and how many warnings it has."""
+    chapters = [block for block in blocks if isinstance(block, Section)]
+    for chapter in chapters if sum(chapter.new_page for chapter in chapters) > 1 else ():
+        inner = [*_all_in(chapter)] if chapter.new_page else []
         verdict = next((one.text for one in inner if isinstance(one, Verdict)), "")
         count = sum(len(group) for one in inner if isinstance(one, Warnings) for group in one.groups)
-        if verdict or count:
-            warnings = f"{count} warning{'s' * (count > 1)}" if count else ""
-            yield {"title": _text(chapter.title), "verdict": _text(verdict), "warnings": warnings}
+        warnings = f"{count} warning{'s' * (count > 1)}" if count else ""
+        yield {"title": _text(chapter.title), "verdict": _text(verdict), "warnings": warnings}
 
 
 def _all_in(block: Block) -> Iterator[Block]:
