@@ -82,15 +82,16 @@ def as_pdf(document: Document) -> bytes:
     """
     check_typst()
     import typst
-    from matplotlib import get_data_path  # its fonts, which come with it, have what typst's own fonts lack
 
-    pdf: bytes = typst.compile(
-        files_of(document),
-        format="pdf",
-        font_paths=[Path(get_data_path()) / "fonts" / "ttf"],
-        ignore_system_fonts=True,
-    )
+    pdf: bytes = typst.compile(files_of(document), format="pdf", font_paths=fonts(), ignore_system_fonts=True)
     return pdf
+
+
+def fonts() -> list[Path]:
+    """Folders of fonts beside typst's own: those in matplotlib have what these lack."""
+    from matplotlib import get_data_path
+
+    return [Path(get_data_path()) / "fonts" / "ttf"]
 
 
 def files_of(document: Document) -> dict[str, bytes]:
