@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from levilab.motion.summary import changing_energy
-from levilab.present.style import STYLE, row
+from levilab.present.drawing import SMALL, curve, headline, panel
+from levilab.present.looks import GREY, LOOKS
+from levilab.present.style import STYLE, WIDE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -24,50 +27,70 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-BLUE, RED, GREEN, PINK = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
-#: A curve of more points is drawn as the band between its least and greatest values in so many pieces.
-PIECES = 1500
+#: A curve of more points is drawn as the envelope of so many pieces.
+PIECES = 700
 #: A path of more points than these is no clearer.
 MOST_POINTS = 30_000
 #: Most lines with a name, most rows of names above the highest line; a row's height and the gap between names, in parts
 #: of the panel's height and width.
-MOST_NAMED, ROWS, _ROW, _GAP = 10, 4, 0.072, 0.008
-_NAMES_SHARE = 0.31
-_FONT = 7.5
+MOST_NAMED, ROWS, _ROW, _GAP = 10, 6, 0.062, 0.006
+_NAMES_SHARE = 0.385
+#: A name in this row or higher leaves room for others below it.
+_FREE_ROWS = 2
+_FONT = 7.0
 #: A path is not magnified more than to this width [cm]: what is left then is rounding.
 _SMALLEST_CM = 1e-4
+#: Height of the legend of the spin [inch].
+_LEGEND = 0.12
+#: Letters of a title of 8 pt that find room over a curve and its zoom.
+_LETTERS = 92
 #: Decades of the spectrum that are shown below its highest line.
 DECADES = 5
+#: A motion of at least so long has a zoom of one second beside each curve [s].
+_LEAST_FOR_ZOOM, ZOOM_S = 4.0, 1.0
+
+#: Sizes [inches]: left edge and width of the panels; the zoom beside them and its distance; the row of paths, of a
+#: curve and of the spectrum, from one to the next.
+_LEFT, _FULL, _ZOOM, _BESIDE = 0.76, 6.1, 1.28, 0.55
+_PATH, _CURVE, _PITCH, _SPECTRUM, _BOTTOM = 2.1, 0.86, 1.16, 2.3, 0.55
 
 
 def motion_figure(summary: Summary) -> Figure:
     """The path from the side and from above, height, spin, tilt and energy in time, and the spectrum of n_x + i n_y."""
-    with mpl.rc_context({**STYLE, "agg.path.chunksize": 10_000}):
+    with mpl.rc_context(STYLE):
         if summary.motion.scene.observed == "spin":
             return _spin_figure(summary)
         return _whole_figure(summary)
 
 
-#: Sizes [inches]: the figure's width; what the spectrum adds to its height; heights and distance of the panels.
-_WIDTH, _SPECTRUM, _PATHS, _PANEL, _PITCH = 10.0, 2.87, 2.9, 1.242, 1.5525
-
-
 def _whole_figure(summary: Summary) -> Figure:
-    """Without the spectrum's part where there is none."""
-    lowest = 0.55 + (_SPECTRUM if _has_spectrum(summary) else 0.0)
-    paths = lowest + 3 * _PITCH + _PANEL + 0.92
-    height = paths + _PATHS + 0.67
-    figure = Figure(figsize=(_WIDTH, height))
-    _draw_paths(row(figure, paths / height, _PATHS / height, 2, gap=0.075), summary)
-    panels = [row(figure, (lowest + k * _PITCH) / height, _PANEL / height)[0] for k in (3, 2, 1, 0)]
-    for panel, draw in zip(panels, (_draw_height, _draw_spin, _draw_tilt, _draw_energy), strict=True):
-        draw(panel, summary)
-        panel.set_xlim(0, summary.end)
-        panel.tick_params(labelbottom=panel is panels[-1])
-    panels[-1].set_xlabel("time  [s]", labelpad=1)
+    """Without the spectrum's part where there is none, and without the zoom where all is short."""
+    quantities = _quantities(summary)
+    tops = 0.62 + _PATH + 0.74 + _PITCH * np.arange(len(quantities))
+    tops[1:] += _LEGEND if quantities[1].has_legend else 0.0  # of the spin, between its title and its panel
+    below = float(tops[-1]) + _CURVE
+    height = below + _BOTTOM + (_SPECTRUM + 0.72 if _has_spectrum(summary) else 0.0)
+    figure = Figure(figsize=(WIDE, height))
+    headline(figure, _finding(summary), "SYNTHETIC")
+    _draw_paths(figure, summary)
+    zoom = _zoom(summary)
+    wide = _FULL if zoom is None else _FULL - _ZOOM - _BESIDE
+    for k, quantity in enumerate(quantities):
+        axes = panel(figure, _LEFT, float(tops[k]), wide, _CURVE)
+        _draw_quantity(axes, quantity, summary.motion.time)
+        axes.set_xlim(0, summary.end)
+        last = k == len(quantities) - 1
+        axes.tick_params(labelbottom=last)
+        axes.set_xlabel("time  [s]" if last else "")
+        if zoom is not None:
+            beside = panel(figure, _LEFT + wide + _BESIDE, float(tops[k]), _ZOOM, _CURVE)
+            axes.axvspan(*zoom, color=GREY, alpha=0.25, linewidth=0, zorder=0.5)
+            _draw_zoom(beside, quantity, summary.motion.time, zoom)
+            beside.set_title("the second marked grey" if k == 0 else "", fontsize=SMALL, loc="right")
+            beside.tick_params(labelbottom=last)
+            beside.set_xlabel("time  [s]" if last else "")
     if _has_spectrum(summary):
-        _draw_spectrum(row(figure, 0.54 / height, 2.0 / height)[0], summary)
-    figure.text(0.01, 1 - 0.2 / height, _headline(summary), fontsize=11, va="top")
+        _draw_spectrum(panel(figure, _LEFT, below + 0.72, _FULL, _SPECTRUM), summary)
     return figure
 
 
@@ -77,81 +100,119 @@ def _has_spectrum(summary: Summary) -> bool:
 
 def _spin_figure(summary: Summary) -> Figure:
     """Of a scene that has no motion."""
-    figure = Figure(figsize=(10, 4))
-    (axes,) = row(figure, 0.13, 0.7)
-    _draw_spin(axes, summary)
+    figure = Figure(figsize=(WIDE, 3.0))
+    axes = panel(figure, _LEFT, 0.85, _FULL, 1.6)
+    headline(figure, _finding(summary), "SYNTHETIC")
+    _draw_quantity(axes, _spin(summary), summary.motion.time)
     axes.set(xlim=(0, summary.end), xlabel="time  [s]")
-    figure.text(0.01, 0.97, _headline(summary), fontsize=11, va="top")
     return figure
 
 
-def _headline(summary: Summary) -> str:
-    name = (summary.motion.scene.name or "simulation").replace("$", r"\$")
-    return f"Simulated motion (SYNTHETIC): {name[:60]}, {summary.ending}"
+def _finding(summary: Summary) -> str:
+    name = (summary.motion.scene.name or "simulation").replace("\\", "\\\\").replace("$", r"\$")
+    return f"Simulated motion: {name[:60]}, {summary.ending}"
+
+
+def _zoom(summary: Summary) -> tuple[float, float] | None:
+    """The second that is shown by itself [s]: the last one of a top that fell, else the middle one."""
+    if summary.end < _LEAST_FOR_ZOOM:
+        return None
+    start = summary.end - ZOOM_S if summary.motion.fell else math.floor(summary.end / 2)
+    return start, start + ZOOM_S
 
 
 # --- the path ---
 
 
-def _draw_paths(panels: list[Axes], summary: Summary) -> None:
-    """Both on the same scale in both directions, a circle is a circle; and both over the same x."""
-    place = 100 * summary.motion.position[:: max(1, len(summary.motion.time) // MOST_POINTS)]
-    width = 0.6 if len(place) < 20_000 else 0.2
+def _draw_paths(figure: Figure, summary: Summary) -> None:
+    """Both on the same scale in both directions, a circle is a circle; over the same x; its colour is the time."""
+    step = max(1, len(summary.motion.time) // MOST_POINTS)
+    place, time = 100 * summary.motion.position[::step], summary.motion.time[::step]
+    wide = 2.4
+    panels = [panel(figure, left, 0.62, wide, _PATH) for left in (_LEFT, _LEFT + wide + 0.6)]
     middle = (place.min(axis=0) + place.max(axis=0)) / 2
-    size = panels[0].get_window_extent()
-    shape = size.width / size.height
-    span = np.ptp(place, axis=0)
+    shape, span = wide / _PATH, np.ptp(place, axis=0)
     half = 0.5 * 1.16 * max(span[0], shape * span[1], shape * span[2], _SMALLEST_CM)
-    for panel, across, up, title in ((panels[0], 0, 2, "from the side"), (panels[1], 0, 1, "from above")):
-        panel.plot(place[:, across], place[:, up], color=BLUE, linewidth=width)
-        panel.plot(*place[0, [across, up]], "o", color="black", markersize=4, markerfacecolor="white", label="start")
-        panel.plot(*place[-1, [across, up]], "s", color=RED, markersize=4, label="end")
-        panel.set_aspect("equal")
-        panel.set_xlim(middle[across] - half, middle[across] + half)
-        panel.set_ylim(middle[up] - half / shape, middle[up] + half / shape)
-        panel.set(xlabel="x  [cm]", ylabel=f"{'xyz'[up]}  [cm]")
-        panel.set_title(f"Path {title}", loc="left")
-    panels[0].legend(loc="best", fontsize=8)
+    for axes, up, title in ((panels[0], 2, "from the side"), (panels[1], 1, "from above")):
+        points = place[:, [0, up]]
+        path = LineCollection(
+            np.stack([points[:-1], points[1:]], axis=1).tolist(), cmap="cividis", array=time[:-1], rasterized=True,
+            linewidths=0.7 if len(place) < 20_000 else 0.35, clim=(0, summary.end),
+        )  # fmt: skip
+        axes.add_collection(path)
+        axes.plot(*points[0], "o", color="black", markersize=5, markerfacecolor="white", label="start")
+        axes.plot(*points[-1], "s", color=LOOKS["top"].colour, markersize=4.5, label="end")
+        axes.set_aspect("equal")
+        axes.set_xlim(middle[0] - half, middle[0] + half)
+        axes.set_ylim(middle[up] - half / shape, middle[up] + half / shape)
+        axes.locator_params(nbins=6)
+        axes.set(xlabel="x  [cm]", ylabel=f"{'xyz'[up]}  [cm]")
+        axes.set_title(f"Path {title}", loc="left")
+    panels[1].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, handlelength=1, columnspacing=1)
+    bar = figure.colorbar(path, cax=panel(figure, _LEFT + 2 * wide + 0.75, 0.62, 0.1, _PATH))
+    bar.set_label("time  [s]")
+    bar.outline.set_linewidth(0.5)  # type: ignore[operator]
 
 
 # --- in time ---
 
 
-def _draw_height(axes: Axes, summary: Summary) -> None:
-    _curve(axes, summary.motion.time, 100 * summary.motion.position[:, 2], BLUE)
-    axes.set_ylabel("height z  [cm]")
-    axes.set_title(f"Height: {summary.heights}", loc="left")
+@dataclass(frozen=True, eq=False)
+class _Quantity:
+    """One row of curves.
+
+    Attributes:
+        title: what it is, with its range.
+        axis: its name and unit.
+        curves: things of `LOOKS`, their names for the legend, values of each.
+        drive: the frequency at which a line is drawn [Hz]; None: no line.
+        least: an axis shows no smaller range, in which rounding would look like a motion.
+        from_zero: whether the axis begins at 0.
+    """
+
+    title: str
+    axis: str
+    curves: tuple[tuple[str, str, Array], ...]
+    drive: float | None = None
+    least: float = 0.0
+    from_zero: bool = False
+
+    @property
+    def has_legend(self) -> bool:
+        """Whether there is more than one line to tell apart."""
+        return len(self.curves) > 1 or self.drive is not None
 
 
-def _draw_spin(axes: Axes, summary: Summary) -> None:
-    motion, scene = summary.motion, summary.motion.scene
-    _curve(axes, motion.time, motion.spin_hz, RED, label="top")
-    if scene.washers.inertia_kg_m2 > 0:
-        _curve(axes, motion.time, motion.washer_spin_hz, PINK, label="loose washers")
-    if scene.drive.waveform != "off":
-        axes.axhline(scene.drive.frequency_hz, color="black", linewidth=0.8, linestyle="dashed", label="drive")
-    if len(axes.get_legend_handles_labels()[1]) > 1:
-        axes.legend(loc="lower right", bbox_to_anchor=(1, 0.98), ncols=3, fontsize=8, borderpad=0)
-    axes.set_ylabel("spin ω₃/2π  [Hz]")
-    axes.set_title(f"Spin: {summary.spin}", loc="left")
-    _limit_zoom(axes, 1e-6 * abs(float(motion.spin_hz[0])))
-
-
-def _draw_tilt(axes: Axes, summary: Summary) -> None:
-    tilt = np.degrees(summary.motion.tilt)
-    _curve(axes, summary.motion.time, tilt, GREEN)
-    axes.set_ylabel("tilt  [degrees]")
-    axes.set_ylim(bottom=0)
-    axes.set_title(f"Tilt of the axis against the base's: up to {tilt.max():.3g}°", loc="left")
-
-
-def _draw_energy(axes: Axes, summary: Summary) -> None:
-    energy = summary.motion.energies
+def _quantities(summary: Summary) -> tuple[_Quantity, ...]:
+    motion = summary.motion
+    tilt = np.degrees(motion.tilt)
+    energy = motion.energies
     change = (energy - energy[0]) / (abs(energy[0]) or 1.0)
     power = math.floor(math.log10(summary.energy_change)) if summary.energy_change > 0 else 0
-    _curve(axes, summary.motion.time, change / 10.0**power, "black")
-    axes.set_ylabel("(E − E₀)/E₀" + (f"  [10$^{{{power}}}$]" if power else ""))
-    axes.set_title(_energy_title(summary), loc="left")
+    return (
+        _Quantity(f"Height: {summary.heights}", "z  [cm]", (("height", "height", 100 * motion.position[:, 2]),)),
+        _spin(summary),
+        _Quantity(
+            f"Tilt of the axis against the base's: up to {tilt.max():.3g}°", "tilt  [degrees]",
+            (("tilt", "tilt", tilt),), from_zero=True,
+        ),
+        _Quantity(
+            _energy_title(summary), "(E − E₀)/E₀" + (f"  [10$^{{{power}}}$]" if power else ""),
+            (("energy", "energy", change / 10.0**power),),
+        ),
+    )  # fmt: skip
+
+
+def _spin(summary: Summary) -> _Quantity:
+    motion, scene = summary.motion, summary.motion.scene
+    curves = [("top", "top", motion.spin_hz)]
+    if scene.washers.inertia_kg_m2 > 0:
+        curves.append(("washers", "loose washers", motion.washer_spin_hz))
+    return _Quantity(
+        f"Spin: {summary.spin}", "ω₃/2π  [Hz]", tuple(curves),
+        drive=scene.drive.frequency_hz if scene.drive.waveform != "off" else None,
+        least=1e-6 * abs(float(motion.spin_hz[0])),
+    )  # fmt: skip
 
 
 def _energy_title(summary: Summary) -> str:
@@ -168,21 +229,43 @@ def _exactly(change: float) -> str:
     return f"to {change:.1g}" if change else "exactly"
 
 
-def _curve(axes: Axes, time: Array, values: Array, colour: str, label: str | None = None) -> None:
-    """A line, or the band that it fills."""
-    if len(time) <= 2 * PIECES:
-        axes.plot(time, values, color=colour, linewidth=0.8, label=label)
-        return
-    edges = np.linspace(0, len(time), PIECES + 1).astype(int)[:-1]
-    low, high = np.minimum.reduceat(values, edges), np.maximum.reduceat(values, edges)
-    axes.fill_between(time[edges], low, high, color=colour, linewidth=0.5, label=label)
+def _draw_quantity(axes: Axes, quantity: _Quantity, time: Array) -> None:
+    """The curves over the whole time, with what they are above them."""
+    envelope = False
+    for name, label, values in quantity.curves:
+        envelope |= curve(axes, time, values, LOOKS[name], pieces=PIECES, label=label)
+    _finish(axes, quantity)
+    axes.set_ylabel(quantity.axis, fontsize=8)
+    drawn = "; shaded: least to greatest, black: mean" if envelope else ""
+    if quantity.has_legend:
+        axes.legend(loc="lower left", bbox_to_anchor=(0, 0.96), ncols=3, fontsize=SMALL, borderaxespad=0, borderpad=0.2)
+    title = quantity.title + (drawn if len(quantity.title + drawn) < _LETTERS else "")
+    axes.set_title(title, loc="left", fontsize=8, pad=14 if quantity.has_legend else None)
 
 
-def _limit_zoom(axes: Axes, span: float) -> None:
-    """No range so small that rounding would look like a motion."""
+def _draw_zoom(axes: Axes, quantity: _Quantity, time: Array, zoom: tuple[float, float]) -> None:
+    """The same curves for a second."""
+    inside = slice(*np.searchsorted(time, zoom))
+    for name, _, values in quantity.curves:
+        axes.plot(time[inside], values[inside], linewidth=0.9, **LOOKS[name].as_line)
+    _finish(axes, quantity)
+    axes.set_xlim(*zoom)
+    axes.locator_params(axis="y", nbins=4)
+    axes.ticklabel_format(axis="y", useOffset=False)
+    axes.xaxis.set_major_locator(mpl.ticker.MultipleLocator(ZOOM_S / 2))
+    axes.xaxis.set_major_formatter(mpl.ticker.FormatStrFormatter("%g"))
+    axes.tick_params(labelsize=SMALL)
+
+
+def _finish(axes: Axes, quantity: _Quantity) -> None:
+    """Draw the drive's line, and set limits in which rounding does not look like a motion."""
+    if quantity.drive is not None:
+        axes.axhline(quantity.drive, linewidth=0.8, label="drive", **LOOKS["drive"].as_line)
+    if quantity.from_zero:
+        axes.set_ylim(bottom=0)
     low, high = axes.get_ylim()
-    if high - low < span:
-        axes.set_ylim((low + high) / 2 - 50 * span, (low + high) / 2 + 50 * span)
+    if high - low < quantity.least:
+        axes.set_ylim((low + high) / 2 - 50 * quantity.least, (low + high) / 2 + 50 * quantity.least)
         axes.ticklabel_format(axis="y", useOffset=False)
 
 
@@ -199,7 +282,7 @@ def _draw_spectrum(axes: Axes, summary: Summary) -> None:
     limits = (min(places) - margin, max(places) + margin)
     shown = (frequency >= limits[0]) & (frequency <= limits[1])
     top = amplitude.max()
-    axes.semilogy(*_outline(frequency[shown], amplitude[shown]), color=BLUE, linewidth=0.7)
+    axes.semilogy(*_outline(frequency[shown], amplitude[shown]), linewidth=0.7, **LOOKS["tilt"].as_line)
     room = DECADES * _NAMES_SHARE / (1 - _NAMES_SHARE)  # decades above the highest line, for the names
     axes.set(xlim=limits, ylim=(top / 10**DECADES, top * 10**room))
     _name_lines(axes, summary)
@@ -224,6 +307,7 @@ class _Label:
     left: float
     right: float
     row: int
+    text: str
 
     def fits(self, others: list[_Label]) -> bool:
         """Whether it is inside of the panel and neither it nor its pole crosses another one."""
@@ -251,12 +335,18 @@ def _name_lines(axes: Axes, summary: Summary) -> None:
         waiting = [_pole(axes, other.frequency) for other in lines[k + 1 :] if not other.sideband]
         number = f"{line.frequency:.2f}".replace("-", "−")
         texts = [number] if line.sideband or not line.name else [f"{number} {line.name}", number]
-        places = [(text, flag) for text in texts for flag in _flags(axes, line.frequency, text) if flag.fits(flags)]
-        if places:
-            # the first place that leaves room for the poles to come, if there is one
-            found = next((place for place in places if not place[1].covers(waiting)), places[0])
-            flags.append(found[1])
-            _draw_label(axes, line, *found)
+        found = next(filter(None, (_place(axes, line.frequency, text, flags, waiting) for text in texts)), None)
+        if found:
+            flags.append(found)
+            _draw_label(axes, line, found)
+
+
+def _place(axes: Axes, frequency: float, text: str, flags: list[_Label], waiting: list[float]) -> _Label | None:
+    """Where a name finds room that it does not take from poles to come: beside them, or high enough above."""
+    places = [flag for flag in _flags(axes, frequency, text) if flag.fits(flags)]
+    beside = (flag for flag in places if not flag.covers(waiting))
+    above = (flag for flag in places if flag.row >= _FREE_ROWS)
+    return next(beside, None) or next(above, None)
 
 
 def _pole(axes: Axes, frequency: float) -> float:
@@ -270,19 +360,17 @@ def _flags(axes: Axes, frequency: float, text: str) -> Iterator[_Label]:
     probe = axes.text(0, 0, text, fontsize=_FONT)
     width = 1.03 * probe.get_window_extent().width / axes.get_window_extent().width
     probe.remove()
-    right = _Label(pole, pole + _GAP / 2, pole + _GAP / 2 + width, 0)
-    left = _Label(pole, pole - _GAP / 2 - width, pole - _GAP / 2, 0)
+    right = _Label(pole, pole + _GAP / 2, pole + _GAP / 2 + width, 0, text)
+    left = _Label(pole, pole - _GAP / 2 - width, pole - _GAP / 2, 0, text)
     for flag in (left, right) if frequency < 0 else (right, left):
         yield from (replace(flag, row=k) for k in range(ROWS))
 
 
-def _draw_label(axes: Axes, line: NamedLine, text: str, flag: _Label) -> None:
+def _draw_label(axes: Axes, line: NamedLine, flag: _Label) -> None:
     height = 1 - _NAMES_SHARE + 0.01 + flag.row * _ROW
     mixed = axes.get_xaxis_transform()  # frequencies across, parts of the panel up
     low, high = np.log10(axes.get_ylim())
     peak = (math.log10(1000 * line.amplitude) - low) / (high - low)
-    axes.plot(
-        [line.frequency] * 2, [peak + 0.01, height + 0.8 * _ROW], color="darkgrey", linewidth=0.6, transform=mixed
-    )
+    axes.plot([line.frequency] * 2, [peak + 0.01, height + 0.8 * _ROW], color=GREY, linewidth=0.5, transform=mixed)
     x, side = (flag.right, "right") if flag.right < flag.pole else (flag.left, "left")
-    axes.text(x, height, text, fontsize=_FONT, color="dimgrey", transform=axes.transAxes, ha=side)
+    axes.text(x, height, flag.text, fontsize=_FONT, color="black", transform=axes.transAxes, ha=side)

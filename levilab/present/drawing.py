@@ -117,18 +117,23 @@ def curve(axes: Axes, time: Array, values: Array, look: Look, *, pieces: int = 6
     Returns:
         whether it is an envelope.
     """
-    if len(time) <= 4 * pieces:
-        axes.plot(time, values, linewidth=0.8, label=label, **look.as_line)
-        return False
     found = columns(time, values, pieces)
-    if float(np.max(found.high - found.low)) <= 0.01 * float(np.ptp(values)):
-        axes.plot(found.time, found.mean, linewidth=1.0, label=label, **look.as_line)
+    if len(time) <= 4 * pieces or not _oscillates(found):
+        axes.plot(time, values, linewidth=0.9, label=label, **look.as_line)  # saved without the points no eye misses
         return False
+    mean = columns(time, values, pieces // 12)
     axes.fill_between(found.time, found.low, found.high, color=look.colour, alpha=0.35, linewidth=0, label=label)
     for edge in (found.low, found.high):
-        axes.plot(found.time, edge, color=look.colour, linewidth=0.5)
-    axes.plot(found.time, found.mean, color="black", linewidth=0.8)
+        axes.plot(found.time, edge, color=look.colour, linewidth=0.4)
+    axes.plot(mean.time, mean.mean, color="black", linewidth=0.9)
     return True
+
+
+def _oscillates(found: Columns) -> bool:
+    """Whether the curve swings within its pieces: further than from one to the next, and so far that it is seen."""
+    within = found.high - found.low
+    whole = float(np.max(found.high) - np.min(found.low))
+    return bool(np.median(within) > 0.05 * whole and within.sum() > 1.5 * np.abs(np.diff(found.mean)).sum())
 
 
 def run_look(k: int, total: int) -> Look:

@@ -54,7 +54,7 @@ def document_of(results: Results, others: Sequence[Section] = ()) -> Document:
     blocks: list[Block] = []
     for (analysis, found), part in zip(results, parts, strict=True):
         own = blocks_of_part(analysis, found, part, deeper=not alone)
-        blocks += own if alone else [_of_one_analysis(found, part, own)]
+        blocks += own if alone else [_of_one_analysis(found, part, own, first=not blocks)]
     blocks += others
     if results:
         blocks += [_measured(results, parts), reproduction(results)]
@@ -110,7 +110,9 @@ def picture_of(analysis: Analysis[A], found: A, part: ReportPart) -> Picture:
     )
 
 
-def _of_one_analysis(found: Analyzed[Any, Any, Any, Any], part: ReportPart, blocks: Iterable[Block]) -> Section:
+def _of_one_analysis(
+    found: Analyzed[Any, Any, Any, Any], part: ReportPart, blocks: Iterable[Block], *, first: bool
+) -> Section:
     """One of several analyses, below a heading of its own."""
     mixed = _mixes(found)
     mark = _banner(found.sources, mixed=True) if mixed else None
@@ -119,7 +121,7 @@ def _of_one_analysis(found: Analyzed[Any, Any, Any, Any], part: ReportPart, bloc
         (*([mark] if mark else []), *blocks),
         anchor=part.subject,
         lead=_lead(found, part),
-        new_page=True,
+        new_page=not first,
     )
 
 

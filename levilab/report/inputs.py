@@ -233,14 +233,11 @@ def _changes(source: Source[Any]) -> tuple[Block, ...]:
 
 
 def _differences(kind: str, start: Mapping[str, Any], end: Mapping[str, Any]) -> Iterator[tuple[str, str, str, str]]:
-    """A row for each setting; the name of the instrument stands in its first alone."""
+    """A row for each setting that both have; the name of the instrument stands in its first alone."""
     name = kind
-    for key in (*end, *(key for key in start if key not in end)):
-        was, is_ = start.get(key), end.get(key)
-        if was != is_:
-            shown = [value_in_words(key, value) for value in (was, is_)]
-            yield name, setting_name(key), shown[0], shown[1]
-            name = ""
+    for key in (key for key in end if key in start and start[key] != end[key]):
+        yield name, setting_name(key), value_in_words(key, start[key]), value_in_words(key, end[key])
+        name = ""
 
 
 def setting_name(key: str) -> str:

@@ -12,8 +12,10 @@ from matplotlib.figure import Figure
 from analysis.field.floating import floating_spins, floating_top
 from analysis.field.magnet import axial_field
 from levilab.pipelines.field.quantities import SHOWN
+from levilab.present.drawing import SMALL, band, headline, panel, sigma_bands, synthetic_mark
+from levilab.present.looks import BLUE, GREY, LOOKS, PURPLE, SKY, VERMILION
 from levilab.present.numbers import short_name, with_uncertainty
-from levilab.present.style import STYLE, row
+from levilab.present.style import STYLE, WIDE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,9 +25,11 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: Okabe and Ito's colours, a scan each as long as there are so few; the model, what floats, and what to set.
-COLOURS = ("#0072B2", "#D55E00", "#CC79A7", "#56B4E9")
-FLOATS, SET = "#009E73", "#E69F00"
+#: A scan each as long as there are so few: colour and marker.
+COLOURS, _MARKERS = (BLUE, VERMILION, PURPLE, SKY), "o^vD"
+FLOATS, SET = LOOKS["floats"].colour, LOOKS["to set"].colour
+#: Left edge and width of the panels of the field [inch], and where what explains them begins, in parts of the width.
+_LEFT, _WIDTH, _BESIDE = 0.7, 4.05, 1.02
 #: The curves go on by this part of the scan's length on either side.
 _BEYOND = 0.06
 #: Points of a curve, and of the windows of spin, which take longer.
@@ -38,20 +42,32 @@ _INSIDE = 1e-6
 def field_figure(analysis: FieldAnalysis) -> Figure:
     """Flux density and fit, residuals in units of their uncertainty, and what follows: masses, heights, spins."""
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(10, 10))
-        above = row(figure, 0.575, 0.385)[0]
+        figure = Figure(figsize=(WIDE, 6.9))
+        headline(figure, _finding(analysis), synthetic_mark([source.synthetic for source in analysis.sources]))
+        above = panel(figure, _LEFT, 0.45, _WIDTH, 2.0)
         _draw_field(above, analysis)
-        _draw_residuals(row(figure, 0.405, 0.11)[0], analysis, above.get_xlim())
+        _draw_residuals(panel(figure, _LEFT, 2.62, _WIDTH, 1.0), analysis, above.get_xlim())
         run = analysis.runs[0]
-        left, right = row(figure, 0.055, 0.26, 2, gap=0.09)
+        left, right = (panel(figure, x, 4.45, 2.55, 1.9) for x in (_LEFT, _LEFT + 3.7))
         if run.floating is None:
             for axes in (left, right):
                 axes.set_axis_off()
-            left.text(0.0, 0.5, "no top floats above this base", fontsize=11)
+            left.text(0.0, 0.5, "no top floats above this base", fontsize=9)
         else:
             _draw_masses(left, run)
             _draw_spins(right, run)
     return figure
+
+
+def _finding(analysis: FieldAnalysis) -> str:
+    values = analysis.values
+    strength = with_uncertainty(SHOWN["strength"].of(values["strength"]))
+    said = f"Field of the base on its axis: ρ = {strength}"
+    if "lowest_height" not in values:
+        return said
+    mass = with_uncertainty(SHOWN["mass_to_set"].of(values["mass_to_set"]))
+    low, high = (1e3 * (values[name].value or 0.0) for name in ("lowest_height", "highest_height"))
+    return f"{said}; tops float from {low:.2f} to {high:.2f} mm, set {mass}"
 
 
 # --- field and residuals -------------------------------------------------------------------------------
@@ -64,39 +80,27 @@ def _draw_field(axes: Axes, analysis: FieldAnalysis) -> None:
     for k, run in enumerate(analysis.runs):
         colour, scan = COLOURS[k % len(COLOURS)], run.scan
         axes.plot(1e3 * z, 1e3 * scan.model(z), color=colour, linewidth=1.3, label=_curve_label(analysis, k))
+        style = {"markersize": 4.0, "markerfacecolor": "white", "zorder": 3, "linestyle": "none", "color": colour}
         axes.plot(
-            1e3 * scan.height,
-            1e3 * scan.flux_density,
-            linestyle="none",
-            marker="o",
-            markersize=4.5,
-            markerfacecolor="white",
-            color=colour,
-            zorder=3,
-            label=_points_label(analysis, k),
-        )
-    axes.axhline(0, color="black", linewidth=0.8)
+            1e3 * scan.height, 1e3 * scan.flux_density, marker=_MARKERS[k % len(COLOURS)], gid=f"readings-{k}",
+            label=_points_label(analysis, k), **style,
+        )  # fmt: skip
+    axes.axhline(0, color="black", linewidth=0.6)
     axes.set_xlim(1e3 * z[0], 1e3 * z[-1])
     _mark_window(axes, analysis)
-    axes.set(ylabel="flux density along the axis, B  [mT]")
+    axes.set(ylabel="B along the axis  [mT]")
     axes.tick_params(labelbottom=False)
-    made_up = sum(source.synthetic for source in analysis.sources)
-    synthetic = (
-        "" if not made_up else "  (SYNTHETIC)" if made_up == len(analysis.sources) else f"  ({made_up} SYNTHETIC)"
-    )
-    strength = with_uncertainty(SHOWN["strength"].of(analysis.values["strength"]))
-    axes.set_title(f"Field of the base on its axis: ρ = {strength}{synthetic}", loc="left", fontsize=11)
-    axes.legend(loc="best")
+    axes.legend(loc="upper left", bbox_to_anchor=(_BESIDE, 1.0), borderaxespad=0, labelspacing=0.7)
 
 
 def _curve_label(analysis: FieldAnalysis, k: int) -> str | None:
-    return "fit: a ring of inner and outer radius, with thickness" if k == 0 and len(analysis.runs) == 1 else None
+    return "fit: a ring of inner and\nouter radius, with thickness" if k == 0 and len(analysis.runs) == 1 else None
 
 
 def _points_label(analysis: FieldAnalysis, k: int) -> str | None:
     if len(analysis.runs) == 1:
         return "readings"
-    return short_name(analysis.sources[k].name)[:40].replace("$", r"\$") if k < len(COLOURS) else None
+    return short_name(analysis.sources[k].name)[:24].replace("$", r"\$") if k < len(COLOURS) else None
 
 
 def _mark_window(axes: Axes, analysis: FieldAnalysis) -> None:
@@ -107,29 +111,29 @@ def _mark_window(axes: Axes, analysis: FieldAnalysis) -> None:
     low, high, middle = (
         1e3 * (values[name].value or 0.0) for name in ("lowest_height", "highest_height", "height_at_mass")
     )
-    axes.axvspan(low, high, color=FLOATS, alpha=0.15, linewidth=0, label=f"tops float: {low:.2f} to {high:.2f} mm")
+    axes.axvspan(low, high, color=FLOATS, alpha=0.15, linewidth=0, label=f"tops float:\n{low:.2f} to {high:.2f} mm")
     mass = with_uncertainty(SHOWN["mass_to_set"].of(values["mass_to_set"]))
-    axes.axvline(middle, color=SET, linewidth=1.5, linestyle="dashed", label=f"a top of {mass}")
+    axes.axvline(middle, linewidth=1.3, label=f"a top of {mass}", **LOOKS["to set"].as_line)
 
 
 def _draw_residuals(axes: Axes, analysis: FieldAnalysis, limits: tuple[float, float]) -> None:
     """What the fit leaves over should be noise: two thirds within the dark band."""
-    axes.axhspan(-2, 2, color="black", alpha=0.06, linewidth=0)
-    axes.axhspan(-1, 1, color="black", alpha=0.10, linewidth=0)
-    axes.axhline(0, color="black", linewidth=0.8)
+    sigma_bands(axes)
     most = 2.5
     for k, run in enumerate(analysis.runs):
         scaled = run.scan.residuals / run.scan.u
         most = max(most, 1.15 * float(np.abs(scaled).max()))
         axes.plot(
-            1e3 * run.scan.height, scaled, linestyle="none", marker="o", markersize=4, color=COLOURS[k % len(COLOURS)]
-        )
-    axes.set(xlim=limits, ylim=(-most, most), xlabel="height  [mm]", ylabel="residual\n[its u]")
-    u = np.concatenate([run.scan.u for run in analysis.runs])
+            1e3 * run.scan.height, scaled, linestyle="none", marker=_MARKERS[k % len(COLOURS)], markersize=3.5,
+            color=COLOURS[k % len(COLOURS)], gid=f"residuals-{k}",
+        )  # fmt: skip
+    axes.set(xlim=limits, ylim=(-most, most), xlabel="height  [mm]", ylabel="residual  [u]")
+    u = 1e6 * np.concatenate([run.scan.u for run in analysis.runs])
     text = (
-        f"reading − fit, in units of its u ({1e6 * u.min():.0f} to {1e6 * u.max():.0f} µT, that of the height included)"
+        f"reading − fit, in units of its\nu of {u.min():.0f} to {u.max():.0f} µT, that of the\n"
+        "height included; shaded ±1, ±2"
     )
-    axes.set_title(text, loc="left", fontsize=9)
+    axes.text(_BESIDE, 1.0, text, transform=axes.transAxes, va="top", fontsize=8)
 
 
 # --- what follows --------------------------------------------------------------------------------------
@@ -145,24 +149,19 @@ def _draw_masses(axes: Axes, run: FieldRun) -> None:
     mass = np.abs(moment * axial_field(ring, top.magnet)(z)[1]) / top.gravity
     share = (floating.values["mass_to_set"].u or 0.0) / floating["mass_to_set"]
     inside = (z >= low) & (z <= high)
-    axes.fill_between(
-        1e3 * z, 1e3 * mass * (1 - share), 1e3 * mass * (1 + share), color="grey", alpha=0.25, linewidth=0
-    )
-    axes.plot(1e3 * z, 1e3 * mass, color="grey", linewidth=1)
-    axes.plot(1e3 * z[inside], 1e3 * mass[inside], color=FLOATS, linewidth=2.5)
+    band(axes, 1e3 * z, 1e3 * mass, 1e3 * mass * share, GREY, label="± u")
+    axes.plot(1e3 * z, 1e3 * mass, color=GREY, linewidth=1, label="not stable there")
+    axes.plot(1e3 * z[inside], 1e3 * mass[inside], color=FLOATS, linewidth=2.5, label="floats stably")
     for name, height in (("heaviest_mass", low), ("lightest_mass", high)):
-        axes.plot(1e3 * height, 1e3 * floating[name], marker="o", color=FLOATS)
+        axes.plot(1e3 * height, 1e3 * floating[name], marker="s", color=FLOATS)
     set_at = 1e3 * floating["height_at_mass"], 1e3 * floating["mass_to_set"]
-    axes.plot(*set_at, marker="D", color=SET, markersize=7, zorder=4)
-    axes.annotate(
-        f"set {with_uncertainty(SHOWN['mass_to_set'].of(floating.values['mass_to_set']))}",
-        set_at,
-        (9, 5),
-        textcoords="offset points",
-        fontsize=9,
-    )
+    mass_to_set = with_uncertainty(SHOWN["mass_to_set"].of(floating.values["mass_to_set"]))
+    axes.plot(*set_at, marker="D", color=SET, linestyle="none", markersize=5, zorder=4, label=f"to set: {mass_to_set}")
     axes.set(xlabel="height at which it floats  [mm]", ylabel="mass of the top  [g]")
-    axes.set_title("masses that float (green: stably); grey: ±u", loc="left")
+    bottom, top_of = axes.get_ylim()
+    axes.set_ylim(bottom, top_of + 0.55 * (top_of - bottom))
+    axes.legend(loc="upper left", fontsize=SMALL, ncols=2, columnspacing=1.0, handlelength=1.6, borderaxespad=0)
+    axes.set_title("Which mass floats where", loc="left")
 
 
 def _draw_spins(axes: Axes, run: FieldRun) -> None:
@@ -179,9 +178,10 @@ def _draw_spins(axes: Axes, run: FieldRun) -> None:
     axes.plot(1e3 * masses, slow, color=FLOATS, linewidth=1.5)
     axes.plot(1e3 * masses, fast, color=FLOATS, linewidth=1.5)
     at = 1e3 * floating["mass_to_set"]
-    for name, side in (("slowest_spin", 8), ("fastest_spin", -14)):
-        axes.plot(at, floating[name], marker="D", color=SET, markersize=7, zorder=4)
-        text = with_uncertainty(SHOWN[name].of(floating.values[name]))
-        axes.annotate(text, (at, floating[name]), (9, side), textcoords="offset points", fontsize=9)
-    axes.set(xlabel="mass of the top  [g]", ylabel="spin  [Hz]", ylim=(0, None))
-    axes.set_title("spins at which small motions stay small", loc="left")
+    for name in ("slowest_spin", "fastest_spin"):
+        axes.plot(at, floating[name], linestyle="none", marker="D", color=SET, markersize=5, zorder=4)
+    texts = [with_uncertainty(SHOWN[name].of(floating.values[name])) for name in ("slowest_spin", "fastest_spin")]
+    axes.set(xlabel="mass of the top  [g]", ylabel="spin  [Hz]", ylim=(0, 1.35 * float(np.nanmax(fast))))
+    axes.set_title("Spins at which small motions stay small", loc="left")
+    about = f"at the mass to set:\n{texts[0]} to {texts[1]}"
+    axes.text(0.02, 0.98, about, transform=axes.transAxes, va="top", fontsize=SMALL)

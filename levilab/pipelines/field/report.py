@@ -69,12 +69,12 @@ _BASE = (
 def _bases(analysis: FieldAnalysis) -> tuple[Block, ...]:
     """The base as each scan finds it."""
     if len(analysis.runs) == 1:
-        return (Tabular("field-base", base_table(analysis.runs[0].scan), _BASE),)
+        return (Tabular("field-base", replace(base_table(analysis.runs[0].scan), title=""), _BASE),)
     bases = (
         Section(source.name, (Tabular("field-base", replace(base_table(run.scan), title="")),))
         for source, run in zip(analysis.sources, analysis.runs, strict=True)
     )
-    by_run = Tabular("field-runs", by_run_table(analysis), first_column_wraps=True)
+    by_run = Tabular("field-runs", replace(by_run_table(analysis), title=""), first_column_wraps=True)
     return by_run, *bases, Note(_BASE)
 
 

@@ -10,8 +10,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from levilab.pipelines.limit.analysis import LOWER_EDGE, RESONANCE, UPPER_EDGE
+from levilab.present.drawing import SMALL, headline, panel, synthetic_mark
+from levilab.present.looks import BLACK, GREEN, GREY, LOOKS, MARKERS, ORANGE, PURPLE, SKY, VERMILION, YELLOW
 from levilab.present.numbers import with_uncertainty
-from levilab.present.style import MARKERS, STYLE, label_of_run
+from levilab.present.style import STYLE, WIDE, label_of_run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,15 +23,17 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: Of runs: colours of Okabe and Ito that theory does not have.
-_COLOURS = ("#0072B2", "#009E73", "#56B4E9", "#E69F00", "#F0E442", "#000000")
-_MEAN = "#000000"
-_THEORY = {LOWER_EDGE: ("#D55E00", "--"), UPPER_EDGE: ("#D55E00", "--"), RESONANCE: ("#CC79A7", ":")}
+#: Of runs: colours that theory does not have.
+_COLOURS = (BLACK, GREEN, SKY, ORANGE, YELLOW, GREY)
+_MEAN = LOOKS["fit"].colour
+_THEORY = {LOWER_EDGE: (VERMILION, "--"), UPPER_EDGE: (VERMILION, "--"), RESONANCE: (PURPLE, ":")}
 #: A line of theory so many times farther from the mean than the farthest limit would squeeze the limits: it is named at
 #: the edge of the panel.
 _NEAR = 2.5
-#: Width of the figure; above a panel, a panel, below it for the axis, and for a line of the legend there [inch].
-_WIDTH, _ABOVE, _PANEL, _BELOW, _LINE = 9.0, 0.5, 2.9, 0.6, 0.17
+#: Above a panel, a panel, below it for the axis, and for a line of the legend there; what stands above all [inch].
+_ABOVE, _PANEL, _BELOW, _LINE, _HEAD = 0.5, 2.2, 0.5, 0.155, 0.42
+#: Left edges and widths of the limits and of their distribution [inch].
+_LEFT, _WIDTH, _BESIDE, _NARROW = 0.7, 4.7, 5.55, 1.35
 #: Bins of the distribution, a scatter from the mean on either side, and fewer limits than this have none.
 _BINS, _REACH, _FEWEST = 14, 3.5, 5
 
@@ -37,27 +41,37 @@ _BINS, _REACH, _FEWEST = 14, 3.5, 5
 def limit_figure(analysis: LimitAnalysis) -> Figure:
     """For each of the conditions the limits top by top with mean, scatter and theory, and how they are distributed."""
     with mpl.rc_context(STYLE):
-        figure = Figure()
-        rows: list[tuple[Axes, Axes, float]] = []
-        for group in analysis.groups:
-            left = figure.add_axes((0.085, 0, 0.7, 1), label=f"limits {len(rows)}")
-            right = figure.add_axes((0.805, 0, 0.18, 1), label=f"distribution {len(rows)}", sharey=left)
-            lines = _draw_limits(left, analysis, group)
+        legends = [_legend_lines(group) for group in analysis.groups]
+        height = _HEAD + sum(_ABOVE + _PANEL + _BELOW + _LINE * lines for lines in legends)
+        figure = Figure(figsize=(WIDE, height))
+        headline(figure, _finding(analysis), synthetic_mark([source.synthetic for source in analysis.sources]))
+        top = _HEAD
+        for k, (group, lines) in enumerate(zip(analysis.groups, legends, strict=True)):
+            left = panel(figure, _LEFT, top + _ABOVE, _WIDTH, _PANEL, label=f"limits {k}")
+            right = panel(figure, _BESIDE, top + _ABOVE, _NARROW, _PANEL, label=f"distribution {k}", sharey=left)
+            _draw_limits(left, analysis, group)
             _draw_distribution(right, analysis, group)
-            rows.append((left, right, _BELOW + _LINE * lines))
-        height = sum(_ABOVE + _PANEL + below for _, _, below in rows)
-        figure.set_size_inches(_WIDTH, height)
-        top = height
-        for left, right, below in rows:
-            top -= _ABOVE + _PANEL
-            left.set_position((0.085, top / height, 0.7, _PANEL / height))
-            right.set_position((0.805, top / height, 0.18, _PANEL / height))
-            top -= below
+            top += _ABOVE + _PANEL + _BELOW + _LINE * lines
     return figure
 
 
-def _draw_limits(axes: Axes, analysis: LimitAnalysis, group: Limits) -> int:
-    """The limits of a group top by top; returns the number of lines of the legend."""
+def _finding(analysis: LimitAnalysis) -> str:
+    """The means of the groups, while there are few."""
+    found = [f"{group.which} {with_uncertainty(group.statistics.mean)}" for group in analysis.groups]
+    more = f" and {len(found) - 3} more conditions" if len(found) > 3 else ""
+    return f"Limit{'s' if len(found) > 1 else ''} of levitation: {', '.join(found[:3])}{more}"
+
+
+def _legend_lines(group: Limits) -> int:
+    """Lines that a legend of two columns may take."""
+    found = group.statistics
+    runs = len(group.runs) if len(group.runs) <= len(MARKERS) else 1
+    entries = runs + bool(found.outliers) + 1 + 2 * bool(found.scatter) + len(group.comparisons) + 1
+    return (entries + 1) // 2
+
+
+def _draw_limits(axes: Axes, analysis: LimitAnalysis, group: Limits) -> None:
+    """The limits of a group top by top."""
     found, mean = group.statistics, group.statistics.mean.value or 0.0
     every = _limits(analysis, group)
     start = 1
@@ -65,7 +79,13 @@ def _draw_limits(axes: Axes, analysis: LimitAnalysis, group: Limits) -> int:
         start = _draw_run(axes, analysis, group, k, start)
     outliers = list(found.outliers)
     if outliers:
-        style: Any = {"marker": "o", "markersize": 12, "markerfacecolor": "none", "color": "red", "linestyle": "none"}
+        style: Any = {
+            "marker": "o",
+            "markersize": 9,
+            "markerfacecolor": "none",
+            "color": LOOKS["left out"].colour,
+            "linestyle": "none",
+        }
         axes.plot(np.array(outliers) + 1, every[outliers], label="outlier, in the mean", **style)
     axes.axhline(mean, color=_MEAN, linewidth=1.2, label=f"mean {with_uncertainty(found.mean)}")
     if found.scatter and found.scatter.value is not None and found.mean.u is not None:
@@ -86,11 +106,15 @@ def _draw_limits(axes: Axes, analysis: LimitAnalysis, group: Limits) -> int:
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.ticklabel_format(axis="y", useOffset=False)
     axes.set(xlabel="top, one after another", ylabel="spin frequency ν  [Hz]")
-    synthetic = all(analysis.sources[number].synthetic for number in group.runs)
+    axes.tick_params(axis="x", which="minor", bottom=False)
     title = ("Lower limit: the spin at which a free top falls", _upper_title(group))[group.which == "upper"]
-    axes.set_title(title + "  (SYNTHETIC)" * synthetic + "\n" + group.conditions.text, loc="left", fontsize=9)
-    legend = axes.legend(loc="upper left", bbox_to_anchor=(-0.02, -0.16), ncols=2, fontsize=8, borderaxespad=0)
-    return (len(legend.get_texts()) + 1) // 2
+    made_up = {bool(source.synthetic) for source in analysis.sources}
+    own = all(analysis.sources[number].synthetic for number in group.runs)
+    title += "  (SYNTHETIC)" if len(made_up) > 1 and own else ""
+    axes.set_title(title + "\n" + group.conditions.text, loc="left", fontsize=8)
+    axes.legend(
+        loc="upper left", bbox_to_anchor=(-0.09, -0.2), ncols=2, fontsize=SMALL, borderaxespad=0, columnspacing=1.2
+    )
 
 
 def _draw_run(axes: Axes, analysis: LimitAnalysis, group: Limits, k: int, start: int) -> int:
@@ -99,19 +123,14 @@ def _draw_run(axes: Axes, analysis: LimitAnalysis, group: Limits, k: int, start:
     limit, u = source.readings.limit, source.readings.u
     colour = _COLOURS[k % len(_COLOURS)]
     several = len(group.runs) > 1
-    axes.errorbar(
-        np.arange(start, start + len(limit)),
-        limit,
-        u,
-        color=colour,
-        marker=MARKERS[k % len(MARKERS)],
-        linestyle="none",
-        markersize=5,
-        elinewidth=0.9,
-        capsize=2,
-        zorder=3,
+    tops = np.arange(start, start + len(limit))
+    if u is not None:
+        axes.errorbar(tops, limit, u, color=colour, fmt="none", elinewidth=0.8, capsize=1.5, zorder=2.9)
+    axes.plot(
+        tops, limit, color=colour, marker=MARKERS[k % len(MARKERS)], linestyle="none", markersize=4, zorder=3,
+        gid=f"readings-{group.which}-{group.runs[k]}",
         label=label_of_run(source.name, k, len(group.runs), "a top" + " ± u" * (u is not None)),
-    )
+    )  # fmt: skip
     if several:
         axes.plot([start - 0.4, start + len(limit) - 0.6], [limit.mean()] * 2, color=colour, linewidth=1.2)
     return start + len(limit)
@@ -132,7 +151,7 @@ def _draw_theory(axes: Axes, name: str, expected: float) -> None:
         xycoords="axes fraction",
         ha="right",
         va="top" if above else "bottom",
-        fontsize=8,
+        fontsize=SMALL,
         color=colour,
     )
 
@@ -165,9 +184,10 @@ def _draw_distribution(axes: Axes, analysis: LimitAnalysis, group: Limits) -> No
     axes.tick_params(labelleft=False)
     axes.set_xlabel("tops")
     axes.xaxis.set_major_locator(MaxNLocator(4, integer=True))
+    axes.tick_params(axis="x", which="minor", bottom=False)
     if s == 0:
         axes.text(0.5, 0.5, "too few for\na distribution" if len(limits) < _FEWEST else "all alike", ha="center",
-                  va="center", fontsize=8, color="0.35", transform=axes.transAxes)  # fmt: skip
+                  va="center", fontsize=SMALL, color="0.35", transform=axes.transAxes)  # fmt: skip
         axes.set_xlim(0, 1)
         return
     bins = np.linspace(mean - _REACH * s, mean + _REACH * s, _BINS + 1)
@@ -175,4 +195,4 @@ def _draw_distribution(axes: Axes, analysis: LimitAnalysis, group: Limits) -> No
     y = np.linspace(*axes.get_ylim(), 200)
     normal = np.exp(-0.5 * ((y - mean) / s) ** 2) / np.sqrt(2 * np.pi)
     axes.plot(len(limits) * (2 * _REACH / _BINS) * normal, y, color=_MEAN, linewidth=1)
-    axes.set_title("distribution, normal law", loc="left", fontsize=8)
+    axes.set_title("distribution, normal law", loc="left", fontsize=SMALL)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 import numpy as np
@@ -10,8 +10,10 @@ from matplotlib.figure import Figure
 
 from analysis.numbers import digits
 from levilab.pipelines.precession.analysis import intercept_of, slope_of
+from levilab.present.drawing import SMALL, band, headline, panel, run_look, synthetic_mark
+from levilab.present.looks import GREY, LOOKS
 from levilab.present.numbers import plain, without_unit
-from levilab.present.style import MARKERS, STYLE, label_of_run, row
+from levilab.present.style import STYLE, WIDE, label_of_run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,20 +24,25 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: Okabe and Ito's colours: the line, the median line, points left out.
-LINE, ROBUST, OUT = "#0072B2", "#E69F00", "#D55E00"
 #: More points have no bars.
 MOST_BARS = 200
+
+
+#: Left edge and width of the panels, and where what explains them begins [inch].
+_LEFT, _WIDTH, _BESIDE = 0.66, 3.95, 1.03
 
 
 def precession_figure(analysis: PrecessionAnalysis) -> Figure:
     """Points with line and bands; departures from a locked top; what each point does to the line; phase lock."""
     phases = any(run.coherences for run in analysis.runs)
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(10, 11))
-        _draw_line(row(figure, 0.655, 0.315)[0], analysis)
-        _draw_departures(row(figure, 0.325, 0.255)[0], analysis)
-        panels = row(figure, 0.055, 0.185, 3 if phases else 2, gap=0.085)
+        figure = Figure(figsize=(WIDE, 6.8))
+        headline(figure, _finding(analysis.combined), synthetic_mark([one.synthetic for one in analysis.sources]))
+        _draw_line(panel(figure, _LEFT, 0.45, _WIDTH, 2.25), analysis)
+        _draw_departures(panel(figure, _LEFT, 3.3, _WIDTH, 1.3), analysis)
+        count = 3 if phases else 2
+        width = (6.24 - 0.62 * (count - 1)) / count
+        panels = [panel(figure, _LEFT + k * (width + 0.62), 5.3, width, 1.0) for k in range(count)]
         _draw_leverage(panels[0], analysis)
         _draw_changes(panels[1], analysis)
         if phases:
@@ -49,20 +56,12 @@ def precession_figure(analysis: PrecessionAnalysis) -> Figure:
 def _draw_line(axes: Axes, analysis: PrecessionAnalysis) -> None:
     fit = analysis.combined
     x = _span(fit)
-    axes.plot(
-        x, x, color="black", linestyle="dashed", linewidth=1, label="locked top: slope 1, intercept 0", zorder=2.4
+    axes.plot(x, x, linewidth=1, label="locked top: slope 1,\nintercept 0", zorder=2.4, **LOOKS["locked"].as_line)
+    label = f"line: slope {without_unit(slope_of(fit))},\nintercept {without_unit(intercept_of(fit))} Hz".replace(
+        "-", "−"
     )
-    label = f"line: slope {without_unit(slope_of(fit))}, intercept {without_unit(intercept_of(fit))} Hz"
-    axes.plot(x, fit.line.at(x), color=LINE, linewidth=1.6, label=label, zorder=2.6)
-    axes.plot(
-        x,
-        median_line(fit, x),
-        color=ROBUST,
-        linestyle=(0, (1, 2)),
-        linewidth=1.8,
-        label="median line, robust",
-        zorder=2.7,
-    )
+    axes.plot(x, fit.line.at(x), linewidth=1.4, label=label, zorder=2.6, **LOOKS["fit"].as_line)
+    axes.plot(x, median_line(fit, x), linewidth=1.6, label="median line, robust", zorder=2.7, **LOOKS["robust"].as_line)
     _draw_bands(axes, x, fit.line.at(x), fit, labels=True)
     inside = np.concatenate([run.fit.column("precession")[_used(run.fit)] for run in analysis.runs])
     low, high = min(float(inside.min()), float(x[0])), max(float(inside.max()), float(x[-1]))
@@ -70,13 +69,10 @@ def _draw_line(axes: Axes, analysis: PrecessionAnalysis) -> None:
     axes.set_ylim(low - margin, high + margin)
     for k, (run, source) in enumerate(zip(analysis.runs, analysis.sources, strict=True)):
         name = label_of_run(source.name, k, len(analysis.runs), "points")
-        _draw_points(axes, run.fit, k, run.fit.column("precession"), label=name)
+        _draw_points(axes, analysis, k, run.fit.column("precession"), label=name, gid=f"readings-{k}")
         _draw_left_out(axes, run.fit)
-    axes.set(xlabel="frequency of the drive ν$_d$  [Hz]", ylabel="precession that was counted ν$_p$  [Hz]")
-    made_up = sum(source.synthetic for source in analysis.sources)
-    mark = "" if not made_up else "  (SYNTHETIC)" if made_up == len(analysis.sources) else f"  ({made_up} SYNTHETIC)"
-    axes.set_title(f"{_finding(fit)}{mark}", loc="left", fontsize=11)
-    axes.legend(loc="upper left")
+    axes.set(xlabel="frequency of the drive ν$_d$  [Hz]", ylabel="precession ν$_p$  [Hz]")
+    axes.legend(loc="upper left", bbox_to_anchor=(_BESIDE, 1.0), borderaxespad=0, labelspacing=0.7)
 
 
 def median_line(fit: SweepFit, x: Array) -> Array:
@@ -113,20 +109,29 @@ def _draw_bands(axes: Axes, x: Array, y: Array, fit: SweepFit, *, labels: bool =
         return
     usual = fit.line.scale * _usual_u(fit)
     for half, alpha, what in (
-        (fit.line.prediction_band(x, _usual_u(fit)), 0.10, f"95 % of further points of u = {digits(usual)} Hz"),
-        (fit.line.confidence_band(x), 0.28, "95 % confidence of the line"),
+        (fit.line.prediction_band(x, _usual_u(fit)), 0.10, f"95 % of further points\nof u = {digits(usual)} Hz"),
+        (fit.line.confidence_band(x), 0.28, "95 % confidence of the\nline"),
     ):
-        axes.fill_between(x, y - half, y + half, color=LINE, alpha=alpha, linewidth=0, label=what if labels else None)
+        band(axes, x, y, half, LOOKS["fit"].colour, alpha=alpha, label=what if labels else None)
 
 
 def _draw_points(
-    axes: Axes, fit: SweepFit, k: int, y: Array, *, bars: Array | None = None, label: str | None = None
+    axes: Axes,
+    analysis: PrecessionAnalysis,
+    k: int,
+    y: Array,
+    *,
+    bars: Array | None = None,
+    label: str | None = None,
+    gid: str | None = None,
 ) -> None:
+    fit, look = analysis.runs[k].fit, run_look(k, len(analysis.runs))
     used = _used(fit)
-    style: Any = {"color": "black", "linestyle": "none", "marker": MARKERS[k % len(MARKERS)], "zorder": 3}
-    style |= {"markersize": 5 if used.sum() <= MOST_BARS else 2, "markerfacecolor": "white"}
-    error = bars[used] if bars is not None and used.sum() <= MOST_BARS and np.isfinite(bars).all() else None
-    axes.errorbar(fit.column("drive")[used], y[used], error, elinewidth=0.9, label=label, **style)
+    few = used.sum() <= MOST_BARS
+    if bars is not None and few and np.isfinite(bars).all():
+        axes.errorbar(fit.column("drive")[used], y[used], bars[used], elinewidth=0.8, color=look.colour, fmt="none")
+    style = look.as_points | {"markersize": 4 if few else 2, "zorder": 3, "label": label, "gid": gid}
+    axes.plot(fit.column("drive")[used], y[used], **style)
 
 
 def _draw_left_out(axes: Axes, fit: SweepFit) -> None:
@@ -138,12 +143,14 @@ def _draw_left_out(axes: Axes, fit: SweepFit) -> None:
         beyond = not low <= point.precession <= high
         y = min(max(point.precession, low + 0.03 * (high - low)), high - 0.03 * (high - low))
         marker = "x" if not beyond else "v" if point.precession < low else "^"
-        axes.plot(point.drive, y, marker=marker, color=OUT, markersize=8, linestyle="none", zorder=5)
+        axes.plot(
+            point.drive, y, marker=marker, color=LOOKS["left out"].colour, markersize=6, linestyle="none", zorder=5
+        )
         text = f"{point.precession:.4g} Hz: {point.miscount}" if beyond else point.miscount
         last = point.drive > float(fit.column("drive").mean())
         axes.annotate(
-            text, (point.drive, y), (-8 if last else 8, -3), textcoords="offset points", color=OUT, fontsize=8,
-            ha="right" if last else "left", zorder=5,
+            text, (point.drive, y), (-8 if last else 8, -3), textcoords="offset points", fontsize=SMALL,
+            color=LOOKS["left out"].colour, ha="right" if last else "left", zorder=5,
         )  # fmt: skip
 
 
@@ -153,11 +160,11 @@ def _draw_left_out(axes: Axes, fit: SweepFit) -> None:
 def _draw_departures(axes: Axes, analysis: PrecessionAnalysis) -> None:
     """ν_p − ν_d with the u of each point, which differ: noise about zero for a locked top."""
     fit = analysis.combined
-    axes.axhline(0, color="black", linestyle="dashed", linewidth=1)
+    axes.axhline(0, linewidth=1, **LOOKS["locked"].as_line)
     x = _span(fit)
     y = fit.line.at(x) - x
-    axes.plot(x, y, color=LINE, linewidth=1.6)
-    axes.plot(x, median_line(fit, x) - x, color=ROBUST, linestyle=(0, (1, 2)), linewidth=1.8, zorder=2.7)
+    axes.plot(x, y, linewidth=1.4, **LOOKS["fit"].as_line)
+    axes.plot(x, median_line(fit, x) - x, linewidth=1.6, zorder=2.7, **LOOKS["robust"].as_line)
     _draw_bands(axes, x, y, fit)
     scatter = fit.line.scale if fit.line.u_slope else 0.0
     tallest = 0.0
@@ -165,15 +172,15 @@ def _draw_departures(axes: Axes, analysis: PrecessionAnalysis) -> None:
         u = run.fit.column("u") * fit.line.scale
         bars = np.where(np.isfinite(u), u, scatter)
         off = run.fit.column("precession") - run.fit.column("drive")
-        _draw_points(axes, run.fit, k, off, bars=bars)
+        _draw_points(axes, analysis, k, off, bars=bars, gid=f"residuals-{k}")
         tallest = max(tallest, 1.1 * float((np.abs(off) + 2 * bars)[_used(run.fit)].max()))
     if tallest > 0:
         axes.set_ylim(-tallest, tallest)
     axes.set(xlabel="frequency of the drive ν$_d$  [Hz]", ylabel="ν$_p$ − ν$_d$  [Hz]")
-    bar = "their u" if fit.line.chi_square is not None else "the scatter"
-    axes.set_title(
-        f"Departures from a locked top, bars: {bar}; blue: the line with its bands; orange: the median line", loc="left"
-    )
+    bar = "u of each point" if fit.line.chi_square is not None else "the scatter"
+    axes.set_title("Departures from a locked top")
+    about = f"bars: ± {bar};\nlines and bands as above.\nA locked top scatters\nabout the dashed line."
+    axes.text(_BESIDE, 1.0, about, transform=axes.transAxes, va="top", fontsize=8)
 
 
 # --- influence -----------------------------------------------------------------------------------------
@@ -184,11 +191,11 @@ def _draw_leverage(axes: Axes, analysis: PrecessionAnalysis) -> None:
     for k, run in enumerate(analysis.runs):
         drive, leverage, used = run.fit.column("drive"), run.fit.column("leverage"), _used(run.fit)
         axes.vlines(drive[used], 0, leverage[used], color="black", linewidth=1)
-        _draw_points(axes, run.fit, k, leverage)
+        _draw_points(axes, analysis, k, leverage)
     n = min(run.fit.line.n for run in analysis.runs)
-    axes.axhline(2 / n, color="dimgrey", linestyle="dotted", linewidth=1)
+    axes.axhline(2 / n, color=GREY, linestyle="dotted", linewidth=1)
     axes.set(xlabel="ν$_d$  [Hz]", ylabel="leverage", ylim=(0, None))
-    axes.set_title(f"Leverage; dotted: the mean, {digits(2 / n)}", loc="left")
+    axes.set_title(f"Leverage; dotted: the mean, {digits(2 / n)}", loc="left", fontsize=8)
 
 
 def _draw_changes(axes: Axes, analysis: PrecessionAnalysis) -> None:
@@ -199,10 +206,10 @@ def _draw_changes(axes: Axes, analysis: PrecessionAnalysis) -> None:
         u = run.fit.line.u_slope or 1.0
         drive, change, used = run.fit.column("drive"), run.fit.column("slope_change") / u, _used(run.fit)
         axes.vlines(drive[used], 0, change[used], color="black", linewidth=1)
-        _draw_points(axes, run.fit, k, change)
+        _draw_points(axes, analysis, k, change)
         tallest = max(tallest, 1.2 * float(np.nanmax(np.abs(change))))
-    axes.set(xlabel="ν$_d$  [Hz]", ylabel="change of the slope / u", ylim=(-tallest, tallest))
-    axes.set_title("The slope without the point", loc="left")
+    axes.set(xlabel="ν$_d$  [Hz]", ylabel="change / u", ylim=(-tallest, tallest))
+    axes.set_title("Slope without the point", loc="left", fontsize=8)
 
 
 def _draw_phases(axes: Axes, analysis: PrecessionAnalysis) -> None:
@@ -210,8 +217,8 @@ def _draw_phases(axes: Axes, analysis: PrecessionAnalysis) -> None:
     for k, run in enumerate(analysis.runs):
         drive = [run.fit.points[one.point].drive for one in run.coherences]
         length = [one.coherence.length for one in run.coherences]
-        colours = [LINE if one.coherence.locked else OUT for one in run.coherences]
+        colours = [LOOKS["fit" if one.coherence.locked else "left out"].colour for one in run.coherences]
         axes.vlines(drive, 0, length, color=colours, linewidth=1)
-        axes.scatter(drive, length, c=colours, s=22, marker=MARKERS[k % len(MARKERS)], zorder=3)
-    axes.set(xlabel="ν$_d$  [Hz]", ylabel="mean vector of the pulses", ylim=(0, 1.05))
-    axes.set_title("Phase lock to the drive; 1: firm", loc="left")
+        axes.scatter(drive, length, c=colours, s=14, marker=run_look(k, len(analysis.runs)).marker, zorder=3)
+    axes.set(xlabel="ν$_d$  [Hz]", ylabel="mean vector", ylim=(0, 1.05))
+    axes.set_title("Phase lock to the drive; 1: firm", loc="left", fontsize=8)

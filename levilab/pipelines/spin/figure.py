@@ -10,8 +10,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from analysis.numbers import digits
+from levilab.present.drawing import SMALL, band, headline, panel, synthetic_mark, write
+from levilab.present.looks import LOOKS
 from levilab.present.numbers import short_name, with_uncertainty
-from levilab.present.style import STYLE
+from levilab.present.style import STYLE, WIDE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,7 +31,9 @@ if TYPE_CHECKING:
 MOST_INPUTS, MOST_POINTS = 3, 4000
 #: Turns of the trace that are shown, and the longest part of it that is folded [s].
 TURNS_SHOWN, LONGEST_FOLDED_S = 6, 12.0
-BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
+READINGS, PULSES, FIT = LOOKS["readings"].colour, LOOKS["pulses"].colour, LOOKS["fit"].colour
+#: Height of the sentence above all, and of the four panels of an input [inch].
+_HEAD, _EACH = 0.42, 4.35
 #: Bins of the folded pulse.
 BINS = 240
 
@@ -49,31 +53,34 @@ class _Excerpt:
 def spin_figure(analysis: SpinAnalysis) -> Figure:
     """For each input its trace with the turns found in it, all turns laid over each other, residuals, and frequency."""
     shown = list(zip(analysis.sources, analysis.runs, strict=True))[:MOST_INPUTS]
-    height = 6.4
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(10, height * len(shown)))
+        head = _HEAD if len(analysis.runs) > 1 else _HEAD - 0.2
+        figure = Figure(figsize=(WIDE, head + _EACH * len(shown)))
+        headline(figure, _finding(analysis), synthetic_mark([source.synthetic for source in analysis.sources]))
         for k, (source, run) in enumerate(shown):
-            top = 1 - k / len(shown)
-            size = 1 / len(shown)
-            panels = [
-                figure.add_axes((x, top - size * (1 - y), 0.405, size * 0.335))
-                for y in (0.53, 0.075) for x in (0.075, 0.575)
-            ]  # fmt: skip
-            _title(figure, top - 0.035 * size, analysis, source, run)
+            top = head + _EACH * k
+            panels = [panel(figure, x, top + y, 2.62, 1.35) for y in (0.5, 2.55) for x in (0.72, 4.25)]
+            if len(analysis.runs) > 1:
+                write(figure, 0.1, top, _title(source, run), fontsize=9)
             _draw(panels, source, run)
         more = len(analysis.runs) - len(shown)
         if more > 0:
-            y = 1 - 0.035 / len(shown)
-            figure.text(0.985, y, f"{more} more inputs are not drawn", ha="right", va="center", fontsize=8)
+            write(figure, WIDE - 0.1, 0.3, f"{more} more inputs are not drawn", ha="right", fontsize=SMALL)
     return figure
 
 
-def _title(figure: Figure, y: float, analysis: SpinAnalysis, source: Source[Records], run: SpinRun) -> None:
+def _finding(analysis: SpinAnalysis) -> str:
+    if len(analysis.runs) == 1:
+        spin = analysis.runs[0].spin
+        return f"Spin {with_uncertainty(spin.frequency)} at {spin.reference_time:.4g} s"
+    return f"Spin of {len(analysis.runs)} inputs"
+
+
+def _title(source: Source[Records], run: SpinRun) -> str:
     spin = run.spin
     made_up = "  (SYNTHETIC)" if source.synthetic else ""
-    name = f"{_drawable(short_name(source.name))}: " if len(analysis.runs) > 1 else ""
-    text = f"{name}spin {with_uncertainty(spin.frequency)} at {spin.reference_time:.4g} s{made_up}"
-    figure.text(0.02, y, text, fontsize=11, va="center")
+    name = _drawable(short_name(source.name))
+    return f"{name}: spin {with_uncertainty(spin.frequency)} at {spin.reference_time:.4g} s{made_up}"
 
 
 def _drawable(name: str) -> str:
@@ -221,25 +228,25 @@ def _draw_trace(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:
     turns = excerpt.turns[near]
     for turn in np.arange(np.ceil(turns.min()), np.floor(turns.max()) + 1):
         at = np.interp(turn, turns, excerpt.time[near])
-        axes.axvline(at, color=VERMILION, linewidth=1, alpha=0.7, zorder=1)
+        axes.axvline(at, linewidth=0.9, zorder=1, **LOOKS["pulses"].as_line)
     axes.set(xlabel="time  [s]", ylabel=f"signal  [{excerpt.unit}]")
     axes.locator_params(axis="x", nbins=6)
-    axes.set_title("The trace, and the turns found in it", loc="left")
+    axes.set_title("Trace; dashed: the turns found in it", loc="left")
 
 
 def _draw_folded(axes: Axes, excerpt: _Excerpt) -> None:
     """All turns over each other."""
     part = _thin(len(excerpt.turns))
     off = excerpt.turns - np.rint(excerpt.turns)
-    style: Any = {"marker": ".", "markersize": 2, "linestyle": "none", "color": BLUE, "alpha": 0.4, "rasterized": True}
+    style: Any = {"marker": ".", "markersize": 2, "linestyle": "none", "color": FIT, "alpha": 0.4, "rasterized": True}
     axes.plot(off[part], excerpt.signal[part], **style)
     phase, mean = _fold(excerpt.signal, excerpt.turns)
     good = np.isfinite(mean)
     axes.plot(phase[good], mean[good], color="black", linewidth=1)
-    axes.axvline(0, color=VERMILION, linewidth=1, alpha=0.7, zorder=1)
+    axes.axvline(0, linewidth=0.9, zorder=1, **LOOKS["pulses"].as_line)
     turns = round(float(np.ptp(excerpt.turns)))
     axes.set(xlabel="part of a turn", ylabel=f"signal  [{excerpt.unit}]", xlim=(-0.5, 0.5))
-    axes.set_title(f"{turns} turns laid over each other, and their mean", loc="left")
+    axes.set_title(f"{turns} turns over each other; black: mean", loc="left")
 
 
 def _draw_intervals(axes: Axes, excerpt: _Excerpt) -> None:
@@ -250,30 +257,33 @@ def _draw_intervals(axes: Axes, excerpt: _Excerpt) -> None:
 
 
 def _draw_phases_of_pulses(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:
-    axes.hist(1e6 * excerpt.residuals, bins=30, color=BLUE, alpha=0.6)
-    axes.axvline(0, color=VERMILION, linewidth=1)
-    axes.set(xlabel="time of a pulse − fit  [µs]", ylabel="pulses")
-    axes.set_title(f"Scatter of a pulse's time: {digits(1e6 * spin.scatter, 3)} µs", loc="left")
+    axes.hist(1e6 * excerpt.residuals, bins=30, color=FIT, alpha=0.6)
+    axes.axvline(0, linewidth=1, **LOOKS["pulses"].as_line)
+    axes.margins(x=0.08, y=0.12)
+    axes.set(xlabel="pulse − fit  [µs]", ylabel="pulses")
+    axes.set_title(f"Scatter of a pulse: {digits(1e6 * spin.scatter, 3)} µs", loc="left")
 
 
 def _draw_residuals(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:
     """What the pulses' times leave over: noise about zero, without a shape."""
-    axes.axhline(0, color=VERMILION, linewidth=1)
+    axes.axhline(0, color="black", linewidth=0.6)
     limit = 6 * 1e6 * max(spin.scatter, float(np.median(np.abs(excerpt.residuals))) if len(excerpt.residuals) else 0.0)
     scale, unit = (1e-3, "ms") if limit >= 5e3 else (1.0, "µs")  # five digits would not find room beside the axis
     limit *= scale
     values = 1e6 * scale * excerpt.residuals
     inside = np.abs(values) <= limit
     style: Any = {"linestyle": "none", "color": "black", "markersize": 4}
-    axes.plot(excerpt.arrivals[inside], values[inside], marker=".", **style)
+    axes.plot(excerpt.arrivals[inside], values[inside], marker=".", gid="residuals-pulses", **style)
     edges = excerpt.arrivals[~inside], np.clip(values[~inside], -limit, limit)
-    axes.plot(*edges, marker="x", **style | {"color": "red"}, label="beyond the panel")
+    axes.plot(*edges, marker="x", **style | {"color": LOOKS["left out"].colour}, label="beyond the panel")
+    room = 1.1
     if (~inside).any():
-        axes.legend(loc="upper right")
+        axes.legend(loc="upper right", fontsize=SMALL, borderaxespad=0)
+        room = 1.45
     if limit > 0:
-        axes.set_ylim(-1.1 * limit, 1.1 * limit)
-    axes.set(xlabel="time  [s]", ylabel=f"time of a pulse − fit  [{unit}]")
-    degree = " from a fit of the third degree" if spin.bend else ""
+        axes.set_ylim(-1.1 * limit, room * limit)
+    axes.set(xlabel="time  [s]", ylabel=f"pulse − fit  [{unit}]")
+    degree = ", fit of third degree" if spin.bend else ""
     axes.set_title(f"Residuals of the pulses' times{degree}", loc="left")
 
 
@@ -285,20 +295,23 @@ def _draw_series(axes: Axes, run: SpinRun, excerpt: _Excerpt) -> None:
         along = [spin.at(float(x)) for x in t]
         nu = np.array([one.value for one in along], dtype=np.float64)
         u = np.array([one.u if one.u is not None else np.nan for one in along])
-        axes.fill_between(t, nu - u, nu + u, color=BLUE, alpha=0.25, linewidth=0)
-        axes.plot(t, nu, color=BLUE)
-        axes.plot(spin.reference_time, spin.frequency.value or 0.0, "o", color="black", markersize=5)
-        curve = "slope and its change" if spin.bend else "slope"
-        axes.set_title(f"Frequency along the {curve}, ± u", loc="left")
+        band(axes, t, nu, u, FIT)
+        axes.plot(t, nu, **LOOKS["fit"].as_line)
+        axes.plot(spin.reference_time, spin.frequency.value or 0.0, markersize=4, **LOOKS["readings"].as_points)
+        degree = " of third degree" if spin.bend else ""
+        axes.set_title(f"Frequency by the fit{degree}, ± u", loc="left")
     else:
-        axes.errorbar(series.time, series.frequency, series.u, color=BLUE, fmt=".", markersize=3, elinewidth=0.8)
-        colours = {"coasting": GREEN, "held": VERMILION, "speeding-up": "#E69F00"}
+        axes.errorbar(series.time, series.frequency, series.u, color=READINGS, fmt="none", elinewidth=0.7)
+        axes.plot(series.time, series.frequency, ".", color=READINGS, markersize=3, gid="readings-series")
         for kind, start, end in series.phases:
-            if kind in colours:
+            if kind in ("coasting", "held", "speeding-up"):
                 known = axes.get_legend_handles_labels()[1]
-                axes.axvspan(start, end, color=colours[kind], alpha=0.12, label=None if kind in known else kind)
+                look, label = LOOKS[kind], None if kind in known else kind
+                axes.axvspan(start, end, facecolor=look.colour, alpha=0.15, linewidth=0, label=label, hatch=look.hatch)
         if axes.get_legend_handles_labels()[1]:
-            axes.legend(loc="best")
-        axes.set_title(f"Frequency of {len(series)} {series.of}s", loc="left")
+            low, high = axes.get_ylim()
+            axes.set_ylim(low, high + 0.25 * (high - low))
+            axes.legend(loc="upper center", ncols=3, fontsize=SMALL, borderaxespad=0, columnspacing=1, handlelength=1.6)
+        axes.set_title(f"Frequency of {len(series)} {series.of}s, ± u", loc="left")
     axes.ticklabel_format(axis="y", useOffset=False)
-    axes.set(xlabel="time  [s]", ylabel="spin frequency ν  [Hz]")
+    axes.set(xlabel="time  [s]", ylabel="spin ν  [Hz]")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from analysis.numbers import digits
@@ -41,7 +42,7 @@ def spin_part(analysis: SpinAnalysis) -> ReportPart:
             points=_points(analysis),
         ),
         runs_title="The pulses",
-        runs=(Tabular("spin-pulses", pulse_table(analysis), _PULSES, first_column_wraps=True),),
+        runs=(Tabular("spin-pulses", replace(pulse_table(analysis), title=""), _PULSES, first_column_wraps=True),),
         inputs=tuple(
             InputPart(_in_words(source, run), origin.text, in_a_sentence(run), _series(source, run))
             for source, run, origin in zip(analysis.sources, analysis.runs, analysis.origins, strict=True)

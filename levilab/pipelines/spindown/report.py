@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 
 #: Readings printed in the page; more stay in the run folder.
 MOST_READINGS = 200
+#: Runs with more readings have a figure in which not each is a point.
+MOST_POINTS = 300
 #: Runs whose wobble is shown without unfolding it.
 MOST_COUNTS = 12
 #: Most falls that are listed; of more the range is given.
@@ -323,26 +325,24 @@ def _points(analysis: SpinDownAnalysis) -> tuple[Points, ...]:
     return tuple(
         points
         for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True))
-        for points in _points_of_run(k, short_name(source.name) if len(analysis.runs) > 1 else "", run)
+        if len(run.time) <= MOST_POINTS
+        for points in _points_of_run(k, short_name(source.name) if len(analysis.runs) > 1 else "", run, analysis)
     )
 
 
-def _points_of_run(k: int, name: str, run: SpinDown) -> Iterator[Points]:
-    texts = []
+def _points_of_run(k: int, name: str, run: SpinDown, analysis: SpinDownAnalysis) -> Iterator[Points]:
+    u = [None] * len(run.time) if run.u is None else run.u.tolist()
+    heads = [
+        f"{name}\n" * bool(name) + f"t = {digits(t, 6)} s\nν = {with_uncertainty(Estimate(nu, u_, 'Hz'))}"
+        for t, nu, u_ in zip(run.time.tolist(), run.frequency.tolist(), u, strict=True)
+    ]
     for law in run.fits:
-        own = [_point(name, run, i, law.name, r) for i, r in enumerate(law.residuals.tolist())]
-        yield Points(f"residuals-{law.name}-{k}", tuple(own))
-        if law.name == run.best:
-            texts = own
-    yield Points(f"readings-{k}", tuple(texts))
-
-
-def _point(name: str, run: SpinDown, i: int, law: str, residual: float) -> str:
-    """One reading in three or four lines."""
-    u = None if run.u is None else float(run.u[i])
-    spin = with_uncertainty(Estimate(float(run.frequency[i]), u, "Hz"))
-    lines = [name, f"t = {digits(float(run.time[i]), 6)} s", f"ν = {spin}", f"ν − {law} law = {off(residual, u)} Hz"]
-    return "\n".join(filter(None, lines))
+        left = zip(heads, law.residuals.tolist(), u, strict=True)
+        texts = tuple(f"{head}\nν − {law.name} law = {off(r, u_)} Hz" for head, r, u_ in left)
+        yield Points(f"residuals-{law.name}-{k}", texts)
+        if law.name == analysis.combined.best:
+            yield Points(f"readings-{k}", texts)
+            yield Points(f"residuals-best-{k}", texts)
 
 
 def _fall(source: Source[Readings], fit: SpinDown) -> str:

@@ -24,7 +24,6 @@ from levilab.present.document.blocks import (
     Verdict,
     Warnings,
 )
-from levilab.present.style import as_png, as_svg
 from levilab.report.html.elements import Html, element, joined, lines, words
 
 if TYPE_CHECKING:
@@ -132,12 +131,13 @@ def _listing(_: Writer, block: Listing, __: int) -> Html:
     whole = replace(block.table, title="")
     pieces = [_table(whole, rows[k : k + size], classes) for k in range(0, len(rows), size)]
     title = element("strong", words(block.table.title)) if block.table.title else ""
-    return element("div", title, element("div", pieces, class_="pieces"), _small_print(block.note), class_="listing")
+    shown = _moved_sideways(joined(pieces), block.table.title or block.name.replace("-", " "), "scroll pieces")
+    return element("div", title, shown, _small_print(block.note), class_="listing")
 
 
-def _moved_sideways(drawn: Html, name: str) -> Html:
+def _moved_sideways(drawn: Html, name: str, kind: str = "scroll") -> Html:
     """What is too wide is moved sideways, also from the keyboard."""
-    return element("div", drawn, class_="scroll", tabindex="0", role="region", aria_label=name)
+    return element("div", drawn, class_=kind, tabindex="0", role="region", aria_label=name)
 
 
 def _classes(table: Table, wraps: Iterable[str] = (), *, names: bool = False) -> tuple[str | None, ...]:
@@ -173,6 +173,8 @@ def _small_print(text: str) -> Html | str:
 
 
 def _picture(writer: Writer, block: Picture, _: int) -> Html:
+    from levilab.present.style import as_png, as_svg  # with matplotlib
+
     prefix = writer.new_id(block.name)
     figure = block.draw()
     if block.raster:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from levilab.motion.figure import motion_figure
+from levilab.motion.figure import PIECES, motion_figure
 from levilab.motion.lines import lines_of, rate_for
 from levilab.motion.simulation import COLUMNS, SimulationRequest, kept_rows, run_simulation
 from levilab.motion.summary import as_document, summarise
@@ -23,6 +23,7 @@ from levilab.runs.run import Run
 from levilab.runs.writer import RunWriter
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
+from support.figures import faults
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -312,10 +313,32 @@ def test_the_lines_are_named_inside_of_their_panel_and_apart(name: str, spin: fl
     shown = [text.get_text() for text in panel.texts]
     assert any(text.endswith(" precession") for text in shown)
     assert any(text.endswith(" nutation") for text in shown)
-    for k, box in enumerate(boxes):
+    for box in boxes:
         assert frame.x0 <= box.x0 < box.x1 <= frame.x1
         assert frame.y0 <= box.y0 < box.y1 <= frame.y1
-        assert not any(box.overlaps(other) for other in boxes[k + 1 :])
+    assert faults(figure) == []
+
+
+def test_of_a_long_tilt_the_envelope_is_drawn_with_its_mean_and_a_second_of_it_beside() -> None:
+    found = summary(preset("driven"), 30.0, rate=400.0)
+    tilt = np.degrees(found.motion.tilt)
+    panels = {panel.get_ylabel(): panel for panel in motion_figure(found).axes}
+    whole = panels["tilt  [degrees]"]
+    lines = [np.asarray(line.get_ydata()) for line in whole.get_lines()]
+    assert [len(line) for line in lines] == [PIECES, PIECES, PIECES // 12]
+    assert (lines[0].min(), lines[1].max()) == pytest.approx((tilt.min(), tilt.max()))
+    assert lines[2].mean() == pytest.approx(tilt.mean(), rel=0.01)
+    (mark,) = [patch.get_x() for patch in whole.patches]
+    beside = next(panel for panel in motion_figure(found).axes if panel.get_xlim() == (15.0, 16.0))
+    assert mark == 15.0
+    assert beside.get_xlim() == (15.0, 16.0)
+
+
+def test_a_fall_is_drawn_to_its_end() -> None:
+    found = summary(preset("friction").changed({"start.spin_hz": 22.0}), 60.0)
+    assert found.motion.fell
+    height = motion_figure(found).axes[3].get_lines()[0]
+    assert np.asarray(height.get_ydata())[-1] == pytest.approx(100 * found.motion.position[-1, 2])
 
 
 # --- what is refused, and what ends it ---

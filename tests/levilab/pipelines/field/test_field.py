@@ -24,6 +24,7 @@ from levilab.pipelines.sources import collect
 from levilab.pipelines.top import calculate_top
 from levilab.report.page import render
 from levilab.world.base import Base
+from support.figures import faults
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -139,7 +140,9 @@ def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(
     page = render([(ANALYSES["field"], found)])
     assert "None of these 2 runs came from a real bench" in page
     assert ANALYSES["field"].document(found, tmp_path)["values"]["strength"]["runs"] == 2
-    assert len(field_figure(found).axes) == 4
+    figure = field_figure(found)
+    assert len(figure.axes) == 4
+    assert faults(figure) == []
     assert len(field_part(found).inputs) == 2
 
 

@@ -21,6 +21,7 @@ from levilab.runs.gates import COUNTED, gates_event
 from levilab.runs.run import RunRecord, utc_now
 from levilab.runs.writer import RunWriter
 from support.commands import command
+from support.figures import faults
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -164,8 +165,10 @@ def test_figure_and_page_show_what_was_found(tmp_path: Path) -> None:
     assert "mean vector" in page
     assert "half the frequency was counted" in page
     assert "left out" in page
-    line, _, leverage, *_ = precession_figure(found).axes
-    assert re.fullmatch(r"The precession follows the drive one to one \(p = 0\.\d+\)", line.get_title("left"))
+    figure = precession_figure(found)
+    leverage = figure.axes[2]
+    assert re.fullmatch(r"The precession follows the drive one to one \(p = 0\.\d+\)", figure.texts[0].get_text())
+    assert faults(figure) == []
     assert leverage.get_title("left") == "Leverage; dotted: the mean, 0.67"  # of the shortest sweep, 2 of 3 points
 
 

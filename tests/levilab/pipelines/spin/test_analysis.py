@@ -22,6 +22,7 @@ from levilab.runs.run import Run, RunRecord, utc_now
 from levilab.runs.waveforms import run_waveforms
 from levilab.runs.writer import RunWriter
 from support.detector import C32, RELEASE_HZ, coasting_turns, coasting_wav, pulses, write_wav
+from support.figures import faults
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -263,11 +264,12 @@ def test_the_figure_shows_the_trace_the_turns_the_residuals_and_the_frequency(
     figure = spin_figure(analyze_spins(files[what], SpinOptions()))
     panels = figure.get_axes()
     assert len(panels) == (12 if what == "many" else 4)
+    assert faults(figure) == []
     if what in {"trace", "long"}:
         marks = [line for line in panels[0].get_lines() if len(line.get_xdata()) == 2]
         assert 5 <= len(marks) <= 7  # a turn each, of six that are shown
     if what != "long":
-        assert panels[3].get_title("left") == "Frequency along the slope, ± u"
+        assert panels[3].get_title("left") == "Frequency by the fit, ± u"
     residuals = np.concatenate([np.asarray(line.get_ydata(), float) for line in panels[2].get_lines()[1:]])
     assert len(residuals) > 10
     assert np.abs(residuals).max() < 200  # µs: a fifth of a pulse's width
@@ -292,7 +294,7 @@ def test_residuals_from_a_third_degree_have_no_bend_left(what: str, tmp_path: Pa
     analysis = analyze_spins([file], SpinOptions())
     assert any(note.name == "curved" for note in analysis.runs[0].spin.notes)
     panel, beside = spin_figure(analysis).get_axes()[2:]
-    assert beside.get_title("left") == "Frequency along the slope and its change, ± u"
+    assert beside.get_title("left") == "Frequency by the fit of third degree, ± u"
     (dots,) = [line for line in panel.get_lines() if line.get_marker() == "."]
     at, residuals = (np.asarray(values, dtype=float) for values in (dots.get_xdata(), dots.get_ydata()))
     assert len(at) > 140  # of 150 turns

@@ -8,12 +8,13 @@ import pytest
 from analysis.spindown.drag import LAWS, spin
 from analysis.spindown.tilt import PARAMETERS
 from levilab.pipelines.spindown.laws import SHOWN_LAWS, SYMBOLS
+from levilab.present.looks import LOOKS
 
 
 def test_every_law_that_is_fitted_is_shown_and_every_constant_has_a_symbol() -> None:
     assert list(SHOWN_LAWS) == list(LAWS)
     assert set(SYMBOLS) == {name for law in LAWS.values() for name in law.parameters} | set(PARAMETERS)
-    assert len({law.colour for law in SHOWN_LAWS.values()}) == len(SHOWN_LAWS)
+    assert len({LOOKS[name].colour for name in SHOWN_LAWS}) == len(SHOWN_LAWS)
 
 
 @pytest.mark.parametrize(("law", "constant"), [("stokes", 3.2e-3), ("newton", 1.7e-5), ("disc", 2.3e-4)])

@@ -1,0 +1,116 @@
+"""Blocks as HTML: structure, escaping, ids, typeset numbers."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any
+
+import pytest
+from matplotlib.figure import Figure
+
+from levilab.present.document.blocks import (
+    Banner,
+    Bullets,
+    Code,
+    Details,
+    Document,
+    Fact,
+    Facts,
+    Listing,
+    Note,
+    Paragraph,
+    Picture,
+    Points,
+    Section,
+    Tabular,
+    Verdict,
+    Warnings,
+)
+from levilab.present.tables import Row, table
+from levilab.report.html.page import fragment_of, page_of
+from support.pages import Page
+
+EVIL = "</script></style></svg><b onclick=x>{{7*7}}${x}\"'&"
+NAMES = ("a", EVIL)
+
+
+def drawn() -> Figure:
+    figure = Figure((2, 2))
+    figure.subplots().plot([1, 2], [3, 4], "o", gid="readings-0")
+    return figure
+
+
+def blocks(text: str) -> tuple[Any, ...]:
+    """One block of each kind, with a text wherever one can stand."""
+    cells = table(text, (text, "n"), [Row((text, "1"), "best"), Row((f"{text}\n{text}", "2"))], numbers=["n"])
+    picture = Picture("figure", text, text, text, drawn, (Points("readings-0", (text, text)),))
+    return (
+        Paragraph(text, lead=text), Note(text), Verdict(text), Banner(text, text), Bullets((text,)), Code(text),
+        Warnings(((text,) * 5, (text,))), Facts((Fact(text, (text, text)), Fact(text, (text,), code=True))),
+        Tabular("table", cells, text, first_column_wraps=True, wraps=("n",)), Listing("listing", cells, text), picture,
+        Details(text, (Paragraph(text),), more=text),
+    )  # fmt: skip
+
+
+def document(text: str) -> Document:
+    sections = tuple(Section(text, blocks(text), anchor="result", lead=text) for _ in range(2))
+    return Document(text, text, sections, Banner(text, text), contents=True, footer=text, subject=text)
+
+
+def test_no_text_of_any_block_becomes_markup() -> None:
+    hostile, tame = Page(page_of(document(EVIL))), Page(page_of(document("word")))
+    assert [tag for tag, _ in hostile.tags] == [tag for tag, _ in tame.tags]
+    assert hostile.text.count(EVIL) == tame.text.count("word")
+
+
+def test_points_are_data_that_ends_no_script() -> None:
+    html = page_of(document(EVIL))
+    island = html.partition('id="points">')[2].partition("</script>")[0]
+    assert "<" not in island
+    assert json.loads(island) == {"figure-readings-0": [EVIL, EVIL], "figure-2-readings-0": [EVIL, EVIL]}
+
+
+def test_no_two_elements_share_an_id_and_each_link_leads_somewhere() -> None:
+    page = Page(page_of(document("word")))
+    ids = [given["id"] for _, given in page.tags if "id" in given]
+    assert len(ids) == len(set(ids))
+    links = [str(given["href"])[1:] for tag, given in page.tags if tag == "a"]
+    assert links == ["result", "result-2"]
+    assert set(links) <= {*ids}
+
+
+def test_headings_go_down_by_one() -> None:
+    inner = Section("three", (Section("four", ()),))
+    page = Page(page_of(Document("one", "", (Section("two", (inner,)), Section("two", ())))))
+    assert page.headings == [(1, "one"), (2, "two"), (3, "three"), (4, "four"), (2, "two")]
+
+
+def test_points_that_a_figure_does_not_have_one_by_one_answer_nothing() -> None:
+    few = Picture("figure", "t", "c", "a", drawn, (Points("readings-0", ("one of two",)), Points("gone", ("x",))))
+    assert "one of two" not in page_of(Document("d", "", (few,)))
+
+
+def test_units_are_typeset_and_code_is_not() -> None:
+    shown = fragment_of([Paragraph("C₃/₂ = 2.4×10⁻⁴ (rad/s)^−½/s, -3 Hz"), Code("x^−½ -3")])
+    assert "C<sub>3/2</sub> = 2.4×10<sup>−4</sup> (rad/s)<sup>−½</sup>/s, −3 Hz" in shown
+    assert "x^−½ -3" in shown
+
+
+def test_a_listing_is_folded_into_pieces_that_lose_no_row() -> None:
+    rows = [(str(k), f"v{k}") for k in range(23)]
+    page = Page(fragment_of([Listing("l", table("L", ("k", "v"), rows, numbers=["k"]))]))
+    assert sum(tag == "table" for tag, _ in page.tags) == 3
+    assert re.findall(r"v\d+", page.text) == [v for _, v in rows]
+
+
+def test_a_fragment_keeps_its_style_and_ids_to_itself_and_has_no_script() -> None:
+    fragment = fragment_of(blocks("word"), prefix="one-")
+    assert fragment.startswith('<div class="levilab-part"><style>.levilab-part {')
+    assert "<script" not in fragment
+    assert all(str(given["id"]).startswith("one-") for _, given in Page(fragment).tags if "id" in given)
+
+
+@pytest.mark.parametrize("on_paper", ["whole", "summary", "out"])
+def test_what_is_folded_knows_how_it_is_printed(on_paper: Any) -> None:
+    assert f'class="on-paper-{on_paper}"' in fragment_of([Details("s", (Note("n"),), on_paper=on_paper)])

@@ -1,0 +1,140 @@
+"""The report in a browser: readings answer, nothing overflows, nothing that a run contains is markup or script."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from typing import TYPE_CHECKING
+
+import pytest
+
+from levilab.report.page import write_report
+from support.browser import PHONE, watch
+from support.paths import SAMPLE_DATA
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from playwright.sync_api import Browser, Page
+
+EVIL = (
+    """</script><script>window.pwned = 1</script><img src=x onerror="window.pwned = 2">${1+1}{{7*7}}"' &amp; --> ]]>"""
+)
+LONG = "x" * 3000
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of a run in which each text is hostile, or long and without a blank."""
+    folder = tmp_path_factory.mktemp("report")
+    run = folder / "run <b>bold<script>window.pwned = 3<"
+    shutil.copytree(SAMPLE_DATA / "spin-down-1", run)
+    record = json.loads((run / "run.json").read_text(encoding="utf-8"))
+    settings = {EVIL: EVIL, "gate_s": 1.0, "slope": LONG}
+    about = {"identity": EVIL, "address": LONG, "settings_start": {**settings, EVIL: LONG}, "settings_end": settings}
+    record |= {
+        "note": EVIL + LONG,
+        "synthetic_how": EVIL,
+        "command_line": ["levilab", EVIL, LONG],
+        "started_utc": EVIL,
+        "software": {EVIL: EVIL},
+        "configuration": {"spin": {EVIL: EVIL, "drive_waveform": LONG}, "limits": {EVIL: EVIL}},
+        "channels": [{"name": "spin_frequency_u_hz", "source": EVIL}],
+        "instruments": {EVIL: about, LONG: about},
+    }
+    (run / "run.json").write_text(json.dumps(record), encoding="utf-8")
+    events = [{"time_s": float(k), "kind": EVIL, "text": EVIL if k % 2 else LONG} for k in range(20)]
+    (run / "events.jsonl").write_text("".join(json.dumps(event) + "\n" for event in events), encoding="utf-8")
+    return write_report([run], folder / "report.html", {"tilt": "none"})
+
+
+@pytest.fixture(scope="module")
+def desk(browser: Browser, report: Path) -> Iterator[Page]:
+    with watch(browser) as page:
+        page.goto(report.as_uri())
+        yield page
+
+
+def test_what_a_run_contains_is_text_and_runs_nowhere(desk: Page) -> None:
+    assert desk.evaluate("window.pwned") is None
+    assert EVIL in desk.locator("main").inner_text()
+    assert desk.locator("main b, main img, main script").count() == 0
+
+
+def test_a_reading_answers_to_the_pointer_with_value_uncertainty_and_residual(desk: Page) -> None:
+    mark = desk.locator('[id="spindown-readings-0"] use').nth(2)
+    mark.scroll_into_view_if_needed()
+    box = mark.bounding_box()
+    assert box is not None
+    desk.mouse.move(box["x"] + box["width"] / 2 + 4, box["y"] + box["height"] / 2)
+    tip = desk.get_by_role("tooltip")
+    assert tip.is_visible()
+    assert tip.inner_text().split("\n") == ["t = 20 s", "ν = 37.090(30) Hz", "ν − disc law = -0.014 Hz"]
+    desk.mouse.move(2, 2)
+    assert not tip.is_visible()
+
+
+def test_a_reading_answers_to_the_keyboard_too(desk: Page) -> None:
+    marks = desk.locator('[id="spindown-readings-0"] use')
+    marks.first.focus()
+    tip = desk.get_by_role("tooltip")
+    assert tip.inner_text().startswith("t = 0 s\n")
+    desk.keyboard.press("ArrowRight")
+    assert tip.inner_text().startswith("t = 10 s\n")
+    desk.keyboard.press("End")
+    assert tip.inner_text().startswith("t = 190 s\n")
+    label = marks.last.get_attribute("aria-label")
+    assert label is not None
+    assert label.startswith("t = 190 s, ν = ")
+    desk.keyboard.press("Escape")
+    assert not tip.is_visible()
+
+
+def test_a_figure_is_enlarged_and_whole_again(desk: Page) -> None:
+    def width() -> float:
+        return float(desk.locator("figure svg").first.evaluate("svg => svg.viewBox.baseVal.width"))
+
+    whole = width()
+    desk.get_by_role("button", name="Enlarge the figure").click()
+    assert width() == pytest.approx(whole / 2)
+    desk.get_by_role("button", name="The whole figure").click()
+    assert width() == pytest.approx(whole)
+
+
+def test_what_is_folded_is_opened_for_the_printer_and_folded_again(desk: Page) -> None:
+    folded = desk.locator("details:not([open])")
+    count = folded.count()
+    assert count > 0
+    desk.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    assert folded.count() == 0
+    desk.evaluate("window.dispatchEvent(new Event('afterprint'))")
+    assert folded.count() == count
+
+
+@pytest.mark.parametrize("script", [True, False])
+def test_on_a_telephone_the_page_is_not_moved_sideways(browser: Browser, report: Path, script: bool) -> None:
+    with watch(browser, viewport=PHONE, color_scheme="dark", java_script_enabled=script) as page:
+        page.goto(report.as_uri())
+        for details in page.locator("summary").all():
+            details.click()
+        right = page.evaluate("document.documentElement.scrollWidth") if script else _right_edge(page)
+        assert right <= PHONE["width"]
+        background = page.locator("body").evaluate("body => getComputedStyle(body).backgroundColor")
+        assert background == "rgb(20, 24, 28)"
+        card = page.locator(".card").first.evaluate("card => getComputedStyle(card).backgroundColor")
+        assert card == "rgb(255, 255, 255)"  # figures are drawn in black
+
+
+def _right_edge(page: Page) -> float:
+    box = page.locator("main").bounding_box()
+    assert box is not None
+    return box["x"] + box["width"]
+
+
+def test_paper_is_light_and_holds_what_is_folded(browser: Browser, report: Path) -> None:
+    with watch(browser, color_scheme="dark") as page:
+        page.goto(report.as_uri())
+        page.emulate_media(media="print")
+        assert page.locator("body").evaluate("body => getComputedStyle(body).backgroundColor") == "rgb(255, 255, 255)"
+        assert not page.locator(".zoom").first.is_visible()
