@@ -127,16 +127,19 @@ def _scene(run: Run) -> Scene:
 # --- what it is like -----------------------------------------------------------------------------------
 
 
+_LOCKED = {"True": " It is locked to its drive.", "False": " It is not locked to its drive."}
+
+
 def _verdict(found: Mapping[str, Any], name: str) -> str:
     fell = found.get("fell")
     if isinstance(fell, dict):
         said = f"{name}: the top was up for {plain(fell.get('time_s'), 4)} s: it {fell.get('text', 'fell')}."
     else:
         said = f"{name}: the top stayed up for all of {found['end_s']:g} s."
-    locked = {True: " It is locked to its drive.", False: " It is not locked to its drive."}.get(found.get("locked"))
+    locked = _LOCKED.get(str(found.get("locked")), "")
     reached = "within" if found.get("tolerance_reached") else "NOT within"
     accuracy = f" The estimated error at the end is {reached} the tolerance of {_digits(found, 'tolerance', 1)}."
-    return said + (locked or "") + accuracy
+    return said + locked + accuracy
 
 
 def _notes(found: Mapping[str, Any]) -> Iterator[Warnings]:
@@ -278,7 +281,8 @@ def _again(run: Run, scene: Scene, found: Mapping[str, Any]) -> Summary | None:
     if not isinstance(took, int | float) or took > LONGEST_S:
         return None
     try:
-        request = SimulationRequest(scene, *(float(settings[key]) for key in ("duration_s", "tolerance", "rate_hz")))
+        duration, tolerance, rate = (float(settings[key]) for key in ("duration_s", "tolerance", "rate_hz"))
+        request = SimulationRequest(scene, duration, tolerance, rate)
         summary = run_simulation(request, lambda _: None).summary
     except (LevilabError, KeyError, TypeError, ValueError):
         return None

@@ -47,8 +47,8 @@ def _blocks(found: Mapping[str, Any], scene: Scene) -> Iterator[Block]:
         for window in found["windows"]
     ]
     yield Tabular("stability-windows", table("Where tops float, if they spin", heads, rows))
-    heads = ("height [cm]", "", "spins [Hz]")
-    rows3 = [
+    places = ["height [cm]", "", "spins [Hz]"]
+    equilibria = [
         (
             plain(100 * place["height_m"], 5),
             "stable" if place["stable"] else "not stable",
@@ -56,7 +56,7 @@ def _blocks(found: Mapping[str, Any], scene: Scene) -> Iterator[Block]:
         )
         for place in found["equilibria"]
     ]
-    yield Tabular("stability-equilibria", table("Where field and weight balance", heads, rows3))
+    yield Tabular("stability-equilibria", table("Where field and weight balance", places, equilibria))
     yield Facts(tuple(_facts(found, scene)))
     settings = " ".join(f"--set {key}={value}" for key, value in (changes(scene) or {}).items())
     if scene.name and changes(scene) is not None:

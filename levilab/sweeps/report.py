@@ -53,6 +53,7 @@ def sweep_section(path: Path) -> Section:
     summary = summarise(store)
     report = report_in(store)
     filled = in_words(report, store.plan) if report else []
+    explained: tuple[Block, ...] = (Note("Points that were filled in:"), Bullets(tuple(filled))) if filled else ()
     blocks: list[Block] = [
         SYNTHETIC,
         Verdict(f"{headline(summary)}."),
@@ -60,7 +61,7 @@ def sweep_section(path: Path) -> Section:
         *_figures(store, filled),
         Tabular("sweep-columns", columns_table(summary), "least, mean and greatest over the points that have a value"),
         *_points(store),
-        *([Note("Points that were filled in:"), Bullets(tuple(filled))] if filled else []),
+        *explained,
         Section("What was simulated", scene_blocks(store.plan.scene, tuple(_facts(store)))),
         Section("How to reproduce it", tuple(_reproduction(store))),
     ]

@@ -10,7 +10,6 @@ import re
 from dataclasses import dataclass, field
 from importlib import resources
 from importlib.util import find_spec
-from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +36,7 @@ from levilab.present.document.typesetting import typeset
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
     from datetime import datetime
+    from pathlib import Path
 
     from levilab.present.document.blocks import Block, Document
     from levilab.present.tables import Row, Table
@@ -83,15 +83,15 @@ def as_pdf(document: Document) -> bytes:
     check_typst()
     import typst
 
-    pdf: bytes = typst.compile(files_of(document), format="pdf", font_paths=fonts(), ignore_system_fonts=True)
-    return pdf
+    files: Any = files_of(document)  # a dictionary of files is missing in the types that typst declares
+    return typst.compile(files, format="pdf", font_paths=fonts(), ignore_system_fonts=True)
 
 
 def fonts() -> list[Path]:
     """Folders of fonts beside typst's own: those in matplotlib have what these lack."""
-    from matplotlib import get_data_path
+    from levilab.present.style import font_folder  # with matplotlib
 
-    return [Path(get_data_path()) / "fonts" / "ttf"]
+    return [font_folder()]
 
 
 def files_of(document: Document) -> dict[str, bytes]:
@@ -261,15 +261,22 @@ def _fixed(text: str) -> Text:
 
 
 def _section(block: Section, drawing: _Drawing) -> Drawn:
-    # a heading does not stay behind alone when its only figure leaves
-    alone = len(block.blocks) == 1 and isinstance(block.blocks[0], Picture)
     return {
         "kind": "section",
         "title": _text(block.title),
         "lead": _text(block.lead),
         "page": block.new_page,
-        "blocks": [_picture(block.blocks[0], drawing, floats=False)] if alone else drawing.blocks(block.blocks),
+        "blocks": _inside(block, drawing),
     }
+
+
+def _inside(section: Section, drawing: _Drawing) -> list[Drawn]:
+    """What stands below a heading, which does not stay behind alone when its only figure leaves."""
+    match section.blocks:
+        case (Picture() as picture,):
+            return [_picture(picture, drawing, floats=False)]
+        case _:
+            return drawing.blocks(section.blocks)
 
 
 def _details(block: Details, drawing: _Drawing) -> Drawn | None:

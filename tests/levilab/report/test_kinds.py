@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import pytest
 
 from levilab.errors import DataError
-from levilab.files import CannotWrite
 from levilab.motion.report import motion_section
 from levilab.motion.simulation import SimulationRequest, run_simulation
 from levilab.present.document.blocks import Banner, Code, Details, Fact, Facts, Picture, Section, Tabular, Verdict
@@ -40,7 +39,7 @@ def silent(text: str) -> None: ...
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a simulated motion, a sweep and a result of stability."""
     place = tmp_path_factory.mktemp("simulated")
-    scene = with_settings(preset("undriven"), ["top.mass_kg=0.0252", "start.spin_hz=30"])
+    scene = with_settings(preset("undriven"), ["top.mass_kg=0.0252", "start.spin_hz=31"])
     with undrawn():
         run_simulation(SimulationRequest(scene, 1.2, 1e-6, 100.0, place / "runs"), silent)
     request = SweepRequest(scene, ("start.spin_hz=18:40:3", "start.position_m.2=0.070:0.072:2"), duration=0.3)
@@ -77,7 +76,7 @@ def test_a_motion_says_how_it_ended_what_was_changed_and_how_good_it_is(folder: 
     assert isinstance(section.blocks[0], Banner)
     assert section.blocks[0].lead == "SYNTHETIC."
     assert "stayed up for all of 1.2 s" in of_kind(section, Verdict)[0].text  # type: ignore[attr-defined]
-    assert facts["Changed keys"].texts == ("top.mass_kg = 0.0252", "start.spin_hz = 30.0")
+    assert facts["Changed keys"].texts == ("top.mass_kg = 0.0252", "start.spin_hz = 31.0")
     assert "drag of the air" in facts["Left out"].texts[0]
     assert "1×10⁻⁶" in facts["Asked for"].texts[0]
     assert facts["Asked for"].texts[0].endswith(": reached")
@@ -127,10 +126,10 @@ def test_a_motion_that_is_not_whole_is_an_error_that_names_the_folder(folder: Pa
 def test_simulations_and_a_measurement_go_into_one_report(place: Path, tmp_path: Path) -> None:
     said: list[str] = []
     with undrawn():
-        paths = [place, place / "where.json", SAMPLE_DATA / "spin-down-1"]
+        paths = [place, place / "where.json", SAMPLE_DATA / "lower-limits"]
         page = write_report(paths, tmp_path / "x.html", tell=said.append, tables=True).read_text(encoding="utf-8")
     for title in (
-        "Spin-down of a levitated top",
+        "Limits of the spin",
         "Simulated motion: undriven",
         "Sweep: undriven",
         "Where the top floats",
@@ -138,7 +137,7 @@ def test_simulations_and_a_measurement_go_into_one_report(place: Path, tmp_path:
         assert title in page
     assert not [text for text in said if "simulate run" in text], "it is in the report"
     names = {file.name for file in (tmp_path / "x.tables").iterdir()}
-    assert {"motions.csv", "sweep-map.csv", "spindown-inputs.csv", "motion.tex"} <= names
+    assert {"motions.csv", "sweep-map.csv", "limit-inputs.csv", "motion.tex"} <= names
     rows = (tmp_path / "x.tables/sweep-map.csv").read_text(encoding="utf-8").splitlines()
     assert rows[0] == "synthetic,start.spin_hz,start.position_m.2,survived,lifetime_s"
     assert len(rows) == 1 + 6
@@ -179,9 +178,3 @@ def test_the_marks_of_the_kinds_are_those_that_are_written(place: Path) -> None:
     assert [len(found["simulated motion"]), len(found["sweep"])] == [1, 1]
     assert KINDS[2].find(place / "where.json") == [place / "where.json"]
     assert KINDS[2].find(place) == []
-
-
-def test_tables_need_a_place(place: Path, tmp_path: Path) -> None:
-    (tmp_path / "x.tables").write_text("", encoding="utf-8")
-    with undrawn(), pytest.raises(CannotWrite, match="tables"):
-        write_report([place / "map.zarr"], tmp_path / "x.html", tables=True)

@@ -43,13 +43,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: What means something in typst, what no font has, what steers, and words that fit into no line.
-HOSTILE = (
-    '#panic("x") #import "@preview/x:1.0.0" $x^2$ @ref <label> [a] {b} `c` *d* _e_ \\u{41} ~ -- /* // = + \' " https://x.y '
-    "\x00\x01\x1b[31m\x07\x7f\u0085 \u202e\u2066 שלום عربى 😀 中文 \ue000 \ufffe \U0010ffff \u0378 \u0301 a\u0334\u0334 \ufeff "
-    + "w" * 300
-    + " runs/"
-    + "/".join(["20261120T101500Z-spin-7f3a"] * 12)
-)
+HOSTILE = " ".join([
+    '#panic("x") #import "@preview/x:1.0.0" $x^2$ @ref <label> [a] {b} `c` *d* _e_ \\u{41} ~ -- /* // = + \' "',
+    "https://x.y \x00\x01\x1b[31m\x07\x7f\u0085 \u202e\u2066 שלום عربى 😀 中文 \ue000 \ufffe \U0010ffff \u0378 \u0301",
+    "a\u0334\u0334 \ufeff",
+    "w" * 300,
+    "runs/" + "/".join(["20261120T101500Z-spin-7f3a"] * 12),
+])  # fmt: skip
 
 
 def drawn() -> Figure:
