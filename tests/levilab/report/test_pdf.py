@@ -88,7 +88,7 @@ def data_of(document: Document) -> Any:
 def test_no_text_becomes_markup_or_ends_the_setting() -> None:
     pdf = as_pdf(of_all_blocks(HOSTILE))
     assert pdf.startswith(b"%PDF-1.7")
-    files = files_of(of_all_blocks(HOSTILE))
+    files = files_of(Document(HOSTILE, HOSTILE, (Paragraph(HOSTILE),)))
     template = (ROOT / "levilab/report/pdf/report.typ").read_bytes()
     assert files["main.typ"] == template, "the template is the same whatever the text is"
     assert b"@preview" not in template
@@ -112,8 +112,8 @@ def digest() -> str:
 
 def test_the_date_is_that_of_the_data_and_never_the_present_one() -> None:
     when = datetime(2026, 11, 20, 10, 15, 0, tzinfo=UTC)
-    assert b"D:20261120101500" in as_pdf(of_all_blocks("x", date=when))
-    assert b"CreationDate" not in as_pdf(of_all_blocks("x"))
+    assert b"D:20261120101500" in as_pdf(Document("t", "", (), date=when))
+    assert b"CreationDate" not in as_pdf(Document("t", "", ()))
 
 
 def test_fonts_and_title_are_inside_and_the_file_is_tagged() -> None:
@@ -148,8 +148,8 @@ def test_a_first_page_of_several_chapters_says_what_each_found() -> None:
 
 
 def test_what_is_synthetic_is_marked_on_every_page() -> None:
-    assert data_of(of_all_blocks("x", banner=Banner("SYNTHETIC.", "of a model")))["mark"] == "SYNTHETIC"
-    assert data_of(of_all_blocks("x", banner=None))["mark"] == ""
+    assert data_of(Document("t", "", (), Banner("SYNTHETIC.", "of a model")))["mark"] == "SYNTHETIC"
+    assert data_of(Document("t", "", ()))["mark"] == ""
 
 
 def test_a_figure_that_stands_alone_below_its_heading_stays_there() -> None:
