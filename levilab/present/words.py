@@ -10,11 +10,14 @@ if TYPE_CHECKING:
 #: How the last word of a key is written as a unit.
 UNITS = {
     "s": "s", "hz": "Hz", "v": "V", "vpp": "Vpp", "ohm": "Ω", "t": "T", "m": "m", "a": "A", "k": "K", "db": "dB",
+    "kg": "kg",
 }  # fmt: skip
 #: Instruments say infinite as 9.9e37 (SCPI-99 volume 1, §7.2.1.4).
 INFINITE = 9e37
 #: What makes up a generator's drive; the other settings are named one by one.
 _DRIVE = ("frequency_hz", "amplitude_vpp", "waveform")
+#: Units as this lab uses them where the number is between the two: what one of them is, and its name.
+_OF_THE_LAB = {"m": (1e-4, 1.0, 1e-3, "mm"), "T": (1e-4, 1.0, 1e-3, "mT"), "kg": (1e-6, 1.0, 1e-3, "g")}
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 
@@ -50,6 +53,8 @@ def value_in_words(key: str, value: Any) -> str:
 
     >>> value_in_words("trigger_level_v", 0.6), value_in_words("slope", "POS"), value_in_words("interval_s", 0.005)
     ('0.6 V', 'POS', '5 ms')
+    >>> value_in_words("range_t", 0.035), value_in_words("base_inner_radius_m", 0.03)
+    ('35 mT', '30 mm')
     """
     if isinstance(value, bool):
         return "on" if value else "off"
@@ -59,6 +64,9 @@ def value_in_words(key: str, value: Any) -> str:
     unit = UNITS.get(last, "") if name else ""
     if abs(value) >= INFINITE:
         return "high impedance" if unit == "Ω" else "infinite"
+    if unit in _OF_THE_LAB and _OF_THE_LAB[unit][0] <= abs(value) < _OF_THE_LAB[unit][1]:
+        _, _, one, own = _OF_THE_LAB[unit]
+        return f"{value / one:g} {own}"
     if not unit or 0.01 <= abs(value) < 1000 or value == 0:
         return f"{value:g} {unit}".strip()
     factor, prefix = next(((f, p) for f, p in _PREFIXES if abs(value) >= f), _PREFIXES[-1])

@@ -202,7 +202,11 @@ def _conditions(record: RunRecord) -> tuple[str, ...]:
     if not isinstance(settings, dict):
         return ()
     said = _IN_DRIVE if _drive(record) else frozenset()
-    others = [setting_in_words(key, settings[key]) for key in sorted(settings) if key not in said]
+    others = [
+        setting_in_words(key, settings[key])
+        for key in sorted(settings)
+        if key not in said and settings[key] is not None
+    ]
     return (", ".join(others),) if others else ()
 
 

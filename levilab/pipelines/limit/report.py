@@ -93,7 +93,7 @@ def _points(analysis: LimitAnalysis) -> tuple[Points, ...]:
     several = len(analysis.runs) > 1
     return tuple(
         Points(
-            f"readings-{k}",
+            f"readings-{run.which}-{k}",
             tuple(
                 _point(short_name(source.name) if several else "", source.readings, run, i)
                 for i in range(source.readings.limit.size)

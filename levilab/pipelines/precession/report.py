@@ -113,7 +113,7 @@ def _figure_points(analysis: PrecessionAnalysis) -> tuple[Points, ...]:
     for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True)):
         name = short_name(source.name) if several else ""
         texts = tuple(_point(name, point) for point in run.fit.points if point.used)
-        found += [Points(f"readings-{k}", texts), Points(f"departures-{k}", texts)]
+        found += [Points(f"readings-{k}", texts), Points(f"residuals-{k}", texts)]
     return tuple(found)
 
 

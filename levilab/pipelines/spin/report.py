@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 #: Values of a series printed in the page; more stay in result.json.
 MOST_VALUES = 40
+#: A series with more values has none that answers to the pointer.
+MOST_POINTS = 300
 
 
 def spin_part(analysis: SpinAnalysis) -> ReportPart:
@@ -74,14 +76,10 @@ def _series(source: Source[Records], run: SpinRun) -> tuple[Block, ...]:
 
 
 def _points(analysis: SpinAnalysis) -> tuple[Points, ...]:
-    """What each value of the frequency against time answers."""
-    return tuple(
-        Points(
-            f"readings-{k}",
-            tuple(
-                f"t = {digits(float(t), 6)} s\nν = {with_uncertainty(Estimate(float(nu), float(u), 'Hz'))}"
-                for t, nu, u in zip(run.series.time, run.series.frequency, run.series.u, strict=True)
-            ),
-        )
-        for k, run in enumerate(analysis.runs)
+    """What each value of the frequency against time answers; the figure has it for the first input."""
+    series = analysis.runs[0].series
+    texts = (
+        f"t = {digits(float(t), 6)} s\nν = {with_uncertainty(Estimate(float(nu), float(u), 'Hz'))}"
+        for t, nu, u in zip(series.time, series.frequency, series.u, strict=True)
     )
+    return (Points("readings-series", tuple(texts)),) if len(series) <= MOST_POINTS else ()

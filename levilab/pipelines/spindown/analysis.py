@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -11,6 +12,7 @@ from analysis.spindown.fit import SpinDown, fit_spin_down
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.sources import InputOptions, Needs
+from levilab.pipelines.spindown.laws import SYMBOLS
 from levilab.pipelines.spindown.readings import Readings, read_run_readings, read_spin_file
 
 if TYPE_CHECKING:
@@ -65,7 +67,7 @@ class SpinDownAnalysis(Analyzed[Readings, SpinDown, Combined, SpinDownOptions]):
 
     def about_all(self) -> Iterable[str]:
         """What to know of the means, and of the laws that are not excluded."""
-        return (*self.combined.warnings, *self._of_laws(self.combined.fits))
+        return (*map(_with_symbols, self.combined.warnings), *self._of_laws(self.combined.fits))
 
     def about_run(self, run: SpinDown) -> Iterable[str]:
         """What to know of one run."""
@@ -74,6 +76,15 @@ class SpinDownAnalysis(Analyzed[Readings, SpinDown, Combined, SpinDownOptions]):
     def _of_laws(self, fits: Iterable[LawFit | CombinedLaw]) -> Iterable[str]:
         excluded = {name for name, _ in self.combined.verdict.excluded}  # what they lack is of no interest any more
         return (warning for fit in fits if fit.name not in excluded for warning in fit.warnings)
+
+
+def _with_symbols(text: str) -> str:
+    """A warning with the constants' symbols, as tables and figures have them, for their names in result.json.
+
+    >>> _with_symbols("disc: c32 scatters between the runs 25 times as much")
+    'disc: C₃/₂ scatters between the runs 25 times as much'
+    """
+    return re.sub(r"(?<=: )(\w+)(?= scatters)", lambda found: SYMBOLS.get(found[0], found[0]), text)
 
 
 def fit_source(source: Source[Readings], options: SpinDownOptions, *, tilt: bool | None = None) -> SpinDown:

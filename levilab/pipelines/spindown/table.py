@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 #: How well a law fits: heads for 80 columns, and in words.
 QUALITY = ("constants", "rms [Hz]", "χ²/dof", "ΔAICc", "weight", "order p", "DW")
 QUALITY_IN_WORDS = (*QUALITY[:5], "order test p", "Durbin–Watson")
+#: Below it ΔAICc has a digit behind the point: only there does it decide anything.
+_WITH_TENTHS = 100.0
 
 
 def spindown_tables(analysis: SpinDownAnalysis) -> tuple[Table, ...]:
@@ -93,7 +95,7 @@ def _quality(statistics: Statistics, runs: int) -> list[str]:
         str(statistics.n_parameters - runs),  # each run has a start besides, under every law
         plain(statistics.rms_residual),
         plain(statistics.reduced_chi_square),
-        "—" if difference is None else f"{difference:.1f}",
+        "—" if difference is None else f"{difference:.1f}" if difference < _WITH_TENTHS else f"{difference:.0f}",
         share(statistics.weight),
         plain(statistics.runs_test_p, 2),
         plain(statistics.durbin_watson),

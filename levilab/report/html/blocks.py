@@ -194,9 +194,9 @@ def _picture(writer: Writer, block: Picture, _: int) -> Html:
 
 
 def _count_marks(svg: str, group: str) -> int:
-    """Points drawn in a group of a figure: a figure may thin them out, and then none of them answers."""
-    _, found, rest = svg.partition(f'<g id="{group}">')
-    return rest.partition("<g id=")[0].count("<use ") if found else 0
+    """Points drawn in the only group of that name: a figure may thin them out, and then none of them answers."""
+    _, *after = svg.split(f'<g id="{group}">')
+    return after[0].partition("<g id=")[0].count("<use ") if len(after) == 1 else 0
 
 
 # --- what holds other blocks ---------------------------------------------------------------------------
