@@ -243,7 +243,9 @@ def scene_blocks(scene: Scene, more: Sequence[Fact] = ()) -> tuple[Block, ...]:
         Fact("Left out", (", ".join(left_out) or "no effect that the simulator knows",)),
         *more,
     )
-    note = Note("levilab simulate SCENE --explain computes how much each effect changes height, precession and spin.")
+    note = Note(
+        "How much each effect changes height, precession and spin, levilab simulate computes where it is asked to explain."
+    )
     # a preset and its changes say all of it in few lines
     keys = Details(
         "All keys of the scene", (Code(scene.as_toml().strip()),), on_paper="whole" if changed is None else "out"
@@ -331,8 +333,8 @@ def _reproduction(run: Run) -> Iterator[Block]:
 def command_in_words(words: Sequence[str]) -> str:
     """A recorded command line as one types it: ours without the place of its program.
 
-    >>> command_in_words(["/opt/bin/levilab", "simulate", "driven", "--set", "drive.frequency_hz=30.1 "])
-    "levilab simulate driven --set 'drive.frequency_hz=30.1 '"
+    >>> command_in_words(["/opt/bin/levilab", "simulate", "my scene.toml"])
+    "levilab simulate 'my scene.toml'"
     """
     first, *others = words
     name = first.replace("\\", "/").rpartition("/")[2]

@@ -14,6 +14,7 @@ from levilab.errors import DataError
 from levilab.files import parse_json
 from levilab.report.tables.values import Values
 from levilab.runs.run import Run, find_runs, read_record
+from levilab.stability.report import stability_section
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -134,8 +135,6 @@ def _stability_files(path: Path) -> list[Path]:
 
 
 def _stability_sections(files: Sequence[Path]) -> tuple[Section, ...]:
-    from levilab.stability.report import stability_section
-
     return tuple(map(stability_section, files))
 
 

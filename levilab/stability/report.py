@@ -1,7 +1,8 @@
-"""Where a top floats, as `levilab stability --json` printed it → a section of a report."""
+"""Where a top floats, as `levilab stability` printed it as JSON → a section of a report."""
 
 from __future__ import annotations
 
+import shlex
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import DataError, LevilabError
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
 
     from levilab.present.document.blocks import Block
     from levilab.simulator.scene import Scene
+
+#: An option of a command that a reader types.
+_OPTION = "--{}"
 
 
 def stability_section(path: Path) -> Section:
@@ -58,9 +62,9 @@ def _blocks(found: Mapping[str, Any], scene: Scene) -> Iterator[Block]:
     ]
     yield Tabular("stability-equilibria", table("Where field and weight balance", places, equilibria))
     yield Facts(tuple(_facts(found, scene)))
-    settings = " ".join(f"--set {key}={value}" for key, value in (changes(scene) or {}).items())
-    if scene.name and changes(scene) is not None:
-        yield Code(f"levilab stability {scene.name} {settings} --json".replace("  ", " "))
+    if (changed := changes(scene)) is not None:
+        settings = [word for key, value in changed.items() for word in (_OPTION.format("set"), f"{key}={value}")]
+        yield Code(shlex.join(["levilab", "stability", scene.name, *settings, _OPTION.format("json")]))
 
 
 def _facts(found: Mapping[str, Any], scene: Scene) -> Iterator[Fact]:
