@@ -243,9 +243,7 @@ def scene_blocks(scene: Scene, more: Sequence[Fact] = ()) -> tuple[Block, ...]:
         Fact("Left out", (", ".join(left_out) or "no effect that the simulator knows",)),
         *more,
     )
-    note = Note(
-        "How much each effect changes height, precession and spin, levilab simulate computes where it is asked to explain."
-    )
+    note = Note("What each effect changes, levilab simulate computes where it is asked to explain.")
     # a preset and its changes say all of it in few lines
     keys = Details(
         "All keys of the scene", (Code(scene.as_toml().strip()),), on_paper="whole" if changed is None else "out"
