@@ -7,6 +7,7 @@ import re
 from functools import partial
 from html import escape
 from importlib import resources
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
@@ -16,8 +17,6 @@ from levilab.present.looks import MARKERS
 from levilab.present.numbers import short_name
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Figure  # noqa: PLC0414 - for others, who may not name matplotlib
 
@@ -143,3 +142,21 @@ def row(figure: Figure, bottom: float, height: float, n: int = 1, gap: float = 0
     left, right = 0.085, 0.985
     width = (right - left - (n - 1) * gap) / n
     return [figure.add_axes((left + k * (width + gap), bottom, width, height)) for k in range(n)]
+
+
+def font_folder() -> Path:
+    """The folder of the fonts that matplotlib contains, for documents, so that they are the same on every machine."""
+    return Path(mpl.get_data_path()) / "fonts" / "ttf"
+
+
+def figure_of_png(png: bytes) -> Figure:
+    """A picture as a figure of the same size, for documents, which want figures."""
+    from matplotlib.figure import Figure as NewFigure
+    from matplotlib.image import imread
+
+    pixels = imread(io.BytesIO(png), format="png")
+    figure = NewFigure(figsize=(WIDE, WIDE * pixels.shape[0] / pixels.shape[1]))
+    axes = figure.add_axes((0, 0, 1, 1))
+    axes.set_axis_off()
+    axes.imshow(pixels, aspect="auto")
+    return figure

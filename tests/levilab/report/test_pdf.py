@@ -1,0 +1,186 @@
+"""A document as PDF: all of its text is data, the bytes are the same each time, and it has numbered pages."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from datetime import UTC, datetime
+from hashlib import sha256
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from levilab.present.document.blocks import (
+    Banner,
+    Bullets,
+    Code,
+    Details,
+    Document,
+    Fact,
+    Facts,
+    Listing,
+    Note,
+    Paragraph,
+    Picture,
+    Section,
+    Tabular,
+    Verdict,
+    Warnings,
+)
+from levilab.present.tables import table
+from levilab.report.page import write_report
+from levilab.report.pdf.renderer import NoTypst, as_pdf, files_of, fonts
+from support.commands import command
+from support.paths import ROOT
+from support.waiting import HANG_GUARD_S
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.figure import Figure
+
+#: What means something in typst, what no font has, what steers, and words that fit into no line.
+HOSTILE = " ".join([
+    '#panic("x") #import "@preview/x:1.0.0" $x^2$ @ref <label> [a] {b} `c` *d* _e_ \\u{41} ~ -- /* // = + \' "',
+    "https://x.y \x00\x01\x1b[31m\x07\x7f\u0085 \u202e\u2066 שלום عربى 😀 中文 \ue000 \ufffe \U0010ffff \u0378 \u0301",
+    "a\u0334\u0334 \ufeff",
+    "w" * 300,
+    "runs/" + "/".join(["20261120T101500Z-spin-7f3a"] * 12),
+])  # fmt: skip
+
+
+def drawn() -> Figure:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7, 2))
+    figure.add_axes((0.1, 0.2, 0.8, 0.7)).plot([0, 1], [1, 0])
+    return figure
+
+
+def of_all_blocks(text: str, **changes: Any) -> Document:
+    """A document with every kind of block, all texts of which are this one."""
+    shown = table(text, (text, "n"), [(text, "1"), (f"{text}\n{text}", "2")], numbers=["n"])
+    blocks = (
+        Verdict(text), Banner(text, text), Warnings(((text,), (text,) * 5)), Paragraph(text, text), Note(text),
+        Bullets((text,)), Code(f"{text}\n{text}"), Facts((Fact(text, (text, text)), Fact(text, (text,), code=True))),
+        Tabular("t", shown, text, wraps=(text,)), Listing("l", shown, text), Picture("p", text, text, text, drawn),
+        Details(text, (Paragraph(text),), text), Details(text, (Paragraph("left out"),), on_paper="out"),
+    )  # fmt: skip
+    whole = Document(text, text, (Section(text, blocks, "a", text),), Banner(text, text), footer=text)
+    return Document(**(vars(whole) | changes))
+
+
+def pages_of(document: Document) -> int:
+    import typst
+
+    files: Any = files_of(document)
+    found = typst.query(files, "<pages>", field="value", one=True, font_paths=fonts(), ignore_system_fonts=True)
+    return int(json.loads(found))
+
+
+def data_of(document: Document) -> Any:
+    return json.loads(files_of(document)["document.json"])
+
+
+def test_no_text_becomes_markup_or_ends_the_setting() -> None:
+    pdf = as_pdf(of_all_blocks(HOSTILE))
+    assert pdf.startswith(b"%PDF-1.7")
+    files = files_of(Document(HOSTILE, HOSTILE, (Paragraph(HOSTILE),)))
+    template = (ROOT / "levilab/report/pdf/report.typ").read_bytes()
+    assert files["main.typ"] == template, "the template is the same whatever the text is"
+    assert b"@preview" not in template
+    assert b"eval(" not in template
+
+
+def test_two_processes_write_the_same_bytes() -> None:
+    """The other one takes its own time, and begins with another hash of texts."""
+    paths = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
+    environment = os.environ | {"PYTHONPATH": paths, "PYTHONHASHSEED": "7", "TZ": "Asia/Tokyo"}
+    ended = subprocess.run(
+        [sys.executable, __file__], check=True, timeout=HANG_GUARD_S, env=environment, capture_output=True, text=True
+    )
+    assert ended.stdout.strip() == digest()
+
+
+def digest() -> str:
+    """Of a document with all kinds of blocks."""
+    return sha256(as_pdf(of_all_blocks("ν = 3.2(1)×10⁻³ s⁻¹"))).hexdigest()
+
+
+def test_the_date_is_that_of_the_data_and_never_the_present_one() -> None:
+    when = datetime(2026, 11, 20, 10, 15, 0, tzinfo=UTC)
+    assert b"D:20261120101500" in as_pdf(Document("t", "", (), date=when))
+    assert b"CreationDate" not in as_pdf(Document("t", "", ()))
+
+
+def test_fonts_and_title_are_inside_and_the_file_is_tagged() -> None:
+    pdf = as_pdf(of_all_blocks("ν and 中"))
+    assert b"/MarkInfo" in pdf
+    assert re.search(rb"/FontFile[23]", pdf)
+    for name in (b"LibertinusSerif", b"DejaVuSans", b"LastResort"):
+        assert name in pdf
+
+
+def test_a_long_table_repeats_its_head_and_a_page_knows_how_many_there_are() -> None:
+    rows = [(f"run {k}", f"{k}") for k in range(300)]
+    long = Tabular("long", table("Many", ("run", "n"), rows, numbers=["n"]))
+    assert pages_of(Document("t", "", (Section("Many", (long,)),))) >= 5
+    assert pages_of(Document("t", "", (Paragraph("short"),))) == 1
+
+
+def test_a_first_page_of_several_chapters_says_what_each_found() -> None:
+    chapters = tuple(
+        Section(name, (Warnings((("mind",),)), Section("Result", (Verdict(f"{name} holds"),))), new_page=True)
+        for name in ("one", "two")
+    )
+    last = Section("How to reproduce this", (Paragraph("x"),))
+    said = data_of(Document("t", "", (*chapters, last)))["chapters"]
+    assert [(one["title"], one["verdict"], one["warnings"]) for one in said] == [
+        ("one", "one holds", "1 warning"),
+        ("two", "two holds", "1 warning"),
+        ("How to reproduce this", "", ""),
+    ]
+    assert data_of(Document("t", "", (chapters[0], last)))["chapters"] == []
+    assert pages_of(Document("t", "", (*chapters, last))) == 4
+
+
+def test_what_is_synthetic_is_marked_on_every_page() -> None:
+    assert data_of(Document("t", "", (), Banner("SYNTHETIC.", "of a model")))["mark"] == "SYNTHETIC"
+    assert data_of(Document("t", "", ()))["mark"] == ""
+
+
+def test_a_figure_that_stands_alone_below_its_heading_stays_there() -> None:
+    def tall() -> Figure:
+        figure = drawn()
+        figure.set_size_inches(7, 12)
+        return figure
+
+    picture = Picture("p", "", "c", "a", tall)
+    alone, beside = Section("alone", (picture,)), Section("beside", (picture, Note("n")))
+    first, second = data_of(Document("t", "", (alone, beside)))["blocks"]
+    assert first["blocks"][0]["floats"] is False
+    assert second["blocks"][0]["floats"] is True
+    assert first["blocks"][0]["width"] < 100, "it fits on a page with its caption"
+
+
+def test_without_the_extra_the_message_says_how_to_install_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("levilab.report.pdf.renderer.find_spec", lambda _: None)
+    with pytest.raises(NoTypst, match=r'pip install "levilab\[pdf\]"'):
+        write_report([tmp_path / "nothing is read before"], tmp_path / "x.pdf")
+    ended = command("report", ROOT / "sample_data/spin-down-1", "-o", "x.pdf", cwd=tmp_path)
+    assert ended.status == 1
+    assert 'pip install "levilab[pdf]"' in ended.err
+    assert not (tmp_path / "x.pdf").exists()
+
+
+def test_another_ending_is_wrong_usage_and_says_which_two_work(tmp_path: Path) -> None:
+    ended = command("report", ROOT / "sample_data/spin-down-1", "-o", "x.docx", cwd=tmp_path)
+    assert ended.status == 2
+    assert ".html or .pdf" in ended.err
+
+
+if __name__ == "__main__":
+    print(digest())  # noqa: T201

@@ -1,0 +1,137 @@
+"""Tables beside a report: all digits for programs, LaTeX that compiles, nothing that a spreadsheet would execute."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+from typing import TYPE_CHECKING
+
+import pytest
+
+from levilab.errors import LevilabError
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.present.document.blocks import Banner, Details, Document, Section, Tabular
+from levilab.present.tables import Row, table
+from levilab.report.tables.folder import CONTENTS, folder_of, write_tables
+from levilab.report.tables.latex import as_latex, escaped
+from levilab.report.tables.values import Values, as_csv, of_analysis
+from support.paths import SAMPLE_DATA
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@pytest.fixture(scope="module")
+def values() -> dict[str, list[dict[str, str]]]:
+    """Name → rows of the tables of two spin-downs, and the result that they are of as `result`."""
+    analysis = ANALYSES["spindown"]
+    found = analysis.analyze([SAMPLE_DATA / f"spin-down-{k}" for k in (1, 2)], analysis.options_from({}))
+    tables = {
+        one.name: [*csv.DictReader(io.StringIO(as_csv(one)))] for one in of_analysis(analysis, found, SAMPLE_DATA)
+    }
+    return tables | {"result": [{"json": json.dumps(analysis.document(found, SAMPLE_DATA))}]}
+
+
+def test_each_run_has_a_row_with_units_in_the_names_and_all_digits(values: dict[str, list[dict[str, str]]]) -> None:
+    result = json.loads(values["result"][0]["json"])
+    first, second = values["spindown-inputs"]
+    disc = next(model for model in result["runs"][0]["models"] if model["name"] == "disc")["parameters"]["c32"]
+    assert float(first["disc_c32_per_sqrt_rad_s"]) == disc["value"]
+    assert float(first["disc_c32_u_per_sqrt_rad_s"]) == disc["u"]
+    assert (first["input"], second["input"]) == ("spin-down-1", "spin-down-2")
+    assert first["synthetic"] == "true"
+
+
+def test_each_quantity_has_a_row_with_u_and_unit(values: dict[str, list[dict[str, str]]]) -> None:
+    result = json.loads(values["result"][0]["json"])
+    rows = {(row["input"], row["model"], row["quantity"]): row for row in values["spindown-quantities"]}
+    mean = rows["all together", "", "c32"]
+    assert float(mean["value"]) == result["values"]["c32"]["value"]
+    assert mean["unit"] == "(rad/s)^-1/2/s"
+    assert mean["runs"] == "2"
+    assert rows["spin-down-2", "stokes", "c1_linearised"]["unit"] == "1/s"
+    assert rows["spin-down-1", "disc", "rms_residual"]["unit"] == "Hz"
+
+
+@pytest.mark.parametrize("text", ["=1+1", "+1", "-2+3", "@SUM(A1)", "\t=1", "\r=1", " =cmd|'/C calc'!A0"])
+def test_no_text_is_a_formula_to_a_spreadsheet(text: str) -> None:
+    ((head,), (cell,)) = csv.reader(io.StringIO(as_csv(Values("x", "", (text,), ((text,),)))))
+    assert head.startswith("'")
+    assert cell.startswith("'")
+    assert as_csv(Values("x", "", ("n",), ((-0.5,),))) == "n\n-0.5\n", "a number is none"
+
+
+#: Characters with a meaning of their own, a row that begins like an option, and letters that LaTeX's fonts lack.
+HOSTILE = "\\input{/etc/passwd} \\write18{x} $ & # % _ ^ ~ { } < > | \" ` ' [x] * -- --- ?` !` 中 é ν\x00\u202e"
+#: What may stand in the body: a command of LaTeX itself or of booktabs.
+KNOWN = {
+    "begin", "end", "centering", "caption", "label", "toprule", "midrule", "bottomrule", "textbf", "textsuperscript",
+    "raisebox", "scriptsize", "shortstack", "par", "smallskip", "footnotesize", "textbackslash", "textasciicircum",
+    "textasciitilde", "times", "nu", "frac", "ldots", "linewidth",
+}  # fmt: skip
+
+
+def test_what_a_person_typed_is_no_command_of_latex() -> None:
+    shown = table(HOSTILE, (HOSTILE, "[n]"), [("*", "[1pt]"), (HOSTILE, "10⁻³ (rad/s)^−½")], numbers=["[n]"])
+    text = as_latex("hostile", shown, note=HOSTILE, mark="SYNTHETIC.")
+    assert text.isascii()
+    body = "".join(line for line in text.splitlines(keepends=True) if not line.startswith("%"))
+    commands = set(re.findall(r"\\([a-zA-Z]+)", body))
+    assert commands <= KNOWN
+    assert "\\write18" not in body
+    unescaped = re.sub(r"\\[\\{}$&#%_]", "", body)
+    assert unescaped.count("{") == unescaped.count("}")
+    assert unescaped.count("$") % 2 == 0
+    assert "#" not in unescaped
+    assert "%" not in unescaped
+    rows = [line for line in body.splitlines() if line.endswith(r"\\")]
+    assert len(rows) == 3
+    assert all(re.sub(r"\\&", "", row).count("&") == 1 for row in rows), "as many columns as heads"
+    # behind a row's end LaTeX takes [ for a length, and * for an option
+    assert all(not re.match(r"\s*[\[*]", row) for row in rows)
+
+
+def test_numbers_are_typeset_as_in_the_report() -> None:
+    assert escaped("2.34(3)×10⁻⁴") == r"2.34(3)$\times$10\textsuperscript{$-$4}"
+    assert escaped("φ̇ and χ²") == r"$\dot\varphi$ and $\chi$\textsuperscript{2}"
+
+
+def document(*names: str) -> Document:
+    shown = table("Laws", ("law", "c₁"), [("disc", "1"), Row(("mean", "2"), "together")], numbers=["c₁"])
+    tables = tuple(Tabular(name, shown) for name in names)
+    inner = Section("Simulated", (Banner("SYNTHETIC.", ""), Details("more", (Tabular("lines", shown),))))
+    return Document("t", "", (Section("Result", tables), inner))
+
+
+def test_all_tables_are_listed_and_those_of_an_earlier_report_go(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "report.pdf")
+    write_tables(document("laws", "laws", "quality"), [Values("v", "values", ("a",), ((1.0,),))], folder)
+    assert {file.name for file in folder.iterdir()} == {
+        CONTENTS, "laws.tex", "laws-2.tex", "quality.tex", "lines.tex", "v.csv",
+    }  # fmt: skip
+    (folder / "mine.csv").write_text("1\n", encoding="utf-8")
+    files = write_tables(document("laws", "events"), [], folder)
+    assert {file.name for file in folder.iterdir()} == {CONTENTS, "laws.tex", "lines.tex", "mine.csv"}
+    assert {file.name for file in files} == {CONTENTS, "laws.tex", "lines.tex"}
+    assert "SYNTHETIC." not in (folder / "laws.tex").read_text(encoding="utf-8")
+    assert "SYNTHETIC." in (folder / "lines.tex").read_text(encoding="utf-8")
+    before = {file.name: file.read_bytes() for file in files}
+    write_tables(document("laws", "events"), [], folder)
+    assert {file.name: file.read_bytes() for file in files} == before
+
+
+def test_the_list_of_an_earlier_report_takes_nothing_else_away(tmp_path: Path) -> None:
+    folder = tmp_path / "x.tables"
+    folder.mkdir()
+    (tmp_path / "precious.csv").write_text("1\n", encoding="utf-8")
+    (folder / CONTENTS).write_text("file,what\n../precious.csv,x\n.hidden.csv,x\n/etc/passwd,x\n", encoding="utf-8")
+    write_tables(document("laws"), [], folder)
+    assert (tmp_path / "precious.csv").exists()
+
+
+def test_a_folder_that_cannot_be_written_is_reported_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "x.tables").write_text("a file\n", encoding="utf-8")
+    with pytest.raises(LevilabError, match="the tables could not be written"):
+        write_tables(document("laws"), [], tmp_path / "x.tables")
