@@ -148,6 +148,7 @@ class PacedClock(VirtualClock):
     def _pass(self, end: float) -> None:
         if self.paused and self.meanwhile is not None:
             time.sleep(PART_S)
+            self._due = time.monotonic()
             return
         part = min(end - self._now, PART_S * self.speed)
         self._now = end if part >= end - self._now else self._now + part

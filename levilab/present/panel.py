@@ -46,16 +46,19 @@ class Trend:
     Attributes:
         channel: as in readings.csv.
         answers: times on the clock of the bench [s], and values.
+        driven: whether the drive was on then: what a driven top does is no part of the trend of a free one.
     """
 
     channel: str = ""
     answers: deque[tuple[float, float]] = field(default_factory=lambda: deque(maxlen=_KEPT))
+    driven: bool = False
 
     def take(self, state: State) -> None:
-        """Take in what the bench says; another channel, or none, begins anew."""
+        """Take in what the bench says; another channel, or none, or a drive that was switched begins anew."""
         channel = next((name for name in _SHOWN if name in state.last), "")
-        if channel != self.channel:
-            self.channel = channel
+        driven = state.drive is not None and state.drive.output
+        if (channel, driven) != (self.channel, self.driven):
+            self.channel, self.driven = channel, driven
             self.answers.clear()
         if channel and (not self.answers or self.answers[-1][1] != state.last[channel]):
             self.answers.append((state.time_s, state.last[channel]))
@@ -149,7 +152,8 @@ def _progress(state: State) -> tuple[float, str]:
     elapsed, left = state.elapsed_s or 0.0, state.time_left_s
     if left is None:
         return 0.0, f"{_clock(elapsed)} so far"
-    return elapsed / (elapsed + left) if elapsed + left > 0 else 0.0, f"{_clock(elapsed)}, about {_clock(left)} left"
+    share = elapsed / (elapsed + left) if elapsed + left > 0 else 0.0
+    return share, f"{_clock(elapsed)} done, about {_clock(left)} left"
 
 
 def _flow(pieces: Sequence[Piece], width: int) -> Iterator[Line]:
@@ -184,7 +188,7 @@ def _clock(seconds: float) -> str:
     """Return a duration.
 
     >>> [_clock(seconds) for seconds in (7.2, 95.0, 4000.0)]
-    ['7 s', '1:35 min', '1:07 h']
+    ['7 s', '1:35 min', '1:06 h']
     """
     whole = round(seconds)
     if whole < 60:
