@@ -72,12 +72,13 @@ class PracticeBench:
             BenchGone: the process has ended.
         """
         self._number += 1
+        gone = BenchGone("the bench for practice has ended, or was not started: start it anew")
+        if self._pipe is None:
+            raise gone
         try:
-            sent = self._pipe and (self._pipe.send_bytes(to_bytes(self._number, command)), True)
-        except (OSError, ValueError):
-            sent = None
-        if not sent:
-            raise BenchGone("the bench for practice has ended, or was not started: start it anew")
+            self._pipe.send_bytes(to_bytes(self._number, command))
+        except (OSError, ValueError) as error:
+            raise gone from error
         return self._number
 
     def events(self) -> list[PracticeEvent]:

@@ -204,18 +204,20 @@ class PracticeProcess:
     def run(self) -> None:
         """Be the bench until the end."""
         address = self._publisher.address
-        said = {"port": address.port, "token": address.token.hex()} if address else {}
-        ready = PracticeEvent("ready", f"the top of the scene {self.scene.name}", scene=self.scene.as_table(), **said)
+        said: dict[str, Any] = {"port": address.port, "token": address.token.hex()} if address else {}
+        ready: PracticeEvent | None = PracticeEvent(
+            "ready", f"the top of the scene {self.scene.name}", scene=self.scene.as_table(), **said
+        )
         self._place_probe(0.072)
         while not self._over:
             with open_bench(self._wiring, tuple(self._wiring.instruments)) as bench, self._looking_at(bench):
                 self._set_up(bench)
-                if ready:
+                if ready is not None:
                     self._report(ready)
                     ready = None
-                while not (self._over or self._wanted):
+                while not (self._over or self._wanted is not None):
                     self._measure(bench)
-            if self._wanted and not self._over:
+            if self._wanted is not None and not self._over:
                 self._record(self._wanted)
             self._wanted = None
 
@@ -309,7 +311,7 @@ class PracticeProcess:
     def state(self) -> State:
         """Return what views are shown."""
         speed = self.clock.speed if math.isfinite(self.clock.speed) else None
-        here = {"virtual": True, "speed": speed, "paused": self.clock.paused, "probe_m": self._probe_m}
+        here: dict[str, Any] = {"virtual": True, "speed": speed, "paused": self.clock.paused, "probe_m": self._probe_m}
         if self._session is not None:
             return replace(state_of(self._session, virtual=True), busy=True, **here)
         drive = drive_of(self._bench) if self._bench else None
