@@ -7,10 +7,20 @@ import sys
 import time
 from typing import TYPE_CHECKING, Protocol
 
-from levilab.present.characters import printable
+from levilab.present.characters import for_encoding, printable
+from levilab.present.panel import Trend, bench_lines
 
 if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
+    from rich.console import Console
+    from rich.progress import Progress
+    from rich.text import Text
+
+    from levilab.telemetry.messages import State
+
+#: The bench is drawn anew so often [s].
+_DRAWN_EVERY_S = 0.25
+#: Style of a piece → rich's.
+_STYLES = {"plain": "", "strong": "bold", "on": "green", "off": "dim", "alarm": "bold red"}
 
 
 class Display(Protocol):
@@ -24,6 +34,12 @@ class Display(Protocol):
 
     def message(self, text: str) -> None:
         """Show a line of its own."""
+
+    def is_due(self) -> bool:
+        """Whether it wants to show the state of the bench now."""
+
+    def state(self, state: State) -> None:
+        """Show the state of the bench."""
 
     def close(self) -> None:
         """End the display."""
@@ -39,6 +55,13 @@ class Mute:
         """Nothing."""
 
     def message(self, text: str) -> None:
+        """Nothing."""
+
+    def is_due(self) -> bool:
+        """Never."""
+        return False
+
+    def state(self, state: State) -> None:
         """Nothing."""
 
     def close(self) -> None:
@@ -71,44 +94,87 @@ class LineDisplay:
         except OSError:
             self._gone = True
 
+    def is_due(self) -> bool:
+        """Never."""
+        return False
+
+    def state(self, state: State) -> None:
+        """Nothing: a log has the readings and the events."""
+
     def close(self) -> None:
         """Nothing is open."""
 
 
 class BarDisplay:
-    """A progress bar with the time left and the last reading."""
+    """The readings as lines, and below them the bench as it is: last value, trend, instruments, time left.
 
-    def __init__(self) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn
+    It has no thread: it is drawn anew when the bench has something to show, at most four times a second.
 
-        self._progress: Progress = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(bar_width=30),
-            TextColumn("{task.fields[left]}"),
-            console=Console(stderr=True),
+    Args:
+        console: by default one on standard error.
+    """
+
+    def __init__(self, console: Console | None = None) -> None:
+        from rich.live import Live
+
+        from levilab.present.terminal import Terminal
+
+        self._console = console or Terminal(stderr=True)
+        self._trend = Trend()
+        self._next = 0.0
+        self._shown: State | None = None
+        self._live = Live(
+            console=self._console,
+            auto_refresh=False,
             transient=True,
+            redirect_stdout=False,
+            redirect_stderr=False,
+            get_renderable=self._panel,
         )
-        self._progress.start()
-        self._task: TaskID = self._progress.add_task("connecting", total=1.0, left="")
+        self._live.start()
+
+    def _panel(self) -> Text:
+        from rich.text import Text
+
+        if self._shown is None:
+            return Text("connecting")
+        console = self._console
+        plain = bool(for_encoding("▁━", console.encoding) != "▁━")
+        width = max(console.width - 1, 10)  # a full line would begin another one
+        lines = bench_lines(self._shown, self._trend, width, plain=plain)
+        text = Text(no_wrap=True)
+        for k, line in enumerate(lines):
+            text.append("\n" * bool(k))
+            for piece in line:
+                text.append(for_encoding(piece.text, console.encoding), style=_STYLES[piece.style])
+        return text
 
     def preparing(self, text: str, fraction: float) -> None:
-        """Fill the bar once for the preparation."""
-        self._progress.update(self._task, description=text, completed=fraction)
+        """The state of the bench has it."""
 
     def reading(self, text: str, elapsed: float, remaining: float) -> None:
-        """A line above the bar; the bar's share is bench time elapsed over elapsed and expected."""
+        """A line above; time left stands below."""
         self.message(text)
-        share = elapsed / (elapsed + remaining) if elapsed + remaining > 0 else 0.0
-        self._progress.update(self._task, description=text, completed=share, left=f"about {remaining:.0f} s left")
+        self._next = 0.0
 
     def message(self, text: str) -> None:
-        """A line above the bar."""
-        self._progress.console.print(printable(text), markup=False, highlight=False)
+        """A line above."""
+        self._console.print(printable(text), markup=False, highlight=False)
+
+    def is_due(self) -> bool:
+        """Whether the last drawing is long enough ago, or a reading came since."""
+        return time.monotonic() >= self._next
+
+    def state(self, state: State) -> None:
+        """Draw the bench."""
+        self._next = time.monotonic() + _DRAWN_EVERY_S
+        self._shown = state
+        self._trend.take(state)
+        self._live.refresh()
 
     def close(self) -> None:
-        """Take the bar away; the lines stay."""
-        self._progress.stop()
+        """Take the lines of the bench away; the readings stay."""
+        self._live.stop()
 
 
 def to_stderr() -> Display:

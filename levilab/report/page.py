@@ -11,9 +11,9 @@ from hashlib import sha256
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from levilab.errors import UsageError
+from levilab.errors import DoesNotSuit, NoneUsable, UsageError
 from levilab.files import replace_atomically, writing
-from levilab.pipelines.catalogue import DoesNotSuit, NoneUsable, recall_suiting, remarks
+from levilab.pipelines.catalogue import recall_suiting, remarks
 from levilab.pipelines.document import NO_RESULT
 from levilab.pipelines.sources import data_files
 from levilab.report.document import document_of, list_in_words, notebook_blocks

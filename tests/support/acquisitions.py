@@ -44,6 +44,11 @@ class Silent:
     def message(self, text: str) -> None:
         self.messages.append(text)
 
+    def is_due(self) -> bool:
+        return False
+
+    def state(self, state: object) -> None: ...
+
     def close(self) -> None: ...
 
 

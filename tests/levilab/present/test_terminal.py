@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import shutil
 import sys
 
@@ -12,6 +13,7 @@ import pytest
 from levilab.present import terminal
 from levilab.present.progress import BarDisplay
 from levilab.present.tables import table
+from levilab.telemetry.messages import State
 
 HEADS = ("what is set", "now", "what may stand there", "what it means to the person at the bench")
 ROWS = (
@@ -57,13 +59,33 @@ def test_a_table_is_as_wide_as_the_terminal_and_wider_into_a_file(monkeypatch: p
     assert terminal.terminal().width == 160
 
 
-def test_at_the_end_the_bar_is_taken_away_and_the_lines_stay(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_at_the_end_the_bench_is_taken_away_and_the_lines_stay(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in {"TERM": "xterm", "COLUMNS": "100", "LINES": "24"}.items():
         monkeypatch.setenv(name, value)
     monkeypatch.setattr(sys, "stderr", screen := Screen())
     display = BarDisplay()
     display.reading("40.123 Hz", 1.0, 3.0)
+    assert display.is_due()
+    display.state(State(5.0, elapsed_s=1.0, time_left_s=3.0, last={"spin_frequency_hz": 40.123}, readings=1))
+    assert not display.is_due()
     display.close()
     shown = screen.getvalue()
     assert "40.123 Hz" in shown
-    assert "\x1b[2K" in shown.rpartition("about 3 s left")[2]  # the line of the bar is erased
+    assert "\x1b[2K" in shown.rpartition("about 3 s left")[2]  # the lines of the bench are erased
+
+
+@pytest.mark.parametrize(
+    ("encoding", "expected"), [("utf-8", "─"), ("cp437", "---"), ("ascii", "---"), ("cp1252", "---")]
+)
+def test_the_bench_is_drawn_in_the_characters_of_the_stream(encoding: str, expected: str) -> None:
+    stream = io.TextIOWrapper(io.BytesIO(), encoding=encoding)  # it raises for what it cannot carry
+    display = BarDisplay(terminal.Terminal(file=stream, force_terminal=True, width=60, color_system=None))
+    for k in range(5):
+        display.state(State(1.0 * k, elapsed_s=1.0, time_left_s=9.0, last={"spin_frequency_hz": 25.0 - 0.1 * k}))
+    stream.flush()
+    shown = stream.buffer.getvalue().decode(encoding)  # type: ignore[attr-defined]
+    display.close()
+    assert "spin 24.600 Hz" in shown
+    assert "0.10 Hz/s" in shown
+    assert expected in shown
+    assert not re.search("\x1b\\[[0-9;]*m", shown)  # no colour was asked for

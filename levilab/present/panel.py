@@ -1,0 +1,196 @@
+"""The bench in a few lines of a terminal: last value, trend, instruments, time left.  A function of state and width."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
+
+from levilab.present.characters import printable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from levilab.telemetry.messages import State
+
+#: Answers of an instrument that the trend is of; so many are needed for a rate.
+_KEPT, _FEWEST = 24, 3
+#: Heights of a spark line.
+_SPARKS = "▁▂▃▄▅▆▇█"
+#: What is measured, by channel: name, unit, decimals, and the factor to that unit; the first that is known has a trend.
+_SHOWN = {
+    "spin_frequency_hz": ("spin", "Hz", 3, 1.0),
+    "flux_density_t": ("field", "mT", 4, 1e3),
+    "precession_frequency_hz": ("precession", "Hz", 3, 1.0),
+    "height_m": ("height", "cm", 2, 1e2),
+}
+#: Narrower than this a line has no room for words beside the bar [columns].
+_NARROW = 60
+
+
+class Piece(NamedTuple):
+    """A text that is not broken.  style: plain, strong, on, off or alarm."""
+
+    text: str
+    style: str = "plain"
+
+
+Line = tuple[Piece, ...]
+
+
+@dataclass
+class Trend:
+    """The latest answers of one channel, and how they change.
+
+    Attributes:
+        channel: as in readings.csv.
+        answers: times on the clock of the bench [s], and values.
+        driven: whether the drive was on then: what a driven top does is no part of the trend of a free one.
+    """
+
+    channel: str = ""
+    answers: deque[tuple[float, float]] = field(default_factory=lambda: deque(maxlen=_KEPT))
+    driven: bool = False
+
+    def take(self, state: State) -> None:
+        """Take in what the bench says; another channel, or none, or a drive that was switched begins anew."""
+        channel = next((name for name in _SHOWN if name in state.last), "")
+        driven = state.drive is not None and state.drive.output
+        if (channel, driven) != (self.channel, self.driven):
+            self.channel, self.driven = channel, driven
+            self.answers.clear()
+        if channel and (not self.answers or self.answers[-1][1] != state.last[channel]):
+            self.answers.append((state.time_s, state.last[channel]))
+
+    @property
+    def rate(self) -> float | None:
+        """The slope of the straight line through the answers [unit/s]; None of fewer than three."""
+        n = len(self.answers)
+        if n < _FEWEST:
+            return None
+        mean_t = math.fsum(t for t, _ in self.answers) / n
+        mean_v = math.fsum(v for _, v in self.answers) / n
+        spread = math.fsum((t - mean_t) ** 2 for t, _ in self.answers)
+        return math.fsum((t - mean_t) * (v - mean_v) for t, v in self.answers) / spread if spread else None
+
+    @property
+    def spark(self) -> str:
+        """The answers as heights.
+
+        >>> trend = Trend("spin_frequency_hz")
+        >>> trend.answers.extend([(0.0, 25.0), (10.0, 24.5), (20.0, 24.0)])
+        >>> trend.spark, trend.rate
+        ('█▅▁', -0.05)
+        """
+        values = [value for _, value in self.answers]
+        if len(values) < _FEWEST:
+            return ""
+        low, high = min(values), max(values)
+        steps = (len(_SPARKS) - 1) / (high - low) if high > low else 0.0
+        return "".join(_SPARKS[math.floor((value - low) * steps + 0.5)] for value in values)
+
+
+def bench_lines(state: State, trend: Trend, width: int, *, plain: bool) -> list[Line]:
+    """Return what a terminal shows of a bench, each line at most as wide as the terminal.
+
+    Args:
+        state: of the bench.
+        trend: of what it measures.
+        width: of the terminal [columns].
+        plain: without characters beyond ASCII, beside those that are spelled out.
+    """
+    measured = [*_flow([*_measured(state, trend, plain=plain)], width)]
+    instruments = [*_flow([*_instruments(state)], width)]
+    return [*measured, *instruments, _bar(state, width, plain=plain)]
+
+
+def _measured(state: State, trend: Trend, *, plain: bool) -> Iterator[Piece]:
+    shown = [(name, *_SHOWN[name]) for name in _SHOWN if name in state.last]
+    if not shown:
+        yield Piece("nothing counted yet" if state.share is not None else "no light, no value", "off")
+    for name, word, unit, decimals, factor in shown:
+        style = "strong" if name == trend.channel else "plain"
+        yield Piece(f"{word} {state.last[name] * factor:.{decimals}f} {unit}".replace("-", "−"), style)
+        if name == trend.channel and trend.rate is not None:
+            yield Piece(f"{_signed(trend.rate * factor)} {unit}/s")
+            if not plain:
+                yield Piece(trend.spark)
+    if state.readings:
+        yield Piece(f"{state.readings} reading{'s' * (state.readings != 1)}")
+
+
+def _instruments(state: State) -> Iterator[Piece]:
+    yield from (Piece(f"{kind} LOST", "alarm") for kind in state.lost)
+    if state.drive is not None and "generator" not in state.lost:
+        drive = state.drive
+        if drive.output:
+            yield Piece("drive ON", "on")
+            yield Piece(f"{drive.frequency_hz:.2f} Hz")
+            yield Piece(f"{drive.amplitude_vpp:g} Vpp {printable(drive.waveform)}")
+        else:
+            yield Piece("drive off", "off")
+    if state.counting is not None and "counter" not in state.lost:
+        yield Piece(f"gate {state.counting.gate_s:g} s", "off")
+        yield Piece(f"level {state.counting.trigger_level_v:g} V", "off")
+
+
+def _bar(state: State, width: int, *, plain: bool) -> Line:
+    """Share that is done, and time left; while the bench is prepared, what it does."""
+    share, said = _progress(state)
+    room = min(40, max(8, width - len(said) - 2)) if width >= _NARROW else max(4, width - len(said) - 2)
+    if len(said) + 6 > width:
+        return (Piece(said[:width]),)
+    done = round(room * min(max(share, 0.0), 1.0))
+    full, empty = ("#", "-") if plain else ("━", "─")
+    return Piece(full * done, "on"), Piece(empty * (room - done), "off"), Piece(f"  {said}")
+
+
+def _progress(state: State) -> tuple[float, str]:
+    if state.share is not None:
+        return state.share, printable(state.text)
+    elapsed, left = state.elapsed_s or 0.0, state.time_left_s
+    if left is None:
+        return 0.0, f"{_clock(elapsed)} so far"
+    share = elapsed / (elapsed + left) if elapsed + left > 0 else 0.0
+    return share, f"{_clock(elapsed)} done, about {_clock(left)} left"
+
+
+def _flow(pieces: Sequence[Piece], width: int) -> Iterator[Line]:
+    """Yield lines of pieces with two columns between them; one that is wider than the terminal is cut."""
+    line: list[Piece] = []
+    used = 0
+    for text, style in pieces:
+        size = min(len(text), width)
+        if line and used + 2 + size > width:
+            yield tuple(line)
+            line, used = [], 0
+        gap = "  " if line else ""
+        line.append(Piece(gap + text[:width], style))
+        used += len(gap) + size
+    if line:
+        yield tuple(line)
+
+
+def _signed(value: float) -> str:
+    """Return a rate with two digits and a sign.
+
+    >>> [_signed(value) for value in (-0.0934, 0.051, 12.0, 0.0)]
+    ['−0.093', '+0.051', '+12', '0']
+    """
+    if not value:
+        return "0"
+    decimals = min(max(1 - math.floor(math.log10(abs(value))), 0), 6)
+    return f"{value:+.{decimals}f}".replace("-", "−")
+
+
+def _clock(seconds: float) -> str:
+    """Return a duration.
+
+    >>> [_clock(seconds) for seconds in (7.2, 95.0, 4000.0)]
+    ['7 s', '1:35 min', '1:06 h']
+    """
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    return f"{whole // 60}:{whole % 60:02d} min" if whole < 3600 else f"{whole // 3600}:{whole % 3600 // 60:02d} h"

@@ -1,0 +1,90 @@
+"""The bench in a few lines: what stands there, and that it fits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from levilab.present.panel import Trend, bench_lines
+from levilab.telemetry.messages import Counting, Drive, State
+
+LOCKED = State(
+    130.0,
+    elapsed_s=60.0,
+    time_left_s=95.0,
+    readings=12,
+    last={"spin_frequency_hz": 31.2, "precession_frequency_hz": 31.1998, "flux_density_t": -0.0123},
+    drive=Drive("SIN", 31.2, 10.0, 0.0, output=True),
+    counting=Counting(1.0, 0.6),
+)
+
+
+def texts(state: State, width: int = 80, *, plain: bool = False) -> list[str]:
+    trend = Trend()
+    for k in range(10):
+        spin = state.last.get("spin_frequency_hz")
+        last = state.last | ({"spin_frequency_hz": spin + 0.05 * (9 - k)} if spin else {})
+        trend.take(replace(state, time_s=state.time_s + k - 9, last=last))
+    return ["".join(piece.text for piece in line) for line in bench_lines(state, trend, width, plain=plain)]
+
+
+def test_a_person_sees_value_trend_instruments_and_time_left() -> None:
+    assert texts(LOCKED, 84) == [
+        "spin 31.200 Hz  −0.050 Hz/s  █▇▆▆▅▄▃▃▂▁  field −12.3000 mT  precession 31.200 Hz",
+        "12 readings",
+        "drive ON  31.20 Hz  10 Vpp SIN  gate 1 s  level 0.6 V",
+        "━━━━━━━━━━━━━━━─────────────────────────  1:00 min done, about 1:35 min left",
+    ]
+
+
+def test_without_the_characters_there_is_no_spark_line() -> None:
+    first, *_, last = texts(LOCKED, plain=True)
+    assert "▁" not in first
+    assert last.startswith("###")
+
+
+def test_while_the_bench_is_prepared_its_step_stands_beside_the_bar() -> None:
+    state = State(5.0, text="drive at 30.50 Hz", share=0.5, drive=Drive())
+    assert texts(state) == ["nothing counted yet", "drive off", "━" * 20 + "─" * 20 + "  drive at 30.50 Hz"]
+
+
+def test_an_instrument_that_is_lost_is_an_alarm_and_its_settings_are_gone() -> None:
+    line = bench_lines(replace(LOCKED, lost=("counter",)), Trend(), 80, plain=False)[-2]
+    assert [piece.text for piece in line] == ["counter LOST", "  drive ON", "  31.20 Hz", "  10 Vpp SIN"]
+    assert line[0].style == "alarm"
+
+
+def test_a_drive_that_is_switched_off_begins_a_new_trend() -> None:
+    trend = Trend()
+    for k in range(5):
+        trend.take(replace(LOCKED, time_s=float(k), last={"spin_frequency_hz": 30.0 + k}))
+    assert trend.rate == pytest.approx(1.0)
+    trend.take(replace(LOCKED, drive=Drive(), last={"spin_frequency_hz": 33.0}))
+    assert (trend.rate, trend.spark) == (None, "")
+
+
+def test_nothing_that_an_instrument_says_steers_the_terminal() -> None:
+    state = replace(LOCKED, drive=Drive("\x1b[31m", 1.0, 1.0, 0.0, output=True), text="\x1b]0;x", share=0.2)
+    assert "\x1b" not in "".join(texts(state))
+
+
+@given(
+    st.integers(10, 200),
+    st.builds(
+        State,
+        time_s=st.floats(0, 1e6),
+        elapsed_s=st.none() | st.floats(0, 1e6),
+        time_left_s=st.none() | st.floats(0, 1e6),
+        share=st.none() | st.floats(-1, 2),
+        text=st.text(max_size=100),
+        readings=st.integers(0, 10**7),
+        last=st.dictionaries(st.sampled_from(["spin_frequency_hz", "flux_density_t"]), st.floats(-1e6, 1e6)),
+        lost=st.lists(st.sampled_from(["counter", "oscilloscope"])).map(tuple),
+        drive=st.none() | st.just(LOCKED.drive),
+    ),
+)
+def test_no_line_is_wider_than_the_terminal(width: int, state: State) -> None:
+    assert max(map(len, texts(state, width))) <= width
