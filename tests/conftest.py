@@ -8,6 +8,9 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+#: The fixtures of tests of pages.
+pytest_plugins = ["support.browser"]
+
 #: Makes the golden data, with a package that the tests do not need.
 collect_ignore = ["golden/make_trajectories.py"]
 
@@ -30,6 +33,7 @@ SLOW = """
     levilab/simulator  ../levilab/simulator  levilab/stability  levilab/sweeps
     levilab/world/test_base.py  levilab/world/test_motion_world.py  levilab/world/test_serve.py
     levilab/workers  levilab/world/test_spin_world.py
+    test_browser.py
     test_documentation.py
 """
 

@@ -1,14 +1,18 @@
-"""The style of all figures, and how they are saved."""
+"""The style of all figures, and how a figure becomes SVG, PDF or PNG, the same bytes each time."""
 
 from __future__ import annotations
 
 import io
+import re
 from functools import partial
+from html import escape
+from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 
 from levilab.files import replace_atomically
+from levilab.present.looks import MARKERS
 from levilab.present.numbers import short_name
 
 if TYPE_CHECKING:
@@ -17,27 +21,37 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Figure  # noqa: PLC0414 - for others, who may not name matplotlib
 
-
-STYLE: Any = {
-    "font.size": 9,
-    "axes.titlesize": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.alpha": 0.25,
-    "legend.frameon": False,
-    "svg.fonttype": "path",
-    "svg.hashsalt": "levilab",
-    "axes.formatter.use_mathtext": True,
-}
-#: One a run, as long as there are so few.
-MARKERS = "osD^vP*X"
+#: Widths of figures [inches]: one column of a journal, and two.
+NARROW, WIDE = 3.4, 7.0
+#: Pixels below which a wide figure's smallest text (7 pt) is less than 8 pixels high: a page that is narrower lets the
+#: figure be moved sideways instead of shrinking it further.
+LEAST_PX = 576
 
 
-def as_png(figure: Figure) -> bytes:
+def _sheet() -> dict[str, Any]:
+    """Matplotlib's defaults with levilab.mplstyle over them; a person's matplotlibrc changes nothing."""
+    own = resources.files("levilab.present") / "levilab.mplstyle"
+    with resources.as_file(own) as path:
+        sheet = mpl.rc_params_from_file(path, use_default_template=False)
+    defaults = mpl.rcParamsDefault
+    return {key: defaults[key] for key in defaults if key not in _NOT_STYLE} | dict(sheet)
+
+
+#: Parameters of the program, not of its figures.
+_NOT_STYLE = frozenset({
+    "backend", "backend_fallback", "interactive", "toolbar", "timezone", "date.epoch", "docstring.hardcopy",
+    "figure.max_open_warning", "figure.raise_window", "savefig.directory", "tk.window_focus", "webagg.address",
+    "webagg.open_in_browser", "webagg.port", "webagg.port_retries",
+})  # fmt: skip
+#: What a figure is drawn and saved with.
+STYLE: Any = _sheet()
+
+
+def as_png(figure: Figure, dpi: float = 150) -> bytes:
     """A figure as a picture."""
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=150)
+    with mpl.rc_context(STYLE):
+        figure.savefig(buffer, format="png", dpi=dpi, metadata={"Software": None})
     return buffer.getvalue()
 
 
@@ -46,12 +60,57 @@ def save_png(figure: Figure, path: Path) -> None:
     replace_atomically(path, as_png(figure))
 
 
-def as_svg(figure: Figure) -> str:
-    """A figure as SVG text, the same bytes for the same results."""
+def as_pdf(figure: Figure) -> bytes:
+    """A figure as a page of PDF of its own size, with its fonts."""
+    buffer = io.BytesIO()
+    with mpl.rc_context(STYLE):
+        figure.savefig(buffer, format="pdf", metadata={"CreationDate": None, "Creator": None, "Producer": None})
+    return buffer.getvalue()
+
+
+def as_svg(figure: Figure, prefix: str = "", title: str = "", description: str = "") -> str:
+    """A figure as one <svg> element, for a page that may hold others, or as a file of its own.
+
+    An artist whose points answer to the pointer has ``set_gid("readings-NAME")``.  Matplotlib writes each marker of a
+    `Line2D` as a ``<use>`` element inside of the group ``<g id="PREFIX-readings-NAME">``, in the order of the line's
+    points; it leaves out points that are not finite or lie outside of the figure, so such a line has none of these.
+
+    Args:
+        figure: as a figure's function returns it.
+        prefix: put before every id with a hyphen, so that no two figures of a page share one: matplotlib gives the same
+            ids in every figure.  Letters, digits, hyphens; empty for a file of its own.
+        title: the figure's name for screen readers.
+        description: what the figure shows, for screen readers.
+    """
     buffer = io.StringIO()
     with mpl.rc_context(STYLE):
-        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    return buffer.getvalue()
+        figure.savefig(buffer, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
+    return _for_a_page(buffer.getvalue(), prefix, title, description)
+
+
+#: Of matplotlib's SVG: texts as comments, a rule for all elements of the page, and the places where an id stands.
+_COMMENT = re.compile(r"\s*<!--.*?-->", re.DOTALL)
+_RULE = re.compile(r"\s*<defs>\s*<style type=\"text/css\">\*\{[^}]*\}</style>\s*</defs>")
+_IDS = re.compile(r"(\sid=\"|href=\"#|url\(#)")
+#: Places in points, with more digits than a hundredth of a point, which no eye sees and which make half of the text.
+_PLACES = re.compile(r"\s(?:d|x|y)=\"[^\"]*\"")
+_DIGITS = re.compile(r"(\.\d\d)\d+")
+_PREFIX = re.compile(r"[A-Za-z][A-Za-z0-9_-]*|")
+
+
+def _for_a_page(svg: str, prefix: str, title: str, description: str) -> str:
+    if not _PREFIX.fullmatch(prefix):
+        raise ValueError(f"{prefix!r} is no prefix of ids: it begins with a letter and has letters, digits and hyphens")
+    svg = svg[svg.index("<svg") :]
+    svg = _PLACES.sub(lambda found: _DIGITS.sub(r"\1", found[0]), svg)
+    svg = _RULE.sub("", _COMMENT.sub("", svg), count=1)
+    if prefix:
+        svg = _IDS.sub(rf"\g<1>{prefix}-", svg)
+    about = f' aria-label="{escape(title)}"' if title else ""
+    inside = f"<desc>{escape(description)}</desc>" if description else ""
+    own = f'<svg role="img"{about} stroke-linejoin="round" stroke-linecap="butt"'
+    head, body = svg.split(">", 1)
+    return f"{head.replace('<svg', own, 1)}>{inside}{body}"
 
 
 def for_notebooks(figure: Figure) -> Figure:

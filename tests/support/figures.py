@@ -15,6 +15,6 @@ if TYPE_CHECKING:
 def undrawn() -> Iterator[None]:
     """Figures are made, but matplotlib does not draw them: that is most of what a result or a page costs."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("levilab.present.style.as_png", lambda _: b"\x89PNG\r\n\x1a\n")
-        patch.setattr("levilab.present.style.as_svg", lambda _: "<svg/>")
+        patch.setattr("levilab.present.style.as_png", lambda *_, **__: b"\x89PNG\r\n\x1a\n")
+        patch.setattr("levilab.present.style.as_svg", lambda *_, **__: "<svg/>")
         yield

@@ -1,0 +1,275 @@
+"""A document as blocks of data, which HTML, PDF and notebooks draw each in their own way.
+
+All text is plain text and never markup: what a person typed stands in it as it was typed.  A renderer escapes it for
+its format and typesets it by `levilab.present.document.typesetting.typeset`: superscripts, subscripts, nothing else.
+
+Blocks hold no results and compute nothing.  The only callable is a picture's `draw`, since each format wants the figure
+in a form of its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from levilab.present.style import Figure
+    from levilab.present.tables import Table
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """A sentence or several, as running text.
+
+    Attributes:
+        text: the sentences; a line feed is a blank.
+        lead: a few words in bold that stand before the text in the same line, such as "The fall."; empty for none.
+    """
+
+    text: str
+    lead: str = ""
+
+
+@dataclass(frozen=True)
+class Note:
+    """What explains the block before it: smaller and quieter than a paragraph, close below that block, on its page."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the data say, in a few sentences.
+
+    It is the first thing that a reader of its section sees: set off by a bar or a tint, never split between pages.
+    """
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Banner:
+    """A mark that no reader overlooks: what is synthetic, or what mixes synthetic with real.
+
+    Attributes:
+        lead: in capitals and bold, such as "SYNTHETIC.".
+        text: what that means here; in the same line, after the lead.
+    """
+
+    lead: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Warnings:
+    """What to know before the numbers are used: a list, set off so that a reader sees it before tables and figures.
+
+    Attributes:
+        groups: warnings that are alike stand together.  Of a group of more than three the first is shown, and the
+            others can be folded away below it ("and 12 more like this one"); on paper they are printed smaller.
+            Without any group the block says that there are none.
+    """
+
+    groups: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True)
+class Bullets:
+    """A list of short texts."""
+
+    texts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Code:
+    """What a person types, such as a command, line by line: in letters of one width.
+
+    Lines that are too long are folded at any character; nothing in it is typeset.
+    """
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Fact:
+    """A name and what is said about it.
+
+    Attributes:
+        name: such as "Counter".
+        texts: a line each, or more where it is too long.
+        code: whether the texts are commands, paths or hashes: in letters of one width, not typeset, folded anywhere.
+    """
+
+    name: str
+    texts: tuple[str, ...]
+    code: bool = False
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Facts below each other: names in bold in a narrow column, texts beside them; where it is narrow, below them."""
+
+    facts: tuple[Fact, ...]
+
+
+@dataclass(frozen=True)
+class Tabular:
+    """A table in a document.
+
+    Heads are bold above a line; numbers are aligned to the right with digits of one width.  Rows of the kind "best"
+    have a green tint, "outlier" is red, the first of the kind "together" has a line above it.  Cells may have several
+    lines.  A table that is too wide is moved sideways on a screen, never the page; on paper it is set smaller.  Rows
+    are not split between pages, and heads are printed again on each page.
+
+    Attributes:
+        name: of files beside the report, such as "spindown-laws"; lower case, digits and hyphens; unique in a document
+            together with the anchors of the sections around it.
+        table: what is in it; its title stands above it as a caption, where it has one.
+        note: explains the columns, small print below it.
+        first_column_wraps: whether the first column holds names, which may be long and are folded.
+    """
+
+    name: str
+    table: Table
+    note: str = ""
+    first_column_wraps: bool = False
+
+
+@dataclass(frozen=True)
+class Listing:
+    """A long narrow table of readings.
+
+    A format folds it into pieces of some ten rows side by side, as many as fit the page's width, each with the heads.
+
+    Attributes:
+        name: as that of a `Tabular`.
+        table: all its rows.
+        note: small print below it; such as "the first 200 of 20000".
+        rows_in_a_piece: how many.
+    """
+
+    name: str
+    table: Table
+    note: str = ""
+    rows_in_a_piece: int = 10
+
+
+@dataclass(frozen=True)
+class Points:
+    """The points of a figure that answer to the pointer and to the keyboard's focus.
+
+    Attributes:
+        gid: of the artist in the figure, as given to matplotlib's `set_gid`; such as "readings-disc".
+        texts: of its points in their order: value, uncertainty, residual; lines separated by line feeds.
+    """
+
+    gid: str
+    texts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure.
+
+    It is as wide as the text, its caption below it on the same page; it is never split between pages.  Figures are
+    drawn in dark on white, and stay on a white card where the page is dark.
+
+    Attributes:
+        name: such as "spindown"; lower case, digits and hyphens; the prefix of ids where it is inlined.
+        title: in bold at the beginning of the caption.
+        caption: what is to be seen, in sentences.
+        alt: the same in a few words for readers who do not see it; never empty.
+        draw: returns the matplotlib figure, a new one at each call.
+        points: what answers to the pointer; a format without a pointer passes over it.
+        raster: whether it is so full of lines or points that PNG is smaller than a drawing of lines.
+    """
+
+    name: str
+    title: str
+    caption: str
+    alt: str
+    draw: Callable[[], Figure]
+    points: tuple[Points, ...] = ()
+    raster: bool = False
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading and what stands below it.
+
+    How deep it lies in others is how deep its heading is: a section of the document itself is of the second level,
+    below the title.  A heading never stands alone at the end of a page.
+
+    Attributes:
+        title: the heading.
+        blocks: below it.
+        anchor: the name by which links find it, such as "result"; lower case, digits and hyphens.  A renderer makes it
+            unique by a number where it is used again.  Empty for none.
+        lead: a line below the heading, quieter than text; empty for none.
+        new_page: whether it begins on a page of its own where there are pages.
+    """
+
+    title: str
+    blocks: tuple[Block, ...]
+    anchor: str = ""
+    lead: str = ""
+    new_page: bool = False
+
+
+@dataclass(frozen=True)
+class Details:
+    """What most readers pass over: on a screen folded below its summary, which opens it.
+
+    Attributes:
+        summary: one line.
+        more: quieter text after the summary in its line; empty for none.
+        blocks: what it opens.
+        on_paper: "whole": printed, the summary as a small heading; "summary": the summary alone; "out": nothing is.
+        opened: whether it is open at first.
+    """
+
+    summary: str
+    blocks: tuple[Block, ...]
+    more: str = ""
+    on_paper: Literal["whole", "summary", "out"] = "whole"
+    opened: bool = False
+
+
+Block: TypeAlias = (
+    Paragraph
+    | Note
+    | Verdict
+    | Banner
+    | Warnings
+    | Bullets
+    | Code
+    | Facts
+    | Tabular
+    | Listing
+    | Picture
+    | Section
+    | Details
+)
+
+
+@dataclass(frozen=True)
+class Document:
+    """A whole document.
+
+    Attributes:
+        title: the largest heading, once, at its beginning.
+        lead: a line below it: how much was used, when it was measured.
+        blocks: in their order; mostly sections.
+        banner: stands directly below title and lead; None where nothing is synthetic.
+        contents: whether links to the sections of the first depth stand before the blocks (HTML), or an outline (PDF).
+        footer: one line of small print at its end, such as versions.
+    """
+
+    title: str
+    lead: str
+    blocks: tuple[Block, ...]
+    banner: Banner | None = None
+    contents: bool = False
+    footer: str = ""

@@ -1,0 +1,57 @@
+"""The house's plain notation of powers and indices → runs of text, which each format sets high or low.
+
+Plain text says 10⁻³, s⁻¹, (rad/s)^−½ and C₃/₂, so that a terminal can print it.  A format that can set text high or low
+asks here; nothing else of a text is ever changed.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+Level = Literal["", "high", "low"]
+
+_HIGH = str.maketrans("⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ", "+−0123456789n")
+_LOW = str.maketrans("₊₋₀₁₂₃₄₅₆₇₈₉", "+−0123456789")
+#: Powers by raised characters, and those that no raised character exists for: ^−½, ^½ and ^(1−n).
+#: Indices by lowered characters, the fraction of C₃/₂ among them, and ν_r: a Greek letter, a low line, one letter.
+_RUNS = re.compile(
+    r"(?P<raised>[⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ]+)|\^(?P<half>−?½)|\^\((?P<power>1−n)\)"
+    r"|(?P<lowered>[₊₋₀₁₂₃₄₅₆₇₈₉]+(?:/[₀₁₂₃₄₅₆₇₈₉]+)?)|(?<=[α-ωΑ-Ω])_(?P<index>[a-zA-Z0-9])(?![a-zA-Z0-9_])"
+)
+
+
+@dataclass(frozen=True)
+class Run:
+    """Text of one level.  level: "" on the line, "high" or "low"."""
+
+    text: str
+    level: Level = ""
+
+
+def typeset(text: str) -> tuple[Run, ...]:
+    """A plain text as runs.
+
+    >>> [(run.text, run.level) for run in typeset("2.34(3)×10⁻⁴ (rad/s)^−½/s")]
+    [('2.34(3)×10', ''), ('−4', 'high'), (' (rad/s)', ''), ('−½', 'high'), ('/s', '')]
+    >>> [run.text for run in typeset("C₃/₂, ν_r, but file_r and x^2") if run.level == "low"]
+    ['3/2', 'r']
+    >>> typeset("")
+    ()
+    """
+    runs: list[Run] = []
+    at = 0
+    for found in _RUNS.finditer(text):
+        if found.start() > at:
+            runs.append(Run(text[at : found.start()]))
+        runs.append(_run(found))
+        at = found.end()
+    return (*runs, Run(text[at:])) if at < len(text) else tuple(runs)
+
+
+def _run(found: re.Match[str]) -> Run:
+    name = str(found.lastgroup)
+    if name in {"lowered", "index"}:
+        return Run(found[name].translate(_LOW), "low")
+    return Run(found[name].translate(_HIGH), "high")

@@ -1,0 +1,1 @@
+"""Blocks of a document → one HTML page with everything in it."""

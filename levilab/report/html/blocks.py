@@ -1,0 +1,200 @@
+"""Each kind of block as HTML: a table of functions, which read blocks and know nothing of runs or analyses."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections import Counter
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from levilab.present.document.blocks import (
+    Banner,
+    Bullets,
+    Code,
+    Details,
+    Facts,
+    Listing,
+    Note,
+    Paragraph,
+    Picture,
+    Section,
+    Tabular,
+    Verdict,
+    Warnings,
+)
+from levilab.present.style import as_png, as_svg
+from levilab.report.html.elements import Html, element, joined, lines, words
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+    from levilab.present.document.blocks import Block, Fact
+    from levilab.present.tables import Row, Table
+
+#: Warnings of a group that are shown without opening it.
+MOST_ALIKE = 3
+#: No heading is of a deeper level in HTML.
+_DEEPEST = 6
+
+
+@dataclass
+class Writer:
+    """What is known while blocks are written one after the other.
+
+    Attributes:
+        prefix: of all ids, so that pieces of several documents can stand in one notebook.
+        names: how often each id was used.
+        points: texts of the points that answer to the pointer, by the id of their element.
+    """
+
+    prefix: str = ""
+    names: Counter[str] = field(default_factory=Counter)
+    points: dict[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def new_id(self, name: str) -> str:
+        """An id that no other element has: the name, and from the second use on a number."""
+        plain = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-") or "part"
+        self.names[plain] += 1
+        count = self.names[plain]
+        return f"{self.prefix}{plain}" if count == 1 else f"{self.prefix}{plain}-{count}"
+
+    def blocks(self, blocks: Iterable[Block], level: int) -> Html:
+        """Blocks below each other; level: of the headings among them."""
+        return joined(_RENDERERS[type(block)](self, block, level) for block in blocks)
+
+
+# --- words ---------------------------------------------------------------------------------------------
+
+
+def _paragraph(_: Writer, block: Paragraph, __: int) -> Html:
+    lead = joined([element("strong", words(block.lead)), " "]) if block.lead else ""
+    return element("p", lead, words(block.text))
+
+
+def _note(_: Writer, block: Note, __: int) -> Html:
+    return element("p", words(block.text), class_="note")
+
+
+def _verdict(_: Writer, block: Verdict, __: int) -> Html:
+    return element("p", words(block.text), class_="verdict")
+
+
+def _banner(_: Writer, block: Banner, __: int) -> Html:
+    return element("p", element("strong", block.lead), " ", words(block.text), class_="synthetic", role="note")
+
+
+def _bullets(_: Writer, block: Bullets, __: int) -> Html:
+    return element("ul", [element("li", words(text)) for text in block.texts])
+
+
+def _code(_: Writer, block: Code, __: int) -> Html:
+    return element("pre", element("code", block.text))
+
+
+def _warnings(_: Writer, block: Warnings, __: int) -> Html:
+    if not block.groups:
+        return element("p", "None.", class_="none")
+    return element("ul", [_alike(group) for group in block.groups], class_="warnings")
+
+
+def _alike(group: tuple[str, ...]) -> Html:
+    if len(group) <= MOST_ALIKE:
+        return joined(element("li", words(text)) for text in group)
+    others = element("ul", [element("li", words(text)) for text in group[1:]])
+    summary = element("summary", f"and {len(group) - 1} more like this one")
+    return element("li", words(group[0]), element("details", summary, others))
+
+
+def _facts(_: Writer, block: Facts, __: int) -> Html:
+    return element("dl", [(element("dt", words(fact.name)), element("dd", _texts(fact))) for fact in block.facts])
+
+
+def _texts(fact: Fact) -> list[Html]:
+    return [element("code", text) if fact.code else element("span", words(text)) for text in fact.texts]
+
+
+# --- tables --------------------------------------------------------------------------------------------
+
+
+def _tabular(_: Writer, block: Tabular, __: int) -> Html:
+    drawn = _table(block.table, block.table.rows, wraps=block.first_column_wraps)
+    return element("div", _moved_sideways(drawn, block.table.title or block.name), _small_print(block.note),
+                   class_="table")  # fmt: skip
+
+
+def _listing(_: Writer, block: Listing, __: int) -> Html:
+    size = block.rows_in_a_piece
+    rows = block.table.rows
+    pieces = [_table(block.table, rows[k : k + size], caption=False) for k in range(0, len(rows), size)]
+    return element("div", element("div", pieces, class_="pieces"), _small_print(block.note), class_="listing")
+
+
+def _moved_sideways(drawn: Html, name: str) -> Html:
+    """What is too wide is moved sideways, also from the keyboard."""
+    return element("div", drawn, class_="scroll", tabindex="0", role="region", aria_label=name)
+
+
+def _table(table: Table, rows: Iterable[Row], *, wraps: bool = False, caption: bool = True) -> Html:
+    title = element("caption", words(table.title)) if caption and table.title else ""
+    heads = [
+        element("th", lines(head), class_="n" if k in table.numbers else None, scope="col")
+        for k, head in enumerate(table.heads)
+    ]
+    head = element("thead", element("tr", heads)) if any(table.heads) else ""
+    return element("table", title, head, element("tbody", [_row(table, row, wraps=wraps) for row in rows]))
+
+
+def _row(table: Table, row: Row, *, wraps: bool) -> Html:
+    names = wraps and row.kind != "together"
+    kinds = ["n" if k in table.numbers else "name" if names and k == 0 else None for k in range(len(row.cells))]
+    cells = [element("td", lines(cell), class_=kind) for cell, kind in zip(row.cells, kinds, strict=True)]
+    return element("tr", cells, class_=row.kind or None)
+
+
+def _small_print(text: str) -> Html | str:
+    return element("p", words(text), class_="note") if text else ""
+
+
+# --- figures -------------------------------------------------------------------------------------------
+
+
+def _picture(writer: Writer, block: Picture, _: int) -> Html:
+    prefix = writer.new_id(block.name)
+    figure = block.draw()
+    drawn: Html
+    if block.raster:
+        source = f"data:image/png;base64,{base64.b64encode(as_png(figure)).decode()}"
+        drawn = element("img", src=source, alt=block.alt)
+    else:
+        drawn = Html(as_svg(figure))
+        writer.points |= {f"{prefix}-{points.gid}": points.texts for points in block.points}
+    caption = element("figcaption", element("strong", words(block.title)), " ", words(block.caption))
+    shown = element("div", drawn, class_="card", role="img", aria_label=block.alt)
+    return element("figure", shown, caption, id=prefix)
+
+
+# --- what holds other blocks ---------------------------------------------------------------------------
+
+
+def _section(writer: Writer, block: Section, level: int) -> Html:
+    anchor = writer.new_id(block.anchor) if block.anchor else None
+    heading = element(f"h{min(level, _DEEPEST)}", words(block.title))
+    lead = element("p", words(block.lead), class_="lead") if block.lead else ""
+    kind = "new-page" if block.new_page else None
+    return element("section", heading, lead, writer.blocks(block.blocks, level + 1), id=anchor, class_=kind)
+
+
+def _details(writer: Writer, block: Details, level: int) -> Html:
+    more = joined([" ", element("small", words(block.more))]) if block.more else ""
+    summary = element("summary", element("strong", words(block.summary)), more)
+    body = element("div", writer.blocks(block.blocks, level), class_="body")
+    return element("details", summary, body, class_=f"on-paper-{block.on_paper}", open=block.opened)
+
+
+_RENDERERS: Mapping[type, Callable[[Writer, Any, int], Html]] = MappingProxyType({
+    Paragraph: _paragraph, Note: _note, Verdict: _verdict, Banner: _banner, Bullets: _bullets, Code: _code,
+    Warnings: _warnings, Facts: _facts, Tabular: _tabular, Listing: _listing, Picture: _picture, Section: _section,
+    Details: _details,
+})  # fmt: skip
