@@ -150,19 +150,11 @@ def make() -> Found:
             Check(f"{name}: lower edge of the quartic", printed["lower_quartic"], Estimate(low, None, "rad/s")),
             Check(f"{name}: upper edge of the quartic", printed["upper_quartic"], Estimate(high, None, "rad/s")),
         ]
-        ends = []
-        for ratio in RATIOS:
-            for start in STARTS:
-                scene = scene_of(simon, ratio, start)
-                if scene is not None:
-                    below, above, spins, up = limits(scene, simon)
-                    ends.append((below, above))
-                    if ratio == RATIOS[1] or len(ends) == 1:
-                        shown = (name, spins, up, (low, high), (printed["lower"].value, printed["upper"].value))
-            if scene is not None and start == STARTS[-1] and ratio >= RATIOS[1]:
-                break
-        scans.append(shown)
-        found = np.array(ends)
+        scenes = [scene_of(simon, ratio, start) for ratio in RATIOS for start in STARTS]
+        runs = [limits(scene, simon) for scene in scenes if scene is not None]
+        shown = runs[len(runs) // 2]
+        scans.append((name, shown[2], shown[3], (low, high), (printed["lower"].value, printed["upper"].value)))
+        found = np.array([run[:2] for run in runs])
         lowest, highest = np.nanmin(found, axis=0), np.nanmax(found, axis=0)
         findings += [
             Check(
