@@ -83,6 +83,37 @@ class LawFit:
         tau = (np.asarray(time, dtype=float) - self.start_time) / duration
         return frequency * counted(self.law, tau, self.solution)
 
+    def u_spin_frequency(self, time: ArrayLike) -> Array | None:
+        """The standard uncertainty of the fitted curve [Hz] at times [s], shape (n,); None where it is undefined.
+
+        That of the parameters with their correlation, and nothing for the law itself.
+        """
+        if self.covariance is None:
+            return None
+        frequency, duration = self.reference
+        tau = (np.asarray(time, dtype=float) - self.start_time) / duration
+        steps = 1e-5 * np.maximum(np.abs(self.solution), 1e-3)
+        slopes = np.array([
+            (counted(self.law, tau, self.solution + step) - counted(self.law, tau, self.solution - step)) / (2 * size)
+            for step, size in zip(np.diag(steps), steps, strict=True)
+        ])  # fmt: skip
+        try:
+            of_parameters = np.linalg.solve(self._natural_slopes.T, frequency * slopes)
+        except np.linalg.LinAlgError:
+            return None
+        variance = np.einsum("pn,pq,qn->n", of_parameters, self.covariance, of_parameters)
+        return np.sqrt(np.maximum(variance, 0.0)) if np.isfinite(variance).all() else None
+
+    @property
+    def _natural_slopes(self) -> Array:
+        """Of the parameters with the solution, shape (p, p)."""
+        p, (frequency, duration) = len(self.law.parameters), self.reference
+        slopes = np.eye(len(self.solution)) * frequency  # ν_r and K
+        slopes[:p, :p] = self.law.natural(self.solution[:p], frequency, duration)[1]
+        if self.has_tilt:
+            slopes[p, p] = 1 / (2 * np.sqrt(self.solution[p]))  # δ, of δ²
+        return slopes
+
     @property
     def has_tilt(self) -> bool:
         """Whether the count's tilt is in it."""

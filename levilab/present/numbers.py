@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import TYPE_CHECKING
 
@@ -125,6 +126,43 @@ def signed(value: float, decimals: int) -> str:
     """
     text = f"{value:+.{decimals}f}"
     return text if float(text) else text[1:]
+
+
+def decimals_of(u: float | None, most: int = 5) -> int:
+    """Digits behind the point that a number of such an uncertainty has by the rule of the Particle Data Group.
+
+    Args:
+        u: the standard uncertainty; None where it is not known.
+        most: digits where it is not known.
+
+    >>> decimals_of(0.03), decimals_of(0.00102), decimals_of(35.0), decimals_of(0.0962), decimals_of(None)
+    (3, 4, 0, 2, 5)
+    """
+    if not u or not math.isfinite(u):
+        return most
+    hundreds = float(f"{u:.2e}".partition("e")[0]) * 100
+    power = math.floor(math.log10(u))
+    return max(1 - power if hundreds <= 354 else -power, 0)
+
+
+def off(value: float, u: float | None) -> str:
+    """How far a reading is off, with the digits of its uncertainty and a sign.
+
+    >>> off(0.02149, 0.03), off(-1e-9, 0.03)
+    ('+0.021', '0.000')
+    """
+    return signed(value, decimals_of(u))
+
+
+def reading(value: float, u: float | None, residual: float | None) -> tuple[str, str, str]:
+    """A reading, its uncertainty and what a fit leaves over, for three columns; a dash for what is not known.
+
+    >>> reading(39.93661, 0.03, -0.012), reading(39.9, None, None)
+    (('39.937', '0.030', '-0.012'), ('39.90000', '—', '—'))
+    """
+    places = decimals_of(u)
+    left = "—" if residual is None else signed(residual, places)
+    return f"{value:.{places}f}", "—" if u is None else f"{u:.{places}f}", left
 
 
 def short_name(name: str) -> str:

@@ -1,4 +1,4 @@
-"""What the page says of one input, whatever the analysis: the drive, the instruments, what happened."""
+"""What a report says of one input, whatever the analysis: when, under which conditions, with what, what happened."""
 
 from __future__ import annotations
 
@@ -7,22 +7,26 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from levilab.present.clock import moment
+from levilab.present.document.blocks import Details, Fact, Facts, Note, Section, Tabular
+from levilab.present.tables import table
 from levilab.present.words import setting_in_words, settings_in_words, value_in_words
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from levilab.pipelines.part import InputPart, ReportPart
     from levilab.pipelines.sources import Source
+    from levilab.present.document.blocks import Block
     from levilab.runs.run import RunRecord
-
-#: The name of a fact, such as "Counter", and the fact in words.
-Fact = tuple[str, tuple[str, ...]]
 
 #: Events printed in the page; more stay in the run folder.
 MOST_EVENTS = 100
+#: With more events they are folded away on a screen.
+_FEW_EVENTS = 12
 #: What the drive's line says beside its signal.
 _DRIVE = ("drive_waveform", "drive_frequency_hz", "drive_amplitude_vpp")
+#: The settings of the experiment that the drive's line says.
+_IN_DRIVE = frozenset({*_DRIVE, "ramp_hz_per_s"})
 
 
 @dataclass(frozen=True)
@@ -43,30 +47,35 @@ class About:
 
 @dataclass(frozen=True)
 class Input:
-    """One input as the page shows it.
+    """One input as a report shows it.
 
     Attributes:
-        facts: (what, in words), in the order of the page.
-        events: (when, text).
-        parts: what each analysis says of it.
+        facts: in their order.
+        blocks: below the facts: what was changed, what happened, the readings.
     """
 
     name: str
     facts: tuple[Fact, ...]
-    events: tuple[tuple[str, str], ...]
-    events_left_out: int
-    parts: tuple[About, ...]
+    blocks: tuple[Block, ...]
 
     @property
-    def heading(self) -> str:
+    def more(self) -> str:
         """Its status unless that is finished, and the number of its readings."""
-        facts = dict(self.facts)
+        facts = {fact.name: fact.texts for fact in self.facts}
         texts = [*facts.get("Status", ()), *facts.get("Readings", ())[:1]]
         return "; ".join(text for text in texts if text != "finished")
 
     def without(self, common: Sequence[Fact]) -> Input:
         """Return the input without the facts that all inputs share."""
         return replace(self, facts=tuple(fact for fact in self.facts if fact not in common))
+
+    def section(self) -> Section:
+        """The input below a heading of its own."""
+        return Section(self.name, (Facts(self.facts), *self.blocks))
+
+    def folded(self) -> Details:
+        """The input as one of many: on a screen it can be opened, on paper it stands there in full."""
+        return Details(self.name, (Facts(self.facts), *self.blocks), more=self.more)
 
 
 def in_common(inputs: Sequence[Input]) -> tuple[Fact, ...]:
@@ -78,47 +87,44 @@ def in_common(inputs: Sequence[Input]) -> tuple[Fact, ...]:
 def describe(parts: Sequence[About]) -> Input:
     """What is known of an input, of which several analyses may say something."""
     source = parts[0].source
-    events = source.run.events() if source.run else []
-    zero = source.run.record.time_zero_utc if source.run else None
     return Input(
         name=source.name,
-        facts=tuple((what, texts) for what, texts in _facts(source, parts) if texts),
-        events=tuple((_moment(event, zero), event["text"]) for event in events[:MOST_EVENTS]),
-        events_left_out=max(0, len(events) - MOST_EVENTS),
-        parts=tuple(parts),
+        facts=tuple(fact for fact in _facts(source, parts) if any(fact.texts)),
+        blocks=(*_changes(source), *_events(source), *(block for one in parts for block in one.part.blocks)),
     )
 
 
 def _facts(source: Source[Any], parts: Sequence[About]) -> list[Fact]:
     about_readings = _of_one(parts[0]) if len(parts) == 1 else [_of_several(part) for part in parts]
+    none = Fact("Instruments", ("no instruments recorded",))
     if source.run is None:
-        return [*about_readings, ("Instruments", ("no instruments recorded",))]
+        return [*about_readings, none]
     record = source.run.record
     made_up = (_sentence(record.synthetic_how or "not said how", record.seed),) if record.synthetic else ()
-    instruments = [(kind.capitalize(), _instrument(about)) for kind, about in record.instruments.items()]
+    instruments = [Fact(kind.capitalize(), _instrument(about)) for kind, about in record.instruments.items()]
     return [
-        ("Synthetic", made_up),
-        ("Note", (record.note,) if record.note else ()),
-        ("When", (*_when(record), *_local_start(source))),
-        ("Status", (source.run.status,)),
+        Fact("Synthetic", made_up),
+        Fact("Note", (record.note,) if record.note else ()),
+        Fact("When", (*_when(record), *_local_start(source))),
+        Fact("Status", (source.run.status,)),
         *about_readings,
-        ("Drive", _drive(record)),
-        *(instruments or [("Instruments", ("no instruments recorded",))]),
-        ("Command", (" ".join(record.command_line),) if record.command_line else ()),
+        Fact("Drive", _drive(record)),
+        Fact("Conditions", _conditions(record)),
+        *(instruments or [none]),
     ]
 
 
 def _of_one(about: About) -> list[Fact]:
     """What the only analysis says."""
-    alone = [("This run alone", (about.part.alone,))] if about.several else []
-    return [*alone, ("Readings", about.part.readings), ("Analysis", (about.part.origin,))]
+    alone = [Fact("This run alone", (about.part.alone,))] if about.several else []
+    return [*alone, Fact("Readings", about.part.readings), Fact("Analysis", (about.part.origin,))]
 
 
 def _of_several(about: About) -> Fact:
     """What one of several analyses says."""
     subject = about.whole.subject
     alone = (about.part.alone,) if about.several else ()
-    return subject[0].upper() + subject[1:], (*alone, *about.part.readings, about.part.origin)
+    return Fact(subject[0].upper() + subject[1:], (*alone, *about.part.readings, about.part.origin))
 
 
 def _sentence(how: str, seed: int | None) -> str:
@@ -147,8 +153,24 @@ def _time(utc: str) -> str:
     """A time of run.json to the second; what is no time stands as it is."""
     try:
         return datetime.fromisoformat(utc).astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
-    except ValueError:
+    except (ValueError, OverflowError):
         return utc
+
+
+def _events(source: Source[Any]) -> tuple[Block, ...]:
+    """What happened, in the order of time."""
+    events = source.run.events() if source.run else []
+    if not events or source.run is None:
+        return ()
+    zero = source.run.record.time_zero_utc
+    rows = [(_moment(event, zero), event["text"]) for event in events[:MOST_EVENTS]]
+    left_out = len(events) - MOST_EVENTS
+    note = f"and {left_out} more, in events.jsonl" if left_out > 0 else ""
+    heads = ("at", "what happened")
+    shown = Tabular("events", table("", heads, rows, numbers=heads[:1]), note, wraps=heads[1:])
+    if len(rows) <= _FEW_EVENTS:
+        return (Section("What happened", (shown,)),)
+    return (Details("What happened", (shown,), more=f"{len(events)} events"),)
 
 
 def _moment(event: Mapping[str, Any], zero: str | None) -> str:
@@ -163,7 +185,7 @@ def _moment(event: Mapping[str, Any], zero: str | None) -> str:
 
 def _drive(record: RunRecord) -> tuple[str, ...]:
     """What drove the top before the readings, and what the bench stands."""
-    settings, limits = (record.configuration.get(table) for table in (record.experiment, "limits"))
+    settings, limits = (record.configuration.get(name) for name in (record.experiment, "limits"))
     if not isinstance(settings, dict) or settings.get(_DRIVE[1], 0) is None:  # nothing drives the top
         return ()
     signal = [value_in_words(key, settings[key]) for key in _DRIVE if key in settings]
@@ -174,6 +196,16 @@ def _drive(record: RunRecord) -> tuple[str, ...]:
     return (", ".join(signal + ramp), *([f"limits of the bench: {', '.join(bounds)}"] if bounds else []))
 
 
+def _conditions(record: RunRecord) -> tuple[str, ...]:
+    """The other settings of the experiment."""
+    settings = record.configuration.get(record.experiment)
+    if not isinstance(settings, dict):
+        return ()
+    said = _IN_DRIVE if _drive(record) else frozenset()
+    others = [setting_in_words(key, settings[key]) for key in sorted(settings) if key not in said]
+    return (", ".join(others),) if others else ()
+
+
 def _instrument(about: Mapping[str, Any]) -> tuple[str, ...]:
     """Who answered, where, and the settings of the measurement: those at its end."""
     where = f"{about.get('identity', 'did not answer')} at {about.get('address', 'an unknown address')}"
@@ -181,3 +213,40 @@ def _instrument(about: Mapping[str, Any]) -> tuple[str, ...]:
     if not isinstance(settings, dict):
         return where, "settings not recorded"
     return where, settings_in_words(settings)
+
+
+def _changes(source: Source[Any]) -> tuple[Block, ...]:
+    """Which settings differ between start and end."""
+    instruments = source.run.record.instruments if source.run else {}
+    both = [
+        (kind.capitalize(), about["settings_start"], about["settings_end"])
+        for kind, about in instruments.items()
+        if all(isinstance(about.get(when), dict) for when in ("settings_start", "settings_end"))
+    ]
+    if not both:
+        return ()
+    rows = [row for one in both for row in _differences(*one)]
+    if not rows:
+        return (Note("No setting of an instrument changed between start and end."),)
+    heads = ("instrument", "setting", "at the start", "at the end")
+    return (Section("Settings that changed between start and end", (Tabular("changes", table("", heads, rows)),)),)
+
+
+def _differences(kind: str, start: Mapping[str, Any], end: Mapping[str, Any]) -> Iterator[tuple[str, str, str, str]]:
+    """A row for each setting; the name of the instrument stands in its first alone."""
+    name = kind
+    for key in (*end, *(key for key in start if key not in end)):
+        was, is_ = start.get(key), end.get(key)
+        if was != is_:
+            shown = [value_in_words(key, value) for value in (was, is_)]
+            yield name, setting_name(key), shown[0], shown[1]
+            name = ""
+
+
+def setting_name(key: str) -> str:
+    """A setting's name without its unit.
+
+    >>> setting_name("trigger_level_v"), setting_name("sweep")
+    ('trigger level', 'sweep')
+    """
+    return setting_in_words(key, "").strip()

@@ -1,14 +1,29 @@
-"""Figures that no test looks at."""
+"""Figures that no test looks at, and what is wrong with those that tests look at."""
 
 from __future__ import annotations
 
 import contextlib
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+#: Pixels that a letter's box is larger than the letter, and by how much less than a line's box is looked at.
+_EDGE = 1.5
 
 
 @contextlib.contextmanager
@@ -18,3 +33,104 @@ def undrawn() -> Iterator[None]:
         patch.setattr("levilab.present.style.as_png", lambda *_, **__: b"\x89PNG\r\n\x1a\n")
         patch.setattr("levilab.present.style.as_svg", lambda *_, **__: "<svg/>")
         yield
+
+
+def faults(figure: Figure) -> list[str]:
+    """Texts that lie over each other, over a line or a marker, or beyond the figure; each in words."""
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    whole = figure.bbox
+    boxes = [(text, _box(text)) for text in _texts(figure)]
+    found = [f"beyond the figure: {_named(text)}" for text, box in boxes if not _inside(box, whole)]
+    for k, (text, box) in enumerate(boxes):
+        found += [f"{_named(text)} over {_named(other)}" for other, at in boxes[:k] if _overlap(box, at)]
+    for axes in figure.axes:
+        if axes.get_visible():
+            found += [
+                f"{_named(text)} over {what}"
+                for what, marks in _drawn(axes)
+                for text, box in boxes
+                if _hits(marks, box)
+            ]
+    return found
+
+
+def _texts(figure: Figure) -> list[Text]:
+    """All that can be read: with anything written, visible, and inside of a visible panel."""
+    hidden = {id(text) for axes in figure.axes if not axes.get_visible() for text in axes.findobj(Text)}
+    ticks = {id(text) for axes in figure.axes for text in _idle_ticks(axes)}
+    return [
+        text
+        for text in figure.findobj(Text)
+        if text.get_visible() and text.get_text().strip() and id(text) not in hidden | ticks
+    ]
+
+
+def _idle_ticks(axes: Axes) -> Iterator[Text]:
+    """Labels of ticks that are not drawn: those beyond the limits."""
+    for axis in (axes.xaxis, axes.yaxis):
+        shown = {id(text) for tick in axis._update_ticks() for text in (tick.label1, tick.label2)}
+        yield from (text for text in axis.findobj(Text) if id(text) not in shown and text is not axis.label)
+        if not axes.axison:
+            yield from axis.findobj(Text)
+
+
+def _box(text: Text) -> Bbox:
+    box = text.get_window_extent()
+    return Bbox.from_extents(box.x0 + _EDGE, box.y0 + _EDGE, box.x1 - _EDGE, box.y1 - _EDGE)
+
+
+def _named(text: Text) -> str:
+    return repr(" ".join(text.get_text().split())[:40])
+
+
+def _inside(box: Bbox, whole: Bbox) -> bool:
+    return bool(box.x0 >= whole.x0 and box.y0 >= whole.y0 and box.x1 <= whole.x1 and box.y1 <= whole.y1)
+
+
+def _overlap(one: Bbox, other: Bbox) -> bool:
+    return one.x0 < other.x1 and other.x0 < one.x1 and one.y0 < other.y1 and other.y0 < one.y1
+
+
+def _drawn(axes: Axes) -> Iterator[tuple[str, Array]]:
+    """Of each line and each bar of a panel, its name and points a pixel apart, in pixels."""
+    inside = axes.get_window_extent()
+    for line in axes.get_lines():
+        if line.get_visible():
+            yield f"the line {line.get_label()}", _clipped(_line(line), inside if line.get_clip_on() else None)
+    for bars in axes.collections:
+        if isinstance(bars, LineCollection) and bars.get_visible():
+            transform = bars.get_transform()
+            pieces = [_dense(transform.transform(piece)) for piece in bars.get_segments() if len(piece) > 1]
+            if pieces:
+                yield "a bar", _clipped(np.concatenate(pieces), inside)
+
+
+def _line(line: Line2D) -> Array:
+    path = line.get_transform().transform_path(line.get_path())
+    points = np.asarray(path.vertices, dtype=np.float64)
+    points = points[np.isfinite(points).all(axis=1)]
+    if line.get_linestyle() not in {"None", "none", "", " "} and len(points) > 1:
+        return _dense(points)
+    return points if line.get_marker() not in {"None", "none", "", " "} else points[:0]
+
+
+def _dense(points: Array) -> Array:
+    """The line through some points as points at most a pixel apart; no more than can matter."""
+    points = np.clip(points, -1e4, 1e4)
+    steps = np.maximum(np.ceil(np.hypot(*np.diff(points, axis=0).T)).astype(int), 1)
+    if steps.sum() > 200_000:
+        return points
+    return np.concatenate([np.linspace(a, b, n + 1) for a, b, n in zip(points[:-1], points[1:], steps, strict=True)])
+
+
+def _clipped(points: Array, box: Bbox | None) -> Array:
+    if box is None or not len(points):
+        return points
+    inside = (points >= [box.x0 - 1, box.y0 - 1]) & (points <= [box.x1 + 1, box.y1 + 1])
+    return points[inside.all(axis=1)]
+
+
+def _hits(points: Array, box: Bbox) -> bool:
+    inside = (points > [box.x0, box.y0]) & (points < [box.x1, box.y1])
+    return bool(inside.all(axis=1).any())

@@ -2,45 +2,80 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from analysis.uncertainty import Estimate
 from levilab.pipelines.field.table import base_table, by_run_table, follows_table, scans_table
-from levilab.pipelines.part import InputPart, ReportPart
+from levilab.pipelines.part import FigureText, InputPart, ReportPart, first_of
+from levilab.present.document.blocks import Listing, Note, Points, Section, Tabular
+from levilab.present.numbers import off, short_name, signed, with_uncertainty
 from levilab.present.tables import table
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from levilab.pipelines.field.analysis import FieldAnalysis, FieldRun
+    from levilab.present.document.blocks import Block
 
-#: Readings printed in the page; more stay in the run folder.  They stand in blocks side by side.
-MOST_READINGS, BLOCK = 200, 10
+#: Readings printed in the page; more stay in the run folder.
+MOST_READINGS = 200
 
 
 def field_part(analysis: FieldAnalysis) -> ReportPart:
     """What the scans say, the base, what follows, and the readings."""
     several = len(analysis.runs) > 1
+    means = " Of several scans these are means; what is common to them makes no mean more certain." if several else ""
     return ReportPart(
         subject="field of the base",
         heading="Field of the base on its axis",
         lead=f"{sum(run.scan.statistics.n for run in analysis.runs)} heights measured",
-        figure_text="Flux density against height with its fit, residuals, masses and spins of tops that float",
-        template="pipelines/field/report.html.j2",
-        context={
-            "several": several,
-            "text": analysis.text,
-            "follows": follows_table(analysis.values),
-            "scans": scans_table(analysis),
-            "by_run": by_run_table(analysis),
-            "bases": [
-                (source.name, base_table(run.scan)) for source, run in zip(analysis.sources, analysis.runs, strict=True)
-            ],
-        },
+        verdict=analysis.text,
+        result=(
+            Tabular("field-follows", follows_table(analysis.values), f"{_FOLLOWS}{means}"),
+            Tabular("field-scans", scans_table(analysis), _SCANS, first_column_wraps=True),
+        ),
+        figure=FigureText(
+            title="Field of the base.",
+            caption=(
+                "Flux density against height with the fitted ring, what the fit leaves over, and the masses and spins "
+                "of tops that float in this field."
+            ),
+            alt="Flux density against height with its fit, residuals, masses and spins of tops that float",
+            points=_points(analysis),
+        ),
+        runs_title="Scan by scan" if several else "The base",
+        runs=_bases(analysis),
         inputs=tuple(
-            InputPart(_in_words(run), origin.text, run.text, _readings(run))
+            InputPart(_in_words(run), origin.text, run.text, (_readings(run),))
             for run, origin in zip(analysis.runs, analysis.origins, strict=True)
         ),
     )
+
+
+_FOLLOWS = (
+    "value(u): the digits in parentheses are the standard uncertainty of the last digits. All of what calliper, scales "
+    "and scan leave open is in it, to first order. Masses and heights are those at which a moment that follows the "
+    "field is stable; spins those at which small motions of the whole top stay small, for a top of the mass to set."
+)
+_SCANS = (
+    "χ²/dof is near 1 where the fit leaves nothing but the uncertainties. Order p: the order test (Wald–Wolfowitz); a "
+    "small one, below 0.01 say, means that the residuals have a shape."
+)
+_BASE = (
+    "Known before: by calliper and data sheet. Held: not moved by the fit; what the calliper leaves open of it is in "
+    "the uncertainties of the others."
+)
+
+
+def _bases(analysis: FieldAnalysis) -> tuple[Block, ...]:
+    """The base as each scan finds it."""
+    if len(analysis.runs) == 1:
+        return (Tabular("field-base", base_table(analysis.runs[0].scan), _BASE),)
+    bases = (
+        Section(source.name, (Tabular("field-base", replace(base_table(run.scan), title="")),))
+        for source, run in zip(analysis.sources, analysis.runs, strict=True)
+    )
+    by_run = Tabular("field-runs", by_run_table(analysis), first_column_wraps=True)
+    return by_run, *bases, Note(_BASE)
 
 
 def _in_words(run: FieldRun) -> tuple[str, ...]:
@@ -51,15 +86,35 @@ def _in_words(run: FieldRun) -> tuple[str, ...]:
     return text, f"{u}, that of its height included"
 
 
-def _readings(run: FieldRun) -> Mapping[str, object]:
-    """The first readings in blocks; rows of height [mm], flux density [mT] and residual [u]."""
+def _readings(run: FieldRun) -> Listing:
+    """The first readings; rows of height [mm], flux density [mT] and residual [u]."""
     scan = run.scan
     shown = min(len(scan.height), MOST_READINGS)
     scaled = scan.residuals / scan.u
     rows = [
-        (f"{1e3 * z:.2f}", f"{1e3 * b:.4f}", f"{r:+.1f}")
+        (f"{1e3 * z:.2f}", f"{1e3 * b:.4f}", signed(float(r), 1))
         for z, b, r in zip(scan.height[:shown], scan.flux_density[:shown], scaled[:shown], strict=True)
     ]
     heads = ("z [mm]", "B [mT]", "residual [u]")
-    blocks = [table("", heads, rows[k : k + BLOCK], numbers=heads) for k in range(0, shown, BLOCK)]
-    return {"blocks": blocks, "shown": shown, "count": len(scan.height)}
+    note = f"Residual: reading − fit, in units of u. {first_of(shown, len(scan.height))}".rstrip()
+    return Listing("field-readings", table("Readings", heads, rows, numbers=heads), note)
+
+
+def _points(analysis: FieldAnalysis) -> tuple[Points, ...]:
+    """What each reading of the figure answers."""
+    several = len(analysis.runs) > 1
+    found = []
+    for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True)):
+        name = short_name(source.name) if several else ""
+        texts = tuple(_point(name, run, i) for i in range(len(run.scan.height)))
+        found += [Points(f"readings-{k}", texts), Points(f"residuals-{k}", texts)]
+    return tuple(found)
+
+
+def _point(name: str, run: FieldRun, i: int) -> str:
+    scan = run.scan
+    u = 1e3 * float(scan.u[i])
+    field = with_uncertainty(Estimate(1e3 * float(scan.flux_density[i]), u, "mT"))
+    residual = float(scan.residuals[i])
+    lines = [name, f"z = {1e3 * scan.height[i]:.2f} mm", f"B = {field}", f"B − fit = {off(1e3 * residual, u)} mT"]
+    return "\n".join(filter(None, lines))

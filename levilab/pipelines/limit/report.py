@@ -5,19 +5,20 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from analysis.numbers import digits
+from analysis.uncertainty import Estimate
 from levilab.pipelines.limit.table import runs_table, theory_table
-from levilab.pipelines.part import InputPart, ReportPart
+from levilab.pipelines.part import FigureText, InputPart, ReportPart, first_of
+from levilab.present.document.blocks import Listing, Paragraph, Points, Tabular
+from levilab.present.numbers import off, reading, short_name, with_uncertainty
 from levilab.present.tables import Row, table
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from levilab.pipelines.limit.analysis import LimitAnalysis, Limits
     from levilab.pipelines.limit.readings import LimitReadings
     from levilab.pipelines.sources import Source
 
-#: Limits printed in the page; they stand in blocks side by side.
-_MOST_SHOWN, _BLOCK = 200, 10
+#: Limits printed in the page.
+_MOST_SHOWN = 200
 
 
 def limit_part(analysis: LimitAnalysis) -> ReportPart:
@@ -27,18 +28,41 @@ def limit_part(analysis: LimitAnalysis) -> ReportPart:
         subject="limits of the spin",
         heading="Limits of the spin of a levitated top",
         lead=f"{n} tops",
-        figure_text="Limits top by top with mean, scatter and theory, and how they are distributed",
-        template="pipelines/limit/report.html.j2",
-        context={
-            "verdict": analysis.text,
-            "runs": runs_table(analysis),
-            "theory": theory_table(analysis),
-        },
+        verdict=analysis.text,
+        result=(Tabular("limit-statistics", runs_table(analysis), _STATISTICS, first_column_wraps=True),),
+        figure=FigureText(
+            title="Limits of the spin.",
+            caption=(
+                "The limits top by top with their mean, their scatter and what theory says, and how they are "
+                "distributed."
+            ),
+            alt="Limits top by top with mean, scatter and theory, and how they are distributed",
+            points=_points(analysis),
+        ),
+        runs_title="Beside theory",
+        runs=(
+            Paragraph("What theory says of this top, and how far the mean is from it."),
+            Tabular("limit-theory", theory_table(analysis), _THEORY, first_column_wraps=True),
+        ),
         inputs=tuple(
-            InputPart(_in_words(source, run), origin.text, run.text, _readings(source, run))
+            InputPart(_in_words(source, run), origin.text, run.text, (_readings(source, run),))
             for source, run, origin in zip(analysis.sources, analysis.runs, analysis.origins, strict=True)
         ),
     )
+
+
+_STATISTICS = (
+    "value(u): the digits in parentheses are the standard uncertainty of the last digits. That of the mean is the "
+    "standard error: s/√n from the scatter s of the tops, and what the steps of the drive leave, up to step/√12 where "
+    "the tops scatter less than that. Several runs of the same conditions have a random-effects mean, whose standard "
+    "error holds the scatter between them; runs of other conditions are no repetitions, and stand apart. Trend: slope "
+    "of a straight line through the limits of a run. Outliers by Grubbs's test, 1 %; the mean includes them."
+)
+_THEORY = (
+    "p: how probable so large a difference is by chance (Student's t); below 0.05 it is called a difference. The "
+    "linear window holds for small motions of a top without drag; the resonance is that of a wobble that turns with "
+    "the top, which a moment that is not along the axis keeps up."
+)
 
 
 def _in_words(source: Source[LimitReadings], run: Limits) -> tuple[str, ...]:
@@ -48,17 +72,40 @@ def _in_words(source: Source[LimitReadings], run: Limits) -> tuple[str, ...]:
     return span, f"u of a limit: {known}"
 
 
-def _readings(source: Source[LimitReadings], run: Limits) -> Mapping[str, object]:
-    """The limits in blocks; rows of number, limit [Hz] and u [Hz]."""
+def _readings(source: Source[LimitReadings], run: Limits) -> Listing:
+    """The limits; rows of number, limit, u and its distance from the mean of the run [Hz]."""
     limit, u = source.readings.limit, source.readings.u
     shown = min(limit.size, _MOST_SHOWN)
-    heads = ("top", "limit [Hz]", "u [Hz]")
+    heads = ("top", "limit [Hz]", "u [Hz]", "− mean [Hz]")
+    mean = run.statistics.mean.value
     rows = [
         Row(
-            (str(i + 1), f"{limit[i]:.4f}", "—" if u is None else f"{digits(u[i])}"),
+            (str(i + 1), *reading(x, None if u is None else float(u[i]), None if mean is None else x - mean)),
             "outlier" if i in run.statistics.outliers else "",
         )
-        for i in range(shown)
+        for i, x in enumerate(limit[:shown].tolist())
     ]
-    blocks = [table("", heads, rows[k : k + _BLOCK], numbers=heads) for k in range(0, shown, _BLOCK)]
-    return {"blocks": blocks, "shown": shown, "count": limit.size}
+    return Listing("limit-readings", table("Limits", heads, rows, numbers=heads), first_of(shown, limit.size))
+
+
+def _points(analysis: LimitAnalysis) -> tuple[Points, ...]:
+    """What each top of the figure answers."""
+    several = len(analysis.runs) > 1
+    return tuple(
+        Points(
+            f"readings-{k}",
+            tuple(
+                _point(short_name(source.name) if several else "", source.readings, run, i)
+                for i in range(source.readings.limit.size)
+            ),
+        )
+        for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True))
+    )
+
+
+def _point(name: str, readings: LimitReadings, run: Limits, i: int) -> str:
+    limit, mean = float(readings.limit[i]), run.statistics.mean.value
+    u = None if readings.u is None else float(readings.u[i])
+    lines = [name, f"top {i + 1}", f"limit = {with_uncertainty(Estimate(limit, u, 'Hz'))}"]
+    lines += [] if mean is None else [f"limit − mean = {off(limit - mean, u)} Hz"]
+    return "\n".join(filter(None, lines))

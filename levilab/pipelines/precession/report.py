@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.numbers import digits
-from levilab.pipelines.part import InputPart, ReportPart
+from analysis.uncertainty import Estimate
+from levilab.pipelines.part import FigureText, InputPart, ReportPart, first_of
 from levilab.pipelines.precession.analysis import verdict
 from levilab.pipelines.precession.table import coherence_table, lines_table, points_table, power_table
 from levilab.present.clock import with_clock
+from levilab.present.document.blocks import Note, Paragraph, Points, Tabular
+from levilab.present.numbers import off, short_name, with_uncertainty
 
 if TYPE_CHECKING:
+    from analysis.precession.sweep import Point
     from levilab.pipelines.analyzed import Origin
     from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionOptions, PrecessionRun
     from levilab.pipelines.precession.readings import Readings
     from levilab.pipelines.sources import Source
+    from levilab.present.document.blocks import Block
 
 #: Points printed in the page; more stay in the run folder.
 MOST_POINTS = 200
@@ -24,22 +30,26 @@ MOST_POINTS = 200
 
 def precession_part(analysis: PrecessionAnalysis) -> ReportPart:
     """Verdict, lines, power, phase lock, and the points."""
-    several = len(analysis.runs) > 1
-    names = [f" of {source.name}" if several else "" for source in analysis.sources]
     return ReportPart(
         subject="precession",
         heading="Precession of a driven top",
         lead=f"{analysis.combined.line.n} points used",
-        figure_text="Precession against drive with the line, departures from the drive, influence of each point",
-        template="pipelines/precession/report.html.j2",
-        context={
-            "verdict": analysis.text,
-            "lines": lines_table(analysis),
-            "power": power_table(analysis.combined),
-            "coherences": [
-                coherence_table(run, name) for run, name in zip(analysis.runs, names, strict=True) if run.coherences
-            ],
-        },
+        verdict=analysis.text,
+        result=(
+            Tabular("precession-lines", lines_table(analysis), _LINES, first_column_wraps=True),
+            *_power(analysis),
+        ),
+        figure=FigureText(
+            title="Precession against drive.",
+            caption=(
+                "The points with the line and its bands of 95 %; departures from the drive; how far the line follows "
+                "each point, and what each does to the slope."
+            ),
+            alt="Precession against drive with the line, departures from the drive, influence of each point",
+            points=_figure_points(analysis),
+        ),
+        runs_title="Phase of the laser's pulses",
+        runs=_phases(analysis),
         inputs=tuple(
             _input(source, run, origin)
             for source, run, origin in zip(analysis.sources, analysis.runs, analysis.origins, strict=True)
@@ -47,16 +57,72 @@ def precession_part(analysis: PrecessionAnalysis) -> ReportPart:
     )
 
 
+_LINES = (
+    "value(u): the digits in parentheses are the standard uncertainty of the last digits. p locked: how probable it is "
+    "that the points of a locked top, slope 1 and intercept 0, lie as far off as these; below 0.01 that is excluded. "
+    "Slope and intercept are tested together, as they are correlated. The median line (Theil and Sen) goes through all "
+    "points, those left out of the fit as well; it stands up to a few wild ones."
+)
+_PHASES = (
+    "Mean vector: length of the mean of unit vectors in the direction of each pulse's phase; 1 where all pulses come "
+    "at one phase of the drive, about 1/√n where they come anyhow. Drift: frequency of the pulses − frequency of the "
+    "drive. Turns: from the lowest to the highest phase; a locked top stays within one."
+)
+_POINTS = (
+    "Leverage: how far the line follows the point, 0 to 1. Δslope/u: by how many of its u the slope changes without "
+    "the point."
+)
+
+
+def _power(analysis: PrecessionAnalysis) -> tuple[Block, ...]:
+    """What it takes to tell the published slope from 1."""
+    found = power_table(analysis.combined)
+    note = "The slope of 1.05 was published without an uncertainty."
+    return (Tabular("precession-power", found, note, first_column_wraps=True),) if found.rows else ()
+
+
+def _phases(analysis: PrecessionAnalysis) -> tuple[Block, ...]:
+    """How firmly the laser's pulses follow the drive, run by run."""
+    several = len(analysis.runs) > 1
+    names = [f" of {source.name}" if several else "" for source in analysis.sources]
+    tables = [
+        Tabular("precession-phases", coherence_table(run, name))
+        for run, name in zip(analysis.runs, names, strict=True)
+        if run.coherences
+    ]
+    if not tables:
+        text = "No records of the oscilloscope were kept: the phase of the laser's pulses on the drive is not known."
+        return (Paragraph(text),)
+    return *tables, Note(_PHASES)
+
+
 def _input(source: Source[Readings], run: PrecessionRun, origin: Origin[PrecessionOptions]) -> InputPart:
     count = len(run.fit.points)
     time = source.readings.time
     clock = with_clock(source.time_zero, None if time is None else time.tolist(), ())
-    context = {
-        "points": points_table(run, most=MOST_POINTS, clock=clock),
-        "shown": min(count, MOST_POINTS),
-        "count": count,
-    }
-    return InputPart(_in_words(source, run, origin), origin.text, verdict(run.fit), context)
+    found = replace(points_table(run, most=MOST_POINTS, clock=clock), title="Points")
+    more = first_of(min(count, MOST_POINTS), count)
+    blocks = (Tabular("precession-points", found, f"{_POINTS} {more}".rstrip()),)
+    return InputPart(_in_words(source, run, origin), origin.text, verdict(run.fit), blocks)
+
+
+def _figure_points(analysis: PrecessionAnalysis) -> tuple[Points, ...]:
+    """What each point of the figure that the line goes through answers."""
+    several = len(analysis.runs) > 1
+    found = []
+    for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True)):
+        name = short_name(source.name) if several else ""
+        texts = tuple(_point(name, point) for point in run.fit.points if point.used)
+        found += [Points(f"readings-{k}", texts), Points(f"departures-{k}", texts)]
+    return tuple(found)
+
+
+def _point(name: str, point: Point) -> str:
+    precession = with_uncertainty(Estimate(point.precession, point.u, "Hz"))
+    lines = [name, f"ν_d = {point.drive:.7g} Hz", f"ν_p = {precession}"]
+    lines += [f"ν_p − ν_d = {off(point.precession - point.drive, point.u)} Hz"]
+    lines += [f"ν_p − line = {off(point.residual, point.u)} Hz"]
+    return "\n".join(filter(None, lines))
 
 
 def _in_words(source: Source[Readings], run: PrecessionRun, origin: Origin[PrecessionOptions]) -> tuple[str, ...]:

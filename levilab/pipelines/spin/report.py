@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from levilab.pipelines.part import InputPart, ReportPart
+from analysis.numbers import digits
+from analysis.uncertainty import Estimate
+from levilab.pipelines.part import FigureText, InputPart, ReportPart
 from levilab.pipelines.spin.analysis import in_a_sentence
 from levilab.pipelines.spin.table import frequency_table, pulse_table, series_table
+from levilab.present.document.blocks import Listing, Points, Tabular
+from levilab.present.numbers import with_uncertainty
 
 if TYPE_CHECKING:
     from levilab.pipelines.sources import Source
     from levilab.pipelines.spin.analysis import SpinAnalysis, SpinRun
     from levilab.pipelines.spin.readings import Records
+    from levilab.present.document.blocks import Block
 
 #: Values of a series printed in the page; more stay in result.json.
 MOST_VALUES = 40
@@ -24,18 +29,34 @@ def spin_part(analysis: SpinAnalysis) -> ReportPart:
         subject="spin frequency",
         heading="Spin frequency of a top",
         lead=f"{total} pulses used",
-        figure_text="Traces with the turns found in them, turns laid over each other, residuals, frequency in time",
-        template="pipelines/spin/report.html.j2",
-        context={
-            "verdict": analysis.text,
-            "frequencies": frequency_table(analysis),
-            "pulses": pulse_table(analysis),
-        },
+        verdict=analysis.text,
+        result=(Tabular("spin-frequencies", frequency_table(analysis), _FREQUENCIES, first_column_wraps=True),),
+        figure=FigureText(
+            title="Spin frequency.",
+            caption=(
+                "Traces with the turns found in them, turns laid over each other, what the fit leaves over, and the "
+                "frequency in time."
+            ),
+            alt="Traces with the turns found in them, turns laid over each other, residuals, frequency in time",
+            points=_points(analysis),
+        ),
+        runs_title="The pulses",
+        runs=(Tabular("spin-pulses", pulse_table(analysis), _PULSES, first_column_wraps=True),),
         inputs=tuple(
             InputPart(_in_words(source, run), origin.text, in_a_sentence(run), _series(source, run))
             for source, run, origin in zip(analysis.sources, analysis.runs, analysis.origins, strict=True)
         ),
     )
+
+
+_FREQUENCIES = (
+    "value(u): the digits in parentheses are the standard uncertainty of the last digits. The spin is that at the time "
+    "given, its slope the change of the spin in a second. bound: no method does better with this noise (Cramér–Rao)."
+)
+_PULSES = (
+    "missing: turns without a pulse; doubled: pulses beyond one a turn; scatter: standard deviation of one pulse's "
+    "time; S/N: height of a pulse over the noise of a sample."
+)
 
 
 def _in_words(source: Source[Records], run: SpinRun) -> tuple[str, ...]:
@@ -44,5 +65,22 @@ def _in_words(source: Source[Records], run: SpinRun) -> tuple[str, ...]:
     return f"{records.kind}; {count} {what}", f"{run.spin.pulses} pulses, {run.spin.missing} missing"
 
 
-def _series(source: Source[Records], run: SpinRun) -> dict[str, object]:
-    return {"series": series_table(source, run, MOST_VALUES) if len(run.series) > 1 else None}
+def _series(source: Source[Records], run: SpinRun) -> tuple[Block, ...]:
+    """Frequency against time, where there is more than one value."""
+    if len(run.series) <= 1:
+        return ()
+    return (Listing("spin-series", series_table(source, run, MOST_VALUES)),)
+
+
+def _points(analysis: SpinAnalysis) -> tuple[Points, ...]:
+    """What each value of the frequency against time answers."""
+    return tuple(
+        Points(
+            f"readings-{k}",
+            tuple(
+                f"t = {digits(float(t), 6)} s\nν = {with_uncertainty(Estimate(float(nu), float(u), 'Hz'))}"
+                for t, nu, u in zip(run.series.time, run.series.frequency, run.series.u, strict=True)
+            ),
+        )
+        for k, run in enumerate(analysis.runs)
+    )

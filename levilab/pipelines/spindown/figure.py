@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
@@ -10,12 +11,26 @@ import numpy as np
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont, get_font
+from matplotlib.lines import Line2D
 
 from analysis.numbers import digits
 from levilab.pipelines.spindown.laws import SHOWN_LAWS, SYMBOLS
 from levilab.pipelines.spindown.table import tilt_part
+from levilab.present.drawing import (
+    SMALL,
+    band,
+    headline,
+    limits_about,
+    panel,
+    run_look,
+    sigma_bands,
+    synthetic_mark,
+    write,
+)
+from levilab.present.drawing import Label as NamedLine
+from levilab.present.looks import GREY, LOOKS, MARKERS
 from levilab.present.numbers import in_words, short_name
-from levilab.present.style import STYLE, row
+from levilab.present.style import STYLE, WIDE
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,59 +42,110 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: One a run, as long as there are so few.
-MARKERS = "osD^vP*X"
 #: The laws that have a straight line.
 STRAIGHT_LINES = {name: law.straight for name, law in SHOWN_LAWS.items() if law.straight}
 #: More points than a panel can show are thinned out evenly; up to so many have bars each; so many means of more.
 MOST_POINTS, MOST_BARS, MEANS = 600, 200, 40
 #: A bar longer than the marker's radius, as part of the panel's height, is seen; outliers with their value written.
 _SEEN, _MOST_NAMED = 1 / 120, 6
+#: Of the residuals: the common scale shows at least so many units, a law whose residuals reach this much further than
+#: it does has a scale of its own.
+_LEAST_SCALE, _BEYOND = 3.2, 1.1
+#: Places [inch]: left edge and width of the panels; height of the figure.
+_LEFT, _FULL, _HEIGHT = 0.66, 6.26, 9.15
+
+
+@dataclass(frozen=True)
+class _Unit:
+    """In what residuals are counted: each reading's u, or where none is known the best law's scatter.
+
+    Attributes:
+        of: for each run what its residuals are divided by [Hz].
+        usual: of a reading [Hz].
+        symbol: for axes.
+        words: what it is.
+    """
+
+    of: list[Array]
+    usual: float
+    symbol: str
+    words: str
 
 
 def spindown_figure(analysis: SpinDownAnalysis) -> Figure:
-    """Readings and laws; residuals of every law; the straight lines one draws on paper, and what departs from them."""
+    """Readings with the best law; what the others differ from it; residuals of each; the lines one draws on paper."""
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(10, 12.5))
+        figure = Figure(figsize=(WIDE, _HEIGHT))
+        headline(figure, _finding(analysis), synthetic_mark([source.synthetic for source in analysis.sources]))
+        unit = _unit(analysis)
+        _draw_spin(panel(figure, _LEFT, 0.62, 4.3, 1.75), analysis)
         if len(analysis.runs) > len(MARKERS):
-            spin, by_run = row(figure, 0.665, 0.31, 2, gap=0.09)
-            _draw_spin(spin, analysis)
-            _draw_by_run(by_run, analysis)
+            _draw_by_run(panel(figure, _LEFT + 4.98, 0.62, 1.3, 1.75), analysis)
         else:
-            _draw_spin(row(figure, 0.665, 0.31)[0], analysis)
-        _draw_residuals(figure, row(figure, 0.425, 0.15, len(SHOWN_LAWS), gap=0.055), analysis)
-        _draw_straight_lines(
-            figure,
-            row(figure, 0.16, 0.185, len(STRAIGHT_LINES), gap=0.095),
-            row(figure, 0.04, 0.105, len(STRAIGHT_LINES), gap=0.095),
-            analysis,
-        )
+            _draw_weights(panel(figure, _LEFT + 5.0, 0.62, 1.0, 1.75), analysis)
+        _draw_differences(panel(figure, _LEFT, 2.98, 4.3, 1.5), analysis, unit)
+        _draw_residuals(figure, 5.34, analysis, unit)
+        _draw_straight_lines(figure, 7.2, analysis)
     return figure
+
+
+def _finding(analysis: SpinDownAnalysis) -> str:
+    """The verdict in one sentence."""
+    verdict, best = analysis.combined.verdict, analysis.combined.best
+    together = f" of {len(analysis.runs)} runs" if len(analysis.runs) > 1 else ""
+    equation = SHOWN_LAWS[best].equation
+    if not verdict.describes:
+        return f"Spin-down{together}: no drag law describes these readings; the {best} law comes nearest"
+    if not verdict.decided:
+        others = [name for name in (*verdict.indistinguishable, *verdict.needless, *verdict.weak) if name != best]
+        also = f"; {_listed(others)} cannot be excluded" if others else ""
+        return f"Spin-down{together}: the readings do not single out a drag law, {best} comes first{also}"
+    excluded = [name for name in SHOWN_LAWS if name in dict(verdict.excluded)]
+    also = f"; {_listed(excluded)} {'is' if len(excluded) == 1 else 'are'} excluded" if excluded else ""
+    return f"Spin-down{together}: the {best} law, {equation}, describes the readings{also}"
+
+
+def _listed(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _unit(analysis: SpinDownAnalysis) -> _Unit:
+    known = [run.u for run in analysis.runs if run.u is not None]
+    if len(known) == len(analysis.runs):
+        usual = float(np.median(np.concatenate(known)))
+        return _Unit(known, usual, "u", f"u of a reading ({digits(usual)} Hz)")
+    residuals = [run.fit(analysis.combined.best).residuals for run in analysis.runs]
+    floor = 1e-12 * float(analysis.runs[0].frequency[0])  # readings that a law describes exactly
+    scatter = max(float(np.sqrt(np.mean(np.concatenate(residuals) ** 2))), floor)
+    words = f"the best law's scatter, s = {digits(scatter)} Hz"
+    return _Unit([np.full(len(one), scatter) for one in residuals], scatter, "s", words)
 
 
 # --- readings and laws ---------------------------------------------------------------------------------
 
 
 def _draw_spin(axes: Axes, analysis: SpinDownAnalysis) -> None:
-    """The readings of all runs, every law through the first, the best one through each."""
+    """The readings of all runs, and the best law through each."""
     span = _set_range(axes, analysis)
-    for name in SHOWN_LAWS:
-        _draw_law(axes, analysis, name)
-    for k in range(len(analysis.runs)):
-        _draw_readings(axes, analysis, k, analysis.runs[k].frequency, span, label=_run_label(analysis, k))
+    best, several = analysis.combined.best, len(analysis.runs)
+    for k, run in enumerate(analysis.runs):
+        t = np.linspace(run.time[0], run.time[-1], 200)
+        width = 1.4 if several == 1 else 0.9 if several <= len(MARKERS) else 0.4
+        label = f"best law: {best}, {SHOWN_LAWS[best].equation}" if k == 0 else None
+        axes.plot(t, run.fit(best).spin_frequency(t), linewidth=width, zorder=2.5, label=label, **LOOKS[best].as_line)
+        name = _run_label(analysis, k)
+        _draw_readings(axes, analysis, k, run.frequency, span=span, label=name, gid=f"readings-{k}")
         _draw_outliers(axes, analysis, k)
     axes.set(xlabel="time  [s]", ylabel="spin frequency ν  [Hz]")
-    together = "" if len(analysis.runs) == 1 else f" of {len(analysis.runs)} runs"
-    many = len(analysis.runs) > len(MARKERS)
-    what = "" if many else ": readings and drag laws"
-    axes.set_title(f"Spin-down{together}{what}{_synthetic(analysis)}", loc="left", fontsize=11)
+    handles, labels = axes.get_legend_handles_labels()
     axes.legend(
-        loc="upper right", ncols=2 if len(axes.get_lines()) > 9 and not many else 1, fontsize=8 if many else None
-    )
+        handles, labels, loc="upper right", ncols=2 if len(labels) > 6 else 1, handlelength=1.8, columnspacing=1.0,
+        fontsize=8 if len(labels) <= 4 else SMALL,
+    )  # fmt: skip
 
 
 def _set_range(axes: Axes, analysis: SpinDownAnalysis) -> float:
-    """What the readings used need, and no more: an outlier squeezes nothing."""
+    """What the readings used need, and no more, with room for the legend above: an outlier squeezes nothing."""
     low = min(float(run.frequency.min()) for run in analysis.runs)
     high = max(float(run.frequency.max()) for run in analysis.runs)
     margin = 0.06 * (high - low) or 0.06 * high
@@ -87,26 +153,76 @@ def _set_range(axes: Axes, analysis: SpinDownAnalysis) -> float:
     return high - low + 2 * margin
 
 
-def _draw_law(axes: Axes, analysis: SpinDownAnalysis, name: str) -> None:
-    """One law; with several runs through the first one alone, unless it is the best."""
-    verdict, best = analysis.combined.verdict, name == analysis.combined.best
-    excluded = name in dict(verdict.excluded)
-    as_good = name in verdict.needless or (name in verdict.indistinguishable and not best)
-    note = "excluded" if excluded else "fits as well" if as_good else "best" if best and verdict.decided else ""
-    label = f"{name}   {SHOWN_LAWS[name].equation}" + (f"   ({note})" if note else "")
-    several = len(analysis.runs)
-    thick = 2.4 if several == 1 and not _many(analysis) else 1.2 if several <= len(MARKERS) else 0.4
-    for k, run in enumerate(analysis.runs if best else analysis.runs[:1]):
-        t = np.linspace(run.time[0], run.time[-1], 200)
-        axes.plot(
-            t,
-            run.fit(name).spin_frequency(t),
-            color=SHOWN_LAWS[name].colour,
-            linestyle="dashed" if excluded else "solid",
-            linewidth=thick if best else 1.0,
-            zorder=2.5 if best else 2.2,
-            label=label if k == 0 else None,
+def _run_label(analysis: SpinDownAnalysis, k: int) -> str | None:
+    """A name for each of a few runs, a number for many."""
+    if len(analysis.runs) == 1:
+        return "readings" + (" ± u" if analysis.runs[0].u is not None else "")
+    if len(analysis.runs) <= len(MARKERS):
+        return _drawable(short_name(analysis.sources[k].name))
+    return f"readings of {len(analysis.runs)} runs" if k == 0 else None
+
+
+def _drawable(name: str) -> str:
+    """A name as a legend shows it: no formula, no hidden label, and no character that the font lacks."""
+    font = get_font(findfont("DejaVu Sans"))
+    text = "".join(c if c.isprintable() and font.get_char_index(ord(c)) else "□" for c in name)
+    text = text if len(text) <= 24 else text[:23] + "…"
+    return (" " if text.startswith("_") else "") + text.replace("\\", "\\\\").replace("$", r"\$")
+
+
+def _draw_outliers(axes: Axes, analysis: SpinDownAnalysis, k: int) -> None:
+    """A cross where it lies; an arrow at the edge, with its value, where it lies beyond."""
+    readings, outliers = analysis.sources[k].readings, np.array(analysis.runs[k].outliers, dtype=np.intp)
+    t, nu = readings.time[outliers], readings.frequency[outliers]
+    low, high = axes.get_ylim()
+    look = LOOKS["left out"]
+    style: Any = {"color": look.colour, "linestyle": "none", "zorder": 5}
+    edges = (("x", (low <= nu) & (nu <= high), None), ("^", nu > high, 0.97), ("v", nu < low, 0.03))
+    first = "left out" not in axes.get_legend_handles_labels()[1]
+    for marker, chosen, share in edges:
+        if not chosen.any():
+            continue
+        shown = np.flatnonzero(chosen)[_thin(int(chosen.sum()), MOST_POINTS)]
+        y = nu[shown] if share is None else np.full(len(shown), low + share * (high - low))
+        axes.plot(t[shown], y, marker=marker, markersize=6, label="left out" if first else None, **style)
+        first = False
+        for i in range(min(len(shown), _MOST_NAMED) if share else 0):
+            text = f"{nu[shown[i]]:.4g} Hz"
+            axes.annotate(
+                text, (t[shown[i]], y[i]), (7, -1.5), textcoords="offset points", color=look.colour, fontsize=SMALL
+            )
+
+
+# --- the weights, and run by run -----------------------------------------------------------------------
+
+
+def _draw_weights(axes: Axes, analysis: SpinDownAnalysis) -> None:
+    """How the criterion weighs the laws: a bar each, with its number and the verdict."""
+    for place, name in enumerate(SHOWN_LAWS):
+        weight = analysis.combined.fit(name).statistics.weight
+        look = LOOKS[name]
+        axes.barh(-place, weight or 0.0, height=0.3, color=look.colour, linewidth=0)
+        number = "" if weight is None else f"  {weight:.2f}" if weight >= 0.005 or weight == 0 else "  < 0.01"
+        axes.text(
+            0.03, 0.22 - place, f"{name}{number}{_note(analysis, name)}", fontsize=SMALL, va="bottom", color="black"
         )
+    known = analysis.combined.fit(analysis.combined.best).statistics.weight is not None
+    about = "weight of the law" if known else "too few readings to weigh"
+    axes.set(xlim=(0, 1), ylim=(-len(SHOWN_LAWS) + 0.6, 0.75), yticks=[], xlabel=about)
+    axes.xaxis.set_major_locator(mpl.ticker.FixedLocator([0, 0.5, 1]))
+    axes.tick_params(axis="y", which="both", left=False)
+    axes.set_title("AICc weights" if analysis.combined.fits[0].statistics.aicc is not None else "weights", pad=3)
+
+
+def _note(analysis: SpinDownAnalysis, name: str) -> str:
+    verdict, best = analysis.combined.verdict, name == analysis.combined.best
+    if name in dict(verdict.excluded):
+        return ", excluded"
+    if best:
+        return ", best" if verdict.decided else ", first" if verdict.describes else ", nearest"
+    if not verdict.describes:
+        return ""
+    return ", as good" if name in verdict.needless or name in verdict.indistinguishable else ""
 
 
 def _draw_by_run(axes: Axes, analysis: SpinDownAnalysis) -> None:
@@ -120,19 +236,19 @@ def _draw_by_run(axes: Axes, analysis: SpinDownAnalysis) -> None:
     power = _power_of_ten(value)
     value, u = value / 10.0**power, u / 10.0**power
     number = np.arange(1, len(found) + 1)
-    colour = SHOWN_LAWS[best.name].colour
+    look = LOOKS[best.name]
     if mean.value is not None:
         if mean.scatter is not None:
             ends = ((mean.value + side * mean.scatter) / 10.0**power for side in (-1, 1))
             axes.axhspan(*ends, color="black", alpha=0.12, linewidth=0)
-        axes.axhline(mean.value / 10.0**power, color=colour, linewidth=1.2)
+        axes.axhline(mean.value / 10.0**power, color=look.colour, linewidth=1.2)
     few = len(found) <= MOST_BARS
-    axes.errorbar(number, value, u if few else None, color=colour, linestyle="none", marker="o",
-                  markersize=3 if few else 1.5, elinewidth=0.8)  # fmt: skip
+    axes.errorbar(number, value, u if few else None, color="black", linestyle="none", elinewidth=0.6)
+    axes.plot(number, value, color="black", linestyle="none", marker="o", markersize=2.5 if few else 1.2)
     unit = in_words(mean.unit).replace("^−½", "$^{−1/2}$").replace("^(1−n)", "$^{1−n}$")
     times = f"$10^{{{power}}}$ ".replace("-", "−") if power else ""
-    axes.set(xlabel="run, in the order of the table", ylabel=f"{SYMBOLS[name]}  [{times}{unit}]")
-    axes.set_title(f"{SYMBOLS[name]} of the {best.name} law run by run; grey: ±s", loc="left", fontsize=11)
+    axes.set(xlabel="run", ylabel=f"{SYMBOLS[name]}  [{times}{unit}]")
+    axes.set_title(f"{SYMBOLS[name]}, {best.name}: mean, ±s", pad=3, fontsize=8)
 
 
 def _power_of_ten(values: Array) -> int:
@@ -141,73 +257,98 @@ def _power_of_ten(values: Array) -> int:
     return math.floor(math.log10(largest)) if largest > 0 and not 0.01 <= largest < 1e4 else 0
 
 
-def _run_label(analysis: SpinDownAnalysis, k: int) -> str | None:
-    """A name for each of a few runs, a number for many."""
-    if len(analysis.runs) <= len(MARKERS):
-        return _drawable(short_name(analysis.sources[k].name))
-    return f"{len(analysis.runs)} runs" if k == 0 else None
+# --- what the laws differ from each other --------------------------------------------------------------
 
 
-def _drawable(name: str) -> str:
-    """A name as a legend shows it: no formula, no hidden label, and no character that the font lacks."""
-    font = get_font(findfont("DejaVu Sans"))
-    text = "".join(c if c.isprintable() and font.get_char_index(ord(c)) else "□" for c in name)
-    text = text if len(text) <= 40 else text[:39] + "…"
-    return (" " if text.startswith("_") else "") + text.replace("\\", "\\\\").replace("$", r"\$")
+def _draw_differences(axes: Axes, analysis: SpinDownAnalysis, unit: _Unit) -> None:
+    """Readings and every law less the best one, which is the line at zero, with the band of its u."""
+    best, several = analysis.combined.best, len(analysis.runs)
+    excluded = dict(analysis.combined.verdict.excluded)
+    found: list[float] = []
+    for k, run in enumerate(analysis.runs):
+        found += [*(run.fit(best).residuals + 1.5 * unit.usual), *(run.fit(best).residuals - 1.5 * unit.usual)]
+        _draw_readings(axes, analysis, k, run.fit(best).residuals, span=6 * unit.usual, gid=f"residuals-best-{k}")
+        _draw_means(axes, analysis, run.fit(best).residuals)
+    run = max(analysis.runs, key=lambda one: float(one.time[-1] - one.time[0]))
+    t = np.linspace(run.time[0], run.time[-1], 200)
+    curves = {name: run.fit(name).spin_frequency(t) - run.fit(best).spin_frequency(t) for name in SHOWN_LAWS}
+    for name, difference in curves.items():
+        if name not in excluded and np.isfinite(difference).all():
+            found += [1.3 * float(difference.min()), 1.3 * float(difference.max())]
+    u = run.fit(best).u_spin_frequency(t)
+    if u is not None:
+        band(axes, t, np.zeros(len(t)), 2 * u, LOOKS[best].colour, alpha=0.25, zorder=1.9)
+    most = max(map(abs, limits_about(found, 0.02)))
+    axes.locator_params(axis="y", nbins=6)
+    axes.set(xlabel="time  [s]", ylabel=f"ν − ν$_{{\\rm {best}}}$  [Hz]", ylim=(-most, most))
+    ends = []
+    for name, difference in curves.items():
+        axes.plot(t, difference, linewidth=1.3, zorder=2.6, **LOOKS[name].as_line)
+        where = "" if np.abs(difference).max() <= most else f", to {_signed(difference)} Hz"
+        said = _note(analysis, name)[2:] + (", 2 u shaded" if name == best and u is not None else "")
+        ends.append(NamedLine(float(difference[-1]), f"{name}: {said or 'not excluded'}{where}", LOOKS[name].colour))
+    _name_laws(axes, [end for end in ends if math.isfinite(end.y)])
+    of = "" if several == 1 else f"; curves of {'the longest run' if several > 1 else 'the run'}"
+    axes.set_title(f"Readings and laws less the best law{of}", pad=3)
 
 
-def _draw_outliers(axes: Axes, analysis: SpinDownAnalysis, k: int) -> None:
-    """A cross where it lies; an arrow at the edge, with its value, where it lies beyond."""
-    readings, outliers = analysis.sources[k].readings, np.array(analysis.runs[k].outliers, dtype=np.intp)
-    t, nu = readings.time[outliers], readings.frequency[outliers]
-    low, high = axes.get_ylim()
-    style: Any = {"color": "red", "linestyle": "none", "zorder": 5}
-    edges = (("x", (low <= nu) & (nu <= high), None), ("^", nu > high, 0.97), ("v", nu < low, 0.03))
-    first = "outlier" not in axes.get_legend_handles_labels()[1]
-    for marker, chosen, share in edges:
-        if not chosen.any():
-            continue
-        shown = np.flatnonzero(chosen)[_thin(int(chosen.sum()), MOST_POINTS)]
-        y = nu[shown] if share is None else np.full(len(shown), low + share * (high - low))
-        axes.plot(t[shown], y, marker=marker, markersize=8, label="outlier" if first else None, **style)
-        first = False
-        for i in range(min(len(shown), _MOST_NAMED) if share else 0):
-            text = f"{nu[shown[i]]:.4g} Hz"
-            axes.annotate(text, (t[shown[i]], y[i]), (7, -3), textcoords="offset points", color="red", fontsize=8)
+def _signed(difference: Array) -> str:
+    """The value farthest from zero, in two digits."""
+    farthest = float(difference[np.argmax(np.abs(difference))])
+    return f"{'−' if farthest < 0 else '+'}{digits(abs(farthest))}"
 
 
-def _synthetic(analysis: SpinDownAnalysis) -> str:
-    made_up = sum(source.synthetic for source in analysis.sources)
-    if not made_up:
-        return ""
-    return "  (SYNTHETIC)" if made_up == len(analysis.sources) else f"  ({made_up} of them SYNTHETIC)"
+def _name_laws(axes: Axes, ends: list[NamedLine]) -> None:
+    """A piece of each law's line and its name beside the panel, in the order of the lines' ends."""
+    order = sorted(ends, key=lambda end: -end.y)
+    handles = [Line2D([], [], linewidth=1.3, **LOOKS[end.text.partition(":")[0]].as_line) for end in order]
+    axes.legend(
+        handles, [end.text for end in order], loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=SMALL,
+        handlelength=2.6, borderaxespad=0, labelspacing=0.9,
+    )  # fmt: skip
 
 
 # --- residuals -----------------------------------------------------------------------------------------
 
 
-def _draw_residuals(figure: Figure, panels: list[Axes], analysis: SpinDownAnalysis) -> None:
-    """What each law leaves over, each on its own scale: it should be noise about zero, without a shape."""
-    u = _usual_u(analysis)
-    band = "" if u is None else f"; grey: ±u of one reading, {digits(u)} Hz"
-    means = "; black: means" if _many(analysis) else ""
-    _head(figure, 0.605, f"Residuals, reading − law, each law on its own scale{band}{means}{_tilt_in_words(analysis)}")
-    for axes, name in zip(panels, SHOWN_LAWS, strict=True):
-        residuals = [run.fit(name).residuals for run in analysis.runs]
-        most = max(float(np.abs(r).max()) for r in residuals)
-        limit = max(1.1 * (most + (u or 0.0)), 1e-12 * float(analysis.runs[0].frequency[0]))
-        if u is not None:
-            axes.axhspan(-u, u, color="black", alpha=0.12, linewidth=0)
-        axes.axhline(0, color="black", linewidth=0.8)
-        for k, values in enumerate(residuals):
-            _draw_tilt(axes, analysis, k, name, limit)
-            _draw_readings(axes, analysis, k, values, 2 * limit, colour=SHOWN_LAWS[name].colour)
-            _draw_means(axes, analysis, values)
-        axes.set(ylim=(-limit, limit), xlabel="time  [s]")
-        axes.tick_params(labelsize=7)
-        axes.set_title(name, loc="left", color=SHOWN_LAWS[name].colour, fontweight="bold", pad=9)
-        axes.set_title(f"to ±{digits(most)} Hz", loc="right", color="dimgrey", fontsize=8, pad=9)
-    panels[0].set_ylabel("residual  [Hz]")
+def _draw_residuals(figure: Figure, top: float, analysis: SpinDownAnalysis, unit: _Unit) -> None:
+    """What each law leaves over, in units of a reading's u: noise within the bands, without a shape, if it holds."""
+    text = f"Residuals, reading − law, in units of {unit.words}; shaded ±1, ±2"
+    text += "; black: means" if _many(analysis) else ""
+    write(figure, 0.08, top - 0.42, text, fontsize=9)
+    tilt = _tilt_in_words(analysis)
+    if tilt:
+        write(figure, 0.08, top - 0.26, tilt, fontsize=SMALL, color=GREY)
+    values = {
+        name: [run.fit(name).residuals / of for run, of in zip(analysis.runs, unit.of, strict=True)]
+        for name in SHOWN_LAWS
+    }
+    reach = {name: max(float(np.abs(one).max()) for one in of) for name, of in values.items()}
+    excluded = dict(analysis.combined.verdict.excluded)
+    good = [reach[name] for name in SHOWN_LAWS if name not in excluded] or [reach[analysis.combined.best]]
+    common = max(_LEAST_SCALE, 1.12 * max(good))
+    width, gap = 1.02, (_FULL - 5 * 1.02) / 4
+    for place, name in enumerate(SHOWN_LAWS):
+        axes = panel(figure, _LEFT + place * (width + gap), top, width, 1.05)
+        own = reach[name] > _BEYOND * common
+        most = 1.12 * reach[name] if own else common
+        sigma_bands(axes)
+        for k, one in enumerate(values[name]):
+            _draw_tilt(axes, analysis, k, name, most)
+            bars = np.ones(len(one)) if analysis.runs[k].u is not None else None
+            _draw_readings(
+                axes, analysis, k, one, span=2 * most, bars=bars, colour=LOOKS[name].colour, gid=f"residuals-{name}-{k}"
+            )
+            _draw_means(axes, analysis, one)
+        axes.set(ylim=(-most, most), xlabel="time  [s]")
+        axes.tick_params(labelsize=SMALL)
+        axes.locator_params(nbins=4)
+        axes.set_title(name, loc="left", color=LOOKS[name].colour, fontsize=8, fontweight="bold", pad=3)
+        if own:
+            axes.set_title("own scale", loc="right", color="black", fontsize=SMALL - 0.5, fontstyle="italic", pad=3)
+            axes.set_facecolor("#F4F4F4")
+        if place == 0:
+            axes.set_ylabel(f"residual  [{unit.symbol}]")
 
 
 def _draw_tilt(axes: Axes, analysis: SpinDownAnalysis, k: int, name: str, limit: float) -> None:
@@ -218,58 +359,58 @@ def _draw_tilt(axes: Axes, analysis: SpinDownAnalysis, k: int, name: str, limit:
         t = np.linspace(run.time[0], run.time[-1], 100)
         added = tilt_part(fit, t)
         y = 0.9 * limit * added / float(np.abs(added).max())
-        axes.plot(t, y, color="dimgrey", linestyle="dotted", linewidth=1.2, zorder=2)
+        axes.plot(t, y, color=GREY, linestyle="dotted", linewidth=1.0, zorder=2)
 
 
 def _tilt_in_words(analysis: SpinDownAnalysis) -> str:
     """What the dotted curves are; empty where no run shows a tilt."""
     fits = [run.fit(analysis.combined.best) for run in analysis.runs]
     most = [float(np.abs(tilt_part(fit, run.time)).max()) for fit, run in zip(fits, analysis.runs, strict=True)]
-    return f"; dotted: what the tilt adds to the count, up to {digits(max(most))} Hz, not to scale" if max(most) else ""
-
-
-def _usual_u(analysis: SpinDownAnalysis) -> float | None:
-    known = [run.u for run in analysis.runs if run.u is not None]
-    return float(np.median(np.concatenate(known))) if known else None
+    return f"dotted: what the tilt adds to the count, up to {digits(max(most))} Hz, not to scale" if max(most) else ""
 
 
 # --- straight lines ------------------------------------------------------------------------------------
 
 
-def _draw_straight_lines(figure: Figure, above: list[Axes], below: list[Axes], analysis: SpinDownAnalysis) -> None:
+def _draw_straight_lines(figure: Figure, top: float, analysis: SpinDownAnalysis) -> None:
     """Where a law holds, its points lie on the line, and the strip below shows noise about zero."""
-    _head(figure, 0.375, "Straight lines as one draws them on paper; below each, how far the points lie from the line")
-    for panel, strip, (law, straight) in zip(above, below, STRAIGHT_LINES.items(), strict=True):
-        _draw_straight(panel, strip, analysis, straight.transform, law)
-        panel.set_ylabel(straight.axis)
-        panel.set_title(f"straight if {law} holds", loc="left", color=SHOWN_LAWS[law].colour, fontweight="bold", pad=9)
-        panel.tick_params(labelbottom=False)
-        strip.set(xlabel="time  [s]", xlim=panel.get_xlim())
-    most = max(abs(limit) for strip in below for limit in strip.get_ylim())
-    for strip in below:
+    write(
+        figure, 0.08, top - 0.3, "Straight lines as drawn on paper, and below each how far the points lie from it",
+        fontsize=9,
+    )  # fmt: skip
+    width, gap, strips = 1.68, 0.62, []
+    for place, (law, straight) in enumerate(STRAIGHT_LINES.items()):
+        left = _LEFT + place * (width + gap)
+        above, strip = panel(figure, left, top, width, 0.95), panel(figure, left, top + 1.03, width, 0.45)
+        strips.append(strip)
+        _draw_straight(above, strip, analysis, straight.transform, law)
+        above.set_ylabel(straight.axis, fontsize=8)
+        above.set_title(f"straight if {law} holds", color=LOOKS[law].colour, fontsize=8, fontweight="bold", pad=3)
+        for axes in (above, strip):
+            axes.tick_params(labelsize=SMALL)
+        above.tick_params(labelbottom=False)
+        strip.set(xlabel="time  [s]", xlim=above.get_xlim())
+    most = max(abs(limit) for strip in strips for limit in strip.get_ylim())
+    for strip in strips:
         strip.set_ylim(-most, most)  # in parts of the range, so that one sees which line is the straightest
-    below[0].set_ylabel("off the line\n[% of the range]")
+    strips[0].set_ylabel("off  [%]", fontsize=8)
 
 
 def _draw_straight(
-    panel: Axes, strip: Axes, analysis: SpinDownAnalysis, transform: Callable[[Array], Array], law: str
+    above: Axes, strip: Axes, analysis: SpinDownAnalysis, transform: Callable[[Array], Array], law: str
 ) -> None:
-    strip.axhline(0, color=SHOWN_LAWS[law].colour, linewidth=1)
+    strip.axhline(0, color=LOOKS[law].colour, linewidth=1)
     for k, run in enumerate(analysis.runs):
         y = transform(2 * np.pi * run.frequency)
         line = np.polynomial.Polynomial.fit(run.time, y, 1)(run.time)
-        panel.plot(run.time[[0, -1]], line[[0, -1]], color=SHOWN_LAWS[law].colour, linewidth=1)
-        _draw_readings(panel, analysis, k, y)
+        above.plot(run.time[[0, -1]], line[[0, -1]], color=LOOKS[law].colour, linewidth=1)
+        _draw_readings(above, analysis, k, y)
         off = 100 * (y - line) / (np.ptp(y) or 1.0)
         _draw_readings(strip, analysis, k, off)
         _draw_means(strip, analysis, off)
 
 
 # --- what the panels share -----------------------------------------------------------------------------
-
-
-def _head(figure: Figure, y: float, text: str) -> None:
-    figure.text(0.01, y, text, fontsize=10)
 
 
 def _many(analysis: SpinDownAnalysis) -> bool:
@@ -293,28 +434,45 @@ def _draw_readings(
     analysis: SpinDownAnalysis,
     k: int,
     y: Array,
-    span: float | None = None,
     *,
+    span: float | None = None,
+    bars: Array | None = None,
     colour: str | None = None,
     label: str | None = None,
+    gid: str | None = None,
 ) -> None:
-    """One number for each reading of run k: points, with bars of u where they are seen in a `span`."""
+    """One number for each reading of run k: points, with bars of u where they are seen in a `span`.
+
+    Args:
+        axes: where.
+        analysis: of all runs.
+        k: the run.
+        y: what is drawn for each of its readings.
+        span: height of the panel, in the unit of y; None: no bars.
+        bars: half length of the bars, in the unit of y; None: u of the readings [Hz].
+        colour: of the points, else the run's.
+        label: for the legend.
+        gid: by which a page finds the points, where each reading is one.
+    """
     run, runs = analysis.runs[k], len(analysis.runs)
     total = sum(len(each.time) for each in analysis.runs)
-    if runs > len(MARKERS):
-        colour = to_hex(mpl.colormaps["viridis"](0.9 * k / (runs - 1)))
+    look = run_look(k, runs)
+    own = to_hex(mpl.colormaps["cividis"](0.9 * k / (runs - 1))) if runs > len(MARKERS) else look.colour
     points = _thin(len(y), max(MOST_POINTS // runs, 20))
     few = total <= MOST_BARS
-    style: Any = {"color": colour or "black", "linestyle": "none", "alpha": 0.8 if few else 0.4}
+    style: Any = {"color": colour or own, "linestyle": "none", "alpha": 0.8 if few else 0.4}
     style["zorder"] = 3.0 if few else 2.1  # many points would hide the laws
-    if span and run.u is not None and few and np.median(run.u) > _SEEN * span:
-        axes.errorbar(run.time, y, run.u, elinewidth=0.8, **style)
+    bars = run.u if bars is None else bars
+    if span and bars is not None and few and np.median(bars) > _SEEN * span:
+        axes.errorbar(run.time, y, bars, elinewidth=0.7, **style)
     axes.plot(
         run.time[points],
         y[points],
-        marker=MARKERS[k] if runs <= len(MARKERS) else "o",
-        markersize=4 if few else 2.5 if len(y) <= MOST_BARS else 1.5,
+        marker=look.marker,
+        markersize=3.2 if few else 2.0 if len(y) <= MOST_BARS else 1.2,
+        markeredgewidth=0.8,
         markerfacecolor=style["color"] if colour else "white",
         label=label,
+        gid=gid if len(points) == len(y) else None,
         **style,
     )

@@ -37,26 +37,41 @@ class ShownLaw:
 
     Attributes:
         equation: as a figure's label.
-        colour: the same in every figure.
+        meaning: what takes the spin where it holds, in a sentence.
         straight: None if nothing is.
     """
 
     equation: str
-    colour: str
+    meaning: str
     straight: StraightLine | None = None
 
 
 #: By the names of `analysis.spindown.drag.LAWS`, in their order.
-#: Okabe and Ito's colours: distinct to the colour-blind, too.
+#: Their colours are in `levilab.present.looks`.
 SHOWN_LAWS = MappingProxyType({
-    "stokes": ShownLaw("ω̇ = −C₁ω", "#0072B2", StraightLine("ln ω", "ln ω   (ω in rad/s)", np.log)),
-    "newton": ShownLaw("ω̇ = −C₂ω²", "#D55E00", StraightLine("1/ω", "1/ω  [s/rad]", lambda omega: 1 / omega)),
+    "stokes": ShownLaw(
+        "ω̇ = −C₁ω",
+        "The torque of the drag is proportional to the spin, as of eddy currents, or of air that creeps.",
+        StraightLine("ln ω", "ln ω   (ω in rad/s)", np.log),
+    ),
+    "newton": ShownLaw(
+        "ω̇ = −C₂ω²",
+        "The torque of the drag is proportional to the square of the spin, as of air that is stirred up.",
+        StraightLine("1/ω", "1/ω  [s/rad]", lambda omega: 1 / omega),
+    ),
     "disc": ShownLaw(
-        "ω̇ = −Cω$^{3/2}$", "#009E73",
+        "ω̇ = −Cω$^{3/2}$",
+        "The torque of the drag is proportional to the spin to the power 3/2, as of the laminar layer of air on a disc "
+        "(von Kármán, 1921).",
         StraightLine("ω^−½", "ω$^{−1/2}$  [(s/rad)$^{1/2}$]", lambda omega: omega**-0.5),
     ),
-    "mixed": ShownLaw("ω̇ = −C₁ω − C₂ω²", "#CC79A7"),
-    "power": ShownLaw("ω̇ = −cωⁿ", "#E69F00"),
+    "mixed": ShownLaw(
+        "ω̇ = −C₁ω − C₂ω²",
+        "The torque of the drag has a part that is proportional to the spin and one that is to its square.",
+    ),
+    "power": ShownLaw(
+        "ω̇ = −cωⁿ", "The torque of the drag is proportional to a power n of the spin, which the fit chose.",
+    ),
 })  # fmt: skip
 
 #: The laws' parameters in the field's letters.

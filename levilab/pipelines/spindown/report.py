@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
-from levilab.pipelines.part import InputPart, ReportPart
-from levilab.pipelines.spindown.laws import SYMBOLS
+from levilab.pipelines.part import FigureText, InputPart, ReportPart, first_of
+from levilab.pipelines.spindown.laws import SHOWN_LAWS, SYMBOLS
 from levilab.pipelines.spindown.table import (
     QUALITY_IN_WORDS,
     count_table,
@@ -19,20 +19,24 @@ from levilab.pipelines.spindown.table import (
     straight_quantity,
 )
 from levilab.present.clock import with_clock
-from levilab.present.numbers import column, ends, in_words, short_name, with_uncertainty
+from levilab.present.document.blocks import Details, Listing, Note, Paragraph, Points, Tabular
+from levilab.present.numbers import column, ends, in_words, off, reading, short_name, with_uncertainty
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from analysis.spindown.combine import CombinedLaw, Mean
     from analysis.spindown.fit import SpinDown
     from levilab.pipelines.sources import Source
     from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions
     from levilab.pipelines.spindown.readings import Readings
+    from levilab.present.document.blocks import Block
 
-#: Readings printed in the page; more stay in the run folder.  They stand in blocks side by side.
-MOST_READINGS, BLOCK = 200, 10
+#: Readings printed in the page; more stay in the run folder.
+MOST_READINGS = 200
+#: Runs whose wobble is shown without unfolding it.
+MOST_COUNTS = 12
 #: Most falls that are listed; of more the range is given.
 MOST_FALLS = 8
 #: The event that says when the top fell.
@@ -40,47 +44,133 @@ FELL = "fell"
 
 
 def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
-    """Verdict, laws, how well they fit, the constants run by run, and the readings."""
-    combined, several = analysis.combined, len(analysis.runs) > 1
+    """Verdict, laws, what they mean, how well they fit, the constants run by run, and the readings."""
+    combined = analysis.combined
     n = combined.fit(combined.best).statistics.n
-    falls = [
-        (short_name(source.name), fall)
-        for source, run in zip(analysis.sources, analysis.runs, strict=True)
-        if (fall := _fall(source, run))
-    ]
-    asked = {origin.options.uncertainty for origin in analysis.origins} - {"covariance"}
     return ReportPart(
         subject="spin-down",
         heading="Spin-down of a levitated top",
         lead=f"{n} readings used",
-        figure_text="Readings with all drag laws, residuals of each law, and straight lines",
-        template="pipelines/spindown/report.html.j2",
-        context={
-            "several": several,
-            "verdict": combined.verdict.text,
-            "best": combined.best + " law" + (", the best" if combined.verdict.decided else ""),
-            "falls": falls,
-            "all_falls": _falls_in_short(analysis, len(falls)) if len(falls) > MOST_FALLS else "",
-            "laws": _laws_table(analysis),
-            "quality": quality_table(analysis, QUALITY_IN_WORDS),
-            "count": count_table(analysis),
-            "by_run": _by_run_table(analysis),
-            "intervals": " and ".join(sorted(asked)),
-            "durbin_watson": (max(2 - 4 / math.sqrt(n), 0), min(2 + 4 / math.sqrt(n), 4)),
-        },
+        verdict=combined.verdict.text,
+        result=(*_meaning(analysis), *_falls(analysis), *_laws(analysis), *_count(analysis)),
+        figure=FigureText(
+            title="Spin-down.",
+            caption=(
+                "The readings with all drag laws; what each law leaves over, which is noise about zero where the law "
+                "holds; and the straight lines that one draws on paper, straight where their law holds."
+            ),
+            alt="Readings with all drag laws, residuals of each law, and straight lines",
+            points=_points(analysis),
+        ),
+        runs_title="Run by run",
+        runs=_run_by_run(analysis),
         inputs=tuple(
             InputPart(
                 _in_words(source, run, origin.options),
                 origin.text,
                 run.verdict.text,
-                _readings(source, run, origin.options),
+                (_readings(source, run, origin.options, combined.best),),
             )
             for source, run, origin in zip(analysis.sources, analysis.runs, analysis.origins, strict=True)
         ),
     )
 
 
+# --- what the fits mean --------------------------------------------------------------------------------
+
+
+def _meaning(analysis: SpinDownAnalysis) -> tuple[Paragraph, ...]:
+    """What takes the spin by the best law, and how fast."""
+    combined, first = analysis.combined, analysis.runs[0]
+    if not combined.verdict.describes:
+        text = "No law that was tried describes these readings, so none of their constants is a property of the top."
+        return (Paragraph(text, "What it means."),)
+    law, fit = SHOWN_LAWS[combined.best], first.fit(combined.best)
+    start, end = (float(nu) for nu in fit.spin_frequency([first.time[0], first.time[-1]]))
+    lost = (
+        f"In {'the first run' if len(analysis.runs) > 1 else 'these readings'} the spin falls from {start:.2f} Hz to "
+        f"{end:.2f} Hz in {first.time[-1] - first.time[0]:.0f} s, by {100 * (1 - end / start):.0f} %."
+    )
+    rank = "" if combined.verdict.decided else " It fits best, but is not the only law that fits."
+    return (Paragraph(f"{law.meaning}{rank} {lost}", f"What the {combined.best} law means."),)
+
+
+def _falls(analysis: SpinDownAnalysis) -> tuple[Paragraph, ...]:
+    """What was seen of the falls; of many their range."""
+    falls = [
+        (short_name(source.name), fall)
+        for source, run in zip(analysis.sources, analysis.runs, strict=True)
+        if (fall := _fall(source, run))
+    ]
+    if len(falls) > MOST_FALLS:
+        return (Paragraph(f"{_falls_in_short(analysis, len(falls))}.", "The falls."),)
+    several = len(analysis.runs) > 1
+    return tuple(Paragraph(f"{text}.", f"The fall of {name}." if several else "The fall.") for name, text in falls)
+
+
 # --- tables --------------------------------------------------------------------------------------------
+
+
+def _laws(analysis: SpinDownAnalysis) -> tuple[Tabular, Tabular]:
+    """The constants of all laws, and how well they fit."""
+    several = len(analysis.runs) > 1
+    n = analysis.combined.fit(analysis.combined.best).statistics.n
+    low, high = max(2 - 4 / math.sqrt(n), 0), min(2 + 4 / math.sqrt(n), 4)
+    u = "Of a mean it comes from the scatter s of the runs, u = s/√N." if several else "ν₀: the spin at first."
+    constants = (
+        "value(u): the digits in parentheses are the standard uncertainty of the last digits. "
+        f"{u}{'' if several else _intervals(analysis)}"
+    )
+    quality = (
+        "constants: how many were fitted, beside the start of each run; the exponent is common to all runs. χ²/dof is "
+        "near 1 where a law leaves nothing but the readings' own uncertainty. ΔAICc counts against a law, more than 10 "
+        "excludes it; weight: the law's share of the evidence (Akaike). Order test p (Wald–Wolfowitz): how probable it "
+        "is that residuals in random order change their sign so seldom, or so often; below 0.01 they have a shape. "
+        f"Durbin–Watson is near 2 for noise: chance alone gives {low:.2f} to {high:.2f} (2 ± 4/√n, 2σ); less means a "
+        "shape."
+    )
+    return (
+        Tabular("spindown-laws", _laws_table(analysis), constants),
+        Tabular("spindown-models-compared", quality_table(analysis, QUALITY_IN_WORDS), quality),
+    )
+
+
+def _count(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
+    """What the count holds beside the spin."""
+    found = count_table(analysis)
+    if found is None:
+        text = "These readings show no tilt of the top's moment. What one that noise hides could change is part of the "
+        return (Note(f"{text}uncertainties."),)
+    explained = (
+        "A counter counts turns about the vertical. A moment that points off the axis by δ makes the top wobble with "
+        "its spin, the more the nearer the spin is to the resonance ν_r, and the count is higher than the spin by what "
+        "is given for the last reading. Where neighbouring readings resemble each other they say as much as fewer "
+        "independent ones."
+    )
+    shown = Tabular("spindown-count", found, explained)
+    if len(found.rows) <= MOST_COUNTS:
+        return (shown,)
+    return (Details("What the counter sees of the wobble, run by run", (shown,)),)
+
+
+def _run_by_run(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
+    """Straight lines and the best law's fit, a row for each run."""
+    combined = analysis.combined
+    best = combined.best + " law" + (", the best" if combined.verdict.decided else "")
+    paper = (
+        "Unweighted straight lines as one draws them on paper (ln ω, 1/ω, ω^−½ against time), and beside them the fit "
+        f"of the {best}."
+    )
+    several = " s: standard deviation of one run's constant from another's; the uncertainty of the mean is s/√N."
+    note = f"ν₀: the spin at the first reading.{several if len(analysis.runs) > 1 else ''}{_intervals(analysis)}"
+    shown = Tabular("spindown-runs", _by_run_table(analysis), note, first_column_wraps=True)
+    return Paragraph(paper), shown
+
+
+def _intervals(analysis: SpinDownAnalysis) -> str:
+    """What the brackets hold where there are some."""
+    asked = {origin.options.uncertainty for origin in analysis.origins} - {"covariance"}
+    return f" In brackets: the 68 % interval ({' and '.join(sorted(asked))})." if asked else ""
 
 
 def _laws_table(analysis: SpinDownAnalysis) -> Table:
@@ -202,22 +292,57 @@ def _uncertainty(source: Source[Readings], fit: SpinDown, options: SpinDownOptio
     return f"u of a reading: {size}, {origin or 'from a column of the data'}"
 
 
-def _readings(source: Source[Readings], fit: SpinDown, options: SpinDownOptions) -> Mapping[str, object]:
-    """The first readings in blocks; rows of clock time, if it is known, time [s], spin [Hz] and u [Hz]."""
+def _residuals(source: Source[Readings], fit: SpinDown, law: str) -> dict[int, float]:
+    """Number of a reading → what the law leaves over [Hz]; of those that were fitted."""
+    out = frozenset(fit.outliers)
+    used = [i for i in range(len(source.readings)) if i not in out or len(fit.time) == len(source.readings)]
+    return dict(zip(used, fit.fit(law).residuals.tolist(), strict=True))
+
+
+def _readings(source: Source[Readings], fit: SpinDown, options: SpinDownOptions, best: str) -> Listing:
+    """The first readings; rows of clock time, if it is known, time [s], spin [Hz], u and residual [Hz]."""
     readings, given_u = source.readings, options.reading_u
     shown = min(len(readings), MOST_READINGS)
     u = [given_u] * shown if readings.u is None or given_u is not None else readings.u[:shown].tolist()
-    outliers = frozenset(fit.outliers)
-    heads, clocks = with_clock(source.time_zero, readings.time[:shown].tolist(), ("t [s]", "ν [Hz]", "u [Hz]"))
+    outliers, left = frozenset(fit.outliers), _residuals(source, fit, best)
+    named = ("t [s]", "ν [Hz]", "u [Hz]", "residual [Hz]")
+    heads, clocks = with_clock(source.time_zero, readings.time[:shown].tolist(), named)
     rows = [
         Row(
-            (*clocks[i], f"{t:.3f}", f"{nu:.5f}", "—" if u_ is None else f"{digits(u_)}"),
+            (*clocks[i], f"{t:.3f}", *reading(float(nu), u_, left.get(i))),
             "outlier" if i in outliers else "",
         )
         for i, (t, nu, u_) in enumerate(zip(readings.time[:shown], readings.frequency[:shown], u, strict=True))
     ]
-    blocks = [table("", heads, rows[k : k + BLOCK], numbers=heads) for k in range(0, shown, BLOCK)]
-    return {"blocks": blocks, "shown": shown, "count": len(readings)}
+    note = f"Residual: reading − {best} law. {first_of(shown, len(readings))}".rstrip()
+    return Listing("spindown-readings", table("Readings", heads, rows, numbers=heads), note)
+
+
+def _points(analysis: SpinDownAnalysis) -> tuple[Points, ...]:
+    """What each reading of the figure answers: of run k, its readings, and what every law leaves over."""
+    return tuple(
+        points
+        for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True))
+        for points in _points_of_run(k, short_name(source.name) if len(analysis.runs) > 1 else "", run)
+    )
+
+
+def _points_of_run(k: int, name: str, run: SpinDown) -> Iterator[Points]:
+    texts = []
+    for law in run.fits:
+        own = [_point(name, run, i, law.name, r) for i, r in enumerate(law.residuals.tolist())]
+        yield Points(f"residuals-{law.name}-{k}", tuple(own))
+        if law.name == run.best:
+            texts = own
+    yield Points(f"readings-{k}", tuple(texts))
+
+
+def _point(name: str, run: SpinDown, i: int, law: str, residual: float) -> str:
+    """One reading in three or four lines."""
+    u = None if run.u is None else float(run.u[i])
+    spin = with_uncertainty(Estimate(float(run.frequency[i]), u, "Hz"))
+    lines = [name, f"t = {digits(float(run.time[i]), 6)} s", f"ν = {spin}", f"ν − {law} law = {off(residual, u)} Hz"]
+    return "\n".join(filter(None, lines))
 
 
 def _fall(source: Source[Readings], fit: SpinDown) -> str:

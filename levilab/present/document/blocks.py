@@ -129,12 +129,14 @@ class Tabular:
         table: what is in it; its title stands above it as a caption, where it has one.
         note: explains the columns, small print below it.
         first_column_wraps: whether the first column holds names, which may be long and are folded.
+        wraps: heads of columns of sentences, which are folded and take the width that others leave.
     """
 
     name: str
     table: Table
     note: str = ""
     first_column_wraps: bool = False
+    wraps: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -265,6 +267,7 @@ class Document:
         banner: stands directly below title and lead; None where nothing is synthetic.
         contents: whether links to the sections of the first depth stand before the blocks (HTML), or an outline (PDF).
         footer: one line of small print at its end, such as versions.
+        subject: the name of the file's window or in its metadata; empty for the title.
     """
 
     title: str
@@ -273,3 +276,4 @@ class Document:
     banner: Banner | None = None
     contents: bool = False
     footer: str = ""
+    subject: str = ""

@@ -1,7 +1,7 @@
 """The house's plain notation of powers and indices → runs of text, which each format sets high or low.
 
-Plain text says 10⁻³, s⁻¹, (rad/s)^−½ and C₃/₂, so that a terminal can print it.  A format that can set text high or low
-asks here; nothing else of a text is ever changed.
+Plain text says 10⁻³, s⁻¹, (rad/s)^−½, C₃/₂ and -0.012, so that a terminal can print it.  A format that can set text
+high or low asks here, and gets a minus for the hyphen before a number; nothing else of a text is ever changed.
 """
 
 from __future__ import annotations
@@ -12,12 +12,14 @@ from typing import Literal
 
 Level = Literal["", "high", "low"]
 
-_HIGH = str.maketrans("⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ", "+−0123456789n")
+#: A hyphen that is a minus: at the beginning, or after a blank, a bracket or a sign, and before a digit.
+_MINUS = re.compile(r"(?:(?<=[\s(\[=±×])|(?<!.))-(?=\d)")
+_HIGH = str.maketrans("⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ-", "+−0123456789n−")
 _LOW = str.maketrans("₊₋₀₁₂₃₄₅₆₇₈₉", "+−0123456789")
 #: Powers by raised characters, and those that no raised character exists for: ^−½, ^½ and ^(1−n).
 #: Indices by lowered characters, the fraction of C₃/₂ among them, and ν_r: a Greek letter, a low line, one letter.
 _RUNS = re.compile(
-    r"(?P<raised>[⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ]+)|\^(?P<half>−?½)|\^\((?P<power>1−n)\)"
+    r"(?P<raised>[⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ]+)|\^(?P<half>−?½)|(?<=rad/s\))\^(?P<ascii>-1/2)|\^\((?P<power>1−n)\)"
     r"|(?P<lowered>[₊₋₀₁₂₃₄₅₆₇₈₉]+(?:/[₀₁₂₃₄₅₆₇₈₉]+)?)|(?<=[α-ωΑ-Ω])_(?P<index>[a-zA-Z0-9])(?![a-zA-Z0-9_])"
 )
 
@@ -37,9 +39,12 @@ def typeset(text: str) -> tuple[Run, ...]:
     [('2.34(3)×10', ''), ('−4', 'high'), (' (rad/s)', ''), ('−½', 'high'), ('/s', '')]
     >>> [run.text for run in typeset("C₃/₂, ν_r, but file_r and x^2") if run.level == "low"]
     ['3/2', 'r']
+    >>> [run.text for run in typeset("-0.012 of 2026-11-22-run -3")]
+    ['−0.012 of 2026-11-22-run −3']
     >>> typeset("")
     ()
     """
+    text = _MINUS.sub("−", text)
     runs: list[Run] = []
     at = 0
     for found in _RUNS.finditer(text):

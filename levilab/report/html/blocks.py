@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import re
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -47,11 +47,13 @@ class Writer:
         prefix: of all ids, so that pieces of several documents can stand in one notebook.
         names: how often each id was used.
         points: texts of the points that answer to the pointer, by the id of their element.
+        is_alive: whether something in the page wants its script.
     """
 
     prefix: str = ""
     names: Counter[str] = field(default_factory=Counter)
     points: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    is_alive: bool = False
 
     def new_id(self, name: str) -> str:
         """An id that no other element has: the name, and from the second use on a number."""
@@ -62,7 +64,7 @@ class Writer:
 
     def blocks(self, blocks: Iterable[Block], level: int) -> Html:
         """Blocks below each other; level: of the headings among them."""
-        return joined(_RENDERERS[type(block)](self, block, level) for block in blocks)
+        return joined((_RENDERERS[type(block)](self, block, level), "\n") for block in blocks)
 
 
 # --- words ---------------------------------------------------------------------------------------------
@@ -82,7 +84,7 @@ def _verdict(_: Writer, block: Verdict, __: int) -> Html:
 
 
 def _banner(_: Writer, block: Banner, __: int) -> Html:
-    return element("p", element("strong", block.lead), " ", words(block.text), class_="synthetic", role="note")
+    return element("div", element("strong", block.lead), " ", words(block.text), class_="synthetic", role="note")
 
 
 def _bullets(_: Writer, block: Bullets, __: int) -> Html:
@@ -119,16 +121,18 @@ def _texts(fact: Fact) -> list[Html]:
 
 
 def _tabular(_: Writer, block: Tabular, __: int) -> Html:
-    drawn = _table(block.table, block.table.rows, wraps=block.first_column_wraps)
-    return element("div", _moved_sideways(drawn, block.table.title or block.name), _small_print(block.note),
-                   class_="table")  # fmt: skip
+    classes = _classes(block.table, block.wraps, names=block.first_column_wraps)
+    drawn = _table(block.table, block.table.rows, classes)
+    named = block.table.title or block.name.replace("-", " ")
+    return element("div", _moved_sideways(drawn, named), _small_print(block.note), class_="table")
 
 
 def _listing(_: Writer, block: Listing, __: int) -> Html:
-    size = block.rows_in_a_piece
-    rows = block.table.rows
-    pieces = [_table(block.table, rows[k : k + size], caption=False) for k in range(0, len(rows), size)]
-    return element("div", element("div", pieces, class_="pieces"), _small_print(block.note), class_="listing")
+    size, rows, classes = block.rows_in_a_piece, block.table.rows, _classes(block.table)
+    whole = replace(block.table, title="")
+    pieces = [_table(whole, rows[k : k + size], classes) for k in range(0, len(rows), size)]
+    title = element("strong", words(block.table.title)) if block.table.title else ""
+    return element("div", title, element("div", pieces, class_="pieces"), _small_print(block.note), class_="listing")
 
 
 def _moved_sideways(drawn: Html, name: str) -> Html:
@@ -136,20 +140,28 @@ def _moved_sideways(drawn: Html, name: str) -> Html:
     return element("div", drawn, class_="scroll", tabindex="0", role="region", aria_label=name)
 
 
-def _table(table: Table, rows: Iterable[Row], *, wraps: bool = False, caption: bool = True) -> Html:
-    title = element("caption", words(table.title)) if caption and table.title else ""
-    heads = [
-        element("th", lines(head), class_="n" if k in table.numbers else None, scope="col")
+def _classes(table: Table, wraps: Iterable[str] = (), *, names: bool = False) -> tuple[str | None, ...]:
+    """Of each column: numbers, sentences, names, or none of these."""
+    folded = set(wraps)
+    return tuple(
+        "n" if k in table.numbers else "words" if head in folded else "name" if names and k == 0 else None
         for k, head in enumerate(table.heads)
+    )
+
+
+def _table(table: Table, rows: Iterable[Row], classes: tuple[str | None, ...]) -> Html:
+    title = element("caption", words(table.title)) if table.title else ""
+    heads = [
+        element("th", lines(head), class_="n" if kind == "n" else None, scope="col")
+        for head, kind in zip(table.heads, classes, strict=True)
     ]
     head = element("thead", element("tr", heads)) if any(table.heads) else ""
-    return element("table", title, head, element("tbody", [_row(table, row, wraps=wraps) for row in rows]))
+    body = [(_row(row, classes), "\n") for row in rows]
+    return element("table", title, head, element("tbody", body))
 
 
-def _row(table: Table, row: Row, *, wraps: bool) -> Html:
-    names = wraps and row.kind != "together"
-    kinds = ["n" if k in table.numbers else "name" if names and k == 0 else None for k in range(len(row.cells))]
-    cells = [element("td", lines(cell), class_=kind) for cell, kind in zip(row.cells, kinds, strict=True)]
+def _row(row: Row, classes: tuple[str | None, ...]) -> Html:
+    cells = [element("td", lines(cell), class_=kind) for cell, kind in zip(row.cells, classes, strict=True)]
     return element("tr", cells, class_=row.kind or None)
 
 
@@ -163,16 +175,26 @@ def _small_print(text: str) -> Html | str:
 def _picture(writer: Writer, block: Picture, _: int) -> Html:
     prefix = writer.new_id(block.name)
     figure = block.draw()
-    drawn: Html
     if block.raster:
         source = f"data:image/png;base64,{base64.b64encode(as_png(figure)).decode()}"
         drawn = element("img", src=source, alt=block.alt)
     else:
-        drawn = Html(as_svg(figure))
-        writer.points |= {f"{prefix}-{points.gid}": points.texts for points in block.points}
+        svg = as_svg(figure, prefix, title=block.alt)
+        drawn = Html(svg)
+        writer.is_alive = True
+        writer.points |= {
+            f"{prefix}-{points.gid}": points.texts
+            for points in block.points
+            if _count_marks(svg, f"{prefix}-{points.gid}") == len(points.texts)
+        }
     caption = element("figcaption", element("strong", words(block.title)), " ", words(block.caption))
-    shown = element("div", drawn, class_="card", role="img", aria_label=block.alt)
-    return element("figure", shown, caption, id=prefix)
+    return element("figure", element("div", drawn, class_="card", tabindex="0"), caption, id=prefix)
+
+
+def _count_marks(svg: str, group: str) -> int:
+    """Points drawn in a group of a figure: a figure may thin them out, and then none of them answers."""
+    _, found, rest = svg.partition(f'<g id="{group}">')
+    return rest.partition("<g id=")[0].count("<use ") if found else 0
 
 
 # --- what holds other blocks ---------------------------------------------------------------------------
@@ -188,6 +210,7 @@ def _section(writer: Writer, block: Section, level: int) -> Html:
 
 def _details(writer: Writer, block: Details, level: int) -> Html:
     more = joined([" ", element("small", words(block.more))]) if block.more else ""
+    writer.is_alive = True  # browsers print what is folded only where the script opens it
     summary = element("summary", element("strong", words(block.summary)), more)
     body = element("div", writer.blocks(block.blocks, level), class_="body")
     return element("details", summary, body, class_=f"on-paper-{block.on_paper}", open=block.opened)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import base64
+import json
 from functools import cache
+from hashlib import sha256
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
@@ -15,16 +18,14 @@ if TYPE_CHECKING:
 
     from levilab.present.document.blocks import Block, Document
 
-#: Nothing is loaded, and no script runs but our own.
-_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
-
 
 def page_of(document: Document) -> str:
     """The whole page; the same document always has the same text."""
     writer = Writer()
     body = joined(
         [
-            element("header", _head(document), class_="title"),
+            element("header", _head(document, writer)),
+            "\n",
             writer.blocks(document.blocks, level=2),
             element("footer", words(document.footer)) if document.footer else "",
         ]
@@ -32,11 +33,13 @@ def page_of(document: Document) -> str:
     head = joined([
         element("meta", charset="utf-8"),
         element("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        element("meta", http_equiv="Content-Security-Policy", content=_POLICY),
-        element("title", document.title),
+        element("meta", http_equiv="Content-Security-Policy", content=_policy()),
+        element("title", f"levilab: {document.subject or document.title}"),
         element("style", Html(style())),
     ])  # fmt: skip
-    page = element("html", element("head", head), element("body", element("main", body)), lang="en")
+    scripts = (_island(writer), element("script", Html(script()))) if writer.is_alive else ()
+    page = element("html", element("head", head), "\n",
+                   element("body", element("main", body), *scripts, class_="levilab"), lang="en")  # fmt: skip
     return f"<!DOCTYPE html>\n{page.markup}\n"
 
 
@@ -45,16 +48,15 @@ def fragment_of(blocks: Iterable[Block], prefix: str = "") -> str:
 
     Args:
         blocks: in their order.
-        prefix: of all ids, which differs from that of other fragments in the page.
+        prefix: of all ids, which differs from that of other fragments in the page; it begins with a letter.
     """
-    scoped = Html(f".levilab-part {{\n{style()}\n}}")
-    return element(
-        "div", element("style", scoped), Writer(prefix).blocks(blocks, level=2), class_="levilab-part"
-    ).markup
+    scoped = Html(f".levilab-part {{\n{style()}\n}}")  # a sheet inside of a selector reaches nothing else of the page
+    body = element("main", Writer(prefix).blocks(blocks, level=2), class_="levilab")
+    return element("div", element("style", scoped), body, class_="levilab-part").markup
 
 
-def _head(document: Document) -> list[Html]:
-    banner = Writer().blocks([document.banner], level=2) if document.banner else joined([])
+def _head(document: Document, writer: Writer) -> list[Html]:
+    banner = writer.blocks([document.banner], level=2) if document.banner else joined([])
     lead = element("p", words(document.lead), class_="lead") if document.lead else joined([])
     return [element("h1", words(document.title)), lead, banner, _contents(document)]
 
@@ -69,7 +71,30 @@ def _contents(document: Document) -> Html:
     return element("nav", links, aria_label="Contents")
 
 
+def _island(writer: Writer) -> Html:
+    """The texts of the points, as data that no browser takes for markup or runs."""
+    text = json.dumps(writer.points, ensure_ascii=False, sort_keys=True).replace("<", "\\u003c").replace("&", "\\u0026")
+    return element("script", Html(text), type="application/json", id="points")
+
+
+@cache
+def _policy() -> str:
+    """Nothing is loaded, and no script runs but our own, by its hash."""
+    hashes = [base64.b64encode(sha256(text.encode()).digest()).decode() for text in (script(), style())]
+    return (
+        f"default-src 'none'; base-uri 'none'; form-action 'none'; img-src data:; script-src 'sha256-{hashes[0]}'; "
+        # attributes alone, which figures have on each line; the second is for browsers that do not know the others
+        f"style-src-elem 'sha256-{hashes[1]}'; style-src-attr 'unsafe-inline'; style-src 'unsafe-inline'"
+    )
+
+
 @cache
 def style() -> str:
     """The page's style sheet."""
     return files("levilab.report.html").joinpath("style.css").read_text(encoding="utf-8")
+
+
+@cache
+def script() -> str:
+    """The page's script."""
+    return files("levilab.report.html").joinpath("script.js").read_text(encoding="utf-8")

@@ -73,6 +73,20 @@ def test_readings_without_noise_give_their_constants_back(law, u):
     assert fit.statistics.rms_residual < 1e-12
 
 
+def test_the_uncertainty_of_the_curve_is_its_scatter_over_repetitions():
+    fits = [fit_spin_down(T, readings(seed=seed), SIGMA, tilt=False).fit("power") for seed in range(100)]
+    at = T[[0, 10, -1]]
+    scatter = np.std([fit.spin_frequency(at) for fit in fits], axis=0)
+    stated = np.mean([fit.u_spin_frequency(at) for fit in fits], axis=0)
+    assert scatter == pytest.approx(stated, rel=0.21)  # 3 standard errors of a standard deviation from 100
+
+
+def test_the_curve_has_no_uncertainty_where_its_parameters_have_none():
+    fit = fit_spin_down(T[:3], readings()[:3], None).fit("power")
+    assert fit.covariance is None
+    assert fit.u_spin_frequency(T[:3]) is None
+
+
 def noises(sets=5):
     """Noise vectors of 20 readings, shape (40·sets, 20).
 

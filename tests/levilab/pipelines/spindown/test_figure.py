@@ -6,15 +6,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_hex
 
 from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions, analyze_spindowns
-from levilab.pipelines.spindown.figure import MOST_POINTS, STRAIGHT_LINES, spindown_figure
+from levilab.pipelines.spindown.figure import MOST_POINTS, spindown_figure
 from levilab.pipelines.spindown.laws import SHOWN_LAWS
+from levilab.present.looks import LOOKS
 from levilab.present.style import as_svg
+from support.figures import faults
 from support.spin_downs import spin_down_csv
 
-COLOURS = {name: law.colour for name, law in SHOWN_LAWS.items()}
+COLOURS = {name: LOOKS[name].colour for name in SHOWN_LAWS}
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,9 +33,13 @@ def analysis_of(*paths: Path, u: float | None = None) -> SpinDownAnalysis:
 
 def panels(figure: Figure) -> tuple[Axes, list[Axes], list[Axes], list[Axes]]:
     """The spin, the residuals, the straight lines and the strips below them."""
-    spin, *others = figure.axes
-    laws, lines = len(COLOURS), len(STRAIGHT_LINES)
-    return spin, others[:laws], others[laws : laws + lines], others[laws + lines :]
+    spin, _, _, *others = figure.axes
+    laws, lines = len(COLOURS), others[len(COLOURS) :]
+    return spin, others[:laws], lines[::2], lines[1::2]
+
+
+def differences(figure: Figure) -> Axes:
+    return figure.axes[2]
 
 
 def curves(axes: Axes) -> list[str]:
@@ -71,23 +78,29 @@ def test_straight_line_panels_show_angular_frequency_as_the_tables_do(tmp_path: 
     assert np.asarray(drawn.get_ydata()) == pytest.approx(np.log(2 * np.pi * analysis.runs[0].frequency))
 
 
-def test_each_law_has_its_own_residual_scale_and_says_so(tmp_path: Path) -> None:
+def test_good_laws_share_a_scale_and_a_bad_one_says_that_it_has_its_own(tmp_path: Path) -> None:
     residuals = panels(spindown_figure(analysis_of(spin_down_csv(tmp_path / "a.csv"))))[1]
     tops = {axes.get_title(loc="left"): axes.get_ylim()[1] for axes in residuals}
+    assert tops["disc"] == tops["mixed"] == tops["power"]
     assert tops["stokes"] > 3 * tops["disc"]
     assert all(axes.get_ylim()[0] == -axes.get_ylim()[1] for axes in residuals)
-    notes = [axes.get_title(loc="right") for axes in residuals]
-    assert all("±" in note and "Hz" in note for note in notes)
-    assert len(set(notes)) > 1
+    notes = {axes.get_title(loc="left"): axes.get_title(loc="right") for axes in residuals}
+    assert notes == {"stokes": "own scale", "newton": "own scale", "disc": "", "mixed": "", "power": ""}
 
 
 @pytest.mark.parametrize("known", [True, False])
-def test_a_band_and_bars_of_u_are_there_where_u_is_known(tmp_path: Path, known: bool) -> None:
-    residuals = panels(spindown_figure(analysis_of(spin_down_csv(tmp_path / "a.csv", u=known))))[1]
+def test_residuals_are_in_units_of_u_or_of_the_scatter_with_bands(tmp_path: Path, known: bool) -> None:
+    analysis = analysis_of(spin_down_csv(tmp_path / "a.csv", u=known))
+    residuals = panels(spindown_figure(analysis))[1]
+    assert residuals[0].get_ylabel() == f"residual  [{'u' if known else 's'}]"
     for axes in residuals:
         bands = [patch.get_extents().transformed(axes.transData.inverted()) for patch in axes.patches]
-        assert [(band.y0, band.y1) for band in bands] == ([pytest.approx((-0.03, 0.03))] if known else [])
+        assert [(band.y0, band.y1) for band in bands] == [pytest.approx((-2, 2)), pytest.approx((-1, 1))]
         assert len(axes.collections) == int(known)
+    drawn = next(line for line in residuals[2].get_lines() if line.get_marker() == "o")
+    fit = analysis.runs[0].fit("disc")
+    u = 0.03 if known else fit.statistics.rms_residual
+    assert np.asarray(drawn.get_ydata()) == pytest.approx(fit.residuals / u)
 
 
 def test_bars_are_drawn_on_the_readings_where_one_can_see_them(tmp_path: Path) -> None:
@@ -102,36 +115,65 @@ def test_an_outlier_squeezes_nothing_and_stands_at_the_edge_with_its_value(tmp_p
     assert 20 < low < 22
     assert 40 < high < 42
     assert {text.get_text() for text in spin.texts} == {"62 Hz", "3.5 Hz"}
-    marks = [line for line in spin.get_lines() if line.get_marker() in {"^", "v"} and line.get_color() == "red"]
+    marks = [line for line in spin.get_lines() if line.get_marker() in {"^", "v"}]
     assert len(marks) == 2
     assert all(low < float(np.asarray(mark.get_ydata())[0]) < high for mark in marks)
-    assert legend(spin).count("outlier") == 1
+    assert legend(spin).count("left out") == 1
 
 
-def test_of_one_run_every_law_is_drawn_and_named_and_the_best_is_on_top(tmp_path: Path) -> None:
+def test_every_law_is_drawn_against_the_best_one_and_named_with_the_verdict(tmp_path: Path) -> None:
     analysis = analysis_of(spin_down_csv(tmp_path / "a.csv"))
-    spin = panels(spindown_figure(analysis))[0]
-    assert curves(spin) == list(COLOURS.values())
-    best = max((line for line in spin.get_lines() if line.get_linestyle() != "None"), key=lambda line: line.zorder)
-    assert to_hex(best.get_color()).upper() == COLOURS[analysis.combined.best]
-    assert best.get_linewidth() == max(line.get_linewidth() for line in spin.get_lines())
-    names = legend(spin)
-    assert [name.split()[0] for name in names[:5]] == list(COLOURS)
-    assert "(excluded)" in names[0]
-    assert any("(best)" in name for name in names) == analysis.combined.verdict.decided
+    figure = spindown_figure(analysis)
+    assert curves(panels(figure)[0]) == [COLOURS["disc"]]
+    axes = differences(figure)
+    lines = [np.asarray(line.get_ydata()) for line in axes.get_lines() if line.get_linestyle() != "None"]
+    drawn = dict(zip(curves(axes), lines, strict=True))
+    assert set(drawn) == set(COLOURS.values())
+    assert np.abs(drawn[COLOURS["disc"]]).max() == 0
+    names = {text.partition(":")[0]: text for text in legend(axes)}
+    assert set(names) == set(COLOURS)
+    assert names["disc"] == "disc: best, 2 u shaded"
+    farthest = np.abs(drawn[COLOURS["stokes"]]).max()
+    assert farthest > axes.get_ylim()[1]
+    assert "excluded, to" in names["stokes"]
+    assert float(names["stokes"].split()[-2].lstrip("+−")) == pytest.approx(farthest, rel=0.05)
+
+
+def test_the_band_of_the_best_law_is_twice_its_u(tmp_path: Path) -> None:
+    analysis = analysis_of(spin_down_csv(tmp_path / "a.csv"))
+    run = analysis.runs[0]
+    (band,) = [one for one in differences(spindown_figure(analysis)).collections if isinstance(one, PolyCollection)]
+    u = run.fit("disc").u_spin_frequency(run.time[[0]])
+    assert u is not None
+    at_start = np.array([y for x, y in band.get_paths()[0].vertices.tolist() if x == run.time[0]])
+    assert at_start.max() == pytest.approx(2 * u[0])
 
 
 def test_many_runs_are_one_mark_and_one_law_each(tmp_path: Path) -> None:
     analysis = analysis_of(*(spin_down_csv(tmp_path / f"{k}.csv", seed=k) for k in range(12)))
-    spin = panels(spindown_figure(analysis))[0]
-    best = COLOURS[analysis.combined.best]
-    assert curves(spin).count(best) == 12
-    assert len(curves(spin)) == 12 + 4
+    figure = spindown_figure(analysis)
+    spin = panels(figure)[0]
+    assert curves(spin) == 12 * [COLOURS[analysis.combined.best]]
     marks = [line for line in spin.get_lines() if line.get_linestyle() == "None"]
     assert {line.get_marker() for line in marks} == {"o"}
     assert len({to_hex(line.get_color()) for line in marks}) == 12
-    assert len(legend(spin)) == 6
-    assert "12 runs" in legend(spin)
+    assert legend(spin)[1:] == ["readings of 12 runs"]
+    assert faults(figure) == []
+
+
+@pytest.mark.parametrize("rows", [3, 20])
+def test_nothing_that_is_written_lies_over_anything_else(tmp_path: Path, rows: int) -> None:
+    path = spin_down_csv(tmp_path / "a.csv", n=rows)
+    if rows > 12:
+        with_readings(path, [(6, "50.0,62.0,0.03"), (13, "120.0,3.5,0.03")])
+    assert faults(spindown_figure(analysis_of(path))) == []
+
+
+def test_readings_answer_to_the_pointer_where_each_is_a_point(tmp_path: Path) -> None:
+    page = as_svg(spindown_figure(analysis_of(spin_down_csv(tmp_path / "a.csv"))), "x")
+    for name in ("readings-0", "residuals-best-0", "residuals-disc-0"):
+        group = page[page.index(f'<g id="x-{name}">') :]
+        assert group[: group.index("</g>\n   </g>")].count("<use") == 20
 
 
 def test_the_legend_shows_short_names_and_takes_them_literally(tmp_path: Path) -> None:
@@ -139,7 +181,7 @@ def test_the_legend_shows_short_names_and_takes_them_literally(tmp_path: Path) -
     paths = [spin_down_csv(tmp_path / name, seed=k) for k, name in enumerate(names)]
     figure = spindown_figure(analysis_of(*paths))
     as_svg(figure)
-    assert legend(panels(figure)[0])[5:] == ["spin-7f3a.csv", " _hidden.csv", r"\$a_{b\$.csv", "□.csv"]
+    assert legend(panels(figure)[0])[1:] == ["spin-7f3a.csv", " _hidden.csv", r"\$a_{b\$.csv", "□.csv"]
 
 
 def test_many_readings_are_thinned_out_and_means_show_the_shape(tmp_path: Path) -> None:

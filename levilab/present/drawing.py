@@ -1,0 +1,203 @@
+"""What figures share: panels placed by hand in inches, the sentence above them, bands, envelopes, labels beside lines.
+
+Panels are placed by hand because automatic layouts differ in the last bit from one drawing to the next.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from levilab.present.looks import GREY, MARKERS, SERIES, Look
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike, NDArray
+
+    Array = NDArray[np.float64]
+
+#: Half widths of the bands that a residual in units of its u is judged by, and how dark they are.
+SIGMAS = ((2.0, 0.07), (1.0, 0.10))
+#: The smallest text, for marks and long legends [pt].
+SMALL = 7.0
+#: Widths of a letter of 9 pt on the average [inch], for wrapping.
+_LETTER = 0.078
+#: Height of a line of small text [inch].
+_LINE = 0.125
+
+
+def panel(figure: Figure, left: float, top: float, width: float, height: float, **more: Any) -> Axes:
+    """Return a panel whose upper left corner is so far from that of the figure; all in inches."""
+    wide, high = figure.get_size_inches()
+    return figure.add_axes((left / wide, 1 - (top + height) / high, width / wide, height / high), **more)
+
+
+def write(figure: Figure, left: float, top: float, text: str, **style: Any) -> None:
+    """Write a text whose upper left corner is so far from that of the figure [inch]."""
+    wide, high = figure.get_size_inches()
+    figure.text(left / wide, 1 - top / high, text, va="top", **style)
+
+
+def headline(figure: Figure, text: str, synthetic: str = "") -> None:
+    """Write what the figure shows in one sentence at its top, and at the right the mark of data that nothing measured.
+
+    Args:
+        figure: as wide as the text may be.
+        text: the finding; it takes two lines at the most.
+        synthetic: the mark, empty for measured data.
+    """
+    width = figure.get_size_inches()[0] - 0.1
+    room = width - 0.4 - (len(synthetic) + 1) * 0.075 if synthetic else width - 0.1
+    lines = textwrap.wrap(text, int(room / _LETTER), max_lines=2, placeholder=" …")
+    write(figure, 0.08, 0.08, "\n".join(lines), fontsize=9, fontweight="bold", linespacing=1.25)
+    if synthetic:
+        mark = {"boxstyle": "square,pad=0.25", "facecolor": "white", "edgecolor": "black", "linewidth": 0.8}
+        write(figure, width, 0.09, synthetic, fontsize=SMALL, ha="right", bbox=mark)
+
+
+def synthetic_mark(made_up: Sequence[bool]) -> str:
+    """What stands in the mark, for inputs of which some are synthetic; empty where none is.
+
+    >>> synthetic_mark([True, True]), synthetic_mark([True, False]), synthetic_mark([False])
+    ('SYNTHETIC', '1 of 2 SYNTHETIC', '')
+    """
+    count = sum(made_up)
+    if not count:
+        return ""
+    return "SYNTHETIC" if count == len(made_up) else f"{count} of {len(made_up)} SYNTHETIC"
+
+
+def sigma_bands(axes: Axes) -> None:
+    """Draw zero and the bands of ±1 and ±2 that residuals in units of their u are judged by."""
+    for half, alpha in SIGMAS:
+        axes.axhspan(-half, half, color="black", alpha=alpha, linewidth=0)
+    axes.axhline(0, color="black", linewidth=0.6)
+
+
+def band(axes: Axes, x: Array, y: Array, half: Array, colour: str, **more: Any) -> None:
+    """Draw a band of y ± half."""
+    axes.fill_between(x, y - half, y + half, **{"color": colour, "alpha": 0.25, "linewidth": 0, **more})
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Least, mean and greatest value of each piece of a long curve: what a column of pixels can show."""
+
+    time: Array
+    low: Array
+    mean: Array
+    high: Array
+
+
+def columns(time: Array, values: Array, pieces: int) -> Columns:
+    """Cut a curve into so many pieces of equally many points.
+
+    >>> found = columns(np.arange(6.0), np.array([0.0, 1, 2, 3, 4, 6]), 2)
+    >>> found.low.tolist(), found.mean.tolist(), found.high.tolist()
+    ([0.0, 3.0], [1.0, 4.333333333333333], [2.0, 6.0])
+    """
+    edges = np.unique(np.linspace(0, len(time), pieces + 1).astype(np.intp)[:-1])
+    count = np.diff([*edges, len(time)])
+
+    def means(of: Array) -> Array:
+        return np.asarray(np.add.reduceat(of, edges) / count, dtype=np.float64)
+
+    return Columns(means(time), np.minimum.reduceat(values, edges), means(values), np.maximum.reduceat(values, edges))
+
+
+def curve(axes: Axes, time: Array, values: Array, look: Look, *, pieces: int = 600, label: str | None = None) -> bool:
+    """Draw a line; one with more points than can be told apart as its envelope and its mean.
+
+    Returns:
+        whether it is an envelope.
+    """
+    if len(time) <= 4 * pieces:
+        axes.plot(time, values, linewidth=0.8, label=label, **look.as_line)
+        return False
+    found = columns(time, values, pieces)
+    if float(np.max(found.high - found.low)) <= 0.01 * float(np.ptp(values)):
+        axes.plot(found.time, found.mean, linewidth=1.0, label=label, **look.as_line)
+        return False
+    axes.fill_between(found.time, found.low, found.high, color=look.colour, alpha=0.35, linewidth=0, label=label)
+    for edge in (found.low, found.high):
+        axes.plot(found.time, edge, color=look.colour, linewidth=0.5)
+    axes.plot(found.time, found.mean, color="black", linewidth=0.8)
+    return True
+
+
+def run_look(k: int, total: int) -> Look:
+    """How the k-th of several runs is drawn: by a marker and a colour of its own while there are few."""
+    if total == 1:
+        return Look(SERIES[0], marker=MARKERS[0])
+    if total <= len(MARKERS):
+        return Look(SERIES[k], marker=MARKERS[k])
+    return Look(GREY, marker="o")
+
+
+@dataclass(frozen=True)
+class Label:
+    """A name to be written beside a line's end: at a height in the axis's units."""
+
+    y: float
+    text: str
+    colour: str
+
+
+def labels_at_right(axes: Axes, labels: Sequence[Label], *, x: float = 1.012, size: float = 8.0) -> None:
+    """Write names to the right of a panel, each at its line's end or as near as the others leave room.
+
+    Args:
+        axes: with its final limits and scale.
+        labels: in any order; those of lines that end beyond the panel stand at its edge.
+        x: where they begin, in parts of the panel's width.
+        size: of the letters [pt].
+    """
+    high = axes.get_position().height * axes.get_figure(root=True).get_size_inches()[1]  # type: ignore[union-attr]
+    apart = 1.3 * size / 72 / high
+    places = np.clip([_share(axes, label.y) for label in labels], 0.0, 1.0)
+    order = np.argsort(places, kind="stable")
+    for k, y in zip(order, spread(places[order], apart), strict=True):
+        label = labels[k]
+        axes.text(x, y, label.text, transform=axes.transAxes, color=label.colour, fontsize=size, va="center")
+
+
+def spread(places: Array, apart: float) -> Array:
+    """Move rising places as little as it takes to be so far apart, about the middle of each crowd.
+
+    >>> spread(np.array([0.0, 0.1, 0.1, 0.9]), 0.2).round(2).tolist()
+    [-0.13, 0.07, 0.27, 0.9]
+    """
+    crowds: list[tuple[float, int]] = []  # middle, and how many
+    for place in places:
+        crowds.append((float(place), 1))
+        while len(crowds) > 1:
+            (below, m), (above, n) = crowds[-2:]
+            if above - below >= apart * (m + n) / 2 - 1e-12:
+                break
+            crowds[-2:] = [((m * below + n * above) / (m + n), m + n)]
+    return np.concatenate([middle + apart * (np.arange(n) - (n - 1) / 2) for middle, n in crowds])
+
+
+def _share(axes: Axes, y: float) -> float:
+    """A height in the axis's units as a part of the panel's height."""
+    at = axes.transData.transform((axes.get_xlim()[0], y))
+    return float(axes.transAxes.inverted().transform(at)[1])
+
+
+def limits_about(values: ArrayLike, margin: float = 0.06, least: float = 0.0) -> tuple[float, float]:
+    """Limits of an axis that hold all finite values, with a margin, and are no nearer to each other than `least`.
+
+    >>> limits_about([1.0, 3.0], 0.5), limits_about([2.0], least=1.0)
+    ((0.0, 4.0), (1.5, 2.5))
+    """
+    finite = np.asarray(values, dtype=np.float64)
+    finite = finite[np.isfinite(finite)]
+    low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
+    add = max(margin * (high - low), (least - (high - low)) / 2)
+    return low - (add or abs(low) or 1.0), high + (add or abs(high) or 1.0)

@@ -1,0 +1,222 @@
+"""Results → a document: warnings first, then what the data say, then with what they were measured."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from levilab.errors import unquoted
+from levilab.present.document.blocks import (
+    Banner,
+    Document,
+    Facts,
+    Note,
+    Picture,
+    Section,
+    Verdict,
+    Warnings,
+)
+from levilab.report.inputs import About, describe, in_common
+from levilab.report.reproduction import reproduction
+from levilab.report.supplements import SUPPLEMENTS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from pathlib import Path
+
+    from levilab.pipelines.analyzed import A, Analyzed
+    from levilab.pipelines.catalogue import Analysis
+    from levilab.pipelines.part import ReportPart
+    from levilab.pipelines.sources import Source
+    from levilab.present.document.blocks import Block
+    from levilab.report.inputs import Input
+
+    Results = Sequence[tuple[Analysis[Any], Any]]
+
+#: Inputs that a message names at most.
+MOST_NAMES = 4
+#: With more inputs the report is an overview: facts that all share stand there once, the section of each can be opened,
+#: and the figure is a PNG, a tenth as large as an SVG of so many lines.
+MOST_IN_FULL = 12
+
+
+def document_of(results: Results, others: Sequence[Section] = ()) -> Document:
+    """The report.
+
+    Args:
+        results: of measurements: analyses with what they found.
+        others: sections of inputs that are no measurement; at least one of the two has something in it.
+    """
+    parts = [analysis.part(found) for analysis, found in results]
+    alone = len(results) == 1 and not others
+    sources = list({source.path.resolve(): source for _, found in results for source in found.sources}.values())
+    banner = _document_banner(results, sources, others)
+    blocks: list[Block] = []
+    for (analysis, found), part in zip(results, parts, strict=True):
+        own = blocks_of_part(analysis, found, part, deeper=not alone)
+        blocks += own if alone else [_of_one_analysis(found, part, own)]
+    blocks += others
+    if results:
+        blocks += [_measured(results, parts), reproduction(results)]
+    counts = counted(sources)
+    subjects = ", ".join([*(part.subject for part in parts), *(one.title.lower() for one in others)])
+    return Document(
+        title=parts[0].heading if alone else f"Report of {counts}" if counts else others[0].title,
+        lead=_lead(results[0][1], parts[0]) if alone else subjects[:1].upper() + subjects[1:],
+        blocks=tuple(blocks),
+        banner=banner,
+        contents=True,
+        subject=f"{subjects}{', ' if counts else ''}{counts}",
+    )
+
+
+def blocks_of_part(analysis: Analysis[A], found: A, part: ReportPart, *, deeper: bool = False) -> list[Block]:
+    """What one analysis found: warnings, result, figure, what else is known, run by run.
+
+    Args:
+        analysis: the row of the catalogue.
+        found: what it found.
+        part: its words.
+        deeper: whether sections stand below a heading of the analysis, and need no links of their own.
+    """
+
+    def section(title: str, anchor: str, *blocks: Block) -> Section:
+        return Section(title, blocks, anchor=f"{analysis.name}-{anchor}" if deeper else anchor)
+
+    groups = tuple(tuple(map(unquoted, alike)) for alike in found.grouped_warnings)
+    count = sum(map(len, groups))
+    warnings = [section(f"{count} warning{'s' * (count > 1)}", "warnings", Warnings(groups))] if groups else []
+    supplements = (block for supplement in SUPPLEMENTS for block in supplement(analysis, found))
+    return [
+        *warnings,
+        section("Result", "result", Verdict(part.verdict), *part.result),
+        section("Figure", "figure", picture_of(analysis, found, part)),
+        *supplements,
+        section(part.runs_title, "runs", *part.runs),
+    ]
+
+
+def picture_of(analysis: Analysis[A], found: A, part: ReportPart) -> Picture:
+    """The analysis's figure."""
+    many = len(found.sources) > MOST_IN_FULL
+    return Picture(
+        name=analysis.name,
+        title=part.figure.title,
+        caption=part.figure.caption,
+        alt=part.figure.alt,
+        draw=partial(analysis.figure, found),
+        points=() if many else part.figure.points,
+        raster=many,
+    )
+
+
+def _of_one_analysis(found: Analyzed[Any, Any, Any, Any], part: ReportPart, blocks: Iterable[Block]) -> Section:
+    """One of several analyses, below a heading of its own."""
+    mixed = _mixes(found)
+    mark = _banner(found.sources, mixed=True) if mixed else None
+    return Section(
+        part.heading,
+        (*([mark] if mark else []), *blocks),
+        anchor=part.subject,
+        lead=_lead(found, part),
+        new_page=True,
+    )
+
+
+def _lead(found: Analyzed[Any, Any, Any, Any], part: ReportPart) -> str:
+    """How much was used."""
+    warnings = "" if found.grouped_warnings else ", no warnings"
+    return f"{counted(found.sources)}, {part.lead}{warnings}"
+
+
+def _measured(results: Results, parts: Sequence[ReportPart]) -> Section:
+    """Each input: when, under which conditions, with which instruments; what happened; its readings."""
+    abouts: dict[Path, list[About]] = {}
+    for (_, found), part in zip(results, parts, strict=True):
+        several = len(found.sources) > 1
+        for source, of_input in zip(found.sources, part.inputs, strict=True):
+            abouts.setdefault(source.path.resolve(), []).append(About(source, part, of_input, several))
+    inputs = [describe(of_input) for of_input in abouts.values()]
+    title, anchor = "What was measured, and with what", "inputs"
+    if len(inputs) <= MOST_IN_FULL:
+        return Section(title, tuple(one.section() for one in inputs), anchor=anchor)
+    return Section(title, tuple(_overview(inputs)), anchor=anchor)
+
+
+def _overview(inputs: Sequence[Input]) -> Iterable[Block]:
+    """Many inputs: what they share once, and the rest folded away."""
+    common = in_common(inputs)
+    if common:
+        yield Section("All of them alike", (Facts(common),))
+    yield Section("Each by itself", tuple(one.without(common).folded() for one in inputs))
+
+
+# --- what is synthetic ---------------------------------------------------------------------------------
+
+
+def _document_banner(results: Results, sources: Sequence[Source[Any]], others: Sequence[Section]) -> Banner | None:
+    """The mark of the whole document."""
+    if not results:
+        return Banner("SYNTHETIC.", "All of it was simulated on a computer; nothing was measured.") if others else None
+    mixed = _mixes(results[0][1]) if len(results) == 1 else False
+    return _banner(sources, mixed=mixed)
+
+
+def _mixes(found: Analyzed[Any, Any, Any, Any]) -> bool:
+    """Whether numbers are of real and synthetic inputs together."""
+    return any(0 < sum(one.synthetic for one in together) < len(together) for together in found.averaged)
+
+
+def _banner(sources: Sequence[Source[Any]], *, mixed: bool = False) -> Banner | None:
+    """Which inputs are synthetic, and what that does to numbers that are of both together."""
+    total, made_up = len(sources), [source.name for source in sources if source.synthetic]
+    files = sum(source.run is None for source in sources)
+    if not made_up:
+        return None
+    below = "How it was made stands below, under its name."
+    if total == 1:
+        return Banner("SYNTHETIC.", f"This run did not come from a real bench. {below}")
+    below = "How each was made stands below, under its name."
+    if len(made_up) == total:
+        return Banner("SYNTHETIC.", f"None of these {total} runs came from a real bench. {below}")
+    said = f"{len(made_up)} of {total} runs did not come from a real bench ({list_in_words(made_up)})."
+    if not mixed and files:
+        said = f"Of {counted(sources)} {len(made_up)} did not come from a real bench ({list_in_words(made_up)})."
+        return Banner("SYNTHETIC IN PART.", f"{said} A data file does not say where it is from. {below}")
+    if not mixed:
+        return Banner("REAL AND SYNTHETIC RUNS.", f"{said} {below}")
+    consequence = "Means, comparisons and figure are of both together and so no measurement: report the real runs "
+    return Banner("REAL AND SYNTHETIC RUNS MIXED.", f"{said} {consequence}by themselves. {below}")
+
+
+# --- a part in a notebook ------------------------------------------------------------------------------
+
+
+def notebook_blocks(analysis: Analysis[A], found: A) -> tuple[Block, ...]:
+    """What one analysis found, for a page that is not ours: below a heading, with how synthetic inputs were made."""
+    part = analysis.part(found)
+    mark = _banner(found.sources, mixed=_mixes(found))
+    made_up = [
+        Note(f"{source.name}: {source.run.record.synthetic_how or 'not said how'}")
+        for source in found.sources
+        if source.run and source.run.record.synthetic
+    ]
+    how = [Section("How it was made", tuple(made_up))] if made_up else []
+    blocks = (*([mark] if mark else []), *blocks_of_part(analysis, found, part), *how)
+    return (Section(part.heading, blocks, lead=_lead(found, part)),)
+
+
+# --- words ---------------------------------------------------------------------------------------------
+
+
+def counted(sources: Sequence[Source[Any]]) -> str:
+    """How many inputs of which kind: "4 runs and 1 data file"."""
+    files = sum(source.run is None for source in sources)
+    kinds = ((len(sources) - files, "run"), (files, "data file"))
+    return " and ".join(f"{n} {kind}{'s' * (n > 1)}" for n, kind in kinds if n)
+
+
+def list_in_words(names: Sequence[str]) -> str:
+    """The names, or the first of them."""
+    more = len(names) - MOST_NAMES
+    return ", ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
