@@ -87,9 +87,15 @@ def levilab(
     """The lab application for experiments on the Levitron: acquire, analyze, report."""
 
 
-@app.command(cls=Later, epilog="Example: levilab report sample_data/ -o report.html")
+@app.command(
+    cls=Later,
+    epilog="Example: levilab report sample_data/ -o report.html, or -o report.pdf --tables",
+)
 def report() -> Callable[..., None]:
-    """Report runs in one self-contained file: what was measured, with what, figures, numbers, warnings.
+    """Report runs and simulations in one file, HTML or PDF: what was measured, with what, figures, numbers, warnings.
+
+    A PATH is a run folder, a data file, a folder to search, a simulated motion, a sweep's NAME.zarr, or the output of
+    levilab stability --json; all of them go together.
 
     The numbers are those that levilab analyze wrote beside the runs, of every analysis; where it wrote them elsewhere
     (--out), give that folder or result.json.  What has no result, or one of other readings or options than the given,

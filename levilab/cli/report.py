@@ -14,9 +14,23 @@ from levilab.cli.quantities import with_options
 def report(
     context: typer.Context,
     paths: Paths,
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE.html", help="The file to write.")] = Path(
-        "report.html"
-    ),
+    output: Annotated[
+        Path,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE.html|FILE.pdf",
+            help=r"The file to write; its ending chooses the format.  PDF needs levilab\[pdf].",
+        ),
+    ] = Path("report.html"),
+    tables: Annotated[
+        bool,
+        typer.Option(
+            "--tables",
+            help="Write the tables of results, too, into a folder beside the report, FILE.tables: CSV with all digits, "
+            "LaTeX as shown.",
+        ),
+    ] = False,
     columns: Columns = "",
     channel: Channel = None,
     rate: Rate = None,
@@ -36,8 +50,14 @@ def report(
     }
     app = context.find_root().command
     with interruptible("no report is written"):
-        written = write_report(paths, output, analysis_options(given), lambda text: message(with_options(text, app)))
+        written = write_report(
+            paths, output, analysis_options(given), lambda text: message(with_options(text, app)), tables=tables
+        )
     result(f"the report is in {written}")
+    if tables:
+        from levilab.report.tables.folder import folder_of
+
+        result(f"its tables are in {folder_of(written)}")
 
 
 def runs(

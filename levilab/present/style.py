@@ -143,3 +143,16 @@ def row(figure: Figure, bottom: float, height: float, n: int = 1, gap: float = 0
     left, right = 0.085, 0.985
     width = (right - left - (n - 1) * gap) / n
     return [figure.add_axes((left + k * (width + gap), bottom, width, height)) for k in range(n)]
+
+
+def figure_of_png(png: bytes) -> Figure:
+    """A picture as a figure of the same size, for documents, which want figures."""
+    from matplotlib.figure import Figure as NewFigure
+    from matplotlib.image import imread
+
+    pixels = imread(io.BytesIO(png), format="png")
+    figure = NewFigure(figsize=(WIDE, WIDE * pixels.shape[0] / pixels.shape[1]))
+    axes = figure.add_axes((0, 0, 1, 1))
+    axes.set_axis_off()
+    axes.imshow(pixels, aspect="auto")
+    return figure

@@ -5,33 +5,60 @@ Nothing is fetched when it is opened, what a person typed is never markup, and t
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from hashlib import sha256
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from levilab.errors import DoesNotSuit, NoneUsable, UsageError
+from levilab.errors import UsageError
 from levilab.files import replace_atomically, writing
 from levilab.pipelines.catalogue import recall_suiting, remarks
 from levilab.pipelines.document import NO_RESULT
+from levilab.pipelines.sources import data_files
 from levilab.report.document import document_of, list_in_words, notebook_blocks
 from levilab.report.html.page import fragment_of, page_of
 from levilab.report.kinds import KINDS
+from levilab.report.pdf.renderer import as_pdf, check_typst
+from levilab.report.tables.folder import folder_of, write_tables
+from levilab.report.tables.values import of_analysis
+from levilab.runs.run import find_runs
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
     from pathlib import Path
 
     from levilab.pipelines.analyzed import A
     from levilab.pipelines.catalogue import Analysis
-    from levilab.present.document.blocks import Document, Section
+    from levilab.present.document.blocks import Document
     from levilab.report.document import Results
+    from levilab.report.kinds import Kind
+    from levilab.report.tables.values import Values
 
-#: The end of a file's name → how a document becomes its content.
-FORMATS: Mapping[str, Callable[[Document], str | bytes]] = MappingProxyType({".html": page_of, ".htm": page_of})
+    #: Each kind of input with those that were found.
+    Found = Sequence[tuple[Kind, Sequence[Path]]]
 
 
 class UnknownFormat(UsageError):
     """A report in a format that is not written."""
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format of reports.
+
+    Attributes:
+        content: of the file, from a document.
+        check: raises LevilabError if what it needs is not installed, before anything is analyzed.
+    """
+
+    content: Callable[[Document], str | bytes]
+    check: Callable[[], None] = lambda: None
+
+
+_HTML, _PDF = Format(page_of), Format(as_pdf, check_typst)
+#: The end of a file's name → its format.
+FORMATS: Mapping[str, Format] = MappingProxyType({".html": _HTML, ".htm": _HTML, ".pdf": _PDF})
 
 
 def write_report(
@@ -39,15 +66,18 @@ def write_report(
     output: Path,
     given: Mapping[str, Any] | None = None,
     tell: Callable[[str], None] | None = None,
+    *,
+    tables: bool = False,
 ) -> Path:
     """Report what was found of the inputs at the paths; what has no result yet is analyzed, and nothing is stored.
 
     Args:
-        paths: run folders, data files, folders to search, results.
-        output: the file to write.
+        paths: run folders, data files, folders to search, results, simulated motions, sweeps.
+        output: the file to write; its ending chooses the format.
         given: options by their names; those at their defaults count as not given, see
             `levilab.pipelines.document.Document.look`.
         tell: called with what lies there and is not in the report, and with what has no result.
+        tables: whether tables of the results are written, too, into the folder that `folder_of` names.
 
     Returns:
         The file.
@@ -55,47 +85,74 @@ def write_report(
     Raises:
         DataError: nothing can be reported of.
         UnknownFormat: of the output's name.
+        NoTypst: PDF, and the extra `pdf` is not installed.
         CannotWrite: of the output.
     """
     form = FORMATS.get(output.suffix.lower())
     if form is None:
-        expected = "reports are written as HTML, name the file report.html; a browser prints it to PDF"
-        raise UnknownFormat("output", expected, value=output)
-    others, left = _of_other_kinds(paths)
-    results = _results(left, given or {}, tell, needed=not others)
-    content = form(document_of(results, others))
+        raise UnknownFormat("output", "a name that ends in .html or .pdf is expected", value=output)
+    form.check()
+    others, left = _sorted_by_kind(paths)
+    sections = [section for kind, found in others for section in kind.sections(found)]
+    results = recall_suiting(left, given or {}, tell) if left else []
+    document = replace(document_of(results, sections), date=_newest(results, others))
+    content = form.content(document)
     with writing(f"{output}: could not be written", "choose another place with `output`"):
         output.parent.mkdir(parents=True, exist_ok=True)
         replace_atomically(output, content)
-    if tell:
-        for remark in remarks([found.remarks for _, found in results]):
-            tell(remark)
-        for text in _without_result(results):
-            tell(text)
+    if tables:
+        write_tables(document, _values(results, others, folder_of(output)), folder_of(output))
+    for text in _remarks(results, others) if tell else ():
+        tell(text)  # type: ignore[misc]
     return output
 
 
-def _results(
-    paths: Sequence[Path], given: Mapping[str, Any], tell: Callable[[str], None] | None, *, needed: bool
-) -> Results:
-    """What was found of the measurements at the paths; none where there are none and none are needed."""
-    try:
-        return recall_suiting(paths, given, tell) if paths or needed else []
-    except (DoesNotSuit, NoneUsable):
-        if needed:
-            raise
-        return []
-
-
-def _of_other_kinds(paths: Sequence[Path]) -> tuple[list[Section], list[Path]]:
-    """The sections of inputs that are no measurement, and the paths that may hold measurements, too."""
-    sections: list[Section] = []
+def _sorted_by_kind(paths: Sequence[Path]) -> tuple[Found, list[Path]]:
+    """Each kind of input that is no measurement, with those that lie at the paths; and the paths for the analyses."""
     inputs = {path: [(kind, kind.find(path)) for kind in KINDS] for path in paths}
-    for kind in KINDS:
-        found = [one for of_path in inputs.values() for this, places in of_path if this is kind for one in places]
-        sections += kind.sections(found) if found else ()
-    only = {path for path, of_path in inputs.items() if any(path in places for _, places in of_path)}
-    return sections, [path for path in paths if path not in only]
+    found = [
+        (kind, list(dict.fromkeys(one for of_path in inputs.values() for one in dict(of_path)[kind]))) for kind in KINDS
+    ]
+    taken = {path: {one for _, places in of_path for one in places} for path, of_path in inputs.items()}
+    left = [path for path in paths if not taken[path] or (path.is_dir() and _holds_more(path, taken[path]))]
+    return [(kind, places) for kind, places in found if places], left
+
+
+def _holds_more(folder: Path, taken: Collection[Path]) -> bool:
+    """Whether a folder holds more than inputs of the other kinds."""
+    return folder not in taken and (any(run not in taken for run in find_runs(folder)) or bool(data_files(folder)))
+
+
+def _newest(results: Results, others: Found) -> datetime | None:
+    """When the newest of the inputs ended; None where none of them says."""
+    records = [source.run.record for _, found in results for source in found.sources if source.run]
+    texts = [record.ended_utc or record.started_utc for record in records]
+    texts += [kind.when(path) for kind, found in others for path in found]
+    return max(filter(None, map(_moment, texts)), default=None)
+
+
+def _moment(utc: str | None) -> datetime | None:
+    try:
+        return datetime.fromisoformat(utc).astimezone(UTC) if utc else None
+    except (ValueError, OverflowError):
+        return None
+
+
+def _values(results: Results, others: Found, folder: Path) -> Iterator[Values]:
+    """The tables for programs."""
+    for analysis, found in results:
+        yield from of_analysis(analysis, found, folder)
+    for kind, places in others:
+        yield from kind.tables(places)
+
+
+def _remarks(results: Results, others: Found) -> Iterator[str]:
+    """What lies there and is not in the report, and what has no result."""
+    in_it = tuple(f" {kind.experiment} run" for kind, _ in others if kind.experiment)
+    for remark in remarks([found.remarks for _, found in results]):
+        if not remark.removesuffix("s").endswith(in_it or ("\0",)):
+            yield remark
+    yield from _without_result(results)
 
 
 def _without_result(results: Results) -> Iterator[str]:

@@ -20,12 +20,12 @@ from levilab.simulator.keys import SceneError, Table, as_toml, nearest, parse_se
 from levilab.simulator.parts import Base, Drag, Drive, Escape, Part, Start, Top, Washers
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
     from importlib.resources.abc import Traversable
 
 __all__ = [
     "Base", "Drag", "Drive", "Escape", "Scene", "SceneError", "Start", "Top", "Washers",
-    "preset", "presets", "read_scene", "remarks", "scene_of", "with_settings",
+    "changes", "preset", "presets", "read_scene", "remarks", "scene_of", "with_settings",
 ]  # fmt: skip
 
 
@@ -282,6 +282,27 @@ def preset(name: str) -> Scene:
     near = nearest(name, presets())
     meant = f"did you mean {near}? Known" if near else "known"
     raise SceneError(f"there is no scene {name!r}: {meant} are {', '.join(presets())}; or give the path of a TOML file")
+
+
+def changes(scene: Scene) -> dict[str, Any] | None:
+    """Return dotted key → value where a scene differs from the preset of its name; None if that is no preset.
+
+    >>> changes(preset("driven").changed({"top.mass_kg": 0.025, "drag.law": "disc"}))
+    {'top.mass_kg': 0.025, 'drag.law': 'disc', 'drag.coefficient': 0.000234}
+    """
+    if scene.name not in presets():
+        return None
+    usual = dict(_leaves(preset(scene.name).as_table()))
+    return {key: value for key, value in _leaves(scene.as_table()) if value != usual[key]}
+
+
+def _leaves(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield dotted keys with their values."""
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from _leaves(value, f"{before}{key}.")
+        else:
+            yield before + key, value
 
 
 def read_scene(name_or_path: str | Path) -> Scene:

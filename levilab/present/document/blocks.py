@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from datetime import datetime
 
     from levilab.present.style import Figure
     from levilab.present.tables import Table
@@ -268,6 +269,7 @@ class Document:
         contents: whether links to the sections of the first depth stand before the blocks (HTML), or an outline (PDF).
         footer: one line of small print at its end, such as versions.
         subject: the name of the file's window or in its metadata; empty for the title.
+        date: when the newest of the data were taken, in the file's properties; None where that is not known.
     """
 
     title: str
@@ -277,3 +279,4 @@ class Document:
     contents: bool = False
     footer: str = ""
     subject: str = ""
+    date: datetime | None = None

@@ -30,7 +30,7 @@ def test_a_command_has_the_texts_of_its_stand_in_and_the_options_of_its_function
     assert stand_in.params == []
     assert {"paths", "output", "columns"} <= {one.name for one in stand_in.command.params}
     assert stand_in.command.help == stand_in.help
-    assert stand_in.command.epilog == "Example: levilab report sample_data/ -o report.html"
+    assert stand_in.command.epilog == "Example: levilab report sample_data/ -o report.html, or -o report.pdf --tables"
 
 
 def test_a_misspelt_command_below_a_stand_in_gets_its_suggestion(tmp_path: Path) -> None:

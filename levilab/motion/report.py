@@ -1,0 +1,343 @@
+"""A simulated motion, as it lies in a run folder → a section of a report.
+
+All numbers are those that run.json has.  The figure is drawn from the motion computed once more, if its last state is
+the one in states.csv to the last digit; otherwise, or where that would take long, from the picture in the folder.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import shlex
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from levilab.errors import DataError, LevilabError
+from levilab.motion.effects import KINDS, field_kinds
+from levilab.motion.simulation import COLUMNS, FIGURE, SimulationRequest, run_simulation
+from levilab.present.document.blocks import (
+    Banner,
+    Code,
+    Details,
+    Fact,
+    Facts,
+    Note,
+    Picture,
+    Section,
+    Tabular,
+    Verdict,
+    Warnings,
+)
+from levilab.present.numbers import plain
+from levilab.present.tables import table
+from levilab.runs.run import STATES, Run
+from levilab.simulator.scene import SceneError, changes, scene_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+    from pathlib import Path
+
+    from levilab.motion.summary import Summary
+    from levilab.present.document.blocks import Block
+    from levilab.present.style import Figure
+    from levilab.simulator.scene import Scene
+
+#: Motions that took longer to compute are not computed again for a figure [s].
+LONGEST_S = 10.0
+NUMBERS = ("quantity", "value", "unit")
+SYNTHETIC = Banner("SYNTHETIC.", "This is a simulation: nothing of it was measured.")
+#: Programs by which a command line begins that is one of ours.
+_PROGRAMS = {"levilab", "levilab.exe", "__main__.py", "levilab-script.py"}
+
+
+def motion_section(run: Run) -> Section:
+    """The section of a simulated motion.  Raises DataError for a folder in which one is not, or not whole."""
+    found, scene = _document(run), _scene(run)
+    name = str(found.get("scene") or scene.name or "without a name")
+    blocks: list[Block] = [
+        SYNTHETIC,
+        Verdict(_verdict(found, name)),
+        *_notes(found),
+        *_pictures(run, scene, name, found),
+        Tabular("motion", table("The motion in numbers", NUMBERS, _numbers(found, scene), numbers=NUMBERS[1:2])),
+        *_lines(found),
+        Section("Accuracy and cost", (Facts(tuple(_accuracy(found))),)),
+        Section("What was simulated", scene_blocks(scene, _how_long(run))),
+        Section("How to reproduce it", tuple(_reproduction(run))),
+    ]
+    return Section(f"Simulated motion: {name}", tuple(blocks), "motion", run.folder.name, new_page=True)
+
+
+def motions_overview(runs: Sequence[Run]) -> Section:
+    """One section of many simulated motions: a row for each, no figures."""
+    heads = ("run", "scene", "how it ended", "up for [s]", "spin at the end [Hz]")
+    rows, unusable = [], []
+    for run in runs:
+        try:
+            found = _document(run)
+        except DataError as error:
+            unusable.append((str(error),))
+            continue
+        fell = found.get("fell")
+        ended = str(fell.get("text", "fell")) if isinstance(fell, dict) else "stayed up"
+        numbers = (_digits(found, "end_s", 4), _digits(found, "spin_end_hz", 5))
+        rows.append((run.folder.name, str(found.get("scene") or "—"), ended, *numbers))
+    shown = Tabular("motions", table("", heads, rows, numbers=heads[3:]), first_column_wraps=True)
+    note = Note("A report of up to twelve simulated motions has a chapter with figure, lines and accuracy for each.")
+    warnings = [Warnings(tuple(unusable))] if unusable else []
+    return Section(f"{len(runs)} simulated motions", (SYNTHETIC, *warnings, shown, note), "motions", new_page=True)
+
+
+def motion_values(runs: Sequence[Run]) -> tuple[tuple[str, ...], tuple[tuple[str | float | bool | None, ...], ...]]:
+    """Heads and rows of a table for programs: what run.json says of each motion in single numbers and words."""
+    found = [(run, document) for run in runs if (document := _document_or_none(run))]
+    plain_keys = {
+        key: None
+        for _, document in found
+        for key, value in document.items()
+        if value is None or isinstance(value, str | int | float)
+    }
+    rows = [(run.folder.name, True, *map(document.get, plain_keys)) for run, document in found]
+    return ("input", "synthetic", *plain_keys), tuple(
+        tuple(None if isinstance(cell, dict | list) else cell for cell in row) for row in rows
+    )
+
+
+def _document_or_none(run: Run) -> Mapping[str, Any] | None:
+    try:
+        return _document(run)
+    except DataError:
+        return None
+
+
+def _document(run: Run) -> Mapping[str, Any]:
+    found = (run.record.model_extra or {}).get("simulation")
+    if not isinstance(found, dict) or not isinstance(found.get("end_s"), int | float):
+        raise DataError(f"{run.folder}: is {run.status} and says nothing of its motion; simulate it anew")
+    return found
+
+
+def _scene(run: Run) -> Scene:
+    try:
+        return scene_of(run.record.configuration["scene"])
+    except (KeyError, TypeError, AttributeError, SceneError) as error:
+        raise DataError(f"{run.folder}: its scene cannot be read ({error}); simulate it anew") from error
+
+
+# --- what it is like -----------------------------------------------------------------------------------
+
+
+def _verdict(found: Mapping[str, Any], name: str) -> str:
+    fell = found.get("fell")
+    if isinstance(fell, dict):
+        said = f"{name}: the top was up for {plain(fell.get('time_s'), 4)} s: it {fell.get('text', 'fell')}."
+    else:
+        said = f"{name}: the top stayed up for all of {found['end_s']:g} s."
+    locked = {True: " It is locked to its drive.", False: " It is not locked to its drive."}.get(found.get("locked"))
+    reached = "within" if found.get("tolerance_reached") else "NOT within"
+    accuracy = f" The estimated error at the end is {reached} the tolerance of {_digits(found, 'tolerance', 1)}."
+    return said + (locked or "") + accuracy
+
+
+def _notes(found: Mapping[str, Any]) -> Iterator[Warnings]:
+    if notes := found.get("notes"):
+        yield Warnings(tuple((str(note),) for note in notes))
+
+
+#: What run.json says, in the units of a laboratory: quantity, unit, factor, key.
+_QUANTITIES = (
+    ("mean height", "cm", 1e2, "height_mean_m"),
+    ("least height", "cm", 1e2, "height_min_m"),
+    ("greatest height", "cm", 1e2, "height_max_m"),
+    ("greatest distance from the axis", "mm", 1e3, "distance_from_axis_max_m"),
+    ("greatest tilt of the axis", "°", 180 / math.pi, "tilt_max_rad"),
+    ("spin at the start", "Hz", 1.0, "spin_start_hz"),
+    ("spin at the end", "Hz", 1.0, "spin_end_hz"),
+    ("mean spin", "Hz", 1.0, "spin_mean_hz"),
+    ("least spin", "Hz", 1.0, "spin_min_hz"),
+    ("greatest spin", "Hz", 1.0, "spin_max_hz"),
+    ("spin of the washers at the end", "Hz", 1.0, "washer_spin_end_hz"),
+    ("lifetime", "s", 1.0, "end_s"),
+)
+
+
+def _numbers(found: Mapping[str, Any], scene: Scene) -> Iterator[tuple[str, str, str]]:
+    for name, unit, factor, key in _QUANTITIES:
+        value = found.get(key)
+        if scene.observed == "spin" and not ("spin" in name or name == "lifetime"):
+            continue
+        if isinstance(value, int | float):
+            yield name, plain(factor * value + 0.0, 5), unit
+    change = found.get("energy_change_relative")
+    if isinstance(change, int | float):
+        conserved = found.get("energy_conserved")
+        name = (
+            "error of the energy, which is conserved" if conserved else "change of the energy, which drag or drive make"
+        )
+        yield name, plain(change, 2), "of itself"
+
+
+def _lines(found: Mapping[str, Any]) -> Iterator[Block]:
+    lines = [line for line in found.get("lines", ()) if isinstance(line, dict)]
+    if not lines:
+        because = found.get("no_lines_because")
+        if because:
+            yield Note(f"No lines of the axis: {because}.")
+        return
+    heads = ("frequency [Hz]", "amplitude [mrad]", "what it is")
+    rows = [
+        (
+            f"{line.get('frequency_hz', math.nan):.3f}",
+            plain(1e3 * line.get("amplitude_rad", math.nan)),
+            str(line.get("name") or "not identified"),
+        )
+        for line in lines
+    ]
+    resolution, until = found.get("line_resolution_hz"), found.get("lines_until_s")
+    note = f"Lines of n_x + i n_y, positive in the sense of a positive spin; resolution {plain(resolution, 2)} Hz"
+    if isinstance(until, int | float) and until < 0.99 * found["end_s"]:
+        note += f", of the first {plain(until)} s"
+    drawn = table("Lines of the axis", heads, rows, numbers=heads[:2])
+    yield Tabular("lines", drawn, f"{note}.")
+
+
+def _accuracy(found: Mapping[str, Any]) -> Iterator[Fact]:
+    reached = "reached" if found.get("tolerance_reached") else "NOT reached"
+    yield Fact(
+        "Asked for", (f"an error of at most {_digits(found, 'tolerance', 1)} at the end, in m and in rad: {reached}",)
+    )
+    position, axis = (_digits(found, key, 1) for key in ("position_error_m", "axis_error_rad"))
+    yield Fact("Estimated", (f"{position} m of the place, {axis} rad of the axis, at the end",))
+    if steps := found.get("steps"):
+        step = found.get("step_s")
+        size = f" of at most {plain(1e3 * step)} ms" if isinstance(step, int | float) else ""
+        yield Fact("Integrated", (f"{steps} steps{size} by {found.get('scheme', 'a scheme that is not recorded')}",))
+    took, speed = _digits(found, "computing_time_s"), _digits(found, "times_real_time", 2)
+    yield Fact("Cost", (f"{took} s on that machine, {speed} times as fast as the top itself",))
+
+
+def _digits(found: Mapping[str, Any], key: str, count: int = 3) -> str:
+    value = found.get(key)
+    return plain(value, count) if isinstance(value, int | float) else "—"
+
+
+# --- what was simulated --------------------------------------------------------------------------------
+
+
+def scene_blocks(scene: Scene, more: Sequence[Fact] = ()) -> tuple[Block, ...]:
+    """What a scene is, what differs from its preset, which effects it has and which it lacks, and its keys."""
+    changed = changes(scene)
+    kinds = (*field_kinds(scene), *KINDS)
+    included = [kind.name for kind in kinds if kind.included(scene)]
+    left_out = [kind.name for kind in kinds if not kind.included(scene)]
+    own = "a scene of its own; all its keys stand below"
+    same = "none" if changed is not None else own
+    said = tuple(f"{key} = {value}" for key, value in (changed or {}).items())
+    facts = (
+        Fact("Scene", tuple(filter(None, (scene.name or "without a name", scene.description)))),
+        Fact("Changed keys", said or (same,), code=bool(said)),
+        Fact("In it", (", ".join(included) or "none of the effects that the simulator can add",)),
+        Fact("Left out", (", ".join(left_out) or "no effect that the simulator knows",)),
+        *more,
+    )
+    note = Note("levilab simulate SCENE --explain computes how much each effect changes height, precession and spin.")
+    # a preset and its changes say all of it in few lines
+    keys = Details(
+        "All keys of the scene", (Code(scene.as_toml().strip()),), on_paper="whole" if changed is None else "out"
+    )
+    return Facts(facts), note, keys
+
+
+def _how_long(run: Run) -> tuple[Fact, ...]:
+    settings = run.record.configuration
+    texts = tuple(
+        f"{words} {settings[key]}{unit}"
+        for key, words, unit in (("duration_s", "up to", " s"), ("rate_hz", "states kept:", " per second"))
+        if key in settings
+    )
+    return (Fact("Length", texts),) if texts else ()
+
+
+# --- figure --------------------------------------------------------------------------------------------
+
+
+def _pictures(run: Run, scene: Scene, name: str, found: Mapping[str, Any]) -> Iterator[Picture]:
+    summary = _again(run, scene, found)
+    stored = run.folder / FIGURE
+    if summary is None and not stored.is_file():
+        return
+    caption = "Path from the side and from above; height, spin, tilt and energy in time; the spectrum of the axis."
+    draw = partial(_drawn, summary) if summary else partial(_stored, stored)
+    alt = f"Simulated motion of the scene {name}: path, height, spin, tilt, energy and spectrum"
+    yield Picture("motion", f"Simulated motion of {name}, SYNTHETIC.", caption, alt, draw, raster=summary is None)
+
+
+def _again(run: Run, scene: Scene, found: Mapping[str, Any]) -> Summary | None:
+    """The motion computed once more; None where that takes long, or does not end in the same state."""
+    settings, took = run.record.configuration, found.get("computing_time_s")
+    if not isinstance(took, int | float) or took > LONGEST_S:
+        return None
+    try:
+        request = SimulationRequest(scene, *(float(settings[key]) for key in ("duration_s", "tolerance", "rate_hz")))
+        summary = run_simulation(request, lambda _: None).summary
+    except (LevilabError, KeyError, TypeError, ValueError):
+        return None
+    last = ",".join(repr(float(values(summary.motion)[-1])) for _, _, _, values in COLUMNS)
+    return summary if last == _last_state(run.folder / STATES) else None
+
+
+def _last_state(path: Path) -> str:
+    """The last line of a file; empty if there is none."""
+    try:
+        with path.open("rb") as file:
+            file.seek(0, 2)
+            file.seek(max(0, file.tell() - 4096))
+            return file.read().decode(errors="replace").strip().rpartition("\n")[2]
+    except OSError:
+        return ""
+
+
+def _drawn(summary: Summary) -> Figure:
+    from levilab.motion.figure import motion_figure  # with matplotlib
+
+    return motion_figure(summary)
+
+
+def _stored(path: Path) -> Figure:
+    from levilab.present.style import figure_of_png  # with matplotlib
+
+    return figure_of_png(path.read_bytes())
+
+
+# --- how to reproduce it -------------------------------------------------------------------------------
+
+
+def _reproduction(run: Run) -> Iterator[Block]:
+    record = run.record
+    if record.command_line:
+        yield Code(command_in_words(record.command_line))
+    facts = [
+        Fact("When", tuple(f"{utc[:19].replace('T', ' ')} UTC" for utc in (record.started_utc,) if utc)),
+        Fact("Software", (", ".join(f"{name} {version}" for name, version in record.software.items()),)),
+        Fact("states.csv", tuple(f"sha256 {digest}" for digest in _hash_of(run.folder / STATES)), code=True),
+    ]
+    yield Facts(tuple(fact for fact in facts if any(fact.texts)))
+
+
+def command_in_words(words: Sequence[str]) -> str:
+    """A recorded command line as one types it: ours without the place of its program.
+
+    >>> command_in_words(["/opt/bin/levilab", "simulate", "driven", "--set", "drive.frequency_hz=30.1 "])
+    "levilab simulate driven --set 'drive.frequency_hz=30.1 '"
+    """
+    first, *others = words
+    name = first.replace("\\", "/").rpartition("/")[2]
+    return shlex.join(["levilab" if name in _PROGRAMS else first, *others])
+
+
+def _hash_of(path: Path) -> Iterator[str]:
+    try:
+        with path.open("rb") as file:
+            yield hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError:
+        return

@@ -1,0 +1,360 @@
+"""A document → PDF: its blocks as data, which the template report.typ draws.
+
+Texts reach typst as strings of a JSON file and never as markup, so nothing in them has to be escaped.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import dataclass, field
+from importlib import resources
+from importlib.util import find_spec
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from levilab.errors import LevilabError
+from levilab.present.characters import printable
+from levilab.present.document.blocks import (
+    Banner,
+    Bullets,
+    Code,
+    Details,
+    Fact,
+    Facts,
+    Listing,
+    Note,
+    Paragraph,
+    Picture,
+    Section,
+    Tabular,
+    Verdict,
+    Warnings,
+)
+from levilab.present.document.typesetting import typeset
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+    from datetime import datetime
+
+    from levilab.present.document.blocks import Block, Document
+    from levilab.present.tables import Row, Table
+
+TEMPLATE = "report.typ"
+#: Letters of a word that is never divided; a longer one is divided behind what stands between its parts, as in a path.
+LONGEST_WORD = 24
+#: Characters of the title in the head of each page.
+SHORT_TITLE = 90
+#: Entries up to which an outline has those of the second depth.
+MOST_ENTRIES = 20
+#: Height over width from which a figure may leave its place in the text for the top of a page.
+TALL = 0.62
+#: Height over the width of the text beyond which a figure with its caption does not fit on a page.
+TALLEST = 1.2
+#: Of alike warnings so many are printed like the first.
+FEW_ALIKE = 3
+#: What no PDF may contain: code points that are no characters, and those for private use, which no font has.
+_NO_CHARACTERS = re.compile("[\ufdd0-\ufdef\ufffe\uffff\ue000-\uf8ff\U000f0000-\U0010ffff]")
+
+#: A text for the template: a string, or parts of it: strings, (level, string), None where a word may be divided.
+Text = Any
+Drawn = dict[str, Any]
+
+
+class NoTypst(LevilabError):
+    """The library that sets PDF is not installed."""
+
+
+def check_typst() -> None:
+    """Raise NoTypst if PDF cannot be set here."""
+    if find_spec("typst") is None:
+        raise NoTypst(
+            'a PDF is set by typst, which is not installed: pip install "levilab[pdf]", or name the report report.html'
+        )
+
+
+def as_pdf(document: Document) -> bytes:
+    """A document as PDF; the same bytes for the same document.
+
+    Raises:
+        NoTypst: the extra `pdf` is not installed.
+    """
+    check_typst()
+    import typst
+    from matplotlib import get_data_path  # its fonts, which come with it, have what typst's own fonts lack
+
+    pdf: bytes = typst.compile(
+        files_of(document),
+        format="pdf",
+        font_paths=[Path(get_data_path()) / "fonts" / "ttf"],
+        ignore_system_fonts=True,
+    )
+    return pdf
+
+
+def files_of(document: Document) -> dict[str, bytes]:
+    """The files that typst sets: the template, the document as data, the figures."""
+    drawing = _Drawing()
+    content = _content(document, drawing)
+    template = (resources.files("levilab.report.pdf") / TEMPLATE).read_bytes()
+    data = json.dumps(content, allow_nan=False, ensure_ascii=True, sort_keys=True).encode()
+    return {"main.typ": template, "document.json": data, **drawing.files}
+
+
+@dataclass(frozen=True)
+class _Drawing:
+    """What blocks are drawn into.
+
+    Attributes:
+        files: the figures, by their names; typst takes text alone, so that each is a list of its bytes.
+    """
+
+    files: dict[str, bytes] = field(default_factory=dict)
+
+    def blocks(self, blocks: Iterable[Block]) -> list[Drawn]:
+        """Blocks as data; what is not printed is left out."""
+        return [drawn for block in blocks if (drawn := _BLOCKS[type(block)](block, self)) is not None]
+
+    def figure(self, picture: Picture, *, floats: bool = True) -> Drawn:
+        """Draw a figure: the name of its file, its format, its width, and whether it may leave its place.
+
+        Args:
+            picture: the block.
+            floats: whether there is text that can stand in its place.
+        """
+        from levilab.present.style import as_pdf as figure_as_pdf  # with matplotlib
+        from levilab.present.style import as_png
+
+        drawn = picture.draw()
+        kind, data = ("png", as_png(drawn, dpi=200)) if picture.raster else ("pdf", figure_as_pdf(drawn))
+        name = f"figure-{len(self.files) + 1}.json"
+        self.files[name] = json.dumps([*data], separators=(",", ":")).encode()
+        width, height = drawn.get_size_inches()
+        shape = float(height / width)
+        return {
+            "file": name,
+            "format": kind,
+            "floats": floats and shape > TALL,
+            "width": min(100.0, 100 * TALLEST / shape),
+        }
+
+
+def _content(document: Document, drawing: _Drawing) -> Drawn:
+    title = _plain(document.title)
+    count = next((k for k, block in enumerate(document.blocks) if isinstance(block, Section)), len(document.blocks))
+    first, rest = document.blocks[:count], document.blocks[count:]
+    return {
+        "title": title,
+        "short": _text(title if len(title) <= SHORT_TITLE else f"{title[: SHORT_TITLE - 1]}…"),
+        "heading": _text(document.title),
+        "date": None if document.date is None else _date(document.date),
+        "lead": _text(document.lead),
+        "banner": None if document.banner is None else _banner(document.banner, drawing),
+        "mark": _text(document.banner.lead.rstrip(".")) if document.banner else "",
+        "before": drawing.blocks(first),
+        "short_verdicts": [*_in_short(rest)],
+        "outline": _outline_depth(document),
+        "blocks": drawing.blocks(rest),
+        "footer": _text(document.footer),
+    }
+
+
+def _outline_depth(document: Document) -> int:
+    """How deep the outline goes; 0: none is asked for.  The template leaves it out of a document of few pages."""
+    sections = [block for block in document.blocks if isinstance(block, Section)]
+    if not document.contents:
+        return 0
+    inner = sum(isinstance(block, Section) for section in sections for block in section.blocks)
+    return 2 if len(sections) + inner <= MOST_ENTRIES else 1
+
+
+def _in_short(blocks: Iterable[Block]) -> Iterator[Drawn]:
+    """What each chapter says, for the first page of a report of several: its verdict, and how many warnings it has."""
+    chapters = [(block, [*_all_in(block)]) for block in blocks if isinstance(block, Section) and block.new_page]
+    for chapter, inner in chapters if len(chapters) > 1 else ():
+        verdict = next((one.text for one in inner if isinstance(one, Verdict)), "")
+        count = sum(len(group) for one in inner if isinstance(one, Warnings) for group in one.groups)
+        if verdict or count:
+            warnings = f"{count} warning{'s' * (count > 1)}" if count else ""
+            yield {"title": _text(chapter.title), "verdict": _text(verdict), "warnings": warnings}
+
+
+def _all_in(block: Block) -> Iterator[Block]:
+    yield block
+    for inner in block.blocks if isinstance(block, Section) else ():
+        yield from _all_in(inner)
+
+
+def _date(date: datetime) -> dict[str, int]:
+    return {name: getattr(date, name) for name in ("year", "month", "day", "hour", "minute", "second")}
+
+
+# --- texts ---------------------------------------------------------------------------------------------
+
+
+def _plain(text: str) -> str:
+    """A text of one line, without what no PDF may contain."""
+    clean = _NO_CHARACTERS.sub("\N{REPLACEMENT CHARACTER}", printable(text.replace("\t", " ")))
+    return " ".join(clean.encode(errors="replace").decode().split("\n"))
+
+
+def _text(text: str) -> Text:
+    """A text as its parts, with superscripts, subscripts and places where long words may be divided.
+
+    >>> _text("3.2(1)×10⁻³ s⁻¹")
+    ['3.2(1)×10', ['high', '−3'], ' s', ['high', '−1']]
+    >>> _text("plain")
+    'plain'
+    """
+    parts: list[Any] = []
+    for run in typeset(_plain(text)):
+        if run.level:
+            parts.append([run.level, run.text])
+        else:
+            parts += _divisible(run.text)
+    return parts[0] if len(parts) == 1 and isinstance(parts[0], str) else parts or ""
+
+
+#: Behind these a path, an address or a list without blanks may be divided.
+_JOINT = re.compile(r"(?<=[/\\_.,;:=&?+|-])(?=\w)")
+_LONG_WORD = re.compile(rf"\S{{{LONGEST_WORD + 1},}}")
+
+
+def _divisible(text: str) -> list[str | None]:
+    """A text with None wherever a word of more than so many letters may be divided.
+
+    >>> _divisible("in runs/20261120T101500Z-spin-7f3a or x.csv")
+    ['in runs/', None, '20261120T101500Z-', None, 'spin-', None, '7f3a or x.csv']
+    """
+    parts: list[str | None] = []
+    at = 0
+    for word in _LONG_WORD.finditer(text):
+        before = text[at : word.start()]
+        pieces = [short for piece in _JOINT.split(word[0]) for short in _short(piece)]
+        parts += [before + pieces[0], *(part for piece in pieces[1:] for part in (None, piece))]
+        at = word.end()
+    if not parts:
+        return [text]
+    rest = text[at:]
+    return [*parts[:-1], f"{parts[-1]}{rest}"]
+
+
+def _short(piece: str) -> list[str]:
+    """A part of a word in letters one by one where it is long."""
+    return [*piece] if len(piece) > LONGEST_WORD else [piece]
+
+
+def _lines(text: str) -> list[Text]:
+    """The lines of a cell."""
+    return [_text(line) for line in text.split("\n")]
+
+
+def _fixed(text: str) -> Text:
+    """A line in letters of one width, divided anywhere; nothing is typeset."""
+    parts = _divisible(_plain(text))
+    return parts[0] if len(parts) == 1 else parts
+
+
+# --- blocks --------------------------------------------------------------------------------------------
+
+
+def _section(block: Section, drawing: _Drawing) -> Drawn:
+    # a heading does not stay behind alone when its only figure leaves
+    alone = len(block.blocks) == 1 and isinstance(block.blocks[0], Picture)
+    return {
+        "kind": "section",
+        "title": _text(block.title),
+        "lead": _text(block.lead),
+        "page": block.new_page,
+        "blocks": [_picture(block.blocks[0], drawing, floats=False)] if alone else drawing.blocks(block.blocks),
+    }
+
+
+def _details(block: Details, drawing: _Drawing) -> Drawn | None:
+    if block.on_paper == "out":
+        return None
+    return {
+        "kind": "details",
+        "summary": _text(block.summary),
+        "more": _text(block.more),
+        "blocks": drawing.blocks(block.blocks) if block.on_paper == "whole" else [],
+    }
+
+
+def _banner(block: Banner, _: _Drawing) -> Drawn:
+    return {"kind": "banner", "lead": _text(block.lead), "text": _text(block.text)}
+
+
+def _warnings(block: Warnings, _: _Drawing) -> Drawn:
+    groups: list[Drawn] = []
+    for alike in block.groups:
+        if len(alike) > FEW_ALIKE:
+            more = f"and {len(alike) - 1} more like this one"
+            groups.append({"first": _text(alike[0]), "more": more, "others": [_text(text) for text in alike[1:]]})
+        else:
+            groups += [{"first": _text(text), "more": "", "others": []} for text in alike]
+    return {"kind": "warnings", "groups": groups}
+
+
+def _facts(block: Facts, _: _Drawing) -> Drawn:
+    return {"kind": "facts", "facts": [_fact(fact) for fact in block.facts]}
+
+
+def _fact(fact: Fact) -> Drawn:
+    put = _fixed if fact.code else _text
+    return {"name": _text(fact.name), "texts": [put(text) for text in fact.texts], "code": fact.code}
+
+
+def _tabular(block: Tabular, _: _Drawing) -> Drawn:
+    names = block.table.heads[:1] if block.first_column_wraps else ()
+    return {"kind": "tabular", **_table(block.table, {*block.wraps, *names}), "note": _text(block.note)}
+
+
+def _listing(block: Listing, _: _Drawing) -> Drawn:
+    return {"kind": "listing", **_table(block.table), "note": _text(block.note), "piece": block.rows_in_a_piece}
+
+
+def _table(table: Table, wraps: Collection[str] = ()) -> Drawn:
+    """A table: which of its columns are numbers, and which of the others are folded."""
+    return {
+        "title": _text(table.title),
+        "heads": [_lines(head) for head in table.heads],
+        "numbers": [k in table.numbers for k in range(len(table.heads))],
+        "wraps": [head in wraps for head in table.heads],
+        "rows": [_row(row) for row in table.rows],
+    }
+
+
+def _row(row: Row) -> Drawn:
+    return {"kind": row.kind, "cells": [_lines(cell) for cell in row.cells]}
+
+
+def _picture(block: Picture, drawing: _Drawing, *, floats: bool = True) -> Drawn:
+    return drawing.figure(block, floats=floats) | {
+        "kind": "picture",
+        "title": _text(block.title),
+        "stop": "" if block.title.endswith((".", "?", "!")) else ".",
+        "caption": _text(block.caption),
+        "alt": _plain(block.alt),
+    }
+
+
+#: Block → what the template gets of it; None: nothing is printed.
+_BLOCKS: Mapping[type, Callable[[Any, _Drawing], Drawn | None]] = MappingProxyType(
+    {
+        Paragraph: lambda it, _: {"kind": "paragraph", "lead": _text(it.lead), "text": _text(it.text)},
+        Note: lambda it, _: {"kind": "note", "text": _text(it.text)},
+        Verdict: lambda it, _: {"kind": "verdict", "text": _text(it.text)},
+        Banner: _banner,
+        Warnings: _warnings,
+        Bullets: lambda it, _: {"kind": "bullets", "texts": [_text(text) for text in it.texts]},
+        Code: lambda it, _: {"kind": "code", "lines": [_fixed(line) for line in it.text.split("\n")]},
+        Facts: _facts,
+        Tabular: _tabular,
+        Listing: _listing,
+        Picture: _picture,
+        Section: _section,
+        Details: _details,
+    }
+)

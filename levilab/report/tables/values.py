@@ -1,0 +1,130 @@
+"""Results → tables for programs: all values with all their digits, units in the names of columns."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from levilab.pipelines.row import Column, plain, text_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+    from pathlib import Path
+
+    from levilab.pipelines.catalogue import Analysis
+    from levilab.pipelines.row import Cell
+
+#: A spreadsheet takes a text that begins with one of these for a formula.
+_FORMULA = re.compile(r"\s*[=+\-@\t\r]")
+#: Units of residuals by the name of the analysis.
+RESIDUALS = MappingProxyType({"spindown": "Hz", "precession": "Hz", "field": "T"})
+#: The first columns of both kinds of tables.
+INPUT, SYNTHETIC = "input", "synthetic"
+
+
+@dataclass(frozen=True)
+class Values:
+    """A table of values.
+
+    Attributes:
+        name: of its file, without the ending.
+        about: what a row is, for people.
+        heads: names of the columns, with the unit at the end.
+        rows: of cells; a float is written with all its digits, None is empty.
+    """
+
+    name: str
+    about: str
+    heads: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+
+
+def as_csv(values: Values) -> str:
+    """The table as CSV; no text in it is a formula to a spreadsheet.
+
+    >>> print(as_csv(Values("x", "", ("input", "c1_per_s"), (("=1+1", -0.5), ("a, b", None)))), end="")
+    input,c1_per_s
+    '=1+1,-0.5
+    "a, b",
+    """
+    written = io.StringIO()
+    writer = csv.writer(written, lineterminator="\n")
+    writer.writerow([_harmless(head) for head in values.heads])
+    writer.writerows([[_harmless(cell) for cell in row] for row in values.rows])
+    return written.getvalue()
+
+
+def _harmless(cell: Cell) -> str:
+    """A cell as text; an apostrophe, which spreadsheets do not show, keeps a text from being a formula."""
+    if isinstance(cell, str):
+        text = " ".join(cell.split("\n")).replace("\r", " ")
+        return f"'{text}" if _FORMULA.match(text) else text
+    return text_of(cell)
+
+
+# --- of an analysis ------------------------------------------------------------------------------------
+
+
+def of_analysis(analysis: Analysis[Any], found: Any, folder: Path) -> Iterator[Values]:
+    """Its tables: a row for each input, and a row for each quantity, of inputs and of all together.
+
+    Args:
+        analysis: the row of the catalogue.
+        found: what it found.
+        folder: of the tables.
+    """
+    document = analysis.document(found, folder)
+    names = [source.name for source in found.sources]
+    yield _by_input(analysis, document, names)
+    yield Values(
+        f"{analysis.name}-quantities",
+        f"{analysis.name}: a row for each quantity of each input, and of all inputs together",
+        (INPUT, SYNTHETIC, "model", "quantity", "value", "u", "unit", "interval_68_low", "interval_68_high",
+         "scatter", "runs"),
+        tuple(_quantities(document, names)),
+    )  # fmt: skip
+
+
+def _by_input(analysis: Analysis[Any], document: Mapping[str, Any], names: Sequence[str]) -> Values:
+    columns: tuple[Column, ...] = analysis.row
+    rows = [
+        (name, bool(part["synthetic"]), *(plain(column.read(part), column.kind) for column in columns))
+        for name, part in zip(names, document["runs"], strict=True)
+    ]
+    heads = (INPUT, SYNTHETIC, *(column.name for column in columns))
+    return Values(f"{analysis.name}-inputs", f"{analysis.name}: a row for each input", heads, tuple(rows))
+
+
+def _quantities(document: Mapping[str, Any], names: Sequence[str]) -> Iterator[tuple[Cell, ...]]:
+    analysis = str(document["analysis"])
+    if len(names) > 1:
+        yield from _of_part("all together", analysis, document)
+    for name, part in zip(names, document["runs"], strict=True):
+        yield from _of_part(name, analysis, part)
+
+
+def _of_part(name: str, analysis: str, part: Mapping[str, Any]) -> Iterator[tuple[Cell, ...]]:
+    synthetic = bool(part["synthetic"])
+    for model, quantity, found in _values_in(part, analysis):
+        low, high = found.get("interval_68") or (None, None)
+        value, u, unit = (found.get(key) for key in ("value", "u", "unit"))
+        yield name, synthetic, model, quantity, value, u, unit, low, high, found.get("scatter"), found.get("runs")
+
+
+def _values_in(part: Mapping[str, Any], analysis: str) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
+    """Model, name and value of each quantity; values without a model come first."""
+    for name, value in part["values"].items():
+        yield "", name, value
+    for model in part.get("models") or ():
+        for name, value in model["parameters"].items():
+            yield model["name"], name, value
+        for name, value in (model.get("linearised") or {}).items():
+            yield model["name"], f"{name}_linearised", value
+        for name, value in (model.get("statistics") or {}).items():
+            unit = RESIDUALS.get(analysis) if name == "rms_residual" else "1"
+            if unit and value is not None:
+                yield model["name"], name, {"value": value, "unit": unit}

@@ -1,0 +1,82 @@
+"""Where a top floats, as `levilab stability --json` printed it → a section of a report."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from levilab.errors import DataError, LevilabError
+from levilab.files import parse_json
+from levilab.present.document.blocks import Banner, Code, Fact, Facts, Section, Tabular, Verdict, Warnings
+from levilab.present.numbers import plain
+from levilab.present.tables import table
+from levilab.simulator.scene import changes, scene_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+    from pathlib import Path
+
+    from levilab.present.document.blocks import Block
+    from levilab.simulator.scene import Scene
+
+
+def stability_section(path: Path) -> Section:
+    """The section of such a file.  Raises DataError for one that is damaged."""
+    try:
+        found = parse_json(path.read_text(encoding="utf-8"))
+        scene = scene_of(found["scene"])
+        blocks = tuple(_blocks(found, scene))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, LevilabError) as error:
+        raise DataError(f"{path}: is no whole result of levilab stability ({error}); print it anew") from error
+    return Section(f"Where the top floats: {scene.name or 'a scene'}", blocks, "stability", path.name, new_page=True)
+
+
+def _blocks(found: Mapping[str, Any], scene: Scene) -> Iterator[Block]:
+    yield Banner("SYNTHETIC.", "This follows from a model: nothing of it was measured.")
+    mass = plain(1e3 * scene.top.mass_kg, 4)
+    if found["floats"]:
+        yield Verdict(f"A top of {mass} g floats at {plain(100 * found['height_m'], 4)} cm.")
+    else:
+        near = found.get("nearest_mass_kg")
+        more = "" if near is None else f"; the nearest mass that does is {plain(1e3 * near, 5)} g"
+        yield Verdict(f"A top of {mass} g does not float{more}.")
+    if found["remarks"]:
+        yield Warnings(tuple((str(text),) for text in found["remarks"]))
+    heads = ("heights [cm]", "masses [g]")
+    rows = [
+        (_range(window, "low_m", "high_m", 1e2), _range(window, "light_kg", "heavy_kg", 1e3))
+        for window in found["windows"]
+    ]
+    yield Tabular("stability-windows", table("Where tops float, if they spin", heads, rows))
+    heads = ("height [cm]", "", "spins [Hz]")
+    rows3 = [
+        (
+            plain(100 * place["height_m"], 5),
+            "stable" if place["stable"] else "not stable",
+            ", ".join(f"{_number(low)} – {_number(high)}" for low, high in place["spins_hz"]) or "none helps",
+        )
+        for place in found["equilibria"]
+    ]
+    yield Tabular("stability-equilibria", table("Where field and weight balance", heads, rows3))
+    yield Facts(tuple(_facts(found, scene)))
+    settings = " ".join(f"--set {key}={value}" for key, value in (changes(scene) or {}).items())
+    if scene.name and changes(scene) is not None:
+        yield Code(f"levilab stability {scene.name} {settings} --json".replace("  ", " "))
+
+
+def _facts(found: Mapping[str, Any], scene: Scene) -> Iterator[Fact]:
+    modes = ", ".join(
+        plain(mode["frequency"], 4) + (" (grows)" if mode["growth_per_s"] > 1e-6 else "") for mode in found["modes_hz"]
+    )
+    if modes:
+        yield Fact(f"Modes at {scene.start.spin_hz:g} Hz", (f"{modes} Hz",))
+    for name, key in (("Up and down", "vertical_mode_hz"), ("Sleeping top's limit", "sleeping_limit_hz")):
+        if found[key] is not None:
+            yield Fact(name, (f"{plain(found[key], 4)} Hz",))
+
+
+def _range(window: Mapping[str, Any], low: str, high: str, factor: float) -> str:
+    return f"{plain(factor * window[low], 5)} – {plain(factor * window[high], 5)}"
+
+
+def _number(value: float | None) -> str:
+    return "—" if value is None else plain(value, 4)

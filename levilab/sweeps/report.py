@@ -1,0 +1,156 @@
+"""A sweep, as it lies in its store → a section of a report.  Nothing is simulated."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from levilab.motion.report import SYNTHETIC, command_in_words, scene_blocks
+from levilab.present.document.blocks import (
+    Bullets,
+    Code,
+    Fact,
+    Facts,
+    Note,
+    Picture,
+    Section,
+    Tabular,
+    Verdict,
+    Warnings,
+)
+from levilab.sweeps.adaptive import in_words, report_in
+from levilab.sweeps.axes import in_words as axis_in_words
+from levilab.sweeps.drawing import MOST_POINTS
+from levilab.sweeps.observables import GROUPS, columns_of
+from levilab.sweeps.store import Store
+from levilab.sweeps.summary import summarise
+from levilab.sweeps.table import columns_table, headline, points_table
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from pathlib import Path
+
+    from levilab.present.document.blocks import Block
+    from levilab.present.style import Figure
+    from levilab.sweeps.plan import Plan
+    from levilab.sweeps.store import Map
+    from levilab.sweeps.summary import Summary
+
+#: Columns that are drawn; a store with more has its figures beside it.
+MOST_FIGURES = 6
+#: A table of points has at most so many rows.
+MOST_ROWS = 500
+#: A store of more points is read from itself, by programs that read Zarr.
+MOST_IN_A_TABLE = 100_000
+
+
+def sweep_section(path: Path) -> Section:
+    """The section of a store.  Raises DataError for a folder that is none, or damaged."""
+    store = Store.open(path)
+    summary = summarise(store)
+    report = report_in(store)
+    filled = in_words(report, store.plan) if report else []
+    blocks: list[Block] = [
+        SYNTHETIC,
+        Verdict(f"{headline(summary)}."),
+        *_warnings(store, summary),
+        *_figures(store, filled),
+        Tabular("sweep-columns", columns_table(summary), "least, mean and greatest over the points that have a value"),
+        *_points(store),
+        *([Note("Points that were filled in:"), Bullets(tuple(filled))] if filled else []),
+        Section("What was simulated", scene_blocks(store.plan.scene, tuple(_facts(store)))),
+        Section("How to reproduce it", tuple(_reproduction(store))),
+    ]
+    name = store.plan.scene.name or "a scene without a name"
+    return Section(f"Sweep: {name}", tuple(blocks), "sweep", path.name, new_page=True)
+
+
+def sweep_values(path: Path) -> tuple[tuple[str, ...], tuple[tuple[Any, ...], ...]] | None:
+    """Heads and rows of a table for programs: the points that are computed; None for a store of too many."""
+    store = Store.open(path)
+    plan = store.plan
+    if plan.size > MOST_IN_A_TABLE:
+        return None
+    found = store.load()
+    heads = ("synthetic", *(axis.key for axis in plan.axes), *found.values)
+    rows = []
+    for index in np.argwhere(found.computed):
+        place = tuple(index.tolist())
+        rows.append((True, *plan.point(place).values(), *(_cell(values[place]) for values in found.values.values())))
+    return heads, tuple(rows)
+
+
+def _cell(value: Any) -> Any:
+    """A value as Python's own; None for one that is not defined."""
+    plain = value.item()
+    return None if isinstance(plain, float) and not math.isfinite(plain) else plain
+
+
+def _warnings(store: Store, summary: Summary) -> Iterator[Warnings]:
+    if left := store.plan.size - summary.points:
+        text = f"{left} of {store.plan.size} points are not computed; levilab sweep {store.path} --resume goes on"
+        yield Warnings(((text,),))
+
+
+def _figures(store: Store, notes: Sequence[str]) -> Iterator[Block]:
+    from levilab.sweeps.figure import has_figure  # with matplotlib
+
+    plan = store.plan
+    if not has_figure(plan) or plan.size > MOST_POINTS:
+        return
+    found = store.load()
+    if not found.computed.any():
+        return
+    columns = list(columns_of(name for name in plan.observables if name not in GROUPS))
+    for column in columns[:MOST_FIGURES]:
+        title = f"{column.name} over {_axes(plan)}, SYNTHETIC."
+        alt = f"Map of {column.name} over {_axes(plan)}"
+        draw = partial(_drawn, found, column.name, tuple(notes))
+        yield Picture(f"sweep-{column.name.replace('_', '-')}", title, column.meaning, alt, draw)
+    if len(columns) > MOST_FIGURES:
+        yield Note(f"{len(columns) - MOST_FIGURES} more columns are not drawn here; levilab sweep draws all of them.")
+
+
+def _axes(plan: Plan) -> str:
+    return " and ".join(axis.key for axis in plan.axes)
+
+
+def _drawn(found: Map, column: str, notes: Sequence[str]) -> Figure:
+    from levilab.sweeps.figure import map_figure  # with matplotlib
+
+    return map_figure(found, column, notes)
+
+
+def _points(store: Store) -> Iterator[Block]:
+    """Point by point, where the points are a line or the rows of a table, and not too many."""
+    plan = store.plan
+    if len(plan.shape) == 1 and plan.size <= MOST_ROWS:
+        yield Tabular("sweep-points", points_table(store.load()))
+
+
+def _facts(store: Store) -> Iterator[Fact]:
+    plan = store.plan
+    yield Fact("Axes", tuple(axis_in_words(axis) for axis in plan.axes))
+    yield Fact("Length", (f"each motion up to {plan.duration_s:g} s",))
+    step = "chosen in each chunk" if plan.step_share is None else f"{plan.step_share:g} of the longest one"
+    yield Fact("Accuracy", (f"wanted error at the end {plan.tolerance:g}, in m and in rad; step {step}",))
+    yield Fact("Cost", (f"{plan.chunk_count} chunks, {store.done} of them computed",))
+
+
+def _reproduction(store: Store) -> Iterator[Block]:
+    attributes = dict(store.group.attrs)
+    words = attributes.get("command_line")
+    if isinstance(words, list) and words:
+        yield Code(command_in_words([str(word) for word in words]))
+    software, processor = attributes.get("software"), attributes.get("processor")
+    facts = []
+    if isinstance(software, dict):
+        facts.append(Fact("Software", (", ".join(f"{name} {version}" for name, version in software.items()),)))
+    if isinstance(processor, dict) and "name" in processor:
+        facts.append(Fact("Processor", (str(processor["name"]),)))
+    facts.append(Fact("When", (f"begun {str(attributes.get('created_utc', '—'))[:19].replace('T', ' ')} UTC",)))
+    yield Facts(tuple(facts))
+    yield Note("On a processor of the same kind the same command gives the same numbers to the last digit.")
