@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 LONGEST_S, GATE_S, EVERY_S = 240.0, 1.0, 5.0
 #: Drives of the sweep [Hz], and how long each is held [s].
 DRIVES_HZ, HELD_S = np.linspace(28.0, 44.0, 9), 20.0
+#: How well a line of so short a record is placed beside others [Hz].
+LINE_U_HZ = 0.001
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,7 @@ def about_counter(seen: Counted) -> list[Finding]:
         Statement(
             "what a mark on the rim counts",
             "chapter on the spin counter",
-            "(taken as the spin)",
+            "",
             f"turns about the vertical, ω₃/cos θ: {1e3 * high[0]:+.0f} mHz at {seen.spin[0]:.0f} Hz, {1e3 * high[-1]:+.0f} mHz at "
             f"{seen.spin[-1]:.1f} Hz; 1/cos θ explains all but {1e3 * np.sqrt(np.mean(rest**2)):.0f} mHz (rms)",
             holds=bool(high[-1] > 0.02 and np.sqrt(np.mean(rest**2)) < 0.3 * high.max()),
@@ -119,7 +121,7 @@ def about_counter(seen: Counted) -> list[Finding]:
         Statement(
             "what that does to the law of drag",
             "the spin-downs' figures",
-            "(not discussed)",
+            "",
             f"true n = 1.5: the spin ω₃ itself gives n = {of_spin.value:.2f}, the counts n = {of_count.value:.2f}; the tilt "
             f"grows towards the resonance at {resonance:.1f} Hz, to {seen.tilt[-1]:.3f} rad",
             holds=abs(of_spin.value - 1.5) < 0.03 and of_count.value > of_spin.value + 0.02,
@@ -137,7 +139,7 @@ def about_lock() -> list[Finding]:
         motion = simulate(scene, HELD_S, tolerance=1e-7, rate=float(math.ceil(rate_for(scene))))
         lines = [line for line in lines_of(motion).lines if abs(line.frequency - drive) < 1.0]
         found.append(min(lines, key=lambda line: abs(line.frequency - drive)).frequency)
-    fit = fit_sweep(Sweep(DRIVES_HZ, np.array(found)))
+    fit = fit_sweep(Sweep(DRIVES_HZ, np.array(found), np.full(DRIVES_HZ.size, LINE_U_HZ)))
     line = fit.line
     printed = THESIS["measured.slope"]
     p = fit.p_locked

@@ -29,6 +29,7 @@ class Verdict(Enum):
 
     AGREES = "agrees"
     DIFFERS = "differs, for the reason shown"
+    ADDED = "found here, nothing is published"
     UNEXPECTED = "UNEXPECTED"
 
 
@@ -148,7 +149,7 @@ class Check:
     @property
     def published_text(self) -> str:
         """As printed, with its unit."""
-        return f"{self.published.text} {in_words(self.published.unit)}".strip()
+        return f"{_raised(self.published.text)} {in_words(self.published.unit)}".strip()
 
     @property
     def ours_text(self) -> str:
@@ -168,12 +169,26 @@ class Check:
 
 
 def _like(value: float, published: Printed) -> str:
-    """A number with as many decimals as the print has and one more, so that its rounding can be seen."""
+    """A number with as many decimals as the print has and one more, so that its rounding can be seen, at least two.
+
+    >>> from levilab.stability.published.printed import Printed
+    >>> _like(22.0799, Printed("22.06", "Hz", "", "")), _like(1.76004e-5, Printed("1.760e-5", "1/rad", "", ""))
+    ('22.080', '1.7600×10⁻⁵')
+    """
     mantissa, _, power = published.text.lower().partition("e")
-    decimals = len(mantissa.partition(".")[2]) + 1
+    decimals = max(len(mantissa.partition(".")[2]) + 1, 2)
     if not power:
         return f"{value:.{decimals}f}"
-    return f"{value / 10.0 ** int(power):.{decimals}f}e{int(power)}"
+    return _raised(f"{value / 10.0 ** int(power):.{decimals}f}e{int(power)}")
+
+
+def _raised(text: str) -> str:
+    """A number's text with its power of ten as people write it."""
+    mantissa, _, power = text.lower().partition("e")
+    return f"{mantissa}×10{power.translate(_HIGH)}" if power else text
+
+
+_HIGH = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @dataclass(frozen=True)
@@ -244,7 +259,7 @@ class Statement:
     Attributes:
         name: what is tried.
         place: of the sentence.
-        said: the sentence, in our words.
+        said: the sentence, in our words; empty for a fact that the source does not have.
         found: what we found, with its numbers.
         holds: whether that is what the sentence says.
         reason: why it differs, where it does and the reason was found to hold; empty: it must hold.
@@ -259,8 +274,8 @@ class Statement:
 
     @property
     def published_text(self) -> str:
-        """The sentence."""
-        return self.said
+        """The sentence, a dash for none."""
+        return self.said or "—"
 
     @property
     def ours_text(self) -> str:
@@ -271,13 +286,13 @@ class Statement:
     def verdict(self) -> Verdict:
         """What trying it says."""
         if self.holds:
-            return Verdict.AGREES
+            return Verdict.AGREES if self.said else Verdict.ADDED
         return Verdict.DIFFERS if self.reason else Verdict.UNEXPECTED
 
     @property
     def why(self) -> str:
-        """How it was tried, or why it differs."""
-        return "tried" if self.holds else self.reason
+        """Why it differs; empty where it holds."""
+        return "" if self.holds else self.reason
 
 
 def counts(findings: Iterable[Finding]) -> dict[Verdict, int]:

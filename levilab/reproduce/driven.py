@@ -72,13 +72,10 @@ def wave(lines: AxisLines, name: str) -> float:
     return next((line.frequency for line in lines.lines if line.name == name), math.nan)
 
 
-def swing(motion: Trajectory) -> float:
-    """The frequency of the spin's swing about the drive, from its crossings upward through its mean [Hz]."""
-    off = motion.spin_hz - motion.spin_hz.mean()
-    up = np.flatnonzero((off[:-1] < 0) & (off[1:] >= 0))
-    # the wobble crosses the mean several times a swing: crossings closer than a second are one
-    starts = up[np.concatenate([[True], np.diff(motion.time[up]) > 1.0])]
-    return float((starts.size - 1) / (motion.time[starts[-1]] - motion.time[starts[0]]))
+def sideband(lines: AxisLines) -> float:
+    """The distance of the sidebands next to the drive's line [Hz]: the spin's swing about the drive."""
+    drive = wave(lines, "drive")
+    return min((abs(line.frequency - drive) for line in lines.lines if line.name.startswith("drive ")), default=math.nan)
 
 
 def of_spin(motion: Trajectory, lines: AxisLines) -> list[Finding]:
@@ -86,7 +83,6 @@ def of_spin(motion: Trajectory, lines: AxisLines) -> list[Finding]:
     spin, drive = motion.spin_hz, THESIS["driven.drive"]
     turns = float(np.trapezoid(spin, motion.time)) / float(motion.time[-1])
     locked = is_locked(motion.scene, motion.states, survived=motion.survived)
-    sideband = swing(motion)
     early = lines_of(simulate(motion.scene, WINDOW_S, tolerance=TOLERANCE, rate=float(math.ceil(rate_for(motion.scene)))))
     precession = wave(early, "precession")
     return [
@@ -121,11 +117,10 @@ def of_spin(motion: Trajectory, lines: AxisLines) -> list[Finding]:
         Check(
             "distance of the sidebands, the spin's swing about the drive",
             THESIS["driven.sideband"],
-            Estimate(sideband, None, "Hz"),
+            Estimate(sideband(lines), None, "Hz"),
             Within(
-                early.resolution / 2,
-                f"a record of {WINDOW_S:g} s has a line each {early.resolution / 2:.2f} Hz; the swing is a pendulum's, and "
-                "slower the wider it is",
+                1 / WINDOW_S,
+                f"a bin of a record of {WINDOW_S:g} s is {1e3 / WINDOW_S:.0f} mHz wide; the place of a line between bins is found here",
             ),
         ),
     ]
@@ -147,7 +142,7 @@ def of_azimuth(found: Azimuth, lines: AxisLines) -> list[Finding]:
         Statement(
             "its irregularity comes from passages near θ = 0",
             "figure of the driven precession",
-            "(no reason is given)",
+            "",
             f"φ̇ is beyond the nutation or backwards {100 * found.share:.0f} % of the time; the median tilt is then "
             f"{1e3 * found.tilt_then:.0f} mrad, and {1e3 * found.tilt_ever:.0f} mrad at all times",
             holds=found.tilt_then < 0.7 * found.tilt_ever,
@@ -155,7 +150,7 @@ def of_azimuth(found: Azimuth, lines: AxisLines) -> list[Finding]:
         Statement(
             "n_x + i n_y of the same run is regular",
             "figure of the driven precession",
-            "(not analysed)",
+            "",
             f"{len(named)} lines, each with a name, hold {100 * power / all_power:.0f} % of its power",
             holds=power > 0.8 * all_power,
         ),

@@ -45,7 +45,7 @@ def rate(scene: Scene, value: Callable[[Trajectory], Array]) -> float:
     return (ends[0] - ends[1]) / (2 * _H_S)
 
 
-def bend(scene: Scene, value: Callable[[Trajectory], Array], h: float = 2e-4) -> float:
+def bend(scene: Scene, value: Callable[[Trajectory], Array], h: float = 5e-5) -> float:
     """The second rate of change at the start."""
     motions = [simulate(scene, sign * h, tolerance=1e-14, rate=None, step=h / 8) for sign in (1, -1)]
     after, before = (float(value(one)[-1]) for one in motions)

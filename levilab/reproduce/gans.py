@@ -123,8 +123,9 @@ def make() -> Found:
         Statement(
             "stable heights over a ring of dipoles",
             "the model's polynomials",
-            f"{by_hand[0]:.5f} to {by_hand[1]:.5f} R (zeros of the polynomials)",
-            f"{low:.5f} to {high:.5f} R (windows of the base's field)",
+            "",
+            f"{low:.5f} to {high:.5f} R (windows of the base's field), {by_hand[0]:.5f} to {by_hand[1]:.5f} R (zeros of the "
+            "polynomials)",
             holds=abs(low / by_hand[0] - 1) < 1e-5 and abs(high / by_hand[1] - 1) < 1e-5,
         ),
         Statement(

@@ -13,7 +13,7 @@ from levilab.present.document.blocks import Note, Picture
 from levilab.reproduce.chapter import Found
 from levilab.reproduce.check import Because, Check, Statement, Within
 from levilab.reproduce.figure import Scans, limits_figure
-from levilab.reproduce.tops import FALL_M, MASS_KG, THESIS, Array, Flags, many, scan, started, survivors
+from levilab.reproduce.tops import DURATION_S, FALL_M, MASS_KG, THESIS, Array, Flags, many, scan, started, survivors
 from levilab.simulator.equilibrium import stability_of
 from levilab.stability.scan import all_up_until, last_up, lower_limit, upper_edges
 from levilab.stability.thesis import SIMULATED_HZ, STARTS
@@ -44,12 +44,14 @@ class Upper:
         last: the highest one that is up [Hz].
         edges: where the scan changes from up to lost, shape (n,) [Hz].
         up: which are up, of the spins of the scan.
+        printed_lasts: how long a top of the thesis's limit lasts, up to the duration of the scan [s].
     """
 
     until: float
     last: float
     edges: Array
     up: Flags
+    printed_lasts: float
 
 
 def lower_over_masses(name: str) -> Array:
@@ -70,7 +72,8 @@ def best_mass(lower: dict[str, Array]) -> tuple[float, Array]:
 def upper_scan(name: str, spins: Array) -> Upper:
     """Scan for the upper limit from a start."""
     up = survivors(started(name), spins)
-    return Upper(all_up_until(spins, up), last_up(spins, up), upper_edges(spins, up), up)
+    lasts = float(many(started(name), {"start.spin_hz": [SIMULATED_HZ[name][1]]}).time[0])
+    return Upper(all_up_until(spins, up), last_up(spins, up), upper_edges(spins, up), up, lasts)
 
 
 def falls(name: str, *settings: str) -> Array:
@@ -93,13 +96,13 @@ def lower_checks(lower: dict[str, Array], mass: float) -> list[Finding]:
     ]
     for name in STARTS:
         near = lower[name][max(at - 1, 0) : at + 2]
-        room = STEP_HZ + float(np.nanmax(near) - np.nanmin(near)) / 2
+        room = 2 * STEP_HZ + float(np.nanmax(near) - np.nanmin(near)) / 2
         found.append(
             Check(
                 f"{name}: lower limit",
                 THESIS[f"limits.lower.{name}"],
                 Estimate(float(lower[name][at]), None, "Hz"),
-                Within(room, f"a step of the scan, {STEP_HZ:g} Hz, and 0.005 g of mass"),
+                Within(room, f"a step of {STEP_HZ:g} Hz in each of two scans, and half a step of mass, 0.0025 g"),
             )
         )
     return found
@@ -113,13 +116,16 @@ def upper_checks(uppers: dict[str, Upper]) -> list[Finding]:
     for name, one in uppers.items():
         printed = THESIS[f"limits.upper.{name}"]
         islands = int(np.sum(one.edges > one.until + UPPER_STEP_HZ))
-        inside = one.until - 0.5 <= printed.value <= one.last + 0.5
         nearest = float(one.edges[np.argmin(np.abs(one.edges - printed.value))])
-        why = (
-            f"there is no single limit: every top is up to {one.until:.2f} Hz, the last one at {one.last:.2f} Hz, with "
-            f"{islands} islands between at a step of {UPPER_STEP_HZ:g} Hz, and {printed.text} Hz lies among them; the "
-            f"nearest edge from up to lost is at {nearest:.2f} Hz. The linear window ends at {edge.spins[0][1]:.2f} Hz"
+        late = f"a top of {printed.text} Hz " + (
+            "is still up" if one.printed_lasts >= DURATION_S else f"is lost after {one.printed_lasts:.1f} s"
         )
+        why = (
+            f"there is no single limit: every top is up to {one.until:.2f} Hz and the last one has {one.last:.2f} Hz, with "
+            f"{islands} islands between at a step of {UPPER_STEP_HZ:g} Hz; the nearest edge from up to lost is at "
+            f"{nearest:.2f} Hz, and {late}. Small motions are stable up to {edge.spins[0][1]:.2f} Hz"
+        )
+        inside = one.until - 0.5 <= printed.value <= one.last + 0.5
         found.append(
             Check(
                 f"{name}: upper limit, all tops up to",
@@ -165,13 +171,15 @@ def misprint(with_030: Array) -> tuple[list[Finding], Array]:
     up = many(scene, {"start.spin_hz": spins[None, :], "start.position_m.0": ASIDE_M[:, None]}).survived
     lower = np.array([lower_limit(spins, row) for row in up])
     aside = float(np.interp(printed.value, lower[:-1], ASIDE_M[:-1])) if np.all(np.diff(lower[:-1]) > 0) else np.nan
+    # the scan's step, as an even distribution, over the slope of the limit
+    u_aside = COARSE_HZ / 12**0.5 * 0.001 / (lower[3] - lower[1])
     by_x = {round(100 * x, 2): limit for x, limit in zip(ASIDE_M.tolist(), lower.tolist(), strict=True)}
     drag = falls("IC3", "start.position_m=[0.005,0,0.0725]")
     found: list[Finding] = [
         Check(
             "IC3: the start's place beside the axis that gives the printed lower limit",
             THESIS["limits.start.IC3_x"],
-            Estimate(100 * aside, None, "cm"),
+            Estimate(100 * aside, 100 * u_aside, "cm"),
             Because(
                 f"the lower limit is {by_x[0.5]:.2f} Hz from x = 0.50 cm as printed and {by_x[0.3]:.2f} Hz from 0.30 cm, "
                 f"with steps of {COARSE_HZ:g} Hz; printed is {printed.text} Hz: a 3 read or printed as 5",

@@ -64,8 +64,8 @@ def modes() -> list[Finding]:
         Statement(
             f"IC2: {name} in the spectrum of n_x + i n_y",
             "theory of small motions",
-            f"{frequency:.3f} Hz (root of the quartic)",
-            f"{lines.get(name, math.nan):.3f} Hz (line of the simulated motion)",
+            "",
+            f"{lines.get(name, math.nan):.3f} Hz (line of the simulated motion), {frequency:.3f} Hz (root of the quartic)",
             holds=abs(off[name]) < NEAR,
         )
         for name, frequency in theory.items()
@@ -105,15 +105,15 @@ def tilted() -> tuple[list[Finding], tuple[Trajectory, Trajectory]]:
     ]
     spin = scene.start.spin_hz
     wobble = [max((x.amplitude for x in one.lines if abs(x.frequency - spin) < 0.05), default=0.0) for one in lines]
-    small = math.degrees(math.asin(0.03 / 1.15))
     found: list[Finding] = [
         Check(
             "angle between moment and axis",
             printed,
             Estimate(angle, None, "°"),
             Because(
-                f"μ·(0.03, 0, 0.97) leans by arctan(0.03/0.97) = {angle:.4f}°; and its length is {norm:.6f} μ, {100 * (1 - norm):.0f} % "
-                f"too short, so that a lighter top floats; 1.5° would be (0.026, 0, 0.97) (printed 0.03: {small:.2f}°)",
+                f"μ·(0.03, 0, 0.97) leans by arctan(0.03/0.97) = {angle:.4f}°, and it has {norm:.6f} of the length of μ, "
+                f"{100 * (1 - norm):.0f} % less, so that a lighter top floats; 1.5° would be "
+                f"({along * math.tan(math.radians(printed.value)):.4f}, 0, 0.97)",
                 abs(angle - 1.7715) < 1e-3 and abs(norm - 0.970464) < 1e-6,
             ),
         ),

@@ -61,7 +61,7 @@ def make() -> Found:
         Statement(
             "rounding to 0.1 Hz",
             THESIS["measured.limits.0"].place,
-            "(not discussed)",
+            "",
             f"adds {1e3 * step:.0f} mHz to the scatter, {100 * (1 - math.sqrt(1 - (step / found.scatter.value) ** 2)):.1f} % "
             f"of it, and {1e3 * step / math.sqrt(10):.0f} mHz to the mean: nothing to correct",
             holds=step < 0.2 * found.scatter.value,
@@ -69,7 +69,7 @@ def make() -> Found:
         Statement(
             "are the ten normal?",
             THESIS["measured.limits.0"].place,
-            "(taken as such)",
+            "",
             f"Shapiro and Wilk: W = {w:.3f}, p = {p:.2f}; no outlier, no trend ({1e3 * found.trend.value:+.0f} mHz a top, "
             f"p = {found.trend_p:.2f}); ten values leave the scatter ± {found.scatter.u:.2f} Hz",
             holds=p > 0.05 and not found.outliers,
