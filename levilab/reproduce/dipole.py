@@ -97,10 +97,10 @@ def make() -> Found:
     picture = Picture(
         "dipole",
         "A disc is lifted otherwise than a point.",
-        "What a disc of 1.44 cm radius and 0.33 cm height feels, over what a point of the same moment feels, along the axis: "
-        "energy, force, and the second derivative of the field, which decides where the motion up and down is stable. "
-        "Dashed: 7.3 cm.",
-        "Energy, force and second derivative of a disc over those of a point",
+        "Left: energy and force of a disc of 1.44 cm radius and 0.33 cm height over those of a point of the same moment, "
+        "along the axis. Right: the second derivative of the field that each of them feels, which decides where the motion "
+        "up and down is stable. Dotted: 7.3 cm.",
+        "Energy and force of a disc over those of a point, and the second derivative of the field of both",
         partial(dipole_figure, 100 * z, fields, 100 * HEIGHT_M),
     )
     said = "The magnet of the top is 1.44 cm in radius and floats 7 cm above its base: how much of a point is it?"

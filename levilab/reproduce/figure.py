@@ -64,10 +64,9 @@ def _band(axes: Axes, time: Array, values: Array, colour: str) -> None:
     if time.size <= 2 * PIECES:
         axes.plot(time, values, color=colour, linewidth=0.8)
         return
-    n = time.size // PIECES
-    cut = values[: n * PIECES].reshape(PIECES, n)
-    at = time[: n * PIECES].reshape(PIECES, n).mean(axis=1)
-    axes.fill_between(at, cut.min(axis=1), cut.max(axis=1), color=colour, linewidth=0.4)
+    first = np.linspace(0, time.size, PIECES, endpoint=False).astype(int)
+    least, greatest = (function.reduceat(values, first) for function in (np.minimum, np.maximum))
+    axes.fill_between(time[first], least, greatest, color=colour, linewidth=0.4)
 
 
 # --- where tops float ---
@@ -127,7 +126,7 @@ def window_figure(over: MassWindows, estimate: float) -> Figure:
     from levilab.reproduce.tops import MASS_KG
     from levilab.stability.thesis import SIMULATED_HZ
 
-    figure, (axes,) = _figure(3.2, (0.085, 0.15, 0.6, 0.79))
+    figure, (axes,) = _figure(3.2, (0.085, 0.15, 0.57, 0.79))
     masses = 1e3 * over.masses
     up = LOOKS["up"].colour
     axes.fill_between(masses, over.slowest, over.fastest, color=up, alpha=0.25, linewidth=0, label="small motions stay small")
@@ -135,9 +134,9 @@ def window_figure(over: MassWindows, estimate: float) -> Figure:
     axes.plot(masses, over.fastest, color=up)
     limits = np.array(list(SIMULATED_HZ.values()))
     axes.plot(np.full(limits.size, 1e3 * MASS_KG), limits.ravel(), **_THESIS, label="thesis, four starts, simulated")
-    axes.axhline(estimate, **LOOKS["theory"].as_line, label="thesis's estimate of the lower limit")
+    axes.axhline(estimate, **LOOKS["theory"].as_line, label="its estimate of the lower limit")
     axes.set(xlabel="mass  [g]", ylabel="spin  [Hz]", ylim=(0, 100), xlim=(masses[0], masses[-1]))
-    figure.legend(loc="center left", bbox_to_anchor=(0.69, 0.5))
+    figure.legend(loc="center left", bbox_to_anchor=(0.66, 0.5))
     return figure
 
 
@@ -171,7 +170,7 @@ class Scans:
 def limits_figure(shown: Scans) -> Figure:
     """Scans of the upper limit, and what the lower ones depend on."""
     figure, panels = _figure(
-        5.2, (0.085, 0.63, 0.9, 0.26), (0.085, 0.1, 0.31, 0.37), (0.475, 0.1, 0.22, 0.37), (0.785, 0.1, 0.2, 0.37)
+        5.2, (0.085, 0.63, 0.9, 0.26), (0.085, 0.1, 0.28, 0.37), (0.475, 0.1, 0.22, 0.37), (0.785, 0.1, 0.2, 0.37)
     )
     _draw_scans(panels[0], shown)
     figure.legend(handles=[_UP, _LOST, Line2D([], [], **_THESIS, label="thesis")], loc="upper right", ncols=3)
@@ -205,9 +204,13 @@ def _draw_lower(axes: Axes, shown: Scans) -> None:
     for (name, values), colour in zip(shown.lower.items(), SERIES, strict=False):
         axes.plot(shown.masses, values, color=colour)
         axes.axhline(SIMULATED_HZ[name][0], color=colour, linestyle=(0, (4, 2)), linewidth=0.8)
-        at = np.flatnonzero(np.isfinite(values))[0]
-        axes.annotate(name, (shown.masses[at], values[at]), (2, -10), textcoords="offset points", color=colour, fontsize=7)
-    axes.set(xlabel="mass  [g]", ylabel="lower limit  [Hz]", ylim=(21.6, 23.3))
+        axes.annotate(
+            name, (shown.masses[-1], SIMULATED_HZ[name][0]), (4, 0), textcoords="offset points", color=colour, fontsize=8,
+            va="center", annotation_clip=False,
+        )  # fmt: skip
+    axes.set(
+        xlabel="mass  [g]", ylabel="lower limit  [Hz]", ylim=(21.6, 23.3), xlim=(shown.masses[0], shown.masses[-1])
+    )
     axes.set_title("Lower limit over mass")
 
 
@@ -297,7 +300,7 @@ def tilted_figure(motions: tuple[Trajectory, Trajectory]) -> Figure:
 @_styled
 def driven_figure(motion: Trajectory) -> Figure:
     """The spin of the driven top."""
-    figure, panels = _figure(3.8, (0.085, 0.59, 0.9, 0.34), (0.085, 0.12, 0.9, 0.34))
+    figure, panels = _figure(4.2, (0.085, 0.62, 0.89, 0.31), (0.085, 0.11, 0.89, 0.31))
     drive = motion.scene.drive.frequency_hz
     early = motion.time <= 20.0
     _band(panels[0], motion.time, motion.spin_hz, LOOKS["top"].colour)
@@ -315,6 +318,8 @@ def driven_figure(motion: Trajectory) -> Figure:
 
 #: Rates of the azimuth are cut here for the figure [Hz].
 _CUT_HZ = 120.0
+#: Lines that are slower have one name together: they stand too near to each other.
+_SLOW_HZ = 2.0
 
 
 @_styled
@@ -332,17 +337,20 @@ def azimuth_figure(motion: Trajectory, found: Azimuth, lines: AxisLines) -> Figu
     panels[1].set_title("... is large near θ = 0")
     assert lines.spectrum is not None
     frequency, amplitude = lines.spectrum
-    near = (frequency > -5) & (frequency < 60)
+    near = (frequency > -13) & (frequency < 60)
     axes = panels[2]
     axes.semilogy(frequency[near], 1e3 * amplitude[near], color=BLUE, linewidth=0.5)
     highest = 1e3 * max(line.amplitude for line in lines.lines)
-    for line in lines.lines:
-        if line.name and not line.sideband:
+    named = [line for line in lines.lines if line.name and not line.sideband]
+    for line in named:
+        if abs(line.frequency) > _SLOW_HZ:
             axes.annotate(
                 f"{line.name}\n{line.frequency:.2f}", (line.frequency, 1e3 * line.amplitude), (0, 5),
-                textcoords="offset points", ha="center" if line.frequency > 2 or line.frequency < -2 else "left", fontsize=7,
+                textcoords="offset points", ha="center", fontsize=7,
             )  # fmt: skip
-    axes.set(xlim=(-5, 60), ylim=(1e-4 * highest, 8 * highest), xlabel="frequency  [Hz]", ylabel="|n_x + i n_y|  [mrad]")
+    slow = sorted(line.frequency for line in named if abs(line.frequency) <= _SLOW_HZ)
+    axes.text(-2.6, 0.2 * highest, "swings sideways\n" + ", ".join(f"{f:.2f}" for f in slow), ha="right", fontsize=7)
+    axes.set(xlim=(-13, 60), ylim=(1e-4 * highest, 8 * highest), xlabel="frequency  [Hz]", ylabel="|n_x + i n_y|  [mrad]")
     axes.set_title("The axis itself: lines")
     return figure
 
@@ -355,6 +363,7 @@ def spindown_figure(runs: Sequence[tuple[Array, SpinDown]]) -> Figure:
     """What three laws leave over of the runs."""
     laws = (("stokes", "n = 1"), ("disc", "n = 3/2"), ("newton", "n = 2"))
     figure, panels = _figure(3.0, *[(0.085 + k * 0.305, 0.15, 0.285, 0.75) for k in range(3)])
+    most = 1050 * max(float(np.abs(fit.fit(law).residuals).max()) for _, fit in runs for law, _ in laws)
     for axes, (law, name) in zip(panels, laws, strict=True):
         for number, ((time, fit), marker) in enumerate(zip(runs, "osD^", strict=False), start=1):
             axes.plot(
@@ -362,7 +371,7 @@ def spindown_figure(runs: Sequence[tuple[Array, SpinDown]]) -> Figure:
                 markerfacecolor="white", markersize=3.5, label=f"run {number}",
             )  # fmt: skip
         axes.axhline(0, color=BLACK, linewidth=0.6)
-        axes.set(xlabel="time  [s]", ylim=(-290, 290))
+        axes.set(xlabel="time  [s]", ylim=(-most, most))
         axes.set_title(f"{name} ({law})")
         axes.tick_params(labelleft=axes is panels[0])
     panels[0].set_ylabel("reading − fit  [mHz]")
@@ -414,16 +423,23 @@ def counter_figure(spin: Array, count: Array, cosine: Array) -> Figure:
 
 @_styled
 def dipole_figure(z: Array, fields: tuple[Array, Array], height: float) -> Figure:
-    """What a disc feels over what a point feels."""
-    figure, (axes,) = _figure(3.0, (0.085, 0.15, 0.66, 0.8))
-    names = (("energy, B", BLUE, "-"), ("force, B′", VERMILION, (0, (4, 2))), ("stiffness, B″", GREEN, (0, (6, 2, 1, 2))))
-    for k, (name, colour, line) in enumerate(names):
-        ratio = 100 * (fields[1][k] / fields[0][k] - 1)
-        axes.plot(z, np.where(np.abs(ratio) < 200, ratio, np.nan), color=colour, linestyle=line, label=name)
-    axes.axvline(height, color=GREY, linewidth=0.8, linestyle=(0, (4, 2)))
-    axes.axhline(0, color=BLACK, linewidth=0.6)
-    axes.set(xlabel="height z  [cm]", ylabel="disc over point, less 1  [%]", xlim=(z[0], z[-1]), ylim=(-60, 200))
-    figure.legend(loc="center left", bbox_to_anchor=(0.77, 0.5))
+    """What a disc feels over what a point feels, and the curvature of the field of both."""
+    figure, panels = _figure(2.9, (0.085, 0.17, 0.4, 0.74), (0.575, 0.17, 0.41, 0.74))
+    left, right = panels
+    for k, name, colour, line in ((0, "energy, B", BLUE, "-"), (1, "force, B′", VERMILION, (0, (4, 2)))):
+        left.plot(z, 100 * (fields[1][k] / fields[0][k] - 1), color=colour, linestyle=line, label=name)
+    left.set_title("disc over point, less 1")
+    left.set_ylabel("[%]")
+    # 1 T/m² is 0.1 mT/cm²
+    for field, name, colour, line in ((fields[0], "a point", BLACK, (0, (4, 2))), (fields[1], "the disc", GREEN, "-")):
+        right.plot(z, 0.1 * field[2], color=colour, linestyle=line, label=name)
+    right.set_title("second derivative: above 0 it is stable")
+    right.set_ylabel("B″  [mT/cm²]")
+    for axes in panels:
+        axes.axhline(0, color=BLACK, linewidth=0.6)
+        axes.axvline(height, color=GREY, linewidth=0.8, linestyle=":")
+        axes.set(xlabel="height z  [cm]", xlim=(z[0], z[-1]))
+        axes.legend(loc="upper right" if axes is left else "lower right")
     return figure
 
 
@@ -447,7 +463,10 @@ def simon_figure(
         axes.spines["left"].set_visible(False)
     panels[-1].set_xlabel("spin  [rad/s]")
     edge_line = Line2D([], [], **LOOKS["theory"].as_line, label="quartic")
-    figure.legend(handles=[_UP, _LOST, edge_line, Line2D([], [], **_THESIS, label="Table I")], loc="upper right", ncols=4)
+    figure.legend(
+        handles=[_UP, _LOST, edge_line, Line2D([], [], **_THESIS, label="Table I")],
+        loc="upper right", bbox_to_anchor=(0.975, 1.0), ncols=4,
+    )  # fmt: skip
     return figure
 
 
@@ -461,7 +480,7 @@ def gans_figure(spins: Array, tilts: Array, up: Flags, window: tuple[float, floa
         if math.isfinite(edge):
             axes.axvline(edge, **LOOKS["theory"].as_line)
     axes.set(xlabel="spin  [√(g/R)]", ylabel="tilt of the start  [rad]", xlim=(spins[0], spins[-1]))
-    line = Line2D([], [], **LOOKS["theory"].as_line, label="window of small motions")
+    line = Line2D([], [], **LOOKS["theory"].as_line, label="small motions")
     figure.legend(handles=[_UP, _LOST, line], loc="center left", bbox_to_anchor=(0.76, 0.5))
     return figure
 

@@ -32,7 +32,7 @@ RADIUS_M, HALF_WIDTH = 0.0347, 1e-3
 MASS_KG, MOMENT_A_M2, GRAVITY = 0.02135, 0.65, 9.82
 DURATION_S = 30.0
 #: Spins in √(g/R), and tilts [rad].
-SPINS, TILTS = np.linspace(3.0, 24.0, 43), np.geomspace(0.002, 0.6, 26)
+SPINS, TILTS = np.linspace(4.0, 10.5, 66), np.geomspace(0.002, 0.3, 26)
 #: Tilts for the amplitude of the motion [rad].
 SMALL_TILTS = np.geomspace(1e-4, 0.02, 8)
 

@@ -133,10 +133,10 @@ def make() -> Found:
     shown = [contours(own.changed({"base.field": "exact", "top.mass_kg": mass})) for mass in masses]
     picture = Picture(
         "contours",
-        "The potential's trap is shallow, and heavier tops have less of it.",
+        "The trap is shallow, and deepest in the middle of the masses.",
         "Contours of mgz + |μ||B| over the distance from the axis and the height, in steps of 2 µJ from the place where "
-        "the top rests (cross), in the exact field of the base. The line that is drawn bold is the rim over which a top "
-        "escapes. All that is left of the trap at 25.45 g is a dimple.",
+        "the top rests (cross), in the exact field of the base. The bold line is the rim over which a top "
+        "escapes: sideways and up for light tops, down for heavy ones.",
         "Contours of the potential for tops of three masses",
         partial(contour_figure, tuple(shown), tuple(f"{1e3 * mass:.2f} g" for mass in masses)),
     )
