@@ -165,7 +165,7 @@ def crosscheck() -> Callable[..., None]:
 
 @app.command(cls=Later, epilog="Example: levilab reproduce --only limits,errata -o reproduce.html")
 def reproduce() -> Callable[..., None]:
-    """Make the tables and figures of the Levitron thesis anew, and those of two papers: the published value beside ours.
+    """Make the tables and figures of the Levitron thesis and of two papers anew: published value beside ours.
 
     Prints published, ours and agreement, and writes all with figures as a report.  A minute on two cores.  Ends with 1
     where a value neither agrees nor differs for the reason that is shown.

@@ -26,8 +26,8 @@ def reproduce(
         str,
         typer.Option(
             metavar="CHAPTER,…",
-            help="These chapters alone: stability, limits, paths, driven, spindown, statistics, dipole, errata, beyond, "
-            "simon, gans.",
+            help="These chapters alone: stability, limits, paths, driven, spindown, statistics, dipole, errata, "
+            "beyond, simon, gans.",
         ),
     ] = "",
     as_json: Json = False,

@@ -98,7 +98,9 @@ def about_counter(seen: Counted) -> list[Finding]:
     """What a counter counts, and what that does to the exponent of the drag."""
     laws = ("disc", "power")
     of_spin, of_count = (
-        fit_spin_down(seen.time, values, 0.003, laws=laws, tilt=False, keep_outliers=True).fit("power").parameters["exponent"]
+        fit_spin_down(seen.time, values, 0.003, laws=laws, tilt=False, keep_outliers=True)
+        .fit("power")
+        .parameters["exponent"]
         for values in (seen.spin, seen.count)
     )
     assert of_spin.value is not None
@@ -114,7 +116,8 @@ def about_counter(seen: Counted) -> list[Finding]:
             "what a mark on the rim counts",
             "chapter on the spin counter",
             "",
-            f"turns about the vertical, ω₃/cos θ: {1e3 * high[0]:+.0f} mHz at {seen.spin[0]:.0f} Hz, {1e3 * high[-1]:+.0f} mHz at "
+            f"turns about the vertical, ω₃/cos θ: {1e3 * high[0]:+.0f} mHz at {seen.spin[0]:.0f} Hz, "
+            f"{1e3 * high[-1]:+.0f} mHz at "
             f"{seen.spin[-1]:.1f} Hz; 1/cos θ explains all but {1e3 * np.sqrt(np.mean(rest**2)):.0f} mHz (rms)",
             holds=bool(high[-1] > 0.02 and np.sqrt(np.mean(rest**2)) < 0.3 * high.max()),
         ),
@@ -122,7 +125,8 @@ def about_counter(seen: Counted) -> list[Finding]:
             "what that does to the law of drag",
             "the spin-downs' figures",
             "",
-            f"true n = 1.5: the spin ω₃ itself gives n = {of_spin.value:.2f}, the counts n = {of_count.value:.2f}; the tilt "
+            f"true n = 1.5: the spin ω₃ itself gives n = {of_spin.value:.2f}, the counts n = {of_count.value:.2f}; "
+            "the tilt "
             f"grows towards the resonance at {resonance:.1f} Hz, to {seen.tilt[-1]:.3f} rad",
             holds=abs(of_spin.value - 1.5) < 0.03 and of_count.value > of_spin.value + 0.02,
         ),
@@ -149,9 +153,12 @@ def about_lock() -> list[Finding]:
             printed,
             Estimate(line.slope, line.u_slope, ""),
             Because(
-                f"a locked top wobbles at the drive's frequency: slope 1 and intercept 0 jointly (here {line.slope:.6f} and "
-                f"{1e3 * line.intercept:.2f} mHz, p = {p:.2f}); 1.05 is printed without uncertainty, number of readings and "
-                f"range, so how far it is from 1 cannot be said: from {DRIVES_HZ[0]:g} to {DRIVES_HZ[-1]:g} Hz it would be {0.05 * float(np.ptp(DRIVES_HZ)):.1f} Hz",
+                "a locked top wobbles at the drive's frequency: slope 1 and intercept 0 jointly (here "
+                f"{line.slope:.6f} and "
+                f"{1e3 * line.intercept:.2f} mHz, p = {p:.2f}); 1.05 is printed without uncertainty, number of "
+                "readings and "
+                f"range, so how far it is from 1 cannot be said: from {DRIVES_HZ[0]:g} to {DRIVES_HZ[-1]:g} Hz it "
+                f"would be {0.05 * float(np.ptp(DRIVES_HZ)):.1f} Hz",
                 abs(line.slope - 1) < 1e-3 and (p or 0.0) > 0.01,
             ),
         )
@@ -167,7 +174,8 @@ def make() -> Found:
         Picture(
             "window",
             "The exact window, and four limits each way.",
-            "The window of spin in which small motions stay small, over the mass of the top (area); dots: the limits that the "
+            "The window of spin in which small motions stay small, over the mass of the top (area); dots: the limits "
+            "that the "
             "thesis simulated from four starts, at the mass that fits them; line: its own estimate of the lower one.",
             "Window of spin over mass, with the thesis's limits",
             partial(window_figure, over, THESIS["stability.estimate"].value),
@@ -175,14 +183,16 @@ def make() -> Found:
         Picture(
             "counter",
             "A counter counts turns about the vertical.",
-            "By how much a counter's reading exceeds the spin of a simulated top (dots), and what 1/cos θ makes of the tilt "
+            "By how much a counter's reading exceeds the spin of a simulated top (dots), and what 1/cos θ makes of "
+            "the tilt "
             "(line), up to the fall.",
             "Count less spin over the spin",
             partial(counter_figure, seen.spin, seen.count, seen.cosine),
         ),
     )
     note = Note(
-        "The counter's chapter is simulated: the scene `spindown`, from 40 Hz, drag of a disc, the moment tilted by 1.77°."
+        "The counter's chapter is simulated: the scene `spindown`, from 40 Hz, drag of a disc, the moment tilted by "
+        "1.77°."
     )
     findings = [*about_window(), *about_counter(seen), *about_lock()]
     return Found(tuple(findings), (*pictures, note), "With today's means, beside what the thesis has.")

@@ -67,7 +67,8 @@ def make() -> Found:
             THESIS["dipole.energy"],
             Estimate(abs(energy), None, "%"),
             Because(
-                f"the thesis says: about. The mean of B_z over a disc is B + ½B″(h²/12 − R²/4) + …: {leading:+.2f} % from this "
+                f"the thesis says: about. The mean of B_z over a disc is B + ½B″(h²/12 − R²/4) + …: {leading:+.2f} % "
+                "from this "
                 f"term, {energy:+.2f} % in all",
                 abs(leading / energy - 1) < 0.5 and abs(energy) < THESIS["dipole.energy"].value,
             ),
@@ -80,10 +81,13 @@ def make() -> Found:
             "is the approximation good?",
             "dipole approximation",
             "the energy differs by about 1 %, so a point will do",
-            f"the force by {force:.1f} %, more than the whole window of masses, {100 * (own.heavy / own.light - 1):.1f} %; "
-            f"the heights' lower edge by {10 * (edges[0] - edges[1]):.1f} mm of {10 * 100 * (own.high - own.low):.1f} mm",
+            f"the force by {force:.1f} %, more than the whole window of masses, "
+            f"{100 * (own.heavy / own.light - 1):.1f} %; "
+            f"the heights' lower edge by {10 * (edges[0] - edges[1]):.1f} mm of "
+            f"{10 * 100 * (own.high - own.low):.1f} mm",
             holds=False,
-            reason="a force is a derivative: a small change of the energy over a short distance is a large one of its slope",
+            reason="a force is a derivative: a small change of the energy over a short distance is a large one of its "
+            "slope",
         ),
         Statement(
             "mean of B_z over the disc by two rules",
@@ -97,8 +101,10 @@ def make() -> Found:
     picture = Picture(
         "dipole",
         "A disc is lifted otherwise than a point.",
-        "Left: energy and force of a disc of 1.44 cm radius and 0.33 cm height over those of a point of the same moment, "
-        "along the axis. Right: the second derivative of the field that each of them feels, which decides where the motion "
+        "Left: energy and force of a disc of 1.44 cm radius and 0.33 cm height over those of a point of the same "
+        "moment, "
+        "along the axis. Right: the second derivative of the field that each of them feels, which decides where the "
+        "motion "
         "up and down is stable. Dotted: 7.3 cm.",
         "Energy and force of a disc over those of a point, and the second derivative of the field of both",
         partial(dipole_figure, 100 * z, fields, 100 * HEIGHT_M),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -15,8 +14,8 @@ from levilab.motion.lock import is_locked
 from levilab.present.document.blocks import Note, Picture
 from levilab.reproduce.chapter import Found
 from levilab.reproduce.check import Check, Statement, Within
-from levilab.reproduce.figure import azimuth_figure, driven_figure
-from levilab.reproduce.tops import THESIS, TOLERANCE, Array
+from levilab.reproduce.figure import Azimuth, azimuth_figure, driven_figure
+from levilab.reproduce.tops import THESIS, TOLERANCE
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
 
@@ -25,29 +24,8 @@ if TYPE_CHECKING:
     from levilab.reproduce.check import Finding
     from levilab.simulator.trajectory import Trajectory
 
-#: The run is as long as the thesis's [s]; its first part is as long as the window of a spectrum with a line each 0.1 Hz.
+#: The run is as long as the thesis's [s]; its first part, for a spectrum with two digits, is shorter.
 RUN_S, WINDOW_S = THESIS["driven.duration"].value, 30.0
-
-
-@dataclass(frozen=True)
-class Azimuth:
-    """The rate of the azimuth φ of the axis.
-
-    Attributes:
-        rate: φ̇/2π, shape (n,) [Hz].
-        tilt: θ, shape (n,) [rad].
-        near: φ̇/2π is beyond the axis's own frequencies, shape (n,).
-        share: part of the time with such a rate.
-        tilt_then: median of θ then [rad].
-        tilt_ever: median of θ [rad].
-    """
-
-    rate: Array
-    tilt: Array
-    near: Array
-    share: float
-    tilt_then: float
-    tilt_ever: float
 
 
 def azimuth(motion: Trajectory, fastest: float) -> Azimuth:
@@ -75,7 +53,9 @@ def wave(lines: AxisLines, name: str) -> float:
 def sideband(lines: AxisLines) -> float:
     """The distance of the sidebands next to the drive's line [Hz]: the spin's swing about the drive."""
     drive = wave(lines, "drive")
-    return min((abs(line.frequency - drive) for line in lines.lines if line.name.startswith("drive ")), default=math.nan)
+    return min(
+        (abs(line.frequency - drive) for line in lines.lines if line.name.startswith("drive ")), default=math.nan
+    )
 
 
 def of_spin(motion: Trajectory, lines: AxisLines) -> list[Finding]:
@@ -83,7 +63,9 @@ def of_spin(motion: Trajectory, lines: AxisLines) -> list[Finding]:
     spin, drive = motion.spin_hz, THESIS["driven.drive"]
     turns = float(np.trapezoid(spin, motion.time)) / float(motion.time[-1])
     locked = is_locked(motion.scene, motion.states, survived=motion.survived)
-    early = lines_of(simulate(motion.scene, WINDOW_S, tolerance=TOLERANCE, rate=float(math.ceil(rate_for(motion.scene)))))
+    early = lines_of(
+        simulate(motion.scene, WINDOW_S, tolerance=TOLERANCE, rate=float(math.ceil(rate_for(motion.scene))))
+    )
     precession = wave(early, "precession")
     return [
         Statement(
@@ -120,7 +102,8 @@ def of_spin(motion: Trajectory, lines: AxisLines) -> list[Finding]:
             Estimate(sideband(lines), None, "Hz"),
             Within(
                 1 / WINDOW_S,
-                f"a bin of a record of {WINDOW_S:g} s is {1e3 / WINDOW_S:.0f} mHz wide; the place of a line between bins is found here",
+                f"a bin of a record of {WINDOW_S:g} s is {1e3 / WINDOW_S:.0f} mHz wide; the place of a line between "
+                "bins is found here",
             ),
         ),
     ]
@@ -168,7 +151,8 @@ def make() -> Found:
         Picture(
             "driven",
             "The spin of a locked top swings about its drive.",
-            "Spin ω₃/2π of the thesis's driven top (ν₀ = 30.03 Hz, ν_d = 30 Hz, 24.45 g, 0.4 mT), as the band between its "
+            "Spin ω₃/2π of the thesis's driven top (ν₀ = 30.03 Hz, ν_d = 30 Hz, 24.45 g, 0.4 mT), as the band "
+            "between its "
             "least and greatest values over the whole run, and its first 20 s below; dashed: the drive.",
             "Spin of the driven top over 300 s",
             partial(driven_figure, motion),
@@ -176,8 +160,10 @@ def make() -> Found:
         Picture(
             "azimuth",
             "The azimuth's rate is wild, the axis is not.",
-            "Above: φ̇/2π over five seconds, cut at ±120 Hz, and its values over the tilt θ at the same time: large where θ "
-            "is small, since the azimuth turns by half a turn when the axis passes the vertical. Below: the spectrum of "
+            "Above: φ̇/2π over five seconds, cut at ±120 Hz, and its values over the tilt θ at the same time: large "
+            "where θ "
+            "is small, since the azimuth turns by half a turn when the axis passes the vertical. Below: the spectrum "
+            "of "
             "n_x + i n_y of the whole run, with the names of its lines.",
             "Rate of the azimuth over time and tilt, and the spectrum of the axis",
             partial(azimuth_figure, motion, rates, lines),

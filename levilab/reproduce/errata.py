@@ -417,7 +417,8 @@ def make() -> Found:
     )
     note = Note(
         "Each row: what the printed equation gives for a number, what the corrected one gives, and what is true by a "
-        "third way (a simulated motion, an exact field, a dimension). Where a slip is known by the number of its equation "
+        "third way (a simulated motion, an exact field, a dimension). Where a slip is known by the number of its "
+        "equation "
         "and a few words alone, the row says how it was read."
     )
     return Found(findings, (note,), "Slips in equations and tables of the thesis, each with a numeric test.")

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from analysis.limits import Statistics
     from analysis.spindown.fit import SpinDown
     from levilab.motion.lines import AxisLines
-    from levilab.reproduce.driven import Azimuth
     from levilab.simulator.equilibrium import MassWindows
     from levilab.simulator.trajectory import Trajectory
 
@@ -38,7 +37,13 @@ PIECES = 900
 FATES = ListedColormap([LOOKS["lost"].colour, LOOKS["up"].colour])
 _UP = Patch(color=LOOKS["up"].colour, label="up after 30 s")
 _LOST = Patch(color=LOOKS["lost"].colour, label="lost")
-_THESIS: dict[str, Any] = {"marker": "v", "color": "white", "markeredgecolor": BLACK, "linestyle": "none", "markersize": 6}
+_THESIS: dict[str, Any] = {
+    "marker": "v",
+    "color": "white",
+    "markeredgecolor": BLACK,
+    "linestyle": "none",
+    "markersize": 6,
+}
 #: Axes in parts of the figure: left, bottom, width, height.
 Box = tuple[float, float, float, float]
 
@@ -89,7 +94,7 @@ class Contours:
 
 
 def rim(shown: Contours) -> float:
-    """The energy of the lowest pass out of the trap [µJ]: the least level at which its basin reaches the picture's edge."""
+    """The energy of the lowest pass out of the trap [µJ]: up to there its basin does not reach the picture's edge."""
     from scipy.ndimage import label
 
     centre = (int(np.argmin(np.abs(shown.z - shown.height))), int(np.argmin(np.abs(shown.r))))
@@ -129,7 +134,9 @@ def window_figure(over: MassWindows, estimate: float) -> Figure:
     figure, (axes,) = _figure(3.2, (0.085, 0.15, 0.57, 0.79))
     masses = 1e3 * over.masses
     up = LOOKS["up"].colour
-    axes.fill_between(masses, over.slowest, over.fastest, color=up, alpha=0.25, linewidth=0, label="small motions stay small")
+    axes.fill_between(
+        masses, over.slowest, over.fastest, color=up, alpha=0.25, linewidth=0, label="small motions stay small"
+    )
     axes.plot(masses, over.slowest, color=up)
     axes.plot(masses, over.fastest, color=up)
     limits = np.array(list(SIMULATED_HZ.values()))
@@ -205,8 +212,8 @@ def _draw_lower(axes: Axes, shown: Scans) -> None:
         axes.plot(shown.masses, values, color=colour)
         axes.axhline(SIMULATED_HZ[name][0], color=colour, linestyle=(0, (4, 2)), linewidth=0.8)
         axes.annotate(
-            name, (shown.masses[-1], SIMULATED_HZ[name][0]), (4, 0), textcoords="offset points", color=colour, fontsize=8,
-            va="center", annotation_clip=False,
+            name, (shown.masses[-1], SIMULATED_HZ[name][0]), (4, 0), textcoords="offset points", color=colour,
+            fontsize=8, va="center", annotation_clip=False,
         )  # fmt: skip
     axes.set(
         xlabel="mass  [g]", ylabel="lower limit  [Hz]", ylim=(21.6, 23.3), xlim=(shown.masses[0], shown.masses[-1])
@@ -316,6 +323,27 @@ def driven_figure(motion: Trajectory) -> Figure:
     return figure
 
 
+@dataclass(frozen=True)
+class Azimuth:
+    """The rate of the azimuth φ of the axis.
+
+    Attributes:
+        rate: φ̇/2π, shape (n,) [Hz].
+        tilt: θ, shape (n,) [rad].
+        near: φ̇/2π is beyond the axis's own frequencies, shape (n,).
+        share: part of the time with such a rate.
+        tilt_then: median of θ then [rad].
+        tilt_ever: median of θ [rad].
+    """
+
+    rate: Array
+    tilt: Array
+    near: Array
+    share: float
+    tilt_then: float
+    tilt_ever: float
+
+
 #: Rates of the azimuth are cut here for the figure [Hz].
 _CUT_HZ = 120.0
 #: Lines that are slower have one name together: they stand too near to each other.
@@ -350,7 +378,9 @@ def azimuth_figure(motion: Trajectory, found: Azimuth, lines: AxisLines) -> Figu
             )  # fmt: skip
     slow = sorted(line.frequency for line in named if abs(line.frequency) <= _SLOW_HZ)
     axes.text(-2.6, 0.2 * highest, "swings sideways\n" + ", ".join(f"{f:.2f}" for f in slow), ha="right", fontsize=7)
-    axes.set(xlim=(-13, 60), ylim=(1e-4 * highest, 8 * highest), xlabel="frequency  [Hz]", ylabel="|n_x + i n_y|  [mrad]")
+    axes.set(
+        xlim=(-13, 60), ylim=(1e-4 * highest, 8 * highest), xlabel="frequency  [Hz]", ylabel="|n_x + i n_y|  [mrad]"
+    )
     axes.set_title("The axis itself: lines")
     return figure
 
@@ -367,7 +397,7 @@ def spindown_figure(runs: Sequence[tuple[Array, SpinDown]]) -> Figure:
     for axes, (law, name) in zip(panels, laws, strict=True):
         for number, ((time, fit), marker) in enumerate(zip(runs, "osD^", strict=False), start=1):
             axes.plot(
-                time, 1e3 * fit.fit(law).residuals, marker=marker, linestyle="-", linewidth=0.4, color=LOOKS[law].colour,
+                time, 1e3 * fit.fit(law).residuals, color=LOOKS[law].colour, marker=marker, linewidth=0.4,
                 markerfacecolor="white", markersize=3.5, label=f"run {number}",
             )  # fmt: skip
         axes.axhline(0, color=BLACK, linewidth=0.6)
@@ -483,5 +513,3 @@ def gans_figure(spins: Array, tilts: Array, up: Flags, window: tuple[float, floa
     line = Line2D([], [], **LOOKS["theory"].as_line, label="small motions")
     figure.legend(handles=[_UP, _LOST, line], loc="center left", bbox_to_anchor=(0.76, 0.5))
     return figure
-
-

@@ -124,7 +124,8 @@ def make() -> Found:
             "stable heights over a ring of dipoles",
             "the model's polynomials",
             "",
-            f"{low:.5f} to {high:.5f} R (windows of the base's field), {by_hand[0]:.5f} to {by_hand[1]:.5f} R (zeros of the "
+            f"{low:.5f} to {high:.5f} R (windows of the base's field), {by_hand[0]:.5f} to {by_hand[1]:.5f} R (zeros "
+            "of the "
             "polynomials)",
             holds=abs(low / by_hand[0] - 1) < 1e-5 and abs(high / by_hand[1] - 1) < 1e-5,
         ),
@@ -146,7 +147,8 @@ def make() -> Found:
             "three modes of failure",
             ABSTRACT,
             "insufficient spin, too large a tilt, too great a spin",
-            f"calm tops are up from {calm.min():.1f} to {calm.max():.1f} √(g/R); at {SPINS[row]:.1f} √(g/R) the first tilt that "
+            f"calm tops are up from {calm.min():.1f} to {calm.max():.1f} √(g/R); at {SPINS[row]:.1f} √(g/R) the "
+            "first tilt that "
             f"is lost is {least_lost:.2f} rad",
             holds=bool(not up[0, 0] and not up[-1, 0] and not up[row, -1] and up[row, 0]),
         ),
@@ -162,13 +164,15 @@ def make() -> Found:
     picture = Picture(
         "gans",
         "Three ways to be lost over a ring of dipoles.",
-        f"Which tops are up after {DURATION_S:g} s (filled) over spin and tilt of the start, where the top floats; lines: the "
+        f"Which tops are up after {DURATION_S:g} s (filled) over spin and tilt of the start, where the top floats; "
+        "lines: the "
         "window of small motions. Below a spin, beyond a tilt, above a spin: the paper's three modes of failure.",
         "Survival over spin and tilt over a ring of dipoles",
         partial(gans_figure, SPINS, TILTS, up, (spins[0], spins[1])),
     )
     note = Note(
-        "What could not be had: the numbers of the paper's edges. Its abstract has none, and its tables and figures are "
+        "What could not be had: the numbers of the paper's edges. Its abstract has none, and its tables and figures "
+        "are "
         "not freely to read; the model's parameters are those of Scilab's demonstration, which names the paper."
     )
     return Found(findings, (picture, note), "What the abstract says, tried with the paper's model.")

@@ -1,4 +1,4 @@
-"""The limits of the spin that the thesis simulated from four starts: without drag, with drag, and the misprint of IC3."""
+"""The limits of the spin that the thesis simulated from four starts, without and with drag, and IC3's misprint."""
 
 from __future__ import annotations
 
@@ -121,7 +121,8 @@ def upper_checks(uppers: dict[str, Upper]) -> list[Finding]:
             "is still up" if one.printed_lasts >= DURATION_S else f"is lost after {one.printed_lasts:.1f} s"
         )
         why = (
-            f"there is no single limit: every top is up to {one.until:.2f} Hz and the last one has {one.last:.2f} Hz, with "
+            f"there is no single limit: every top is up to {one.until:.2f} Hz and the last one has {one.last:.2f} "
+            "Hz, with "
             f"{islands} islands between at a step of {UPPER_STEP_HZ:g} Hz; the nearest edge from up to lost is at "
             f"{nearest:.2f} Hz, and {late}. Small motions are stable up to {edge.spins[0][1]:.2f} Hz"
         )
@@ -181,7 +182,8 @@ def misprint(with_030: Array) -> tuple[list[Finding], Array]:
             THESIS["limits.start.IC3_x"],
             Estimate(100 * aside, 100 * u_aside, "cm"),
             Because(
-                f"the lower limit is {by_x[0.5]:.2f} Hz from x = 0.50 cm as printed and {by_x[0.3]:.2f} Hz from 0.30 cm, "
+                f"the lower limit is {by_x[0.5]:.2f} Hz from x = 0.50 cm as printed and {by_x[0.3]:.2f} Hz from 0.30 "
+                "cm, "
                 f"with steps of {COARSE_HZ:g} Hz; printed is {printed.text} Hz: a 3 read or printed as 5",
                 abs(by_x[0.3] - printed.value) < COARSE_HZ and by_x[0.5] - printed.value > 1.0,
             ),
@@ -227,20 +229,24 @@ def make() -> Found:
     picture = Picture(
         "limits",
         "One mass fits four lower limits; upper limits are torn.",
-        f"Above: from each start, which tops are up after 30 s (filled) in a scan of {UPPER_STEP_HZ:g} Hz; triangles are "
+        f"Above: from each start, which tops are up after 30 s (filled) in a scan of {UPPER_STEP_HZ:g} Hz; triangles "
+        "are "
         "the thesis's upper limits. Below, from the left: the simulated lower limit over the mass (lines) with the "
         "thesis's figures (dashed), which meet at one mass; the spin at the fall with drag from 48 starts alike (dots) "
-        "with the thesis's (dashes); the lower limit of IC3 over its place beside the axis, which is the printed one at "
+        "with the thesis's (dashes); the lower limit of IC3 over its place beside the axis, which is the printed one "
+        "at "
         "0.30 cm and not at 0.50 cm.",
         "Scans of survival over spin, and lower limits over mass, with drag, and over the place of the third start",
         partial(limits_figure, scans),
     )
     said = (
-        f"Survival over 30 s, scanned in steps of {STEP_HZ:g} Hz (lower) and {UPPER_STEP_HZ:g} Hz (upper), in the thesis's "
+        f"Survival over 30 s, scanned in steps of {STEP_HZ:g} Hz (lower) and {UPPER_STEP_HZ:g} Hz (upper), in the "
+        "thesis's "
         f"field to r², with a mass of {1e3 * mass:.3f} g."
     )
     note = Note(
-        f"The mass is the only number that was fitted: to the four lower limits, which it meets within {min(rms):.3f} Hz "
+        "The mass is the only number that was fitted: to the four lower limits, which it meets within "
+        f"{min(rms):.3f} Hz "
         "(rms). Upper limits are given as the spin up to which every top of the scan is up."
     )
     return Found(tuple(findings), (picture, note), said)

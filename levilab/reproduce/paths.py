@@ -45,7 +45,8 @@ def paths() -> tuple[list[Finding], dict[str, Trajectory]]:
                 f"{name}: path over x and z at 30 Hz",
                 "figures of the paths",
                 "the top stays in the trap",
-                f"|x| up to {x:.2f} cm, z from {z[0]:.2f} to {z[1]:.2f} cm in {PATH_S:g} s; energy constant to {drift:.0e}",
+                f"|x| up to {x:.2f} cm, z from {z[0]:.2f} to {z[1]:.2f} cm in {PATH_S:g} s; energy constant to "
+                f"{drift:.0e}",
                 holds=motion.survived and drift < 1e-9,
             )
         )
@@ -65,7 +66,8 @@ def modes() -> list[Finding]:
             f"IC2: {name} in the spectrum of n_x + i n_y",
             "theory of small motions",
             "",
-            f"{lines.get(name, math.nan):.3f} Hz (line of the simulated motion), {frequency:.3f} Hz (root of the quartic)",
+            f"{lines.get(name, math.nan):.3f} Hz (line of the simulated motion), {frequency:.3f} Hz (root of the "
+            "quartic)",
             holds=abs(off[name]) < NEAR,
         )
         for name, frequency in theory.items()
@@ -84,7 +86,8 @@ def fall() -> tuple[Finding, Trajectory]:
             "tilt at the fall, IC1 with drag from 30 Hz",
             "figure of the tilt",
             "the tilt stays small until the spin is too slow, and grows within a second",
-            f"up to {math.degrees(before):.1f}° until {SHOWN_S:g} s before the fall, {math.degrees(last):.0f}° when z is 6 "
+            f"up to {math.degrees(before):.1f}° until {SHOWN_S:g} s before the fall, {math.degrees(last):.0f}° when "
+            "z is 6 "
             f"cm, at {motion.spin_hz[-1]:.2f} Hz; the sleeping top's limit is {limit:.2f} Hz",
             holds=not motion.survived and last > 3 * before and abs(float(motion.spin_hz[-1]) - limit) < 0.5,
         ),
@@ -111,7 +114,8 @@ def tilted() -> tuple[list[Finding], tuple[Trajectory, Trajectory]]:
             printed,
             Estimate(angle, None, "°"),
             Because(
-                f"μ·(0.03, 0, 0.97) leans by arctan(0.03/0.97) = {angle:.4f}°, and it has {norm:.6f} of the length of μ, "
+                f"μ·(0.03, 0, 0.97) leans by arctan(0.03/0.97) = {angle:.4f}°, and it has {norm:.6f} of the length "
+                "of μ, "
                 f"{100 * (1 - norm):.0f} % less, so that a lighter top floats; 1.5° would be "
                 f"({along * math.tan(math.radians(printed.value)):.4f}, 0, 0.97)",
                 abs(angle - 1.7715) < 1e-3 and abs(norm - 0.970464) < 1e-6,
@@ -121,7 +125,8 @@ def tilted() -> tuple[list[Finding], tuple[Trajectory, Trajectory]]:
             "a tilted moment makes the top wobble once a turn",
             "figures of the tilted and the aligned dipole",
             "the tilted one wobbles, the aligned one does not",
-            f"line of n_x + i n_y at {spin:g} Hz: {1e3 * wobble[0]:.2f} mrad (tilted), {1e3 * wobble[1]:.2f} mrad (aligned)",
+            f"line of n_x + i n_y at {spin:g} Hz: {1e3 * wobble[0]:.2f} mrad (tilted), {1e3 * wobble[1]:.2f} mrad "
+            "(aligned)",
             holds=wobble[0] > 10 * wobble[1] and wobble[0] > 0.01,
         ),
     ]
@@ -137,14 +142,16 @@ def make() -> Found:
         Picture(
             "paths",
             "Four starts, four paths.",
-            f"Path of the centre of mass over x and z, the first {PATH_S:g} s at 30 Hz without drag; the ring marks the start.",
+            f"Path of the centre of mass over x and z, the first {PATH_S:g} s at 30 Hz without drag; the ring marks "
+            "the start.",
             "Paths over x and z from the four starts",
             partial(paths_figure, shown),
         ),
         Picture(
             "fall",
             "A top that slows down tilts at the very end.",
-            "Tilt (band between its least and greatest value, and on the right the last second), height and spin of a top "
+            "Tilt (band between its least and greatest value, and on the right the last second), height and spin of "
+            "a top "
             "with the thesis's drag, from 30 Hz, up to its fall.",
             "Tilt, height and spin up to the fall",
             partial(fall_figure, falling),
@@ -152,7 +159,8 @@ def make() -> Found:
         Picture(
             "tilted",
             "A tilted moment wobbles with the spin.",
-            "The axis seen from above, n_x and n_y, in the first 4 s at 30 Hz: with the moment tilted by 1.77° and with one "
+            "The axis seen from above, n_x and n_y, in the first 4 s at 30 Hz: with the moment tilted by 1.77° and "
+            "with one "
             "that is as strong along the axis, but not tilted.",
             "The axis seen from above with a tilted and with an aligned moment",
             partial(tilted_figure, both),

@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from levilab.reproduce.run import Reproduction
 
 HOW_TO_READ = (
-    "A published number has the precision of its print: it agrees if ours lies within half a unit of its last digit, or "
+    "A published number has the precision of its print: it agrees if ours lies within half a unit of its last digit, "
+    "or "
     "within a tolerance that its row gives with the reason. Where it differs, the reason is computed, too, and shown: "
     "what it makes of our number must give the published one. Some of the thesis's figures have no numbers; what "
     "stands for these was computed apart from levilab, with other code, and is marked (recomputed apart)."
@@ -68,8 +69,8 @@ def document_of(found: Reproduction) -> Document:
         summary.insert(1, Warnings((unexpected,)))
     return Document(
         title="The Levitron thesis, reproduced",
-        lead="Tables and figures of the master's thesis, and of two papers, made anew with levilab: the published value "
-        "beside ours",
+        lead="Tables and figures of the master's thesis, and of two papers, made anew with levilab: the published "
+        "value beside ours",
         blocks=(
             Section("Summary", tuple(summary), anchor="summary"),
             *(_section(chapter, of_chapter) for chapter, of_chapter in found.chapters),

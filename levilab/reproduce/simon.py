@@ -155,12 +155,16 @@ def make() -> Found:
         scans.append((name, calm[2], calm[3], (low, high), (printed["lower"].value, last)))
         lasts = lasting(simon, last)
         beyond = Because(
-            f"over a ring with its B, B′, B″ every calm top is up to {calm[1]:.0f} rad/s and all others to {other[1]:.0f}; the "
-            f"quartic ends at {high:.0f}. At {printed['upper'].text} rad/s a calm top takes {lasts:.1f} s to be lost: a shorter "
+            f"over a ring with its B, B′, B″ every calm top is up to {calm[1]:.0f} rad/s and all others to "
+            f"{other[1]:.0f}; the "
+            f"quartic ends at {high:.0f}. At {printed['upper'].text} rad/s a calm top takes {lasts:.1f} s to be "
+            "lost: a shorter "
             "simulation has it up",
             1.0 < lasts < DURATION_S,
         )
-        near = Within(STEP_RAD_S + abs(calm[1] - other[1]), f"a step of {STEP_RAD_S:g} rad/s; another start gives {other[1]:.0f}")
+        near = Within(
+            STEP_RAD_S + abs(calm[1] - other[1]), f"a step of {STEP_RAD_S:g} rad/s; another start gives {other[1]:.0f}"
+        )
         upper = near if abs(calm[1] - last) <= near.tolerance else beyond
         findings += [
             Check(f"{name}: lower edge of the quartic", printed["lower_quartic"], Estimate(low, None, "rad/s")),
@@ -171,7 +175,8 @@ def make() -> Found:
                 Estimate(calm[0], None, "rad/s"),
                 Within(
                     2 * STEP_RAD_S,
-                    f"two steps of {STEP_RAD_S:g} rad/s; the paper's start is not known, another one gives {other[0]:.0f}",
+                    f"two steps of {STEP_RAD_S:g} rad/s; the paper's start is not known, another one gives "
+                    f"{other[0]:.0f}",
                 ),
             ),
             Check(f"{name}: upper limit, simulated", printed["upper"], Estimate(calm[1], None, "rad/s"), upper),
@@ -184,7 +189,8 @@ def make() -> Found:
             SIMON["abstract.upper_simulated"].place,
             f"{SIMON['abstract.upper_simulated'].text} rpm = {rpm['upper_simulated']:.0f} rad/s simulated, "
             f"{SIMON['abstract.upper_measured'].text} rpm = {rpm['upper_measured']:.0f} rad/s measured",
-            f"the quartic ends at {three.window[1]:.0f} rad/s: {100 * (three.window[1] / rpm['upper_simulated'] - 1):+.0f} % of "
+            f"the quartic ends at {three.window[1]:.0f} rad/s: "
+            f"{100 * (three.window[1] / rpm['upper_simulated'] - 1):+.0f} % of "
             f"the simulated, {100 * (three.window[1] / rpm['upper_measured'] - 1):+.0f} % of the measured one",
             holds=abs(three.window[1] / rpm["upper_simulated"] - 1) < 0.05,
         )
@@ -192,15 +198,15 @@ def make() -> Found:
     picture = Picture(
         "simon",
         "Three tops of Simon, Heflinger and Ridgway.",
-        f"Which tops are up after {DURATION_S:g} s (filled) over a ring that has the paper's B, B′ and B″ where the top "
+        f"Which tops are up after {DURATION_S:g} s (filled) over a ring that has the paper's B, B′ and B″ where the "
+        "top "
         f"floats, in steps of {STEP_RAD_S:g} rad/s; lines: the window of the quartic; triangles: Table I.",
         "Survival of three tops over their spin",
         partial(simon_figure, tuple(scans)),
     )
     note = Note(
-        "The second derivative in Table I is half of B″. The weight is taken as the force of the table's own numbers, which "
+        "The second derivative in Table I is half of B″. The weight is taken as the force of the table's own "
+        "numbers, which "
         f"are rounded: gravity comes out as {', '.join(f'{row(k).gravity:.2f}' for k in TOPS)} m/s²."
     )
     return Found(tuple(findings), (picture, note), "The first simulated limits of a Levitron, of three tops and bases.")
-
-

@@ -84,7 +84,8 @@ def disc_law(fits: tuple[SpinDown, ...]) -> list[Finding]:
             "neither model is a perfect fit",
             "the spin-downs' figures",
             "neither exponential (n = 1) nor 1/(A + Ct) (n = 2) fits well",
-            f"n = {average.value:.2f} ± {average.u:.2f} fits; the scatter left over is up to {1e3 * worst['disc']:.0f} mHz "
+            f"n = {average.value:.2f} ± {average.u:.2f} fits; the scatter left over is up to "
+            f"{1e3 * worst['disc']:.0f} mHz "
             f"under n = 3/2, {1e3 * worst['stokes']:.0f} under n = 1, {1e3 * worst['newton']:.0f} under n = 2 "
             f"(noise: {1e3 * NOISE_HZ:.0f})",
             holds=abs(average.value - 1.5) < 3 * average.u and worst["stokes"] > 2 * worst["disc"] < worst["newton"],
@@ -100,7 +101,8 @@ def disc_law(fits: tuple[SpinDown, ...]) -> list[Finding]:
             "von Kármán's disc",
             "ω R²/ν ≈ 1700 to 5200, far below 3×10⁵",
             f"{_reynolds(20):.0f} at 20 Hz, {_reynolds(60):.0f} at 60 Hz (R = 1.44 cm); the four runs have "
-            f"{np.mean([fit.fit('disc').parameters['c32'].value for fit in fits]) / karman_disc():.2f} times the disc's drag",
+            f"{np.mean([fit.fit('disc').parameters['c32'].value for fit in fits]) / karman_disc():.2f} times the "
+            "disc's drag",
             holds=abs(_reynolds(20) - 1700) < 50 and abs(_reynolds(60) - 5200) < 50,
         ),
     ]
@@ -122,17 +124,23 @@ def make() -> Found:
     picture = Picture(
         "spindowns",
         "Two straight lines that bend the two ways, and one law between them.",
-        "What the laws leave over of the four synthetic runs: readings less the law fitted, over time. Stokes's law (n = 1) "
+        "What the laws leave over of the four synthetic runs: readings less the law fitted, over time. Stokes's law "
+        "(n = 1) "
         "and Newton's (n = 2) leave arcs of opposite sense, the disc's (n = 3/2) the noise. SYNTHETIC readings.",
         "Residuals of four synthetic spin-downs under three laws of drag",
         partial(spindown_figure, tuple((run.time, fit) for run, fit in zip(runs, fits, strict=True))),
     )
     note = Note(
-        f"SYNTHETIC: law of a laminar disc, a reading each 10 s, noise of {NOISE_HZ:g} Hz, start and constant solved for so "
-        f"that the straight lines return the printed C₁ and C₂; rounded to 0.01 Hz ({how}). That both constants of a run "
-        "can be had from one law with n = 3/2 and 40 Hz is the finding; the agreement of C₁ and C₂ with the print is how "
+        f"SYNTHETIC: law of a laminar disc, a reading each 10 s, noise of {NOISE_HZ:g} Hz, start and constant solved "
+        "for so "
+        f"that the straight lines return the printed C₁ and C₂; rounded to 0.01 Hz ({how}). That both constants of a "
+        "run "
+        "can be had from one law with n = 3/2 and 40 Hz is the finding; the agreement of C₁ and C₂ with the print is "
+        "how "
         "the readings were made."
     )
     said = "The thesis prints the constants of four spin-downs, and no readings. SYNTHETIC readings stand for them."
-    synthetic = "The readings of the four spin-downs were made up to give the printed constants; they are not the author's."
+    synthetic = (
+        "The readings of the four spin-downs were made up to give the printed constants; they are not the author's."
+    )
     return Found((*straight(runs), *disc_law(fits)), (picture, note), said, synthetic)

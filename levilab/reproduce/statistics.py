@@ -62,7 +62,8 @@ def make() -> Found:
             "rounding to 0.1 Hz",
             THESIS["measured.limits.0"].place,
             "",
-            f"adds {1e3 * step:.0f} mHz to the scatter, {100 * (1 - math.sqrt(1 - (step / found.scatter.value) ** 2)):.1f} % "
+            f"adds {1e3 * step:.0f} mHz to the scatter, "
+            f"{100 * (1 - math.sqrt(1 - (step / found.scatter.value) ** 2)):.1f} % "
             f"of it, and {1e3 * step / math.sqrt(10):.0f} mHz to the mean: nothing to correct",
             holds=step < 0.2 * found.scatter.value,
         ),
@@ -70,7 +71,8 @@ def make() -> Found:
             "are the ten normal?",
             THESIS["measured.limits.0"].place,
             "",
-            f"Shapiro and Wilk: W = {w:.3f}, p = {p:.2f}; no outlier, no trend ({1e3 * found.trend.value:+.0f} mHz a top, "
+            f"Shapiro and Wilk: W = {w:.3f}, p = {p:.2f}; no outlier, no trend ({1e3 * found.trend.value:+.0f} mHz a "
+            "top, "
             f"p = {found.trend_p:.2f}); ten values leave the scatter ± {found.scatter.u:.2f} Hz",
             holds=p > 0.05 and not found.outliers,
         ),
@@ -86,10 +88,14 @@ def make() -> Found:
     picture = Picture(
         "ten",
         "Ten falls beside what theory and simulation say.",
-        "The ten limits in their order; band: the mean with its standard error, dashed: the scatter of one; dotted: the "
-        "lower edge of the window of small motions. On the right, the values in order over normal quantiles: on a line, "
+        "The ten limits in their order; band: the mean with its standard error, dashed: the scatter of one; dotted: "
+        "the "
+        "lower edge of the window of small motions. On the right, the values in order over normal quantiles: on a "
+        "line, "
         "as normal ones are.",
         "Ten lower limits and their normal quantiles",
         partial(statistics_figure, values, found, edge.expected),
     )
-    return Found(tuple(findings), (picture,), "The only readings that the thesis prints: ten spins at which a top fell.")
+    return Found(
+        tuple(findings), (picture,), "The only readings that the thesis prints: ten spins at which a top fell."
+    )

@@ -71,8 +71,10 @@ def device() -> list[Check]:
         THESIS["stability.estimate"],
         Estimate(exact, None, "Hz"),
         Because(
-            f"the estimate lacks the factor 2√(I₁/I₃) = {factor:.3f}: with it, at the place where the top floats, it is "
-            f"{found.sleeping:.2f} Hz, the sleeping top's limit, and the sideways motion moves that to {exact:.2f} Hz; without "
+            f"the estimate lacks the factor 2√(I₁/I₃) = {factor:.3f}: with it, at the place where the top floats, it "
+            "is "
+            f"{found.sleeping:.2f} Hz, the sleeping top's limit, and the sideways motion moves that to {exact:.2f} "
+            "Hz; without "
             f"it, for {1e3 * ESTIMATE_KG:.2f} g at 7.3 cm, it is {estimate:.3f} Hz, as printed",
             estimate,
         ),
@@ -134,18 +136,21 @@ def make() -> Found:
     picture = Picture(
         "contours",
         "The trap is shallow, and deepest in the middle of the masses.",
-        "Contours of mgz + |μ||B| over the distance from the axis and the height, in steps of 2 µJ from the place where "
+        "Contours of mgz + |μ||B| over the distance from the axis and the height, in steps of 2 µJ from the place "
+        "where "
         "the top rests (cross), in the exact field of the base. The bold line is the rim over which a top "
         "escapes: sideways and up for light tops, down for heavy ones.",
         "Contours of the potential for tops of three masses",
         partial(contour_figure, tuple(shown), tuple(f"{1e3 * mass:.2f} g" for mass in masses)),
     )
     said = (
-        "A fast top whose moment follows the field floats stably in two regions of height, of which the upper one is the "
+        "A fast top whose moment follows the field floats stably in two regions of height, of which the upper one is "
+        "the "
         "Levitron's. The edges are zeros of three conditions on the field of the base, found here to the last digits."
     )
     note = Note(
-        "The masses of 24.742 to 25.485 g are those of the thesis's field and moment. Its estimate of the least spin is "
+        "The masses of 24.742 to 25.485 g are those of the thesis's field and moment. Its estimate of the least spin "
+        "is "
         "a sleeping top's limit without the factor 2√(I₁/I₃)."
     )
     return Found(tuple(findings), (picture, note), said)
