@@ -144,7 +144,7 @@ class Check:
     @property
     def place(self) -> str:
         """Where it stands in the source."""
-        return self.published.place + (" (recomputed apart)" if self.published.recomputed else "")
+        return self.published.place + (", recomputed apart" if self.published.recomputed else "")
 
     @property
     def published_text(self) -> str:
@@ -160,12 +160,12 @@ class Check:
 
     @property
     def why(self) -> str:
-        """How it was compared, or why it differs."""
+        """The tolerance with its reason, or why it differs; empty within the rounding of the print."""
         if isinstance(self.way, Because):
-            return self.way.why if self.verdict is not Verdict.AGREES else "within the rounding of the print"
+            return self.way.why if self.verdict is not Verdict.AGREES else ""
         if isinstance(self.way, Within) and abs(self.difference) > self.published.rounding:
             return f"within {digits(self.way.tolerance, 2)}: {self.way.why}"
-        return "within the rounding of the print" + (" and our u" if self.ours.u else "")
+        return "within our u" if abs(self.difference) > self.published.rounding * (1 + _FLOAT) else ""
 
 
 def _like(value: float, published: Printed) -> str:

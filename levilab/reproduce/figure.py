@@ -338,7 +338,7 @@ class Azimuth:
 
     rate: Array
     tilt: Array
-    near: Array
+    near: Flags
     share: float
     tilt_then: float
     tilt_ever: float

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -73,7 +73,7 @@ def edges_by_hand() -> tuple[float, float]:
     ψ = Z/(1 + Z²)^(3/2): up and down it is stable above the zero of ψ⁗ in 8Z⁴ − 24Z² + 3, sideways below the zero of
     ψ″² − 2ψ‴ψ′, with the derivatives as polynomials over powers of 1 + Z².
     """
-    x = np.polynomial.Polynomial([0.0, 1.0])
+    x: Any = np.polynomial.Polynomial([0.0, 1.0])
     u = 1 + x**2
     # ψ⁽ᵏ⁾ = p_k/u^(k + 3/2), and p_(k+1) = p_k′ u − (2k + 3) Z p_k
     p = [x]
@@ -85,7 +85,7 @@ def edges_by_hand() -> tuple[float, float]:
     return low, min(zero for zero in sideways if zero > low)
 
 
-def _zeros(polynomial: np.polynomial.Polynomial) -> list[float]:
+def _zeros(polynomial: Any) -> list[float]:
     """Real zeros above 0."""
     return [float(root.real) for root in polynomial.roots() if abs(root.imag) < 1e-9 and root.real > 1e-9]
 

@@ -34,7 +34,7 @@ HOW_TO_READ = (
     "or "
     "within a tolerance that its row gives with the reason. Where it differs, the reason is computed, too, and shown: "
     "what it makes of our number must give the published one. Some of the thesis's figures have no numbers; what "
-    "stands for these was computed apart from levilab, with other code, and is marked (recomputed apart)."
+    "stands for these was computed apart from levilab, with other code, and is marked: recomputed apart."
 )
 
 
@@ -83,7 +83,7 @@ def document_of(found: Reproduction) -> Document:
 
 def _section(chapter: Chapter, found: Found) -> Section:
     marks = (Banner("SYNTHETIC.", found.synthetic),) if found.synthetic else ()
-    findings = Tabular(chapter.name, findings_table("", found.findings), first_column_wraps=True)
+    findings = Tabular(chapter.name, findings_table("", found.findings, broken=True))
     return Section(chapter.title, (*marks, Paragraph(found.said), *found.blocks, findings), anchor=chapter.name)
 
 

@@ -65,18 +65,18 @@ def solve(c1: float, c2: float, n: int) -> MadeUp:
     """
     from scipy.optimize import root
 
-    t = STEP_S * np.arange(n)
+    t = STEP_S * np.arange(n, dtype=np.float64)
     for seed in range(SEEDS):
         noise = np.random.default_rng((n, round(c1 * 1e6), seed)).normal(0, NOISE_HZ, n)
 
-        def miss(x: Array, noise: Array = noise) -> list[float]:
+        def miss(x: Array, noise: Array = noise) -> Array:
             got = straight_lines(t, disc(t, START_HZ * x[0], 2.3e-4 * x[1]) + noise)
-            return [got[0] / c1 - 1, got[1] / c2 - 1]
+            return np.array([got[0] / c1 - 1, got[1] / c2 - 1])
 
-        found = root(miss, [1.0, 1.0], tol=1e-12)
-        start, c32 = START_HZ * found.x[0], 2.3e-4 * found.x[1]
-        nu = np.round(disc(t, start, c32) + noise, 2)
+        found = root(miss, np.ones(2), tol=1e-12)
+        start, c32 = START_HZ * float(found.x[0]), 2.3e-4 * float(found.x[1])
+        nu = np.asarray(np.round(disc(t, start, c32) + noise, 2), dtype=np.float64)
         kept = as_printed(*straight_lines(t, nu)) == as_printed(c1, c2)
         if found.success and kept and abs(start - START_HZ) < NEAR_HZ:
-            return MadeUp(t, nu, float(start), float(c32), seed)
+            return MadeUp(t, nu, start, c32, seed)
     raise RuntimeError(f"no seed gives C1 = {c1}, C2 = {c2}")

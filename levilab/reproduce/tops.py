@@ -13,6 +13,8 @@ from levilab.stability.published.printed import published
 from levilab.stability.thesis import STARTS
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from levilab.simulator.ensemble import Ensemble
     from levilab.simulator.scene import Scene
 
@@ -37,7 +39,7 @@ def started(name: str, scene: str = "undriven", *settings: str) -> Scene:
     return with_settings(preset(scene), [f"top.mass_kg={MASS_KG}", *STARTS[name], *settings])
 
 
-def many(scene: Scene, over: dict[str, ArrayLike], duration: float = DURATION_S, **given: Any) -> Ensemble:
+def many(scene: Scene, over: Mapping[str, ArrayLike], duration: float = DURATION_S, **given: Any) -> Ensemble:
     """Simulate many tops, without estimates of their errors."""
     return simulate_many(scene, over, duration, tolerance=TOLERANCE, errors=False, **given)
 

@@ -6,11 +6,11 @@ import json
 
 import pytest
 
+from levilab.report.html.page import page_of
 from levilab.reproduce import catalogue, run
 from levilab.reproduce.chapter import Chapter, Found
 from levilab.reproduce.check import Statement, Verdict
 from levilab.reproduce.report import document_of
-from levilab.report.html.page import page_of
 from support.commands import command
 
 
