@@ -15,6 +15,8 @@ from matplotlib.patches import Patch
 
 from levilab.present.looks import BLACK, BLUE, GREEN, GREY, LOOKS, ORANGE, SERIES, VERMILION
 from levilab.present.style import STYLE, WIDE
+from levilab.reproduce.tops import MASS_KG
+from levilab.stability.thesis import SIMULATED_HZ, WITH_DRAG_HZ
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -128,9 +130,6 @@ def contour_figure(shown: Sequence[Contours], names: Sequence[str]) -> Figure:
 @_styled
 def window_figure(over: MassWindows, estimate: float) -> Figure:
     """The window of spin over mass."""
-    from levilab.reproduce.tops import MASS_KG
-    from levilab.stability.thesis import SIMULATED_HZ
-
     figure, (axes,) = _figure(3.2, (0.085, 0.15, 0.57, 0.79))
     masses = 1e3 * over.masses
     up = LOOKS["up"].colour
@@ -188,7 +187,6 @@ def limits_figure(shown: Scans) -> Figure:
 
 
 def _draw_scans(axes: Axes, shown: Scans) -> None:
-    from levilab.stability.thesis import SIMULATED_HZ
 
     half = (shown.spins[1] - shown.spins[0]) / 2
     extent = (shown.spins[0] - half, shown.spins[-1] + half)
@@ -206,7 +204,6 @@ def _draw_scans(axes: Axes, shown: Scans) -> None:
 
 
 def _draw_lower(axes: Axes, shown: Scans) -> None:
-    from levilab.stability.thesis import SIMULATED_HZ
 
     for (name, values), colour in zip(shown.lower.items(), SERIES, strict=False):
         axes.plot(shown.masses, values, color=colour)
@@ -222,7 +219,6 @@ def _draw_lower(axes: Axes, shown: Scans) -> None:
 
 
 def _draw_falls(axes: Axes, shown: Scans) -> None:
-    from levilab.stability.thesis import WITH_DRAG_HZ
 
     for k, ((name, values), colour) in enumerate(zip(shown.falling.items(), SERIES, strict=False)):
         spread = 0.5 * (np.arange(values.size) / (values.size - 1) - 0.5)
@@ -235,7 +231,6 @@ def _draw_falls(axes: Axes, shown: Scans) -> None:
 
 
 def _draw_aside(axes: Axes, shown: Scans) -> None:
-    from levilab.stability.thesis import SIMULATED_HZ
 
     axes.plot(shown.aside, shown.lower_aside, "o-", color=SERIES[2], markersize=3)
     axes.axhline(SIMULATED_HZ["IC3"][0], color=SERIES[2], linestyle=(0, (4, 2)))
