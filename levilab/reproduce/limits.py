@@ -89,8 +89,8 @@ def lower_checks(lower: dict[str, Array], mass: float) -> list[Finding]:
         Statement(
             "the one mass behind the four lower limits",
             "Table 3.1 and Table 4.2",
-            "25.5 g, which cannot float",
-            f"{1e3 * mass:.3f} g, in steps of 0.005 g",
+            "",
+            f"{1e3 * mass:.3f} g, in steps of 0.005 g; Table 3.1 has 25.5 g, which cannot float",
             holds=abs(mass - MASS_KG) < 1e-6 and mass < stability_of(started("IC1")).lifted[-1].heavy,
         )
     ]
@@ -144,7 +144,8 @@ def drag_checks() -> tuple[list[Finding], dict[str, Array]]:
     found: list[Finding] = []
     for name, ends in spins.items():
         middle = float(np.median(ends))
-        room = max(float(ends.max()) - middle, middle - float(ends.min())) + STEP_HZ / 2
+        above = THESIS[f"limits.drag.{name}"].value > middle
+        room = abs(float(ends.max() if above else ends.min()) - middle) + STEP_HZ / 2
         found.append(
             Check(
                 f"{name}: spin at the fall, with drag",

@@ -162,10 +162,12 @@ def make() -> Found:
             "simulation has it up",
             1.0 < lasts < DURATION_S,
         )
+        spread = sorted((calm[1], other[1]))
         near = Within(
-            STEP_RAD_S + abs(calm[1] - other[1]), f"a step of {STEP_RAD_S:g} rad/s; another start gives {other[1]:.0f}"
+            STEP_RAD_S + spread[1] - spread[0],
+            f"a step of {STEP_RAD_S:g} rad/s; another start gives {other[1]:.0f}",
         )
-        upper = near if abs(calm[1] - last) <= near.tolerance else beyond
+        upper = near if spread[0] - STEP_RAD_S <= last <= spread[1] + STEP_RAD_S else beyond
         findings += [
             Check(f"{name}: lower edge of the quartic", printed["lower_quartic"], Estimate(low, None, "rad/s")),
             Check(f"{name}: upper edge of the quartic", printed["upper_quartic"], Estimate(high, None, "rad/s")),
